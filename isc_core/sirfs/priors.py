@@ -1,0 +1,52 @@
+"""What SIRFS believes before it sees a photo: statistics of shape, reflectance and illumination.
+
+All are in the convention of the SIRFS reference (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712): lights are
+9 coefficients a channel, stacked channel by channel, for normals in a (down, right, toward the viewer) frame.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .tables import CostTable
+
+
+@dataclass(frozen=True)
+class AbsoluteTable:
+    """Cost of a whitened log colour: `values` (n, n, n) for colour or (n,) for grey, nodes from `low` to `high` on each axis."""
+
+    low: float
+    high: float
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Light:
+    """A Gaussian over the stacked light coefficients l (9 C numbers).
+
+    `mean` and `covariance` are the Gaussian of the light's cost. The solver works in u, with l = unwhiten @ u + offset.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+    unwhiten: np.ndarray
+    offset: np.ndarray
+
+
+@dataclass(frozen=True)
+class Priors:
+    """Everything the SIRFS objective needs besides its weights.
+
+    `channels`: 3 (colour) or 1 (grey).
+    `curvature`: cost of the difference x of two mean curvatures (1 / pixel), symmetric, 0 at x = 0.
+    `smoothness`: cost of m = 0.5 |smoothness_whiten (A_p - A_q)|^2 in colour, of A_p - A_q itself in grey.
+    `parsimony_whiten`: (C, C), takes log reflectance to the space of the parsimony and absolute terms.
+    """
+
+    channels: int
+    curvature: CostTable
+    smoothness: CostTable
+    smoothness_whiten: np.ndarray
+    parsimony_whiten: np.ndarray
+    absolute: AbsoluteTable
+    light: Light
