@@ -1,0 +1,59 @@
+"""The SIRFS objective in plain NumPy: the path that always works, and the one the compiled engine is held against."""
+
+import numpy as np
+
+from . import reflectance, surface
+from .illumination import basis, basis_adjoint, light_cost
+from .problem import Evaluation, Problem, Terms
+
+
+class NumpyEngine:
+    """Evaluates one `Problem` in `dtype` (sums always in float64)."""
+
+    def __init__(self, problem: Problem, dtype: type[np.floating] = np.float64) -> None:
+        self.problem = problem
+        self.dtype = np.dtype(dtype)
+        self._log_image = np.ascontiguousarray(problem.log_image, self.dtype)
+
+    def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
+        """The objective at `height` (H, W) and `light` (9, C), with its gradients."""
+        p = self.problem
+        g = surface.geometry(np.ascontiguousarray(height, self.dtype))
+        functions = basis(g.n1, g.n2, g.n3)
+        log_reflectance = self._log_image - np.einsum("khw,kc->hwc", functions, light.astype(self.dtype))
+        log_reflectance[~p.valid] = 0
+        reflectance_terms, d_reflectance = self._reflectance(log_reflectance)
+        d_reflectance[~p.valid] = 0
+        d_shading = -d_reflectance
+        light_gradient = np.einsum("khw,hwc->kc", functions, d_shading, dtype=float)
+        d1, d2, d3 = basis_adjoint(g.n1, g.n2, g.n3, np.einsum("hwc,kc->khw", d_shading, light.astype(self.dtype)))
+        shape_terms, height_gradient = self._shape(height, g, d1, d2, d3)
+        cost, pull = light_cost(light.astype(float), p.priors.light, p.weights.light)
+        terms = Terms(**reflectance_terms, **shape_terms, light=cost)
+        return Evaluation(terms, height_gradient, light_gradient + pull)
+
+    def _reflectance(self, log_reflectance: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
+        p, w = self.problem, self.problem.weights
+        if p.shading_only:
+            cost, gradient = reflectance.one_color_cost(log_reflectance, p.valid, w.shading_only)
+            return {"shading_only": cost}, gradient
+        smooth, d_smooth = reflectance.smoothness_cost(log_reflectance, p.valid, p.priors, w.smoothness)
+        parsimony, absolute, d_palette = reflectance.palette_cost(log_reflectance, p.valid, p.priors, w)
+        return {"smoothness": smooth, "parsimony": parsimony, "absolute": absolute}, d_smooth + d_palette
+
+    def _shape(
+        self, height: np.ndarray, g: surface.Geometry, d1: np.ndarray, d2: np.ndarray, d3: np.ndarray
+    ) -> tuple[dict[str, float], np.ndarray]:
+        p, w = self.problem, self.problem.weights
+        curvature, dk = surface.curvature_cost(g.curvature, p.valid, p.priors.curvature, w.curvature, p.curvature_unit**2)
+        slant, d_slant = surface.slant_cost(g.n3, w.slant)
+        contour, c1, c2 = surface.contour_cost(g.n1, g.n2, p.contour, w.contour, w.contour_power, g.n1.size)
+        at = (p.contour.rows, p.contour.columns)
+        d1[at] += c1.astype(d1.dtype)
+        d2[at] += c2.astype(d2.dtype)
+        gradient = surface.height_gradient(g, d1, d2, d3 + d_slant, dk)
+        terms = {"curvature": curvature, "slant": slant, "contour": contour}
+        if p.observation is not None:
+            terms["observation"], seen = surface.observation_cost(height, p.observation)
+            gradient = gradient + seen
+        return terms, gradient

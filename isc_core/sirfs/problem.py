@@ -1,0 +1,73 @@
+"""One SIRFS problem: the photo's logarithm, where it is valid, the contour, and what is believed beforehand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .contour import Contour
+from .priors import Priors
+from .settings import Weights
+
+# Half of the 5 x 5 window's offsets (down, right): every unordered pair once.
+PAIR_OFFSETS = ((0, 1), (0, 2), (1, -2), (1, -1), (1, 0), (1, 1), (1, 2), (2, -2), (2, -1), (2, 0), (2, 1), (2, 2))
+
+
+@dataclass(frozen=True)
+class DepthObservation:
+    """Heights seen by something else (a depth sensor, another program): a map with holes.
+
+    `height`: (H, W) in pixels toward the viewer, any constant added, NaN where nothing was seen. `sigma`: its standard error in
+    pixels; larger differences cost linearly, so that outliers do not rule. `weight`: of the whole term.
+    """
+
+    height: np.ndarray
+    sigma: float = 2.0
+    weight: float = 10.0
+
+
+@dataclass(frozen=True)
+class Problem:
+    """`log_image`: (H, W, C) natural logarithm of linear intensities, 0 where not `valid`; `valid`: (H, W) bool.
+
+    `shading_only`: shape-from-shading mode, reflectance is taken as one unknown colour.
+    `curvature_unit`: pixels of this problem to one pixel of the scale at which the priors were fitted; curvature differences
+    are multiplied by its square, since curvature is per pixel and a pair's distance is in pixels.
+    """
+
+    log_image: np.ndarray
+    valid: np.ndarray
+    contour: Contour
+    priors: Priors
+    weights: Weights
+    observation: DepthObservation | None = None
+    shading_only: bool = False
+    curvature_unit: float = 1.0
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The weighted terms of the objective at one state."""
+
+    curvature: float = 0.0
+    contour: float = 0.0
+    slant: float = 0.0
+    smoothness: float = 0.0
+    parsimony: float = 0.0
+    absolute: float = 0.0
+    light: float = 0.0
+    observation: float = 0.0
+    shading_only: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """The objective's value."""
+        return sum(self.__dict__.values())
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Terms with the gradients of their sum with respect to the height (H, W) and the light (9, C)."""
+
+    terms: Terms
+    height_gradient: np.ndarray
+    light_gradient: np.ndarray

@@ -1,0 +1,146 @@
+"""What SIRFS believes of reflectance: locally smooth, few colours, likely colours.
+
+With log reflectance A = log I - log shading (n pixels in the crop, n_v of them valid):
+  smoothness  w (3/25)/(C n) * sum over valid pairs of cost(sqrt(m^2 + 1e-8)), m = 0.5 |B (A_p - A_q)|^2   (colour)
+              w 3/(25 n) * sum of cost(A_p - A_q)                                                          (grey)
+  parsimony   w * -log V, V ~ n_v^-2 sum_pq exp(-|w_p - w_q|^2 / (4 sigma^2)), w = W A: a quadratic Renyi entropy with a
+              Parzen window (Principe & Xu 1999), by splatting onto a grid, blurring and summing
+  absolute    w/(8 n_v) * sum of F at w, F tabulated on the same grid
+Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: no term for highlights.
+"""
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from scipy import ndimage
+
+from .priors import AbsoluteTable, Priors
+from .problem import PAIR_OFFSETS
+from .settings import Weights
+from .surface import pair_slices
+
+SOFT_SQUARE = 1e-8
+SIGMA_UNIT = 20.0
+ABSOLUTE_DIVISOR = 8.0
+
+
+def smoothness_cost(log_reflectance: np.ndarray, valid: np.ndarray, priors: Priors, weight: float) -> tuple[float, np.ndarray]:
+    """The smoothness term and its gradient with respect to `log_reflectance` (H, W, C)."""
+    t = log_reflectance.dtype.type
+    whitened = log_reflectance @ priors.smoothness_whiten.astype(log_reflectance.dtype)
+    gradient = np.zeros_like(whitened)
+    total = 0.0
+    for offset in PAIR_OFFSETS:
+        p, q = pair_slices(*offset)
+        both = valid[p] & valid[q]
+        difference = whitened[p][both] - whitened[q][both]
+        if priors.channels == 1:
+            cost, slope = priors.smoothness.evaluate(difference)
+            pull = slope
+        else:
+            m = np.einsum("kc,kc->k", difference, difference) / 2
+            soft = np.sqrt(m * m + t(SOFT_SQUARE))
+            cost, slope = priors.smoothness.evaluate(soft)
+            pull = (slope * m / soft)[:, None] * difference
+        total += float(cost.sum(dtype=float))
+        gradient[p][both] += pull
+        gradient[q][both] -= pull
+    n = valid.size
+    scale = weight * 3 / (25 * n * priors.channels)
+    return scale * total, (gradient @ priors.smoothness_whiten.T.astype(gradient.dtype)) * t(scale)
+
+
+@dataclass(frozen=True)
+class Splat:
+    """Trilinear weights of samples on the occupied part of a grid.
+
+    `shape`: of the occupied part; `start`: its first node on each axis; `index`: (2^C, n_v) flat nodes; `weight`: (2^C, n_v);
+    `side`: (n_v, C) position in the cell; `inside`: (n_v, C) false where a value was clamped.
+    """
+
+    shape: tuple[int, ...]
+    start: tuple[int, ...]
+    index: np.ndarray
+    weight: np.ndarray
+    side: np.ndarray
+    inside: np.ndarray
+    step: float
+
+
+def splat(samples: np.ndarray, table: AbsoluteTable) -> Splat:
+    """Where `samples` (n_v, C) fall on the grid of `table`."""
+    nodes, channels = table.values.shape[0], samples.shape[1]
+    step = (table.high - table.low) / (nodes - 1)
+    position = (samples.astype(float) - table.low) / step
+    inside = (position >= 0) & (position <= nodes - 1)
+    position = np.clip(position, 0, nodes - 1)
+    cell = np.minimum(position.astype(np.int64), nodes - 2)
+    side = position - cell
+    start, last = cell.min(axis=0), cell.max(axis=0) + 1
+    shape = tuple(int(v) for v in last - start + 1)
+    strides = np.cumprod((*shape[1:][::-1], 1)[::-1][::-1]) if channels == 1 else np.array([shape[1] * shape[2], shape[2], 1])
+    base = (cell - start) @ strides
+    corners = list(product((0, 1), repeat=channels))
+    index = np.stack([base + int(np.dot(c, strides)) for c in corners])
+    weight = np.stack([np.prod(np.where(c, side, 1 - side), axis=1) for c in corners])
+    return Splat(shape, tuple(int(v) for v in start), index, weight, side, inside, step)
+
+
+def gather_gradient(where: Splat, node_gradient: np.ndarray) -> np.ndarray:
+    """Gradient of the samples (n_v, C) from the gradient of the node counts (shape of the occupied part)."""
+    flat = node_gradient.ravel()
+    channels = where.side.shape[1]
+    gradient = np.zeros(where.side.shape)
+    for k, corner in enumerate(product((0, 1), repeat=channels)):
+        value = flat[where.index[k]]
+        for axis in range(channels):
+            others = np.ones(len(value))
+            for a in range(channels):
+                if a != axis:
+                    others = others * (where.side[:, a] if corner[a] else 1 - where.side[:, a])
+            gradient[:, axis] += (1 if corner[axis] else -1) * value * others
+    return np.where(where.inside, gradient / where.step, 0.0)
+
+
+def parzen_taps(sigma: float, step: float, count: int, channels: int) -> np.ndarray:
+    """Blur weights of one axis for the Parzen window of `parsimony_sigma / 20`, and the share 1/count^2 of all axes together."""
+    half = min(100, int(np.ceil(6 * sigma / step)))
+    k = np.arange(-half, half + 1)
+    return np.exp(-((k * step) ** 2) / (4 * sigma**2)) / count ** (2 / channels)
+
+
+def blur(counts: np.ndarray, taps: np.ndarray) -> np.ndarray:
+    """Zero-padded separable blur; the result is floored at the smallest float64 step from 1."""
+    for axis in range(counts.ndim):
+        counts = ndimage.correlate1d(counts, taps, axis=axis, mode="constant")
+    return np.maximum(counts, np.finfo(float).eps)
+
+
+def palette_cost(log_reflectance: np.ndarray, valid: np.ndarray, priors: Priors, weights: Weights) -> tuple[float, float, np.ndarray]:
+    """The parsimony and absolute terms, and the gradient of their sum with respect to `log_reflectance` (H, W, C)."""
+    whiten = priors.parsimony_whiten
+    samples = log_reflectance[valid].astype(float) @ whiten.T
+    where = splat(samples, priors.absolute)
+    count = len(samples)
+    size = int(np.prod(where.shape))
+    counts = np.bincount(where.index.ravel(), where.weight.ravel(), size).reshape(where.shape)
+    taps = parzen_taps(weights.parsimony_sigma / SIGMA_UNIT, where.step, count, priors.channels)
+    blurred = blur(counts, taps)
+    overlap = float((blurred * counts).sum())
+    part = tuple(slice(s, s + n) for s, n in zip(where.start, where.shape, strict=True))
+    costs = priors.absolute.values[part]
+    scale = weights.absolute / (ABSOLUTE_DIVISOR * count)
+    node_gradient = (-2 * weights.parsimony / overlap) * blurred + scale * costs
+    gradient = np.zeros_like(log_reflectance)
+    gradient[valid] = gather_gradient(where, node_gradient) @ whiten
+    return -weights.parsimony * float(np.log(overlap)), scale * float((costs * counts).sum()), gradient
+
+
+def one_color_cost(log_reflectance: np.ndarray, valid: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
+    """Shape-from-shading mode: weight/(2 n_v) * sum of (A - mean A)^2, and its gradient (H, W, C)."""
+    away = log_reflectance[valid].astype(float)
+    away = away - away.mean(axis=0)
+    gradient = np.zeros_like(log_reflectance)
+    gradient[valid] = away * (weight / len(away))
+    return weight / (2 * len(away)) * float((away * away).sum()), gradient

@@ -1,0 +1,42 @@
+"""How the terms of the SIRFS objective are weighed, and what the solver may change.
+
+The three published weight sets are those of the SIRFS release 1.5 (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712),
+as printed with it. Grey photos under natural light have no published set: the laboratory grey set stands in.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Weights:
+    """Multipliers of the objective's terms.
+
+    `smoothness`: reflectance varies little between neighbours. `parsimony`: few reflectance colours (Renyi entropy),
+    measured with a Parzen window of `parsimony_sigma / 20` in whitened log colour. `absolute`: likely reflectance colours.
+    `curvature`: mean curvature varies little. `slant`: surfaces face all directions equally often.
+    `contour`: normals on the occluding contour point outward, with the penalty's power `contour_power`.
+    `light`: likely illuminations. `shading_only`: in shape-from-shading mode, how strictly reflectance is one colour.
+    """
+
+    smoothness: float
+    parsimony: float
+    parsimony_sigma: float
+    absolute: float
+    curvature: float
+    slant: float
+    contour: float
+    light: float
+    contour_power: float = 0.75
+    shading_only: float = 50.0
+
+
+COLOR_NATURAL = Weights(16, 3.3636, 2.8284, 4.7568, 4.7568, 1, 2.8284, 3.3636)
+COLOR_LABORATORY = Weights(13.4543, 3.3636, 1.6818, 4.7568, 6.7272, 2.3784, 4, 4.7568)
+GREY_LABORATORY = Weights(6.7272, 1.4142, 1.6818, 4, 6.7272, 2.3784, 3.3636, 4.7568)
+
+
+def published_weights(illumination: str, channels: int) -> Weights:
+    """The published set for "natural" or "laboratory" illumination and 3 or 1 channels."""
+    if channels == 1:
+        return GREY_LABORATORY
+    return COLOR_NATURAL if illumination == "natural" else COLOR_LABORATORY

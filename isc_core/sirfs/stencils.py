@@ -1,0 +1,63 @@
+"""Derivatives of a height map by 3 x 3 stencils with replicated borders, and their adjoints.
+
+Rows grow downward, columns to the right:
+  Zi = [row below - row above] (1,2,1)/8,   Zj = [right - left] (1,2,1)/8,
+  Zii = (1,-2,1) (1,2,1)/4,   Zjj likewise,   Zij = [Z(--) + Z(++) - Z(+-) - Z(-+)]/4
+(Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712).
+"""
+
+import numpy as np
+
+# (weights along rows, weights along columns) of each derivative
+FIRST_DOWN = ((-1, 0, 1), (0.125, 0.25, 0.125))
+FIRST_RIGHT = ((0.125, 0.25, 0.125), (-1, 0, 1))
+SECOND_DOWN = ((1, -2, 1), (0.25, 0.5, 0.25))
+SECOND_RIGHT = ((0.25, 0.5, 0.25), (1, -2, 1))
+MIXED = ((-0.5, 0, 0.5), (-0.5, 0, 0.5))
+DERIVATIVES = (FIRST_DOWN, FIRST_RIGHT, SECOND_DOWN, SECOND_RIGHT, MIXED)
+
+Stencil = tuple[tuple[float, float, float], tuple[float, float, float]]
+
+
+def _three(padded: np.ndarray, weights: tuple[float, float, float], axis: int) -> np.ndarray:
+    """Correlation with three taps along `axis`, without the outermost elements."""
+    n = padded.shape[axis]
+    out: np.ndarray | None = None
+    for k, w in enumerate(weights):
+        if w == 0:
+            continue
+        part = padded[(slice(None),) * axis + (slice(k, n - 2 + k),)]
+        term = part if w == 1 else part * padded.dtype.type(w)
+        out = term if out is None else out + term
+    assert out is not None
+    return out
+
+
+def derivative(padded: np.ndarray, stencil: Stencil) -> np.ndarray:
+    """The derivative `stencil` of a height map; `padded` is (H + 2, W + 2) with replicated borders, the result (H, W)."""
+    return _three(_three(padded, stencil[0], 0), stencil[1], 1)
+
+
+def derivative_adjoint(gradient: np.ndarray, stencil: Stencil) -> np.ndarray:
+    """The adjoint of `derivative` after replicating borders: (H, W) gradient of a derivative to (H, W) gradient of the height."""
+    full = np.pad(gradient, 2)
+    flipped = (stencil[0][::-1], stencil[1][::-1])
+    wide = _three(_three(full, flipped[0], 0), flipped[1], 1)
+    return fold_border(wide)
+
+
+def fold_border(wide: np.ndarray) -> np.ndarray:
+    """The adjoint of replicating the border by one pixel: (H + 2, W + 2) to (H, W). Changes `wide`."""
+    wide[1] += wide[0]
+    wide[-2] += wide[-1]
+    wide[:, 1] += wide[:, 0]
+    wide[:, -2] += wide[:, -1]
+    return wide[1:-1, 1:-1]
+
+
+def normals(height: np.ndarray) -> np.ndarray:
+    """Unit normals (down, right, toward the viewer), (H, W, 3), of a height map (H, W) in pixels."""
+    padded = np.pad(height, 1, mode="edge")
+    zi, zj = derivative(padded, FIRST_DOWN), derivative(padded, FIRST_RIGHT)
+    n3 = 1 / np.sqrt(1 + zi * zi + zj * zj)
+    return np.stack([-zi * n3, -zj * n3, n3], axis=-1)

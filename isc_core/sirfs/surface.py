@@ -1,0 +1,121 @@
+"""What SIRFS believes of shape: smooth mean curvature, no favoured slant, a contour that turns away.
+
+With heights Z in pixels, first derivatives Zi (down) and Zj (right) and second ones Zii, Zjj, Zij:
+  mean curvature K = [(1 + Zi^2) Zjj - 2 Zi Zj Zij + (1 + Zj^2) Zii] / (2 (1 + Zi^2 + Zj^2)^1.5)
+  curvature   w/(25 n) * sum over pairs of C(sqrt((K_p - K_q)^2 + 1e-8)),
+  slant       w/n * sum sqrt((log N3)^2 + 0.01^2),
+  contour     60 w/n * sum over contour points of max(0, 1 - N . c)^power.
+Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: orthographic, one smooth sheet, no holes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .contour import Contour
+from .problem import PAIR_OFFSETS, DepthObservation
+from .stencils import DERIVATIVES, derivative, derivative_adjoint
+from .tables import CostTable
+
+SOFT_DIFFERENCE = 1e-8
+SLANT_SOFTNESS = 0.01
+CONTOUR_FACTOR = 60.0
+CONTOUR_CLOSE = 1e-3  # nearer than this to pointing exactly outward (or inward) the contour term has no gradient
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Derivatives, normals and mean curvature of a height map, each (H, W)."""
+
+    zi: np.ndarray
+    zj: np.ndarray
+    zii: np.ndarray
+    zjj: np.ndarray
+    zij: np.ndarray
+    n1: np.ndarray
+    n2: np.ndarray
+    n3: np.ndarray
+    curvature: np.ndarray
+
+
+def geometry(height: np.ndarray) -> Geometry:
+    """The local geometry of `height` (H, W)."""
+    padded = np.pad(height, 1, mode="edge")
+    zi, zj, zii, zjj, zij = (derivative(padded, s) for s in DERIVATIVES)
+    zi2, zj2 = zi * zi, zj * zj
+    n3 = 1 / np.sqrt(1 + zi2 + zj2)
+    curvature = ((1 + zi2) * zjj - 2 * zi * zj * zij + (1 + zj2) * zii) * (n3 * n3 * n3) / 2
+    return Geometry(zi, zj, zii, zjj, zij, -zi * n3, -zj * n3, n3, curvature)
+
+
+def height_gradient(g: Geometry, d1: np.ndarray, d2: np.ndarray, d3: np.ndarray, dk: np.ndarray) -> np.ndarray:
+    """Gradient of the height from gradients of the normal's components and of the curvature, all (H, W)."""
+    n3, n3cubed = g.n3, g.n3**3
+    along = g.zi * d1 + g.zj * d2 - d3
+    cut = 3 * g.curvature * n3 * n3 * dk
+    half = n3cubed * dk / 2
+    di = -n3 * d1 + g.zi * along * n3cubed + 2 * half * (g.zi * g.zjj - g.zj * g.zij) - cut * g.zi
+    dj = -n3 * d2 + g.zj * along * n3cubed + 2 * half * (g.zj * g.zii - g.zi * g.zij) - cut * g.zj
+    dii, djj, dij = half * (1 + g.zj * g.zj), half * (1 + g.zi * g.zi), -2 * half * g.zi * g.zj
+    total = np.zeros_like(n3)
+    for stencil, d in zip(DERIVATIVES, (di, dj, dii, djj, dij), strict=True):
+        total += derivative_adjoint(d, stencil)
+    return total
+
+
+def pair_slices(down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Index pairs that select p and q of all pairs with q = p + (down, right); down >= 0."""
+    a, b = max(right, 0), max(-right, 0)
+    rows_p, rows_q = slice(None, -down or None), slice(down, None)
+    return (rows_p, slice(b, -a or None)), (rows_q, slice(a, -b or None))
+
+
+def curvature_cost(
+    curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float, unit: float
+) -> tuple[float, np.ndarray]:
+    """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`, both (H, W).
+
+    `unit` multiplies the differences.
+    """
+    gradient = np.zeros_like(curvature)
+    total = 0.0
+    for offset in PAIR_OFFSETS:
+        p, q = pair_slices(*offset)
+        both = valid[p] & valid[q]
+        difference = (curvature[p][both] - curvature[q][both]) * curvature.dtype.type(unit)
+        x = np.sqrt(difference * difference + curvature.dtype.type(SOFT_DIFFERENCE))
+        cost, slope = table.evaluate(x)
+        total += float(cost.sum(dtype=float))
+        pull = slope * difference / x
+        gradient[p][both] += pull
+        gradient[q][both] -= pull
+    scale = weight / (25 * curvature.size)
+    return scale * total, gradient * curvature.dtype.type(scale * unit)
+
+
+def slant_cost(n3: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
+    """The slant term and its gradient with respect to the normals' component toward the viewer."""
+    x = -np.log(n3)
+    soft = np.sqrt(x * x + SLANT_SOFTNESS**2)
+    scale = n3.dtype.type(weight / n3.size)
+    return float(soft.sum(dtype=float)) * float(weight / n3.size), -scale * x / (soft * n3)
+
+
+def contour_cost(n1: np.ndarray, n2: np.ndarray, contour: Contour, weight: float, power: float, pixels: int):  # type: ignore[no-untyped-def]
+    """The contour term and its gradients with respect to n1 and n2 at the contour points only: (cost, (P,), (P,))."""
+    at = (contour.rows, contour.columns)
+    x = n1[at].astype(float) * contour.down + n2[at].astype(float) * contour.right
+    gap = np.maximum(0.0, 1 - x)
+    scale = CONTOUR_FACTOR * weight / pixels
+    pull = np.where(np.abs(x) < 1 - CONTOUR_CLOSE, -scale * power * np.maximum(gap, CONTOUR_CLOSE) ** (power - 1), 0.0)
+    return scale * float(np.sum(gap**power)), pull * contour.down, pull * contour.right
+
+
+def observation_cost(height: np.ndarray, seen: DepthObservation) -> tuple[float, np.ndarray]:
+    """The observation's term, weight/n_seen * sum of (sqrt(1 + (difference/sigma)^2) - 1), and its gradient (H, W)."""
+    known = np.isfinite(seen.height)
+    count = max(int(known.sum()), 1)
+    r = np.where(known, height.astype(float) - np.where(known, seen.height, 0), 0) / seen.sigma
+    root = np.sqrt(1 + r * r)
+    scale = seen.weight / count
+    return scale * float((root - 1).sum()), (scale / seen.sigma) * r / root
