@@ -1,0 +1,38 @@
+# make demo   renders one glossy object, decomposes it, says where the pictures are
+# make test   linter, type checker and tests
+# The first call makes .venv; later ones reuse it until pyproject.toml or constraints.txt change. PYTHON=... picks an interpreter.
+
+BIN := .venv/bin
+INPUTS := pyproject.toml constraints.txt tools/setup.sh
+
+.PHONY: demo test lint clean
+.DEFAULT_GOAL := demo
+
+demo: .venv/.ready-demo
+	@echo "demo: rendering a glossy object"
+	@$(BIN)/python -m synth.demo_scene -o demo/input
+	@echo "demo: taking it apart"
+	@$(BIN)/isc decompose demo/input/photo.png -o demo/result
+	@echo "The photo:        demo/input/photo.png"
+	@echo "What came out:    demo/result/preview.png (look at this first)"
+	@echo "The textured mesh: demo/result/mesh.glb"
+
+test: lint
+	$(BIN)/python -m pytest
+
+lint: .venv/.ready-dev
+	$(BIN)/ruff check .
+	$(BIN)/mypy
+
+# A development set-up is also good for the demo; the demo alone does without the big Blender module.
+.venv/.ready-demo: $(INPUTS)
+	@sh tools/setup.sh synth
+	@touch $@
+
+.venv/.ready-dev: $(INPUTS)
+	@sh tools/setup.sh synth,blender,batch,dev
+	@touch $@ .venv/.ready-demo
+
+clean:
+	rm -rf .venv demo build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
