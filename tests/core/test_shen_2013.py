@@ -1,0 +1,153 @@
+"""Shen & Zheng 2013: published figures, the layers' identities, and what it must leave alone."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from isc_core.decomposition import Separation
+from isc_core.errors import InputError
+from isc_core.separation import METHODS, separate, shen_2013
+from isc_core.separation.clipped import fill
+
+RED, GREEN = np.array([0.7, 0.25, 0.15]), np.array([0.2, 0.6, 0.15])
+
+
+def read(path: Path) -> np.ndarray:
+    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
+    return stored / np.iinfo(stored.dtype).max
+
+
+def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one highlight."""
+    y, x = np.mgrid[-1:1:80j, -1:1:100j]
+    mask = x**2 + y**2 < 0.9
+    shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
+    specular = 0.5 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.02)
+    paint = np.where((x > 0)[..., None], RED, GREEN)
+    return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
+
+
+def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray) -> None:
+    total = split.diffuse + split.specular + split.residual
+    assert np.abs(total - image)[mask].max() <= 1e-6 * image.max()
+    assert (split.diffuse[mask] >= 0).all() and (split.diffuse[mask] <= image[mask] * (1 + 1e-6)).all()
+    assert (split.specular >= 0).all() and np.ptp(split.specular, axis=2).max() == 0
+    for layer in (split.diffuse, split.specular, split.residual, split.confidence):
+        assert layer.dtype == np.float32 and np.isfinite(layer).all() and not layer[~mask].any()
+    assert (split.confidence >= 0).all() and (split.confidence <= 1).all()
+
+
+@pytest.mark.parametrize(("name", "psnr"), [("animals", 37.3), ("cups", 39.2)])
+def test_published_figures(shared: Path, name: str, psnr: float) -> None:
+    image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    split = shen_2013.separate(image, np.ones(image.shape[:2], bool))
+    got = -10 * np.log10(np.mean((split.diffuse - truth) ** 2))
+    assert got == pytest.approx(psnr, abs=0.06)
+
+
+@pytest.mark.parametrize(("name", "psnr"), [("animals", 37.3), ("cups", 39.2)])
+def test_trusted_pixels_err_less(shared: Path, name: str, psnr: float) -> None:
+    image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    split = shen_2013.separate(image, np.ones(image.shape[:2], bool))
+    error = ((split.diffuse - truth) ** 2).mean(axis=2).ravel()
+    ascending = error[np.argsort(split.confidence.ravel(), kind="stable")]
+    assert ascending[len(error) // 4 :].mean() < 0.4 * error.mean()
+
+
+def test_mask_statistics_on_apple(shared: Path) -> None:
+    folder = shared / "data/mit_berkeley_train/laboratory/apple"
+    image, truth = read(folder / "original.png"), read(folder / "diffuse.png")
+    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 0
+    split = shen_2013.separate(image, mask)
+    assert_layers_hold(split, image, mask)
+    assert np.mean((split.diffuse - truth)[mask] ** 2) <= 0.2 * np.mean((image - truth)[mask] ** 2)
+
+
+@pytest.mark.parametrize("name", ["box", "dinosaur"])
+def test_near_grey_objects_are_not_taken_for_highlights(shared: Path, name: str) -> None:
+    folder = shared / "data/mit_berkeley_train/laboratory" / name
+    image, truth = read(folder / "original.png"), read(folder / "diffuse.png")
+    mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 0
+    split = shen_2013.separate(image, mask)
+    assert np.mean((split.diffuse - truth)[mask] ** 2) <= 1.01 * np.mean((image - truth)[mask] ** 2)
+
+
+def test_recovers_a_rendered_highlight() -> None:
+    image, specular, mask = glossy_scene()
+    split = shen_2013.separate(image, mask)
+    assert_layers_hold(split, image, mask)
+    error = np.mean((split.specular[..., 0] - specular)[mask] ** 2)
+    assert error < 0.05 * np.mean(specular[mask] ** 2)
+    assert not split.residual.any()
+
+
+def test_scale_and_surroundings_do_not_matter() -> None:
+    image, _, mask = glossy_scene()
+    split = shen_2013.separate(image, mask)
+    padded_mask = np.pad(mask, 17)
+    padded = np.pad(image, [(17, 17), (17, 17), (0, 0)], constant_values=0.8)
+    wide = shen_2013.separate(1000 * padded, padded_mask)
+    assert np.allclose(wide.specular[17:-17, 17:-17], 1000 * split.specular, atol=1e-3)
+    assert np.allclose(wide.confidence[17:-17, 17:-17], split.confidence, atol=1e-4)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5])
+def test_achromatic_photo_is_left_alone(value: float) -> None:
+    ramp = np.linspace(value, 2 * value, 40)
+    image = np.broadcast_to(ramp[None, :, None], (30, 40, 3))
+    mask = np.ones((30, 40), bool)
+    split = shen_2013.separate(image, mask)
+    assert_layers_hold(split, image, mask)
+    assert not split.specular.any()
+    if value:
+        assert split.confidence[:, ramp > ramp.mean()].max() < 0.4
+
+
+def test_clipped_highlight_is_filled_from_around() -> None:
+    scene, specular, mask = glossy_scene()
+    image = np.minimum(scene, 0.85)
+    clipped = (scene >= 0.85).any(axis=2) & mask
+    assert clipped.sum() > 20
+    split = shen_2013.separate(image, mask, clipped=clipped)
+    assert_layers_hold(split, image, mask)
+    assert not split.residual[~clipped].any() and not split.confidence[clipped].any() and split.residual.max() <= 1e-7
+    truth = scene - specular[..., None]
+    blind = shen_2013.separate(image, mask)
+    error, blind_error = (np.mean((s.diffuse - truth)[clipped] ** 2) for s in (split, blind))
+    assert error < 0.1 * blind_error
+    assert np.mean((split.specular[..., 0] - specular)[clipped] ** 2) < 0.05 * np.mean(specular[clipped] ** 2)
+
+
+def test_fill_carries_a_plane_across_a_hole() -> None:
+    y, x = np.mgrid[:61, :47].astype(float)
+    plane = (0.3 + 0.004 * x + 0.002 * y)[..., None]
+    known = np.hypot(x - 20, y - 30) > 6
+    filled = fill(np.where(known[..., None], plane, 9.0), known)
+    assert np.array_equal(filled[known], plane.astype(np.float32)[known])
+    assert np.abs(filled - plane).max() < 0.01
+
+
+def test_names() -> None:
+    image, _, mask = glossy_scene()
+    nothing = separate("none", image, mask)
+    assert np.allclose(nothing.diffuse[mask], image[mask]) and not nothing.specular.any()
+    for method in METHODS:
+        assert_layers_hold(separate(method, image, mask), image, mask)
+    with pytest.raises(InputError, match="none, shen_2013"):
+        separate("magic", image, mask)
+
+
+def test_refuses_what_it_cannot_use() -> None:
+    image, _, mask = glossy_scene()
+    with pytest.raises(InputError, match="mask is empty"):
+        shen_2013.separate(image, np.zeros_like(mask))
+    with pytest.raises(InputError, match="like the image"):
+        shen_2013.separate(image, mask[1:])
+    with pytest.raises(InputError, match="colour image"):
+        shen_2013.separate(image[..., 0], mask)
+    with pytest.raises(InputError, match="non-finite"):
+        shen_2013.separate(np.where(mask[..., None], np.nan, image), mask)
+    with pytest.raises(InputError, match="cluster_radius"):
+        shen_2013.separate(image, mask, shen_2013.Shen2013Options(cluster_radius=0))
