@@ -59,18 +59,23 @@ def list_objects(root: str | Path, illumination: str) -> tuple[str, ...]:
     return names
 
 
-def load_object(root: str | Path, name: str, illumination: str = "natural", input: str = "diffuse") -> MitBerkeleyObject:
-    """One object of the set. `input`: "diffuse" (without highlights) or "original" (as photographed; laboratory only).
-
-    Height, reflectance, mask and crop always come from the laboratory folder. Raises `InputError` for an unknown name or
-    option, and for a missing, damaged or mis-sized file.
-    """
+def check_request(root: str | Path, name: str, illumination: str, input: str) -> None:
+    """Raises the `InputError` that `load_object` would raise for an unknown name or option, without reading the object."""
     _check_option("input", input, INPUTS)
     known = list_objects(root, illumination)
     if name not in known:
         raise InputError(f"unknown object '{name}': choose from {', '.join(known)}")
     if illumination == "natural" and input == "original":
         raise InputError("the natural images have no highlights: use --input diffuse, or --illumination laboratory")
+
+
+def load_object(root: str | Path, name: str, illumination: str = "natural", input: str = "diffuse") -> MitBerkeleyObject:
+    """One object of the set. `input`: "diffuse" (without highlights) or "original" (as photographed; laboratory only).
+
+    Height, reflectance, mask and crop always come from the laboratory folder. Raises `InputError` for an unknown name or
+    option, and for a missing, damaged or mis-sized file.
+    """
+    check_request(root, name, illumination, input)
     laboratory = _folder(Path(root), "laboratory") / name
     own = _folder(Path(root), illumination) / name
     crop = _crop(laboratory / "crop_idx.mat")
