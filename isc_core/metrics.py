@@ -116,7 +116,6 @@ def scaled_mse(truth: np.ndarray, estimate: np.ndarray) -> float:
 
 def light_error(truth: np.ndarray, estimate: np.ndarray) -> float:
     """Mean square difference of two lights (9, C) of our convention, seen on a front hemisphere, after one common scale."""
-    # The probe's grid is the reference's: it begins at -127/128 and ends at 1, down and right.
     axis = (np.arange(1, _LIGHT_PROBE + 1) - _LIGHT_PROBE / 2) / (_LIGHT_PROBE / 2)
     down, right = np.meshgrid(axis, axis, indexing="ij")
     squared = 1 - down * down - right * right

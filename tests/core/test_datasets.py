@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import scipy.io
@@ -70,6 +71,19 @@ def test_the_release_layout_reads_the_same(root: Path, copy: Path) -> None:
         assert list_objects(copy, illumination) == ("apple",)
         a, b = (load_object(folder, "apple", illumination) for folder in (root, copy))
         assert np.array_equal(a.image, b.image) and np.array_equal(a.light, b.light)
+
+
+def test_a_pixel_with_one_black_channel_is_not_valid(copy: Path) -> None:
+    path = copy / "MIT-Berkeley-Laboratory" / "apple" / "diffuse.png"
+    before = load_object(copy, "apple", "laboratory")
+    crop = scipy.io.loadmat(path.parent / "crop_idx.mat")
+    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    # Red is the last channel of the file as this reader gives it.
+    stored[int(crop["crop_idx1"][0, 100]) - 1, int(crop["crop_idx2"][0, 120]) - 1, 2] = 0
+    assert cv2.imwrite(str(path), stored)
+    after = load_object(copy, "apple", "laboratory")
+    assert np.argwhere(before.valid != after.valid).tolist() == [[100, 120]]
+    assert after.image[100, 120, 0] == 0 < after.image[100, 120, 2]
 
 
 def test_natural_lights(root: Path) -> None:

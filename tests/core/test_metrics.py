@@ -280,21 +280,26 @@ def test_each_error_answers_to_its_own_map(truth: MitBerkeleyObject, changed: st
     assert high == {changed} | ({"rs_mse"} if changed in ("shading", "reflectance") else set())
 
 
-def test_unknown_pixels_and_the_frame_are_not_compared(truth: MitBerkeleyObject) -> None:
-    """Values outside the valid input, NaN included, and on the crop's frame change neither shading nor reflectance."""
-    whole = replace(truth, valid=truth.valid.copy())
-    whole.valid[20:30, 20:30] = False
-    wild = answer(whole)
+def test_unknown_pixels_are_not_compared(truth: MitBerkeleyObject) -> None:
+    """Values outside the valid input, NaN included, change neither shading nor reflectance."""
+    holed = replace(truth, valid=truth.valid.copy())
+    holed.valid[20:30, 20:30] = False
+    wild = answer(holed)
     for name in ("shading", "reflectance"):
-        wild[name] = np.where(whole.valid[..., None], wild[name], np.nan)
-    assert max(asdict(score(whole, **wild)).values()) < 1e-7
+        wild[name] = np.where(holed.valid[..., None], wild[name], np.nan)
+    assert max(asdict(score(holed, **wild)).values()) < 1e-7
+
+
+@pytest.mark.parametrize("edge", [np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]])
+def test_the_frame_of_the_crop_is_not_compared(truth: MitBerkeleyObject, edge: Any) -> None:
+    """On a crop that the object fills, wrong values on the outermost pixels cost nothing; one pixel further in they do."""
     maps = ("image", "valid", "mask", "height", "shading", "reflectance")
-    framed = replace(truth, **{name: getattr(truth, name)[:, 20:] for name in maps})
-    cut = answer(truth) | {name: answer(framed)[name] for name in ("height", "shading", "reflectance")}
-    cut["normal"] = np.nan_to_num(truth_normal(framed.height))
-    cut["shading"] = cut["shading"].copy()
-    cut["shading"][:, 0] *= 5
-    assert score(framed, **cut).shading < 1e-20
+    filled = replace(truth, **{name: getattr(truth, name)[15:29, 20:45] for name in maps})
+    wrong = answer(filled) | {"shading": filled.shading.copy()}
+    wrong["shading"][edge] *= 5
+    assert filled.valid[edge].all() and score(filled, **wrong).shading < 1e-20
+    wrong["shading"][1:-1, 1:-1][edge] *= 5
+    assert score(filled, **wrong).shading > 1e-3
 
 
 def test_refuses_a_misshapen_or_unfinished_answer(truth: MitBerkeleyObject) -> None:
