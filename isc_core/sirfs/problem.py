@@ -29,6 +29,8 @@ class DepthObservation:
 class Problem:
     """`log_image`: (H, W, C) natural logarithm of linear intensities, 0 where not `valid`; `valid`: (H, W) bool.
 
+    `mask`: (H, W) bool, the object; `contour`: its occluding contour.
+
     `shading_only`: shape-from-shading mode, reflectance is taken as one unknown colour.
     `curvature_unit`: pixels of this problem to one pixel of the scale at which the priors were fitted; curvature differences
     are multiplied by its square, since curvature is per pixel and a pair's distance is in pixels.
@@ -36,6 +38,7 @@ class Problem:
 
     log_image: np.ndarray
     valid: np.ndarray
+    mask: np.ndarray
     contour: Contour
     priors: Priors
     weights: Weights

@@ -1,0 +1,475 @@
+"""The SIRFS objective as compiled row kernels: the same formulas as `surface`, `reflectance` and `illumination`.
+
+Every loop runs over one-dimensional rows with few pointers, so that the compiler turns it into vector instructions; each
+kernel works for float32 and float64 alike. Kernels release the interpreter lock and write to rows of their own, hence the
+spill buffers: pairs reach two rows below a block, and these contributions are added later, in a fixed order.
+"""
+
+import numpy as np
+from numba import njit
+
+_FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}
+compiled = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+# Differences of neighbouring heights are exact; reordering them would lose in float32 what the curvature needs.
+in_order = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
+
+
+@in_order
+def forward_rows(first, last, zp, log_image, light, whiten_smooth, whiten_palette, geometry, whitened, palette, d3, slant):
+    """Local geometry, whitened log reflectance and the slant term of rows [first, last).
+
+    zp (H+2, W+2) height with replicated borders; log_image (H, C, W); light (9, C) already times the basis constants.
+    Fills geometry (H, 9, W): zi zj zii zjj zij n1 n2 n3 curvature; whitened, palette (H, C, W); d3 (H, W) the slant
+    term's gradient, unscaled; slant (H,) its sums.
+    """
+    t = zp.dtype.type
+    one, two, eighth, quarter, half = t(1), t(2), t(0.125), t(0.25), t(0.5)
+    channels, width = log_image.shape[1], log_image.shape[2]
+    soft = t(1e-4)
+    a = np.empty((channels, width), zp.dtype)
+    for i in range(first, last):
+        up, mid, low = zp[i], zp[i + 1], zp[i + 2]
+        row = geometry[i]
+        zi, zj, zii, zjj, zij, n1, n2, n3, k = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8]
+        for j in range(width):
+            zi[j] = ((low[j] - up[j]) + two * (low[j + 1] - up[j + 1]) + (low[j + 2] - up[j + 2])) * eighth
+        for j in range(width):
+            zj[j] = ((up[j + 2] - up[j]) + two * (mid[j + 2] - mid[j]) + (low[j + 2] - low[j])) * eighth
+        for j in range(width):
+            left, centre = (up[j] - mid[j]) + (low[j] - mid[j]), (up[j + 1] - mid[j + 1]) + (low[j + 1] - mid[j + 1])
+            zii[j] = (left + two * centre + ((up[j + 2] - mid[j + 2]) + (low[j + 2] - mid[j + 2]))) * quarter
+        for j in range(width):
+            top, centre = (up[j] - up[j + 1]) + (up[j + 2] - up[j + 1]), (mid[j] - mid[j + 1]) + (mid[j + 2] - mid[j + 1])
+            zjj[j] = (top + two * centre + ((low[j] - low[j + 1]) + (low[j + 2] - low[j + 1]))) * quarter
+        for j in range(width):
+            zij[j] = ((low[j + 2] - low[j]) - (up[j + 2] - up[j])) * quarter
+        for j in range(width):
+            n3[j] = one / np.sqrt(one + zi[j] * zi[j] + zj[j] * zj[j])
+        for j in range(width):
+            k[j] = (
+                ((one + zi[j] * zi[j]) * zjj[j] - two * zi[j] * zj[j] * zij[j] + (one + zj[j] * zj[j]) * zii[j])
+                * (n3[j] * n3[j] * n3[j])
+                * half
+            )
+        for j in range(width):
+            n1[j] = -zi[j] * n3[j]
+        for j in range(width):
+            n2[j] = -zj[j] * n3[j]
+        total = t(0)
+        dslant = d3[i]
+        for j in range(width):
+            x = -np.log(n3[j])
+            root = np.sqrt(x * x + soft)
+            total += root
+            dslant[j] = -x / (root * n3[j])
+        slant[i] = total
+        for c in range(channels):
+            l0, l1, l2, l3, l4 = light[0, c], light[1, c], light[2, c], light[3, c], light[4, c]
+            l5, l6, l7, l8 = light[5, c], light[6, c], light[7, c], light[8, c]
+            ac, image = a[c], log_image[i, c]
+            for j in range(width):
+                ac[j] = image[j] - (
+                    l0
+                    + n1[j] * (l3 + l4 * n2[j] + l7 * n3[j] + l8 * n1[j])
+                    + n2[j] * (l1 + l5 * n3[j] - l8 * n2[j])
+                    + n3[j] * (l2 + l6 * n3[j])
+                )
+        _mix(a, whiten_smooth, whitened[i])
+        _mix(a, whiten_palette, palette[i])
+
+
+@compiled
+def _mix(source, matrix, target):
+    """target[c] = sum_d matrix[c, d] source[d], row by row."""
+    width = source.shape[1]
+    if source.shape[0] == 1:
+        for j in range(width):
+            target[0, j] = matrix[0, 0] * source[0, j]
+        return
+    s0, s1, s2 = source[0], source[1], source[2]
+    for c in range(3):
+        m0, m1, m2 = matrix[c, 0], matrix[c, 1], matrix[c, 2]
+        out = target[c]
+        for j in range(width):
+            out[j] = m0 * s0[j] + m1 * s1[j] + m2 * s2[j]
+
+
+@compiled
+def smoothness_block(first, last, whitened, valid, spans, offsets, table, rises, low, inverse_step, gradient, spill, total, block):
+    """The smoothness term of the pairs whose upper pixel lies in rows [first, last); gradients unscaled.
+
+    gradient (H, C, W) is overwritten in these rows; what goes to the two rows below goes to spill (2, C, W).
+    """
+    t = whitened.dtype.type
+    half, soft, zero = t(0.5), t(1e-8), t(0)
+    inv, low_t = t(inverse_step), t(low)
+    height, channels, width = whitened.shape
+    last_cell = t(len(table) - 2)
+    d = np.empty((channels, width), whitened.dtype)
+    w = np.empty(width, whitened.dtype)
+    s = np.empty(width, whitened.dtype)
+    f = np.empty(width, whitened.dtype)
+    cells = np.empty(width, np.int32)
+    gradient[first:last] = zero
+    spill[:] = zero
+    cost = 0.0
+    for i in range(first, last):
+        for o in range(offsets.shape[0]):
+            right, q = offsets[o, 1], i + offsets[o, 0]
+            if q >= height:
+                continue
+            a, b = max(spans[i, 0], spans[q, 0] - right), min(spans[i, 1], spans[q, 1] - right)
+            n = b - a
+            if n <= 0:
+                continue
+            va, vb = valid[i, a:b], valid[q, a + right : b + right]
+            for k in range(n):
+                w[k] = va[k] * vb[k]
+            for c in range(channels):
+                p_row, q_row, dc = whitened[i, c, a:b], whitened[q, c, a + right : b + right], d[c]
+                for k in range(n):
+                    dc[k] = p_row[k] - q_row[k]
+            part = zero
+            if channels == 1:
+                d0 = d[0]
+                for k in range(n):
+                    position = (d0[k] - low_t) * inv
+                    cell = np.int32(max(zero, min(position, last_cell)))
+                    base, rise = table[cell], rises[cell]
+                    part += w[k] * (base + (position - t(cell)) * rise)
+                    d0[k] = w[k] * rise
+            else:
+                d0, d1, d2 = d[0], d[1], d[2]
+                for k in range(n):
+                    s[k] = half * (d0[k] * d0[k] + d1[k] * d1[k] + d2[k] * d2[k])
+                for k in range(n):
+                    f[k] = np.sqrt(s[k] * s[k] + soft)
+                for k in range(n):
+                    s[k] = w[k] * s[k] / f[k]
+                for k in range(n):
+                    f[k] = (f[k] - low_t) * inv
+                for k in range(n):
+                    cells[k] = np.int32(min(f[k], last_cell))
+                for k in range(n):
+                    f[k] -= t(cells[k])
+                for k in range(n):  # the only loop that the table's look-up keeps from becoming vector instructions
+                    cell = cells[k]
+                    rise = rises[cell]
+                    part += w[k] * (table[cell] + f[k] * rise)
+                    s[k] *= rise
+                for k in range(n):
+                    d0[k] *= s[k]
+                for k in range(n):
+                    d1[k] *= s[k]
+                for k in range(n):
+                    d2[k] *= s[k]
+            cost += part
+            for c in range(channels):
+                dc, g = d[c], gradient[i, c, a:b]
+                for k in range(n):
+                    g[k] += dc[k]
+                if q < last:
+                    g = gradient[q, c, a + right : b + right]
+                else:
+                    g = spill[q - last, c, a + right : b + right]
+                for k in range(n):
+                    g[k] -= dc[k]
+    total[block] = cost
+
+
+@compiled
+def curvature_block(first, last, geometry, valid, spans, offsets, unit, table, rises, low, inverse_step, gradient, spill, total, block):
+    """The curvature term of the pairs whose upper pixel lies in rows [first, last); as `smoothness_block`, (H, W) and (2, W)."""
+    t = geometry.dtype.type
+    soft, zero, inv, low_t, scale = t(1e-8), t(0), t(inverse_step), t(low), t(unit)
+    height, width = valid.shape
+    last_cell = t(len(table) - 2)
+    d = np.empty(width, geometry.dtype)
+    w = np.empty(width, geometry.dtype)
+    f = np.empty(width, geometry.dtype)
+    cells = np.empty(width, np.int32)
+    gradient[first:last] = zero
+    spill[:] = zero
+    cost = 0.0
+    for i in range(first, last):
+        for o in range(offsets.shape[0]):
+            right, q = offsets[o, 1], i + offsets[o, 0]
+            if q >= height:
+                continue
+            a, b = max(spans[i, 0], spans[q, 0] - right), min(spans[i, 1], spans[q, 1] - right)
+            n = b - a
+            if n <= 0:
+                continue
+            va, vb = valid[i, a:b], valid[q, a + right : b + right]
+            for k in range(n):
+                w[k] = va[k] * vb[k]
+            p_row, q_row = geometry[i, 8, a:b], geometry[q, 8, a + right : b + right]
+            for k in range(n):
+                d[k] = (p_row[k] - q_row[k]) * scale
+            part = zero
+            for k in range(n):
+                f[k] = np.sqrt(d[k] * d[k] + soft)
+            for k in range(n):
+                d[k] = w[k] * d[k] / f[k]
+            for k in range(n):
+                f[k] = (f[k] - low_t) * inv
+            for k in range(n):
+                cells[k] = np.int32(min(f[k], last_cell))
+            for k in range(n):
+                f[k] -= t(cells[k])
+            for k in range(n):
+                cell = cells[k]
+                rise = rises[cell]
+                part += w[k] * (table[cell] + f[k] * rise)
+                d[k] *= rise
+            cost += part
+            g = gradient[i, a:b]
+            for k in range(n):
+                g[k] += d[k]
+            if q < last:
+                g = gradient[q, a + right : b + right]
+            else:
+                g = spill[q - last, a + right : b + right]
+            for k in range(n):
+                g[k] -= d[k]
+    total[block] = cost
+
+
+@compiled
+def palette_range(palette, valid, spans, low, step, nodes, bounds):
+    """The first and last occupied node on each axis: fills bounds (C, 2)."""
+    height, channels, _ = palette.shape
+    t = palette.dtype.type
+    for c in range(channels):
+        least, most = t(1e30), t(-1e30)
+        for i in range(height):
+            row = palette[i, c]
+            for j in range(spans[i, 0], spans[i, 1]):
+                if valid[i, j] > t(0):
+                    least, most = min(least, row[j]), max(most, row[j])
+        first = min(max((least - low) / step, 0.0), nodes - 1.0)
+        final = min(max((most - low) / step, 0.0), nodes - 1.0)
+        bounds[c, 0] = min(int(first), nodes - 2)
+        bounds[c, 1] = min(int(final), nodes - 2) + 2
+
+
+@compiled
+def _locate(value, low, inverse_step, nodes, first):
+    """Cell (from node `first`), position in the cell, and whether the value lies on the grid, for one axis."""
+    position = (value - low) * inverse_step
+    inside = 0.0 <= position <= nodes - 1.0
+    position = min(max(position, 0.0), nodes - 1.0)
+    cell = min(int(position), nodes - 2)
+    return cell - first, position - cell, inside
+
+
+@compiled
+def splat_color(palette, valid, spans, low, inverse_step, nodes, bounds, counts):
+    """Adds every valid pixel to the eight nodes around its whitened log colour."""
+    for i in range(palette.shape[0]):
+        for j in range(spans[i, 0], spans[i, 1]):
+            if valid[i, j] == 0:
+                continue
+            a, x, _ = _locate(float(palette[i, 0, j]), low, inverse_step, nodes, bounds[0, 0])
+            b, y, _ = _locate(float(palette[i, 1, j]), low, inverse_step, nodes, bounds[1, 0])
+            c, z, _ = _locate(float(palette[i, 2, j]), low, inverse_step, nodes, bounds[2, 0])
+            x0, y0, z0 = 1 - x, 1 - y, 1 - z
+            counts[a, b, c] += x0 * y0 * z0
+            counts[a, b, c + 1] += x0 * y0 * z
+            counts[a, b + 1, c] += x0 * y * z0
+            counts[a, b + 1, c + 1] += x0 * y * z
+            counts[a + 1, b, c] += x * y0 * z0
+            counts[a + 1, b, c + 1] += x * y0 * z
+            counts[a + 1, b + 1, c] += x * y * z0
+            counts[a + 1, b + 1, c + 1] += x * y * z
+
+
+@compiled
+def gather_color(palette, valid, spans, low, inverse_step, nodes, bounds, node_gradient, gradient):
+    """Gradient (H, C, W) of the whitened log colours from the gradient of the node counts; 0 where not valid."""
+    t = gradient.dtype.type
+    for i in range(palette.shape[0]):
+        gradient[i] = t(0)
+        for j in range(spans[i, 0], spans[i, 1]):
+            if valid[i, j] == 0:
+                continue
+            a, x, x_in = _locate(float(palette[i, 0, j]), low, inverse_step, nodes, bounds[0, 0])
+            b, y, y_in = _locate(float(palette[i, 1, j]), low, inverse_step, nodes, bounds[1, 0])
+            c, z, z_in = _locate(float(palette[i, 2, j]), low, inverse_step, nodes, bounds[2, 0])
+            g000, g001 = node_gradient[a, b, c], node_gradient[a, b, c + 1]
+            g010, g011 = node_gradient[a, b + 1, c], node_gradient[a, b + 1, c + 1]
+            g100, g101 = node_gradient[a + 1, b, c], node_gradient[a + 1, b, c + 1]
+            g110, g111 = node_gradient[a + 1, b + 1, c], node_gradient[a + 1, b + 1, c + 1]
+            x0, y0, z0 = 1 - x, 1 - y, 1 - z
+            gx = y0 * (z0 * (g100 - g000) + z * (g101 - g001)) + y * (z0 * (g110 - g010) + z * (g111 - g011))
+            gy = x0 * (z0 * (g010 - g000) + z * (g011 - g001)) + x * (z0 * (g110 - g100) + z * (g111 - g101))
+            gz = x0 * (y0 * (g001 - g000) + y * (g011 - g010)) + x * (y0 * (g101 - g100) + y * (g111 - g110))
+            gradient[i, 0, j] = t(gx * inverse_step) if x_in else t(0)
+            gradient[i, 1, j] = t(gy * inverse_step) if y_in else t(0)
+            gradient[i, 2, j] = t(gz * inverse_step) if z_in else t(0)
+
+
+@compiled
+def blur_color(counts, taps, blurred):
+    """Separable blur of counts (A, B, N), zero padded, only where it can matter: `blurred` is right on occupied rows."""
+    size_a, size_b, size_c = counts.shape
+    half = len(taps) // 2
+    occupied = np.zeros((size_a, size_b), np.bool_)
+    along_c = np.zeros_like(counts)
+    for a in range(size_a):
+        for b in range(size_b):
+            source, target = counts[a, b], along_c[a, b]
+            for c in range(size_c):
+                if source[c] != 0:
+                    occupied[a, b] = True
+                    value = source[c]
+                    start = max(0, c - half)
+                    stop = min(size_c, c + half + 1)
+                    shift = half - c
+                    for k in range(start, stop):
+                        target[k] += value * taps[k + shift]
+    along_b = np.zeros_like(counts)
+    reached = np.zeros((size_a, size_b), np.bool_)
+    for a in range(size_a):
+        for b in range(size_b):
+            if not occupied[a, b]:
+                continue
+            source = along_c[a, b]
+            for k in range(max(0, b - half), min(size_b, b + half + 1)):
+                reached[a, k] = True
+                target, tap = along_b[a, k], taps[k - b + half]
+                for c in range(size_c):
+                    target[c] += source[c] * tap
+    for a in range(size_a):
+        for b in range(size_b):
+            target = blurred[a, b]
+            target[:] = 0
+            if not occupied[a, b]:
+                continue
+            for k in range(max(0, a - half), min(size_a, a + half + 1)):
+                if not reached[k, b]:
+                    continue
+                source, tap = along_b[k, b], taps[a - k + half]
+                for c in range(size_c):
+                    target[c] += source[c] * tap
+
+
+@compiled
+def backward_rows(
+    first, last, geometry, light, whiten_smooth, whiten_palette, g_smooth, g_palette, g_curvature, scales, d3, contour, light_sums, out
+):
+    """Gradients of the first and second derivatives of the height, and of the light, for rows [first, last).
+
+    g_smooth, g_palette (H, C, W); g_curvature (H, W); scales: (smoothness, palette, curvature, slant); contour (2, H, W);
+    light_sums (H, 9, C), of monomials of the normal; out (5, H + 4, W + 4) with zero borders of two.
+    """
+    t = geometry.dtype.type
+    one, two, three, half = t(1), t(2), t(3), t(0.5)
+    channels, width = g_smooth.shape[1], g_smooth.shape[2]
+    k_smooth, k_palette, k_curvature, k_slant = t(scales[0]), t(scales[1]), t(scales[2]), t(scales[3])
+    m_smooth, m_palette = whiten_smooth.T * k_smooth, whiten_palette.T * k_palette
+    e = np.empty((channels, width), geometry.dtype)
+    f = np.empty((channels, width), geometry.dtype)
+    d1 = np.empty(width, geometry.dtype)
+    d2 = np.empty(width, geometry.dtype)
+    dn3 = np.empty(width, geometry.dtype)
+    dk = np.empty(width, geometry.dtype)
+    along = np.empty(width, geometry.dtype)
+    cross = np.empty(width, geometry.dtype)
+    for i in range(first, last):
+        row = geometry[i]
+        zi, zj, zii, zjj, zij, n1, n2, n3, curved = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8]
+        _mix(g_smooth[i], m_smooth, e)
+        _mix(g_palette[i], m_palette, f)
+        c1, c2, slant = contour[0, i], contour[1, i], d3[i]
+        for j in range(width):
+            d1[j] = c1[j]
+        for j in range(width):
+            d2[j] = c2[j]
+        for j in range(width):
+            dn3[j] = slant[j] * k_slant
+        for c in range(channels):
+            ec, fc = e[c], f[c]
+            for j in range(width):
+                ec[j] = -(ec[j] + fc[j])  # gradient of the log shading
+            _light_sums(ec, n1, n2, n3, light_sums[i, :, c])
+            l1, l2, l3, l4 = light[1, c], light[2, c], light[3, c], light[4, c]
+            l5, l6, l7, l8 = light[5, c], light[6, c], light[7, c], light[8, c]
+            for j in range(width):
+                d1[j] += ec[j] * (l3 + l4 * n2[j] + l7 * n3[j] + two * l8 * n1[j])
+            for j in range(width):
+                d2[j] += ec[j] * (l1 + l4 * n1[j] + l5 * n3[j] - two * l8 * n2[j])
+            for j in range(width):
+                dn3[j] += ec[j] * (l2 + l5 * n2[j] + l7 * n1[j] + two * l6 * n3[j])
+        gk = g_curvature[i]
+        for j in range(width):
+            dk[j] = gk[j] * k_curvature
+        for j in range(width):
+            along[j] = zi[j] * d1[j] + zj[j] * d2[j] - dn3[j]
+        for j in range(width):
+            along[j] = along[j] * n3[j] * n3[j] * n3[j] - three * curved[j] * n3[j] * n3[j] * dk[j]
+        for j in range(width):
+            dk[j] = dk[j] * n3[j] * n3[j] * n3[j]
+        for j in range(width):
+            cross[j] = dk[j] * (zi[j] * zjj[j] - zj[j] * zij[j])
+        o = out[0, i + 2, 2 : width + 2]
+        for j in range(width):
+            o[j] = cross[j] + zi[j] * along[j] - n3[j] * d1[j]
+        for j in range(width):
+            cross[j] = dk[j] * (zj[j] * zii[j] - zi[j] * zij[j])
+        o = out[1, i + 2, 2 : width + 2]
+        for j in range(width):
+            o[j] = cross[j] + zj[j] * along[j] - n3[j] * d2[j]
+        o = out[2, i + 2, 2 : width + 2]
+        for j in range(width):
+            o[j] = half * dk[j] * (one + zj[j] * zj[j])
+        o = out[3, i + 2, 2 : width + 2]
+        for j in range(width):
+            o[j] = half * dk[j] * (one + zi[j] * zi[j])
+        o = out[4, i + 2, 2 : width + 2]
+        for j in range(width):
+            o[j] = -dk[j] * zi[j] * zj[j]
+
+
+@compiled
+def _light_sums(d, n1, n2, n3, sums):
+    """Sums of d times 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
+    t = d.dtype.type
+    s0, s1, s2, s3, s4, s5, s6, s7, s8 = t(0), t(0), t(0), t(0), t(0), t(0), t(0), t(0), t(0)
+    for j in range(len(d)):
+        a, b, c = d[j] * n1[j], d[j] * n2[j], d[j] * n3[j]
+        s0 += d[j]
+        s1 += b
+        s2 += c
+        s3 += a
+        s4 += a * n2[j]
+        s5 += b * n3[j]
+        s6 += c * n3[j]
+        s7 += a * n3[j]
+        s8 += a * n1[j] - b * n2[j]
+    sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8] = s0, s1, s2, s3, s4, s5, s6, s7, s8
+
+
+@compiled
+def adjoint_rows(first, last, d, wide):
+    """Rows [first, last) of the gradient of the padded height, (H+2, W+2), from those of its derivatives, (5, H+4, W+4)."""
+    t = wide.dtype.type
+    two, quarter, eighth = t(2), t(0.25), t(0.125)
+    width = d.shape[2]
+    p = np.empty(width, wide.dtype)
+    q = np.empty(width, wide.dtype)
+    r = np.empty(width, wide.dtype)
+    for i in range(first, last):
+        below, here, above = d[:, i], d[:, i + 1], d[:, i + 2]  # sources whose stencil has this row below, at, above its centre
+        b0, b1, b2, b3, b4 = below[0], below[1], below[2], below[3], below[4]
+        h1, h2, h3 = here[1], here[2], here[3]
+        a0, a1, a2, a3, a4 = above[0], above[1], above[2], above[3], above[4]
+        for j in range(width):
+            p[j] = (b0[j] - a0[j]) * eighth + (b2[j] - two * h2[j] + a2[j]) * quarter
+        for j in range(width):
+            q[j] = (b1[j] + two * h1[j] + a1[j]) * eighth + (b4[j] - a4[j]) * quarter
+        for j in range(width):
+            r[j] = (b3[j] + two * h3[j] + a3[j]) * quarter
+        out = wide[i]
+        for j in range(width - 2):
+            out[j] = p[j] + two * p[j + 1] + p[j + 2] + q[j] - q[j + 2] + r[j] - two * r[j + 1] + r[j + 2]

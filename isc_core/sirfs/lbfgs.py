@@ -1,0 +1,258 @@
+"""Limited-memory BFGS with a strong Wolfe line search, in place and in the storage type of the unknowns.
+
+The direction comes from the two-loop recursion (Nocedal 1980, doi:10.1090/S0025-5718-1980-0572855-7) carried out on the
+inner products of the stored vectors alone (after Chen, Wang & Zhou 2014, "Large-scale L-BFGS using MapReduce", NIPS): each
+iteration reads the memory twice, once for products and once for the direction. Products are float64 sums in a fixed order.
+The line search is that of Nocedal & Wright 2006, section 3.5, doi:10.1007/978-0-387-40065-5.
+Limits: smooth unconstrained functions; small kinks are survived, not resolved.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class LbfgsOptions:
+    """`memory`: pairs kept. `iterations`, `evaluations`: at most so many.
+
+    `loss_tolerance`, `loss_window`: stop once so many previous losses all lie within this relative distance of the current
+    one. `gradient_tolerance`: stop at a largest gradient component this small. `step_tolerance`: or at a smaller step.
+    `armijo`, `wolfe`: the strong Wolfe conditions' constants; `trials`: evaluations of one line search.
+    """
+
+    memory: int = 10
+    iterations: int = 2000
+    evaluations: int = 1000
+    loss_tolerance: float = 5e-5
+    loss_window: int = 5
+    gradient_tolerance: float = 1e-5
+    step_tolerance: float = 1e-9
+    armijo: float = 1e-4
+    wolfe: float = 0.9
+    trials: int = 25
+
+
+@dataclass(frozen=True)
+class LbfgsResult:
+    """`loss`: final value. `reason`: why it stopped, one of "loss", "gradient", "step", "iterations", "evaluations"."""
+
+    loss: float
+    iterations: int
+    evaluations: int
+    reason: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether it stopped because there was no more to gain."""
+        return self.reason in ("loss", "gradient", "step")
+
+
+class Algebra(Protocol):
+    """The two passes over the stored vectors."""
+
+    def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """Inner products (K, M) float64 of `vectors` (K, N) with `others` (M, N)."""
+        ...
+
+    def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
+        """out = sum_k coefficients[k] vectors[k]."""
+        ...
+
+
+class NumpyAlgebra:
+    """`Algebra` in plain NumPy."""
+
+    def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
+        """See `Algebra`."""
+        return np.stack([np.einsum("kn,n->k", vectors, v, dtype=float) for v in others], axis=1)
+
+    def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
+        """See `Algebra`."""
+        np.einsum("k,kn->n", coefficients.astype(out.dtype), vectors, out=out)
+
+
+Function = Callable[[np.ndarray, np.ndarray], float]
+
+
+class _Memory:
+    """Steps and gradient changes, with the inner products between all of them. Rows: m steps, m changes, the gradient."""
+
+    def __init__(self, size: int, length: int, dtype: np.dtype, algebra: Algebra) -> None:  # type: ignore[type-arg]
+        self.size = size
+        self.vectors = np.zeros((2 * size + 1, length), dtype)
+        self._gram = np.zeros((2 * size + 1, 2 * size + 1))
+        self._order: list[int] = []
+        self._algebra = algebra
+
+    @property
+    def gradient(self) -> np.ndarray:
+        return self.vectors[-1]
+
+    def next_slot(self) -> int:
+        return self._order[0] if len(self._order) == self.size else len(self._order)
+
+    def refresh(self, slot: int | None) -> None:
+        """Takes the rows of `slot` as the newest pair (None: only the gradient has changed)."""
+        rows = [2 * self.size] if slot is None else [slot, self.size + slot, 2 * self.size]
+        products = self._algebra.products(self.vectors, self.vectors[rows])
+        self._gram[:, rows] = products
+        self._gram[rows, :] = products.T
+        if slot is None:
+            return
+        self._order = [k for k in self._order if k != slot]
+        if self._gram[slot, self.size + slot] > 1e-10:
+            self._order.append(slot)
+
+    def direction(self, out: np.ndarray) -> float:
+        """Writes the descent direction into `out`; returns its product with the gradient."""
+        m, g = self.size, self._gram
+        c = np.zeros(2 * m + 1)
+        c[-1] = -1
+        alpha = {}
+        for k in reversed(self._order):
+            alpha[k] = float(c @ g[:, k]) / g[k, m + k]
+            c[m + k] -= alpha[k]
+        if self._order:
+            newest = self._order[-1]
+            c *= g[newest, m + newest] / g[m + newest, m + newest]
+        for k in self._order:
+            c[k] += alpha[k] - float(c @ g[:, m + k]) / g[k, m + k]
+        self._algebra.combine(c, self.vectors, out)
+        return float(c @ g[:, -1])
+
+    def forget(self) -> None:
+        self._order = []
+
+
+def minimise(
+    function: Function,
+    x: np.ndarray,
+    options: LbfgsOptions,
+    algebra: Algebra,
+    each: Callable[[int, float], None] = lambda iteration, loss: None,
+) -> LbfgsResult:
+    """Minimises `function(x, gradient_out) -> loss`, changing `x` (N,) in place.
+
+    `each(iteration, loss)` is called after every step; what it raises ends the run.
+    """
+    memory = _Memory(options.memory, x.size, x.dtype, algebra)
+    direction, start, old_gradient = np.empty_like(x), np.empty_like(x), np.empty_like(x)
+    loss = function(x, memory.gradient)
+    evaluations, losses = 1, [loss]
+    memory.refresh(None)
+    for iteration in range(1, options.iterations + 1):
+        if float(np.abs(memory.gradient).max()) <= options.gradient_tolerance:
+            return LbfgsResult(loss, iteration - 1, evaluations, "gradient")
+        slope = memory.direction(direction)
+        if not slope < 0:
+            memory.forget()
+            slope = memory.direction(direction)
+        first = 1.0 if iteration > 1 else min(1.0, 1.0 / float(np.abs(memory.gradient).sum(dtype=float)))
+        np.copyto(start, x)
+        np.copyto(old_gradient, memory.gradient)
+        search = _Search(function, x, start, direction, memory.gradient, options)
+        step, loss = search.run(loss, slope, first)
+        evaluations += search.evaluations
+        slot = memory.next_slot()
+        np.subtract(x, start, out=memory.vectors[slot])
+        np.subtract(memory.gradient, old_gradient, out=memory.vectors[memory.size + slot])
+        memory.refresh(slot)
+        each(iteration, loss)
+        losses.append(loss)
+        recent = losses[-1 - options.loss_window : -1]
+        if len(recent) == options.loss_window and all(abs(v - loss) <= options.loss_tolerance * abs(loss) for v in recent):
+            return LbfgsResult(loss, iteration, evaluations, "loss")
+        if step * float(np.abs(direction).max()) < options.step_tolerance or abs(losses[-2] - loss) < options.step_tolerance:
+            return LbfgsResult(loss, iteration, evaluations, "step")
+        if evaluations >= options.evaluations:
+            return LbfgsResult(loss, iteration, evaluations, "evaluations")
+    return LbfgsResult(loss, options.iterations, evaluations, "iterations")
+
+
+@dataclass(frozen=True)
+class _Trial:
+    step: float
+    loss: float
+    slope: float
+
+
+class _Search:
+    """One line search along `direction` from `start`; `x` and `gradient` end at the accepted point."""
+
+    def __init__(
+        self, function: Function, x: np.ndarray, start: np.ndarray, direction: np.ndarray, gradient: np.ndarray, options: LbfgsOptions
+    ) -> None:
+        self._function, self._x, self._start, self._direction, self._gradient = function, x, start, direction, gradient
+        self._options = options
+        self.evaluations = 0
+
+    def run(self, loss: float, slope: float, first: float) -> tuple[float, float]:
+        """The accepted step and its loss."""
+        o = self._options
+        origin = previous = _Trial(0.0, loss, slope)
+        step = first
+        while self.evaluations < o.trials:
+            trial = self._try(step)
+            if not np.isfinite(trial.loss):
+                step = (previous.step + step) / 2
+                continue
+            if trial.loss > loss + o.armijo * step * slope or (self.evaluations > 1 and trial.loss >= previous.loss):
+                return self._zoom(origin, previous, trial)
+            if abs(trial.slope) <= -o.wolfe * slope:
+                return trial.step, trial.loss
+            if trial.slope >= 0:
+                return self._zoom(origin, trial, previous)
+            step = float(np.clip(_cubic_minimum(previous, trial), step + 0.01 * (step - previous.step), 10 * step))
+            previous = trial
+        return self._settle(previous)
+
+    def _zoom(self, origin: _Trial, low: _Trial, high: _Trial) -> tuple[float, float]:
+        o = self._options
+        trial = low
+        while self.evaluations < o.trials:
+            width = abs(high.step - low.step)
+            step = _cubic_minimum(low, high)
+            least, most = min(low.step, high.step), max(low.step, high.step)
+            step = float(np.clip(step, least + 0.1 * width, most - 0.1 * width))
+            trial = self._try(step)
+            if not np.isfinite(trial.loss) or trial.loss > origin.loss + o.armijo * step * origin.slope or trial.loss >= low.loss:
+                high = trial if np.isfinite(trial.loss) else _Trial(step, low.loss + 1, 0.0)
+            elif abs(trial.slope) <= -o.wolfe * origin.slope:
+                return trial.step, trial.loss
+            else:
+                if trial.slope * (high.step - low.step) >= 0:
+                    high = low
+                low = trial
+            if width * float(np.abs(self._direction).max()) < o.step_tolerance:
+                break
+        return (trial.step, trial.loss) if trial is low else self._settle(low)
+
+    def _try(self, step: float) -> _Trial:
+        np.multiply(self._direction, self._x.dtype.type(step), out=self._x)
+        self._x += self._start
+        self.evaluations += 1
+        loss = self._function(self._x, self._gradient)
+        return _Trial(step, loss, float(np.einsum("n,n->", self._gradient, self._direction, dtype=float)))
+
+    def _settle(self, best: _Trial) -> tuple[float, float]:
+        """Goes back to the best point seen, which need not be the last one evaluated."""
+        trial = self._try(best.step)
+        return trial.step, trial.loss
+
+
+def _cubic_minimum(a: _Trial, b: _Trial) -> float:
+    """Where the cubic through two losses and slopes is least; the middle where it has no minimum."""
+    if a.step == b.step:
+        return a.step
+    d1 = a.slope + b.slope - 3 * (a.loss - b.loss) / (a.step - b.step)
+    square = d1 * d1 - a.slope * b.slope
+    if not square >= 0:
+        return (a.step + b.step) / 2
+    d2 = float(np.copysign(np.sqrt(square), b.step - a.step))
+    divisor = b.slope - a.slope + 2 * d2
+    if divisor == 0:
+        return (a.step + b.step) / 2
+    return b.step - (b.step - a.step) * (b.slope + d2 - d1) / divisor

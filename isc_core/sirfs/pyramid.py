@@ -1,0 +1,72 @@
+"""Heights as sums over the levels of a Gaussian pyramid's adjoint, so that one optimiser moves all scales at once.
+
+Z = y_1 + D^T (y_2 + D^T (y_3 + ...)) with D one step down: the filter (1,3,3,1)/sqrt(8) along each axis with replicated edges,
+then every second sample. The gradient of y_1 is dZ, that of y_{k+1} is D dy_k (Barron & Malik 2015,
+doi:10.1109/TPAMI.2014.2377712). A step up doubles heights, as pixels half as large ask for.
+Limits: the replicated edges give nodes of very small levels large weights at the border, so levels stop at `SMALLEST`.
+"""
+
+import numpy as np
+
+TAPS = tuple(float(v) for v in np.array([1, 3, 3, 1]) / np.sqrt(8))
+SMALLEST = 4
+
+
+def level_shapes(shape: tuple[int, int], levels: int | None = None) -> list[tuple[int, int]]:
+    """Shapes of the levels for heights of `shape`, the finest first: `levels` of them, or as many as stay at or above `SMALLEST`."""
+    shapes = [shape]
+    while levels is None or len(shapes) < levels:
+        rows, columns = ((n + 1) // 2 for n in shapes[-1])
+        if levels is None and min(rows, columns) < SMALLEST:
+            break
+        shapes.append((rows, columns))
+    return shapes
+
+
+def down(fine: np.ndarray) -> np.ndarray:
+    """One step down: (H, W) to (ceil(H/2), ceil(W/2))."""
+    return _down_rows(_down_rows(fine).T).T
+
+
+def up(coarse: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """The adjoint of `down` for fine maps of `shape`."""
+    rows = _up_rows(np.ascontiguousarray(coarse.T), shape[1]).T
+    return _up_rows(np.ascontiguousarray(rows), shape[0])
+
+
+def _down_rows(fine: np.ndarray) -> np.ndarray:
+    """Filter and decimation along the first axis."""
+    n = (fine.shape[0] + 1) // 2
+    padded = np.concatenate([fine[:1], fine, fine[-1:], fine[-1:]])
+    a, b = fine.dtype.type(TAPS[0]), fine.dtype.type(TAPS[1])
+    outer = padded[0 : 2 * n : 2] + padded[3 : 2 * n + 3 : 2]
+    return outer * a + (padded[1 : 2 * n + 1 : 2] + padded[2 : 2 * n + 2 : 2]) * b
+
+
+def _up_rows(coarse: np.ndarray, size: int) -> np.ndarray:
+    """The adjoint of `_down_rows` for `size` fine rows."""
+    n = coarse.shape[0]
+    padded = np.zeros((size + 3, *coarse.shape[1:]), coarse.dtype)
+    outer, inner = coarse * coarse.dtype.type(TAPS[0]), coarse * coarse.dtype.type(TAPS[1])
+    padded[0 : 2 * n : 2] += outer
+    padded[1 : 2 * n + 1 : 2] += inner
+    padded[2 : 2 * n + 2 : 2] += inner
+    padded[3 : 2 * n + 3 : 2] += outer
+    padded[1] += padded[0]
+    padded[size] += padded[size + 1] + padded[size + 2]
+    return padded[1 : size + 1]
+
+
+def synthesise(levels: list[np.ndarray]) -> np.ndarray:
+    """The height map that the levels (finest first) stand for."""
+    height = levels[-1]
+    for level in levels[-2::-1]:
+        height = level + up(height, level.shape)  # type: ignore[arg-type]
+    return height
+
+
+def analyse(gradient: np.ndarray, out: list[np.ndarray]) -> None:
+    """The adjoint of `synthesise`: writes the gradients of all levels into `out`."""
+    out[0][...] = gradient
+    for fine, coarse in zip(out[:-1], out[1:], strict=True):
+        coarse[...] = down(fine)

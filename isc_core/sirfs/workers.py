@@ -1,0 +1,45 @@
+"""A few threads for kernels that release the interpreter lock.
+
+Which thread runs which task never changes a result: tasks write to places of their own, and sums over tasks are taken in
+the tasks' order.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from types import TracebackType
+
+
+class Workers:
+    """Runs lists of tasks on `threads` threads, the calling one included. Use as a context manager, or call `close`."""
+
+    def __init__(self, threads: int) -> None:
+        self.threads = max(1, threads)
+        self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
+
+    def run(self, tasks: Sequence[Callable[[], None]]) -> None:
+        """Runs every task and returns when all are done; the first exception is raised."""
+        if self._pool is None or len(tasks) < 2:
+            for task in tasks:
+                task()
+            return
+        waiting = iter(tasks)
+        others = [self._pool.submit(_drain, waiting) for _ in range(min(self.threads, len(tasks)) - 1)]
+        _drain(waiting)
+        for other in others:
+            other.result()
+
+    def close(self) -> None:
+        """Ends the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def __enter__(self) -> "Workers":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        self.close()
+
+
+def _drain(waiting: Iterator[Callable[[], None]]) -> None:
+    for task in waiting:  # a list's iterator hands each task to one thread only
+        task()
