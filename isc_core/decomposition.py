@@ -1,9 +1,15 @@
-"""The results of the core, as typed frozen objects, and their files."""
+"""The results of the core, as typed frozen objects, and the identities that they keep.
+
+Identities, inside the mask: `image = diffuse + specular + residual`, `diffuse = reflectance * shading` (both to 1e-5 of the image's
+maximum), `shading = exp(SH(normal))` (to 1e-4 relative), unit normals. Their files are written and read by `result_folder`.
+"""
 
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
+from .sirfs.frames import real_sh
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,30 @@ class Provenance:
 
 
 @dataclass(frozen=True)
+class IdentityErrors:
+    """The worst violation of each identity inside the mask, and what is tolerated.
+
+    `image`, `shading_product`: largest absolute error over the image's maximum. `sh`: largest relative error of the shading.
+    `normal_length`: largest deviation of a normal's length from 1.
+    """
+
+    image: float
+    shading_product: float
+    sh: float
+    normal_length: float
+
+    def broken(self) -> tuple[str, ...]:
+        """The identities that do not hold, in words; empty for a sound result."""
+        tests = (
+            (self.image, 1e-5, "image = diffuse + specular + residual"),
+            (self.shading_product, 1e-5, "diffuse = reflectance * shading"),
+            (self.sh, 1e-4, "shading = exp(SH(normal))"),
+            (self.normal_length, 1e-4, "normals of length 1"),
+        )
+        return tuple(f"{name} (error {error:.2g})" for error, tolerance, name in tests if not error <= tolerance)
+
+
+@dataclass(frozen=True)
 class Decomposition:
     """The intrinsic scene characteristics of one photo. Maps cover the whole frame at the scale used.
 
@@ -54,3 +84,25 @@ class Decomposition:
     confidence: np.ndarray
     illumination: np.ndarray
     provenance: Provenance
+
+    def identity_errors(self) -> IdentityErrors:
+        """How well the maps fit each other inside the mask. Raises `ValueError` for an empty mask."""
+        if not self.mask.any():
+            raise ValueError("the mask is empty: there is nothing to check")
+        inside = {name: getattr(self, name)[self.mask].astype(np.float64) for name in COLOR_MAPS + ("normal",)}
+        scale = max(float(np.abs(inside["image"]).max()), 1e-6)
+        layers = inside["diffuse"] + inside["specular"] + inside["residual"]
+        expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
+        return IdentityErrors(
+            image=_worst(inside["image"] - layers) / scale,
+            shading_product=_worst(inside["diffuse"] - inside["reflectance"] * inside["shading"]) / scale,
+            sh=_worst(expected / np.maximum(inside["shading"], 1e-9) - 1),
+            normal_length=_worst(np.linalg.norm(inside["normal"], axis=-1) - 1),
+        )
+
+
+COLOR_MAPS = ("image", "diffuse", "specular", "residual", "reflectance", "shading")
+
+
+def _worst(error: np.ndarray) -> float:
+    return float(np.abs(error).max())

@@ -1,0 +1,40 @@
+"""Float32 OpenEXR files from and to plain arrays, channel by channel.
+
+Channels keep their full names (`diffuse.R`, `height.Z`); compression is lossless (ZIP), and equal arrays give equal bytes.
+"""
+
+import errno
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+from .errors import InputError
+
+_FULL = 1 << 20  # a disk with less free space than this, in bytes, is called full
+
+
+def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
+    """Writes one scanline file. `channels`: name -> (H, W), all of one shape. Raises `OSError` when it cannot be written whole."""
+    # The writer stores garbage from strided arrays without a word: every channel is made contiguous here.
+    pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    try:
+        with OpenEXR.File(header, pixels) as file:
+            file.write(str(path))
+    except RuntimeError as error:
+        full = shutil.disk_usage(path.parent).free < _FULL
+        raise OSError(errno.ENOSPC if full else errno.EIO, str(error)) from error
+
+
+def read_channels(path: Path) -> dict[str, np.ndarray]:
+    """All channels of a file's first part: name -> (H, W) float32. Raises `InputError` if it is no readable OpenEXR file."""
+    if not path.is_file():
+        raise InputError(f"{path} does not exist")
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            return {name: np.asarray(channel.pixels, np.float32) for name, channel in file.channels().items()}
+    except (RuntimeError, ValueError) as error:
+        raise InputError(f"{path} is not a readable OpenEXR file (damaged or cut short)") from error

@@ -1,0 +1,226 @@
+"""The contact sheet: one picture that shows a person what came out, before anything else is opened.
+
+Tones: input, diffuse and specular share one exposure, so that they can be compared; reflectance has its own, shading and light one of
+theirs. An exposure puts the 99.5th percentile of the brightest channel inside the mask at 0.95. Everything is blended in linear light
+and coded as sRGB at the end. Maps are cropped to the object and scaled with their mask as weight, so that no black creeps in at the edge.
+
+The height is drawn as a relief under a lamp at the upper left, with contour lines at round distances; the light as a white ball in it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import ceil
+from pathlib import PurePath
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFilter, ImageFont
+
+from .decomposition import Decomposition, Separation
+from .photo import linear_to_srgb, srgb_to_linear
+from .sirfs.frames import real_sh
+
+_PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
+_PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
+_MARGIN = 0.06  # room around the object, of the panel's side
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One picture of a sheet: `color` (N, N, 3) linear, `coverage` (N, N) in [0, 1], a label and a faint remark."""
+
+    color: np.ndarray
+    coverage: np.ndarray
+    label: str
+    remark: str = ""
+
+
+def contact_sheet(decomposition: Decomposition) -> Image.Image:
+    """The sheet of a decomposition: eight panels, 4 x 2, with a title taken from its provenance.
+
+    The title reads `input["name"]`, `settings["model"]`, `settings["separator"]`, `settings["illumination"]`, `status["loss"]`,
+    `status["converged"]`, as far as they are there.
+    """
+    d = decomposition
+    frame = _Frame.around(d.mask)
+    photo, paint, light = (_exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading))
+    ball, coverage = _ball(d.illumination)
+    light = min(light, _exposure(ball[coverage > 0.5]))
+    colors = [
+        (d.image, photo, "Input", ""),
+        (d.diffuse, photo, "Diffuse", ""),
+        (d.specular, photo, "Specular", f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light"),
+        (d.reflectance, paint, "Reflectance", ""),
+        (d.shading, light, "Shading", ""),
+    ]
+    panels = [Panel(gain * frame.scaled(values), frame.coverage, label, remark) for values, gain, label, remark in colors]
+    panels.append(Panel(srgb_to_linear(0.5 + 0.5 * frame.scaled(d.normal)), frame.coverage, "Normals", "x right, y up, z to viewer"))
+    panels.append(_relief(d, frame))
+    panels.append(Panel(light * ball, coverage, "Light", "on a white ball"))
+    return _sheet(*_title(d), panels, columns=4)
+
+
+def separation_sheet(separation: Separation, image: np.ndarray, mask: np.ndarray, title: str = "") -> Image.Image:
+    """The sheet of a separation, 3 x 1: input, diffuse, specular. `image`: (H, W, 3) linear. `mask`: (H, W) bool."""
+    frame, gain = _Frame.around(mask), _exposure(image[mask])
+    share = f"{100 * _share(separation.specular, image, mask):.1f} % of the light"
+    maps = [(image, "Input", ""), (separation.diffuse, "Diffuse", ""), (separation.specular, "Specular", share)]
+    panels = [Panel(gain * frame.scaled(values), frame.coverage, label, remark) for values, label, remark in maps]
+    return _sheet(title or "Separation", f"{mask.shape[1]} x {mask.shape[0]} px", panels, columns=3)
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """How a map gets into a panel: through a square window around the object. `top`, `left`, `side`: pixels of the map, may lie outside."""
+
+    mask: np.ndarray
+    top: int
+    left: int
+    side: int
+
+    @classmethod
+    def around(cls, mask: np.ndarray) -> "_Frame":
+        rows, columns = np.nonzero(mask)
+        ends = np.array([[rows.min(), columns.min()], [rows.max() + 1, columns.max() + 1]])
+        side = ceil(float((ends[1] - ends[0]).max()) / (1 - 2 * _MARGIN))
+        top, left = np.rint((ends.sum(0) - side) / 2).astype(int)
+        return cls(mask, int(top), int(left), side)
+
+    @property
+    def coverage(self) -> np.ndarray:
+        """How much of each pixel of the panel, (N, N), the object covers; a small object's outline is rounded, not shown in steps."""
+        zoom = max(1.0, _PANEL / self.side)
+        soft = Image.fromarray(np.rint(255 * self._resized(self.mask)).astype(np.uint8))
+        if zoom > 1:
+            soft = soft.filter(ImageFilter.GaussianBlur(0.9 * zoom))
+        return np.clip((np.asarray(soft) / 255.0 - 0.5) * zoom + 0.5, 0, 1)
+
+    def scaled(self, values: np.ndarray) -> np.ndarray:
+        """A map, (H, W) or (H, W, C), as it appears in the panel, (N, N) or (N, N, C); 0 where the mask is not."""
+        if values.ndim == 3:
+            return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
+        weight = self._resized(self.mask)
+        return np.where(weight > 1e-3, self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3), 0)
+
+    def _resized(self, plane: np.ndarray) -> np.ndarray:
+        window = np.zeros((self.side, self.side), np.float32)
+        top, left = max(0, self.top), max(0, self.left)
+        part = plane[top : self.top + self.side, left : self.left + self.side]
+        window[top - self.top :, left - self.left :][: part.shape[0], : part.shape[1]] = part
+        return np.asarray(Image.fromarray(window).resize((_PANEL, _PANEL), Image.Resampling.BILINEAR), np.float64)
+
+
+def _exposure(inside: np.ndarray) -> float:
+    bright = float(np.percentile(inside.max(-1), 99.5))
+    return 0.95 / bright if bright > 0 else 1.0
+
+
+def _share(part: np.ndarray, whole: np.ndarray, mask: np.ndarray) -> float:
+    return float(part[mask].sum(dtype=np.float64) / max(float(whole[mask].sum(dtype=np.float64)), 1e-9))
+
+
+def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A white ball under the light, (N, N, 3), and its coverage, (N, N)."""
+    radius = _PANEL * (0.5 - _MARGIN) * 0.9
+    axis = (np.arange(_PANEL) + 0.5 - _PANEL / 2) / radius
+    x, y = np.meshgrid(axis, -axis)
+    distance = np.hypot(x, y)
+    shrink = np.minimum(1, 1 / np.maximum(distance, 1e-9))  # beyond the outline: its normal, for the pixels it crosses
+    normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
+    return np.exp(real_sh(normal) @ illumination), np.clip((1 - distance) * radius + 0.5, 0, 1)
+
+
+def _relief(d: Decomposition, frame: _Frame) -> Panel:
+    """The height under a lamp at the upper left, with contour lines."""
+    heights = d.height[d.mask]
+    low, high = float(heights.min()), float(heights.max())
+    spacing = _round_step((high - low) / 12)
+    normal = frame.scaled(d.normal)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    lamp = np.array([-0.52, 0.58, 0.63])
+    key, sky = np.clip((normal @ lamp + 0.3) / 1.3, 0, 1) ** 1.5, 0.6 + 0.4 * normal[..., 1]  # a large lamp: a soft edge of shadow
+    height = frame.scaled(d.height)
+    tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
+    clay = (1 - tint) * np.array([0.36, 0.44, 0.52]) + tint * np.array([0.86, 0.78, 0.66])
+    color = clay * (0.95 * key[..., None] * np.array([1.0, 0.97, 0.9]) + 0.16 * sky[..., None] * np.array([0.75, 0.88, 1.0]))
+    color *= 1 - 0.55 * _contours(height / spacing, frame.coverage)[..., None]
+    return Panel(color, frame.coverage, "Height", f"range {high - low:.0f} px, lines every {spacing:g}")
+
+
+def _contours(level: np.ndarray, coverage: np.ndarray) -> np.ndarray:
+    """How much of a contour line, [0, 1], lies on each pixel: at whole numbers of `level`, faded where the lines run together."""
+    slope = np.hypot(*np.gradient(level))
+    distance = np.abs(level - np.rint(level)) / np.maximum(slope, 1e-6)  # pixels to the line
+    fade = np.clip((0.25 - slope) / 0.15, 0, 1) * (coverage > 0.99)
+    return np.clip(1.1 - distance, 0, 1) * fade
+
+
+def _round_step(step: float) -> float:
+    """The nearest of 1, 2, 5 times a power of ten from above; 1 for nothing."""
+    if step <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(step))
+    return float(power * next(m for m in (1, 2, 5, 10) if m * power >= step * (1 - 1e-9)))
+
+
+def _title(d: Decomposition) -> tuple[str, str]:
+    given, settings, status = d.provenance.input, d.provenance.settings, d.provenance.status
+    name = PurePath(str(given.get("name", ""))).name or "Decomposition"
+    words = [f"{d.mask.shape[1]} x {d.mask.shape[0]} px"]
+    words += [str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)]
+    if isinstance(loss := status.get("loss"), int | float):
+        words.append(f"loss {loss:.2f}")
+    if isinstance(converged := status.get("converged"), bool):
+        words.append("converged" if converged else "stopped early")
+    return name, "   ·   ".join(words)
+
+
+def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> Image.Image:
+    rows = -(-len(panels) // columns)
+    width = 2 * _EDGE + columns * _PANEL + (columns - 1) * _GAP
+    height = _HEAD + rows * (_PANEL + _LABEL) + (rows - 1) * _GAP + _EDGE
+    sheet = Image.new("RGB", (width, height), _PAGE)
+    draw = ImageDraw.Draw(sheet)
+    _write(draw, (_EDGE, 50), title, 30, _TEXT, width - 2 * _EDGE)
+    _write(draw, (_EDGE, 80), subtitle, 16, _FAINT, width - 2 * _EDGE)
+    for index, panel in enumerate(panels):
+        row, column = divmod(index, columns)
+        x, y = _EDGE + column * (_PANEL + _GAP), _HEAD + row * (_PANEL + _LABEL + _GAP)
+        sheet.paste(_picture(panel), (x, y), _rounded())
+        end = _write(draw, (x + 2, y + _PANEL + 27), panel.label, 18, _TEXT, _PANEL)
+        _write(draw, (x + _PANEL - 2, y + _PANEL + 27), panel.remark, 14, _FAINT, x + _PANEL - end - 12, right=True)
+    return sheet
+
+
+def _write(
+    draw: ImageDraw.ImageDraw,
+    place: tuple[float, float],
+    text: str,
+    size: int,
+    color: tuple[int, int, int],
+    room: float,
+    *,
+    right: bool = False,
+) -> float:
+    """Writes a line on the base line `place`, cut to `room` pixels; returns where it ends."""
+    font = ImageFont.load_default(size)
+    if font.getlength(text) > room:
+        while text and font.getlength(text + "…") > room:
+            text = text[:-1]
+        text += "…"
+    draw.text(place, text, fill=color, font=font, anchor="rs" if right else "ls")
+    return place[0] + font.getlength(text)
+
+
+def _picture(panel: Panel) -> Image.Image:
+    """The panel on its card, blended in linear light."""
+    card = srgb_to_linear(np.array(_CARD) / 255.0)
+    alpha = panel.coverage[..., None]
+    linear = alpha * np.clip(panel.color, 0, 1) + (1 - alpha) * card
+    return Image.fromarray(np.rint(255 * linear_to_srgb(linear)).astype(np.uint8))
+
+
+def _rounded() -> Image.Image:
+    """The card's shape, with smooth round corners."""
+    shape = Image.new("L", (4 * _PANEL, 4 * _PANEL), 0)
+    ImageDraw.Draw(shape).rounded_rectangle((0, 0, 4 * _PANEL - 1, 4 * _PANEL - 1), 48, fill=255)
+    return shape.resize((_PANEL, _PANEL), Image.Resampling.LANCZOS)

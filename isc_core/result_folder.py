@@ -1,0 +1,185 @@
+"""The files of a result: what other programs read and what a person looks at first.
+
+A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`, `mesh.glb`, `preview.png`, and under `maps/`
+the main maps once more as single-layer files, for programs that cannot read multilayer ones. A separation's folder holds
+`separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears whole or not at all (see `atomic`).
+"""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from .atomic import new_folder, require_writable
+from .decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
+from .errors import InputError
+from .exr import read_channels, write_channels
+from .mesh import MeshOptions, MeshResult, build_mesh
+from .photo import linear_to_srgb
+from .progress import Monitor
+from .report import contact_sheet, separation_sheet
+
+SCHEMA_VERSION = 1
+LAYERS = {**dict.fromkeys(COLOR_MAPS, "RGB"), "normal": "XYZ", "height": "Z", "mask": "A", "confidence": "Y"}
+SINGLE = {"diffuse": "RGB", "specular": "RGB", "reflectance": "RGB", "shading": "RGB", "normal": "RGB", "height": "Y"}
+DECOMPOSITION_FILES = ("decomposition.json", "maps.exr", "mesh.glb", "preview.png", *(f"maps/{name}.exr" for name in SINGLE))
+SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
+
+
+def save(decomposition: Decomposition, folder: Path | str, *, mesh: MeshOptions | None = None, monitor: Monitor | None = None) -> None:
+    """Writes the folder of a decomposition, whole or not at all; an earlier result there is replaced.
+
+    Raises `InputError` if the folder is not ours or cannot be written, or the mask is too small for a mesh; `Cancelled`.
+    Raises `ValueError` if a map holds NaN or infinite values.
+    """
+    monitor = monitor or Monitor()
+    channels = _channels({name: getattr(decomposition, name) for name in LAYERS}, LAYERS)
+    if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
+        raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
+    with new_folder(folder, DECOMPOSITION_FILES) as partial:
+        monitor.report("writing maps", 0.0)
+        write_channels(partial / "maps.exr", channels)
+        (partial / "maps").mkdir()
+        for name, letters in SINGLE.items():
+            values = getattr(decomposition, name)
+            write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
+        monitor.report("building the mesh", 0.4)
+        built = build_mesh(decomposition.height, decomposition.normal, decomposition.mask, decomposition.reflectance, mesh)
+        (partial / "mesh.glb").write_bytes(built.glb())
+        monitor.report("drawing the preview", 0.7)
+        contact_sheet(decomposition).save(partial / "preview.png")
+        text = json.dumps(_plain(_description(decomposition, built)), indent=2, ensure_ascii=False, allow_nan=False)
+        (partial / "decomposition.json").write_text(text + "\n", encoding="utf-8")
+        monitor.report("writing maps", 1.0)
+
+
+def load(folder: Path | str) -> Decomposition:
+    """Reads what `save` wrote. Raises `InputError` if something is missing, damaged, or does not fit together."""
+    folder = Path(folder)
+    if not (folder / "decomposition.json").is_file():
+        raise InputError(f"{folder} is not a result folder (it has no decomposition.json): give the folder that isc decompose wrote")
+    description = _read_json(folder / "decomposition.json")
+    maps = _layers(folder / "maps.exr")
+    return Decomposition(
+        **{name: maps[name] for name in (*COLOR_MAPS, "normal", "height", "confidence")},
+        mask=maps["mask"] > 0.5,
+        illumination=_coefficients(description, folder),
+        provenance=_provenance(description, folder),
+    )
+
+
+def save_separation(
+    separation: Separation, image: np.ndarray, folder: Path | str, *, mask: np.ndarray | None = None, title: str = ""
+) -> None:
+    """Writes the folder of a separation: `separation.exr` (linear: image, diffuse, specular, residual, confidence) and sRGB pictures.
+
+    `image`: (H, W, 3) linear. `mask`: (H, W) bool; without one, the pixels that are not black.
+    Raises `InputError` if the folder is not ours or cannot be written.
+    """
+    inside = image.max(-1) > 0 if mask is None else mask
+    if not inside.any():
+        raise InputError("the image is black inside the mask: there is nothing to separate")
+    layers = {"diffuse": "RGB", "specular": "RGB", "residual": "RGB", "confidence": "Y"}
+    channels = _channels({"image": image, **{name: getattr(separation, name) for name in layers}}, {"image": "RGB", **layers})
+    with new_folder(folder, SEPARATION_FILES) as partial:
+        write_channels(partial / "separation.exr", channels)
+        for name in ("diffuse", "specular"):
+            coded = linear_to_srgb(np.clip(getattr(separation, name), 0, 1))
+            Image.fromarray(np.rint(255 * coded).astype(np.uint8)).save(partial / f"{name}.png")
+        separation_sheet(separation, image, inside, title).save(partial / "preview.png")
+
+
+def require_writable_result(folder: Path | str, *, separation: bool = False) -> None:
+    """Tells before the work whether its result could be written to `folder`. Raises `InputError`."""
+    require_writable(folder, SEPARATION_FILES if separation else DECOMPOSITION_FILES)
+
+
+def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
+    p = d.provenance
+    convention = (
+        "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, x right, y up, z toward the viewer"
+    )
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "illumination": {"coefficients": d.illumination, "convention": convention},
+        "brdf": None,
+        "mesh": {**built.describe(), "illumination": {"coefficients": built.illumination(d.illumination), "convention": convention}},
+        "settings": p.settings,
+        "seed": p.seed,
+        "versions": p.versions,
+        "timings": p.timings,
+        "input": p.input,
+        "status": p.status,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """The value in the types of JSON: arrays as lists, paths as text, numbers that are not finite as null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(part) for key, part in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    if isinstance(value, Path):
+        return str(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _planes(values: np.ndarray, names: list[str]) -> dict[str, np.ndarray]:
+    return {name: values[..., index] if values.ndim == 3 else values for index, name in enumerate(names)}
+
+
+def _channels(maps: Mapping[str, np.ndarray], layers: Mapping[str, str]) -> dict[str, np.ndarray]:
+    channels: dict[str, np.ndarray] = {}
+    for name, letters in layers.items():
+        channels |= _planes(maps[name], [f"{name}.{letter}" for letter in letters])
+    return channels
+
+
+def _layers(path: Path) -> dict[str, np.ndarray]:
+    channels = read_channels(path)
+    names = {layer: [f"{layer}.{letter}" for letter in letters] for layer, letters in LAYERS.items()}
+    if missing := [name for group in names.values() for name in group if name not in channels]:
+        raise InputError(f"{path} lacks the channel {missing[0]}: it is not a result of isc decompose, or is damaged")
+    if broken := [name for group in names.values() for name in group if not np.isfinite(channels[name]).all()]:
+        raise InputError(f"{path} holds NaN or infinite values in {broken[0]}: it is damaged; decompose the photo again")
+    stacks = {layer: np.stack([channels[name] for name in group], -1) for layer, group in names.items()}
+    return {layer: stack if stack.shape[-1] > 1 else stack[..., 0] for layer, stack in stacks.items()}
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    try:
+        description = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from error
+    except ValueError as error:  # not JSON, or not UTF-8
+        raise InputError(f"{path} is damaged: {error}") from error
+    version = description.get("schema_version") if isinstance(description, dict) else None
+    if not isinstance(version, int):
+        raise InputError(f"{path} has no schema_version: it is not a result of isc decompose")
+    if version > SCHEMA_VERSION:
+        raise InputError(f"{path} was written by a newer version (schema {version}, known here: {SCHEMA_VERSION}): update ISC")
+    return dict(description)
+
+
+def _coefficients(description: Mapping[str, Any], folder: Path) -> np.ndarray:
+    try:
+        light = np.array(description["illumination"]["coefficients"], np.float64)
+    except (KeyError, TypeError, ValueError):
+        light = np.zeros(0)
+    if light.shape != (9, 3) or not np.isfinite(light).all():
+        raise InputError(f"{folder / 'decomposition.json'} has no illumination of 9 x 3 numbers: it is damaged")
+    return light
+
+
+def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:
+    types = {"settings": dict, "seed": int, "versions": dict, "timings": dict, "input": dict, "status": dict}
+    for name, kind in types.items():
+        if not isinstance(description.get(name), kind):
+            raise InputError(f"{folder / 'decomposition.json'} has no usable {name}: it is damaged")
+    return Provenance(**{name: description[name] for name in types})

@@ -1,0 +1,130 @@
+"""The contact sheet: every panel shows the map that its label names, in tones that can be compared."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from isc_core.decomposition import Decomposition, Provenance, Separation
+from isc_core.photo import srgb_to_linear
+from isc_core.report import contact_sheet, separation_sheet
+from tests.core.ball_scene import ball
+
+LABELS = ("input", "diffuse", "specular", "reflectance", "shading", "normals", "height", "light")
+SIDE, GAP, EDGE, HEAD, LABEL = 320, 20, 40, 104, 38
+
+
+def panels(sheet: Image.Image, columns: int = 4) -> dict[str, np.ndarray]:
+    """Each panel as linear light, (320, 320, 3)."""
+    linear = srgb_to_linear(np.asarray(sheet.convert("RGB")) / 255.0)
+    found = {}
+    for index, label in enumerate(LABELS[: 8 if columns == 4 else 3]):
+        top, left = HEAD + index // columns * (SIDE + LABEL + GAP), EDGE + index % columns * (SIDE + GAP)
+        found[label] = linear[top : top + SIDE, left : left + SIDE]
+    return found
+
+
+@pytest.fixture(scope="module")
+def scene() -> Decomposition:
+    return ball((600, 640), 250.0, (300, 320))
+
+
+@pytest.fixture(scope="module")
+def shown(scene: Decomposition) -> dict[str, np.ndarray]:
+    return panels(contact_sheet(scene))
+
+
+def inner() -> np.ndarray:
+    """Where the ball surely is in a panel."""
+    row, column = np.mgrid[:SIDE, :SIDE] - (SIDE - 1) / 2
+    return np.hypot(row, column) < 120
+
+
+def test_one_exposure_holds_for_input_diffuse_and_specular(shown: dict[str, np.ndarray], scene: Decomposition) -> None:
+    """Light adds up on the page as it does in the scene."""
+    total = shown["diffuse"] + shown["specular"]
+    unclipped = inner() & (shown["input"].max(-1) < 0.9)
+    assert np.abs(total - shown["input"])[unclipped].max() < 0.02
+    gain = 0.95 / np.percentile(scene.image[scene.mask].max(-1), 99.5)
+    assert shown["diffuse"][160, 160] == pytest.approx(gain * scene.diffuse[300, 320], abs=0.02)
+
+
+def test_reflectance_and_shading_have_their_own_exposure(shown: dict[str, np.ndarray]) -> None:
+    for label in ("reflectance", "shading"):
+        assert np.percentile(shown[label][inner()].max(-1), 99.5) == pytest.approx(0.95, abs=0.03)
+
+
+def test_the_ball_of_light_is_a_ball_in_that_light(shown: dict[str, np.ndarray]) -> None:
+    """The scene is itself a ball: its shading is what the light panel shows, a little larger."""
+    small = np.asarray(Image.fromarray(np.uint8(255 * shown["light"])).resize((356, 356)))[18:338, 18:338] / 255
+    assert np.abs(small - shown["shading"])[inner()].max() < 0.04
+
+
+def test_the_normals_are_the_right_way_round(shown: dict[str, np.ndarray]) -> None:
+    coded = shown["normals"]
+    assert coded[160, 270, 0] > 2 * coded[160, 50, 0]  # red grows to the right
+    assert coded[50, 160, 1] > 2 * coded[270, 160, 1]  # green grows upward
+    assert coded[160, 160, 2] > 0.9
+
+
+def test_the_relief_is_lit_from_the_upper_left(shown: dict[str, np.ndarray]) -> None:
+    grey = shown["height"].mean(-1)
+    assert grey[95:115, 95:115].mean() > 3 * grey[205:225, 205:225].mean()
+
+
+def test_contour_lines_show_in_a_dome_and_not_in_a_plain(scene: Decomposition) -> None:
+    flat = replace(scene, height=np.where(scene.mask, 7.0, 0.0), normal=np.broadcast_to([0.0, 0.0, 1.0], scene.normal.shape))
+    dome = panels(contact_sheet(scene))["height"].mean(-1)[160, 60:260]
+    plain = panels(contact_sheet(flat))["height"].mean(-1)[160, 60:260]
+    assert np.ptp(plain) < 0.01
+    assert np.count_nonzero(np.diff(dome, 2) > 0.1) >= 6
+
+
+def test_no_dark_seam_runs_around_the_object(scene: Decomposition) -> None:
+    """A white object on its card: from the inside out the tone falls once and never below the card's."""
+    white = np.where(scene.mask[..., None], 0.8, 0.0)
+    row = panels(contact_sheet(replace(scene, reflectance=white)))["reflectance"][160, 160:, 1]
+    assert (np.diff(row) < 1e-6).all()
+    assert row[0] == pytest.approx(0.95, abs=0.01)
+
+
+def test_the_object_fills_its_panel_wherever_it_is_in_the_frame() -> None:
+    near_corner = panels(contact_sheet(ball((300, 500), 60, (62, 430))))["shading"]
+    central = panels(contact_sheet(ball((200, 200), 60, (100, 100))))["shading"]
+    assert np.abs(near_corner - central).mean() < 0.01
+
+
+@pytest.mark.parametrize("shape", [(300, 3), (3, 300), (2, 2)])
+def test_odd_shapes_can_be_shown(shape: tuple[int, int]) -> None:
+    d = ball()
+    grown = np.ones((*shape, 3))
+    flat = np.zeros(shape)
+    odd = Decomposition(
+        grown, grown, 0 * grown, 0 * grown, grown, grown, grown / np.sqrt(3), flat, flat == 0, flat, d.illumination, Provenance()
+    )
+    assert contact_sheet(odd).size == contact_sheet(d).size
+
+
+def test_a_black_result_and_a_long_name_can_be_shown() -> None:
+    d = ball()
+    named = replace(d.provenance, input={"name": "a long name " * 40 + ".png"}, status={"loss": float("nan"), "converged": False})
+    black = replace(d, image=0 * d.image, diffuse=0 * d.diffuse, specular=0 * d.specular, shading=0 * d.shading, provenance=named)
+    sheet = np.asarray(contact_sheet(black))
+    assert sheet.shape == np.asarray(contact_sheet(d)).shape
+    assert (sheet[:HEAD, -EDGE:] == sheet[0, 0]).all()  # the title ends before the edge
+
+
+def test_the_title_says_what_and_how() -> None:
+    d = ball()
+    nameless = replace(d, provenance=Provenance())
+    with_title, without = (np.asarray(contact_sheet(x))[:HEAD].astype(int) for x in (d, nameless))
+    assert np.abs(with_title - without).max() > 100
+
+
+def test_the_sheet_of_a_separation_adds_up(scene: Decomposition) -> None:
+    separation = Separation(scene.diffuse, scene.specular, scene.residual, scene.confidence)
+    sheet = separation_sheet(separation, scene.image, scene.mask, "ball.png")
+    found = panels(sheet, columns=3)
+    unclipped = inner() & (found["input"].max(-1) < 0.9)
+    assert np.abs(found["diffuse"] + found["specular"] - found["input"])[unclipped].max() < 0.02
