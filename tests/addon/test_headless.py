@@ -1,0 +1,106 @@
+"""A result folder becomes a Blender scene whose render is the photo's diffuse image. Runs the command as a user does."""
+
+import importlib.util
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from blender_addon.headless import main
+from isc_core.decomposition import Decomposition, Provenance
+from isc_core.result_folder import save
+from isc_core.sirfs.frames import real_sh
+
+ROOT = Path(__file__).resolve().parents[2]
+needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="needs the extra `blender` (Python 3.11 or 3.13)")
+
+
+def ball(rows: int = 72, columns: int = 96, radius: float = 26.0, centre: tuple[float, float] = (30.0, 40.0)) -> Decomposition:
+    """A ball off the middle of a wide frame, red above and blue below, lit from the upper left; height and normal are exact."""
+    row, column = np.indices((rows, columns)).astype(float)
+    x, y = (column - centre[1]) / radius, (centre[0] - row) / radius
+    mask = x * x + y * y < 0.96
+    z = np.sqrt(np.maximum(1 - x * x - y * y, 0.04))
+    normal = np.where(mask[..., None], np.dstack([x, y, z]), np.array([0.0, 0, 1]))
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    light = np.zeros((9, 3))
+    light[0], light[1], light[3] = [-2.2, -2.6, -3.0], 0.5, -0.4
+    paint = np.where((y > 0)[..., None], [0.45, 0.10, 0.08], [0.08, 0.14, 0.40])
+    shading = np.exp(real_sh(normal) @ light) * mask[..., None]
+    image = (paint * shading).astype(np.float32)
+    none = np.zeros_like(image)
+    reflectance = (paint * mask[..., None]).astype(np.float32)
+    height = (radius * z * mask).astype(np.float32)
+    maps = (image, image, none, none, reflectance, shading.astype(np.float32), normal.astype(np.float32), height)
+    confidence = mask.astype(np.float32)
+    about = {"sha256": "0" * 64, "size": [columns, rows], "scale": 1.0, "crop_box": [0, 0, columns, rows]}
+    return Decomposition(*maps, mask, confidence, light, Provenance(input=about, status={"converged": True}))
+
+
+@needs_bpy
+def test_the_scene_renders_as_the_photo_shows_it(tmp_path: Path) -> None:
+    known = ball()
+    save(known, tmp_path / "result")
+    blend, picture = tmp_path / "scene" / "out.blend", tmp_path / "scene" / "out.png"
+    done = blender(tmp_path / "result", "--blend", blend, "--render", picture, "--matte", "--samples", 64)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert blend.stat().st_size > 10_000
+    got, alpha = linear_picture(picture)
+    assert alpha.shape == known.mask.shape
+    overlap = ((alpha > 0.5) & known.mask).sum() / ((alpha > 0.5) | known.mask).sum()
+    assert overlap > 0.95, "the camera does not frame the object as the photo does"
+    inner = cv2.erode(known.mask.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    rows = np.indices(known.mask.shape)[0]
+    for half in (inner & (rows < 28), inner & (rows > 32)):  # apart, so that the paint's contrast does not hide the shading's
+        np.testing.assert_allclose(got[half].mean(0), known.diffuse[half].mean(0), rtol=0.03)
+        strongest = known.diffuse[half].mean(0).argmax()
+        assert np.corrcoef(got[half][:, strongest], known.diffuse[half][:, strongest])[0, 1] > 0.98
+
+
+def blender(*arguments: object) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "blender_addon.headless", *map(str, arguments)]
+    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
+
+
+def linear_picture(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """A 16-bit PNG as linear colour, (H, W, 3), and alpha, (H, W)."""
+    pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]].astype(float) / 65535
+    coded = pixels[..., :3]
+    return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4), pixels[..., 3]
+
+
+@needs_bpy
+def test_a_damaged_mesh_is_refused_in_one_line(tmp_path: Path) -> None:
+    save(ball(), tmp_path / "result")
+    (tmp_path / "result" / "mesh.glb").write_bytes(b"glTF no more")
+    done = blender(tmp_path / "result", "--blend", tmp_path / "out.blend")
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "out.blend").exists()
+
+
+def test_a_folder_that_is_no_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([str(tmp_path), "--blend", str(tmp_path / "out.blend")]) == 2
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert "decomposition.json" in message
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"mesh": {}}', '{"mesh": 3}', '{"mesh": {"illumination": {"coefficients": [[1]]}}}'])
+def test_damaged_descriptions_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
+    (tmp_path / "mesh.glb").write_bytes(b"")
+    (tmp_path / "decomposition.json").write_text(text)
+    assert main([str(tmp_path), "--blend", str(tmp_path / "out.blend")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
+def test_without_bpy_the_message_names_the_extra(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    save(ball(), tmp_path / "result")
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    assert main([str(tmp_path / "result"), "--blend", str(tmp_path / "out.blend")]) == 2
+    assert "isc3d[blender]" in capsys.readouterr().err
