@@ -28,6 +28,8 @@ _REASONS = {
     errno.EPERM: "writing is not allowed there; choose another place",
     errno.EROFS: "the disk is read-only; choose another place",
     errno.ENOTDIR: "a part of the path is a file, not a folder; choose another place",
+    errno.EEXIST: "a part of the path is a file, not a folder; choose another place",
+    errno.ENOENT: "nothing can be created there; choose another place",
     errno.ENAMETOOLONG: "the name is too long; choose a shorter one",
 }
 

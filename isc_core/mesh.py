@@ -10,7 +10,9 @@ between them and the recovered normal of each pixel. At stride 1 nothing remains
 
 Rim: the true slope of a smooth object is infinite at its silhouette, so that the outermost heights of a reconstruction are the least
 certain and may spike. Coming from inside, a height in the last `rim` rings of pixels may differ from its neighbours further inside by
-no more than 1.5 times what these differ from theirs, plus half a pixel. A sphere keeps its shape under this rule.
+no more than 1.5 times what these differ from theirs, plus half a pixel; a sphere keeps its shape under this rule. Then the outermost
+ring is averaged along itself over 5 x 5 pixels: the outline climbs the steps of the pixel grid, and on a steep rim each step of one
+pixel sideways would be a tooth of many pixels in depth.
 
 Base colour: k * reflectance, with k such that the 99.5th percentile of the reflectance's brightest channel becomes 0.9; the light that
 belongs to it is the recovered one divided by k, that is log shading - log k. Beyond the mask the texture repeats the nearest colour
@@ -158,13 +160,14 @@ def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
             slack = 1.5 * _neighbour_mean(step, depth > ring)[0] + 0.5
             limited = np.where(known, np.clip(limited, base - slack, base + slack), limited)
         step = np.where(known, np.abs(limited - base), step)
-    return limited
+    outermost = (depth == 1) & (rings > 0)
+    return np.where(outermost, _neighbour_mean(limited, outermost, 5)[0], limited)
 
 
-def _neighbour_mean(values: np.ndarray, valid: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mean of each pixel's valid 3 x 3 neighbourhood, and how many were valid."""
-    weight = ndimage.uniform_filter(valid.astype(np.float64), 3, mode="constant") * 9
-    total = ndimage.uniform_filter(np.where(valid, values, 0.0), 3, mode="constant") * 9
+def _neighbour_mean(values: np.ndarray, valid: np.ndarray, size: int = 3) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of the valid pixels in each pixel's `size` x `size` neighbourhood, and how many were valid."""
+    weight = ndimage.uniform_filter(valid.astype(np.float64), size, mode="constant") * size**2
+    total = ndimage.uniform_filter(np.where(valid, values, 0.0), size, mode="constant") * size**2
     count = np.rint(weight)
     return total / np.maximum(count, 1), count
 

@@ -1,8 +1,9 @@
 """The contact sheet: one picture that shows a person what came out, before anything else is opened.
 
-Tones: input, diffuse and specular share one exposure, so that they can be compared; reflectance has its own, shading and light one of
-theirs. An exposure puts the 99.5th percentile of the brightest channel inside the mask at 0.95. Everything is blended in linear light
-and coded as sRGB at the end. Maps are cropped to the object and scaled with their mask as weight, so that no black creeps in at the edge.
+Tones: input, diffuse and specular share one exposure, so that they can be compared; reflectance has its own, and so has shading, which
+the light shares unless it would be too bright. An exposure puts the 99.5th percentile of the brightest channel inside the mask at 0.95.
+Everything is blended in linear light and coded as sRGB at the end. Maps are cropped to the object and scaled with their mask as weight,
+so that no black creeps in at the edge.
 
 The height is drawn as a relief under a lamp at the upper left, with contour lines at round distances; the light as a white ball in it.
 """
@@ -44,7 +45,7 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     frame = _Frame.around(d.mask)
     photo, paint, light = (_exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading))
     ball, coverage = _ball(d.illumination)
-    light = min(light, _exposure(ball[coverage > 0.5]))
+    ball_light = min(light, _exposure(ball[coverage > 0.5]))  # the ball also shows directions that the object does not
     colors = [
         (d.image, photo, "Input", ""),
         (d.diffuse, photo, "Diffuse", ""),
@@ -55,7 +56,7 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     panels = [Panel(gain * frame.scaled(values), frame.coverage, label, remark) for values, gain, label, remark in colors]
     panels.append(Panel(srgb_to_linear(0.5 + 0.5 * frame.scaled(d.normal)), frame.coverage, "Normals", "x right, y up, z to viewer"))
     panels.append(_relief(d, frame))
-    panels.append(Panel(light * ball, coverage, "Light", "on a white ball"))
+    panels.append(Panel(ball_light * ball, coverage, "Light", "on a white ball"))
     return _sheet(*_title(d), panels, columns=4)
 
 
