@@ -10,7 +10,6 @@ The height is drawn as a relief under a lamp at the upper left, with contour lin
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil
 from pathlib import PurePath
 
 import numpy as np
@@ -71,25 +70,22 @@ def separation_sheet(separation: Separation, image: np.ndarray, mask: np.ndarray
 
 @dataclass(frozen=True)
 class _Frame:
-    """How a map gets into a panel: through a square window around the object. `top`, `left`, `side`: pixels of the map, may lie outside."""
+    """How a map gets into a panel: the object's box, (first row, end row, first column, end column), is scaled by `zoom` to its middle."""
 
     mask: np.ndarray
-    top: int
-    left: int
-    side: int
+    box: tuple[int, int, int, int]
+    zoom: float
 
     @classmethod
     def around(cls, mask: np.ndarray) -> "_Frame":
         rows, columns = np.nonzero(mask)
-        ends = np.array([[rows.min(), columns.min()], [rows.max() + 1, columns.max() + 1]])
-        side = ceil(float((ends[1] - ends[0]).max()) / (1 - 2 * _MARGIN))
-        top, left = np.rint((ends.sum(0) - side) / 2).astype(int)
-        return cls(mask, int(top), int(left), side)
+        box = (int(rows.min()), int(rows.max()) + 1, int(columns.min()), int(columns.max()) + 1)
+        return cls(mask, box, _PANEL * (1 - 2 * _MARGIN) / max(box[1] - box[0], box[3] - box[2]))
 
     @property
     def coverage(self) -> np.ndarray:
         """How much of each pixel of the panel, (N, N), the object covers; a small object's outline is rounded, not shown in steps."""
-        zoom = max(1.0, _PANEL / self.side)
+        zoom = max(1.0, self.zoom)
         soft = Image.fromarray(np.rint(255 * self._resized(self.mask)).astype(np.uint8))
         if zoom > 1:
             soft = soft.filter(ImageFilter.GaussianBlur(0.9 * zoom))
@@ -103,11 +99,14 @@ class _Frame:
         return np.where(weight > 1e-3, self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3), 0)
 
     def _resized(self, plane: np.ndarray) -> np.ndarray:
-        window = np.zeros((self.side, self.side), np.float32)
-        top, left = max(0, self.top), max(0, self.left)
-        part = plane[top : self.top + self.side, left : self.left + self.side]
-        window[top - self.top :, left - self.left :][: part.shape[0], : part.shape[1]] = part
-        return np.asarray(Image.fromarray(window).resize((_PANEL, _PANEL), Image.Resampling.BILINEAR), np.float64)
+        first_row, end_row, first_column, end_column = self.box
+        # A border of nothing, so that the object's outline is soft all around.
+        window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
+        height, width = (min(_PANEL, max(1, round(self.zoom * n))) for n in window.shape)
+        panel = np.zeros((_PANEL, _PANEL))
+        top, left = (_PANEL - height) // 2, (_PANEL - width) // 2
+        panel[top : top + height, left : left + width] = Image.fromarray(window).resize((width, height), Image.Resampling.BILINEAR)
+        return panel
 
 
 def _exposure(inside: np.ndarray) -> float:
