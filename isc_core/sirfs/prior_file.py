@@ -4,14 +4,14 @@ import dataclasses
 import importlib.resources
 import io
 import json
-import os
-import tempfile
 import zipfile
 import zlib
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 
+from ..atomic import new_file
 from ..errors import InputError
 from .fitting.absolute_table import CoarseTable
 from .fitting.color_mixture import ColorScaleMixture
@@ -25,19 +25,8 @@ _LIGHTS = {"natural": 27, "laboratory": 27, "grey_natural": 9, "grey_laboratory"
 
 def save_prior_set(path: str | Path, priors: PriorSet) -> None:
     """Writes `priors` to `path` (.npz); the same set gives the same bytes. Raises `InputError` where `path` cannot be written."""
-    target = Path(path)
-    try:
-        # Written beside the target and renamed, so that nothing half-written ever has the final name.
-        handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=".tmp")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                _write_archive(file, _to_arrays(priors))
-            os.replace(temporary, target)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
-    except OSError as error:
-        raise InputError(f"cannot write {target} ({error.strerror}): choose another place with -o") from error
+    with new_file(path) as partial, partial.open("wb") as file:
+        _write_archive(file, _to_arrays(priors))
 
 
 def load_prior_set(path: str | Path) -> PriorSet:
@@ -75,16 +64,17 @@ def _to_arrays(priors: PriorSet) -> dict[str, np.ndarray]:
         arrays |= {f"{name}.deviations": mixture.deviations, f"{name}.weights": mixture.weights, f"{name}.reach": np.array(mixture.reach)}
     for name in ("absolute", "grey_absolute"):
         table: CoarseTable = getattr(priors, name)
-        arrays |= {f"{name}.coarse": table.coarse, f"{name}.nodes": np.array(table.nodes)}
+        arrays |= {f"{name}.coarse": table.coarse, f"{name}.base": np.array(table.base), f"{name}.nodes": np.array(table.nodes)}
     for name in _LIGHTS:
         light: GaussianLight = getattr(priors.lights, name)
-        arrays |= {f"lights.{name}.mean": light.mean, f"lights.{name}.covariance": light.covariance, f"lights.{name}.floor": np.array(light.floor)}
+        arrays |= {f"lights.{name}.mean": light.mean, f"lights.{name}.covariance": light.covariance}
+        arrays[f"lights.{name}.floor"] = np.array(light.floor)
     return arrays
 
 
-def _write_archive(file: io.IOBase, arrays: dict[str, np.ndarray]) -> None:
+def _write_archive(file: IO[bytes], arrays: dict[str, np.ndarray]) -> None:
     """As `np.savez_compressed`, but without the time of day in the archive."""
-    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:  # type: ignore[call-overload]
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
             buffer = io.BytesIO()
             np.lib.format.write_array(buffer, np.asarray(array), allow_pickle=False)
@@ -94,16 +84,15 @@ def _write_archive(file: io.IOBase, arrays: dict[str, np.ndarray]) -> None:
 
 
 def _parse(data: bytes, source: str) -> PriorSet:
+    problem = InputError(f"{source} is damaged or not a file of priors: give a file that 'isc fit-priors' wrote")
+    if not data.startswith(b"PK"):
+        raise problem
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile):
-                raise InputError(f"{source} is not a file of priors: give a file that 'isc fit-priors' wrote")
-            reader = _Reader({name: file[name] for name in file.files}, source)
+            arrays = {name: file[name] for name in file.files}
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{source} is damaged or not a file of priors: give a file that 'isc fit-priors' wrote") from error
-    return reader.prior_set()
+        raise problem from error
+    return _Reader(arrays, source).prior_set()
 
 
 class _Reader:
@@ -116,7 +105,7 @@ class _Reader:
     def prior_set(self) -> PriorSet:
         version = int(self.numbers("schema_version", ()))
         if version != SCHEMA_VERSION:
-            raise InputError(f"{self.source} has version {version} of the format, this program reads {SCHEMA_VERSION}: fit the priors again")
+            raise InputError(f"{self.source} has format version {version}, not {SCHEMA_VERSION}: fit the priors again")
         whiten = self.numbers("parsimony_whiten", (3, 3))
         lights = Lights(**{name: self.light(f"lights.{name}", size) for name, size in _LIGHTS.items()})
         return PriorSet(
@@ -175,7 +164,8 @@ class _Reader:
 
     def table(self, name: str, dimensions: int) -> CoarseTable:
         nodes = int(self.numbers(f"{name}.nodes", (), positive=True))
-        return CoarseTable(self.numbers(f"{name}.coarse", (-(-nodes // 2),) * dimensions), nodes)
+        coarse = self.numbers(f"{name}.coarse", (-(-nodes // 2),) * dimensions)
+        return CoarseTable(coarse, float(self.numbers(f"{name}.base", ())), nodes)
 
     def light(self, name: str, size: int) -> GaussianLight:
         mean, covariance = self.numbers(f"{name}.mean", (size,)), self.covariance(f"{name}.covariance", size)

@@ -45,13 +45,16 @@ class TableFitOptions:
 
 
 def fit_absolute_table(histogram: np.ndarray, options: TableFitOptions, on_step: Callable[[float], None] = _ignore) -> CoarseTable:
-    """The table for `histogram` p ((n,) * d, sum 1). `on_step` receives the loss after every step and may raise to stop."""
+    """The table for `histogram` p ((n,) * d, sum 1), in half precision if d > 1.
+
+    `on_step` receives the loss after every step and may raise to stop.
+    """
     problem = _Problem(histogram, options)
     unknowns = np.zeros(problem.size, np.float32)
     search = LbfgsOptions(options.memory, options.max_steps, 4 * options.max_steps, options.tolerance, gradient_tolerance=0.0)
     for _ in range(options.runs):
         minimise(problem.loss, unknowns, search, NumpyAlgebra(), lambda _, loss: on_step(loss))
-    return CoarseTable(problem.coarse(unknowns).astype(np.float16), histogram.shape[0])
+    return CoarseTable.of(problem.coarse(unknowns), histogram.shape[0], np.float16 if histogram.ndim > 1 else np.float32)
 
 
 class _Problem:

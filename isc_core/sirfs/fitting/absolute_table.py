@@ -18,14 +18,24 @@ LOW, HIGH = -7.0, 4.0
 
 @dataclass(frozen=True)
 class CoarseTable:
-    """`coarse` (ceil(n/2),) * d float16, whose upsampling to n = `nodes` a side, less its minimum, is the table of costs."""
+    """A table of n = `nodes` a side as the upsampling of `base + coarse`, less its minimum; `coarse` is (ceil(n/2),) * d, least 0.
+
+    So a short float type keeps its digits where the cost is low, that is, where reflectances are.
+    """
 
     coarse: np.ndarray
+    base: float
     nodes: int
+
+    @staticmethod
+    def of(values: np.ndarray, nodes: int, dtype: type = np.float16) -> "CoarseTable":
+        """The coarse `values` (ceil(nodes/2),) * d kept as `dtype`."""
+        base = float(values.min())
+        return CoarseTable((values - base).astype(dtype), base, nodes)
 
     def table(self) -> AbsoluteTable:
         """The full table, float64, minimum 0, over [-7, 4] on each axis."""
-        values = synthesise(synthesis_matrix(self.nodes), self.coarse.astype(float))
+        values = synthesise(synthesis_matrix(self.nodes), self.coarse.astype(float) + self.base)
         return AbsoluteTable(LOW, HIGH, values - values.min())
 
 

@@ -32,7 +32,7 @@ class FitRecord:
     """Where a set comes from: the training objects' names, the factors on the environments' contrast, the options as text."""
 
     objects: tuple[str, ...] = ()
-    natural_contrast: Contrast = Contrast()
+    natural_contrast: Contrast = field(default_factory=Contrast)
     options: dict[str, str] = field(default_factory=dict)
 
 

@@ -14,8 +14,9 @@ import numpy as np
 try:
     import numba
 except ImportError:  # there is no build for every machine; NumPy alone is about ten times slower
-    numba = None
+    numba = None  # type: ignore[assignment]
 
+Taps = list[tuple[float, float, float]]
 _SMOOTH = (0.25, 0.5, 0.25)
 _FIRST = (-0.5, 0.0, 0.5)
 _SECOND = (1.0, -2.0, 1.0)
@@ -34,7 +35,7 @@ def roughness_numpy(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.n
     terms = []
     for a, b in itertools.combinations_with_replacement(range(f.ndim), 2):
         along = _SECOND if a == b else _FIRST
-        taps = [along if axis in (a, b) else _SMOOTH for axis in range(f.ndim)]
+        taps: Taps = [along if axis in (a, b) else _SMOOTH for axis in range(f.ndim)]
         terms.append((1 if a == b else 2, taps, _correlate(f, taps)))
     root = np.sqrt(sum(factor * d**2 for factor, _, d in terms) + softening)
     gradient = np.zeros_like(f)
@@ -43,14 +44,14 @@ def roughness_numpy(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.n
     return float(root.sum(dtype=float)), gradient
 
 
-def _correlate(f: np.ndarray, taps: list[tuple[float, ...]]) -> np.ndarray:
+def _correlate(f: np.ndarray, taps: Taps) -> np.ndarray:
     for axis, t in enumerate(taps):
         f = np.moveaxis(f, axis, 0)
         f = np.moveaxis(t[0] * f[:-2] + t[1] * f[1:-1] + t[2] * f[2:], 0, axis)
     return f
 
 
-def _spread(g: np.ndarray, taps: list[tuple[float, ...]]) -> np.ndarray:
+def _spread(g: np.ndarray, taps: Taps) -> np.ndarray:
     """The transpose of `_correlate`."""
     for axis, t in enumerate(taps):
         g = np.moveaxis(g, axis, 0)
