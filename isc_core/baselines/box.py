@@ -1,0 +1,47 @@
+"""The part of the frame that an object needs, so that empty background costs nothing and changes nothing."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+
+MARGIN = 3
+
+
+@dataclass(frozen=True)
+class Box:
+    """Rows and columns [start, stop) of a mask's bounding box in a frame of `shape` (H, W), and how many empty pixels are put
+    around it: (above, below), (left, right). None where the frame cuts the object, since there it has no contour."""
+
+    shape: tuple[int, int]
+    rows: tuple[int, int]
+    columns: tuple[int, int]
+    around: tuple[tuple[int, int], tuple[int, int]]
+
+    @classmethod
+    def of(cls, mask: np.ndarray) -> "Box":
+        """The box of `mask` (H, W) bool. Raises `InputError` when the mask is empty."""
+        if not mask.any():
+            raise InputError("the mask is empty: mark at least the object's pixels")
+        spans, margins = [], []
+        for axis in (0, 1):
+            used = np.flatnonzero(mask.any(axis=1 - axis))
+            start, stop = int(used[0]), int(used[-1]) + 1
+            spans.append((start, stop))
+            margins.append((MARGIN * (start > 0), MARGIN * (stop < mask.shape[axis])))
+        return cls((mask.shape[0], mask.shape[1]), spans[0], spans[1], (margins[0], margins[1]))
+
+    def crop(self, array: np.ndarray) -> np.ndarray:
+        """(H, W, ...) to the box with its margin, which is zero."""
+        inside = array[slice(*self.rows), slice(*self.columns)]
+        return np.pad(inside, [*self.around, *[(0, 0)] * (array.ndim - 2)])
+
+    def place(self, cropped: np.ndarray) -> np.ndarray:
+        """The box with its margin back in the frame, (H, W); its border values go on outward."""
+        for axis, (start, stop) in enumerate((self.rows, self.columns)):
+            first = start - self.around[axis][0]
+            last = stop + self.around[axis][1]
+            at = np.clip(np.arange(self.shape[axis]), first, last - 1) - first
+            cropped = np.take(cropped, at, axis=axis)
+        return cropped

@@ -1,0 +1,136 @@
+"""Shape from shading by minimising brightness error and roughness of the normals (Ikeuchi & Horn 1981).
+
+Problem: find stereographic coordinates (u, v) = 2 (n_x, n_y) / (1 + n_z) of the normals that minimise
+  sum of (E - R(u, v))^2 + weight * (|grad u|^2 + |grad v|^2),   R = max(0, n . l),
+with n in the image plane, along the contour's normal, where the object turns away: there (u, v) has length 2, which slopes could
+not express. Setting the derivative to zero gives the iteration (u, v) <- mean of neighbours + (E - R) grad R / weight.
+
+Citations: K. Ikeuchi and B. K. P. Horn, "Numerical shape from shading and occluding boundaries", Artificial Intelligence
+17(1-3), 141-184 (1981), doi:10.1016/0004-3702(81)90023-0. The normals are made a surface by least squares as in
+R. T. Frankot and R. Chellappa, IEEE TPAMI 10(4), 439-451 (1988), doi:10.1109/34.3909, but in the mask.
+From coarse to fine, because the contour's news travels one pixel an iteration.
+
+Limits: one distant light, one albedo; every contour is taken for an occluding one, so flat sheets bulge; smoothness flattens detail.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ..sirfs.contour import occluding_contour
+from .box import Box
+from .estimate import BaselineEstimate, from_log_shading, grey_log_shading
+from .poisson import integrate
+
+_AROUND = np.array([[1.0, 4.0, 1.0], [4.0, 0.0, 4.0], [1.0, 4.0, 1.0]]) / 20
+_COARSEST = 24
+
+
+@dataclass(frozen=True)
+class IkeuchiHorn1981Options:
+    """`weight`: of the smoothness, > 0, for brightness scaled to a light of length 1. `iterations`: on each grid.
+    `steepest`: the least n_z, in (0, 1), that slopes are taken from; the contour itself would be infinitely steep.
+    """
+
+    weight: float = 1.0
+    iterations: int = 100
+    steepest: float = 0.2
+
+
+def estimate(log_image: np.ndarray, mask: np.ndarray, options: IkeuchiHorn1981Options | None = None) -> BaselineEstimate:
+    """Shape and light of an evenly coloured object: all its brightness is shading.
+
+    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool. Raises `InputError` for an empty mask.
+    """
+    return from_log_shading(grey_log_shading(log_image, mask), mask, lambda e, m, l: height_from_brightness(e, m, l, options))
+
+
+def height_from_brightness(
+    brightness: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options | None = None
+) -> np.ndarray:
+    """Height (H, W), float64, pixels toward the viewer, mean 0 in the mask, continued beyond its rim by two pixels.
+
+    `brightness` (H, W), linear; `light` (3,) points to the light (x right, y up, z toward the viewer), brightness being
+    max(0, n . light). Raises `InputError` for an empty mask.
+    """
+    options = options or IkeuchiHorn1981Options()
+    box = Box.of(mask)
+    inside = box.crop(mask)
+    strength = max(float(np.linalg.norm(light)), 1e-30)
+    shade = np.where(inside, np.clip(box.crop(brightness) / strength, 0, 1), 0).astype(float)
+    uv = _solve(shade, inside, np.asarray(light, float) / strength, options)
+    return box.place(height_from_normals(_normals(uv), inside, options.steepest))
+
+
+def height_from_normals(normals: np.ndarray, mask: np.ndarray, steepest: float) -> np.ndarray:
+    """The height (H, W) whose slopes fit `normals` (H, W, 3) (x right, y up, z toward) best; two pixels beyond the mask the rim's
+    slopes go on, so that differences across the rim mean something, and further out the height stays."""
+    wide = ndimage.binary_dilation(mask, np.ones((3, 3)), iterations=2)
+    nearest = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    n = normals[tuple(nearest)]
+    toward = np.maximum(n[..., 2], steepest)
+    p, q = -n[..., 0] / toward, -n[..., 1] / toward
+    right, down = np.zeros(mask.shape), np.zeros(mask.shape)
+    right[:, :-1] = (p[:, :-1] + p[:, 1:]) / 2
+    down[:-1] = -(q[:-1] + q[1:]) / 2
+    height = integrate(right, down, wide)
+    outward = ndimage.distance_transform_edt(~wide, return_distances=False, return_indices=True)
+    return height[tuple(outward)] - height[mask].mean()
+
+
+def _solve(shade: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options) -> np.ndarray:
+    """Coordinates (2, H, W), 0 outside the mask; starts from the same problem at half the size."""
+    if min(mask.shape) >= 2 * _COARSEST:
+        smaller = _solve(_halved(shade, mask), _block_any(mask), light, options)
+        start = smaller.repeat(2, axis=1).repeat(2, axis=2)[:, : mask.shape[0], : mask.shape[1]] * mask
+    else:
+        start = np.zeros((2, *mask.shape))
+    return _relax(start, shade, mask, light, options)
+
+
+def _relax(uv: np.ndarray, shade: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options) -> np.ndarray:
+    contour = occluding_contour(mask)
+    at = (contour.rows, contour.columns)
+    rim = 2 * np.stack([contour.right, -contour.down])
+    known = ndimage.correlate(mask.astype(float), _AROUND, mode="constant")
+    scale = mask / np.maximum(known, 1e-12)
+    for _ in range(options.iterations):
+        uv[:, *at] = rim
+        mean = np.stack([ndimage.correlate(c, _AROUND, mode="constant") for c in uv]) * scale
+        reflected, slope = _reflect(mean, light)
+        # Linearised about the neighbours' mean, the step solves the pixel's own problem and cannot overshoot.
+        uv = mean + mask * (shade - reflected) / (options.weight + (slope**2).sum(axis=0)) * slope
+        # Beyond the circle of radius 2 normals would point away from the viewer.
+        uv *= np.minimum(1, 2 / np.maximum(np.hypot(*uv), 1e-12))
+    uv[:, *at] = rim
+    return uv
+
+
+def _normals(uv: np.ndarray) -> np.ndarray:
+    """Unit normals (H, W, 3)."""
+    u, v = uv
+    square = u * u + v * v
+    return np.stack([4 * u, 4 * v, 4 - square], axis=-1) / (4 + square)[..., None]
+
+
+def _reflect(uv: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """max(0, n . l), (H, W), and its derivatives, (2, H, W)."""
+    below = 4 + uv[0] ** 2 + uv[1] ** 2
+    towards = (4 * (light[0] * uv[0] + light[1] * uv[1]) + light[2] * (8 - below)) / below
+    slope = np.stack([(4 * light[k] - 2 * uv[k] * (light[2] + towards)) / below for k in (0, 1)])
+    return np.maximum(towards, 0), np.where(towards > 0, slope, 0)
+
+
+def _blocks(values: np.ndarray) -> np.ndarray:
+    padded = np.pad(values, [(0, n % 2) for n in values.shape])
+    return padded.reshape(padded.shape[0] // 2, 2, padded.shape[1] // 2, 2)
+
+
+def _block_any(mask: np.ndarray) -> np.ndarray:
+    return np.asarray(_blocks(mask).any(axis=(1, 3)))
+
+
+def _halved(shade: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    count = _blocks(mask.astype(float)).sum(axis=(1, 3))
+    return np.asarray(_blocks(shade * mask).sum(axis=(1, 3)) / np.maximum(count, 1))

@@ -1,0 +1,27 @@
+"""The light that a log shading and normals call for.
+
+Problem: find L that minimises mean over the mask of |b(n) L - log shading|^2 + ridge * |L without its constant|^2, a channel
+at a time; b are the nine functions of the SIRFS reference (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712).
+
+The ridge spares the constant, so a flat shape, whose normals tell nothing of direction, gets a light from everywhere.
+"""
+
+import numpy as np
+
+from ..errors import InputError
+from ..sirfs.illumination import basis
+
+
+def fit_light(log_shading: np.ndarray, normals: np.ndarray, mask: np.ndarray, ridge: float = 1e-3) -> np.ndarray:
+    """Light (9, C) float64, reference convention.
+
+    `log_shading` (H, W, C) natural logarithm; `normals` (H, W, 3) unit vectors (down, right, toward the viewer); `mask` (H, W)
+    bool; `ridge` > 0. Raises `InputError` for an empty mask.
+    """
+    if not mask.any():
+        raise InputError("the mask is empty: mark at least the object's pixels")
+    functions = basis(*normals[mask].astype(float).T)
+    count = functions.shape[1]
+    penalty = ridge * np.eye(9)
+    penalty[0, 0] = 1e-12
+    return np.linalg.solve(functions @ functions.T / count + penalty, functions @ log_shading[mask].astype(float) / count)
