@@ -20,7 +20,8 @@ from .fitting.prior_set import FitRecord, Lights, PriorSet
 from .fitting.scale_mixture import ScaleMixture
 
 SCHEMA_VERSION = 1
-_LIGHTS = {"natural": 27, "laboratory": 27, "grey_natural": 9, "grey_laboratory": 9}
+_LIGHTS = ("natural", "laboratory")
+_COEFFICIENTS = 27
 
 
 def save_prior_set(path: str | Path, priors: PriorSet) -> None:
@@ -107,7 +108,7 @@ class _Reader:
         if version != SCHEMA_VERSION:
             raise InputError(f"{self.source} has format version {version}, not {SCHEMA_VERSION}: fit the priors again")
         whiten = self.numbers("parsimony_whiten", (3, 3))
-        lights = Lights(**{name: self.light(f"lights.{name}", size) for name, size in _LIGHTS.items()})
+        lights = Lights(**{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in _LIGHTS})
         return PriorSet(
             curvature=self.mixture("curvature"),
             grey_smoothness=self.mixture("grey_smoothness"),

@@ -16,7 +16,7 @@ from ...progress import Monitor
 from .absolute_color import COLOR_NODES, GREY_NODES, TableFitOptions, fit_absolute_table
 from .absolute_table import splat
 from .color_mixture import ColorCells, fit_color_mixture
-from .lights import Contrast, GaussianLight, fit_contrast, fit_light, grey, mirrored, permuted, scaled
+from .lights import Contrast, fit_contrast, fit_light, mirrored, permuted, scaled
 from .prior_set import FitRecord, Lights, PriorSet
 from .scale_mixture import Magnitudes, fit_scale_mixture
 from .statistics import ObjectStatistics
@@ -30,7 +30,8 @@ class LightFitOptions:
     `natural_contrast`: the factors on the environments' coefficients; None fits them to the training objects' natural lights.
     `split_contrast`: with a factor each for brightness and colour.
     `mirror`: lights also count with left and right exchanged. `permute_natural`, `permute_laboratory`: with every order of the
-    channels. `ridge`: added to the diagonal of every covariance. `floor`: added where the solver whitens, see `GaussianLight`.
+    channels. `laboratory_ridge`: see `fit_light`; ten lights leave many directions unseen, so that a held-out one is much likelier
+    with some. `floor`: added where the solver whitens, see `GaussianLight`.
     """
 
     natural_contrast: Contrast | None = None
@@ -38,7 +39,7 @@ class LightFitOptions:
     mirror: bool = True
     permute_natural: bool = False
     permute_laboratory: bool = True
-    ridge: float = 0.0
+    laboratory_ridge: tuple[float, float] = (0.0, 0.0)
     floor: float = 0.01
 
 
@@ -120,28 +121,18 @@ def _histogram(points: Sequence[np.ndarray], nodes: int) -> np.ndarray:
 
 def fit_lights(objects: Sequence[ObjectStatistics], natural_lights: np.ndarray, options: LightFitOptions) -> tuple[Lights, Contrast]:
     """The light priors and the factors on the contrast of `natural_lights` (9, 3, n)."""
-    environments = natural_lights.transpose(2, 0, 1)
-    laboratory = np.array([o.laboratory_light for o in objects])
-    natural = np.array([o.natural_light for o in objects])
-    color_environments = _augmented_light(environments, options, options.permute_natural)
+    environments = fit_light(_augmented(natural_lights.transpose(2, 0, 1), options.mirror, options.permute_natural), floor=options.floor)
     contrast = options.natural_contrast
     if contrast is None:
-        contrast = fit_contrast(color_environments, natural, options.split_contrast)
-    lights = Lights(
-        natural=scaled(color_environments, contrast),
-        laboratory=_augmented_light(laboratory, options, options.permute_laboratory),
-        grey_natural=scaled(_augmented_light(grey(environments), options, False), contrast),
-        grey_laboratory=_augmented_light(grey(laboratory), options, False),
-    )
-    return lights, contrast
+        contrast = fit_contrast(environments, np.array([o.natural_light for o in objects]), options.split_contrast)
+    laboratory = _augmented(np.array([o.laboratory_light for o in objects]), options.mirror, options.permute_laboratory)
+    return Lights(scaled(environments, contrast), fit_light(laboratory, options.laboratory_ridge, options.floor)), contrast
 
 
-def _augmented_light(lights: np.ndarray, options: LightFitOptions, permute: bool) -> GaussianLight:
-    if options.mirror:
+def _augmented(lights: np.ndarray, mirror: bool, permute: bool) -> np.ndarray:
+    if mirror:
         lights = mirrored(lights)
-    if permute:
-        lights = permuted(lights)
-    return fit_light(lights, options.ridge, options.floor)
+    return permuted(lights) if permute else lights
 
 
 def _as_text(options: FitOptions) -> dict[str, str]:

@@ -41,6 +41,12 @@ class GaussianLight:
         unwhiten = scale * (vectors * np.sqrt(values + self.floor)) @ vectors.T
         return Light(self.mean, self.covariance, unwhiten, self.mean)
 
+    def grey(self) -> "GaussianLight":
+        """The Gaussian of the mean over channels, of 9 coefficients."""
+        channels = len(self.mean) // COEFFICIENTS
+        average = np.kron(np.full((1, channels), 1 / channels), np.eye(COEFFICIENTS))
+        return GaussianLight(average @ self.mean, _symmetric(average @ self.covariance @ average.T), self.floor)
+
     def log_likelihood(self, lights: np.ndarray) -> np.ndarray:
         """log density of each of the `lights` (count, n); shape (count,)."""
         factor = np.linalg.cholesky(self.covariance)
@@ -59,22 +65,23 @@ def permuted(lights: np.ndarray) -> np.ndarray:
     return np.concatenate([lights[:, :, list(order)] for order in itertools.permutations(range(lights.shape[2]))])
 
 
-def grey(lights: np.ndarray) -> np.ndarray:
-    """The mean over channels of `lights` (count, 9, C), as (count, 9, 1)."""
-    return lights.mean(axis=2, keepdims=True)
-
-
 def stacked(lights: np.ndarray) -> np.ndarray:
     """(count, 9, C) to (count, 9 C): channel by channel."""
     return lights.transpose(0, 2, 1).reshape(len(lights), -1)
 
 
-def fit_light(lights: np.ndarray, ridge: float = 0.0, floor: float = 0.01) -> GaussianLight:
-    """The Gaussian of `lights` (count, 9, C); `ridge` is added to the diagonal of its covariance."""
+def fit_light(lights: np.ndarray, ridge: tuple[float, float] = (0.0, 0.0), floor: float = 0.01) -> GaussianLight:
+    """The Gaussian of `lights` (count, 9, C).
+
+    `ridge` is what its covariance gains, for want of lights to see it in: the variance of the brightness, and that of the colour
+    (see `Contrast`).
+    """
     samples = stacked(lights)
     mean = samples.mean(axis=0)
     centred = samples - mean
-    return GaussianLight(mean, centred.T @ centred / len(samples) + ridge * np.eye(len(mean)), floor)
+    brightness = _brightness(len(mean))
+    gain = ridge[0] * brightness + ridge[1] * (np.eye(len(mean)) - brightness)
+    return GaussianLight(mean, _symmetric(centred.T @ centred / len(samples) + gain), floor)
 
 
 @dataclass(frozen=True)
@@ -87,12 +94,9 @@ class Contrast:
 
 def scaled(lights: GaussianLight, contrast: Contrast) -> GaussianLight:
     """The Gaussian of the same lights with their coefficients multiplied by `contrast`."""
-    size = len(lights.mean)
-    channels = size // COEFFICIENTS
-    brightness = np.kron(np.full((channels, channels), 1 / channels), np.eye(COEFFICIENTS))
-    change = contrast.brightness * brightness + contrast.color * (np.eye(size) - brightness)
-    covariance = change @ lights.covariance @ change.T
-    return GaussianLight(change @ lights.mean, (covariance + covariance.T) / 2, lights.floor)
+    brightness = _brightness(len(lights.mean))
+    change = contrast.brightness * brightness + contrast.color * (np.eye(len(lights.mean)) - brightness)
+    return GaussianLight(change @ lights.mean, _symmetric(change @ lights.covariance @ change.T), lights.floor)
 
 
 def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = True) -> Contrast:
@@ -110,3 +114,13 @@ def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = 
     result = scipy.optimize.minimize(cost, start, method="Nelder-Mead", options={"xatol": 1e-5, "fatol": 1e-7, "maxiter": 1000})
     factors = np.exp(result.x)
     return Contrast(float(factors[0]), float(factors[-1]))
+
+
+def _brightness(size: int) -> np.ndarray:
+    """The projection of stacked coefficients on what the channels have in common, (size, size)."""
+    channels = size // COEFFICIENTS
+    return np.kron(np.full((channels, channels), 1 / channels), np.eye(COEFFICIENTS))
+
+
+def _symmetric(matrix: np.ndarray) -> np.ndarray:
+    return (matrix + matrix.T) / 2

@@ -19,12 +19,10 @@ ILLUMINATIONS = ("natural", "laboratory")
 
 @dataclass(frozen=True)
 class Lights:
-    """A light prior for each kind of photo: 27 coefficients in colour, 9 in grey."""
+    """A light prior for each kind of photo, in colour (27 coefficients); those for grey photos follow."""
 
     natural: GaussianLight
     laboratory: GaussianLight
-    grey_natural: GaussianLight
-    grey_laboratory: GaussianLight
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,7 @@ class PriorSet:
             raise InputError(f"unknown illumination '{illumination}': use one of {', '.join(ILLUMINATIONS)}")
         if channels not in (1, 3):
             raise InputError(f"priors are for 1 or 3 channels, not {channels}")
-        natural = illumination == "natural"
-        lights = self.lights
+        light = self.lights.natural if illumination == "natural" else self.lights.laboratory
         if channels == 1:
             return Priors(
                 channels=1,
@@ -65,7 +62,7 @@ class PriorSet:
                 smoothness_whiten=np.eye(1),
                 parsimony_whiten=np.eye(1),
                 absolute=self.grey_absolute.table(),
-                light=(lights.grey_natural if natural else lights.grey_laboratory).light(),
+                light=light.grey().light(),
             )
         return Priors(
             channels=3,
@@ -74,5 +71,5 @@ class PriorSet:
             smoothness_whiten=self.color_smoothness.whiten(),
             parsimony_whiten=self.parsimony_whiten,
             absolute=self.absolute.table(),
-            light=(lights.natural if natural else lights.laboratory).light(),
+            light=light.light(),
         )
