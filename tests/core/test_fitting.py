@@ -272,6 +272,20 @@ class TestLights:
         assert np.mean(u**2) == pytest.approx(1)
         assert np.allclose(light.unwhiten, light.unwhiten.T)
 
+    def test_grey_is_the_mean_of_the_channels(self, environments: np.ndarray) -> None:
+        samples = environments.transpose(2, 0, 1)
+        derived, direct = lights.fit_light(samples).grey(), lights.fit_light(samples.mean(axis=2, keepdims=True))
+        assert np.allclose(derived.mean, direct.mean)
+        assert np.allclose(derived.covariance, direct.covariance)
+
+    def test_ridge_widens_brightness_and_colour_apart(self, environments: np.ndarray) -> None:
+        samples = environments.transpose(2, 0, 1)
+        gain = lights.fit_light(samples, ridge=(0.3, 0.1)).covariance - lights.fit_light(samples).covariance
+        bright, blue = np.tile(np.eye(9)[0], 3) / np.sqrt(3), np.repeat([-1.0, 0, 1], 9) * np.tile(np.eye(9)[0], 3) / np.sqrt(2)
+        assert bright @ gain @ bright == pytest.approx(0.3)
+        assert blue @ gain @ blue == pytest.approx(0.1)
+        assert bright @ gain @ blue == pytest.approx(0, abs=1e-12)
+
     @pytest.mark.parametrize(("brightness", "color"), [(2.0, 1.0), (1.5, 1.5)])
     def test_contrast_is_recovered(self, brightness: float, color: float) -> None:
         rng = np.random.default_rng(9)

@@ -37,7 +37,7 @@ def prior_set() -> PriorSet:
         parsimony_whiten=covariance(3),
         absolute=CoarseTable.of(rng.normal(size=(5, 5, 5)), 10),
         grey_absolute=CoarseTable.of(rng.normal(size=8), 16, np.float32),
-        lights=Lights(light(27), light(27), light(9), light(9)),
+        lights=Lights(light(27), light(27)),
         record=FitRecord(("apple", "cup1"), Contrast(2.5, 1 / 3), {"iterations": "200"}),
     )
 
@@ -150,7 +150,7 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         ("absolute.coarse", np.zeros((5, 5), np.float16), "wrong type or shape"),
         ("absolute.nodes", np.array(12), "shape"),
         ("lights.natural.covariance", -np.eye(27), "not a covariance"),
-        ("lights.grey_natural.mean", np.zeros(27), "shape"),
+        ("lights.natural.mean", np.zeros(9), "shape"),
         ("record", np.array("{"), "record"),
         ("record", np.array("{}"), "record"),
     ],
