@@ -142,7 +142,8 @@ def decompose(
     monitor.report("maps", 0.96)
     with clock.stage("maps"):
         height = shape.height if maps_at is working else _enlarged(shape.height, working, maps_at)
-        provenance = Provenance(_settings_json(settings), settings.seed, _versions(), clock.seconds, _input_json(maps_at, name), shape.status)
+        origin = _input_json(maps_at, name)
+        provenance = Provenance(_settings_json(settings), settings.seed, _versions(), clock.seconds, origin, shape.status)
         return assemble(maps_at, split, height, shape.light, provenance)
 
 
@@ -220,7 +221,8 @@ def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
     factor = working.scale / photo.scale
     for what, values in (("shape", evidence.height), ("depth", evidence.depth)):
         if values is not None and values.shape != photo.mask.shape:
-            raise InputError(f"the {what} map is {values.shape[1]} x {values.shape[0]} but the photo {photo.mask.shape[1]} x {photo.mask.shape[0]}")
+            (rows, columns), (height, width) = values.shape, photo.mask.shape
+            raise InputError(f"the {what} map is {columns} x {rows} but the photo {width} x {height}: give it at the photo's full size")
     light = None if evidence.light is None else light_to_reference(np.asarray(evidence.light, float))
     height = None if evidence.height is None else _shrunk(evidence.height, working.mask.shape) * factor
     if height is not None and not np.isfinite(height[working.mask]).all():

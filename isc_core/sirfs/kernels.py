@@ -5,6 +5,9 @@ kernel works for float32 and float64 alike. Kernels release the interpreter lock
 spill buffers: pairs reach two rows below a block, and these contributions are added later, in a fixed order.
 """
 
+# mypy: disable-error-code="no-untyped-def"
+# (the compiler infers the types of every call)
+
 import numpy as np
 from numba import njit
 

@@ -13,6 +13,7 @@ from . import kernels, reflectance, surface
 from .illumination import C1, C2, C3, C4, C5, light_cost
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
 from .stencils import fold_border
+from .tables import CostTable
 from .workers import Workers
 
 _ROWS_A_BLOCK = 16
@@ -33,6 +34,12 @@ def _unfold_light_gradient(sums: np.ndarray) -> np.ndarray:
     gradient = sums * scale[:, None]
     gradient[6] -= C5 * sums[0]
     return gradient
+
+
+def _from_zero(table: CostTable) -> tuple[float, np.ndarray]:
+    """The part of `table` that arguments above 0 need: where its first node is, and its costs."""
+    first = min(max(int(np.floor(-table.low / table.step)), 0), len(table.values) - 2)
+    return table.low + first * table.step, table.values[first:]
 
 
 class NumbaEngine:
@@ -59,10 +66,10 @@ class NumbaEngine:
         channels = p.log_image.shape[2]
         whiten = (np.eye(channels), np.eye(channels)) if p.shading_only else (p.priors.smoothness_whiten, p.priors.parsimony_whiten)
         self._whiten_smooth, self._whiten_palette = (np.ascontiguousarray(m, t) for m in whiten)
+        # the softened difference is positive: float32 finds its cell more exactly when the table starts at 0
+        self._curvature_low, costs = _from_zero(p.priors.curvature)
         # differences are taken before rounding: two large float32 costs would leave nothing of a small slope
-        self._smooth_table, self._curvature_table = (
-            (v.astype(t), np.diff(v).astype(t)) for v in (p.priors.smoothness.values, p.priors.curvature.values)
-        )
+        self._smooth_table, self._curvature_table = ((v.astype(t), np.diff(v).astype(t)) for v in (p.priors.smoothness.values, costs))
         count = min(_MOST_BLOCKS, max(1, height // _ROWS_A_BLOCK))
         edges = [height * k // count for k in range(count + 1)]
         self._blocks = list(zip(edges[:-1], edges[1:], strict=True))
@@ -137,8 +144,8 @@ class NumbaEngine:
         p = self.problem
         table = p.priors.curvature
         kernels.curvature_block(
-            first, last, self._geometry, self._valid, self._spans, self._offsets, p.curvature_unit**2, *self._curvature_table, table.low,
-            1 / table.step, self._g_curvature, self._curvature_spill[k], self._curvature_cost, k,
+            first, last, self._geometry, self._valid, self._spans, self._offsets, p.curvature_unit**2, *self._curvature_table,
+            self._curvature_low, 1 / table.step, self._g_curvature, self._curvature_spill[k], self._curvature_cost, k,
         )  # fmt: skip
         if p.shading_only:
             return

@@ -12,7 +12,7 @@ TAPS = tuple(float(v) for v in np.array([1, 3, 3, 1]) / np.sqrt(8))
 SMALLEST = 4
 
 
-def level_shapes(shape: tuple[int, int], levels: int | None = None) -> list[tuple[int, int]]:
+def level_shapes(shape: tuple[int, ...], levels: int | None = None) -> list[tuple[int, ...]]:
     """Shapes of the levels for heights of `shape`, the finest first: `levels` of them, or as many as stay at or above `SMALLEST`."""
     shapes = [shape]
     while levels is None or len(shapes) < levels:
@@ -28,7 +28,7 @@ def down(fine: np.ndarray) -> np.ndarray:
     return _down_rows(_down_rows(fine).T).T
 
 
-def up(coarse: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def up(coarse: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """The adjoint of `down` for fine maps of `shape`."""
     rows = _up_rows(np.ascontiguousarray(coarse.T), shape[1]).T
     return _up_rows(np.ascontiguousarray(rows), shape[0])
@@ -61,7 +61,7 @@ def synthesise(levels: list[np.ndarray]) -> np.ndarray:
     """The height map that the levels (finest first) stand for."""
     height = levels[-1]
     for level in levels[-2::-1]:
-        height = level + up(height, level.shape)  # type: ignore[arg-type]
+        height = level + up(height, level.shape)
     return height
 
 

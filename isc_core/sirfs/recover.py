@@ -56,7 +56,7 @@ class Recovered:
     evaluations: int
     reason: str
     converged: bool
-    solved_shape: tuple[int, int]
+    solved_shape: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class _Window:
         out[a - self.top : b - self.top, c - self.left : d - self.left] = array[a:b, c:d]
         return out
 
-    def put(self, window: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    def put(self, window: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         out = np.zeros(shape, window.dtype)
         a, b = max(self.top, 0), min(self.top + self.height, shape[0])
         c, d = max(self.left, 0), min(self.left + self.width, shape[1])

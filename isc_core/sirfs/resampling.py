@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage, sparse
 
 
-def resampled_shape(shape: tuple[int, int], factor: float) -> tuple[int, int]:
+def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
     """The grid that covers `shape` after scaling by `factor`."""
     return max(1, round(shape[0] * factor)), max(1, round(shape[1] * factor))
 
@@ -18,7 +18,7 @@ def resample_inside(values: np.ndarray, inside: np.ndarray, factor: float) -> tu
 
     Returns the values (0 where nothing was inside) and the share of each new pixel that lies inside, in [0, 1].
     """
-    rows, columns = resampled_shape(inside.shape, factor)  # type: ignore[arg-type]
+    rows, columns = resampled_shape(inside.shape, factor)
     down, right = _weights(inside.shape[0], rows), _weights(inside.shape[1], columns)
     share = _apply(inside.astype(float), down, right)
     planes = values if values.ndim == 3 else values[..., None]
@@ -27,7 +27,7 @@ def resample_inside(values: np.ndarray, inside: np.ndarray, factor: float) -> tu
     return (mean if values.ndim == 3 else mean[..., 0]), share
 
 
-def resample_height(height: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+def resample_height(height: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     """A smooth height map (h, w) on a grid of `shape`, by cubic splines, in the new grid's pixels."""
     if height.shape == shape:
         return np.array(height, float)

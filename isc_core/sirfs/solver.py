@@ -72,7 +72,7 @@ class Engine(Protocol):
 def compiled_engine_available() -> bool:
     """Whether Numba can be imported here."""
     try:
-        import numba  # noqa: F401, PLC0415
+        import numba  # noqa: F401
     except ImportError:
         return False
     return True
@@ -98,21 +98,21 @@ class _Tools:
     def engine(self, problem: Problem) -> Engine:
         if not self.compiled:
             return NumpyEngine(problem, self.dtype)
-        from .numba_engine import NumbaEngine  # noqa: PLC0415
+        from .numba_engine import NumbaEngine
 
         return NumbaEngine(problem, self.dtype, self._workers)
 
     def algebra(self) -> Algebra:
         if not self.compiled:
             return NumpyAlgebra()
-        from .vector_kernels import CompiledAlgebra  # noqa: PLC0415
+        from .vector_kernels import CompiledAlgebra
 
         return CompiledAlgebra(self._workers)
 
     def synthesise(self, levels: list[np.ndarray]) -> np.ndarray:
         if not self.compiled:
             return synthesise(levels)
-        from .vector_kernels import up_add  # noqa: PLC0415
+        from .vector_kernels import up_add
 
         height = levels[-1]
         for level in levels[-2::-1]:
@@ -125,7 +125,7 @@ class _Tools:
         if not self.compiled:
             analyse(gradient, out)
             return
-        from .vector_kernels import down  # noqa: PLC0415
+        from .vector_kernels import down
 
         out[0][...] = gradient
         for fine, coarse in zip(out[:-1], out[1:], strict=True):
@@ -140,7 +140,7 @@ class _Unknowns:
     ) -> None:
         self._problem, self._tools, self._engine = problem, tools, tools.engine(problem)
         self._known_height, self._known_light = known_height, known_light
-        self.shapes = [] if known_height is not None else level_shapes(problem.valid.shape, levels)  # type: ignore[arg-type]
+        self.shapes = [] if known_height is not None else level_shapes(problem.valid.shape, levels)
         sizes = [int(np.prod(s)) for s in self.shapes]
         self._edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
         self._light_size = 0 if known_light is not None else problem.priors.light.mean.size
@@ -195,7 +195,7 @@ def solve(
     with Workers(thread_count(options)) as workers:
         tools = _Tools(options, workers)
         stages = _stages(problem, options, known_height)
-        full_levels = len(level_shapes(problem.valid.shape, options.levels))  # type: ignore[arg-type]
+        full_levels = len(level_shapes(problem.valid.shape, options.levels))
         previous: _Unknowns | None = None
         total = 0
         for k, stage in enumerate(stages):
@@ -207,8 +207,6 @@ def solve(
             outcome = minimise(unknowns, unknowns.x, limits, tools.algebra(), _reporter(share, limits.iterations))
             total += unknowns.evaluations
             previous = unknowns
-        loss = unknowns(unknowns.x, np.empty_like(unknowns.x))
-        del loss
         return SirfsResult(
             np.array(unknowns.height(), float), np.array(unknowns.light(), float), unknowns.terms,
             outcome.iterations, outcome.evaluations, total, outcome.reason, outcome.converged,

@@ -1,5 +1,8 @@
 """Compiled passes over many vectors, for the pyramid and for L-BFGS; the same formulas as `pyramid` and `NumpyAlgebra`."""
 
+# mypy: disable-error-code="no-untyped-def"
+# (the compiler infers the types of every call)
+
 from functools import partial
 
 import numpy as np
