@@ -70,6 +70,10 @@ class NumbaEngine:
         self._curvature_low, costs = _from_zero(p.priors.curvature)
         # differences are taken before rounding: two large float32 costs would leave nothing of a small slope
         self._smooth_table, self._curvature_table = ((v.astype(t), np.diff(v).astype(t)) for v in (p.priors.smoothness.values, costs))
+        if p.silhouette is not None:
+            strength = np.where(p.valid, p.silhouette.precision, 0) * (p.weights.silhouette / max(int(p.valid.sum()), 1))
+            field = p.silhouette
+            self._expected, self._strength = np.ascontiguousarray([field.down, field.right], t), strength.astype(t)
         count = min(_MOST_BLOCKS, max(1, height // _ROWS_A_BLOCK))
         edges = [height * k // count for k in range(count + 1)]
         self._blocks = list(zip(edges[:-1], edges[1:], strict=True))
@@ -91,6 +95,7 @@ class NumbaEngine:
         self._smooth_spill = np.empty((blocks, 2, channels, width), t)
         self._curvature_spill = np.empty((blocks, 2, width), t)
         self._smooth_cost, self._curvature_cost = np.zeros((2, blocks))
+        self._silhouette_cost = np.zeros(height)
         self._palette_terms: dict[str, float] = {}
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
@@ -103,6 +108,8 @@ class NumbaEngine:
         pairs += [partial(self._pair_block, k) for k in range(len(self._blocks))]
         self._workers.run(pairs)
         self._add_spills()
+        if p.silhouette is not None:
+            self._each_block(self._silhouette_rows)
         contour = self._contour_term()
         self._each_block(partial(self._backward, folded))
         self._workers.run([partial(kernels.adjoint_rows, a, b, self._derivatives, self._wide) for a, b in self._wide_blocks()])
@@ -110,6 +117,8 @@ class NumbaEngine:
         light_gradient = _unfold_light_gradient(self._light_sums.sum(axis=0))
         cost, pull = light_cost(np.asarray(light, float), p.priors.light, p.weights.light)
         terms = self._palette_terms | {"contour": contour, "light": cost} | self._pair_terms()
+        if p.silhouette is not None:
+            terms["silhouette"] = float(self._silhouette_cost.sum())
         if p.observation is not None:
             terms["observation"], seen = surface.observation_cost(height, p.observation)
             gradient += seen.astype(self.dtype)
@@ -138,6 +147,9 @@ class NumbaEngine:
             first, last, self._padded, self._log_image, light, self._whiten_smooth, self._whiten_palette,
             self._geometry, self._whitened, self._palette, self._d3, self._slant,
         )  # fmt: skip
+
+    def _silhouette_rows(self, first: int, last: int) -> None:
+        kernels.silhouette_rows(first, last, self._geometry, self._expected, self._strength, self._contour, self._silhouette_cost)
 
     def _pair_block(self, k: int) -> None:
         first, last = self._blocks[k]
@@ -202,8 +214,12 @@ class NumbaEngine:
         at = (p.contour.rows, p.contour.columns)
         n1, n2 = self._geometry[:, 5], self._geometry[:, 6]
         cost, c1, c2 = surface.contour_cost(n1, n2, p.contour, w.contour, w.contour_power, p.valid.size)
-        self._contour[(0, *at)] = c1
-        self._contour[(1, *at)] = c2
+        if p.silhouette is None:
+            self._contour[(0, *at)] = c1
+            self._contour[(1, *at)] = c2
+        else:
+            self._contour[(0, *at)] += c1
+            self._contour[(1, *at)] += c2
         return cost
 
     def _scales(self) -> tuple[float, float, float, float]:
