@@ -21,7 +21,7 @@ import numpy as np
 from isc_core.sirfs.frames import real_sh
 
 
-def sky_from_shading(illumination: np.ndarray, rows: int = 32, iterations: int = 300) -> np.ndarray:
+def sky_from_shading(illumination: np.ndarray, rows: int = 32, iterations: int = 100) -> np.ndarray:
     """The radiance of the sky, (rows, 2 rows, 3) float32 >= 0, linear; see `sky_directions` for which pixel looks where.
 
     `illumination`: (9, 3) coefficients of log shading in the camera's frame, as in `decomposition.json`.

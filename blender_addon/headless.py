@@ -16,17 +16,17 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--blend", type=Path, required=True, help="the .blend file to write")
     parser.add_argument("--render", type=Path, help="a PNG file to render to, with Cycles")
     parser.add_argument("--samples", type=int, default=32, help="rays per pixel (default: %(default)s)")
-    parser.add_argument("--matte", action="store_true", help="without gloss, to compare with the diffuse image")
+    parser.add_argument("--gloss", action="store_true", help="keep the material's gloss even where it was not fitted")
     options = parser.parse_args(arguments)
     try:
-        run(options.result, options.blend, options.render, options.samples, options.matte)
+        run(options.result, options.blend, options.render, options.samples, options.gloss)
     except InputError as error:
         print(f"blender: {error}", file=sys.stderr)
         return 2
     return 0
 
 
-def run(result: Path, blend: Path, render: Path | None = None, samples: int = 32, matte: bool = False) -> None:
+def run(result: Path, blend: Path, render: Path | None = None, samples: int = 32, gloss: bool = False) -> None:
     """Builds the scene of a result folder, saves it as `blend`, and renders it to `render`.
 
     Raises `InputError` without the bpy module, for a folder that is no result, or where a file cannot be written.
@@ -40,7 +40,7 @@ def run(result: Path, blend: Path, render: Path | None = None, samples: int = 32
         raise InputError(f"this needs Blender's Python module ({error}): install it with `pip install 'isc3d[blender]'`") from error
     from .scene import build
 
-    scene = build(placement, samples, matte)
+    scene = build(placement, samples, gloss)
     try:
         blend.parent.mkdir(parents=True, exist_ok=True)
         bpy.ops.wm.save_as_mainfile(filepath=str(blend.resolve()), check_existing=False)

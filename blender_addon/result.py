@@ -15,12 +15,14 @@ class Placement:
 
     `mesh`: the .glb file. `illumination`: (9, 3), log shading in the camera's frame, for the mesh's base colour.
     `metres_per_pixel`: of the maps. `origin`: (column, row) in pixels of the mesh's origin.
+    `gloss_is_fitted`: whether the material's gloss was measured in the photo, or is just a usual value.
     """
 
     mesh: Path
     illumination: np.ndarray
     metres_per_pixel: float
     origin: tuple[float, float]
+    gloss_is_fitted: bool
 
 
 def read_placement(folder: Path) -> Placement:
@@ -33,10 +35,11 @@ def read_placement(folder: Path) -> Placement:
         record = json.loads(description.read_text(encoding="utf-8"))["mesh"]
         light = np.array(record["illumination"]["coefficients"], dtype=np.float64)
         scale, origin = float(record["metres_per_pixel"]), (float(record["origin"]["column"]), float(record["origin"]["row"]))
+        fitted = record["roughness"]["source"] == "fitted"
     except OSError as error:
         raise InputError(f"cannot read {description}: {error.strerror}") from error
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"{description} is damaged or not a result of isc decompose: {error}") from error
     if light.shape != (9, 3) or not np.isfinite(light).all() or not scale > 0:
         raise InputError(f"{description} has no usable light or scale: decompose the photo again")
-    return Placement(mesh, light, scale, origin)
+    return Placement(mesh, light, scale, origin, fitted)

@@ -111,11 +111,11 @@ def make_matte(mesh: bpy.types.Object) -> None:
                 node.inputs["Specular IOR Level"].default_value = 0
 
 
-def build(placement: Placement, samples: int = 32, matte: bool = False) -> bpy.types.Scene:
-    """The whole scene in an empty file; `matte`: without gloss. Raises `InputError` if the mesh cannot be used."""
+def build(placement: Placement, samples: int = 32, gloss: bool = False) -> bpy.types.Scene:
+    """The whole scene in an empty file; `gloss`: keep the material's gloss though it was not fitted. Raises `InputError` if the mesh cannot be used."""
     scene = clear_scene()
     mesh = import_mesh(placement.mesh)
-    if matte:
+    if not (gloss or placement.gloss_is_fitted):
         make_matte(mesh)
     place_camera(scene, placement, frame_size(mesh))
     light_world(scene, placement.illumination)

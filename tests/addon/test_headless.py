@@ -45,7 +45,7 @@ def test_the_scene_renders_as_the_photo_shows_it(tmp_path: Path) -> None:
     known = ball()
     save(known, tmp_path / "result")
     blend, picture = tmp_path / "scene" / "out.blend", tmp_path / "scene" / "out.png"
-    done = blender(tmp_path / "result", "--blend", blend, "--render", picture, "--matte", "--samples", 64)
+    done = blender(tmp_path / "result", "--blend", blend, "--render", picture, "--samples", 64)
     assert done.returncode == 0, done.stdout + done.stderr
     assert blend.stat().st_size > 10_000
     got, alpha = linear_picture(picture)
