@@ -112,7 +112,10 @@ def make_matte(mesh: bpy.types.Object) -> None:
 
 
 def build(placement: Placement, samples: int = 32, gloss: bool = False) -> bpy.types.Scene:
-    """The whole scene in an empty file; `gloss`: keep the material's gloss though it was not fitted. Raises `InputError` if the mesh cannot be used."""
+    """The whole scene in an empty file. `gloss`: keep the material's gloss even where it was not fitted.
+
+    Raises `InputError` if the mesh cannot be used.
+    """
     scene = clear_scene()
     mesh = import_mesh(placement.mesh)
     if not (gloss or placement.gloss_is_fitted):
