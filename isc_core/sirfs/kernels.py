@@ -358,6 +358,24 @@ def blur_color(counts, taps, blurred):
 
 
 @compiled
+def silhouette_rows(first, last, geometry, expected, strength, gradient, sums):
+    """The silhouette term of rows [first, last): overwrites gradient (2, H, W) with those of n1 and n2, sums (H,) with its costs."""
+    t = geometry.dtype.type
+    half = t(0.5)
+    for i in range(first, last):
+        n1, n2, m1, m2, s = geometry[i, 5], geometry[i, 6], expected[0, i], expected[1, i], strength[i]
+        g1, g2 = gradient[0, i], gradient[1, i]
+        for j in range(len(s)):
+            g1[j] = s[j] * (n1[j] - m1[j])
+        for j in range(len(s)):
+            g2[j] = s[j] * (n2[j] - m2[j])
+        total = t(0)
+        for j in range(len(s)):
+            total += g1[j] * (n1[j] - m1[j]) + g2[j] * (n2[j] - m2[j])
+        sums[i] = half * total
+
+
+@compiled
 def backward_rows(
     first, last, geometry, light, whiten_smooth, whiten_palette, g_smooth, g_palette, g_curvature, scales, d3, contour, light_sums, out
 ):

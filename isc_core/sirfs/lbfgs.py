@@ -92,7 +92,8 @@ class _Memory:
         return self.vectors[-1]
 
     def next_slot(self) -> int:
-        return self._order[0] if len(self._order) == self.size else len(self._order)
+        """A row that holds no pair, else that of the oldest. (A skipped pair can leave a gap anywhere.)"""
+        return next((k for k in range(self.size) if k not in self._order), self._order[0] if self._order else 0)
 
     def refresh(self, slot: int | None) -> None:
         """Takes the rows of `slot` as the newest pair (None: only the gradient has changed)."""

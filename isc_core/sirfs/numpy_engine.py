@@ -5,6 +5,7 @@ import numpy as np
 from . import reflectance, surface
 from .illumination import basis, basis_adjoint, light_cost
 from .problem import Evaluation, Problem, Terms
+from .silhouette import silhouette_cost
 
 
 class NumpyEngine:
@@ -51,8 +52,11 @@ class NumpyEngine:
         at = (p.contour.rows, p.contour.columns)
         d1[at] += c1.astype(d1.dtype)
         d2[at] += c2.astype(d2.dtype)
-        gradient = surface.height_gradient(g, d1, d2, d3 + d_slant, dk)
         terms = {"curvature": curvature, "slant": slant, "contour": contour}
+        if p.silhouette is not None:
+            terms["silhouette"], e1, e2 = silhouette_cost(g.n1, g.n2, p.valid, p.silhouette, w.silhouette)
+            d1, d2 = d1 + e1, d2 + e2
+        gradient = surface.height_gradient(g, d1, d2, d3 + d_slant, dk)
         if p.observation is not None:
             terms["observation"], seen = surface.observation_cost(height, p.observation)
             gradient = gradient + seen

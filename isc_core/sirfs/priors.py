@@ -34,6 +34,19 @@ class Light:
 
 
 @dataclass(frozen=True)
+class SilhouetteProfile:
+    """How far surfaces have turned away at relative depth u = (k + 0.5) / K behind the silhouette: `mean` and `spread`, both (K,)."""
+
+    mean: np.ndarray
+    spread: np.ndarray
+
+    def at(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Mean and spread at `u` in [0, 1], linearly interpolated."""
+        nodes = (np.arange(len(self.mean)) + 0.5) / len(self.mean)
+        return np.interp(u, nodes, self.mean), np.interp(u, nodes, self.spread)
+
+
+@dataclass(frozen=True)
 class Priors:
     """Everything the SIRFS objective needs besides its weights.
 
@@ -41,6 +54,7 @@ class Priors:
     `curvature`: cost of the difference x of two mean curvatures (1 / pixel), symmetric, 0 at x = 0.
     `smoothness`: cost of m = 0.5 |smoothness_whiten (A_p - A_q)|^2 in colour, of A_p - A_q itself in grey.
     `parsimony_whiten`: (C, C), takes log reflectance to the space of the parsimony and absolute terms.
+    `silhouette`: see `silhouette`; None where nothing is known of it.
     """
 
     channels: int
@@ -50,3 +64,4 @@ class Priors:
     parsimony_whiten: np.ndarray
     absolute: AbsoluteTable
     light: Light
+    silhouette: SilhouetteProfile | None = None

@@ -7,6 +7,7 @@ import numpy as np
 from .contour import Contour
 from .priors import Priors
 from .settings import Weights
+from .silhouette import SilhouetteField
 
 # Half of the 5 x 5 window's offsets (down, right): every unordered pair once.
 PAIR_OFFSETS = ((0, 1), (0, 2), (1, -2), (1, -1), (1, 0), (1, 1), (1, 2), (2, -2), (2, -1), (2, 0), (2, 1), (2, 2))
@@ -31,7 +32,7 @@ class Problem:
 
     `mask`: (H, W) bool, the object; `contour`: its occluding contour.
 
-    `shading_only`: shape-from-shading mode, reflectance is taken as one unknown colour.
+    `silhouette`: what the outline says of the normals. `shading_only`: shape-from-shading mode, reflectance is taken as one unknown colour.
     `curvature_unit`: pixels of this problem to one pixel of the scale at which the priors were fitted; curvature differences
     are multiplied by its square, since curvature is per pixel and a pair's distance is in pixels.
     """
@@ -45,6 +46,7 @@ class Problem:
     observation: DepthObservation | None = None
     shading_only: bool = False
     curvature_unit: float = 1.0
+    silhouette: SilhouetteField | None = None
 
 
 @dataclass(frozen=True)
@@ -58,6 +60,7 @@ class Terms:
     parsimony: float = 0.0
     absolute: float = 0.0
     light: float = 0.0
+    silhouette: float = 0.0
     observation: float = 0.0
     shading_only: float = 0.0
 

@@ -14,6 +14,7 @@ from .priors import Priors
 from .problem import DepthObservation, Problem, Terms
 from .resampling import resample_height, resample_inside
 from .settings import Weights
+from .silhouette import silhouette_field
 from .solver import SolverOptions, solve
 
 MARGIN = 20
@@ -148,7 +149,8 @@ def _problem(
             depth = DepthObservation(np.where(seen_share >= 0.5, seen * factor, np.nan), depth.sigma * factor, depth.weight)
     log_image = np.where(valid[..., None], np.log(np.maximum(image, floor)), 0.0)
     contour = occluding_contour(contour_inside)
-    return Problem(log_image, valid, contour_inside, contour, priors, weights, depth, options.shading_only)
+    field = None if priors.silhouette is None else silhouette_field(contour_inside, priors.silhouette)
+    return Problem(log_image, valid, contour_inside, contour, priors, weights, depth, options.shading_only, silhouette=field)
 
 
 def _to_solve(height: np.ndarray, inside: np.ndarray, factor: float) -> np.ndarray:

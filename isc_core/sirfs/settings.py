@@ -15,7 +15,8 @@ class Weights:
     measured with a Parzen window of `parsimony_sigma / 20` in whitened log colour. `absolute`: likely reflectance colours.
     `curvature`: mean curvature varies little. `slant`: surfaces face all directions equally often.
     `contour`: normals on the occluding contour point outward, with the penalty's power `contour_power`.
-    `light`: likely illuminations. `shading_only`: in shape-from-shading mode, how strictly reflectance is one colour.
+    `light`: likely illuminations. `silhouette`: surfaces lean outward near the outline (ours; not in the
+    published sets). `shading_only`: in shape-from-shading mode, how strictly reflectance is one colour.
     """
 
     smoothness: float
@@ -27,6 +28,7 @@ class Weights:
     contour: float
     light: float
     contour_power: float = 0.75
+    silhouette: float = 0.0
     shading_only: float = 50.0
 
 

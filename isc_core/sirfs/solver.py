@@ -20,6 +20,7 @@ from .lbfgs import Algebra, LbfgsOptions, NumpyAlgebra, minimise
 from .numpy_engine import NumpyEngine
 from .problem import DepthObservation, Evaluation, Problem, Terms
 from .pyramid import analyse, level_shapes, synthesise
+from .silhouette import silhouette_field
 from .workers import Workers
 
 _LEAST_COARSE = 40  # pixels on the short side, below which a halved problem no longer shows the object
@@ -254,6 +255,7 @@ def halved(problem: Problem) -> Problem:
         observation = DepthObservation(np.where(share > 0, mean / 2, np.nan), observation.sigma / 2, observation.weight)
     return replace(
         problem, log_image=log_image, valid=valid, mask=mask, contour=occluding_contour(mask),
+        silhouette=None if problem.priors.silhouette is None else silhouette_field(mask, problem.priors.silhouette),
         observation=observation, curvature_unit=problem.curvature_unit / 2,
     )  # fmt: skip
 
