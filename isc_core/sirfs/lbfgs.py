@@ -77,6 +77,9 @@ class NumpyAlgebra:
 Function = Callable[[np.ndarray, np.ndarray], float]
 
 
+_LEAST_COSINE = 1e-10  # between a step and the change of the gradient: below, the pair says nothing of the curvature
+
+
 class _Memory:
     """Steps and gradient changes, with the inner products between all of them. Rows: m steps, m changes, the gradient."""
 
@@ -104,7 +107,8 @@ class _Memory:
         if slot is None:
             return
         self._order = [k for k in self._order if k != slot]
-        if self._gram[slot, self.size + slot] > 1e-10:
+        change = self.size + slot
+        if self._gram[slot, change] > _LEAST_COSINE * np.sqrt(self._gram[slot, slot] * self._gram[change, change]):
             self._order.append(slot)
 
     def direction(self, out: np.ndarray) -> float:
