@@ -83,6 +83,17 @@ def require_writable(folder: Path | str, ours: Sequence[str]) -> None:
         probe.rmdir()
 
 
+def require_writable_file(path: Path | str) -> None:
+    """Tries now whether `new_file` could begin, before hours of work are spent. Leaves no trace. Raises `InputError`."""
+    target = _resolved(path)
+    if target.is_dir():
+        raise InputError(f"{path} is a folder: name a file")
+    with _explained(target), _made_parents(target, keep=False):
+        probe = _sibling(target, "partial")
+        probe.mkdir()
+        probe.rmdir()
+
+
 def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
     """Raises `InputError` unless `folder` may be created or replaced (see `new_folder`)."""
     with _explained(folder):

@@ -68,7 +68,7 @@ class PhotoSource:
     """The file a photo comes from.
 
     `sha256` of the file; `size` = (width, height) after rotation; `bit_depth` a channel; `transfer` used, "srgb" or "linear";
-    `mask_from`: "file", "alpha" or "black border".
+    `mask_from`: "file", "alpha", "black border" or "whole frame".
     """
 
     sha256: str
@@ -183,20 +183,23 @@ def read_linear(path: str | Path, transfer: str = "auto") -> np.ndarray:
 # --- the photo --------------------------------------------------------------------------------------------------------------------------
 
 
-def read_photo(path: str | Path, mask_path: str | Path | None = None, transfer: str = "auto") -> Photo:
+def read_photo(
+    path: str | Path, mask_path: str | Path | None = None, transfer: str = "auto", *, whole_frame: bool = False
+) -> Photo:
     """Reads a photo at full size.
 
     Files: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM, told apart by their content. `transfer`: "srgb", "linear", or "auto" =
     float files linear, all others sRGB. The mask is `mask_path` (inside = above half of its largest value, or its alpha channel where
     that is not opaque); else the photo's alpha channel (>= 0.5) where that is not opaque; else, on a black border (at most 2/255 in
-    sRGB coding), the pixels that are not black: holes filled, parts smaller than 1 % of the largest dropped.
+    sRGB coding), the pixels that are not black: holes filled, parts smaller than 1 % of the largest dropped. Where there is none of
+    these, `whole_frame` takes all pixels.
     Raises `InputError`, one line with the remedy, for anything that cannot be used.
     """
     raster = read_raster(path)
     used = _transfer_used(transfer, raster)
     _refuse_constant(raster.values, f"{path}: every pixel")
     linear = _to_linear(raster, used)
-    mask, mask_from = _find_mask(path, raster, linear, mask_path)
+    mask, mask_from = _find_mask(path, raster, linear, mask_path, whole_frame)
     check_mask(mask, f"{path if mask_path is None else mask_path}: the mask")
     _refuse_constant(raster.values[mask], f"{path}: every pixel inside the mask")
     height, width = mask.shape
@@ -274,7 +277,9 @@ def tidy_mask(mask: np.ndarray) -> np.ndarray:
     return (areas >= max(0.01 * areas.max(), 1))[labels]
 
 
-def _find_mask(path: str | Path, raster: Raster, linear: np.ndarray, mask_path: str | Path | None) -> tuple[np.ndarray, str]:
+def _find_mask(
+    path: str | Path, raster: Raster, linear: np.ndarray, mask_path: str | Path | None, whole_frame: bool
+) -> tuple[np.ndarray, str]:
     if mask_path is not None:
         return _mask_of_file(mask_path, raster), "file"
     if raster.alpha is not None and (raster.alpha < 1).any():
@@ -286,6 +291,8 @@ def _find_mask(path: str | Path, raster: Raster, linear: np.ndarray, mask_path: 
     white = 1.0 if raster.peak is not None else float(np.percentile(light[light > 0], 99.0))
     lit = light > white * float(srgb_to_linear(BLACK))
     if lit[0].any() or lit[-1].any() or lit[:, 0].any() or lit[:, -1].any():
+        if whole_frame:
+            return np.ones_like(lit), "whole frame"
         raise InputError(
             f"{path}: there is no mask, no transparency and no black border to find the object by: "
             "make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` and give it with --mask"

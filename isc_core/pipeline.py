@@ -221,8 +221,8 @@ def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
     factor = working.scale / photo.scale
     for what, values in (("shape", evidence.height), ("depth", evidence.depth)):
         if values is not None and values.shape != photo.mask.shape:
-            (rows, columns), (height, width) = values.shape, photo.mask.shape
-            raise InputError(f"the {what} map is {columns} x {rows} but the photo {width} x {height}: give it at the photo's full size")
+            (rows, columns), (h, w) = values.shape, photo.mask.shape
+            raise InputError(f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the photo's full size")
     light = None if evidence.light is None else light_to_reference(np.asarray(evidence.light, float))
     height = None if evidence.height is None else _shrunk(evidence.height, working.mask.shape) * factor
     if height is not None and not np.isfinite(height[working.mask]).all():

@@ -7,6 +7,7 @@ the main maps once more as single-layer files, for programs that cannot read mul
 
 import json
 import math
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -27,6 +28,7 @@ SCHEMA_VERSION = 1
 LAYERS = {**dict.fromkeys(COLOR_MAPS, "RGB"), "normal": "XYZ", "height": "Z", "mask": "A", "confidence": "Y"}
 SINGLE = {"diffuse": "RGB", "specular": "RGB", "reflectance": "RGB", "shading": "RGB", "normal": "RGB", "height": "Y"}
 DECOMPOSITION_FILES = ("decomposition.json", "maps.exr", "mesh.glb", "preview.png", *(f"maps/{name}.exr" for name in SINGLE))
+_LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # smaller results have not been seen
 SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
 
 
@@ -96,6 +98,17 @@ def save_separation(
 def require_writable_result(folder: Path | str, *, separation: bool = False) -> None:
     """Tells before the work whether its result could be written to `folder`. Raises `InputError`."""
     require_writable(folder, SEPARATION_FILES if separation else DECOMPOSITION_FILES)
+
+
+def require_room(folder: Path | str, pixels: int) -> None:
+    """Raises `InputError` where the disk surely has no room for the result of an object of `pixels` pixels: known before the work."""
+    place = next(parent for parent in (Path(folder).resolve() / "maps").parents if parent.exists())
+    least = _LEAST_BYTES + _LEAST_BYTES_A_PIXEL * pixels
+    if (free := shutil.disk_usage(place).free) < least:
+        raise InputError(
+            f"cannot write {folder}: no space is left on the disk ({free / 1e6:.1f} MB, at least {least / 1e6:.1f} are needed); "
+            "free some or choose another place"
+        )
 
 
 def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:

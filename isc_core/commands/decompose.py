@@ -1,0 +1,123 @@
+"""`isc decompose`: one photo in, the folder of its decomposition out."""
+
+import argparse
+from dataclasses import fields
+from pathlib import Path
+
+from ..evidence_files import read_height, read_light
+from ..photo import Photo, read_photo
+from ..pipeline import ILLUMINATIONS, LATER_MODELS, MODELS, Evidence, Settings, decompose
+from ..progress import Monitor
+from ..result_folder import require_room, require_writable_result, save
+from ..separation import METHODS
+from ..sirfs.prior_file import load_prior_set
+from .options import Commands, add_command, add_engine, add_photo, count, number, positive
+
+_EXAMPLES = """  isc decompose cup.png -o cup
+  isc decompose photo.jpg --mask mask.png --model sirfs -o result
+  isc decompose scan.tif --transfer linear --depth sensor.exr --depth-sigma 3 -o result
+
+height maps (--shape, --depth): of the photo's size, in photo pixels toward the viewer. EXR: a channel Y or Z, or height.Z;
+NumPy .npy; PNG or TIFF of 16 bits, where one code is 1/64 pixel and 0 is a hole; or the folder of an earlier result.
+NaN is a hole. --height-scale changes the unit: -0.2 for a distance from the camera of which one unit is 0.2 pixels."""
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands, "decompose", run, "everything: layers, shape, light, shading, reflectance, mesh",
+        "Takes a photo of one glossy object apart: diffuse and specular light, shape, illumination, shading, reflectance. Writes a folder "
+        "with preview.png (look at this first), maps.exr, mesh.glb and decomposition.json.", _EXAMPLES,
+    )  # fmt: skip
+    usual = Settings()
+    add_photo(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier result is replaced"
+    )
+    parser.add_argument(
+        "--model",
+        default=usual.model,
+        metavar="NAME",
+        help=f"{', '.join(MODELS)} (default {usual.model}); later: {', '.join(LATER_MODELS)}",
+    )
+    parser.add_argument(
+        "--separator",
+        default=usual.separator,
+        metavar="NAME",
+        help=f"what removes highlights: {', '.join(METHODS)} (default {usual.separator})",
+    )
+    parser.add_argument(
+        "--illumination", choices=ILLUMINATIONS, default=usual.illumination, help="which lights to expect (default %(default)s)"
+    )
+    parser.add_argument(
+        "--max-size",
+        type=count,
+        default=usual.max_size,
+        metavar="N",
+        help="long side of the object, in pixels, to work at (default %(default)s; 0: the photo's)",
+    )
+    parser.add_argument("--full-size", action="store_true", help="bring the result back to the photo's resolution")
+    parser.add_argument("--shading-only", action="store_true", help="shape from shading: the object has one colour")
+    _add_evidence(parser)
+    parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
+    parser.add_argument(
+        "--seed", type=count, default=usual.seed, metavar="N", help="of random numbers, written into the result (default %(default)s)"
+    )
+    add_engine(parser)
+
+
+def _add_evidence(parser: argparse.ArgumentParser) -> None:
+    usual = Evidence()
+    known = parser.add_argument_group("what is known already")
+    known.add_argument("--shape", type=Path, metavar="FILE", help="the exact shape, a height map without holes inside the mask")
+    known.add_argument(
+        "--light", type=Path, metavar="FILE", help="the exact light, a decomposition.json or a JSON file with 9 x 3 coefficients"
+    )
+    known.add_argument("--depth", type=Path, metavar="FILE", help="a measured height map, with holes and errors")
+    known.add_argument(
+        "--depth-sigma",
+        type=positive,
+        default=usual.depth_sigma,
+        metavar="S",
+        help="its standard error in photo pixels (default %(default)s)",
+    )
+    known.add_argument(
+        "--depth-weight", type=positive, default=usual.depth_weight, metavar="W", help="how much it counts (default %(default)s)"
+    )
+    known.add_argument(
+        "--height-scale", type=number, metavar="F", help="photo pixels to one unit of --shape and --depth (default 1; 1/64 for 16 bits)"
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work; what can be wrong is found before it begins."""
+    settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
+    settings.check()
+    require_writable_result(options.output)
+    prior_set = None if options.priors is None else load_prior_set(options.priors)
+    photo = read_photo(options.photo, options.mask, options.transfer)
+    evidence = _evidence(options, photo)
+    require_room(options.output, _pixels(photo, settings))
+    result = decompose(photo, settings, evidence=evidence, prior_set=prior_set, name=options.photo.name, monitor=monitor.part(0.0, 0.8))
+    save(result, options.output, monitor=monitor.part(0.8, 1.0))
+    status = result.provenance.status
+    trouble = [] if status.get("converged", True) else [f"not converged: {status.get('reason', '')}; {status.get('help', '')}"]
+    return [*trouble, f"look at {options.output / 'preview.png'}"]
+
+
+def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:
+    size, scale = photo.mask.shape, options.height_scale
+    return Evidence(
+        height=None if options.shape is None else read_height(options.shape, size, scale),
+        light=None if options.light is None else read_light(options.light),
+        depth=None if options.depth is None else read_height(options.depth, size, scale),
+        depth_sigma=options.depth_sigma,
+        depth_weight=options.depth_weight,
+    )
+
+
+def _pixels(photo: Photo, settings: Settings) -> int:
+    """Of the object in the maps to come."""
+    longest = max(photo.box[2:])
+    keep = settings.full_size or settings.max_size == 0 or longest <= settings.max_size
+    return round(int(photo.mask.sum()) * (1.0 if keep else (settings.max_size / longest) ** 2))

@@ -1,0 +1,66 @@
+"""`isc evaluate`: how far a model is from the truth, object by object."""
+
+import argparse
+import json
+from pathlib import Path
+
+from ..atomic import new_file, require_writable_file
+from ..datasets import ILLUMINATIONS, INPUTS
+from ..evaluate import evaluate
+from ..evaluation_runner import RunnerOptions, make_runner
+from ..progress import Monitor
+from ..sirfs.prior_file import load_prior_set, shipped_prior_set
+from .options import Commands, add_command, add_engine, names
+
+_EXAMPLES = """  isc evaluate DATA --dataset mit-berkeley --json scores.json
+  isc evaluate DATA --dataset mit-berkeley --objects apple,cup1 --illumination natural
+  isc evaluate DATA --dataset mit-berkeley --input original --model mdr
+
+The package's own priors were fitted on the training objects of this set. For a fair figure leave the object out:
+  isc fit-priors DATA --leave-out apple -o priors.npz
+  isc evaluate DATA --dataset mit-berkeley --objects apple --priors priors.npz"""
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands, "evaluate", run, "accuracy on a data set with ground truth",
+        "Prints the errors of height, normals, shading, reflectance and light for each object, and their geometric means.", _EXAMPLES,
+    )  # fmt: skip
+    parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
+    parser.add_argument("--dataset", choices=("mit-berkeley",), required=True, help="its kind")
+    parser.add_argument("--objects", type=names, metavar="a,b", help="their names (default: all)")
+    parser.add_argument(
+        "--input", choices=INPUTS, default="diffuse", help="images without highlights, or as photographed (default %(default)s)"
+    )
+    parser.add_argument("--illumination", choices=(*ILLUMINATIONS, "both"), help="default: both, or laboratory for --input original")
+    parser.add_argument("--model", metavar="NAME", help="as for isc decompose (default: sirfs, or mdr for --input original)")
+    parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of mdr (default %(default)s)")
+    parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
+    add_engine(parser)
+    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work."""
+    if options.json is not None:
+        require_writable_file(options.json)
+    original = options.input == "original"
+    model = options.model or ("mdr" if original else "sirfs")
+    runner_options = RunnerOptions(model, options.separator, options.engine, options.threads)
+    runner_options.check()
+    prior_set = shipped_prior_set() if options.priors is None else load_prior_set(options.priors)
+    report = evaluate(
+        options.root, objects=options.objects, illuminations=_illuminations(options.illumination, original),
+        input=options.input, model=model, runner=make_runner(runner_options, prior_set), monitor=monitor,
+    )  # fmt: skip
+    if options.json is not None:
+        with new_file(options.json) as partial:
+            partial.write_text(json.dumps(report.to_json(), indent=2) + "\n", encoding="utf-8")
+    return [report.table()]
+
+
+def _illuminations(chosen: str | None, original: bool) -> tuple[str, ...]:
+    if chosen is None:
+        return ("laboratory",) if original else ILLUMINATIONS
+    return ILLUMINATIONS if chosen == "both" else (chosen,)

@@ -1,0 +1,106 @@
+"""How options are read: a parser whose complaints are one line, and the types that several commands share."""
+
+import argparse
+import math
+import textwrap
+from pathlib import Path
+from typing import Any, NoReturn
+
+from ..errors import InputError
+from ..photo import TRANSFERS
+
+Commands = Any  # what `add_subparsers` returns has no public name
+
+
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Keeps the examples as they are written, and fills the lines above them."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        keep = "\n" in text
+        return super()._fill_text(text if keep else "\n".join(textwrap.wrap(text, width)), width, indent)
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises `InputError` instead of printing its usage; options cannot be shortened, so that new ones never change old scripts."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(allow_abbrev=False, formatter_class=_Help, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """Raises `InputError`."""
+        raise InputError(f"{message} (see `{self.prog} --help`)")
+
+
+def add_command(commands: Commands, name: str, run: Any, summary: str, description: str, examples: str) -> argparse.ArgumentParser:
+    """A sub-command's parser, with what all of them have."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name, help=summary, description=description, epilog=f"examples:\n{examples}" if examples else None
+    )
+    parser.set_defaults(run=run)
+    parser.add_argument("--quiet", action="store_true", help="show no progress and print nothing")
+    return parser
+
+
+def add_photo(parser: argparse.ArgumentParser) -> None:
+    """PHOTO, --mask, --transfer."""
+    parser.add_argument("photo", metavar="PHOTO", type=Path, help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR or HDR")
+    parser.add_argument(
+        "--mask",
+        type=Path,
+        metavar="MASK",
+        help="image of the photo's size, the object white on black (default: the photo's alpha channel, else what is not black)",
+    )
+    add_transfer(parser)
+
+
+def add_transfer(parser: argparse.ArgumentParser) -> None:
+    """--transfer."""
+    parser.add_argument(
+        "--transfer", choices=TRANSFERS, default="auto", help="how the photo is coded (auto: EXR and HDR are linear, all others sRGB)"
+    )
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """--engine and --threads."""
+    parser.add_argument(
+        "--engine", choices=("auto", "numba", "numpy"), default="auto", help="compiled kernels, or plain NumPy (auto: compiled if possible)"
+    )
+    parser.add_argument("--threads", type=count, default=0, metavar="N", help="how many threads to use (0: one for each core)")
+
+
+def count(text: str) -> int:
+    """A whole number from 0 on."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+    return value
+
+
+def number(text: str) -> float:
+    """A finite number other than 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or value == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number other than 0")
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not above 0")
+    return value
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names with commas between them."""
+    found = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not found:
+        raise argparse.ArgumentTypeError("give at least one name")
+    return found

@@ -1,0 +1,41 @@
+"""`isc separate`: a photo's diffuse and specular layers, without shape and light."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from ..photo import read_photo
+from ..progress import Monitor
+from ..result_folder import require_writable_result, save_separation
+from ..separation import METHODS, separate
+from .options import Commands, add_command, add_photo
+
+_EXAMPLES = """  isc separate cup.png --method shen_2013 -o cup-layers
+  isc separate highlights.bmp --transfer linear --method shen_2013 -o layers"""
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands, "separate", run, "diffuse and specular light only",
+        "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and pictures of both. A photo without mask, "
+        "transparency and black border is taken as a whole.", _EXAMPLES,
+    )  # fmt: skip
+    add_photo(parser)
+    parser.add_argument("--method", choices=METHODS, required=True, help="how")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier result is replaced"
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work."""
+    require_writable_result(options.output, separation=True)
+    photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True)
+    monitor.report(f"separating ({options.method})", 0.2)
+    layers = separate(options.method, photo.image, photo.mask, photo.clipped)
+    monitor.report("writing", 0.8)
+    save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
+    if photo.original.mask_from == "whole frame" and not options.quiet:
+        print("isc: note: there is no mask, so the whole image was taken; --mask names one", file=sys.stderr)
+    return [f"look at {options.output / 'preview.png'}"]

@@ -1,0 +1,84 @@
+"""How each model is run on the MIT-Berkeley set: at the images' own scale, on the data set's crop, with the published weights.
+
+The protocol of J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712: the image is explained where all its channels are above
+zero, and the occluding contour is that of the object's mask, without the points near the crop's frame.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import baselines
+from .datasets import MitBerkeleyObject
+from .evaluate import Estimate, Runner
+from .pipeline import BASELINE_MODELS, SIRFS_MODELS, Settings
+from .progress import Monitor
+from .separation import separate
+from .sirfs.contour import occluding_contour
+from .sirfs.fitting.prior_set import PriorSet
+from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
+from .sirfs.priors import Priors
+from .sirfs.problem import Problem
+from .sirfs.settings import published_weights
+from .sirfs.solver import SirfsResult, SolverOptions, solve
+from .sirfs.stencils import normals
+
+_HALF_CODE = 0.5 / 65535  # the images have 16 bits; a separation may leave less than one code
+
+
+@dataclass(frozen=True)
+class RunnerOptions:
+    """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for `mdr`; `engine`, `threads`: see `SolverOptions`."""
+
+    model: str = "sirfs"
+    separator: str = "shen_2013"
+    engine: str = "auto"
+    threads: int = 0
+
+    def check(self) -> None:
+        """Raises `InputError` for values that mean nothing."""
+        Settings(model=self.model, separator=self.separator, engine=self.engine, threads=self.threads).check()
+
+
+def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
+    """What `evaluate` runs on each object. Raises `InputError` for unknown options."""
+    options.check()
+    tables: dict[str, Priors] = {}
+
+    def run(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
+        log_image = _log_diffuse(truth, options)
+        if options.model in BASELINE_MODELS:
+            guess = baselines.estimate(options.model, log_image, truth.valid)
+            return _estimate(truth, log_image, guess.height, guess.light)
+        if truth.illumination not in tables:
+            tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
+        result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor)
+        return _estimate(truth, log_image, result.height, result.light, result)
+
+    return run
+
+
+def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, options: RunnerOptions, monitor: Monitor) -> SirfsResult:
+    """SIRFS on one object of the set; `log_image` (H, W, 3) is read where `truth.valid`. Looks at nothing else but `truth.mask`."""
+    contour = occluding_contour(truth.mask, drop_near_edge=True)
+    problem = Problem(log_image, truth.valid, truth.mask, contour, priors, published_weights(truth.illumination, 3))
+    return solve(problem, SolverOptions(engine=options.engine, threads=options.threads), monitor=monitor)
+
+
+def _log_diffuse(truth: MitBerkeleyObject, options: RunnerOptions) -> np.ndarray:
+    """Log of the diffuse image (H, W, 3), 0 where it is not valid."""
+    diffuse = truth.image
+    if options.model in SIRFS_MODELS and options.model != "sirfs":
+        diffuse = separate(options.separator, truth.image, truth.valid).diffuse
+    return np.where(truth.valid[..., None], np.log(np.maximum(diffuse, _HALF_CODE)), 0.0)
+
+
+def _estimate(
+    truth: MitBerkeleyObject, log_image: np.ndarray, height: np.ndarray, light: np.ndarray, result: SirfsResult | None = None
+) -> Estimate:
+    """The maps that follow from height and light (9, 3), both in the reference's convention."""
+    normal, illumination = normal_from_reference(normals(height)), light_from_reference(light)
+    log_shading = real_sh(normal) @ illumination
+    reflectance = np.where(truth.valid[..., None], np.exp(log_image - log_shading), 0.0)
+    loss, evaluations = (None, None) if result is None else (result.terms.total, result.total_evaluations)
+    return Estimate(height, normal, np.exp(log_shading), reflectance, illumination, loss, evaluations)
