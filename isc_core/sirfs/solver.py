@@ -39,7 +39,7 @@ class SolverOptions:
     engine: str = "auto"
     single: bool = True
     threads: int = 0
-    halvings: int = 2
+    halvings: int = 0
     levels: int | None = None
     lbfgs: LbfgsOptions = field(default_factory=LbfgsOptions)
     coarse_lbfgs: LbfgsOptions = field(default_factory=LbfgsOptions)
@@ -146,6 +146,7 @@ class _Unknowns:
         self._edges = np.concatenate([[0], np.cumsum(sizes)]).astype(int)
         self._light_size = 0 if known_light is not None else problem.priors.light.mean.size
         self.evaluations = 0
+        self.channels = problem.priors.channels
         self.x = np.zeros(int(self._edges[-1]) + self._light_size, tools.dtype)
         self.terms = Terms()
 
@@ -161,7 +162,7 @@ class _Unknowns:
             return self._known_light
         prior = self._problem.priors.light
         stacked = prior.unwhiten @ self.x[self._edges[-1] :].astype(float) + prior.offset
-        return unstack(stacked, self._problem.priors.channels)
+        return unstack(stacked, self.channels)
 
     def set_light(self, light: np.ndarray) -> None:
         if self._known_light is None:
@@ -186,23 +187,24 @@ def solve(
     *,
     known_height: np.ndarray | None = None,
     known_light: np.ndarray | None = None,
+    start: tuple[np.ndarray, np.ndarray] | None = None,
     monitor: Monitor | None = None,
 ) -> SirfsResult:
     """Minimises the objective of `problem`.
 
-    `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress reports carry the loss. Raises `Cancelled`.
+    `start`: height (H, W) and light (9, C) to begin with, instead of halved problems, a flat shape and no light. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress reports carry the loss. Raises `Cancelled`.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()
     with Workers(thread_count(options)) as workers:
         tools = _Tools(options, workers)
-        stages = _stages(problem, options, known_height)
+        stages = [problem] if known_height is not None or start is not None else _stages(problem, options)
         full_levels = len(level_shapes(problem.valid.shape, options.levels))
         previous: _Unknowns | None = None
         total = 0
         for k, stage in enumerate(stages):
             halvings = len(stages) - 1 - k
             unknowns = _Unknowns(stage, tools, full_levels - halvings, known_height, known_light)
-            _carry_over(previous, unknowns)
+            _begin(unknowns, previous, start)
             share = monitor.part(1 - 0.75**k if k else 0.0, 1 - 0.75 ** (k + 1) if halvings else 1.0)
             limits = options.coarse_lbfgs if halvings else options.lbfgs
             outcome = minimise(unknowns, unknowns.x, limits, tools.algebra(), _reporter(share, limits.iterations))
@@ -221,20 +223,24 @@ def _reporter(monitor: Monitor, most: int):  # type: ignore[no-untyped-def]
     return each
 
 
-def _carry_over(previous: _Unknowns | None, unknowns: _Unknowns) -> None:
+def _begin(unknowns: _Unknowns, previous: _Unknowns | None, start: tuple[np.ndarray, np.ndarray] | None) -> None:
+    """Sets the unknowns to `start`, else to what the halved problem found, else to a flat shape without light."""
+    if start is not None:
+        if unknowns.shapes:
+            unknowns.levels(unknowns.x)[0][...] = start[0]
+        unknowns.set_light(start[1])
+        return
     if previous is None:
-        unknowns.set_light(np.zeros((9, unknowns._problem.priors.channels)))
+        unknowns.set_light(np.zeros((9, unknowns.channels)))
         return
     unknowns.set_light(previous.light())
     for target, source in zip(unknowns.levels(unknowns.x)[1:], previous.levels(previous.x), strict=True):
         target[...] = source
 
 
-def _stages(problem: Problem, options: SolverOptions, known_height: np.ndarray | None) -> list[Problem]:
+def _stages(problem: Problem, options: SolverOptions) -> list[Problem]:
     """The problem and its halved versions, the coarsest first."""
     stages = [problem]
-    if known_height is not None:
-        return stages
     while len(stages) <= options.halvings and min(stages[0].valid.shape) >= 2 * _LEAST_COARSE:
         stages.insert(0, halved(stages[0]))
     return stages

@@ -18,6 +18,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
+from ...errors import InputError
 from ..priors import Light
 
 COEFFICIENTS = 9
@@ -74,14 +75,18 @@ def fit_light(lights: np.ndarray, ridge: tuple[float, float] = (0.0, 0.0), floor
     """The Gaussian of `lights` (count, 9, C).
 
     `ridge` is what its covariance gains, for want of lights to see it in: the variance of the brightness, and that of the colour
-    (see `Contrast`).
+    (see `Contrast`). Raises `InputError` where there are too few different lights for a covariance.
     """
     samples = stacked(lights)
     mean = samples.mean(axis=0)
     centred = samples - mean
     brightness = _brightness(len(mean))
     gain = ridge[0] * brightness + ridge[1] * (np.eye(len(mean)) - brightness)
-    return GaussianLight(mean, _symmetric(centred.T @ centred / len(samples) + gain), floor)
+    covariance = _symmetric(centred.T @ centred / len(samples) + gain)
+    spread = np.linalg.eigvalsh(covariance)
+    if not spread[0] > 1e-9 * spread[-1]:
+        raise InputError(f"{len(samples)} lights, mirror images included, are too few for a prior of light: give more objects or lights")
+    return GaussianLight(mean, covariance, floor)
 
 
 @dataclass(frozen=True)

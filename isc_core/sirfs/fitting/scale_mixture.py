@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import InputError
 from ..tables import CostTable
 
 TABLE_NODES = 20_000
@@ -73,8 +74,10 @@ class ScaleMixture:
 def fit_scale_mixture(samples: Magnitudes, components: int = 40, iterations: int = 200) -> ScaleMixture:
     """The mixture of highest likelihood that `iterations` steps reach from equal weights.
 
-    The deviations run from mean|x| / 1000 to 3 max|x|; the samples must not all be 0.
+    The deviations run from mean|x| / 1000 to 3 max|x|. Raises `InputError` where all samples are 0.
     """
+    if samples.largest == 0:
+        raise InputError("the training objects are flat or of one grey: give objects with some shape and paint")
     used = samples.counts > 0
     counts = samples.counts[used]
     mean = samples.absolute_sum / counts.sum()
