@@ -45,7 +45,8 @@ def test_synthesise_and_analyse_are_adjoint() -> None:
     gradient = rng.normal(size=(37, 52))
     out = [np.empty_like(level) for level in levels]
     analyse(gradient, out)
-    assert float((synthesise(levels) * gradient).sum()) == pytest.approx(sum(float((a * b).sum()) for a, b in zip(levels, out, strict=True)))
+    backward = sum(float((a * b).sum()) for a, b in zip(levels, out, strict=True))
+    assert float((synthesise(levels) * gradient).sum()) == pytest.approx(backward)
 
 
 def test_levels_halve_and_stop_at_the_smallest() -> None:

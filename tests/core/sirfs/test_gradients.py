@@ -1,0 +1,94 @@
+"""Every term's hand-written gradient against finite differences, in both engines, colour and grey."""
+
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from scipy import ndimage
+
+from isc_core.sirfs.numpy_engine import NumpyEngine
+from isc_core.sirfs.problem import DepthObservation, Problem
+from isc_core.sirfs.solver import Engine
+from isc_core.sirfs.tables import CostTable
+
+from .small_problems import blob, make_problem, only, random_state, weights
+
+TERMS = ("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "observation", "shading_only")
+OF_HEIGHT = set(TERMS) - {"light"}
+OF_LIGHT = {"smoothness", "parsimony", "absolute", "light", "shading_only"}
+STEP = 1e-7
+
+numba_only = pytest.mark.skipif(find_spec("numba") is None, reason="needs numba")
+
+
+def make_engine(name: str, problem: Problem) -> Engine:
+    if name == "numpy":
+        return NumpyEngine(problem)
+    from isc_core.sirfs.numba_engine import NumbaEngine
+
+    return NumbaEngine(problem, np.float64)
+
+
+def coarser(table: CostTable) -> CostTable:
+    """Every hundredth node: cells so wide that a difference's two ends hardly ever lie in two of them."""
+    return CostTable(table.low, 100 * table.step, table.values[::100])
+
+
+def problem_of(term: str, channels: int) -> Problem:
+    scene = blob((38, 45), channels)
+    seen = None
+    if term in ("observation", "all"):
+        rng = np.random.default_rng(8)
+        heights = np.where(rng.random(scene.mask.shape) < 0.4, np.nan, scene.height + rng.normal(size=scene.mask.shape))
+        seen = DepthObservation(heights, sigma=1.5, weight=4.0)
+    problem = make_problem(
+        scene, weights() if term == "all" else only(term), observation=seen, shading_only=term == "shading_only", holes=True
+    )
+    priors = problem.priors
+    priors = replace(priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness))
+    return replace(problem, curvature_unit=0.7, priors=priors)
+
+
+def directions(shape: tuple[int, int]) -> list[np.ndarray]:
+    """White, smooth, and along the frame alone, where borders are replicated."""
+    rng = np.random.default_rng(5)
+    white, smooth = rng.normal(size=(2, *shape))
+    frame = rng.normal(size=shape)
+    frame[2:-2, 2:-2] = 0
+    return [white, 5 * ndimage.gaussian_filter(smooth, 2.0), frame]
+
+
+def difference(engine: Engine, height: np.ndarray, light: np.ndarray, dz: np.ndarray, dl: np.ndarray) -> float:
+    ends = [engine.evaluate(height + sign * STEP * dz, light + sign * STEP * dl).terms.total for sign in (1, -1)]
+    return (ends[0] - ends[1]) / (2 * STEP)
+
+
+@pytest.mark.parametrize("channels", [3, 1])
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
+@pytest.mark.parametrize("term", [*TERMS, "all"])
+def test_gradient_is_the_slope(term: str, engine: str, channels: int) -> None:
+    problem = problem_of(term, channels)
+    shape: tuple[int, int] = problem.valid.shape  # type: ignore[assignment]
+    height, light = random_state(shape, channels, 11)
+    of_term = make_engine(engine, problem)
+    result = of_term.evaluate(height, light)
+    d_height, d_light = result.height_gradient.copy(), result.light_gradient.copy()
+    if term != "all":
+        others = {name: value for name, value in vars(result.terms).items() if name != term}
+        assert getattr(result.terms, term) > 0 or term in ("parsimony", "absolute")
+        assert not any(others.values())
+    flat_light, flat_height = np.zeros_like(light), np.zeros(shape)
+    for dz in directions(shape):
+        slope = float((d_height * dz).sum())
+        size = float(np.linalg.norm(d_height * dz))
+        assert difference(of_term, height, light, dz, flat_light) == pytest.approx(slope, rel=1e-5, abs=1e-5 * size + 1e-12)
+    if term in OF_HEIGHT:
+        assert np.abs(d_height).max() > 1e-7
+    rng = np.random.default_rng(6)
+    for _ in range(3):
+        dl = rng.normal(size=light.shape)
+        slope = float((d_light * dl).sum())
+        size = float(np.linalg.norm(d_light * dl))
+        assert difference(of_term, height, light, flat_height, dl) == pytest.approx(slope, rel=1e-5, abs=1e-5 * size + 1e-9)
+    assert (np.abs(d_light).max() > 1e-5) == (term in OF_LIGHT or term == "all")
