@@ -41,7 +41,7 @@ def painted_ball(seed: int, size: int = 40) -> TrainingObject:
 
 @pytest.fixture(scope="module")
 def balls() -> dict[str, ObjectStatistics]:
-    return collect_statistics({f"ball{k}": painted_ball(k) for k in range(3)})
+    return collect_statistics({f"ball{k}": painted_ball(k) for k in range(8)})
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +129,15 @@ class TestColorMixture:
         m = np.array([0.0, 1e-4, 1e-3, 1e-2, 3e-2])
         truth = sum(w * (2 * np.pi * v) ** -1.5 * np.exp(-m / v) for w, v in ((0.6, 1e-4), (0.4, 1e-2)))
         assert np.abs(mixture.log_density(m) - np.log(truth)).max() < 0.15
+
+    def test_a_few_large_differences_do_not_set_the_covariance(self) -> None:
+        rng = np.random.default_rng(10)
+        _, unit = self.samples(1)
+        scale = np.where(np.arange(6000) < 60, 1.0, 0.01)[:, None]
+        x = scale * (rng.normal(size=(6000, 3)) @ np.linalg.cholesky(unit).T)
+        sample = x.T @ x / len(x)
+        assert np.abs(sample / np.cbrt(np.linalg.det(sample)) - unit).max() > 0.15
+        assert np.abs(fit_color_mixture(ColorCells.of(x)).covariance - unit).max() < 0.07
 
     def test_cells_lose_little(self) -> None:
         x, _ = self.samples(4000)
@@ -315,7 +324,7 @@ class TestFit:
                 assert priors.absolute.values.ndim == channels
                 assert priors.absolute.values.min() == 0
                 assert priors.parsimony_whiten.shape == priors.smoothness_whiten.shape == (channels, channels)
-        assert fitted.record.objects == ("ball0", "ball1", "ball2")
+        assert fitted.record.objects == tuple(f"ball{k}" for k in range(8))
 
     def test_same_objects_give_the_same_priors_in_any_order(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
         one = fit_priors(balls, environments, FAST)
@@ -331,7 +340,7 @@ class TestFit:
 
     def test_held_out_likelihood_has_one_value_an_object(self, balls: dict[str, ObjectStatistics]) -> None:
         values = held_out_log_likelihood(balls, TableFitOptions(smoothness=24, max_steps=30, runs=1), channels=1)
-        assert values.shape == (3,)
+        assert values.shape == (8,)
         assert np.isfinite(values).all()
 
     def test_cancelling_ends_the_fit(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
@@ -347,6 +356,14 @@ class TestFit:
     def test_too_few_objects_is_a_clear_error(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
         with pytest.raises(InputError, match="at least two"):
             fit_priors({"ball0": balls["ball0"]}, environments, FAST)
+
+    def test_too_few_lights_is_a_clear_error(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+        with pytest.raises(InputError, match="too few"):
+            fit_priors({name: balls[name] for name in ("ball0", "ball1")}, environments, FAST)
+
+    def test_flat_objects_are_a_clear_error(self) -> None:
+        with pytest.raises(InputError, match="flat"):
+            fit_scale_mixture(Magnitudes.of(np.zeros(5)))
 
     def test_an_empty_object_is_a_clear_error(self) -> None:
         ball = painted_ball(0)
