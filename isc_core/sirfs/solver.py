@@ -192,7 +192,8 @@ def solve(
 ) -> SirfsResult:
     """Minimises the objective of `problem`.
 
-    `start`: height (H, W) and light (9, C) to begin with, instead of halved problems, a flat shape and no light. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress reports carry the loss. Raises `Cancelled`.
+    `start`: height (H, W) and light (9, C) to begin with, instead of a flat shape and no
+    light. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress reports carry the loss. Raises `Cancelled`.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()
     with Workers(thread_count(options)) as workers:
