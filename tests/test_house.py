@@ -201,3 +201,21 @@ def test_every_dependency_is_pinned_exactly() -> None:
 def plain(name: str) -> str:
     """A distribution's name as installers compare it."""
     return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def test_the_readme_names_commands_and_options_that_exist() -> None:
+    """Every `isc COMMAND` of the README starts, and knows the options that stand in its section."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    commands = sorted(set(re.findall(r"\bisc ([a-z][a-z-]+)\b", readme)))
+    start = "import sys; from isc_core.cli import main; sys.exit(main())"
+    known = {}
+    for command in commands:
+        done = subprocess.run([sys.executable, "-c", start, command, "--help"], cwd=ROOT, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"isc {command}: {done.stderr}"
+        known[command] = set(re.findall(r"--[a-z][a-z-]+", done.stdout))
+    assert {"decompose", "separate", "mask", "evaluate", "fit-priors"} <= set(commands)
+    for command in commands:
+        section = re.search(rf"### `isc {command}`\n(.*?)(?=\n##)", readme, re.DOTALL)
+        lines = [line for line in readme.splitlines() if re.search(rf"\bisc {command} ", line)]
+        wanted = set(re.findall(r"--[a-z][a-z-]+", "\n".join([*lines, section.group(1) if section else ""])))
+        assert wanted <= known[command], f"isc {command} lacks {sorted(wanted - known[command])}"
