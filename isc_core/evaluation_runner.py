@@ -17,6 +17,7 @@ from .separation import separate
 from .sirfs.contour import occluding_contour
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
+from .sirfs.kernel_cache import announce_compilation
 from .sirfs.priors import Priors
 from .sirfs.problem import Problem
 from .sirfs.settings import published_weights
@@ -50,6 +51,7 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
         if options.model in BASELINE_MODELS:
             guess = baselines.estimate(options.model, log_image, truth.valid)
             return _estimate(truth, log_image, guess.height, guess.light)
+        announce_compilation(options.engine, monitor)
         if truth.illumination not in tables:
             tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
         result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor)

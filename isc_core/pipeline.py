@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from importlib import metadata
 
 import numpy as np
+from scipy import ndimage
 
 from . import __version__, baselines
 from .decomposition import Decomposition, Provenance, Separation
@@ -22,6 +23,7 @@ from .progress import Monitor
 from .separation import METHODS, separate
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, light_to_reference, normal_from_reference, real_sh
+from .sirfs.kernel_cache import announce_compilation
 from .sirfs.prior_file import shipped_prior_set
 from .sirfs.problem import DepthObservation, Terms
 from .sirfs.recover import Known, Recovered, RecoverOptions, recover
@@ -179,6 +181,7 @@ def _recover(
         log_image = np.log(np.maximum(np.where(photo.mask[..., None], diffuse, 1), floor))
         guess = baselines.estimate(settings.model, log_image, photo.mask)
         return _Shape(guess.height, guess.light, {"converged": True, "reason": "direct method"})
+    announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, photo.mask) else 3
     priors = (prior_set or shipped_prior_set()).priors(settings.illumination, channels)
     options = RecoverOptions(
@@ -227,6 +230,7 @@ def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
     height = None if evidence.height is None else _shrunk(evidence.height, working.mask.shape) * factor
     if height is not None and not np.isfinite(height[working.mask]).all():
         raise InputError("the known shape has holes inside the mask: give it as --depth, which may have holes")
+    height = None if height is None else _continued(height, working.mask)
     if evidence.depth is None:
         return Known(height, light)
     seen = DepthObservation(_shrunk(evidence.depth, working.mask.shape) * factor, evidence.depth_sigma * factor, evidence.depth_weight)
@@ -239,6 +243,14 @@ def _shrunk(values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         return np.asarray(values, float)
     rows, columns = (np.minimum(((np.arange(n) + 0.5) * m / n).astype(int), m - 1) for n, m in zip(shape, values.shape, strict=True))
     return np.asarray(values, float)[np.ix_(rows, columns)]
+
+
+def _continued(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The height (H, W) inside the mask, going on outside as it arrives at the rim (by point reflection): normals look one pixel out."""
+    rim = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    rows, columns = (np.clip(2 * r - i, 0, n - 1) for r, i, n in zip(rim, np.indices(mask.shape), mask.shape, strict=True))
+    at_rim = height[tuple(rim)]
+    return np.where(mask, height, np.where(mask[rows, columns], 2 * at_rim - height[rows, columns], at_rim))
 
 
 def _enlarged(height: np.ndarray, working: Photo, full: Photo) -> np.ndarray:

@@ -7,10 +7,7 @@ from ..atomic import require_writable_file
 from ..datasets import list_objects, load_natural_lights
 from ..errors import InputError
 from ..progress import Monitor
-from ..sirfs.fitting.fit import fit_priors
-from ..sirfs.fitting.statistics import collect_statistics
-from ..sirfs.fitting.training import read_training_objects
-from ..sirfs.prior_file import save_prior_set
+from ..sirfs.kernel_cache import ensure_cache_folder
 from .options import Commands, add_command, names
 
 _EXAMPLES = """  isc fit-priors DATA -o priors.npz
@@ -33,6 +30,13 @@ def declare(commands: Commands) -> None:
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work."""
+    ensure_cache_folder()
+    # These declare compiled functions, which needs the folder, and time that the other commands should not spend.
+    from ..sirfs.fitting.fit import fit_priors
+    from ..sirfs.fitting.statistics import collect_statistics
+    from ..sirfs.fitting.training import read_training_objects
+    from ..sirfs.prior_file import save_prior_set
+
     require_writable_file(options.output)
     chosen = _chosen(options.root, options.objects, options.leave_out)
     lights = load_natural_lights(options.root)

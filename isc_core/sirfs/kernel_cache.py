@@ -1,0 +1,53 @@
+"""Where compiled kernels are kept between runs, and whether the next solve has to compile them first.
+
+Numba keeps them beside the source where that can be written, else in the user's cache folder, or where NUMBA_CACHE_DIR says.
+"""
+
+import atexit
+import shutil
+import sys
+import tempfile
+from pathlib import Path
+
+from ..progress import Monitor
+from .solver import compiled_engine_available
+
+
+def announce_compilation(engine: str, monitor: Monitor) -> None:
+    """Reports a stage of its own when the next solve by `engine` ("auto", "numba", "numpy") will compile first: 20 s in silence look
+    like a fault. Call before the first solve: where no cache folder can be written, it also sees to it that kernels work without."""
+    if engine == "numpy" or not compiled_engine_available():
+        return
+    ensure_cache_folder()
+    if not kernels_compiled():
+        monitor.report("preparing the compiled kernels (only once, some 20 s)", 0.0)
+
+
+def kernels_compiled() -> bool:
+    """Whether the kernels, as they are now, were compiled before. Needs Numba."""
+    from . import kernels
+
+    kernel = kernels.forward_rows
+    code = kernel.py_func.__code__
+    source = Path(code.co_filename)
+    pattern = f"{source.stem}.{code.co_name}-{code.co_firstlineno}.py{sys.version_info[0]}{sys.version_info[1]}*.nbi"
+    found = Path(str(kernel.stats.cache_path)).glob(pattern)
+    return any(index.stat().st_mtime >= source.stat().st_mtime for index in found)
+
+
+def ensure_cache_folder() -> None:
+    """Gives Numba a folder that lasts as long as this process, where it finds none to write to: it would refuse to work."""
+    if not compiled_engine_available():
+        return
+    import numba
+
+    try:
+        numba.njit(cache=True)(_probe)
+    except RuntimeError:
+        folder = tempfile.mkdtemp(prefix="isc-kernels-")
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+        setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010 (the module's own declaration of it is dynamic)
+
+
+def _probe() -> None:
+    """Lies in the kernels' folder, so that Numba looks for a cache where it will look for theirs."""
