@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..progress import Monitor
 from .contour import occluding_contour
 from .illumination import stack, unstack
-from .lbfgs import Algebra, LbfgsOptions, NumpyAlgebra, minimise
+from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
 from .numpy_engine import NumpyEngine
 from .problem import DepthObservation, Evaluation, Problem, Terms
 from .pyramid import analyse, level_shapes, synthesise
@@ -198,8 +198,9 @@ def solve(
     options, monitor = options or SolverOptions(), monitor or Monitor()
     with Workers(thread_count(options)) as workers:
         tools = _Tools(options, workers)
-        stages = [problem] if known_height is not None or start is not None else _stages(problem, options)
         full_levels = len(level_shapes(problem.valid.shape, options.levels))
+        direct = known_height is not None or start is not None
+        stages = [problem] if direct else _stages(problem, min(options.halvings, full_levels - 1))
         previous: _Unknowns | None = None
         total = 0
         for k, stage in enumerate(stages):
@@ -208,7 +209,11 @@ def solve(
             _begin(unknowns, previous, start)
             share = monitor.part(1 - 0.75**k if k else 0.0, 1 - 0.75 ** (k + 1) if halvings else 1.0)
             limits = options.coarse_lbfgs if halvings else options.lbfgs
-            outcome = minimise(unknowns, unknowns.x, limits, tools.algebra(), _reporter(share, limits.iterations))
+            share.report("shape and light", 0.0)
+            if not unknowns.x.size:
+                outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")  # all is known: only the loss is asked for
+            else:
+                outcome = minimise(unknowns, unknowns.x, limits, tools.algebra(), _reporter(share, limits.iterations))
             total += unknowns.evaluations
             previous = unknowns
         return SirfsResult(
@@ -239,11 +244,14 @@ def _begin(unknowns: _Unknowns, previous: _Unknowns | None, start: tuple[np.ndar
         target[...] = source
 
 
-def _stages(problem: Problem, options: SolverOptions) -> list[Problem]:
-    """The problem and its halved versions, the coarsest first."""
+def _stages(problem: Problem, halvings: int) -> list[Problem]:
+    """The problem and its halved versions, the coarsest first; fewer where the object would all but vanish."""
     stages = [problem]
-    while len(stages) <= options.halvings and min(stages[0].valid.shape) >= 2 * _LEAST_COARSE:
-        stages.insert(0, halved(stages[0]))
+    while len(stages) <= halvings and min(stages[0].valid.shape) >= 2 * _LEAST_COARSE:
+        coarser = halved(stages[0])
+        if 8 * np.count_nonzero(coarser.valid) < np.count_nonzero(stages[0].valid):
+            break
+        stages.insert(0, coarser)
     return stages
 
 

@@ -1,0 +1,233 @@
+"""The solver on made scenes whose shape, light and paint are known."""
+
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+
+from isc_core.errors import Cancelled, InputError
+from isc_core.progress import Monitor
+from isc_core.sirfs.lbfgs import LbfgsOptions
+from isc_core.sirfs.numpy_engine import NumpyEngine
+from isc_core.sirfs.problem import DepthObservation
+from isc_core.sirfs.solver import SolverOptions, halved, solve
+from isc_core.sirfs.stencils import normals
+
+from .small_problems import Scene, blob, make_problem, weights
+
+needs_numba = pytest.mark.skipif(find_spec("numba") is None, reason="needs numba")
+SHORT = LbfgsOptions(iterations=40)
+QUICK = SolverOptions(threads=1, lbfgs=SHORT, coarse_lbfgs=SHORT)
+
+
+def shape_error(height: np.ndarray, scene: Scene) -> float:
+    """Mean absolute error in pixels, less the constant that nobody can see."""
+    away = (height - scene.height)[scene.mask]
+    return float(np.abs(away - np.median(away)).mean())
+
+
+def angle_error(height: np.ndarray, scene: Scene) -> float:
+    """Mean angle between normals in degrees, two pixels and more from the rim."""
+    inner = scene.mask.copy()
+    for _ in range(2):
+        inner[1:-1, 1:-1] &= inner[:-2, 1:-1] & inner[2:, 1:-1] & inner[1:-1, :-2] & inner[1:-1, 2:]
+    cosine = (normals(height) * normals(scene.height)).sum(-1)[inner]
+    return float(np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean())
+
+
+def hemisphere(size: int = 56, radius: float = 22.0) -> Scene:
+    """A ball of one colour: what shape from shading is made for."""
+    scene = blob((size, size), one_color=True)
+    i, j = np.mgrid[:size, :size] - (size - 1) / 2
+    mask = np.hypot(i, j) < radius
+    height = np.sqrt(np.maximum(radius**2 - i * i - j * j, 0.3 * radius))
+    from isc_core.sirfs.illumination import basis
+
+    shading = np.exp(np.einsum("khw,kc->hwc", basis(*np.moveaxis(normals(height), -1, 0)), scene.light))
+    image = np.where(mask[..., None], shading * np.array([0.5, 0.4, 0.3]), 0)
+    return Scene(image, mask, np.where(mask, height, 0), scene.light)
+
+
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=needs_numba)])
+@pytest.mark.parametrize("channels", [3, 1])
+def test_loss_falls_and_what_is_returned_belongs_together(engine: str, channels: int) -> None:
+    scene = blob(channels=channels)
+    problem = make_problem(scene)
+    result = solve(problem, replace(QUICK, engine=engine, single=False))
+    start = NumpyEngine(problem).evaluate(np.zeros(scene.mask.shape), np.zeros((9, channels))).terms.total
+    assert result.terms.total < start - 1
+    assert result.height.dtype == result.light.dtype == np.float64
+    assert result.height.shape == scene.mask.shape and result.light.shape == (9, channels)
+    again = NumpyEngine(problem).evaluate(result.height, result.light).terms
+    for name, value in vars(again).items():
+        assert getattr(result.terms, name) == pytest.approx(value, rel=1e-9, abs=1e-12), name
+    assert 0 < result.iterations <= 40 and result.iterations < result.evaluations <= result.total_evaluations
+
+
+def test_solving_improves_on_flat() -> None:
+    scene = blob()
+    result = solve(make_problem(scene), replace(QUICK, lbfgs=LbfgsOptions()))
+    assert result.converged
+    assert angle_error(result.height, scene) < 0.6 * angle_error(np.zeros(scene.mask.shape), scene)
+
+
+@needs_numba
+def test_the_engines_find_the_same_optimum() -> None:
+    problem = make_problem(blob((48, 52)))
+    full = LbfgsOptions()
+    losses = [
+        solve(problem, SolverOptions(engine=engine, single=single, threads=1, lbfgs=full)).terms.total
+        for engine, single in (("numpy", False), ("numba", False), ("numba", True))
+    ]
+    assert np.ptp(losses) < 0.005 * abs(losses[0])
+
+
+@pytest.mark.parametrize("halvings", [0, 1])
+def test_known_light_is_kept_exactly(halvings: int) -> None:
+    scene = blob((84, 82))
+    result = solve(make_problem(scene), replace(QUICK, halvings=halvings), known_light=scene.light)
+    np.testing.assert_array_equal(result.light, scene.light)
+    assert angle_error(result.height, scene) < angle_error(np.zeros(scene.mask.shape), scene)
+
+
+def test_known_shape_is_kept_exactly_and_its_light_is_found() -> None:
+    scene = blob((84, 82))
+    result = solve(make_problem(scene), replace(QUICK, single=False), known_height=scene.height)
+    np.testing.assert_array_equal(result.height, scene.height)
+    start = NumpyEngine(make_problem(scene)).evaluate(scene.height, np.zeros((9, 3))).terms.total
+    assert result.terms.total < start
+    # the light's constant part is shared with the paint; how shading varies is not
+    assert np.abs(result.light - scene.light)[1:].mean() < 0.5 * np.abs(scene.light[1:]).mean()
+
+
+def test_when_all_is_known_it_is_only_evaluated() -> None:
+    scene = blob((84, 82))
+    problem = make_problem(scene)
+    result = solve(problem, replace(QUICK, single=False), known_height=scene.height, known_light=scene.light)
+    np.testing.assert_array_equal(result.height, scene.height)
+    np.testing.assert_array_equal(result.light, scene.light)
+    assert result.terms.total == pytest.approx(NumpyEngine(problem).evaluate(scene.height, scene.light).terms.total, rel=1e-9)
+    assert result.converged and result.iterations == 0
+
+
+def test_shape_from_shading_finds_a_hemisphere() -> None:
+    scene = hemisphere()
+    problem = make_problem(scene, weights(slant=0.5), shading_only=True)
+    result = solve(problem, replace(QUICK, lbfgs=LbfgsOptions()), known_light=scene.light)
+    flat = np.zeros(scene.mask.shape)
+    assert angle_error(result.height, scene) < 0.4 * angle_error(flat, scene)
+    assert shape_error(result.height, scene) < 0.4 * shape_error(flat, scene)
+    assert result.terms.smoothness == result.terms.parsimony == result.terms.absolute == 0 < result.terms.shading_only
+
+
+def test_depth_with_holes_pulls_the_height() -> None:
+    """What was seen is another shape than shading tells, 37 px nearer."""
+    scene = blob()
+    target = scene.height + 5 * np.sin(np.arange(72) / 12)
+    seen = np.where(scene.mask & (np.random.default_rng(0).random(scene.mask.shape) < 0.5), target + 37, np.nan)
+    hole = (slice(22, 28), slice(34, 40))
+    seen[hole] = np.nan
+    errors = []
+    for weight in (0.0, 10.0, 1000.0):
+        problem = make_problem(scene, observation=DepthObservation(seen, sigma=1.0, weight=weight))
+        result = solve(problem, replace(QUICK, lbfgs=LbfgsOptions(iterations=150)))
+        assert np.isfinite(result.height).all()
+        errors.append(shape_error(result.height, replace(scene, height=target)))
+    assert errors[1] < 0.5 * errors[0] and errors[2] < 0.5 * errors[1]
+    assert np.abs((result.height - 37 - target)[hole]).mean() < 1.0
+
+
+def test_cancel_ends_it_at_once() -> None:
+    calls = []
+
+    def cancelled() -> bool:
+        calls.append(0)
+        return len(calls) > 3
+
+    with pytest.raises(Cancelled):
+        solve(make_problem(blob()), QUICK, monitor=Monitor(cancelled=cancelled))
+    assert len(calls) == 4
+
+
+def test_cancel_before_the_start_evaluates_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object) -> None:
+        raise AssertionError("evaluated after the user had cancelled")
+
+    monkeypatch.setattr(NumpyEngine, "evaluate", fail)
+    with pytest.raises(Cancelled):
+        solve(make_problem(blob()), replace(QUICK, engine="numpy"), monitor=Monitor(cancelled=lambda: True))
+
+
+@pytest.mark.parametrize("size", [(60, 60), (90, 84), (170, 165)])
+def test_progress_rises_from_0_to_1(size: tuple[int, int]) -> None:
+    seen: list[tuple[str, float]] = []
+    few = LbfgsOptions(iterations=6)
+    options = SolverOptions(threads=1, lbfgs=few, coarse_lbfgs=few)
+    solve(make_problem(blob(size)), options, monitor=Monitor(lambda stage, fraction: seen.append((stage, fraction))))
+    fractions = [f for _, f in seen]
+    assert len(fractions) >= 7
+    assert fractions == sorted(fractions)
+    assert fractions[0] >= 0 and fractions[-1] <= 1
+    assert "loss" in seen[-1][0]
+
+
+def test_halving_keeps_colours_and_scales_heights() -> None:
+    scene = blob((85, 90))
+    seen = DepthObservation(np.where(scene.mask, scene.height, np.nan), sigma=3.0)
+    problem = make_problem(scene, observation=seen)
+    half = halved(problem)
+    assert half.valid.shape == (43, 45)
+    assert half.curvature_unit == 0.5
+    assert half.valid.sum() == pytest.approx(problem.valid.sum() / 4, rel=0.03)
+    assert np.exp(half.log_image[half.valid]).mean(0) == pytest.approx(np.exp(problem.log_image[problem.valid]).mean(0), rel=0.03)
+    assert (half.log_image[~half.valid] == 0).all()
+    assert half.observation is not None
+    inner = half.valid & np.isfinite(half.observation.height)
+    block = scene.height[:84, :90].reshape(42, 2, 45, 2).mean(axis=(1, 3)) / 2
+    full = scene.mask[:84, :90].reshape(42, 2, 45, 2).all(axis=(1, 3))
+    np.testing.assert_allclose(half.observation.height[:42][full], block[full])
+    assert inner.sum() == half.valid.sum()
+    assert half.observation.sigma == 1.5
+
+
+def test_a_coarse_start_gains_as_much() -> None:
+    """Another start may end in another minimum: what counts is how far down it is."""
+    problem = make_problem(blob((100, 96)))
+    first = NumpyEngine(problem).evaluate(np.zeros((100, 96)), np.zeros((9, 3))).terms.total
+    direct, coarse = (solve(problem, SolverOptions(threads=2, halvings=h)).terms.total for h in (0, 2))
+    assert first - coarse > 0.9 * (first - direct) > 1
+
+
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=needs_numba)])
+def test_starts_where_it_is_told(engine: str) -> None:
+    scene = blob()
+    problem = make_problem(scene)
+    there = NumpyEngine(problem).evaluate(scene.height, scene.light).terms.total
+    none = LbfgsOptions(iterations=0)
+    result = solve(problem, replace(QUICK, engine=engine, single=False, lbfgs=none), start=(scene.height, scene.light))
+    assert result.terms.total == pytest.approx(there, rel=1e-9)
+    np.testing.assert_allclose(result.height, scene.height, atol=1e-12)
+    np.testing.assert_allclose(result.light, scene.light, atol=1e-12)
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+def test_any_number_of_levels_goes_with_any_size(levels: int) -> None:
+    result = solve(make_problem(blob((90, 84))), replace(QUICK, levels=levels, halvings=2))
+    assert np.isfinite(result.height).all()
+
+
+def test_a_thin_object_that_vanishes_when_halved() -> None:
+    """A line one pixel wide along a diagonal that misses the blocks' corners."""
+    scene = blob((100, 100))
+    mask = np.zeros((100, 100), bool)
+    k = np.arange(10, 90)
+    mask[k, k + 1] = True
+    scene = replace(scene, image=np.where(mask[..., None], 0.3 + 0.01 * k[0], 0.0) * np.ones(3), mask=mask)
+    result = solve(make_problem(scene), QUICK)
+    assert np.isfinite(result.height).all() and np.isfinite(result.terms.total)
+
+
+def test_unknown_engine_is_one_clear_line() -> None:
+    with pytest.raises(InputError, match="choose auto, numba or numpy"):
+        solve(make_problem(blob()), SolverOptions(engine="gpu"))
