@@ -13,6 +13,11 @@ def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
     return max(1, round(shape[0] * factor)), max(1, round(shape[1] * factor))
 
 
+def height_scale(old: tuple[int, ...], new: tuple[int, ...]) -> float:
+    """How much larger heights are on a grid of shape `new` than on `old`: sizes are whole, so it is not just the factor asked for."""
+    return float(np.sqrt(new[0] * new[1] / (old[0] * old[1])))
+
+
 def resample_inside(values: np.ndarray, inside: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
     """`values` (H, W) or (H, W, C), averaged over `inside` (H, W) bool, at `factor` times the size.
 
@@ -34,8 +39,7 @@ def resample_height(height: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
     places = [np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1) for n, m in zip(shape, height.shape, strict=True)]
     spline = ndimage.spline_filter(np.asarray(height, float), order=3, mode="nearest")
     grid = np.meshgrid(*places, indexing="ij")
-    scale = np.sqrt(shape[0] * shape[1] / height.size)
-    return scale * ndimage.map_coordinates(spline, grid, order=3, mode="nearest", prefilter=False)
+    return height_scale(height.shape, shape) * ndimage.map_coordinates(spline, grid, order=3, mode="nearest", prefilter=False)
 
 
 def _apply(plane: np.ndarray, down: sparse.csr_array, right: sparse.csr_array) -> np.ndarray:
