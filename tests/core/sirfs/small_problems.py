@@ -7,15 +7,18 @@ from scipy import ndimage
 
 from isc_core.sirfs.contour import occluding_contour
 from isc_core.sirfs.illumination import basis
-from isc_core.sirfs.priors import AbsoluteTable, Light, Priors
+from isc_core.sirfs.priors import AbsoluteTable, Light, Priors, SilhouetteProfile
 from isc_core.sirfs.problem import DepthObservation, Problem
 from isc_core.sirfs.settings import Weights
+from isc_core.sirfs.silhouette import silhouette_field
 from isc_core.sirfs.stencils import normals
 from isc_core.sirfs.tables import CostTable
 
 NODES = 30
 BRIGHTNESS = (-0.8, -0.9, -1.1)
 PALETTE = np.array([[0.55, 0.2, 0.12], [0.15, 0.35, 0.5], [0.6, 0.55, 0.4]])
+# As on a half ball: at relative depth u the normal leans outward by 1 - u.
+PROFILE = SilhouetteProfile(np.linspace(0.95, 0.05, 10), np.linspace(0.1, 0.4, 10))
 # A light from the upper left: constants of the reference's basis (down, right, toward the viewer), one column a channel.
 LIGHT = np.array(
     [
@@ -105,7 +108,8 @@ def weights(**changes: float) -> Weights:
 
 def only(term: str) -> Weights:
     """A set in which only `term` counts."""
-    none = dict.fromkeys(("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "shading_only"), 0.0)
+    names = ("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "silhouette", "shading_only")
+    none = dict.fromkeys(names, 0.0)
     return weights(**(none | {term: 3.0} if term in none else none))
 
 
@@ -117,16 +121,17 @@ def make_problem(
     observation: DepthObservation | None = None,
     shading_only: bool = False,
     holes: bool = False,
+    outline: bool = False,
 ) -> Problem:
-    """The SIRFS problem of `scene`; `holes` makes some pixels of the mask invalid."""
+    """The SIRFS problem of `scene`; `holes` makes some pixels of the mask invalid, `outline` adds what the silhouette says."""
     valid = scene.mask.copy()
     if holes:
         valid &= np.random.default_rng(3).random(valid.shape) > 0.05
     log_image = np.where(valid[..., None], np.log(np.where(valid[..., None], scene.image, 1)), 0.0)
     priors = priors or made_priors(scene.image.shape[2])
-    return Problem(
-        log_image, valid, scene.mask, occluding_contour(scene.mask), priors, chosen or weights(), observation, shading_only
-    )
+    field = silhouette_field(scene.mask, PROFILE) if outline else None
+    contour = occluding_contour(scene.mask)
+    return Problem(log_image, valid, scene.mask, contour, priors, chosen or weights(), observation, shading_only, silhouette=field)
 
 
 def random_state(shape: tuple[int, int], channels: int, seed: int, size: float = 3.0) -> tuple[np.ndarray, np.ndarray]:

@@ -11,7 +11,7 @@ from isc_core.sirfs.problem import DepthObservation, Problem
 from isc_core.sirfs.solver import SolverOptions, solve
 from isc_core.sirfs.workers import Workers
 
-from .small_problems import blob, make_problem, random_state
+from .small_problems import blob, make_problem, random_state, weights
 
 numba_engine = pytest.importorskip("isc_core.sirfs.numba_engine", reason="needs numba", exc_type=ImportError)
 
@@ -22,7 +22,7 @@ def problem_of(kind: str) -> Problem:
     channels, shading_only = KINDS[kind]
     scene = blob((70, 62), channels)
     seen = DepthObservation(np.where(np.random.default_rng(1).random(scene.mask.shape) < 0.3, np.nan, scene.height))
-    problem = make_problem(scene, shading_only=shading_only, observation=seen, holes=True)
+    problem = make_problem(scene, weights(silhouette=2.0), shading_only=shading_only, observation=seen, holes=True, outline=True)
     return replace(problem, curvature_unit=0.8)
 
 

@@ -14,7 +14,7 @@ from isc_core.sirfs.tables import CostTable
 
 from .small_problems import blob, make_problem, only, random_state, weights
 
-TERMS = ("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "observation", "shading_only")
+TERMS = ("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "silhouette", "observation", "shading_only")
 OF_HEIGHT = set(TERMS) - {"light"}
 OF_LIGHT = {"smoothness", "parsimony", "absolute", "light", "shading_only"}
 STEP = 1e-7
@@ -43,7 +43,12 @@ def problem_of(term: str, channels: int) -> Problem:
         heights = np.where(rng.random(scene.mask.shape) < 0.4, np.nan, scene.height + rng.normal(size=scene.mask.shape))
         seen = DepthObservation(heights, sigma=1.5, weight=4.0)
     problem = make_problem(
-        scene, weights() if term == "all" else only(term), observation=seen, shading_only=term == "shading_only", holes=True
+        scene,
+        weights(silhouette=2.0) if term == "all" else only(term),
+        observation=seen,
+        shading_only=term == "shading_only",
+        holes=True,
+        outline=term in ("silhouette", "all"),
     )
     priors = problem.priors
     priors = replace(priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness))

@@ -1,0 +1,44 @@
+"""What the outline says of the inside: outward at the rim, nothing outside, and true on a half ball."""
+
+import numpy as np
+import pytest
+
+from isc_core.sirfs.priors import SilhouetteProfile
+from isc_core.sirfs.silhouette import outline_coordinates, silhouette_cost, silhouette_field
+from isc_core.sirfs.stencils import normals
+
+
+def disc(size: int = 81, radius: float = 34.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    i, j = np.mgrid[:size, :size] - (size - 1) / 2
+    return np.hypot(i, j) < radius, i, j
+
+
+def test_depth_and_direction_on_a_disc() -> None:
+    mask, i, j = disc()
+    u, down, right = outline_coordinates(mask)
+    radius = np.hypot(i, j)
+    assert u[mask].min() > 0 and u.max() == 1 and (u[~mask] == 0).all()
+    np.testing.assert_allclose(u[mask], (1 - radius / 34)[mask], atol=0.05)
+    away = mask & (radius > 6)
+    assert ((down * i + right * j) / np.maximum(radius, 1))[away].min() > 0.97
+
+
+def test_the_field_is_empty_outside_and_finite_on_any_mask() -> None:
+    profile = SilhouetteProfile(np.array([0.9, 0.1]), np.array([0.2, 0.3]))
+    masks = [disc()[0], np.zeros((5, 6), bool), np.ones((5, 6), bool), np.eye(7, dtype=bool)]
+    for mask in masks:
+        field = silhouette_field(mask, profile)
+        for values in (field.down, field.right, field.precision):
+            assert np.isfinite(values).all() and (values[~mask] == 0).all()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_half_ball_costs_less_than_flat_and_a_hollow_more(sign: int) -> None:
+    mask, i, j = disc()
+    height = sign * np.sqrt(np.maximum(36.0**2 - i * i - j * j, 1))
+    profile = SilhouetteProfile(np.linspace(0.95, 0.05, 10), np.full(10, 0.2))
+    field = silhouette_field(mask, profile)
+    n1, n2, _ = np.moveaxis(normals(height), -1, 0)
+    flat = silhouette_cost(0 * n1, 0 * n2, mask, field, 1.0)[0]
+    cost = silhouette_cost(n1, n2, mask, field, 1.0)[0]
+    assert cost < 0.2 * flat if sign == 1 else cost > 2 * flat
