@@ -130,12 +130,11 @@ def decompose(
     settings, evidence, monitor = settings or Settings(), evidence or Evidence(), monitor or Monitor()
     settings.check()
     clock = _Clock()
-    monitor.report("preparing", 0.0)
     with clock.stage("prepare"):
         working = photo.resized_to_object(settings.max_size)
         maps_at = photo if settings.full_size else working
         known = _at_scale(evidence, photo, working)
-    monitor.report(f"separating ({settings.separator})", 0.03)
+    monitor.report(f"separating ({settings.separator})" if settings.model == "mdr" else "preparing", 0.03)
     with clock.stage("separation"):
         split = _separate(maps_at, settings)
         diffuse = split.diffuse if maps_at is working else _separate(working, settings).diffuse

@@ -1,0 +1,44 @@
+"""What the tests of the command share: photos of a made ball, and how a command is run."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from isc_core.photo import linear_to_srgb
+from tests.core.ball_scene import ball
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def ball_codes(radius: float = 20.0) -> np.ndarray:
+    """A glossy ball on black, (H, W, 3) uint16 sRGB codes."""
+    side = int(2 * radius + 12)
+    scene = ball((side, side + 4), radius, (side / 2, side / 2 + 3))
+    return np.rint(65535 * np.clip(linear_to_srgb(scene.image), 0, 1)).astype(np.uint16)
+
+
+def write_image(path: Path, rgb: np.ndarray) -> Path:
+    """Writes (H, W) or (H, W, 3) RGB codes as the suffix of `path` says."""
+    assert cv2.imwrite(str(path), rgb[..., ::-1] if rgb.ndim == 3 else rgb)
+    return path
+
+
+def ball_photo(folder: Path, radius: float = 20.0) -> Path:
+    """Writes the ball's photo, a 16-bit PNG, into `folder`."""
+    return write_image(folder / "ball.png", ball_codes(radius))
+
+
+def run_isc(*arguments: object, before: str = "") -> subprocess.CompletedProcess[str]:
+    """Runs the command in a process of its own; `before` is Python that is run there first."""
+    return subprocess.run(isc_command(*arguments, before=before), capture_output=True, text=True, cwd=ROOT, timeout=300, check=False)
+
+
+def isc_command(*arguments: object, before: str = "") -> list[str]:
+    """The command line that runs `isc` after `before`."""
+    words = [str(argument) for argument in arguments]
+    if not before:
+        return [sys.executable, "-m", "isc_core", *words]
+    return [sys.executable, "-c", f"{before}\nimport sys\nfrom isc_core.cli import main\nsys.exit(main({words!r}))"]

@@ -1,0 +1,457 @@
+"""The command `isc`: what it writes, what it prints, and how it ends when somebody stops it."""
+
+import json
+import os
+import pty
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from isc_core import __version__
+from isc_core.cli import main
+from isc_core.commands import build_parser
+from isc_core.datasets import load_object
+from isc_core.errors import Cancelled, InputError
+from isc_core.evaluation_runner import RunnerOptions, make_runner
+from isc_core.evidence_files import CODE, read_height, read_light
+from isc_core.exr import read_channels, write_channels
+from isc_core.photo import read_photo
+from isc_core.progress import Monitor
+from isc_core.result_folder import load
+from isc_core.separation import separate
+from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.terminal import Interrupts, ProgressBar
+from tests.core.ball_scene import LIGHT, ball
+from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, run_isc, write_image
+
+COMMANDS = ("decompose", "separate", "mask", "evaluate", "fit-priors")
+
+
+def isc(*arguments: object) -> int:
+    return main([str(argument) for argument in arguments])
+
+
+# --- help -------------------------------------------------------------------------------------------------------------------------------
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert isc("--version") == 0
+    assert capsys.readouterr().out == f"isc {__version__}\n"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_explains_itself_with_an_example(capsys: pytest.CaptureFixture[str], command: str) -> None:
+    assert isc(command, "--help") == 0
+    text = capsys.readouterr().out
+    assert f"  isc {command} " in text.partition("examples:")[2]
+    assert all(len(line) <= 140 for line in text.splitlines())
+
+
+def test_the_examples_in_the_help_are_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    """An example whose options no longer exist would not parse."""
+    found = []
+    for words in ((), *((command,) for command in COMMANDS)):
+        isc(*words, "--help")
+        found += re.findall(r"^  isc (\S+ \S.*?)(?:  .*)?$", capsys.readouterr().out.partition("examples:")[2], re.M)
+    assert len(found) >= 10
+    for example in found:
+        assert callable(build_parser().parse_args(example.split()).run), example
+
+
+def test_the_modules_name_runs_the_command() -> None:
+    done = run_isc("--version")
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"isc {__version__}\n", "")
+
+
+# --- decompose --------------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A decomposition of the ball by the default model."""
+    folder = tmp_path_factory.mktemp("ball")
+    assert isc("decompose", ball_photo(folder), "--quiet", "-o", folder / "result") == 0
+    return folder
+
+
+def test_decompose_writes_a_whole_result(result: Path) -> None:
+    found = load(result / "result")
+    assert found.identity_errors().broken() == ()
+    assert found.mask.shape == ball_codes().shape[:2]
+    assert found.provenance.settings["model"] == "mdr" and found.provenance.settings["separator"] == "shen_2013"
+    assert found.provenance.input["name"] == "ball.png"
+    assert {"maps.exr", "decomposition.json", "mesh.glb", "preview.png"} <= {entry.name for entry in (result / "result").iterdir()}
+    assert sorted(entry.name for entry in result.iterdir()) == ["ball.png", "result"]
+
+
+def test_decompose_passes_the_reference_check(result: Path, shared: Path) -> None:
+    checker = shared / "tools" / "check_result.py"
+    done = subprocess.run([sys.executable, str(checker), str(result / "result")], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_options_reach_the_result(tmp_path: Path) -> None:
+    options = ["--model", "sirfs", "--illumination", "laboratory", "--max-size", "30", "--seed", "5", "--threads", "1", "--engine", "numpy"]
+    assert isc("decompose", ball_photo(tmp_path), *options, "--transfer", "linear", "--quiet", "-o", tmp_path / "out") == 0
+    p = load(tmp_path / "out").provenance
+    expected = {"model": "sirfs", "illumination": "laboratory", "max_size": 30, "threads": 1, "engine": "numpy"}
+    assert {name: p.settings[name] for name in expected} == expected
+    assert p.seed == 5
+    assert p.input["transfer"] == "linear"
+    assert max(p.input["crop_box"][2:]) <= 30
+
+
+def test_the_same_command_gives_the_same_bytes_on_any_number_of_threads(result: Path, tmp_path: Path) -> None:
+    assert isc("decompose", result / "ball.png", "--threads", "1", "--quiet", "-o", tmp_path / "again") == 0
+    assert (tmp_path / "again" / "maps.exr").read_bytes() == (result / "result" / "maps.exr").read_bytes()
+
+
+def test_an_earlier_result_is_replaced(tmp_path: Path) -> None:
+    photo = ball_photo(tmp_path)
+    for model in ("naive", "retinex"):
+        assert isc("decompose", photo, "--model", model, "--quiet", "-o", tmp_path / "out") == 0
+        assert load(tmp_path / "out").provenance.settings["model"] == model
+
+
+def test_what_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    photo, out = ball_photo(tmp_path), tmp_path / "out"
+    assert isc("decompose", photo, "--model", "naive", "-o", out) == 0
+    printed = capfd.readouterr()
+    assert printed.out == f"look at {out / 'preview.png'}\n"
+    assert all(line.startswith("isc: ") for line in printed.err.splitlines())
+    assert "isc: building the mesh" in printed.err.splitlines()
+    assert isc("decompose", photo, "--model", "naive", "--quiet", "-o", out) == 0
+    printed = capfd.readouterr()
+    assert (printed.out, printed.err) == ("", "")
+
+
+# --- what is known beforehand -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_known_shape_and_a_known_light_are_kept(tmp_path: Path) -> None:
+    photo = ball_photo(tmp_path)
+    mask = read_photo(photo).mask
+    rows, columns = np.indices(mask.shape)
+    height = np.sqrt(np.maximum(20.0**2 - (rows - 26) ** 2 - (columns - 29) ** 2, 0))
+    write_channels(tmp_path / "shape.exr", {"Z": np.where(mask, height, np.nan)})
+    (tmp_path / "light.json").write_text(json.dumps({"coefficients": LIGHT.tolist()}))
+    known = ["--shape", tmp_path / "shape.exr", "--light", tmp_path / "light.json"]
+    assert isc("decompose", photo, "--model", "sirfs", *known, "--quiet", "-o", tmp_path / "out") == 0
+    found = load(tmp_path / "out")
+    np.testing.assert_allclose(found.illumination, LIGHT, atol=1e-9)
+    np.testing.assert_allclose(found.height[mask], (height - height[mask].min())[mask], atol=1e-4)
+
+
+def test_a_known_shape_goes_on_beyond_its_rim(tmp_path: Path) -> None:
+    """Nothing outside the mask is read: on a slanted plane even the normals at the rim are the plane's."""
+    photo = ball_photo(tmp_path)
+    mask = read_photo(photo).mask
+    rows, columns = np.indices(mask.shape)
+    np.save(tmp_path / "plane.npy", np.where(mask, 0.5 * columns - 0.25 * rows, -1000.0))
+    assert isc("decompose", photo, "--model", "sirfs", "--shape", tmp_path / "plane.npy", "--quiet", "-o", tmp_path / "out") == 0
+    expected = np.array([-0.5, -0.25, 1.0]) / np.linalg.norm([-0.5, -0.25, 1.0])
+    np.testing.assert_allclose(load(tmp_path / "out").normal[mask], np.broadcast_to(expected, (int(mask.sum()), 3)), atol=0.02)
+
+
+def test_the_result_of_a_run_is_a_known_shape_for_the_next(result: Path, tmp_path: Path) -> None:
+    folder = result / "result"
+    assert isc("decompose", result / "ball.png", "--shape", folder, "--light", folder, "--quiet", "-o", tmp_path / "out") == 0
+    before, after = load(folder), load(tmp_path / "out")
+    np.testing.assert_array_equal(after.height, before.height)
+    np.testing.assert_allclose(after.illumination, before.illumination, atol=1e-9)
+
+
+def test_a_measured_depth_bends_the_shape_towards_it(result: Path, tmp_path: Path) -> None:
+    mask = load(result / "result").mask
+    rows, columns = np.indices(mask.shape)
+    tilted = np.where(mask & (rows % 5 > 0), 0.6 * columns, np.nan)
+    np.save(tmp_path / "depth.npy", tilted)
+    options = ["--depth", tmp_path / "depth.npy", "--depth-sigma", "1", "--depth-weight", "1000"]
+    assert isc("decompose", result / "ball.png", *options, "--quiet", "-o", tmp_path / "out") == 0
+
+    def misfit(folder: Path) -> float:
+        difference = (load(folder).height - 0.6 * columns)[mask]
+        return float(np.abs(difference - np.median(difference)).mean())
+
+    assert misfit(tmp_path / "out") < 0.3 * misfit(result / "result")
+
+
+@pytest.mark.parametrize("kind", ["exr", "layered exr", "npy", "png", "tiff"])
+def test_a_height_map_means_the_same_in_every_format(tmp_path: Path, kind: str) -> None:
+    codes = np.random.default_rng(1).integers(1, 65536, (12, 9)).astype(np.uint16)
+    height = codes * CODE
+    codes[3, 4], height[3, 4] = 0, np.nan
+    path = tmp_path / f"map.{kind.rpartition(' ')[2]}"
+    match kind:
+        case "exr":
+            write_channels(path, {"Y": height})
+        case "layered exr":
+            write_channels(path, {"height.Z": height, "normal.Z": np.ones((12, 9))})
+        case "npy":
+            np.save(path, height)
+        case _:
+            write_image(path, codes)
+    np.testing.assert_array_equal(read_height(path, (12, 9)), height)
+
+
+def test_the_height_scale_is_the_unit(tmp_path: Path) -> None:
+    np.save(tmp_path / "distance.npy", np.array([[1, 2], [3, 4]]))
+    np.testing.assert_array_equal(read_height(tmp_path / "distance.npy", (2, 2), -0.5), [[-0.5, -1.0], [-1.5, -2.0]])
+    write_image(tmp_path / "codes.png", np.arange(64 * 64, dtype=np.uint16).reshape(64, 64))
+    assert read_height(tmp_path / "codes.png", (64, 64), 2.0)[0, 3] == 6.0
+
+
+def test_a_height_map_that_cannot_be_chosen(tmp_path: Path) -> None:
+    write_channels(tmp_path / "two.exr", {"R": np.ones((4, 4)), "G": np.ones((4, 4))})
+    with pytest.raises(InputError, match="no channel Y, Z or height.Z but G, R"):
+        read_height(tmp_path / "two.exr", (4, 4))
+
+
+@pytest.mark.parametrize("shape", ["plain", "coefficients", "decomposition"])
+def test_a_light_is_read_from_what_people_have(tmp_path: Path, shape: str) -> None:
+    plain = LIGHT.tolist()
+    forms = {"plain": plain, "coefficients": {"coefficients": plain}, "decomposition": {"illumination": {"coefficients": plain}}}
+    (tmp_path / "decomposition.json").write_text(json.dumps(forms[shape]))
+    np.testing.assert_array_equal(read_light(tmp_path / "decomposition.json"), LIGHT)
+    np.testing.assert_array_equal(read_light(tmp_path), LIGHT)
+
+
+# --- the other commands -----------------------------------------------------------------------------------------------------------------
+
+
+def test_separate_adds_up(tmp_path: Path) -> None:
+    assert isc("separate", ball_photo(tmp_path), "--method", "shen_2013", "--quiet", "-o", tmp_path / "out") == 0
+    maps = read_channels(tmp_path / "out" / "separation.exr")
+    layers = sum(np.stack([maps[f"{name}.{c}"] for c in "RGB"], -1) for name in ("diffuse", "specular", "residual"))
+    photo = read_photo(tmp_path / "ball.png")
+    np.testing.assert_allclose(layers[photo.mask], photo.image[photo.mask], atol=1e-5)
+    truth = ball((52, 56), 20.0, (26, 29)).specular.sum()
+    found = sum(maps[f"specular.{c}"].sum() for c in "RGB")
+    assert 0.3 * truth < found < 3 * truth
+
+
+def test_separate_takes_the_whole_frame_where_nothing_marks_the_object(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    photo = write_image(tmp_path / "full.png", ball_codes() // 2 + 9000)
+    assert isc("separate", photo, "--method", "none", "-o", tmp_path / "out") == 0
+    assert "isc: note: there is no mask" in capfd.readouterr().err
+    assert read_channels(tmp_path / "out" / "separation.exr")["diffuse.G"].min() > 0
+
+
+def test_mask_finds_the_ball_in_its_box(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    codes = ball_codes(40.0)
+    truth = codes.max(-1) > 0
+    backdrop = np.random.default_rng(2).integers(20000, 26000, codes.shape).astype(np.uint16)
+    photo = write_image(tmp_path / "photo.png", np.where(truth[..., None], codes, backdrop))
+    assert isc("mask", photo, "--box", "3,2,88,88", "-o", tmp_path / "mask.png") == 0
+    assert "look at it" in capfd.readouterr().out
+    found = read_photo(photo, tmp_path / "mask.png").mask
+    assert (found & truth).sum() / (found | truth).sum() > 0.9
+
+
+def test_evaluate_scores_and_writes(shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    root = shared / "data" / "mit_berkeley_train"
+    options = ["--dataset", "mit-berkeley", "--objects", "apple", "--model", "naive", "--input", "original"]
+    assert isc("evaluate", root, *options, "--json", tmp_path / "new" / "scores.json") == 0
+    scores = json.loads((tmp_path / "new" / "scores.json").read_text())
+    assert list(scores["results"]) == ["laboratory/original"]
+    average = scores["results"]["laboratory/original"]["apple"]["avg"]
+    assert f"{average:.5f}" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize(("model", "light", "input"), [("sirfs", "natural", "diffuse"), ("mdr", "laboratory", "original")])
+def test_what_is_evaluated_explains_the_image(shared: Path, model: str, light: str, input: str) -> None:
+    """Shading times reflectance is the photo, for mdr its diffuse layer, and the surface is not flat."""
+    truth = load_object(shared / "data" / "mit_berkeley_train", "apple", light, input)
+    answer = make_runner(RunnerOptions(model), shipped_prior_set())(truth, Monitor())
+    product = (answer.shading * answer.reflectance)[truth.valid]
+    diffuse = truth.image if model == "sirfs" else separate("shen_2013", truth.image, truth.valid).diffuse
+    np.testing.assert_allclose(product, np.maximum(diffuse[truth.valid], 0.5 / 65535), rtol=1e-6)
+    assert model == "sirfs" or np.abs(diffuse - truth.image)[truth.valid].max() > 0.001
+    assert answer.loss is not None and answer.evaluations is not None
+    assert np.linalg.norm(answer.normal, axis=-1) == pytest.approx(1)
+    assert answer.normal[truth.valid][:, 2].min() < 0.5
+
+
+# --- stopping ---------------------------------------------------------------------------------------------------------------------------
+
+CTRL_C_WORKS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_stop_during_the_solve_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
+    photo = ball_photo(tmp_path, 110.0)
+    command = isc_command("decompose", photo, "--engine", "numpy", "-o", tmp_path / "new" / "out", before=CTRL_C_WORKS)
+    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        stages = []
+        for line in process.stderr:
+            stages.append(line)
+            if "shape and light" in line:
+                process.send_signal(number)
+        code = process.wait(timeout=60)
+    assert code == (130 if number == signal.SIGINT else 143), stages
+    assert not any("Traceback" in line for line in stages)
+    assert (stages[-1] == "isc: cancelled\n") == (number == signal.SIGINT)
+    assert [entry.name for entry in tmp_path.iterdir()] == ["ball.png"]
+
+
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Ctrl-C as in a terminal, even where the tests themselves run in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
+def test_the_first_interrupt_asks_and_the_second_insists() -> None:
+    with Interrupts() as interrupts:
+        monitor = interrupts.monitor(lambda stage, fraction: None)
+        monitor.report("work", 0.0)
+        signal.raise_signal(signal.SIGINT)
+        with pytest.raises(Cancelled):
+            monitor.report("work", 0.5)
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_ignored_interrupt_stays_ignored() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with Interrupts() as interrupts:
+            signal.raise_signal(signal.SIGINT)
+            interrupts.monitor(lambda stage, fraction: None).report("work", 0.0)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def test_the_command_also_runs_outside_the_main_thread(tmp_path: Path) -> None:
+    photo, codes = ball_photo(tmp_path), []
+    thread = threading.Thread(target=lambda: codes.append(isc("separate", photo, "--method", "none", "--quiet", "-o", tmp_path / "out")))
+    thread.start()
+    thread.join()
+    assert codes == [0]
+
+
+def test_a_reader_that_goes_away_is_no_error() -> None:
+    pipe = f"{sys.executable} -m isc_core decompose --help | true; exit ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", pipe], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1)
+    assert done.stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("error", "words"), [(MemoryError(), "memory"), (OSError(5, "Input/output error", "disk"), "disk: Input/output error")]
+)
+def test_trouble_with_the_machine_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: BaseException, words: str
+) -> None:
+    def fail(arguments: list[str]) -> int:
+        raise error
+
+    monkeypatch.setattr("isc_core.cli._run", fail)
+    assert main([]) == 2
+    text = capsys.readouterr().err
+    assert words in text and text.count("\n") == 1
+
+
+# --- the terminal -----------------------------------------------------------------------------------------------------------------------
+
+
+def through_terminal(script: str) -> str:
+    """What a Python script writes when its standard error is a terminal."""
+    parent, child = pty.openpty()
+    with subprocess.Popen([sys.executable, "-c", script], cwd=ROOT, stderr=child, env={**os.environ, "COLUMNS": "80"}) as process:
+        os.close(child)
+        written = b""
+        while True:
+            try:
+                block = os.read(parent, 4096)
+            except OSError:  # how a terminal says on Linux that everybody has left
+                break
+            if not block:
+                break
+            written += block
+        process.wait(timeout=60)
+    os.close(parent)
+    return written.decode()
+
+
+def test_a_terminal_shows_one_line_that_is_wiped_at_the_end() -> None:
+    text = through_terminal(
+        "import sys; from isc_core.terminal import ProgressBar\n"
+        "with ProgressBar(sys.stderr) as bar:\n"
+        "    bar('separating', 0.25); bar('shape and light, loss 46.100', 0.5); bar('maps ' + 99 * '.', 0.4)\n"
+    )
+    assert "\n" not in text
+    frames = text.split("\r\x1b[K")[1:]
+    assert frames[0] == "[######..................]  25 %  separating"
+    assert frames[1].endswith(" 50 %  shape and light, loss 46.100")
+    assert " 50 %  maps" in frames[2] and len(frames[2]) == 79
+    assert frames[-1] == ""
+
+
+def test_a_terminal_is_not_redrawn_for_every_step() -> None:
+    start = time.monotonic()
+    text = through_terminal(
+        "import sys; from isc_core.terminal import ProgressBar\n"
+        "with ProgressBar(sys.stderr) as bar:\n"
+        "    for k in range(20000): bar(f'shape and light, loss {k}', k / 20000)\n"
+    )
+    assert 2 <= text.count("\r") <= 3 + (time.monotonic() - start) / 0.08
+
+
+def test_a_file_gets_a_line_for_each_stage(tmp_path: Path) -> None:
+    with (tmp_path / "log").open("w") as log, ProgressBar(log) as bar:
+        for loss in (3.0, 2.0, 1.0):
+            bar(f"shape and light, loss {loss}", 0.1)
+        bar("maps", 0.9)
+    assert (tmp_path / "log").read_text() == "isc: shape and light\nisc: maps\n"
+
+
+# --- compiled kernels -------------------------------------------------------------------------------------------------------------------
+
+
+def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
+    """Numba refuses functions that it cannot cache; here it is forbidden every folder but one that is named, and none is."""
+    pytest.importorskip("numba")
+    check = (
+        "import os, numba; from isc_core.sirfs.kernel_cache import ensure_cache_folder; ensure_cache_folder()\n"
+        "from isc_core.sirfs import kernels; print(kernels.forward_rows.stats.cache_path)"
+    )
+    environment = {**os.environ, "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator", "TMPDIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", check], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(str(tmp_path))
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_first_compilation_is_announced(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba")
+    from isc_core.sirfs import kernel_cache
+
+    stages: list[str] = []
+    monitor = Monitor(lambda stage, fraction: stages.append(stage))
+    for compiled in (True, False):
+        monkeypatch.setattr(kernel_cache, "kernels_compiled", lambda known=compiled: known)
+        kernel_cache.announce_compilation("auto", monitor)
+        kernel_cache.announce_compilation("numpy", monitor)
+        assert len(stages) == (0 if compiled else 1)
+    assert "compiled kernels" in stages[0]
+
+
+def test_kernels_count_as_compiled_once_they_were_used(result: Path) -> None:
+    pytest.importorskip("numba")
+    from isc_core.sirfs.kernel_cache import kernels_compiled
+
+    assert load(result / "result").provenance.status["converged"] in (True, False)
+    assert kernels_compiled()
