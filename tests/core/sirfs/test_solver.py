@@ -11,6 +11,7 @@ from isc_core.progress import Monitor
 from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.problem import DepthObservation
+from isc_core.sirfs.pyramid import up
 from isc_core.sirfs.solver import SolverOptions, halved, solve
 from isc_core.sirfs.stencils import normals
 
@@ -197,6 +198,15 @@ def test_a_coarse_start_gains_as_much() -> None:
     first = NumpyEngine(problem).evaluate(np.zeros((100, 96)), np.zeros((9, 3))).terms.total
     direct, coarse = (solve(problem, SolverOptions(threads=2, halvings=h)).terms.total for h in (0, 2))
     assert first - coarse > 0.9 * (first - direct) > 1
+
+
+def test_what_the_halved_problem_finds_is_carried_over() -> None:
+    problem = make_problem(blob((90, 84)))
+    double = replace(QUICK, single=False)
+    small = solve(halved(problem), replace(double, halvings=0, levels=4))
+    begun = solve(problem, replace(double, halvings=1, levels=5, lbfgs=LbfgsOptions(iterations=0)))
+    np.testing.assert_allclose(begun.light, small.light, rtol=1e-9)
+    np.testing.assert_allclose(begun.height, up(small.height, (90, 84)), atol=1e-9)
 
 
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=needs_numba)])
