@@ -104,6 +104,9 @@ class NumbaEngine:
         self._pad(height)
         folded = _fold_light(np.asarray(light, float)).astype(self.dtype)
         self._each_block(partial(self._forward, folded))
+        if not (np.isfinite(self._slant).all() and np.isfinite(folded).all()):
+            # a step too far: kernels that look up tables must not see what is no number
+            return Evaluation(Terms(slant=float("inf")), np.zeros(height.shape, self.dtype), np.zeros(light.shape))
         pairs: list[Callable[[], None]] = [self._palette_task]
         pairs += [partial(self._pair_block, k) for k in range(len(self._blocks))]
         self._workers.run(pairs)

@@ -86,6 +86,17 @@ def test_a_whole_solve_is_the_same_bytes_on_any_threads() -> None:
     assert results[0] == results[1]
 
 
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e37])
+@pytest.mark.parametrize("of", ["height", "light"])
+def test_a_step_too_far_costs_infinitely_much(of: str, bad: float) -> None:
+    problem = problem_of("colour")
+    height, light = states(problem, np.float32)[3]
+    (height if of == "height" else light)[5, 2] = bad
+    with np.errstate(all="ignore"):
+        result = numba_engine.NumbaEngine(problem, np.float32).evaluate(height, light)
+    assert not np.isfinite(result.terms.total) or (of, bad) == ("light", 1e37)
+
+
 @pytest.mark.parametrize("shape", [(3, 3), (1, 9), (9, 1), (17, 4)])
 def test_tiny_problems(shape: tuple[int, int]) -> None:
     """Every pixel valid, no contour, fewer rows than threads."""

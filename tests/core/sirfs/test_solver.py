@@ -238,6 +238,14 @@ def test_a_thin_object_that_vanishes_when_halved() -> None:
     assert np.isfinite(result.height).all() and np.isfinite(result.terms.total)
 
 
+@pytest.mark.parametrize("name", ["known_height", "known_light"])
+def test_what_is_known_must_be_numbers(name: str) -> None:
+    scene = blob()
+    known = {"known_height": np.where(scene.mask, scene.height, np.nan), "known_light": np.full((9, 3), np.nan)}
+    with pytest.raises(InputError, match="holes"):
+        solve(make_problem(scene), **{name: known[name]})  # type: ignore[arg-type]
+
+
 def test_unknown_engine_is_one_clear_line() -> None:
     with pytest.raises(InputError, match="choose auto, numba or numpy"):
         solve(make_problem(blob()), SolverOptions(engine="gpu"))
