@@ -47,9 +47,8 @@ def _run(arguments: list[str]) -> int:
         return int(done.code or 0)
     with Interrupts() as interrupts, ProgressBar(sys.stderr, quiet=options.quiet) as bar:
         lines = options.run(options, interrupts.monitor(bar))
-    if not options.quiet:
-        for line in lines:
-            print(line)
+    for line in lines:
+        print(line)
     return SUCCESS
 
 

@@ -11,7 +11,7 @@ from ..progress import Monitor
 from ..result_folder import require_room, require_writable_result, save
 from ..separation import METHODS
 from ..sirfs.prior_file import load_prior_set
-from .options import Commands, add_command, add_engine, add_photo, count, number, positive
+from .options import Commands, add_command, add_engine, add_photo, count, hints, number, positive
 
 _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
@@ -101,8 +101,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     result = decompose(photo, settings, evidence=evidence, prior_set=prior_set, name=options.photo.name, monitor=monitor.part(0.0, 0.8))
     save(result, options.output, monitor=monitor.part(0.8, 1.0))
     status = result.provenance.status
-    trouble = [] if status.get("converged", True) else [f"not converged: {status.get('reason', '')}; {status.get('help', '')}"]
-    return [*trouble, f"look at {options.output / 'preview.png'}"]
+    trouble = [] if status.get("converged", True) else [f"note: {status['help']}"]
+    return hints(options, *trouble, f"look at {options.output / 'preview.png'}")
 
 
 def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:

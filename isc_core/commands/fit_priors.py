@@ -8,7 +8,7 @@ from ..datasets import list_objects, load_natural_lights
 from ..errors import InputError
 from ..progress import Monitor
 from ..sirfs.kernel_cache import ensure_cache_folder
-from .options import Commands, add_command, names
+from .options import Commands, add_command, hints, names
 
 _EXAMPLES = """  isc fit-priors DATA -o priors.npz
   isc fit-priors DATA --leave-out cup1,cup2 -o without-cups.npz"""
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     statistics = collect_statistics(objects, monitor.part(0.2, 0.4))
     priors = fit_priors(statistics, lights, monitor=monitor.part(0.4, 1.0))
     save_prior_set(options.output, priors)
-    return [f"{options.output}: priors of {', '.join(priors.record.objects)}"]
+    return hints(options, f"{options.output}: priors of {', '.join(priors.record.objects)}")
 
 
 def _chosen(root: Path, wanted: tuple[str, ...] | None, left_out: tuple[str, ...] | None) -> tuple[str, ...]:

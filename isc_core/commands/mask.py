@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..mask import Box, cut_out
 from ..progress import Monitor
-from .options import Commands, add_command, add_transfer
+from .options import Commands, add_command, add_transfer, hints
 
 _EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
 
@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work."""
     del monitor  # one step of a second or two
     found = cut_out(options.photo, options.box, options.output, options.transfer)
-    return [f"{options.output}: {int(found.sum())} pixels; look at it before you use it"]
+    return hints(options, f"{options.output}: {int(found.sum())} pixels; look at it before you use it")
 
 
 def _box(text: str) -> Box:

@@ -37,8 +37,13 @@ def add_command(commands: Commands, name: str, run: Any, summary: str, descripti
         name, help=summary, description=description, epilog=f"examples:\n{examples}" if examples else None
     )
     parser.set_defaults(run=run)
-    parser.add_argument("--quiet", action="store_true", help="show no progress and print nothing")
+    parser.add_argument("--quiet", action="store_true", help="show no progress, and print nothing but what was asked for")
     return parser
+
+
+def hints(options: argparse.Namespace, *lines: str) -> list[str]:
+    """Lines to print that only help a person: none with --quiet."""
+    return [] if options.quiet else list(lines)
 
 
 def add_photo(parser: argparse.ArgumentParser) -> None:

@@ -8,7 +8,7 @@ from ..photo import read_photo
 from ..progress import Monitor
 from ..result_folder import require_writable_result, save_separation
 from ..separation import METHODS, separate
-from .options import Commands, add_command, add_photo
+from .options import Commands, add_command, add_photo, hints
 
 _EXAMPLES = """  isc separate cup.png --method shen_2013 -o cup-layers
   isc separate highlights.bmp --transfer linear --method shen_2013 -o layers"""
@@ -38,4 +38,4 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
     if photo.original.mask_from == "whole frame" and not options.quiet:
         print("isc: note: there is no mask, so the whole image was taken; --mask names one", file=sys.stderr)
-    return [f"look at {options.output / 'preview.png'}"]
+    return hints(options, f"look at {options.output / 'preview.png'}")

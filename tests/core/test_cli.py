@@ -27,7 +27,7 @@ from isc_core.photo import read_photo
 from isc_core.progress import Monitor
 from isc_core.result_folder import load
 from isc_core.separation import separate
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.prior_file import load_prior_set, shipped_prior_set
 from isc_core.terminal import Interrupts, ProgressBar
 from tests.core.ball_scene import LIGHT, ball
 from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, run_isc, write_image
@@ -259,7 +259,7 @@ def test_mask_finds_the_ball_in_its_box(tmp_path: Path, capfd: pytest.CaptureFix
 def test_evaluate_scores_and_writes(shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     root = shared / "data" / "mit_berkeley_train"
     options = ["--dataset", "mit-berkeley", "--objects", "apple", "--model", "naive", "--input", "original"]
-    assert isc("evaluate", root, *options, "--json", tmp_path / "new" / "scores.json") == 0
+    assert isc("evaluate", root, *options, "--quiet", "--json", tmp_path / "new" / "scores.json") == 0
     scores = json.loads((tmp_path / "new" / "scores.json").read_text())
     assert list(scores["results"]) == ["laboratory/original"]
     average = scores["results"]["laboratory/original"]["apple"]["avg"]
@@ -278,6 +278,20 @@ def test_what_is_evaluated_explains_the_image(shared: Path, model: str, light: s
     assert answer.loss is not None and answer.evaluations is not None
     assert np.linalg.norm(answer.normal, axis=-1) == pytest.approx(1)
     assert answer.normal[truth.valid][:, 2].min() < 0.5
+
+
+def test_priors_are_fitted_to_the_chosen_objects(shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    root, path = shared / "data" / "mit_berkeley_train", tmp_path / "priors.npz"
+    few = "box,phone"
+    assert isc("fit-priors", root, "--objects", few, "-o", path) == 2
+    assert "too few" in capfd.readouterr().err
+    left_out = "cup1,dinosaur,panther"
+    assert isc("fit-priors", root, "--leave-out", left_out, "--quiet", "-o", path) == 0
+    assert load_prior_set(path).record.objects == ("apple", "box", "frog1", "paper1", "phone", "squirrel", "teabag2")
+    assert isc("decompose", ball_photo(tmp_path), "--priors", path, "--quiet", "-o", tmp_path / "out") == 0
+    assert isc("fit-priors", root, "--leave-out", "teapot", "-o", tmp_path / "new.npz") == 2
+    assert "unknown object 'teapot'" in capfd.readouterr().err
+    assert not (tmp_path / "new.npz").exists()
 
 
 # --- stopping ---------------------------------------------------------------------------------------------------------------------------
