@@ -198,7 +198,7 @@ def solve(
     options, monitor = options or SolverOptions(), monitor or Monitor()
     for given in (known_height, known_light, *(start or ())):
         if given is not None and not np.isfinite(given).all():
-            raise InputError("a given shape or light has holes or infinite values: fill them, or give the shape as depth, which may have holes")
+            raise InputError("a given shape or light has holes or infinite values: fill them, or give the shape as depth")
     with Workers(thread_count(options)) as workers:
         tools = _Tools(options, workers)
         full_levels = len(level_shapes(problem.valid.shape, options.levels))
