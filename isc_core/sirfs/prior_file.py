@@ -18,8 +18,9 @@ from .fitting.color_mixture import ColorScaleMixture
 from .fitting.lights import Contrast, GaussianLight
 from .fitting.prior_set import FitRecord, Lights, PriorSet
 from .fitting.scale_mixture import ScaleMixture
+from .priors import SilhouetteProfile
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 _LIGHTS = ("natural", "laboratory")
 _COEFFICIENTS = 27
 
@@ -59,6 +60,8 @@ def _to_arrays(priors: PriorSet) -> dict[str, np.ndarray]:
         "color_smoothness.covariance": priors.color_smoothness.covariance,
         "color_smoothness.reach": np.array(priors.color_smoothness.reach),
         "parsimony_whiten": priors.parsimony_whiten,
+        "silhouette.mean": priors.silhouette.mean,
+        "silhouette.spread": priors.silhouette.spread,
     }
     for name in ("curvature", "grey_smoothness"):
         mixture: ScaleMixture = getattr(priors, name)
@@ -116,6 +119,7 @@ class _Reader:
             parsimony_whiten=whiten,
             absolute=self.table("absolute", 3),
             grey_absolute=self.table("grey_absolute", 1),
+            silhouette=self.silhouette(),
             lights=lights,
             record=self.record(),
         )
@@ -167,6 +171,10 @@ class _Reader:
         nodes = int(self.numbers(f"{name}.nodes", (), positive=True))
         coarse = self.numbers(f"{name}.coarse", (-(-nodes // 2),) * dimensions)
         return CoarseTable(coarse, float(self.numbers(f"{name}.base", ())), nodes)
+
+    def silhouette(self) -> SilhouetteProfile:
+        mean = self.numbers("silhouette.mean", (None,))
+        return SilhouetteProfile(mean, self.numbers("silhouette.spread", (len(mean),), positive=True))
 
     def light(self, name: str, size: int) -> GaussianLight:
         mean, covariance = self.numbers(f"{name}.mean", (size,)), self.covariance(f"{name}.covariance", size)

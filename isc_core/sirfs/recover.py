@@ -4,15 +4,16 @@ The priors speak of pixels, so the object is brought to one size first (`Recover
 a fixed margin is solved: neither the photo's scale nor empty space around the object changes the answer.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from ..progress import Monitor
-from .contour import occluding_contour
+from .contour import Contour, occluding_contour
+from .framing import continued
 from .priors import Priors
 from .problem import DepthObservation, Problem, Terms
-from .resampling import resample_height, resample_inside
+from .resampling import height_scale, resample_height, resample_inside
 from .settings import Weights
 from .silhouette import silhouette_field
 from .solver import SolverOptions, solve
@@ -24,10 +25,12 @@ MARGIN = 20
 class RecoverOptions:
     """`solve_size`: long side of the object's box, in pixels, at which SIRFS is solved; 0 for the size given.
 
+    `refinements`: steps taken afterwards at the scale given, under the same light, for the detail that the smaller problem cannot see.
     `margin`: pixels of empty space around the box there. `shading_only`: shape-from-shading mode, one reflectance colour.
     """
 
     solve_size: int = 0
+    refinements: int = 0
     margin: int = MARGIN
     shading_only: bool = False
     solver: SolverOptions = field(default_factory=SolverOptions)
@@ -101,20 +104,25 @@ def recover(
     `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`: zero channels are raised to it, in
     the logarithm only. Raises `Cancelled`.
     """
-    options, known = options or RecoverOptions(), known or Known()
+    options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
     window, factor = _window(mask, options)
-    inside = window.cut(mask, False)
-    problem = _problem(window.cut(image, 0), inside, _contour_mask(mask, window), factor, floor, priors, weights, options, known, window)
-    shape = problem.valid.shape
-    height = None if known.height is None else _to_solve(window.cut(known.height, 0.0), inside, factor)
-    result = solve(problem, options.solver, known_height=height, known_light=known.light, monitor=monitor)
-    cut = resample_height(result.height, inside.shape) if known.height is None else window.cut(known.height, 0.0)
+    inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
+    scene = _Scene(window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window)
+    refine = options.refinements > 0 and factor < 1 and known.height is None
+    problem = scene.problem(factor)
+    given = None if known.height is None else _to_solve(window.cut(known.height, 0.0), scene.inside, factor)
+    share = monitor.part(0, 0.6) if refine else monitor
+    result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=share)
+    cut = resample_height(result.height, scene.inside.shape) if known.height is None else window.cut(known.height, 0.0)
+    light, evaluations = result.light, result.total_evaluations
+    if refine:
+        limits = replace(options.solver, lbfgs=replace(options.solver.lbfgs, iterations=options.refinements))
+        finer = solve(scene.problem(1.0, 1 / factor), limits, known_light=light, start=(cut, light), monitor=monitor.part(0.6, 1))
+        cut, evaluations = finer.height, evaluations + finer.total_evaluations
     if known.height is None and known.depth is None:
-        cut = cut - cut[inside].mean()
-    return Recovered(
-        window.put(cut, mask.shape), result.light, result.terms, result.iterations, result.total_evaluations,
-        result.reason, result.converged, shape,
-    )  # fmt: skip
+        cut = cut - cut[scene.inside].mean()
+    height = window.put(cut, mask.shape)
+    return Recovered(height, light, result.terms, result.iterations, evaluations, result.reason, result.converged, problem.valid.shape)
 
 
 def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[_Window, float]:
@@ -125,35 +133,61 @@ def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[_Window, float]:
     return _Window(int(rows[0]) - margin, int(columns[0]) - margin, height + 2 * margin, width + 2 * margin), factor
 
 
-def _contour_mask(mask: np.ndarray, window: _Window) -> np.ndarray:
-    """The mask in the window, going on beyond the photo where the photo's frame cuts the object: there is no contour there."""
-    grown = np.pad(mask, [(max(-window.top, 0), max(window.top + window.height - mask.shape[0], 0)),
-                          (max(-window.left, 0), max(window.left + window.width - mask.shape[1], 0))], mode="edge")  # fmt: skip
+def _outline(mask: np.ndarray, window: _Window) -> np.ndarray:
+    """The object in the window, going on beyond the photo where the photo's frame cuts it."""
+    below, beyond = window.top + window.height - mask.shape[0], window.left + window.width - mask.shape[1]
+    grown = continued(mask, max(-window.top, 0), max(below, 0), max(-window.left, 0), max(beyond, 0))
     top, left = max(window.top, 0), max(window.left, 0)
     return grown[top : top + window.height, left : left + window.width]
 
 
-def _problem(
-    image: np.ndarray, inside: np.ndarray, contour_mask: np.ndarray, factor: float, floor: float, priors: Priors, weights: Weights,
-    options: RecoverOptions, known: Known, window: _Window,
-) -> Problem:  # fmt: skip
-    valid, contour_inside, depth = inside, contour_mask, known.depth
-    if depth is not None:
-        depth = DepthObservation(window.cut(depth.height, np.nan), depth.sigma, depth.weight)
-    if factor != 1:
-        image, share = resample_inside(image, inside, factor)
-        valid = share >= 0.5
-        contour_inside = resample_inside(contour_mask.astype(float), np.ones_like(inside), factor)[0] >= 0.5
+@dataclass(frozen=True)
+class _Scene:
+    """What a problem is made of, in the window and at the image's scale."""
+
+    image: np.ndarray
+    inside: np.ndarray
+    outline: np.ndarray
+    photo: np.ndarray
+    floor: float
+    priors: Priors
+    weights: Weights
+    options: RecoverOptions
+    known: Known
+    window: _Window
+
+    def problem(self, factor: float, curvature_unit: float = 1.0) -> Problem:
+        """The problem at `factor` times the image's scale."""
+        image, valid, outline, photo, depth = self.image, self.inside, self.outline, self.photo, self.known.depth
         if depth is not None:
-            seen, seen_share = resample_inside(np.nan_to_num(depth.height), np.isfinite(depth.height), factor)
-            depth = DepthObservation(np.where(seen_share >= 0.5, seen * factor, np.nan), depth.sigma * factor, depth.weight)
-    log_image = np.where(valid[..., None], np.log(np.maximum(image, floor)), 0.0)
-    contour = occluding_contour(contour_inside)
-    field = None if priors.silhouette is None else silhouette_field(contour_inside, priors.silhouette)
-    return Problem(log_image, valid, contour_inside, contour, priors, weights, depth, options.shading_only, silhouette=field)
+            depth = DepthObservation(self.window.cut(depth.height, np.nan), depth.sigma, depth.weight)
+        if factor != 1:
+            image, share = resample_inside(image, self.inside, factor)
+            valid = share >= 0.5 * share.max()  # an object thinner than a pixel fills none by half
+            outline, photo = (resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5 for m in (outline, photo))
+            depth = None if depth is None else _scaled_depth(depth, factor)
+        log_image = np.where(valid[..., None], np.log(np.maximum(image, self.floor)), 0.0)
+        profile = self.priors.silhouette
+        return Problem(
+            log_image, valid, outline, _seen(occluding_contour(outline), photo), self.priors, self.weights, depth,
+            self.options.shading_only, curvature_unit, None if profile is None else silhouette_field(outline, profile),
+        )  # fmt: skip
+
+
+def _seen(contour: Contour, photo: np.ndarray) -> Contour:
+    """The contour points that lie in the photo: where an object was continued beyond it, its sides are made up."""
+    keep = photo[contour.rows, contour.columns]
+    return Contour(contour.rows[keep], contour.columns[keep], contour.down[keep], contour.right[keep])
+
+
+def _scaled_depth(depth: DepthObservation, factor: float) -> DepthObservation:
+    seen, share = resample_inside(np.nan_to_num(depth.height), np.isfinite(depth.height), factor)
+    scale = height_scale(depth.height.shape, seen.shape)
+    return DepthObservation(np.where(share >= 0.5, seen * scale, np.nan), depth.sigma * scale, depth.weight)
 
 
 def _to_solve(height: np.ndarray, inside: np.ndarray, factor: float) -> np.ndarray:
     if factor == 1:
         return np.array(height, float)
-    return resample_inside(height, np.ones_like(inside), factor)[0] * factor
+    coarse = resample_inside(height, np.ones_like(inside), factor)[0]
+    return coarse * height_scale(inside.shape, coarse.shape)

@@ -36,7 +36,7 @@ def painted_ball(seed: int, size: int = 40) -> TrainingObject:
     height = np.where(inside, np.sqrt(np.maximum((size / 2) ** 2 - i**2 - j**2, 0)), np.nan)
     paint = np.where((i > j)[..., None], rng.uniform(0.1, 0.9, 3), rng.uniform(0.1, 0.9, 3))
     reflectance = np.clip(paint * np.exp(0.02 * rng.normal(size=(size, size, 1))), 0, 1) * inside[..., None]
-    return TrainingObject(f"ball{seed}", reflectance, inside, height, rng.normal(size=(9, 3)), rng.normal(size=(9, 3)))
+    return TrainingObject(f"ball{seed}", reflectance, inside, height, rng.normal(size=(9, 3)), rng.normal(size=(9, 3)), inside)
 
 
 @pytest.fixture(scope="module")
@@ -367,7 +367,7 @@ class TestFit:
 
     def test_an_empty_object_is_a_clear_error(self) -> None:
         ball = painted_ball(0)
-        empty = TrainingObject("ball", ball.reflectance * 0, ball.valid, ball.height, ball.natural_light, ball.laboratory_light)
+        empty = TrainingObject("ball", ball.reflectance * 0, ball.valid, ball.height, ball.natural_light, ball.laboratory_light, ball.mask)
         with pytest.raises(InputError, match="'ball'"):
             object_statistics(empty)
 

@@ -15,6 +15,7 @@ from isc_core.sirfs.fitting.lights import Contrast, GaussianLight
 from isc_core.sirfs.fitting.prior_set import FitRecord, Lights, PriorSet
 from isc_core.sirfs.fitting.scale_mixture import ScaleMixture
 from isc_core.sirfs.prior_file import load_prior_set, save_prior_set, shipped_prior_set
+from isc_core.sirfs.priors import SilhouetteProfile
 
 
 @pytest.fixture
@@ -37,6 +38,7 @@ def prior_set() -> PriorSet:
         parsimony_whiten=covariance(3),
         absolute=CoarseTable.of(rng.normal(size=(5, 5, 5)), 10),
         grey_absolute=CoarseTable.of(rng.normal(size=8), 16, np.float32),
+        silhouette=SilhouetteProfile(np.linspace(0.6, 0, 7), np.full(7, 0.4)),
         lights=Lights(light(27), light(27)),
         record=FitRecord(("apple", "cup1"), Contrast(2.5, 1 / 3), {"iterations": "200"}),
     )

@@ -17,6 +17,7 @@ from .absolute_color import COLOR_NODES, GREY_NODES, TableFitOptions, fit_absolu
 from .absolute_table import splat
 from .color_mixture import ColorCells, fit_color_mixture
 from .lights import Contrast, fit_contrast, fit_light, mirrored, permuted, scaled
+from .outline import fit_silhouette
 from .prior_set import FitRecord, Lights, PriorSet
 from .scale_mixture import Magnitudes, fit_scale_mixture
 from .statistics import ObjectStatistics
@@ -84,9 +85,10 @@ def fit_priors(
     whiten = fit_whitening(objects, options.whiten_floor)
     grey_absolute = fit_absolute_table(grey_histogram(objects), options.grey_absolute, _steps("absolute grey", monitor.part(0.25, 0.3)))
     absolute = fit_absolute_table(color_histogram(objects, whiten), options.absolute, _steps("absolute colour", monitor.part(0.3, 1.0)))
+    silhouette = fit_silhouette([o.outline for o in objects])
     record = FitRecord(names, contrast, _as_text(options))
     monitor.report("priors fitted", 1.0)
-    return PriorSet(curvature, grey_smoothness, color_smoothness, whiten, absolute, grey_absolute, lights, record)
+    return PriorSet(curvature, grey_smoothness, color_smoothness, whiten, absolute, grey_absolute, silhouette, lights, record)
 
 
 def _steps(stage: str, monitor: Monitor) -> Callable[[float], None]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError
-from ..priors import Priors
+from ..priors import Priors, SilhouetteProfile
 from .absolute_table import CoarseTable
 from .color_mixture import ColorScaleMixture
 from .lights import Contrast, GaussianLight
@@ -44,6 +44,7 @@ class PriorSet:
     parsimony_whiten: np.ndarray
     absolute: CoarseTable
     grey_absolute: CoarseTable
+    silhouette: SilhouetteProfile
     lights: Lights
     record: FitRecord
 
@@ -63,6 +64,7 @@ class PriorSet:
                 parsimony_whiten=np.eye(1),
                 absolute=self.grey_absolute.table(),
                 light=light.grey().light(),
+                silhouette=self.silhouette,
             )
         return Priors(
             channels=3,
@@ -72,4 +74,5 @@ class PriorSet:
             parsimony_whiten=self.parsimony_whiten,
             absolute=self.absolute.table(),
             light=light.light(),
+            silhouette=self.silhouette,
         )

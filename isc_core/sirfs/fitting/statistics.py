@@ -9,6 +9,7 @@ from ...errors import InputError
 from ...progress import Monitor
 from ..surface import geometry
 from .color_mixture import ColorCells
+from .outline import OutlineMoments
 from .pairs import pair_differences
 from .scale_mixture import Magnitudes
 
@@ -18,7 +19,8 @@ class TrainingObject:
     """An object whose intrinsic characteristics are known.
 
     `reflectance`: (H, W, 3) linear. `valid`: (H, W) bool, where the reflectance can be trusted. `height`: (H, W) pixels, toward the
-    viewer, NaN where unknown. `natural_light`, `laboratory_light`: (9, 3), in the reference's convention (`sirfs.priors`).
+    viewer, NaN where unknown. `mask`: (H, W) bool, the object.
+    `natural_light`, `laboratory_light`: (9, 3), in the reference's convention (`sirfs.priors`).
     """
 
     name: str
@@ -27,6 +29,7 @@ class TrainingObject:
     height: np.ndarray
     natural_light: np.ndarray
     laboratory_light: np.ndarray
+    mask: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,8 @@ class ObjectStatistics:
     """One object's share in every prior.
 
     `curvature`, `grey_smoothness`, `color_smoothness`: differences over neighbouring pixels. `log_reflectance` (n, 3) float32 and
-    `grey_log_reflectance` (n, 1): all valid pixels; grey is the mean of the channels. The lights are (9, 3).
+    `grey_log_reflectance` (n, 1): all valid pixels; grey is the mean of the channels. `outline`:
+    leaning behind the silhouette. The lights are (9, 3).
     """
 
     curvature: Magnitudes
@@ -42,6 +46,7 @@ class ObjectStatistics:
     color_smoothness: ColorCells
     log_reflectance: np.ndarray
     grey_log_reflectance: np.ndarray
+    outline: OutlineMoments
     natural_light: np.ndarray
     laboratory_light: np.ndarray
 
@@ -67,6 +72,7 @@ def object_statistics(training: TrainingObject) -> ObjectStatistics:
         color_smoothness=ColorCells.of(steps),
         log_reflectance=log_reflectance[valid].astype(np.float32),
         grey_log_reflectance=log_grey[valid].astype(np.float32)[:, None],
+        outline=OutlineMoments.of(np.asarray(training.height, float), training.mask),
         natural_light=training.natural_light,
         laboratory_light=training.laboratory_light,
     )

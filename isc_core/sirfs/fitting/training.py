@@ -19,5 +19,7 @@ def read_training_objects(root: Path, names: Sequence[str] | None = None, monito
     for count, name in enumerate(chosen):
         monitor.report(f"reading {name}", count / len(chosen))
         laboratory, natural = (load_object(root, name, light, "diffuse") for light in ("laboratory", "natural"))
-        objects[name] = TrainingObject(name, laboratory.reflectance, laboratory.valid, laboratory.height, natural.light, laboratory.light)
+        objects[name] = TrainingObject(
+            name, laboratory.reflectance, laboratory.valid, laboratory.height, natural.light, laboratory.light, laboratory.mask
+        )
     return objects

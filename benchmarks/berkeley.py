@@ -1,0 +1,68 @@
+"""What the benchmarks on MIT-Berkeley share: where the data is, a SIRFS problem in the reference's protocol, its scores."""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.datasets import MitBerkeleyObject, load_object
+from isc_core.metrics import Scores, score
+from isc_core.sirfs.contour import occluding_contour
+from isc_core.sirfs.frames import light_from_reference, normal_from_reference, real_sh
+from isc_core.sirfs.priors import Priors
+from isc_core.sirfs.problem import Problem
+from isc_core.sirfs.settings import Weights
+from isc_core.sirfs.silhouette import silhouette_field
+from isc_core.sirfs.solver import SirfsResult
+from isc_core.sirfs.stencils import normals
+
+LIGHTS = ("natural", "laboratory")
+
+
+def parser(text: str | None) -> argparse.ArgumentParser:
+    """The options that every benchmark has."""
+    options = argparse.ArgumentParser(description=text)
+    options.add_argument("--shared", type=Path, default=Path("../shared"), help="folder with data/ and anchors/")
+    options.add_argument("--json", type=Path, help="write the figures here")
+    return options
+
+
+def training_object(shared: Path, name: str, illumination: str) -> MitBerkeleyObject:
+    """One training object with its diffuse image."""
+    return load_object(shared / "data" / "mit_berkeley_train", name, illumination, "diffuse")
+
+
+def reference_results(shared: Path, illumination: str) -> dict[str, dict[str, float]]:
+    """The reference program's measured results by object, diffuse input."""
+    results: dict[str, dict[str, float]] = json.loads((shared / "anchors" / "sirfs_reference.json").read_text())["results"][
+        f"{illumination}/diffuse"
+    ]
+    return results
+
+
+def problem(truth: MitBerkeleyObject, priors: Priors, weights: Weights) -> Problem:
+    """The problem as the reference program poses it: the data set's crop, contour points near its edge dropped."""
+    log_image = np.where(truth.valid[..., None], np.log(np.where(truth.image > 0, truth.image, 1)), 0.0)
+    field = None if priors.silhouette is None else silhouette_field(truth.mask, priors.silhouette)
+    contour = occluding_contour(truth.mask, drop_near_edge=True)
+    return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field)
+
+
+def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:
+    """The six errors of a solve."""
+    normal = normal_from_reference(normals(result.height))
+    light = light_from_reference(result.light)
+    shading = np.exp(real_sh(normal) @ light)
+    return score(truth, height=result.height, normal=normal, shading=shading, reflectance=truth.image / shading, light=light)
+
+
+def geometric_mean(values: list[float]) -> float:
+    """The geometric mean."""
+    return float(np.exp(np.mean(np.log(values))))
+
+
+def write_json(path: Path | None, figures: object) -> None:
+    """Writes the figures if a path was given."""
+    if path is not None:
+        path.write_text(json.dumps(figures, indent=1) + "\n")

@@ -1,0 +1,60 @@
+"""Our solver with the reference's priors against the reference program: losses, scores, time.
+
+  python -m benchmarks.solver_reference [--float64] [--engine numpy]
+"""
+
+import time
+
+from isc_core.datasets import list_objects
+from isc_core.sirfs.settings import published_weights
+from isc_core.sirfs.solver import SolverOptions, solve
+
+from .berkeley import LIGHTS, geometric_mean, parser, problem, reference_results, scores, training_object, write_json
+from .reference_priors import reference_priors
+
+
+def main() -> None:
+    """Runs the ten training objects under both lights and prints a table."""
+    options = parser(__doc__)
+    options.add_argument("--float64", action="store_true", help="double precision instead of the production setting")
+    options.add_argument("--engine", default="auto")
+    options.add_argument("--threads", type=int, default=0)
+    options.add_argument("--objects", help="comma-separated; all training objects without it")
+    given = options.parse_args()
+    solver = SolverOptions(engine=given.engine, single=not given.float64, threads=given.threads)
+    figures: dict[str, object] = {}
+    for light in LIGHTS:
+        priors = reference_priors(given.shared / "anchors" / "sirfs_reference_priors.npz", light)
+        theirs = reference_results(given.shared, light)
+        names = given.objects.split(",") if given.objects else list_objects(given.shared / "data" / "mit_berkeley_train", light)
+        averages, seconds, reference = [], [], []
+        solve(problem(training_object(given.shared, names[0], light), priors, published_weights(light, 3)), solver)  # compiles
+        for name in names:
+            truth = training_object(given.shared, name, light)
+            start = time.perf_counter()
+            result = solve(problem(truth, priors, published_weights(light, 3)), solver)
+            took = time.perf_counter() - start
+            average = scores(truth, result).average
+            averages.append(average)
+            seconds.append(took)
+            reference.append(theirs[name]["avg"])
+            ratio = result.terms.total / theirs[name]["final_loss"]
+            per = 1e3 * took / result.total_evaluations
+            print(
+                f"{light:10s} {name:9s} loss {result.terms.total:8.4f}  / reference {ratio:.5f}"
+                f"  avg {average:.5f} ({theirs[name]['avg']:.5f})"
+                f"  {result.total_evaluations:4d} evaluations of {per:.2f} ms  {took:.2f} s  {result.reason}",
+                flush=True,
+            )
+            figures[f"{light}/{name}"] = {
+                "loss": result.terms.total, "ratio": ratio, "avg": average, "evaluations": result.total_evaluations, "seconds": took,
+            }  # fmt: skip
+        print(
+            f"{light:10s} geometric means: avg {geometric_mean(averages):.5f} ({geometric_mean(reference):.5f}), "
+            f"time {geometric_mean(seconds):.2f} s"
+        )
+    write_json(given.json, figures)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,40 @@
+"""An object at the photo's frame: cut by it, or trimmed to it?
+
+Where the frame cuts the object its outline is no occluding contour; where a photo was merely trimmed to the object it is. A run of the
+mask along the frame is a cut if the mask is hardly wider a few pixels further in (`CUT_RATIO`); a rounded outline that touches the frame
+widens quickly. Limits: a box-shaped object trimmed exactly along its sides counts as cut.
+"""
+
+import numpy as np
+from scipy import ndimage
+
+DEPTH = 5
+CUT_RATIO = 0.75
+
+
+def cut_line(mask: np.ndarray) -> np.ndarray:
+    """Of the first row of `mask` (H, W) bool, the pixels where the frame cuts the object; (W,) bool."""
+    line, inner = mask[0], mask[min(DEPTH, mask.shape[0] - 1)]
+    runs, count = ndimage.label(line)
+    inner_runs, _ = ndimage.label(inner)
+    cut = np.zeros_like(line)
+    for run in range(1, count + 1):
+        here = runs == run
+        touched = np.unique(inner_runs[here & inner])
+        width = int(np.isin(inner_runs, touched).sum()) if len(touched) else 0
+        if here.sum() >= CUT_RATIO * width > 0:
+            cut |= here
+    return cut
+
+
+def continued(mask: np.ndarray, top: int, bottom: int, left: int, right: int) -> np.ndarray:
+    """`mask` with so many rows and columns added; the object goes on into them where the frame cuts it, else they are empty."""
+    upper, lower, first, last = (cut_line(m) for m in (mask, mask[::-1], mask.T, mask.T[::-1]))
+    out = np.pad(mask, [(top, bottom), (left, right)])
+    rows, columns = slice(top, top + mask.shape[0]), slice(left, left + mask.shape[1])
+    out[:top, columns], out[top + mask.shape[0] :, columns] = upper, lower
+    out[rows, :left], out[rows, left + mask.shape[1] :] = first[:, None], last[:, None]
+    out[:top, :left], out[:top, left + mask.shape[1] :] = upper[0] & first[0], upper[-1] & last[0]
+    out[top + mask.shape[0] :, :left] = lower[0] & first[-1]
+    out[top + mask.shape[0] :, left + mask.shape[1] :] = lower[-1] & last[-1]
+    return out

@@ -1,0 +1,207 @@
+"""Recovery from a photo: blind to the photo's frame and scale, at home with cut objects, grey photos and what is known beforehand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isc_core.errors import Cancelled
+from isc_core.progress import Monitor
+from isc_core.sirfs.lbfgs import LbfgsOptions
+from isc_core.sirfs.problem import DepthObservation
+from isc_core.sirfs.recover import Known, Recovered, RecoverOptions, recover
+from isc_core.sirfs.solver import SolverOptions
+from isc_core.sirfs.stencils import normals
+
+from .small_problems import Scene, blob, made_priors, weights
+
+FLOOR = 1 / 131070
+SOME = LbfgsOptions(iterations=60)
+SOLVER = SolverOptions(threads=1, lbfgs=SOME, coarse_lbfgs=SOME)
+OPTIONS = RecoverOptions(solver=SOLVER)
+
+
+def run(scene: Scene, options: RecoverOptions = OPTIONS, known: Known | None = None) -> Recovered:
+    return recover(scene.image, scene.mask, FLOOR, made_priors(scene.image.shape[2]), weights(), options, known=known)
+
+
+def cropped(scene: Scene, part: tuple[slice, slice]) -> Scene:
+    return Scene(scene.image[part], scene.mask[part], scene.height[part], scene.light)
+
+
+def padded(scene: Scene, rows: tuple[int, int], columns: tuple[int, int]) -> Scene:
+    image = np.pad(scene.image, (rows, columns, (0, 0)))
+    return Scene(image, np.pad(scene.mask, (rows, columns)), np.pad(scene.height, (rows, columns)), scene.light)
+
+
+def box(mask: np.ndarray, margin: int) -> tuple[slice, slice]:
+    rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
+    return slice(rows[0] - margin, rows[-1] + 1 + margin), slice(columns[0] - margin, columns[-1] + 1 + margin)
+
+
+def angles(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> np.ndarray:
+    return np.degrees(np.arccos(np.clip((normals(a) * normals(b)).sum(-1), -1, 1)))[where]
+
+
+def inner(mask: np.ndarray, steps: int = 2) -> np.ndarray:
+    for _ in range(steps):
+        m = np.pad(mask, 1)
+        mask = mask & m[:-2, 1:-1] & m[2:, 1:-1] & m[1:-1, :-2] & m[1:-1, 2:]
+    return mask
+
+
+@pytest.mark.parametrize("channels", [3, 1])
+def test_recovers_shape_and_light(channels: int) -> None:
+    scene = blob(channels=channels)
+    result = run(scene)
+    assert result.height.shape == scene.mask.shape and result.light.shape == (9, channels)
+    assert np.isfinite(result.height).all() and np.isfinite(result.light).all()
+    assert abs(result.height[scene.mask].mean()) < 1e-9
+    where = inner(scene.mask)
+    assert angles(result.height, scene.height, where).mean() < 0.7 * angles(0 * scene.height, scene.height, where).mean()
+
+
+@pytest.mark.parametrize("solve_size", [0, 40])
+def test_empty_space_around_changes_nothing(solve_size: int) -> None:
+    scene = blob()
+    options = replace(OPTIONS, solve_size=solve_size)
+    plain = run(scene, options)
+    wide = padded(scene, (3, 64), (31, 0))
+    around = run(wide, options)
+    part = (slice(3, 3 + 64), slice(31, 31 + 72))
+    np.testing.assert_array_equal(around.light, plain.light)
+    np.testing.assert_array_equal(around.height[part][scene.mask], plain.height[scene.mask])
+    assert repr(around.terms) == repr(plain.terms)
+    assert around.solved_shape == plain.solved_shape
+
+
+def test_a_closer_crop_changes_nothing() -> None:
+    scene = blob()
+    part = box(scene.mask, 1)
+    close = run(cropped(scene, part))
+    np.testing.assert_array_equal(close.height[scene.mask[part]], run(scene).height[scene.mask])
+
+
+def test_a_crop_to_the_last_pixel_changes_little() -> None:
+    """Where the object touches the frame it might go on, so there the contour is left out: that much is lost, no more."""
+    scene = blob()
+    part = box(scene.mask, 0)
+    tight, plain = run(cropped(scene, part)), run(scene)
+    assert np.median(angles(tight.height, plain.height[part], inner(scene.mask[part]))) < 12
+
+
+def test_a_cut_object_works_and_bends_over_nowhere_along_the_cut() -> None:
+    scene = blob()
+    cut = cropped(scene, (slice(0, 64), slice(0, 36)))
+    assert cut.mask[:, -1].sum() > 30
+    result = run(cut)
+    assert np.isfinite(result.height).all()
+    where = inner(cut.mask, 1)
+    error = angles(result.height, cut.height, where)
+    assert error.mean() < 0.8 * angles(0 * cut.height, cut.height, where).mean()
+    along = np.zeros_like(cut.mask)
+    along[20:44, -4:-1] = True
+    assert angles(result.height, cut.height, along & cut.mask).mean() < 20
+
+
+@pytest.mark.parametrize("factor", [2, 3])
+def test_a_larger_photo_gives_the_same_shape_larger(factor: int) -> None:
+    scene = blob()
+    image, mask, height = (
+        np.kron(a, np.ones((factor, factor, 1)[: a.ndim])).astype(a.dtype) for a in (scene.image, scene.mask, scene.height)
+    )
+    large = Scene(image, mask, height, scene.light)
+    side = max(part.stop - part.start for part in box(scene.mask, 0))
+    options = replace(OPTIONS, solve_size=side)
+    small, big = run(scene, options), run(large, options)
+    assert big.solved_shape == small.solved_shape
+    np.testing.assert_allclose(big.light, small.light, atol=1e-4)
+    assert big.height.shape == large.mask.shape
+    coarse = big.height.reshape(64, factor, 72, factor).mean(axis=(1, 3)) / factor
+    away = (coarse - small.height)[inner(scene.mask)]
+    assert np.abs(away - away.mean()).max() < 0.02 * np.ptp(small.height[scene.mask])
+
+
+def test_solving_at_another_size_keeps_the_shape() -> None:
+    scene = blob((96, 104))
+    plain, small = run(scene), run(scene, replace(OPTIONS, solve_size=50))
+    assert max(small.solved_shape) < max(plain.solved_shape)
+    where = inner(scene.mask, 3)
+    assert np.ptp(small.height[scene.mask]) == pytest.approx(np.ptp(plain.height[scene.mask]), rel=0.25)
+    assert np.median(angles(small.height, plain.height, where)) < 12
+
+
+@pytest.mark.parametrize("solve_size", [0, 41])
+def test_what_is_known_comes_back_as_it_was_given(solve_size: int) -> None:
+    scene = blob()
+    options = replace(OPTIONS, solve_size=solve_size)
+    shaped = run(scene, options, Known(height=scene.height + 11))
+    np.testing.assert_array_equal(shaped.height[scene.mask], (scene.height + 11)[scene.mask])
+    lit = run(scene, options, Known(light=scene.light))
+    np.testing.assert_array_equal(lit.light, scene.light)
+    both = run(scene, options, Known(height=scene.height, light=scene.light))
+    np.testing.assert_array_equal(both.height[scene.mask], scene.height[scene.mask])
+
+
+@pytest.mark.parametrize("offset", [0.0, 800.0])
+@pytest.mark.parametrize("solve_size", [0, 41])
+def test_depth_with_holes_pulls_the_height(solve_size: int, offset: float) -> None:
+    scene = blob()
+    target = scene.height + 5 * np.sin(np.arange(72) / 12)
+    seen = np.where(np.random.default_rng(0).random(scene.mask.shape) < 0.3, np.nan, target + offset)
+    seen[~scene.mask] = np.nan
+    options = replace(OPTIONS, solve_size=solve_size, solver=replace(SOLVER, lbfgs=LbfgsOptions(iterations=200)))
+    plain = run(scene, options)
+    pulled = run(scene, options, Known(depth=DepthObservation(seen, sigma=1.0, weight=300.0)))
+    assert np.isfinite(pulled.height).all()
+    away = [(r.height - target)[scene.mask] for r in (plain, pulled)]
+    errors = [np.abs(a - np.median(a)).mean() for a in away]
+    assert errors[1] < 0.3 * errors[0]
+    assert np.median(away[1]) == pytest.approx(offset, abs=1.0)
+
+
+def test_zero_channels_are_floored_and_stay_valid() -> None:
+    scene = blob()
+    image = scene.image.copy()
+    image[30:33, 30:33, 2] = 0
+    result = run(replace(scene, image=image))
+    assert np.isfinite(result.height).all() and np.isfinite(result.terms.total)
+
+
+@pytest.mark.parametrize("solve_size", [0, 20, 64])
+def test_a_line_one_pixel_wide(solve_size: int) -> None:
+    mask = np.zeros((120, 9), bool)
+    mask[5:115, 4] = True
+    image = np.where(mask[..., None], np.linspace(0.2, 0.6, 120)[:, None, None], 0) * np.ones(3)
+    result = run(Scene(image, mask, 0.0 * mask, blob().light), replace(OPTIONS, solve_size=solve_size))
+    assert np.isfinite(result.height).all() and np.isfinite(result.terms.total)
+
+
+def test_shape_from_shading_mode() -> None:
+    scene = blob(one_color=True)
+    result = run(scene, replace(OPTIONS, shading_only=True), Known(light=scene.light))
+    assert result.terms.shading_only > 0 and result.terms.smoothness == 0
+    where = inner(scene.mask)
+    assert angles(result.height, scene.height, where).mean() < 0.6 * angles(0 * scene.height, scene.height, where).mean()
+
+
+def test_refinement_starts_from_the_smaller_problem_and_keeps_its_light() -> None:
+    scene = blob((110, 118), bumps=0.6)
+    small, light = replace(OPTIONS, solve_size=45), Known(light=scene.light)
+    seen: list[float] = []
+    coarse = run(scene, small, light)
+    fine = recover(
+        scene.image, scene.mask, FLOOR, made_priors(), weights(), replace(small, refinements=40), known=light,
+        monitor=Monitor(lambda _, fraction: seen.append(fraction)),
+    )  # fmt: skip
+    where = inner(scene.mask, 3)
+    assert 0.1 < np.median(angles(fine.height, coarse.height, where)) < 10
+    np.testing.assert_array_equal(fine.light, coarse.light)
+    assert fine.evaluations > coarse.evaluations
+    assert seen == sorted(seen) and seen[-1] <= 1
+
+
+def test_cancel() -> None:
+    scene = blob()
+    with pytest.raises(Cancelled):
+        recover(scene.image, scene.mask, FLOOR, made_priors(), weights(), OPTIONS, monitor=Monitor(cancelled=lambda: True))
