@@ -1,4 +1,4 @@
-"""How each model is run on the MIT-Berkeley set: at the images' own scale, on the data set's crop, with the published weights.
+"""How each model is run on the MIT-Berkeley set: at the images' own scale, on the data set's crop, with the project's weights.
 
 The protocol of J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712: the image is explained where all its channels are above
 zero, and the occluding contour is that of the object's mask, without the points near the crop's frame.
@@ -20,7 +20,8 @@ from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
 from .sirfs.kernel_cache import announce_compilation
 from .sirfs.priors import Priors
 from .sirfs.problem import Problem
-from .sirfs.settings import published_weights
+from .sirfs.settings import isc_weights
+from .sirfs.silhouette import silhouette_field
 from .sirfs.solver import SirfsResult, SolverOptions, solve
 from .sirfs.stencils import normals
 
@@ -63,7 +64,9 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
 def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, options: RunnerOptions, monitor: Monitor) -> SirfsResult:
     """SIRFS on one object of the set; `log_image` (H, W, 3) is read where `truth.valid`. Looks at nothing else but `truth.mask`."""
     contour = occluding_contour(truth.mask, drop_near_edge=True)
-    problem = Problem(log_image, truth.valid, truth.mask, contour, priors, published_weights(truth.illumination, 3))
+    field = None if priors.silhouette is None else silhouette_field(truth.mask, priors.silhouette)
+    weights = isc_weights(truth.illumination, 3)
+    problem = Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field)
     return solve(problem, SolverOptions(engine=options.engine, threads=options.threads), monitor=monitor)
 
 

@@ -28,7 +28,7 @@ from .sirfs.prior_file import shipped_prior_set
 from .sirfs.problem import DepthObservation, Terms
 from .sirfs.recover import Known, Recovered, RecoverOptions, recover
 from .sirfs.resampling import resample_height
-from .sirfs.settings import published_weights
+from .sirfs.settings import isc_weights
 from .sirfs.solver import SolverOptions
 from .sirfs.stencils import normals
 
@@ -186,7 +186,7 @@ def _recover(
     options = RecoverOptions(
         solve_size=0, shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads)
     )
-    weights = published_weights(settings.illumination, channels)
+    weights = isc_weights(settings.illumination, channels)
     grey_light = None if known.light is None else known.light[:, :channels]
     result = recover(
         diffuse[..., :channels], photo.mask, floor, priors, weights, options,

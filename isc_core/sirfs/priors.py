@@ -4,7 +4,7 @@ All are in the convention of the SIRFS reference (Barron & Malik 2015, doi:10.11
 9 coefficients a channel, stacked channel by channel, for normals in a (down, right, toward the viewer) frame.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -65,3 +65,7 @@ class Priors:
     absolute: AbsoluteTable
     light: Light
     silhouette: SilhouetteProfile | None = None
+
+    def without_silhouette(self) -> "Priors":
+        """The same without the silhouette term, as SIRFS was published."""
+        return replace(self, silhouette=None)

@@ -7,7 +7,7 @@ absolute colour, pixels (pairs of pixels) alike in those of smoothness. No rando
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
@@ -58,6 +58,15 @@ class FitOptions:
     absolute: TableFitOptions = field(default_factory=TableFitOptions)
     grey_absolute: TableFitOptions = field(default_factory=lambda: TableFitOptions(smoothness=24.0, tolerance=1e-7, max_steps=3000))
     light: LightFitOptions = field(default_factory=LightFitOptions)
+
+
+    def with_fitted_contrast(self) -> "FitOptions":
+        """The same with the contrast of the natural lights fitted to the objects' own lights."""
+        return replace(self, light=replace(self.light, natural_contrast=None))
+
+
+# As published: the lights as they are, no ridge, the table's constant 512 (Barron & Malik 2015). The defaults are ours.
+RECIPE = FitOptions(light=LightFitOptions(natural_contrast=Contrast(), laboratory_ridge=(0.0, 0.0)), absolute=TableFitOptions(512.0))
 
 
 def fit_priors(

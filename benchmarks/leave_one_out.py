@@ -1,0 +1,112 @@
+"""How good are the priors on objects they have not seen? Each training object is solved with priors and lights fitted to the other nine.
+
+  python -m benchmarks.leave_one_out --json loo.json        baseline B (the published recipe and weights) and ours, both lights
+  python -m benchmarks.leave_one_out --in-sample            the same with priors fitted to all ten
+
+Both lights of the object are left out, so its shape, paint and lights are unknown to the priors. The statistics of the ten objects are
+condensed once; a fold is a fit to nine of them. The comparison is paired: the ratio of geometric means with a 95 % bootstrap interval
+over objects, and once more over families of like objects (cups, frogs, papers and teabags have one member each among these ten).
+"""
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.datasets import load_natural_lights
+from isc_core.evaluate import paired_bootstrap
+from isc_core.sirfs.fitting.fit import RECIPE, FitOptions, fit_priors
+from isc_core.sirfs.fitting.prior_set import PriorSet
+from isc_core.sirfs.fitting.statistics import ObjectStatistics, collect_statistics
+from isc_core.sirfs.fitting.training import read_training_objects
+from isc_core.sirfs.settings import isc_weights, published_weights
+from isc_core.sirfs.solver import SolverOptions, solve
+
+from .berkeley import LIGHTS, geometric_mean, parser, problem, scores, training_object, write_json
+
+METHODS = ("B", "B, lights scaled", "ours")
+METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One solve: a method's priors without `name` (or with it) on `name` under `light`."""
+
+    method: str
+    name: str
+    light: str
+    priors: PriorSet
+    shared: Path
+
+
+def fit_options(method: str) -> FitOptions:
+    """How a method's priors are fitted. "B, lights scaled": the recipe with the natural lights' contrast fitted to the objects'."""
+    return {"B": RECIPE, "B, lights scaled": RECIPE.with_fitted_contrast(), "ours": FitOptions()}[method]
+
+
+def run(task: Task) -> tuple[str, str, str, list[float], float]:
+    """Six errors and the loss."""
+    weights = isc_weights(task.light, 3) if task.method == "ours" else published_weights(task.light, 3)
+    truth = training_object(task.shared, task.name, task.light)
+    priors = task.priors.priors(task.light, 3)
+    if task.method != "ours":
+        priors = priors.without_silhouette()
+    result = solve(problem(truth, priors, weights), SolverOptions(threads=1))
+    errors = scores(truth, result)
+    return task.method, task.light, task.name, [getattr(errors, metric) for metric in METRICS], result.terms.total
+
+
+def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool) -> list[Task]:
+    """All solves; fits the folds."""
+    root = shared / "data" / "mit_berkeley_train"
+    statistics = collect_statistics(read_training_objects(root))
+    lights = load_natural_lights(root)
+    made = []
+    for method in methods:
+        whole = fit_priors(statistics, lights, fit_options(method)) if in_sample else None
+        for name in statistics:
+            fold = whole or fit_priors(_without(statistics, name), lights, fit_options(method))
+            made += [Task(method, name, light, fold, shared) for light in LIGHTS]
+    return made
+
+
+def _without(statistics: dict[str, ObjectStatistics], name: str) -> dict[str, ObjectStatistics]:
+    return {key: value for key, value in statistics.items() if key != name}
+
+
+def main() -> None:
+    """Runs and prints."""
+    options = parser(__doc__)
+    options.add_argument("--in-sample", action="store_true", help="priors fitted to all ten objects")
+    options.add_argument("--methods", default=",".join(METHODS).replace("B, lights scaled", "scaled"), help="of B, scaled, ours")
+    options.add_argument("--processes", type=int, default=2)
+    given = options.parse_args()
+    methods = tuple("B, lights scaled" if m == "scaled" else m for m in given.methods.split(","))
+    results: dict[tuple[str, str], dict[str, list[float]]] = {}
+    with ProcessPoolExecutor(given.processes) as pool:
+        for method, light, name, errors, loss in pool.map(run, tasks(given.shared, methods, given.in_sample)):
+            results.setdefault((method, light), {})[name] = errors
+            print(f"{method:18s} {light:10s} {name:9s} avg {geometric_mean(errors):.5f}  loss {loss:.3f}", flush=True)
+    report(results)
+    write_json(given.json, {f"{m}/{light}": found for (m, light), found in results.items()})
+
+
+def report(results: dict[tuple[str, str], dict[str, list[float]]]) -> None:
+    """Geometric means a method and light, and each method against B."""
+    print("\n| light | priors | Z px | N rad | S-MSE | R-MSE | RS-MSE | L-MSE | avg |\n|---|---|---|---|---|---|---|---|---|")
+    for (method, light), found in sorted(results.items(), key=lambda item: item[0][1]):
+        means = np.exp(np.mean([np.log(errors) for errors in found.values()], axis=0))
+        row = [f"{means[0]:.2f}", f"{means[1]:.4f}", *(f"{v:.5f}" for v in means[2:]), f"{geometric_mean(list(means)):.5f}"]
+        print(f"| {light} | {method} | " + " | ".join(row) + " |")
+    for light in LIGHTS:
+        for baseline in METHODS[:2]:
+            if (baseline, light) in results and ("ours", light) in results:
+                theirs, ours = results[baseline, light], results["ours", light]
+                logs = [[np.mean(np.log(found[name])) for name in sorted(ours)] for found in (ours, theirs)]
+                ratio = paired_bootstrap(logs[0], logs[1], seed=0)
+                print(f"{light}: ours / {baseline} = {ratio.ratio:.3f}, 95 % interval {ratio.low:.3f} to {ratio.high:.3f}")
+
+
+if __name__ == "__main__":
+    main()

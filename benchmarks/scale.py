@@ -1,0 +1,135 @@
+"""Does the answer depend on the photo's scale or on empty space around the object? And what does a larger photo cost?
+
+  python -m benchmarks.scale [--photos DIR] [--cost]
+
+For photos whose object is at least 512 pixels long: normals at --max-size 192, 256, 384, 512 against those at 512, compared on the
+smaller grid, and the ratio of relative heights. For all: normals with 0, 16 and 64 pixels of padding. `--cost`: time and peak memory of the
+solve at full scale from 0.1 to 4 megapixels of valid pixels.
+"""
+
+import argparse
+import resource
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.photo import Photo, read_photo
+from isc_core.pipeline import Settings, decompose
+from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.recover import RecoverOptions, recover
+from isc_core.sirfs.resampling import resample_inside
+from isc_core.sirfs.settings import isc_weights
+from isc_core.sirfs.solver import SolverOptions
+
+SIZES = (192, 256, 384, 512)
+
+
+def angle(a: np.ndarray, b: np.ndarray, mask: np.ndarray) -> float:
+    """Median angle in degrees between two normal maps inside `mask`."""
+    return float(np.degrees(np.median(np.arccos(np.clip((a * b).sum(-1)[mask], -1, 1)))))
+
+
+def magnified(photo: Photo, least: int) -> Photo:
+    """The photo, smoothly enlarged where its object is smaller than `least` pixels."""
+    long = max(photo.box[2:])
+    if long >= least:
+        return photo
+    factor = least / long + 1e-9
+    image, _ = resample_inside(photo.image, np.ones_like(photo.mask), factor)
+    mask = resample_inside(photo.mask.astype(float), np.ones_like(photo.mask), factor)[0] >= 0.5
+    return replace(photo, image=image.astype(np.float32), mask=mask, clipped=np.zeros_like(mask), scale=1.0)
+
+
+def padded(photo: Photo, by: int) -> Photo:
+    """The photo with black space around it."""
+    sides = [(by, by), (by, by)]
+    return replace(photo, image=np.pad(photo.image, [*sides, (0, 0)]), mask=np.pad(photo.mask, sides), clipped=np.pad(photo.clipped, sides))
+
+
+def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
+    """For each size: median normal change against 512 on the smaller grid, and the ratio of height ranges for their sizes."""
+    results = {size: decompose(photo, Settings(max_size=size)) for size in SIZES}
+    largest = results[SIZES[-1]]
+    figures = []
+    for size in SIZES[:-1]:
+        small = results[size]
+        factor = small.mask.shape[0] / largest.mask.shape[0]
+        normal, share = resample_inside(largest.normal.astype(float), largest.mask, factor)
+        rows, columns = (min(a, b) for a, b in zip(normal.shape, small.normal.shape, strict=False))
+        normal, share = normal[:rows, :columns], share[:rows, :columns]
+        normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+        both = small.mask[:rows, :columns] & (share > 0.99)
+        spread = [float(np.std(d.height[d.mask])) / max(read_box(d.mask)) for d in (small, largest)]
+        figures.append((size, angle(normal, small.normal[:rows, :columns].astype(float), both), spread[0] / spread[1]))
+    return figures
+
+
+def read_box(mask: np.ndarray) -> tuple[int, int]:
+    """Height and width of the mask's box."""
+    rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
+    return int(rows[-1] - rows[0] + 1), int(columns[-1] - columns[0] + 1)
+
+
+def padding_figures(photo: Photo) -> list[tuple[int, float]]:
+    """Median normal change against the photo as it is, for each padding."""
+    plain = decompose(photo)
+    figures = []
+    for by in (16, 64):
+        normal = decompose(padded(photo, by)).normal[by:-by, by:-by]
+        figures.append((by, angle(normal, plain.normal, plain.mask)))
+    return figures
+
+
+def cost_of(megapixels: float) -> None:
+    """One solve of a synthetic ball at full scale, in a process of its own; prints seconds and peak memory."""
+    radius = int(np.sqrt(megapixels * 1e6 / np.pi))
+    i, j = np.mgrid[-radius - 2 : radius + 3, -radius - 2 : radius + 3] / radius
+    mask = i**2 + j**2 < 1
+    n3 = np.sqrt(np.maximum(1 - i**2 - j**2, 0))
+    paint = np.where(((5 * i).astype(int) + (5 * j).astype(int)) % 2 == 0, 0.6, 0.3)
+    image = np.stack([paint * c * (0.2 + 0.8 * np.maximum(0.3 * -i - 0.4 * j + 0.85 * n3, 0)) for c in (1, 0.8, 0.6)], -1)
+    priors = shipped_prior_set().priors("natural", 3)
+    options = RecoverOptions(solve_size=0, solver=SolverOptions())
+    small = mask[:: max(1, radius // 60), :: max(1, radius // 60)]
+    recover(image[:: max(1, radius // 60), :: max(1, radius // 60)], small, 1e-5, priors, isc_weights("natural", 3), options)  # compiles
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    start = time.perf_counter()
+    result = recover(image, mask, 1e-5, priors, isc_weights("natural", 3), options)
+    seconds, peak = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    pixels = int(mask.sum())
+    print(
+        f"{pixels / 1e6:6.2f} megapixels: {result.evaluations:4d} evaluations of {1e3 * seconds / result.evaluations:8.2f} ms, "
+        f"{seconds:7.1f} s, "
+        f"{1e9 * seconds / result.evaluations / pixels:5.1f} ns a pixel and evaluation; peak {peak / 1024:.0f} MB, "
+        f"{(peak - before) * 1024 / pixels:.0f} bytes a pixel above what importing and a small solve take",
+        flush=True,
+    )
+
+
+def main() -> None:
+    """Prints the figures."""
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("--photos", type=Path, default=Path("../shared/data/photos"))
+    options.add_argument("--cost", action="store_true")
+    options.add_argument("--one", type=float, help=argparse.SUPPRESS)
+    given = options.parse_args()
+    if given.one:
+        cost_of(given.one)
+        return
+    if given.cost:
+        for megapixels in (0.1, 0.25, 1.0, 4.0):
+            subprocess.run([sys.executable, "-m", "benchmarks.scale", "--one", str(megapixels)], check=True)
+        return
+    for path in sorted(given.photos.glob("*.png")):
+        photo = read_photo(path)
+        sizes = "  ".join(f"{s}: {a:.2f} deg, height x{r:.3f}" for s, a, r in scale_figures(magnified(photo, 512)))
+        pads = "  ".join(f"+{by}: {a:.2f} deg" for by, a in padding_figures(photo))
+        print(f"{path.stem:12s} {sizes}   padding {pads}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
