@@ -39,15 +39,15 @@ def main() -> None:
             seconds.append(took)
             reference.append(theirs[name]["avg"])
             ratio = result.terms.total / theirs[name]["final_loss"]
-            per = 1e3 * took / result.total_evaluations
+            per = 1e3 * took / result.evaluations
             print(
                 f"{light:10s} {name:9s} loss {result.terms.total:8.4f}  / reference {ratio:.5f}"
                 f"  avg {average:.5f} ({theirs[name]['avg']:.5f})"
-                f"  {result.total_evaluations:4d} evaluations of {per:.2f} ms  {took:.2f} s  {result.reason}",
+                f"  {result.evaluations:4d} evaluations of {per:.2f} ms  {took:.2f} s  {result.reason}",
                 flush=True,
             )
             figures[f"{light}/{name}"] = {
-                "loss": result.terms.total, "ratio": ratio, "avg": average, "evaluations": result.total_evaluations, "seconds": took,
+                "loss": result.terms.total, "ratio": ratio, "avg": average, "evaluations": result.evaluations, "seconds": took,
             }  # fmt: skip
         print(
             f"{light:10s} geometric means: avg {geometric_mean(averages):.5f} ({geometric_mean(reference):.5f}), "

@@ -85,5 +85,5 @@ def _estimate(
     normal, illumination = normal_from_reference(normals(height)), light_from_reference(light)
     log_shading = real_sh(normal) @ illumination
     reflectance = np.where(truth.valid[..., None], np.exp(log_image - log_shading), 0.0)
-    loss, evaluations = (None, None) if result is None else (result.terms.total, result.total_evaluations)
+    loss, evaluations = (None, None) if result is None else (result.terms.total, result.evaluations)
     return Estimate(height, normal, np.exp(log_shading), reflectance, illumination, loss, evaluations)

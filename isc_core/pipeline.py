@@ -184,7 +184,7 @@ def _recover(
     channels = 1 if _is_grey(diffuse, photo.mask) else 3
     priors = (prior_set or shipped_prior_set()).priors(settings.illumination, channels)
     options = RecoverOptions(
-        solve_size=0, shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads)
+        shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads)
     )
     weights = isc_weights(settings.illumination, channels)
     grey_light = None if known.light is None else known.light[:, :channels]

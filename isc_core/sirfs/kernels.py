@@ -181,10 +181,10 @@ def smoothness_block(first, last, whitened, valid, spans, offsets, table, rises,
 
 
 @compiled
-def curvature_block(first, last, geometry, valid, spans, offsets, unit, table, rises, low, inverse_step, gradient, spill, total, block):
+def curvature_block(first, last, geometry, valid, spans, offsets, table, rises, low, inverse_step, gradient, spill, total, block):
     """The curvature term of the pairs whose upper pixel lies in rows [first, last); as `smoothness_block`, (H, W) and (2, W)."""
     t = geometry.dtype.type
-    soft, zero, inv, low_t, scale = t(1e-8), t(0), t(inverse_step), t(low), t(unit)
+    soft, zero, inv, low_t = t(1e-8), t(0), t(inverse_step), t(low)
     height, width = valid.shape
     last_cell = t(len(table) - 2)
     d = np.empty(width, geometry.dtype)
@@ -208,7 +208,7 @@ def curvature_block(first, last, geometry, valid, spans, offsets, unit, table, r
                 w[k] = va[k] * vb[k]
             p_row, q_row = geometry[i, 8, a:b], geometry[q, 8, a + right : b + right]
             for k in range(n):
-                d[k] = (p_row[k] - q_row[k]) * scale
+                d[k] = p_row[k] - q_row[k]
             part = zero
             for k in range(n):
                 f[k] = np.sqrt(d[k] * d[k] + soft)

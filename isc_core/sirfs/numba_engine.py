@@ -159,7 +159,7 @@ class NumbaEngine:
         p = self.problem
         table = p.priors.curvature
         kernels.curvature_block(
-            first, last, self._geometry, self._valid, self._spans, self._offsets, p.curvature_unit**2, *self._curvature_table,
+            first, last, self._geometry, self._valid, self._spans, self._offsets, *self._curvature_table,
             self._curvature_low, 1 / table.step, self._g_curvature, self._curvature_spill[k], self._curvature_cost, k,
         )  # fmt: skip
         if p.shading_only:
@@ -229,7 +229,7 @@ class NumbaEngine:
         p, w = self.problem, self.problem.weights
         n, channels = p.valid.size, p.priors.channels
         smooth = 0.0 if p.shading_only else w.smoothness * 3 / (25 * n * channels) / p.priors.smoothness.step
-        curvature = w.curvature / (25 * n) * p.curvature_unit**2 / p.priors.curvature.step
+        curvature = w.curvature / (25 * n) / p.priors.curvature.step
         return smooth, 1.0, curvature, w.slant / n
 
     def _pair_terms(self) -> dict[str, float]:

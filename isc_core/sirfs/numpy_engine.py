@@ -46,7 +46,7 @@ class NumpyEngine:
         self, height: np.ndarray, g: surface.Geometry, d1: np.ndarray, d2: np.ndarray, d3: np.ndarray
     ) -> tuple[dict[str, float], np.ndarray]:
         p, w = self.problem, self.problem.weights
-        curvature, dk = surface.curvature_cost(g.curvature, p.valid, p.priors.curvature, w.curvature, p.curvature_unit**2)
+        curvature, dk = surface.curvature_cost(g.curvature, p.valid, p.priors.curvature, w.curvature)
         slant, d_slant = surface.slant_cost(g.n3, w.slant)
         contour, c1, c2 = surface.contour_cost(g.n1, g.n2, p.contour, w.contour, w.contour_power, g.n1.size)
         at = (p.contour.rows, p.contour.columns)

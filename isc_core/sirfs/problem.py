@@ -33,8 +33,6 @@ class Problem:
     `mask`: (H, W) bool, the object; `contour`: its occluding contour.
 
     `silhouette`: what the outline says of the normals. `shading_only`: shape-from-shading mode, reflectance is taken as one unknown colour.
-    `curvature_unit`: pixels of this problem to one pixel of the scale at which the priors were fitted; curvature differences
-    are multiplied by its square, since curvature is per pixel and a pair's distance is in pixels.
     """
 
     log_image: np.ndarray
@@ -45,7 +43,6 @@ class Problem:
     weights: Weights
     observation: DepthObservation | None = None
     shading_only: bool = False
-    curvature_unit: float = 1.0
     silhouette: SilhouetteField | None = None
 
 

@@ -4,7 +4,7 @@ The priors speak of pixels, so the object is brought to one size first (`Recover
 a fixed margin is solved: neither the photo's scale nor empty space around the object changes the answer.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -19,18 +19,17 @@ from .silhouette import silhouette_field
 from .solver import SolverOptions, solve
 
 MARGIN = 20
+SOLVE_SIZE = 320
 
 
 @dataclass(frozen=True)
 class RecoverOptions:
     """`solve_size`: long side of the object's box, in pixels, at which SIRFS is solved; 0 for the size given.
 
-    `refinements`: steps taken afterwards at the scale given, under the same light, for the detail that the smaller problem cannot see.
     `margin`: pixels of empty space around the box there. `shading_only`: shape-from-shading mode, one reflectance colour.
     """
 
-    solve_size: int = 0
-    refinements: int = 0
+    solve_size: int = SOLVE_SIZE
     margin: int = MARGIN
     shading_only: bool = False
     solver: SolverOptions = field(default_factory=SolverOptions)
@@ -108,21 +107,16 @@ def recover(
     window, factor = _window(mask, options)
     inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
     scene = _Scene(window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window)
-    refine = options.refinements > 0 and factor < 1 and known.height is None
     problem = scene.problem(factor)
     given = None if known.height is None else _to_solve(window.cut(known.height, 0.0), scene.inside, factor)
-    share = monitor.part(0, 0.6) if refine else monitor
-    result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=share)
+    result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=monitor)
     cut = resample_height(result.height, scene.inside.shape) if known.height is None else window.cut(known.height, 0.0)
-    light, evaluations = result.light, result.total_evaluations
-    if refine:
-        limits = replace(options.solver, lbfgs=replace(options.solver.lbfgs, iterations=options.refinements))
-        finer = solve(scene.problem(1.0, 1 / factor), limits, known_light=light, start=(cut, light), monitor=monitor.part(0.6, 1))
-        cut, evaluations = finer.height, evaluations + finer.total_evaluations
     if known.height is None and known.depth is None:
         cut = cut - cut[scene.inside].mean()
-    height = window.put(cut, mask.shape)
-    return Recovered(height, light, result.terms, result.iterations, evaluations, result.reason, result.converged, problem.valid.shape)
+    return Recovered(
+        window.put(cut, mask.shape), result.light, result.terms, result.iterations, result.evaluations,
+        result.reason, result.converged, problem.valid.shape,
+    )  # fmt: skip
 
 
 def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[_Window, float]:
@@ -156,7 +150,7 @@ class _Scene:
     known: Known
     window: _Window
 
-    def problem(self, factor: float, curvature_unit: float = 1.0) -> Problem:
+    def problem(self, factor: float) -> Problem:
         """The problem at `factor` times the image's scale."""
         image, valid, outline, photo, depth = self.image, self.inside, self.outline, self.photo, self.known.depth
         if depth is not None:
@@ -170,7 +164,7 @@ class _Scene:
         profile = self.priors.silhouette
         return Problem(
             log_image, valid, outline, _seen(occluding_contour(outline), photo), self.priors, self.weights, depth,
-            self.options.shading_only, curvature_unit, None if profile is None else silhouette_field(outline, profile),
+            self.options.shading_only, None if profile is None else silhouette_field(outline, profile),
         )  # fmt: skip
 
 

@@ -1,29 +1,26 @@
 """Shape and illumination from one image: the minimiser of the SIRFS objective (Barron & Malik 2015).
 
-One L-BFGS run moves the height's pyramid levels and the whitened light together. Halved problems come first: their pyramid is
-the upper part of the full one, so that what they find is the start of the next. Reflectance is not an unknown:
-log A = log I - log shading reproduces the image exactly.
+One L-BFGS run moves the height's pyramid levels and the whitened light together. Reflectance is not an unknown:
+log A = log I - log shading reproduces the image exactly. Limits: the objective has many minima; this finds one of them. Solving halved
+problems first finds others, as often worse as better, and saved no time.
 Source: Barron & Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8), 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 import os
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from ..errors import InputError
 from ..progress import Monitor
-from .contour import occluding_contour
 from .illumination import stack, unstack
 from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
 from .numpy_engine import NumpyEngine
-from .problem import DepthObservation, Evaluation, Problem, Terms
+from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, level_shapes, synthesise
-from .silhouette import silhouette_field
 from .workers import Workers
-
-_LEAST_COARSE = 40  # pixels on the short side, below which a halved problem no longer shows the object
 
 
 @dataclass(frozen=True)
@@ -31,25 +28,21 @@ class SolverOptions:
     """How a problem is solved; none of it changes what is solved.
 
     `engine`: "numba", "numpy", or "auto" for compiled kernels where they can be had. `single`: float32 unknowns (production)
-    or float64. `threads`: 0 for all cores. `halvings`: problems of half, quarter ... size that are solved first.
-    `levels`: of the height's pyramid, None for as many as make sense. `lbfgs`: the optimiser's, at full size;
-    `coarse_lbfgs`: the same for halved problems.
+    or float64. `threads`: 0 for all cores. `levels`: of the height's pyramid, None for as many as make sense. `lbfgs`: the optimiser's.
     """
 
     engine: str = "auto"
     single: bool = True
     threads: int = 0
-    halvings: int = 0
     levels: int | None = None
     lbfgs: LbfgsOptions = field(default_factory=LbfgsOptions)
-    coarse_lbfgs: LbfgsOptions = field(default_factory=LbfgsOptions)
 
 
 @dataclass(frozen=True)
 class SirfsResult:
     """`height`: (H, W) float64, pixels, toward the viewer. `light`: (9, C) float64, reference convention.
 
-    `terms`: of the objective there. `evaluations`: at full size and in all; `reason`: why the optimiser stopped.
+    `terms`: of the objective there. `evaluations` of it; `reason`: why the optimiser stopped.
     """
 
     height: np.ndarray
@@ -57,7 +50,6 @@ class SirfsResult:
     terms: Terms
     iterations: int
     evaluations: int
-    total_evaluations: int
     reason: str
     converged: bool
 
@@ -187,99 +179,34 @@ def solve(
     *,
     known_height: np.ndarray | None = None,
     known_light: np.ndarray | None = None,
-    start: tuple[np.ndarray, np.ndarray] | None = None,
     monitor: Monitor | None = None,
 ) -> SirfsResult:
     """Minimises the objective of `problem`.
 
-    `start`: height (H, W) and light (9, C) to begin with, instead of a flat shape and no
-    light. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress reports carry the loss. Raises `Cancelled`.
+    Begins with a flat shape and no light. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress reports carry
+    the loss. Raises `Cancelled`.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()
-    for given in (known_height, known_light, *(start or ())):
+    for given in (known_height, known_light):
         if given is not None and not np.isfinite(given).all():
             raise InputError("a given shape or light has holes or infinite values: fill them, or give the shape as depth")
     with Workers(thread_count(options)) as workers:
         tools = _Tools(options, workers)
-        full_levels = len(level_shapes(problem.valid.shape, options.levels))
-        direct = known_height is not None or start is not None
-        stages = [problem] if direct else _stages(problem, min(options.halvings, full_levels - 1))
-        previous: _Unknowns | None = None
-        total = 0
-        for k, stage in enumerate(stages):
-            halvings = len(stages) - 1 - k
-            unknowns = _Unknowns(stage, tools, full_levels - halvings, known_height, known_light)
-            _begin(unknowns, previous, start)
-            share = monitor.part(1 - 0.75**k if k else 0.0, 1 - 0.75 ** (k + 1) if halvings else 1.0)
-            limits = options.coarse_lbfgs if halvings else options.lbfgs
-            share.report("shape and light", 0.0)
-            if not unknowns.x.size:
-                outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")  # all is known: only the loss is asked for
-            else:
-                outcome = minimise(unknowns, unknowns.x, limits, tools.algebra(), _reporter(share, limits.iterations))
-            total += unknowns.evaluations
-            previous = unknowns
+        unknowns = _Unknowns(problem, tools, options.levels, known_height, known_light)
+        unknowns.set_light(np.zeros((9, unknowns.channels)))
+        monitor.report("shape and light", 0.0)
+        if unknowns.x.size:
+            outcome = minimise(unknowns, unknowns.x, options.lbfgs, tools.algebra(), _reporter(monitor, options.lbfgs.iterations))
+        else:
+            outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")  # all is known: only the loss is asked for
         return SirfsResult(
             np.array(unknowns.height(), float), np.array(unknowns.light(), float), unknowns.terms,
-            outcome.iterations, outcome.evaluations, total, outcome.reason, outcome.converged,
+            outcome.iterations, unknowns.evaluations, outcome.reason, outcome.converged,
         )  # fmt: skip
 
 
-def _reporter(monitor: Monitor, most: int):  # type: ignore[no-untyped-def]
+def _reporter(monitor: Monitor, most: int) -> Callable[[int, float], None]:
     def each(iteration: int, loss: float) -> None:
         monitor.report(f"shape and light, loss {loss:.3f}", 1 - 0.99**iteration if iteration < most else 1.0)
 
     return each
-
-
-def _begin(unknowns: _Unknowns, previous: _Unknowns | None, start: tuple[np.ndarray, np.ndarray] | None) -> None:
-    """Sets the unknowns to `start`, else to what the halved problem found, else to a flat shape without light."""
-    if start is not None:
-        if unknowns.shapes:
-            unknowns.levels(unknowns.x)[0][...] = start[0]
-        unknowns.set_light(start[1])
-        return
-    if previous is None:
-        unknowns.set_light(np.zeros((9, unknowns.channels)))
-        return
-    unknowns.set_light(previous.light())
-    for target, source in zip(unknowns.levels(unknowns.x)[1:], previous.levels(previous.x), strict=True):
-        target[...] = source
-
-
-def _stages(problem: Problem, halvings: int) -> list[Problem]:
-    """The problem and its halved versions, the coarsest first; fewer where the object would all but vanish."""
-    stages = [problem]
-    while len(stages) <= halvings and min(stages[0].valid.shape) >= 2 * _LEAST_COARSE:
-        coarser = halved(stages[0])
-        if 8 * np.count_nonzero(coarser.valid) < np.count_nonzero(stages[0].valid):
-            break
-        stages.insert(0, coarser)
-    return stages
-
-
-def halved(problem: Problem) -> Problem:
-    """`problem` at half the size: intensities averaged over the valid pixels of 2 x 2 blocks."""
-    weight = _block_mean(problem.valid.astype(float))
-    valid = weight >= 0.5
-    image = _block_mean(np.where(problem.valid[..., None], np.exp(problem.log_image), 0.0))
-    log_image = np.where(valid[..., None], np.log(np.where(valid[..., None], image, 1) / np.where(valid, weight, 1)[..., None]), 0.0)
-    mask = _block_mean(problem.mask.astype(float)) >= 0.5
-    observation = problem.observation
-    if observation is not None:
-        seen = np.isfinite(observation.height)
-        share = _block_mean(seen.astype(float))
-        mean = _block_mean(np.where(seen, observation.height, 0.0)) / np.where(share > 0, share, 1)
-        observation = DepthObservation(np.where(share > 0, mean / 2, np.nan), observation.sigma / 2, observation.weight)
-    return replace(
-        problem, log_image=log_image, valid=valid, mask=mask, contour=occluding_contour(mask),
-        silhouette=None if problem.priors.silhouette is None else silhouette_field(mask, problem.priors.silhouette),
-        observation=observation, curvature_unit=problem.curvature_unit / 2,
-    )  # fmt: skip
-
-
-def _block_mean(image: np.ndarray) -> np.ndarray:
-    """Means of 2 x 2 blocks; an odd last row or column is repeated."""
-    pad = [(0, n % 2) for n in image.shape[:2]] + [(0, 0)] * (image.ndim - 2)
-    even = np.pad(image, pad, mode="edge")
-    return (even[::2, ::2] + even[1::2, ::2] + even[::2, 1::2] + even[1::2, 1::2]) / 4

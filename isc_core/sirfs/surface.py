@@ -71,18 +71,15 @@ def pair_slices(down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice
 
 
 def curvature_cost(
-    curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float, unit: float
+    curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float
 ) -> tuple[float, np.ndarray]:
-    """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`, both (H, W).
-
-    `unit` multiplies the differences.
-    """
+    """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`, both (H, W)."""
     gradient = np.zeros_like(curvature)
     total = 0.0
     for offset in PAIR_OFFSETS:
         p, q = pair_slices(*offset)
         both = valid[p] & valid[q]
-        difference = (curvature[p][both] - curvature[q][both]) * curvature.dtype.type(unit)
+        difference = curvature[p][both] - curvature[q][both]
         x = np.sqrt(difference * difference + curvature.dtype.type(SOFT_DIFFERENCE))
         cost, slope = table.evaluate(x)
         total += float(cost.sum(dtype=float))
@@ -90,7 +87,7 @@ def curvature_cost(
         gradient[p][both] += pull
         gradient[q][both] -= pull
     scale = weight / (25 * curvature.size)
-    return scale * total, gradient * curvature.dtype.type(scale * unit)
+    return scale * total, gradient * curvature.dtype.type(scale)
 
 
 def slant_cost(n3: np.ndarray, weight: float) -> tuple[float, np.ndarray]:

@@ -22,8 +22,7 @@ def problem_of(kind: str) -> Problem:
     channels, shading_only = KINDS[kind]
     scene = blob((70, 62), channels)
     seen = DepthObservation(np.where(np.random.default_rng(1).random(scene.mask.shape) < 0.3, np.nan, scene.height))
-    problem = make_problem(scene, weights(silhouette=2.0), shading_only=shading_only, observation=seen, holes=True, outline=True)
-    return replace(problem, curvature_unit=0.8)
+    return make_problem(scene, weights(silhouette=2.0), shading_only=shading_only, observation=seen, holes=True, outline=True)
 
 
 def states(problem: Problem, dtype: type[np.floating]) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -81,7 +80,7 @@ def test_a_whole_solve_is_the_same_bytes_on_any_threads() -> None:
     short = LbfgsOptions(iterations=25)
     results = []
     for threads in (1, 2):
-        result = solve(problem, SolverOptions(threads=threads, lbfgs=short, coarse_lbfgs=short, engine="numba"))
+        result = solve(problem, SolverOptions(threads=threads, lbfgs=short, engine="numba"))
         results.append((result.height.tobytes(), result.light.tobytes(), repr(result.terms), result.evaluations))
     assert results[0] == results[1]
 

@@ -52,7 +52,7 @@ def problem_of(term: str, channels: int) -> Problem:
     )
     priors = problem.priors
     priors = replace(priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness))
-    return replace(problem, curvature_unit=0.7, priors=priors)
+    return replace(problem, priors=priors)
 
 
 def directions(shape: tuple[int, int]) -> list[np.ndarray]:

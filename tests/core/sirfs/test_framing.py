@@ -1,0 +1,39 @@
+"""A photo trimmed to its object is told from a frame that cuts the object."""
+
+import numpy as np
+
+from isc_core.sirfs.framing import continued, cut_line
+
+
+def disc(size: int, radius: float, center: tuple[float, float]) -> np.ndarray:
+    i, j = np.mgrid[:size, :size]
+    return (i - center[0]) ** 2 + (j - center[1]) ** 2 <= radius**2
+
+
+def test_a_disc_trimmed_to_its_box_is_whole() -> None:
+    mask = disc(101, 50, (50, 50))
+    assert mask[0].any()
+    assert not cut_line(mask).any()
+    assert np.array_equal(continued(mask, 10, 10, 10, 10), np.pad(mask, 10))
+
+
+def test_a_disc_cut_through_its_middle_goes_on() -> None:
+    mask = disc(101, 40, (0, 50))
+    assert np.array_equal(cut_line(mask), mask[0])
+    grown = continued(mask, 7, 3, 2, 2)
+    assert (grown[:7, 2:-2] == mask[0]).all()
+    assert not grown[-3:].any()
+    assert np.array_equal(grown[7:-3, 2:-2], mask)
+
+
+def test_each_side_is_judged_alone() -> None:
+    mask = disc(101, 50, (50, 50))[:, :60]  # trimmed above, below and on the left; cut on the right
+    grown = continued(mask, 4, 4, 4, 4)
+    assert not grown[:4].any()
+    assert not grown[-4:].any()
+    assert not grown[:, :4].any()
+    assert (grown[4:-4, -4:] == mask[:, -1:]).all()
+
+
+def test_a_full_frame_goes_on_everywhere() -> None:
+    assert continued(np.ones((20, 30), bool), 3, 3, 3, 3).all()
