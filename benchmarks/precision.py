@@ -1,0 +1,111 @@
+"""Production (float32, compiled) against double precision and against the plain NumPy engine, with the shipped priors and weights.
+
+  python -m benchmarks.precision               production against float64: losses and scores of the ten objects, both lights
+  python -m benchmarks.precision --numpy       ten fixed states and whole solves in both engines, with the ratio of their times
+"""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.datasets import list_objects
+from isc_core.sirfs.numba_engine import NumbaEngine
+from isc_core.sirfs.numpy_engine import NumpyEngine
+from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.problem import Problem
+from isc_core.sirfs.settings import isc_weights
+from isc_core.sirfs.solver import SirfsResult, SolverOptions, solve
+from isc_core.sirfs.workers import Workers
+
+from .berkeley import LIGHTS, geometric_mean, parser, problem, scores, training_object
+
+
+def timed(function: Callable[[], SirfsResult]) -> tuple[SirfsResult, float]:
+    """What the function returns and the seconds it took."""
+    start = time.perf_counter()
+    return function(), time.perf_counter() - start
+
+
+def against_double(shared: Path, names: list[str]) -> None:
+    """Final losses and scores in both precisions."""
+    for light in LIGHTS:
+        priors, weights = shipped_prior_set().priors(light, 3), isc_weights(light, 3)
+        averages: dict[bool, list[float]] = {True: [], False: []}
+        seconds, evaluations = [], []
+        for k, name in enumerate(names):
+            truth = training_object(shared, name, light)
+            made = problem(truth, priors, weights)
+            if k == 0:
+                solve(made)  # compiles
+            losses = {}
+            for single in (True, False):
+                result, took = timed(lambda single=single, made=made: solve(made, SolverOptions(single=single)))  # type: ignore[misc]
+                losses[single] = result.terms.total
+                averages[single].append(scores(truth, result).average)
+                if single:
+                    seconds.append(took)
+                    evaluations.append(result.evaluations)
+            print(
+                f"{light:10s} {name:9s} loss {losses[True]:.4f}, float64 {losses[False]:.4f}, ratio {losses[True] / losses[False]:.5f}; "
+                f"avg {averages[True][-1]:.5f} / {averages[False][-1]:.5f}; {seconds[-1]:.2f} s, {evaluations[-1]} evaluations of "
+                f"{1e3 * seconds[-1] / evaluations[-1]:.2f} ms",
+                flush=True,
+            )
+        both = geometric_mean(averages[True]), geometric_mean(averages[False])
+        print(
+            f"{light:10s} geometric means: avg {both[0]:.5f} / {both[1]:.5f}, ratio {both[0] / both[1]:.4f}; "
+            f"{geometric_mean(seconds):.2f} s, {geometric_mean([float(e) for e in evaluations]):.0f} evaluations"
+        )
+
+
+def states(made: Problem) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Ten heights and lights, from flat to steep."""
+    rng = np.random.default_rng(0)
+    i, j = np.mgrid[: made.valid.shape[0], : made.valid.shape[1]]
+    found = []
+    for k in range(10):
+        a, b = rng.uniform(10, 40, 2)
+        found.append((2.0 * k * np.sin(i / a + k) * np.cos(j / b), 0.1 * k * rng.normal(size=(9, 3)) * (k > 0)))
+    return found
+
+
+def against_numpy(shared: Path, names: list[str]) -> None:
+    """Both engines at ten states and in whole solves."""
+    for light in LIGHTS:
+        priors, weights = shipped_prior_set().priors(light, 3), isc_weights(light, 3)
+        for name in names:
+            made = problem(training_object(shared, name, light), priors, weights)
+            for dtype in (np.float64, np.float32):
+                worst = np.zeros(3)
+                with Workers(2) as workers:
+                    compiled, plain = NumbaEngine(made, dtype, workers), NumpyEngine(made, dtype)
+                    for height, lit in states(made):
+                        a, b = compiled.evaluate(height.astype(dtype), lit), plain.evaluate(height.astype(dtype), lit)
+                        pairs = ((a.height_gradient, b.height_gradient), (a.light_gradient, b.light_gradient))
+                        differences = [float(np.linalg.norm(x - y) / np.linalg.norm(y)) for x, y in pairs]
+                        worst = np.maximum(worst, np.array([abs(a.terms.total / b.terms.total - 1), *differences]))
+                print(f"{light:10s} {name:9s} {dtype.__name__}: loss {worst[0]:.1e}, dZ {worst[1]:.1e}, dL {worst[2]:.1e}", flush=True)
+            fast, fast_s = timed(lambda made=made: solve(made, SolverOptions(engine="numba")))  # type: ignore[misc]
+            slow, slow_s = timed(lambda made=made: solve(made, SolverOptions(engine="numpy")))  # type: ignore[misc]
+            each = (slow_s / slow.evaluations) / (fast_s / fast.evaluations)
+            print(
+                f"{light:10s} {name:9s} whole solve: loss ratio {slow.terms.total / fast.terms.total:.5f}, "
+                f"time {slow_s:.1f} / {fast_s:.2f} s = {slow_s / fast_s:.1f}, an evaluation {each:.1f}",
+                flush=True,
+            )
+
+
+def main() -> None:
+    """Prints the figures."""
+    options = parser(__doc__)
+    options.add_argument("--numpy", action="store_true")
+    options.add_argument("--objects", help="comma-separated; all training objects without it")
+    given = options.parse_args()
+    names = given.objects.split(",") if given.objects else list(list_objects(given.shared / "data" / "mit_berkeley_train", "natural"))
+    (against_numpy if given.numpy else against_double)(given.shared, names)
+
+
+if __name__ == "__main__":
+    main()
