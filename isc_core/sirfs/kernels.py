@@ -257,59 +257,78 @@ def palette_range(palette, valid, spans, low, step, nodes, bounds):
 
 
 @compiled
-def _locate(value, low, inverse_step, nodes, first):
-    """Cell (from node `first`), position in the cell, and whether the value lies on the grid, for one axis."""
-    position = (value - low) * inverse_step
-    inside = 0.0 <= position <= nodes - 1.0
-    position = min(max(position, 0.0), nodes - 1.0)
-    cell = min(int(position), nodes - 2)
-    return cell - first, position - cell, inside
+def locate_color(palette, spans, low, inverse_step, nodes, bounds, cell, side):
+    """Where every pixel falls on the occupied part of the grid: cell (H, W) its flat node, side (H, 3, W) its place in the cell."""
+    sizes = bounds[:, 1] - bounds[:, 0]
+    strides = (sizes[1] * sizes[2], sizes[2], 1)
+    t = side.dtype.type
+    top, last_cell = nodes - 1.0, nodes - 2.0
+    for i in range(palette.shape[0]):
+        a, b = spans[i, 0], spans[i, 1]
+        flat = cell[i, a:b]
+        flat[:] = 0
+        for c in range(3):
+            values, place = palette[i, c, a:b], side[i, c, a:b]
+            first, stride = bounds[c, 0], strides[c]
+            for j in range(b - a):
+                position = min(max((values[j] - low) * inverse_step, 0.0), top)
+                whole = np.int64(min(position, last_cell))
+                place[j] = t(position - whole)
+                flat[j] += (whole - first) * stride
 
 
 @compiled
-def splat_color(palette, valid, spans, low, inverse_step, nodes, bounds, counts):
-    """Adds every valid pixel to the eight nodes around its whitened log colour."""
-    for i in range(palette.shape[0]):
+def splat_color(valid, spans, cell, side, counts):
+    """Adds every valid pixel to the eight nodes around its whitened log colour; counts (A, B, N)."""
+    right, down = counts.shape[2], counts.shape[1] * counts.shape[2]
+    flat = counts.reshape(counts.size)
+    for i in range(valid.shape[0]):
         for j in range(spans[i, 0], spans[i, 1]):
             if valid[i, j] == 0:
                 continue
-            a, x, _ = _locate(float(palette[i, 0, j]), low, inverse_step, nodes, bounds[0, 0])
-            b, y, _ = _locate(float(palette[i, 1, j]), low, inverse_step, nodes, bounds[1, 0])
-            c, z, _ = _locate(float(palette[i, 2, j]), low, inverse_step, nodes, bounds[2, 0])
-            x0, y0, z0 = 1 - x, 1 - y, 1 - z
-            counts[a, b, c] += x0 * y0 * z0
-            counts[a, b, c + 1] += x0 * y0 * z
-            counts[a, b + 1, c] += x0 * y * z0
-            counts[a, b + 1, c + 1] += x0 * y * z
-            counts[a + 1, b, c] += x * y0 * z0
-            counts[a + 1, b, c + 1] += x * y0 * z
-            counts[a + 1, b + 1, c] += x * y * z0
-            counts[a + 1, b + 1, c + 1] += x * y * z
+            k = cell[i, j]
+            x, y, z = float(side[i, 0, j]), float(side[i, 1, j]), float(side[i, 2, j])
+            x0, y0 = 1 - x, 1 - y
+            p00, p01, p10, p11 = x0 * y0, x0 * y, x * y0, x * y
+            flat[k] += p00 * (1 - z)
+            flat[k + 1] += p00 * z
+            flat[k + right] += p01 * (1 - z)
+            flat[k + right + 1] += p01 * z
+            flat[k + down] += p10 * (1 - z)
+            flat[k + down + 1] += p10 * z
+            flat[k + down + right] += p11 * (1 - z)
+            flat[k + down + right + 1] += p11 * z
 
 
 @compiled
-def gather_color(palette, valid, spans, low, inverse_step, nodes, bounds, node_gradient, gradient):
-    """Gradient (H, C, W) of the whitened log colours from the gradient of the node counts; 0 where not valid."""
+def gather_color(palette, valid, spans, low, high, inverse_step, cell, side, node_gradient, gradient):
+    """Gradient (H, 3, W) of the whitened log colours from that of the node counts (A, B, N); 0 where not valid or off the grid."""
     t = gradient.dtype.type
+    inv = t(inverse_step)
+    right, down = node_gradient.shape[2], node_gradient.shape[1] * node_gradient.shape[2]
+    flat = node_gradient.reshape(node_gradient.size)
     for i in range(palette.shape[0]):
-        gradient[i] = t(0)
+        gx_row, gy_row, gz_row = gradient[i, 0], gradient[i, 1], gradient[i, 2]
         for j in range(spans[i, 0], spans[i, 1]):
             if valid[i, j] == 0:
                 continue
-            a, x, x_in = _locate(float(palette[i, 0, j]), low, inverse_step, nodes, bounds[0, 0])
-            b, y, y_in = _locate(float(palette[i, 1, j]), low, inverse_step, nodes, bounds[1, 0])
-            c, z, z_in = _locate(float(palette[i, 2, j]), low, inverse_step, nodes, bounds[2, 0])
-            g000, g001 = node_gradient[a, b, c], node_gradient[a, b, c + 1]
-            g010, g011 = node_gradient[a, b + 1, c], node_gradient[a, b + 1, c + 1]
-            g100, g101 = node_gradient[a + 1, b, c], node_gradient[a + 1, b, c + 1]
-            g110, g111 = node_gradient[a + 1, b + 1, c], node_gradient[a + 1, b + 1, c + 1]
-            x0, y0, z0 = 1 - x, 1 - y, 1 - z
-            gx = y0 * (z0 * (g100 - g000) + z * (g101 - g001)) + y * (z0 * (g110 - g010) + z * (g111 - g011))
-            gy = x0 * (z0 * (g010 - g000) + z * (g011 - g001)) + x * (z0 * (g110 - g100) + z * (g111 - g101))
-            gz = x0 * (y0 * (g001 - g000) + y * (g011 - g010)) + x * (y0 * (g101 - g100) + y * (g111 - g110))
-            gradient[i, 0, j] = t(gx * inverse_step) if x_in else t(0)
-            gradient[i, 1, j] = t(gy * inverse_step) if y_in else t(0)
-            gradient[i, 2, j] = t(gz * inverse_step) if z_in else t(0)
+            k = cell[i, j]
+            x, y, z = side[i, 0, j], side[i, 1, j], side[i, 2, j]
+            g000, g001, g010, g011 = flat[k], flat[k + 1], flat[k + right], flat[k + right + 1]
+            k += down
+            g100, g101, g110, g111 = flat[k], flat[k + 1], flat[k + right], flat[k + right + 1]
+            d00, d01, d10, d11 = g001 - g000, g011 - g010, g101 - g100, g111 - g110
+            e00, e01, e10, e11 = g000 + z * d00, g010 + z * d01, g100 + z * d10, g110 + z * d11
+            f0, f1 = e01 - e00, e11 - e10
+            gx_row[j] = inv * ((e10 + y * f1) - (e00 + y * f0))
+            gy_row[j] = inv * (f0 + x * (f1 - f0))
+            h0, h1 = d00 + y * (d01 - d00), d10 + y * (d11 - d10)
+            gz_row[j] = inv * (h0 + x * (h1 - h0))
+        for c in range(3):
+            values, out = palette[i, c], gradient[i, c]
+            for j in range(spans[i, 0], spans[i, 1]):
+                if values[j] < low or values[j] > high:
+                    out[j] = t(0)
 
 
 @compiled

@@ -96,6 +96,8 @@ class NumbaEngine:
         self._curvature_spill = np.empty((blocks, 2, width), t)
         self._smooth_cost, self._curvature_cost = np.zeros((2, blocks))
         self._silhouette_cost = np.zeros(height)
+        if channels == 3:
+            self._cell, self._side = np.zeros((height, width), np.int32), np.zeros((height, 3, width), t)
         self._palette_terms: dict[str, float] = {}
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
@@ -187,7 +189,8 @@ class NumbaEngine:
         bounds = np.empty((3, 2), np.int64)
         kernels.palette_range(self._palette, self._valid, self._spans, table.low, step, nodes, bounds)
         counts = np.zeros(tuple(bounds[:, 1] - bounds[:, 0]))
-        kernels.splat_color(self._palette, self._valid, self._spans, table.low, 1 / step, nodes, bounds, counts)
+        kernels.locate_color(self._palette, self._spans, table.low, 1 / step, nodes, bounds, self._cell, self._side)
+        kernels.splat_color(self._valid, self._spans, self._cell, self._side, counts)
         pixels = int(p.valid.sum())
         blurred = np.empty_like(counts)
         kernels.blur_color(counts, reflectance.parzen_taps(w.parsimony_sigma / reflectance.SIGMA_UNIT, step, pixels, 3), blurred)
@@ -196,7 +199,10 @@ class NumbaEngine:
         scale = w.absolute / (reflectance.ABSOLUTE_DIVISOR * pixels)
         node_gradient = (-2 * w.parsimony / overlap) * blurred + scale * costs
         self._palette_terms = {"parsimony": -w.parsimony * float(np.log(overlap)), "absolute": scale * float((costs * counts).sum())}
-        kernels.gather_color(self._palette, self._valid, self._spans, table.low, 1 / step, nodes, bounds, node_gradient, self._g_palette)
+        kernels.gather_color(
+            self._palette, self._valid, self._spans, table.low, table.high, 1 / step, self._cell, self._side,
+            node_gradient.astype(self.dtype), self._g_palette,
+        )  # fmt: skip
 
     def _palette_in_numpy(self) -> None:
         """Grey photos and shape-from-shading mode, where these terms cost next to nothing."""
