@@ -28,8 +28,12 @@ class SilhouetteField:
 
 
 def outline_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Relative depth u in (0, 1] and the outward direction (down, right) of every pixel of `mask` (H, W) bool."""
-    distance = ndimage.distance_transform_edt(np.pad(mask, 1))[1:-1, 1:-1]
+    """Relative depth u in (0, 1] and the outward direction (down, right) of every pixel of `mask` (H, W) bool.
+
+    A mask that reaches the border goes on beyond it: there is no silhouette. One without any outline is deep everywhere, u = 1.
+    """
+    padded = np.pad(mask, 1, mode="edge")
+    distance = np.ones(mask.shape) if padded.all() else ndimage.distance_transform_edt(padded)[1:-1, 1:-1]
     deepest = max(float(distance.max()), 1.0)
     smooth = ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest))
     down, right = np.gradient(smooth)

@@ -23,6 +23,18 @@ def test_depth_and_direction_on_a_disc() -> None:
     assert ((down * i + right * j) / np.maximum(radius, 1))[away].min() > 0.97
 
 
+def test_there_is_no_silhouette_where_the_border_cuts_the_object() -> None:
+    whole, _, _ = disc()
+    u, down, right = outline_coordinates(whole)
+    middle = whole.shape[1] // 2
+    cut_u, cut_down, cut_right = outline_coordinates(whole[:, : middle + 1])
+    near = (slice(None), slice(middle - 8, middle + 1))
+    inside = whole[near]
+    np.testing.assert_allclose(cut_u[near][inside], u[near][inside], atol=0.05)
+    away = inside & (u[near] < 0.7)
+    assert (cut_down[near] * down[near] + cut_right[near] * right[near])[away].min() > 0.97
+
+
 def test_the_field_is_empty_outside_and_finite_on_any_mask() -> None:
     profile = SilhouetteProfile(np.array([0.9, 0.1]), np.array([0.2, 0.3]))
     masks = [disc()[0], np.zeros((5, 6), bool), np.ones((5, 6), bool), np.eye(7, dtype=bool)]
