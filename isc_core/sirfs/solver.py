@@ -22,6 +22,8 @@ from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, level_shapes, synthesise
 from .workers import Workers
 
+MOST_THREADS = 64  # more only wait for each other
+
 
 @dataclass(frozen=True)
 class SolverOptions:
@@ -72,8 +74,9 @@ def compiled_engine_available() -> bool:
 
 
 def thread_count(options: SolverOptions) -> int:
-    """How many threads `options` ask for on this machine."""
-    return options.threads or os.cpu_count() or 1
+    """How many threads `options` ask for on this machine, at most `MOST_THREADS`; 0 means the cores that this process may use."""
+    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return min(options.threads or allowed, MOST_THREADS)
 
 
 class _Tools:

@@ -11,7 +11,7 @@ from isc_core.progress import Monitor
 from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.problem import DepthObservation
-from isc_core.sirfs.solver import SolverOptions, solve
+from isc_core.sirfs.solver import MOST_THREADS, SolverOptions, solve, thread_count
 from isc_core.sirfs.stencils import normals
 
 from .small_problems import Scene, blob, make_problem, weights
@@ -188,3 +188,9 @@ def test_what_is_known_must_be_numbers(name: str) -> None:
 def test_unknown_engine_is_one_clear_line() -> None:
     with pytest.raises(InputError, match="choose auto, numba or numpy"):
         solve(make_problem(blob()), SolverOptions(engine="gpu"))
+
+
+def test_any_number_of_threads_may_be_asked_for() -> None:
+    assert thread_count(SolverOptions(threads=3)) == 3
+    assert thread_count(SolverOptions()) >= 1
+    assert thread_count(SolverOptions(threads=10**9)) == MOST_THREADS
