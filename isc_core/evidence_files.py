@@ -10,6 +10,7 @@ from .errors import InputError
 from .exr import read_channels
 from .photo import read_raster
 from .result_folder import load
+from .sirfs.resampling import nearest_samples
 
 CODE = 1 / 64  # photo pixels to one code of an integer file: 16 bits reach 1024 pixels
 _EXR = b"\x76\x2f\x31\x01"
@@ -105,9 +106,8 @@ def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
         raise InputError(f"{folder / 'decomposition.json'} does not say at which scale its maps are: it is damaged")
     if tuple(int(np.ceil(n * scale - 1e-6)) for n in shape) != result.mask.shape:
         raise InputError(f"{folder} is the result of a photo of another size than {_size(shape)}: give one of this photo")
-    # The same rounding that will bring the map to the working grid, so that going there and back changes nothing.
-    rows, columns = (np.minimum(((np.arange(n) + 0.5) * m / n).astype(int), m - 1) for n, m in zip(shape, result.mask.shape, strict=True))
-    return np.where(result.mask, result.height.astype(np.float64), np.nan)[np.ix_(rows, columns)] / scale
+    # As the map will be brought to the working grid, so that going there and back changes nothing.
+    return nearest_samples(np.where(result.mask, result.height, np.nan), shape, 1 / scale) / scale
 
 
 def _size(shape: tuple[int, ...]) -> str:

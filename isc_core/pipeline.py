@@ -27,7 +27,7 @@ from .sirfs.kernel_cache import announce_compilation
 from .sirfs.prior_file import shipped_prior_set
 from .sirfs.problem import DepthObservation, Terms
 from .sirfs.recover import Known, Recovered, RecoverOptions, recover
-from .sirfs.resampling import resample_height
+from .sirfs.resampling import nearest_samples, resample_height
 from .sirfs.settings import isc_weights
 from .sirfs.solver import SolverOptions
 from .sirfs.stencils import normals
@@ -129,6 +129,7 @@ def decompose(
     """
     settings, evidence, monitor = settings or Settings(), evidence or Evidence(), monitor or Monitor()
     settings.check()
+    _check_used(settings, evidence, prior_set)
     clock = _Clock()
     with clock.stage("prepare"):
         working = photo.resized_to_object(settings.max_size)
@@ -148,6 +149,16 @@ def decompose(
         return assemble(maps_at, split, height, shape.light, provenance)
 
 
+def _check_used(settings: Settings, evidence: Evidence, prior_set: PriorSet | None) -> None:
+    """Raises `InputError` where something is given that the model does not look at."""
+    if settings.model in SIRFS_MODELS:
+        return
+    given = (evidence.height, evidence.light, evidence.depth, prior_set)
+    if settings.shading_only or any(thing is not None for thing in given):
+        models = " or ".join(SIRFS_MODELS)
+        raise InputError(f"--shape, --light, --depth, --priors and --shading-only mean nothing to {settings.model}: use --model {models}")
+
+
 def assemble(photo: Photo, split: Separation, height: np.ndarray, light: np.ndarray, provenance: Provenance) -> Decomposition:
     """Normals, shading and reflectance that follow from `height` (H, W) and `light` (9, 3), reference convention.
 
@@ -157,7 +168,8 @@ def assemble(photo: Photo, split: Separation, height: np.ndarray, light: np.ndar
     normal = normal_from_reference(normals(height)).astype(np.float32)
     normal[~mask] = (0, 0, 1)
     illumination = light_from_reference(light)
-    shading = np.where(mask[..., None], np.exp(real_sh(normal.astype(float)) @ illumination), 0).astype(np.float32)
+    shading = np.zeros(photo.image.shape, np.float32)
+    shading[mask] = np.exp(real_sh(normal[mask].astype(float)) @ illumination)
     reflectance = np.where(mask[..., None], split.diffuse / np.where(mask[..., None], shading, 1), 0).astype(np.float32)
     image = np.where(mask[..., None], photo.image, 0).astype(np.float32)
     return Decomposition(
@@ -187,10 +199,10 @@ def _recover(
         shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads)
     )
     weights = isc_weights(settings.illumination, channels)
-    grey_light = None if known.light is None else known.light[:, :channels]
+    light = known.light if known.light is None or channels == 3 else known.light.mean(axis=1, keepdims=True)
     result = recover(
         diffuse[..., :channels], photo.mask, floor, priors, weights, options,
-        known=Known(known.height, grey_light, known.depth), monitor=monitor,
+        known=Known(known.height, light, known.depth), monitor=monitor,
     )  # fmt: skip
     return _Shape(result.height, np.broadcast_to(result.light, (9, 3)).copy(), _status(result), result.terms)
 
@@ -226,22 +238,16 @@ def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
             (rows, columns), (h, w) = values.shape, photo.mask.shape
             raise InputError(f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the photo's full size")
     light = None if evidence.light is None else light_to_reference(np.asarray(evidence.light, float))
-    height = None if evidence.height is None else _shrunk(evidence.height, working.mask.shape) * factor
+    height = None if evidence.height is None else nearest_samples(evidence.height, working.mask.shape, factor) * factor
     if height is not None and not np.isfinite(height[working.mask]).all():
         raise InputError("the known shape has holes inside the mask: give it as --depth, which may have holes")
     height = None if height is None else _continued(height, working.mask)
     if evidence.depth is None:
         return Known(height, light)
-    seen = DepthObservation(_shrunk(evidence.depth, working.mask.shape) * factor, evidence.depth_sigma * factor, evidence.depth_weight)
-    return Known(height, light, seen)
-
-
-def _shrunk(values: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Nearest samples: holes (NaN) stay holes and do not grow."""
-    if values.shape == shape:
-        return np.asarray(values, float)
-    rows, columns = (np.minimum(((np.arange(n) + 0.5) * m / n).astype(int), m - 1) for n, m in zip(shape, values.shape, strict=True))
-    return np.asarray(values, float)[np.ix_(rows, columns)]
+    seen = nearest_samples(evidence.depth, working.mask.shape, factor) * factor
+    if not np.isfinite(seen[working.mask]).any():
+        raise InputError("the depth map has no value inside the mask, only holes: is it a map of this photo?")
+    return Known(height, light, DepthObservation(seen, evidence.depth_sigma * factor, evidence.depth_weight))
 
 
 def _continued(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -254,7 +260,7 @@ def _continued(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 def _enlarged(height: np.ndarray, working: Photo, full: Photo) -> np.ndarray:
     """The working height on the full photo's grid and in its pixels, smoothly."""
-    return resample_height(height, full.mask.shape) * (working.mask.size / full.mask.size) ** 0.5 * (full.scale / working.scale)
+    return resample_height(height, full.mask.shape, full.scale / working.scale)
 
 
 def _settings_json(settings: Settings) -> dict[str, object]:

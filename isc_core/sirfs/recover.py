@@ -4,7 +4,7 @@ The priors speak of pixels, so the object is brought to one size first (`Recover
 a fixed margin is solved: neither the photo's scale nor empty space around the object changes the answer.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -38,7 +38,7 @@ class RecoverOptions:
 @dataclass(frozen=True)
 class Known:
     """What is known beforehand, each at the image's scale: `height` (H, W) in pixels, `light` (9, C) reference convention,
-    `depth` an observation with holes."""
+    `depth` an observation with holes; outside the mask it is not looked at."""
 
     height: np.ndarray | None = None
     light: np.ndarray | None = None
@@ -79,6 +79,14 @@ class _Window:
         out[a - self.top : b - self.top, c - self.left : d - self.left] = array[a:b, c:d]
         return out
 
+    def cut_on(self, array: np.ndarray) -> np.ndarray:
+        """The same with the border's values going on beyond the image."""
+        rows, columns = (
+            np.clip(np.arange(start, start + size), 0, n - 1)
+            for start, size, n in zip((self.top, self.left), (self.height, self.width), array.shape, strict=True)
+        )
+        return array[np.ix_(rows, columns)]
+
     def put(self, window: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
         out = np.zeros(shape, window.dtype)
         a, b = max(self.top, 0), min(self.top + self.height, shape[0])
@@ -104,19 +112,29 @@ def recover(
     the logarithm only. Raises `Cancelled`.
     """
     options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
+    known, base = _levelled(known, mask)
     window, factor = _window(mask, options)
     inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
     scene = _Scene(window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window)
     problem = scene.problem(factor)
-    given = None if known.height is None else _to_solve(window.cut(known.height, 0.0), scene.inside, factor)
+    given = None if known.height is None else _to_solve(window.cut_on(known.height), scene.inside, factor)
     result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=monitor)
-    cut = resample_height(result.height, scene.inside.shape) if known.height is None else window.cut(known.height, 0.0)
+    cut = resample_height(result.height, scene.inside.shape) + base if known.height is None else window.cut_on(known.height)
     if known.height is None and known.depth is None:
         cut = cut - cut[scene.inside].mean()
     return Recovered(
         window.put(cut, mask.shape), result.light, result.terms, result.iterations, result.evaluations,
         result.reason, result.converged, problem.valid.shape,
     )  # fmt: skip
+
+
+def _levelled(known: Known, mask: np.ndarray) -> tuple[Known, float]:
+    """What is known with the depth inside the mask alone and its median taken off: a sensor's distances are large, float32 is short."""
+    if known.depth is None:
+        return known, 0.0
+    seen = np.where(mask, known.depth.height, np.nan)
+    base = float(np.nanmedian(seen)) if np.isfinite(seen).any() else 0.0
+    return replace(known, depth=replace(known.depth, height=seen - base)), base
 
 
 def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[_Window, float]:

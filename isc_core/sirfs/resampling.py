@@ -32,14 +32,25 @@ def resample_inside(values: np.ndarray, inside: np.ndarray, factor: float) -> tu
     return (mean if values.ndim == 3 else mean[..., 0]), share
 
 
-def resample_height(height: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """A smooth height map (h, w) on a grid of `shape`, by cubic splines, in the new grid's pixels."""
-    if height.shape == shape:
+def resample_height(height: np.ndarray, shape: tuple[int, ...], factor: float | None = None) -> np.ndarray:
+    """A smooth height map (h, w) on a grid of `shape`, by cubic splines, in the new grid's pixels.
+
+    `factor`: how many new pixels an old one is wide; None where both grids cover exactly the same area.
+    """
+    if height.shape == shape and factor in (None, 1.0):
         return np.array(height, float)
-    places = [np.clip((np.arange(n) + 0.5) * m / n - 0.5, 0, m - 1) for n, m in zip(shape, height.shape, strict=True)]
+    steps = [m / n if factor is None else 1 / factor for n, m in zip(shape, height.shape, strict=True)]
+    places = [np.clip((np.arange(n) + 0.5) * s - 0.5, 0, m - 1) for n, m, s in zip(shape, height.shape, steps, strict=True)]
     spline = ndimage.spline_filter(np.asarray(height, float), order=3, mode="nearest")
     grid = np.meshgrid(*places, indexing="ij")
-    return height_scale(height.shape, shape) * ndimage.map_coordinates(spline, grid, order=3, mode="nearest", prefilter=False)
+    scale = height_scale(height.shape, shape) if factor is None else factor
+    return scale * ndimage.map_coordinates(spline, grid, order=3, mode="nearest", prefilter=False)
+
+
+def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
+    """`values` (h, w) at the centres of a grid of `shape` whose pixels are 1/`factor` old ones wide: holes (NaN) stay and do not grow."""
+    rows, columns = (np.minimum(((np.arange(n) + 0.5) / factor).astype(int), m - 1) for n, m in zip(shape, values.shape, strict=True))
+    return np.asarray(values, float)[np.ix_(rows, columns)]
 
 
 def _apply(plane: np.ndarray, down: sparse.csr_array, right: sparse.csr_array) -> np.ndarray:

@@ -242,6 +242,7 @@ OPTIONS = [
     (DECOMPOSE, ("--depth-sigma", "0"), "--depth-sigma"),
     (DECOMPOSE, ("--depth-weight", "nan"), "--depth-weight"),
     (DECOMPOSE, ("--height-scale", "inf"), "--height-scale"),
+    (DECOMPOSE, ("--model", "naive", "--shading-only"), "--shading-only"),
     (DECOMPOSE, ("--models", "mdr"), "--models"),
     (DECOMPOSE, ("--mod", "mdr"), "--mod"),
     (DECOMPOSE, ("another.png",), "another.png"),
@@ -302,6 +303,12 @@ def with_hole(folder: Path, shape: tuple[int, ...]) -> Path:
     return saved("hole.npy", height)(folder, shape)
 
 
+def beside(folder: Path, shape: tuple[int, ...]) -> Path:
+    height = np.full(shape, np.nan)
+    height[0] = 5.0
+    return saved("beside.npy", height)(folder, shape)
+
+
 def eight_bits(folder: Path, shape: tuple[int, ...]) -> Path:
     return write_image(folder / "flat.png", np.full(shape, 9, np.uint8))
 
@@ -316,6 +323,7 @@ EVIDENCE = {
     "shape cut short": ("--shape", written("cut.npy", b"\x93NUMPY\x01\x00v"), "damaged"),
     "shape that is no result": ("--shape", lambda folder, shape: folder, "not a result folder"),
     "depth of holes": ("--depth", of_shape(np.nan), "holes"),
+    "depth of something else": ("--depth", beside, "inside the mask"),
     "depth that is text": ("--depth", written("depth.png", b"deep\n"), "not an image"),
     "light missing": ("--light", lambda folder, shape: folder / "nowhere.json", "No such file"),
     "light that is text": ("--light", written("light.json", b"bright\n"), "JSON"),

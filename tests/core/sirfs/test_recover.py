@@ -143,13 +143,13 @@ def test_what_is_known_comes_back_as_it_was_given(solve_size: int) -> None:
     np.testing.assert_array_equal(both.height[scene.mask], scene.height[scene.mask])
 
 
-@pytest.mark.parametrize("offset", [0.0, 800.0])
+@pytest.mark.parametrize("offset", [0.0, 1e6])
 @pytest.mark.parametrize("solve_size", [0, 41])
 def test_depth_with_holes_pulls_the_height(solve_size: int, offset: float) -> None:
     scene = blob()
     target = scene.height + 5 * np.sin(np.arange(72) / 12)
     seen = np.where(np.random.default_rng(0).random(scene.mask.shape) < 0.3, np.nan, target + offset)
-    seen[~scene.mask] = np.nan
+    seen[:, 36:][~scene.mask[:, 36:]] = -300.0  # what a sensor sees behind the object
     options = replace(OPTIONS, solve_size=solve_size, solver=replace(SOLVER, lbfgs=LbfgsOptions(iterations=200)))
     plain = run(scene, options)
     pulled = run(scene, options, Known(depth=DepthObservation(seen, sigma=1.0, weight=300.0)))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.sirfs.resampling import resample_height, resample_inside, resampled_shape
+from isc_core.sirfs.resampling import nearest_samples, resample_height, resample_inside, resampled_shape
 
 FACTORS = [0.2, 0.37, 0.5, 0.99, 1.0, 1.4, 2.0, 3.3]
 
@@ -72,6 +72,20 @@ def test_heights_scale_with_the_size(factor: float) -> None:
     ball = resample_height(np.sqrt(120.0**2 - (i - 40) ** 2 - (j - 45) ** 2), shape)
     true = np.sqrt(120.0**2 - (rows - 40) ** 2 - (columns - 45) ** 2) * true_factor
     np.testing.assert_allclose(ball[inner], true[inner], atol=1e-4 * factor)
+
+
+@pytest.mark.parametrize("factor", [1 / 0.2137, 1 / 0.61])
+def test_a_grid_whose_last_pixels_reach_beyond_the_photo_does_not_drift(factor: float) -> None:
+    """At scale 0.61, 237 rows make 145, the last of them not full: the two shapes alone do not tell the scale."""
+    shape = (237, 301)
+    small = tuple(int(np.ceil(n / factor)) for n in shape)
+    i, j = np.mgrid[: small[0], : small[1]].astype(float)
+    rows, columns = np.mgrid[: shape[0], : shape[1]].astype(float)
+    inner = (slice(20, -20), slice(20, -20))
+    wanted = 0.5 * rows - 0.2 * columns + (0.5 - 0.2) * (0.5 - 0.5 * factor)
+    np.testing.assert_allclose(resample_height(0.5 * i - 0.2 * j, shape, factor)[inner], wanted[inner], atol=2e-3)
+    back = nearest_samples(nearest_samples(i, shape, factor), small, 1 / factor)
+    np.testing.assert_array_equal(back[:-1], i[:-1])
 
 
 def test_splines_pass_through_the_heights_up_to_the_border() -> None:
