@@ -45,9 +45,10 @@ class Settings:
     """What a decomposition is asked for.
 
     `model`: one of `MODELS`. `separator`: one of `separation.METHODS`, used by `mdr`. `illumination`: "natural" or "laboratory", which
-    lights to expect. `max_size`: the object's long side in pixels at which the maps are made, 0 for the photo's. `full_size`: solve at
-    `max_size`, then bring the maps to the photo's resolution. `engine`, `threads`: see `SolverOptions`. `seed`: written into the
-    result; no step of these models draws random numbers. `shading_only`: shape-from-shading mode, an object of one colour.
+    lights to expect. `max_size`: the object's long side in pixels at which the maps are made, 0 for the photo's; SIRFS is solved at a
+    size of its own, `recover.SOLVE_SIZE`. `full_size`: the maps are then brought to the photo's resolution. `engine`, `threads`: see
+    `SolverOptions`. `seed`: written into the result; no step of these models draws random numbers. `shading_only`: shape-from-shading
+    mode, an object of one colour.
     """
 
     model: str = "mdr"
@@ -213,7 +214,7 @@ def _is_grey(image: np.ndarray, mask: np.ndarray) -> bool:
 
 
 def _status(result: Recovered) -> dict[str, object]:
-    helps = "" if result.converged else "the solver ran out of evaluations; a smaller --max-size or a cleaner mask helps"
+    trouble = "the solver ran out of evaluations, so the result may not be its best: a cleaner mask or the other --illumination may help"
     return {
         "converged": result.converged,
         "reason": result.reason,
@@ -221,7 +222,7 @@ def _status(result: Recovered) -> dict[str, object]:
         "terms": dict(result.terms.__dict__),
         "iterations": result.iterations,
         "evaluations": result.evaluations,
-        "help": helps,
+        "help": "" if result.converged else trouble,
     }
 
 

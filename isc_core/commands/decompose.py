@@ -54,7 +54,7 @@ def declare(commands: Commands) -> None:
         type=count,
         default=usual.max_size,
         metavar="N",
-        help="long side of the object, in pixels, to work at (default %(default)s; 0: the photo's)",
+        help="long side of the object, in pixels, in the maps (default %(default)s; 0: the photo's)",
     )
     parser.add_argument("--full-size", action="store_true", help="bring the result back to the photo's resolution")
     parser.add_argument("--shading-only", action="store_true", help="shape from shading: the object has one colour")
