@@ -2,9 +2,9 @@
 
   python -m benchmarks.scale [--photos DIR] [--cost]
 
-For photos whose object is at least 512 pixels long: normals at --max-size 192, 256, 384, 512 against those at 512, compared on the
-smaller grid, and the ratio of relative heights. For all: normals with 0, 16 and 64 pixels of padding. `--cost`: time and peak memory of the
-solve at full scale from 0.1 to 4 megapixels of valid pixels.
+For each photo (enlarged, where its object is shorter than 512 pixels): normals at --max-size 192, 256 and 384 against those at 512,
+compared on the smaller grid, and the ratio of relative heights; normals with 16 and 64 pixels of padding against none. `--cost`: time and
+peak memory of the solve at full scale from 0.1 to 4 megapixels of valid pixels.
 """
 
 import argparse
@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.photo import Photo, read_photo
+from isc_core.photo import Photo, mask_box, read_photo
 from isc_core.pipeline import Settings, decompose
 from isc_core.sirfs.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
@@ -63,15 +63,9 @@ def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
         normal, share = normal[:rows, :columns], share[:rows, :columns]
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
         both = small.mask[:rows, :columns] & (share > 0.99)
-        spread = [float(np.std(d.height[d.mask])) / max(read_box(d.mask)) for d in (small, largest)]
+        spread = [float(np.std(d.height[d.mask])) / max(mask_box(d.mask)[2:]) for d in (small, largest)]
         figures.append((size, angle(normal, small.normal[:rows, :columns].astype(float), both), spread[0] / spread[1]))
     return figures
-
-
-def read_box(mask: np.ndarray) -> tuple[int, int]:
-    """Height and width of the mask's box."""
-    rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
-    return int(rows[-1] - rows[0] + 1), int(columns[-1] - columns[0] + 1)
 
 
 def padding_figures(photo: Photo) -> list[tuple[int, float]]:
