@@ -20,6 +20,7 @@ from isc_core.sirfs.fitting.fit import RECIPE, FitOptions, fit_priors
 from isc_core.sirfs.fitting.prior_set import PriorSet
 from isc_core.sirfs.fitting.statistics import ObjectStatistics, collect_statistics
 from isc_core.sirfs.fitting.training import read_training_objects
+from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.settings import isc_weights, published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
@@ -52,7 +53,8 @@ def run(task: Task) -> tuple[str, str, str, list[float], float]:
     priors = task.priors.priors(task.light, 3)
     if task.method != "ours":
         priors = priors.without_silhouette()
-    result = solve(problem(truth, priors, weights), SolverOptions(threads=1))
+    options = SolverOptions(threads=1) if task.method == "ours" else SolverOptions(threads=1, lbfgs=LbfgsOptions())  # the published rule
+    result = solve(problem(truth, priors, weights), options)
     errors = scores(truth, result)
     return task.method, task.light, task.name, [getattr(errors, metric) for metric in METRICS], result.terms.total
 

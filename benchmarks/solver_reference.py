@@ -6,6 +6,7 @@
 import time
 
 from isc_core.datasets import list_objects
+from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.settings import published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
@@ -21,7 +22,7 @@ def main() -> None:
     options.add_argument("--threads", type=int, default=0)
     options.add_argument("--objects", help="comma-separated; all training objects without it")
     given = options.parse_args()
-    solver = SolverOptions(engine=given.engine, single=not given.float64, threads=given.threads)
+    solver = SolverOptions(engine=given.engine, single=not given.float64, threads=given.threads, lbfgs=LbfgsOptions())
     figures: dict[str, object] = {}
     for light in LIGHTS:
         priors = reference_priors(given.shared / "anchors" / "sirfs_reference_priors.npz", light)

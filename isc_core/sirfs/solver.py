@@ -30,14 +30,15 @@ class SolverOptions:
     """How a problem is solved; none of it changes what is solved.
 
     `engine`: "numba", "numpy", or "auto" for compiled kernels where they can be had. `single`: float32 unknowns (production)
-    or float64. `threads`: 0 for all cores. `levels`: of the height's pyramid, None for as many as make sense. `lbfgs`: the optimiser's.
+    or float64. `threads`: 0 for all cores. `levels`: of the height's pyramid, None for as many as make sense. `lbfgs`: the optimiser's; it
+    stops at twice the published tolerance, since what the last evaluations gain in loss they do not gain in accuracy.
     """
 
     engine: str = "auto"
     single: bool = True
     threads: int = 0
     levels: int | None = None
-    lbfgs: LbfgsOptions = field(default_factory=LbfgsOptions)
+    lbfgs: LbfgsOptions = field(default_factory=lambda: LbfgsOptions(loss_tolerance=1e-4))
 
 
 @dataclass(frozen=True)

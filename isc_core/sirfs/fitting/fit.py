@@ -28,19 +28,20 @@ from .whitening import parsimony_whitening
 class LightFitOptions:
     """How the light priors are fitted.
 
-    `natural_contrast`: the factors on the environments' coefficients; None fits them to the training objects' natural lights.
+    `natural_contrast`: the factors on the environments' coefficients; None fits them to the training objects' natural lights. Likelihood asks
+    for 2.6 in brightness (1.9 if colour shares the factor); held-out accuracy is best nearer 1.6, the default.
     `split_contrast`: with a factor each for brightness and colour.
     `mirror`: lights also count with left and right exchanged. `permute_natural`, `permute_laboratory`: with every order of the
     channels. `laboratory_ridge`: see `fit_light`; ten lights leave many directions unseen, so that a held-out one is much likelier
     with some. `floor`: added where the solver whitens, see `GaussianLight`.
     """
 
-    natural_contrast: Contrast | None = None
+    natural_contrast: Contrast | None = field(default_factory=lambda: Contrast(1.6, 1.0))
     split_contrast: bool = True
     mirror: bool = True
     permute_natural: bool = False
     permute_laboratory: bool = True
-    laboratory_ridge: tuple[float, float] = (0.0, 0.0)
+    laboratory_ridge: tuple[float, float] = (0.02, 0.001)
     floor: float = 0.01
 
 
