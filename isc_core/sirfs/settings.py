@@ -37,8 +37,8 @@ COLOR_LABORATORY = Weights(13.4543, 3.3636, 1.6818, 4.7568, 6.7272, 2.3784, 4, 4
 GREY_LABORATORY = Weights(6.7272, 1.4142, 1.6818, 4, 6.7272, 2.3784, 3.3636, 4.7568)
 
 
-# Chosen with the priors that ship, leave-one-object-out on ten objects; docs/results.md says how, and how sure that is. The grey set follows
-# the coloured laboratory one halfway: it has not been measured.
+# Chosen with the priors that ship, leave-one-object-out on ten objects; docs/results.md says how, and how sure that is.
+# The grey set follows the coloured laboratory one halfway: it has not been measured.
 ISC_NATURAL = replace(
     COLOR_NATURAL,
     smoothness=1.4 * COLOR_NATURAL.smoothness,

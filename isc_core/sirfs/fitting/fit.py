@@ -28,8 +28,8 @@ from .whitening import parsimony_whitening
 class LightFitOptions:
     """How the light priors are fitted.
 
-    `natural_contrast`: the factors on the environments' coefficients; None fits them to the training objects' natural lights. Likelihood asks
-    for 2.6 in brightness (1.9 if colour shares the factor); held-out accuracy is best nearer 1.6, the default.
+    `natural_contrast`: the factors on the environments' coefficients; None fits them to the training objects' natural lights.
+    Likelihood asks for 2.6 in brightness (1.9 if colour shares the factor); held-out accuracy is best nearer 1.6, the default.
     `split_contrast`: with a factor each for brightness and colour.
     `mirror`: lights also count with left and right exchanged. `permute_natural`, `permute_laboratory`: with every order of the
     channels. `laboratory_ridge`: see `fit_light`; ten lights leave many directions unseen, so that a held-out one is much likelier
