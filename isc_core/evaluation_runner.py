@@ -51,7 +51,7 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
         log_image = _log_diffuse(truth, options)
         if options.model in BASELINE_MODELS:
             guess = baselines.estimate(options.model, log_image, truth.valid)
-            return _estimate(truth, log_image, guess.height, guess.light)
+            return _estimate(truth, log_image, guess.height, guess.light, log_shading=guess.log_shading)
         announce_compilation(options.engine, monitor)
         if truth.illumination not in tables:
             tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
@@ -79,11 +79,19 @@ def _log_diffuse(truth: MitBerkeleyObject, options: RunnerOptions) -> np.ndarray
 
 
 def _estimate(
-    truth: MitBerkeleyObject, log_image: np.ndarray, height: np.ndarray, light: np.ndarray, result: SirfsResult | None = None
+    truth: MitBerkeleyObject,
+    log_image: np.ndarray,
+    height: np.ndarray,
+    light: np.ndarray,
+    result: SirfsResult | None = None,
+    log_shading: np.ndarray | None = None,
 ) -> Estimate:
-    """The maps that follow from height and light (9, 3), both in the reference's convention."""
+    """The maps that follow from height and light (9, 3), both in the reference's convention.
+
+    `log_shading` (H, W, 3): a method's own, where it has one; else that of the light on the normals.
+    """
     normal, illumination = normal_from_reference(normals(height)), light_from_reference(light)
-    log_shading = real_sh(normal) @ illumination
+    log_shading = real_sh(normal) @ illumination if log_shading is None else log_shading
     reflectance = np.where(truth.valid[..., None], np.exp(log_image - log_shading), 0.0)
     loss, evaluations = (None, None) if result is None else (result.terms.total, result.evaluations)
     return Estimate(height, normal, np.exp(log_shading), reflectance, illumination, loss, evaluations)

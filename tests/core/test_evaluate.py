@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 import scipy.io
 
-from isc_core.datasets import MitBerkeleyObject
+from isc_core.baselines import retinex
+from isc_core.datasets import MitBerkeleyObject, load_object
 from isc_core.errors import Cancelled, InputError
 from isc_core.evaluate import Estimate, EvaluationReport, evaluate, paired_bootstrap
+from isc_core.evaluation_runner import RunnerOptions, make_runner
 from isc_core.metrics import truth_normal
 from isc_core.progress import Monitor
 from isc_core.sirfs.frames import light_from_reference, reference_basis
+from isc_core.sirfs.prior_file import shipped_prior_set
 
 
 def write_set(root: Path) -> Path:
@@ -64,6 +67,15 @@ def naive(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
     del monitor
     flat = np.broadcast_to([0.0, 0.0, 1.0], truth.image.shape)
     return Estimate(np.zeros(truth.height.shape), flat, np.ones(truth.image.shape), truth.image, np.zeros((9, 3)))
+
+
+def test_a_baseline_is_scored_on_its_own_shading(root: Path) -> None:
+    """Not on what second-order light on its rough normals makes of it."""
+    truth = load_object(root, "ball", "natural")
+    answer = make_runner(RunnerOptions("retinex"), shipped_prior_set())(truth, Monitor())
+    own = retinex.log_shading(np.log(np.where(truth.valid[..., None], truth.image, 1)), truth.valid)
+    np.testing.assert_allclose(answer.shading[truth.valid], np.exp(own[truth.valid]))
+    np.testing.assert_allclose((answer.shading * answer.reflectance)[truth.valid], truth.image[truth.valid])
 
 
 @pytest.fixture(scope="module")
