@@ -48,14 +48,7 @@ ISC_NATURAL = replace(
     light=0.8 * COLOR_NATURAL.light,
     silhouette=0.3,
 )
-ISC_LABORATORY = replace(
-    COLOR_LABORATORY,
-    parsimony_sigma=0.95 * COLOR_LABORATORY.parsimony_sigma,
-    slant=0.5 * COLOR_LABORATORY.slant,
-    contour=0.48 * COLOR_LABORATORY.contour,
-    light=4 * COLOR_LABORATORY.light,
-    silhouette=0.3,
-)
+ISC_LABORATORY = replace(COLOR_LABORATORY, slant=0.5 * COLOR_LABORATORY.slant, light=4 * COLOR_LABORATORY.light, silhouette=0.3)
 ISC_GREY = replace(GREY_LABORATORY, slant=0.7 * GREY_LABORATORY.slant, light=2 * GREY_LABORATORY.light, silhouette=0.3)
 
 

@@ -29,19 +29,20 @@ class LightFitOptions:
     """How the light priors are fitted.
 
     `natural_contrast`: the factors on the environments' coefficients; None fits them to the training objects' natural lights.
-    Likelihood asks for 2.6 in brightness (1.9 if colour shares the factor); held-out accuracy is best nearer 1.6, the default.
+    Likelihood asks for 2.6 in brightness (1.9 if colour shares the factor); held-out accuracy is best nearer 1.6
+    in brightness and 0.7 in colour, the default.
     `split_contrast`: with a factor each for brightness and colour.
     `mirror`: lights also count with left and right exchanged. `permute_natural`, `permute_laboratory`: with every order of the
     channels. `laboratory_ridge`: see `fit_light`; ten lights leave many directions unseen, so that a held-out one is much likelier
     with some. `floor`: added where the solver whitens, see `GaussianLight`.
     """
 
-    natural_contrast: Contrast | None = field(default_factory=lambda: Contrast(1.6, 1.0))
+    natural_contrast: Contrast | None = field(default_factory=lambda: Contrast(1.6, 0.7))
     split_contrast: bool = True
     mirror: bool = True
     permute_natural: bool = False
     permute_laboratory: bool = True
-    laboratory_ridge: tuple[float, float] = (0.02, 0.001)
+    laboratory_ridge: tuple[float, float] = (0.05, 0.0005)
     floor: float = 0.01
 
 
@@ -59,7 +60,6 @@ class FitOptions:
     absolute: TableFitOptions = field(default_factory=TableFitOptions)
     grey_absolute: TableFitOptions = field(default_factory=lambda: TableFitOptions(smoothness=24.0, tolerance=1e-7, max_steps=3000))
     light: LightFitOptions = field(default_factory=LightFitOptions)
-
 
     def with_fitted_contrast(self) -> "FitOptions":
         """The same with the contrast of the natural lights fitted to the objects' own lights."""
