@@ -18,42 +18,28 @@ in_order = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_mode
 
 
 @in_order
-def forward_rows(first, last, zp, log_image, light, whiten_smooth, whiten_palette, geometry, whitened, palette, d3, slant):
+def forward_rows(first, last, zp, spans, log_image, light, whiten_smooth, whiten_palette, geometry, whitened, palette, d3, slant):
     """Local geometry, whitened log reflectance and the slant term of rows [first, last).
 
-    zp (H+2, W+2) height with replicated borders; log_image (H, C, W); light (9, C) already times the basis constants.
-    Fills geometry (H, 9, W): zi zj zii zjj zij n1 n2 n3 curvature; whitened, palette (H, C, W); d3 (H, W) the slant
-    term's gradient, unscaled; slant (H,) its sums.
+    zp (H+2, W+2) float64, the height with replicated borders; log_image (H, C, W); light (9, C) already times the basis constants.
+    Fills geometry (H, 9, W): zi zj n1 n2 n3 everywhere, zii zjj zij curvature within spans (H, 2); whitened, palette (H, C, W) within
+    spans; d3 (H, W) the slant term's gradient, unscaled; slant (H,) its sums.
     """
-    t = zp.dtype.type
-    one, two, eighth, quarter, half = t(1), t(2), t(0.125), t(0.25), t(0.5)
+    t = geometry.dtype.type
+    one, two, half = t(1), t(2), t(0.5)
     channels, width = log_image.shape[1], log_image.shape[2]
     soft = t(1e-4)
-    a = np.empty((channels, width), zp.dtype)
+    a = np.empty((channels, width), geometry.dtype)
     for i in range(first, last):
         up, mid, low = zp[i], zp[i + 1], zp[i + 2]
         row = geometry[i]
-        zi, zj, zii, zjj, zij, n1, n2, n3, k = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8]
+        zi, zj, n1, n2, n3 = row[0], row[1], row[5], row[6], row[7]
         for j in range(width):
-            zi[j] = ((low[j] - up[j]) + two * (low[j + 1] - up[j + 1]) + (low[j + 2] - up[j + 2])) * eighth
+            zi[j] = ((low[j] - up[j]) + 2.0 * (low[j + 1] - up[j + 1]) + (low[j + 2] - up[j + 2])) * 0.125
         for j in range(width):
-            zj[j] = ((up[j + 2] - up[j]) + two * (mid[j + 2] - mid[j]) + (low[j + 2] - low[j])) * eighth
-        for j in range(width):
-            left, centre = (up[j] - mid[j]) + (low[j] - mid[j]), (up[j + 1] - mid[j + 1]) + (low[j + 1] - mid[j + 1])
-            zii[j] = (left + two * centre + ((up[j + 2] - mid[j + 2]) + (low[j + 2] - mid[j + 2]))) * quarter
-        for j in range(width):
-            top, centre = (up[j] - up[j + 1]) + (up[j + 2] - up[j + 1]), (mid[j] - mid[j + 1]) + (mid[j + 2] - mid[j + 1])
-            zjj[j] = (top + two * centre + ((low[j] - low[j + 1]) + (low[j + 2] - low[j + 1]))) * quarter
-        for j in range(width):
-            zij[j] = ((low[j + 2] - low[j]) - (up[j + 2] - up[j])) * quarter
+            zj[j] = ((up[j + 2] - up[j]) + 2.0 * (mid[j + 2] - mid[j]) + (low[j + 2] - low[j])) * 0.125
         for j in range(width):
             n3[j] = one / np.sqrt(one + zi[j] * zi[j] + zj[j] * zj[j])
-        for j in range(width):
-            k[j] = (
-                ((one + zi[j] * zi[j]) * zjj[j] - two * zi[j] * zj[j] * zij[j] + (one + zj[j] * zj[j]) * zii[j])
-                * (n3[j] * n3[j] * n3[j])
-                * half
-            )
         for j in range(width):
             n1[j] = -zi[j] * n3[j]
         for j in range(width):
@@ -66,19 +52,40 @@ def forward_rows(first, last, zp, log_image, light, whiten_smooth, whiten_palett
             total += root
             dslant[j] = -x / (root * n3[j])
         slant[i] = total
+        start, stop = spans[i, 0], spans[i, 1]
+        count = stop - start
+        if count <= 0:
+            continue
+        up, mid, low = zp[i, start : stop + 2], zp[i + 1, start : stop + 2], zp[i + 2, start : stop + 2]
+        zi, zj, zii, zjj, zij = row[0, start:stop], row[1, start:stop], row[2, start:stop], row[3, start:stop], row[4, start:stop]
+        n1, n2, n3, k = row[5, start:stop], row[6, start:stop], row[7, start:stop], row[8, start:stop]
+        for j in range(count):
+            left, centre = (up[j] - mid[j]) + (low[j] - mid[j]), (up[j + 1] - mid[j + 1]) + (low[j + 1] - mid[j + 1])
+            zii[j] = (left + 2.0 * centre + ((up[j + 2] - mid[j + 2]) + (low[j + 2] - mid[j + 2]))) * 0.25
+        for j in range(count):
+            top, centre = (up[j] - up[j + 1]) + (up[j + 2] - up[j + 1]), (mid[j] - mid[j + 1]) + (mid[j + 2] - mid[j + 1])
+            zjj[j] = (top + 2.0 * centre + ((low[j] - low[j + 1]) + (low[j + 2] - low[j + 1]))) * 0.25
+        for j in range(count):
+            zij[j] = ((low[j + 2] - low[j]) - (up[j + 2] - up[j])) * 0.25
+        for j in range(count):
+            k[j] = (
+                ((one + zi[j] * zi[j]) * zjj[j] - two * zi[j] * zj[j] * zij[j] + (one + zj[j] * zj[j]) * zii[j])
+                * (n3[j] * n3[j] * n3[j])
+                * half
+            )
         for c in range(channels):
             l0, l1, l2, l3, l4 = light[0, c], light[1, c], light[2, c], light[3, c], light[4, c]
             l5, l6, l7, l8 = light[5, c], light[6, c], light[7, c], light[8, c]
-            ac, image = a[c], log_image[i, c]
-            for j in range(width):
+            ac, image = a[c], log_image[i, c, start:stop]
+            for j in range(count):
                 ac[j] = image[j] - (
                     l0
                     + n1[j] * (l3 + l4 * n2[j] + l7 * n3[j] + l8 * n1[j])
                     + n2[j] * (l1 + l5 * n3[j] - l8 * n2[j])
                     + n3[j] * (l2 + l6 * n3[j])
                 )
-        _mix(a, whiten_smooth, whitened[i])
-        _mix(a, whiten_palette, palette[i])
+        _mix(a[:, :count], whiten_smooth, whitened[i, :, start:stop])
+        _mix(a[:, :count], whiten_palette, palette[i, :, start:stop])
 
 
 @compiled
@@ -396,79 +403,98 @@ def silhouette_rows(first, last, geometry, expected, strength, gradient, sums):
 
 @compiled
 def backward_rows(
-    first, last, geometry, light, whiten_smooth, whiten_palette, g_smooth, g_palette, g_curvature, scales, d3, contour, light_sums, out
-):
+    first, last, geometry, spans, light, whiten_smooth, whiten_palette, g_smooth, g_palette, g_curvature, scales, d3, contour, light_sums,
+    out,
+):  # fmt: skip
     """Gradients of the first and second derivatives of the height, and of the light, for rows [first, last).
 
-    g_smooth, g_palette (H, C, W); g_curvature (H, W); scales: (smoothness, palette, curvature, slant); contour (2, H, W);
-    light_sums (H, 9, C), of monomials of the normal; out (5, H + 4, W + 4) with zero borders of two.
+    g_smooth, g_palette (H, C, W) and g_curvature (H, W) matter within spans (H, 2); scales: (smoothness, palette, curvature, slant);
+    contour (2, H, W); light_sums (H, 9, C), of monomials of the normal; out (5, H + 4, W + 4) with zero borders of two, and zero outside
+    spans in its last three.
     """
     t = geometry.dtype.type
-    one, two, three, half = t(1), t(2), t(3), t(0.5)
+    one, two, three, half, zero = t(1), t(2), t(3), t(0.5), t(0)
     channels, width = g_smooth.shape[1], g_smooth.shape[2]
     k_smooth, k_palette, k_curvature, k_slant = t(scales[0]), t(scales[1]), t(scales[2]), t(scales[3])
     m_smooth, m_palette = whiten_smooth.T * k_smooth, whiten_palette.T * k_palette
-    e = np.empty((channels, width), geometry.dtype)
-    f = np.empty((channels, width), geometry.dtype)
-    d1 = np.empty(width, geometry.dtype)
-    d2 = np.empty(width, geometry.dtype)
-    dn3 = np.empty(width, geometry.dtype)
-    dk = np.empty(width, geometry.dtype)
-    along = np.empty(width, geometry.dtype)
-    cross = np.empty(width, geometry.dtype)
+    shape = (channels, width)
+    e_all, f_all = np.empty(shape, geometry.dtype), np.empty(shape, geometry.dtype)
+    d1_all, d2_all, dn3_all = np.empty(width, geometry.dtype), np.empty(width, geometry.dtype), np.empty(width, geometry.dtype)
+    along_all, dk_all, cross = np.empty(width, geometry.dtype), np.empty(width, geometry.dtype), np.empty(width, geometry.dtype)
     for i in range(first, last):
         row = geometry[i]
-        zi, zj, zii, zjj, zij, n1, n2, n3, curved = row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8]
-        _mix(g_smooth[i], m_smooth, e)
-        _mix(g_palette[i], m_palette, f)
+        start, stop = spans[i, 0], spans[i, 1]
+        count = stop - start
         c1, c2, slant = contour[0, i], contour[1, i], d3[i]
         for j in range(width):
-            d1[j] = c1[j]
+            d1_all[j] = c1[j]
         for j in range(width):
-            d2[j] = c2[j]
+            d2_all[j] = c2[j]
         for j in range(width):
-            dn3[j] = slant[j] * k_slant
-        for c in range(channels):
-            ec, fc = e[c], f[c]
-            for j in range(width):
-                ec[j] = -(ec[j] + fc[j])  # gradient of the log shading
-            _light_sums(ec, n1, n2, n3, light_sums[i, :, c])
-            l1, l2, l3, l4 = light[1, c], light[2, c], light[3, c], light[4, c]
-            l5, l6, l7, l8 = light[5, c], light[6, c], light[7, c], light[8, c]
-            for j in range(width):
-                d1[j] += ec[j] * (l3 + l4 * n2[j] + l7 * n3[j] + two * l8 * n1[j])
-            for j in range(width):
-                d2[j] += ec[j] * (l1 + l4 * n1[j] + l5 * n3[j] - two * l8 * n2[j])
-            for j in range(width):
-                dn3[j] += ec[j] * (l2 + l5 * n2[j] + l7 * n1[j] + two * l6 * n3[j])
-        gk = g_curvature[i]
+            dn3_all[j] = slant[j] * k_slant
+        if count > 0:
+            n1, n2, n3 = row[5, start:stop], row[6, start:stop], row[7, start:stop]
+            d1, d2, dn3 = d1_all[start:stop], d2_all[start:stop], dn3_all[start:stop]
+            e, f = e_all[:, :count], f_all[:, :count]
+            _mix(g_smooth[i, :, start:stop], m_smooth, e)
+            _mix(g_palette[i, :, start:stop], m_palette, f)
+            for c in range(channels):
+                ec, fc = e[c], f[c]
+                for j in range(count):
+                    ec[j] = -(ec[j] + fc[j])  # gradient of the log shading
+                _light_sums(ec, n1, n2, n3, light_sums[i, :, c])
+                l1, l2, l3, l4 = light[1, c], light[2, c], light[3, c], light[4, c]
+                l5, l6, l7, l8 = light[5, c], light[6, c], light[7, c], light[8, c]
+                for j in range(count):
+                    d1[j] += ec[j] * (l3 + l4 * n2[j] + l7 * n3[j] + two * l8 * n1[j])
+                for j in range(count):
+                    d2[j] += ec[j] * (l1 + l4 * n1[j] + l5 * n3[j] - two * l8 * n2[j])
+                for j in range(count):
+                    dn3[j] += ec[j] * (l2 + l5 * n2[j] + l7 * n1[j] + two * l6 * n3[j])
+        else:
+            light_sums[i] = 0.0
+        zi, zj, n3 = row[0], row[1], row[7]
         for j in range(width):
-            dk[j] = gk[j] * k_curvature
+            along_all[j] = zi[j] * d1_all[j] + zj[j] * d2_all[j] - dn3_all[j]
         for j in range(width):
-            along[j] = zi[j] * d1[j] + zj[j] * d2[j] - dn3[j]
+            along_all[j] = along_all[j] * n3[j] * n3[j] * n3[j]
+        if count > 0:
+            gk, curved, n3 = g_curvature[i, start:stop], row[8, start:stop], row[7, start:stop]
+            dk, along = dk_all[:count], along_all[start:stop]
+            for j in range(count):
+                dk[j] = gk[j] * k_curvature
+            for j in range(count):
+                along[j] -= three * curved[j] * n3[j] * n3[j] * dk[j]
+            for j in range(count):
+                dk[j] = dk[j] * n3[j] * n3[j] * n3[j]
+        n3 = row[7]
+        down, right = out[0, i + 2, 2 : width + 2], out[1, i + 2, 2 : width + 2]
         for j in range(width):
-            along[j] = along[j] * n3[j] * n3[j] * n3[j] - three * curved[j] * n3[j] * n3[j] * dk[j]
+            down[j] = zi[j] * along_all[j] - n3[j] * d1_all[j]
         for j in range(width):
-            dk[j] = dk[j] * n3[j] * n3[j] * n3[j]
-        for j in range(width):
+            right[j] = zj[j] * along_all[j] - n3[j] * d2_all[j]
+        if count <= 0:
+            continue
+        zi, zj, zii, zjj, zij = row[0, start:stop], row[1, start:stop], row[2, start:stop], row[3, start:stop], row[4, start:stop]
+        dk = dk_all[:count]
+        down, right = down[start:stop], right[start:stop]
+        for j in range(count):
             cross[j] = dk[j] * (zi[j] * zjj[j] - zj[j] * zij[j])
-        o = out[0, i + 2, 2 : width + 2]
-        for j in range(width):
-            o[j] = cross[j] + zi[j] * along[j] - n3[j] * d1[j]
-        for j in range(width):
+        for j in range(count):
+            down[j] += cross[j]
+        for j in range(count):
             cross[j] = dk[j] * (zj[j] * zii[j] - zi[j] * zij[j])
-        o = out[1, i + 2, 2 : width + 2]
-        for j in range(width):
-            o[j] = cross[j] + zj[j] * along[j] - n3[j] * d2[j]
-        o = out[2, i + 2, 2 : width + 2]
-        for j in range(width):
+        for j in range(count):
+            right[j] += cross[j]
+        o = out[2, i + 2, start + 2 : stop + 2]
+        for j in range(count):
             o[j] = half * dk[j] * (one + zj[j] * zj[j])
-        o = out[3, i + 2, 2 : width + 2]
-        for j in range(width):
+        o = out[3, i + 2, start + 2 : stop + 2]
+        for j in range(count):
             o[j] = half * dk[j] * (one + zi[j] * zi[j])
-        o = out[4, i + 2, 2 : width + 2]
-        for j in range(width):
-            o[j] = -dk[j] * zi[j] * zj[j]
+        o = out[4, i + 2, start + 2 : stop + 2]
+        for j in range(count):
+            o[j] = zero - dk[j] * zi[j] * zj[j]
 
 
 @compiled

@@ -82,9 +82,9 @@ class NumbaEngine:
         t = self.dtype
         height, width = self.problem.valid.shape
         channels, blocks = self.problem.log_image.shape[2], len(self._blocks)
-        self._padded = np.empty((height + 2, width + 2), t)
-        self._geometry = np.empty((height, 9, width), t)
-        self._whitened, self._palette = np.empty((2, height, channels, width), t)
+        self._padded = np.empty((height + 2, width + 2))  # float64: in float32 the rounding of heights would drown their curvature
+        self._geometry = np.zeros((height, 9, width), t)
+        self._whitened, self._palette = np.zeros((2, height, channels, width), t)
         self._g_smooth, self._g_palette = np.zeros((2, height, channels, width), t)
         self._d3, self._g_curvature = np.zeros((2, height, width), t)
         self._contour = np.zeros((2, height, width), t)
@@ -149,7 +149,7 @@ class NumbaEngine:
 
     def _forward(self, light: np.ndarray, first: int, last: int) -> None:
         kernels.forward_rows(
-            first, last, self._padded, self._log_image, light, self._whiten_smooth, self._whiten_palette,
+            first, last, self._padded, self._spans, self._log_image, light, self._whiten_smooth, self._whiten_palette,
             self._geometry, self._whitened, self._palette, self._d3, self._slant,
         )  # fmt: skip
 
@@ -248,6 +248,6 @@ class NumbaEngine:
 
     def _backward(self, light: np.ndarray, first: int, last: int) -> None:
         kernels.backward_rows(
-            first, last, self._geometry, light, self._whiten_smooth, self._whiten_palette, self._g_smooth, self._g_palette,
+            first, last, self._geometry, self._spans, light, self._whiten_smooth, self._whiten_palette, self._g_smooth, self._g_palette,
             self._g_curvature, self._scales(), self._d3, self._contour, self._light_sums, self._derivatives,
         )  # fmt: skip

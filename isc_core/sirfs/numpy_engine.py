@@ -19,7 +19,7 @@ class NumpyEngine:
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
         """The objective at `height` (H, W) and `light` (9, C), with its gradients."""
         p = self.problem
-        g = surface.geometry(np.ascontiguousarray(height, self.dtype))
+        g = surface.geometry(np.asarray(height, float), self.dtype)
         functions = basis(g.n1, g.n2, g.n3)
         log_reflectance = self._log_image - np.einsum("khw,kc->hwc", functions, light.astype(self.dtype))
         log_reflectance[~p.valid] = 0

@@ -107,13 +107,14 @@ class _Tools:
         return CompiledAlgebra(self._workers)
 
     def synthesise(self, levels: list[np.ndarray]) -> np.ndarray:
+        """The height in float64, whatever the levels are stored in: a rounded coarse level still gives a smooth height."""
+        height = levels[-1].astype(float)
         if not self.compiled:
-            return synthesise(levels)
+            return synthesise([*levels[:-1], height])
         from .vector_kernels import up_add
 
-        height = levels[-1]
         for level in levels[-2::-1]:
-            out = np.empty_like(level)
+            out = np.empty(level.shape)
             up_add(height, level, out)
             height = out
         return height

@@ -11,6 +11,7 @@ Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: orthographi
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from .contour import Contour
 from .problem import PAIR_OFFSETS, DepthObservation
@@ -38,10 +39,10 @@ class Geometry:
     curvature: np.ndarray
 
 
-def geometry(height: np.ndarray) -> Geometry:
-    """The local geometry of `height` (H, W)."""
+def geometry(height: np.ndarray, dtype: npt.DTypeLike = None) -> Geometry:
+    """The local geometry of `height` (H, W), in `dtype` (the height's if None) but for differences of heights, which keep the height's."""
     padded = np.pad(height, 1, mode="edge")
-    zi, zj, zii, zjj, zij = (derivative(padded, s) for s in DERIVATIVES)
+    zi, zj, zii, zjj, zij = (derivative(padded, s).astype(dtype or height.dtype, copy=False) for s in DERIVATIVES)
     zi2, zj2 = zi * zi, zj * zj
     n3 = 1 / np.sqrt(1 + zi2 + zj2)
     curvature = ((1 + zi2) * zjj - 2 * zi * zj * zij + (1 + zj2) * zii) * (n3 * n3 * n3) / 2

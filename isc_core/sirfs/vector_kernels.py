@@ -96,12 +96,12 @@ def down(fine, out):
 @_compiled
 def up_add(coarse, fine, out):
     """out = fine + the adjoint of `down` applied to `coarse`; see `pyramid.up`."""
-    t = fine.dtype.type
+    t = coarse.dtype.type
     a, b = t(TAPS[0]), t(TAPS[1])
     height, width = fine.shape
     rows, columns = coarse.shape
-    wide = np.empty((2 * rows + 2, 2 * columns + 2), fine.dtype)  # the adjoint before its borders are folded back
-    line = np.empty(columns, fine.dtype)
+    wide = np.empty((2 * rows + 2, 2 * columns + 2), coarse.dtype)  # the adjoint before its borders are folded back
+    line = np.empty(columns, coarse.dtype)
     for i in range(2 * rows + 2):
         # padded row i takes from coarse row k by tap i - 2k in 0..3
         k = i // 2
