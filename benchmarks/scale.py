@@ -19,6 +19,7 @@ import numpy as np
 
 from isc_core.photo import Photo, mask_box, read_photo
 from isc_core.pipeline import Settings, decompose
+from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.resampling import resample_inside
@@ -87,7 +88,7 @@ def cost_of(megapixels: float) -> None:
     paint = np.where(((5 * i).astype(int) + (5 * j).astype(int)) % 2 == 0, 0.6, 0.3)
     image = np.stack([paint * c * (0.2 + 0.8 * np.maximum(0.3 * -i - 0.4 * j + 0.85 * n3, 0)) for c in (1, 0.8, 0.6)], -1)
     priors = shipped_prior_set().priors("natural", 3)
-    options = RecoverOptions(solve_size=0, solver=SolverOptions())
+    options = RecoverOptions(solve_size=0, solver=SolverOptions(lbfgs=LbfgsOptions(iterations=30, loss_tolerance=0)))
     small = mask[:: max(1, radius // 60), :: max(1, radius // 60)]
     recover(image[:: max(1, radius // 60), :: max(1, radius // 60)], small, 1e-5, priors, isc_weights("natural", 3), options)  # compiles
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -36,7 +36,7 @@ def light_cost(light: np.ndarray, prior: Light, weight: float) -> tuple[float, n
     `light`: (9, C). The term is weight / (9 C) * 0.5 (l - mean)' covariance^-1 (l - mean), l the channels stacked.
     """
     away = stack(light) - prior.mean
-    pull = np.linalg.solve(prior.covariance, away)
+    pull = np.einsum("ij,j->i", prior.precision, away)
     scale = weight / away.size
     return 0.5 * scale * float(away @ pull), unstack(scale * pull, light.shape[1])
 

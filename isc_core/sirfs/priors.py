@@ -5,6 +5,7 @@ All are in the convention of the SIRFS reference (Barron & Malik 2015, doi:10.11
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -31,6 +32,12 @@ class Light:
     covariance: np.ndarray
     unwhiten: np.ndarray
     offset: np.ndarray
+
+    @cached_property
+    def precision(self) -> np.ndarray:
+        """The inverse covariance, computed once: a library's solver would wake its threads at every evaluation."""
+        inverse = np.linalg.inv(self.covariance)
+        return (inverse + inverse.T) / 2
 
 
 @dataclass(frozen=True)

@@ -158,7 +158,7 @@ class _Unknowns:
         if self._known_light is not None:
             return self._known_light
         prior = self._problem.priors.light
-        stacked = prior.unwhiten @ self.x[self._edges[-1] :].astype(float) + prior.offset
+        stacked = np.einsum("ij,j->i", prior.unwhiten, self.x[self._edges[-1] :].astype(float)) + prior.offset
         return unstack(stacked, self.channels)
 
     def set_light(self, light: np.ndarray) -> None:
@@ -173,7 +173,7 @@ class _Unknowns:
         if self._known_height is None:
             self._tools.analyse(result.height_gradient, self.levels(gradient))
         if self._known_light is None:
-            gradient[self._edges[-1] :] = self._problem.priors.light.unwhiten.T @ stack(result.light_gradient)
+            gradient[self._edges[-1] :] = np.einsum("ji,j->i", self._problem.priors.light.unwhiten, stack(result.light_gradient))
         self.terms = result.terms
         return result.terms.total
 
