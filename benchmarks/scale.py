@@ -60,7 +60,7 @@ def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
         small = results[size]
         factor = small.mask.shape[0] / largest.mask.shape[0]
         normal, share = resample_inside(largest.normal.astype(float), largest.mask, factor)
-        rows, columns = (min(a, b) for a, b in zip(normal.shape, small.normal.shape, strict=False))
+        rows, columns = (min(a, b) for a, b in zip(normal.shape[:2], small.mask.shape, strict=True))
         normal, share = normal[:rows, :columns], share[:rows, :columns]
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
         both = small.mask[:rows, :columns] & (share > 0.99)

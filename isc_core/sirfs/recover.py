@@ -19,7 +19,7 @@ from .silhouette import silhouette_field
 from .solver import SolverOptions, solve
 
 MARGIN = 20
-SOLVE_SIZE = 320
+SOLVE_SIZE = 256
 
 
 @dataclass(frozen=True)
