@@ -5,7 +5,7 @@
 
 Both lights of the object are left out, so its shape, paint and lights are unknown to the priors. The statistics of the ten objects are
 condensed once; a fold is a fit to nine of them. The comparison is paired: the ratio of geometric means with a 95 % bootstrap interval
-over objects, and once more over families of like objects (cups, frogs, papers and teabags have one member each among these ten).
+over objects. Each is a family of its own: of the cups, frogs, papers and teabags these ten have one member each.
 """
 
 from concurrent.futures import ProcessPoolExecutor
