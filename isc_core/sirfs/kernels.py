@@ -413,14 +413,14 @@ def backward_rows(
     spans in its last three.
     """
     t = geometry.dtype.type
-    one, two, three, half, zero = t(1), t(2), t(3), t(0.5), t(0)
+    two, three = t(2), t(3)
     channels, width = g_smooth.shape[1], g_smooth.shape[2]
     k_smooth, k_palette, k_curvature, k_slant = t(scales[0]), t(scales[1]), t(scales[2]), t(scales[3])
     m_smooth, m_palette = whiten_smooth.T * k_smooth, whiten_palette.T * k_palette
     shape = (channels, width)
     e_all, f_all = np.empty(shape, geometry.dtype), np.empty(shape, geometry.dtype)
     d1_all, d2_all, dn3_all = np.empty(width, geometry.dtype), np.empty(width, geometry.dtype), np.empty(width, geometry.dtype)
-    along_all, dk_all, cross = np.empty(width, geometry.dtype), np.empty(width, geometry.dtype), np.empty(width, geometry.dtype)
+    along_all, dk_all = np.empty(width, geometry.dtype), np.empty(width, geometry.dtype)
     for i in range(first, last):
         row = geometry[i]
         start, stop = spans[i, 0], spans[i, 1]
@@ -473,28 +473,37 @@ def backward_rows(
             down[j] = zi[j] * along_all[j] - n3[j] * d1_all[j]
         for j in range(width):
             right[j] = zj[j] * along_all[j] - n3[j] * d2_all[j]
-        if count <= 0:
-            continue
-        zi, zj, zii, zjj, zij = row[0, start:stop], row[1, start:stop], row[2, start:stop], row[3, start:stop], row[4, start:stop]
-        dk = dk_all[:count]
-        down, right = down[start:stop], right[start:stop]
-        for j in range(count):
-            cross[j] = dk[j] * (zi[j] * zjj[j] - zj[j] * zij[j])
-        for j in range(count):
-            down[j] += cross[j]
-        for j in range(count):
-            cross[j] = dk[j] * (zj[j] * zii[j] - zi[j] * zij[j])
-        for j in range(count):
-            right[j] += cross[j]
-        o = out[2, i + 2, start + 2 : stop + 2]
-        for j in range(count):
-            o[j] = half * dk[j] * (one + zj[j] * zj[j])
-        o = out[3, i + 2, start + 2 : stop + 2]
-        for j in range(count):
-            o[j] = half * dk[j] * (one + zi[j] * zi[j])
-        o = out[4, i + 2, start + 2 : stop + 2]
-        for j in range(count):
-            o[j] = zero - dk[j] * zi[j] * zj[j]
+        if count > 0:
+            _curvature_derivatives(row[:, start:stop], dk_all[:count], out[:, i + 2, start + 2 : stop + 2])
+
+
+@compiled
+def _curvature_derivatives(row, dk, out):
+    """Adds what the curvature's gradient dk (W,), times n3^3, asks of the five derivatives in `out` (5, W); the last three are set."""
+    t = row.dtype.type
+    one, half = t(1), t(0.5)
+    zi, zj, zii, zjj, zij = row[0], row[1], row[2], row[3], row[4]
+    count = len(dk)
+    cross = np.empty(count, row.dtype)
+    for j in range(count):
+        cross[j] = dk[j] * (zi[j] * zjj[j] - zj[j] * zij[j])
+    o = out[0]
+    for j in range(count):
+        o[j] += cross[j]
+    for j in range(count):
+        cross[j] = dk[j] * (zj[j] * zii[j] - zi[j] * zij[j])
+    o = out[1]
+    for j in range(count):
+        o[j] += cross[j]
+    o = out[2]
+    for j in range(count):
+        o[j] = half * dk[j] * (one + zj[j] * zj[j])
+    o = out[3]
+    for j in range(count):
+        o[j] = half * dk[j] * (one + zi[j] * zi[j])
+    o = out[4]
+    for j in range(count):
+        o[j] = -dk[j] * zi[j] * zj[j]
 
 
 @compiled
