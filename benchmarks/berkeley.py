@@ -57,11 +57,6 @@ def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:
     return score(truth, height=result.height, normal=normal, shading=shading, reflectance=truth.image / shading, light=light)
 
 
-def geometric_mean(values: list[float]) -> float:
-    """The geometric mean."""
-    return float(np.exp(np.mean(np.log(values))))
-
-
 def write_json(path: Path | None, figures: object) -> None:
     """Writes the figures if a path was given."""
     if path is not None:

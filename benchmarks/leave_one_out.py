@@ -16,6 +16,7 @@ import numpy as np
 
 from isc_core.datasets import load_natural_lights
 from isc_core.evaluate import paired_bootstrap
+from isc_core.metrics import geometric_mean
 from isc_core.sirfs.fitting.fit import RECIPE, FitOptions, fit_priors
 from isc_core.sirfs.fitting.prior_set import PriorSet
 from isc_core.sirfs.fitting.statistics import ObjectStatistics, collect_statistics
@@ -24,7 +25,7 @@ from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.settings import isc_weights, published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .berkeley import LIGHTS, geometric_mean, parser, problem, scores, training_object, write_json
+from .berkeley import LIGHTS, parser, problem, scores, training_object, write_json
 
 METHODS = ("B", "B, lights scaled", "ours")
 METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")

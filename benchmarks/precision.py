@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.datasets import list_objects
+from isc_core.metrics import geometric_mean
 from isc_core.sirfs.numba_engine import NumbaEngine
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.prior_file import shipped_prior_set
@@ -19,7 +20,7 @@ from isc_core.sirfs.settings import isc_weights
 from isc_core.sirfs.solver import SirfsResult, SolverOptions, solve
 from isc_core.sirfs.workers import Workers
 
-from .berkeley import LIGHTS, geometric_mean, parser, problem, scores, training_object
+from .berkeley import LIGHTS, parser, problem, scores, training_object
 
 
 def timed(function: Callable[[], SirfsResult]) -> tuple[SirfsResult, float]:

@@ -6,11 +6,12 @@
 import time
 
 from isc_core.datasets import list_objects
+from isc_core.metrics import geometric_mean
 from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.settings import published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .berkeley import LIGHTS, geometric_mean, parser, problem, reference_results, scores, training_object, write_json
+from .berkeley import LIGHTS, parser, problem, reference_results, scores, training_object, write_json
 from .reference_priors import reference_priors
 
 

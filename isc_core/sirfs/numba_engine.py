@@ -18,20 +18,19 @@ from .workers import Workers
 
 _ROWS_A_BLOCK = 16
 _MOST_BLOCKS = 16
+_MONOMIAL_SCALES = np.array([C4, 2 * C2, 2 * C2, 2 * C2, 2 * C1, 2 * C1, C3, 2 * C1, C1])
 
 
 def _fold_light(light: np.ndarray) -> np.ndarray:
     """The light (9, C) as coefficients of 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
-    scale = np.array([C4, 2 * C2, 2 * C2, 2 * C2, 2 * C1, 2 * C1, C3, 2 * C1, C1])
-    folded = light * scale[:, None]
+    folded = light * _MONOMIAL_SCALES[:, None]
     folded[0] -= C5 * light[6]
     return folded
 
 
 def _unfold_light_gradient(sums: np.ndarray) -> np.ndarray:
     """The adjoint of `_fold_light`."""
-    scale = np.array([C4, 2 * C2, 2 * C2, 2 * C2, 2 * C1, 2 * C1, C3, 2 * C1, C1])
-    gradient = sums * scale[:, None]
+    gradient = sums * _MONOMIAL_SCALES[:, None]
     gradient[6] -= C5 * sums[0]
     return gradient
 
@@ -117,7 +116,7 @@ class NumbaEngine:
             self._each_block(self._silhouette_rows)
         contour = self._contour_term()
         self._each_block(partial(self._backward, folded))
-        self._workers.run([partial(kernels.adjoint_rows, a, b, self._derivatives, self._wide) for a, b in self._wide_blocks()])
+        self._workers.run([partial(kernels.adjoint_rows, a, b, self._derivatives, self._wide) for a, b in self._shares(len(self._wide))])
         gradient = fold_border(self._wide)
         light_gradient = _unfold_light_gradient(self._light_sums.sum(axis=0))
         cost, pull = light_cost(np.asarray(light, float), p.priors.light, p.weights.light)
@@ -136,16 +135,12 @@ class NumbaEngine:
         z[:, 0], z[:, -1] = z[:, 1], z[:, -2]
 
     def _each_block(self, task: Callable[[int, int], None]) -> None:
-        self._workers.run([partial(task, a, b) for a, b in self._shares()])
+        self._workers.run([partial(task, a, b) for a, b in self._shares(self._valid.shape[0])])
 
-    def _shares(self) -> list[tuple[int, int]]:
+    def _shares(self, rows: int) -> list[tuple[int, int]]:
         """Rows for kernels whose result does not depend on how rows are split: one share a thread."""
-        height, n = self._valid.shape[0], self._workers.threads
-        return [(height * k // n, height * (k + 1) // n) for k in range(n)]
-
-    def _wide_blocks(self) -> list[tuple[int, int]]:
-        height, n = self._valid.shape[0] + 2, self._workers.threads
-        return [(height * k // n, height * (k + 1) // n) for k in range(n)]
+        n = self._workers.threads
+        return [(rows * k // n, rows * (k + 1) // n) for k in range(n)]
 
     def _forward(self, light: np.ndarray, first: int, last: int) -> None:
         kernels.forward_rows(
