@@ -7,13 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.datasets import MitBerkeleyObject, load_object
+from isc_core.evaluation_runner import pose
 from isc_core.metrics import Scores, score
-from isc_core.sirfs.contour import occluding_contour
 from isc_core.sirfs.frames import light_from_reference, normal_from_reference, real_sh
 from isc_core.sirfs.priors import Priors
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
-from isc_core.sirfs.silhouette import silhouette_field
 from isc_core.sirfs.solver import SirfsResult
 from isc_core.sirfs.stencils import normals
 
@@ -44,9 +43,7 @@ def reference_results(shared: Path, illumination: str) -> dict[str, dict[str, fl
 def problem(truth: MitBerkeleyObject, priors: Priors, weights: Weights) -> Problem:
     """The problem as the reference program poses it: the data set's crop, contour points near its edge dropped."""
     log_image = np.where(truth.valid[..., None], np.log(np.where(truth.image > 0, truth.image, 1)), 0.0)
-    field = None if priors.silhouette is None else silhouette_field(truth.mask, priors.silhouette)
-    contour = occluding_contour(truth.mask, drop_near_edge=True)
-    return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field)
+    return pose(truth, log_image, priors, weights)
 
 
 def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:

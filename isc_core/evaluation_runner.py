@@ -20,7 +20,7 @@ from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
 from .sirfs.kernel_cache import announce_compilation
 from .sirfs.priors import Priors
 from .sirfs.problem import Problem
-from .sirfs.settings import isc_weights
+from .sirfs.settings import Weights, isc_weights
 from .sirfs.silhouette import silhouette_field
 from .sirfs.solver import SirfsResult, SolverOptions, solve
 from .sirfs.stencils import normals
@@ -61,12 +61,16 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
     return run
 
 
-def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, options: RunnerOptions, monitor: Monitor) -> SirfsResult:
-    """SIRFS on one object of the set; `log_image` (H, W, 3) is read where `truth.valid`. Looks at nothing else but `truth.mask`."""
+def pose(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, weights: Weights) -> Problem:
+    """The problem as the reference program poses it; `log_image` (H, W, 3) is read where `truth.valid`."""
     contour = occluding_contour(truth.mask, drop_near_edge=True)
     field = None if priors.silhouette is None else silhouette_field(truth.mask, priors.silhouette)
-    weights = isc_weights(truth.illumination, 3)
-    problem = Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field)
+    return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field)
+
+
+def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, options: RunnerOptions, monitor: Monitor) -> SirfsResult:
+    """SIRFS on one object of the set; `log_image` (H, W, 3) is read where `truth.valid`. Looks at nothing else but `truth.mask`."""
+    problem = pose(truth, log_image, priors, isc_weights(truth.illumination, 3))
     return solve(problem, SolverOptions(engine=options.engine, threads=options.threads), monitor=monitor)
 
 
