@@ -4,10 +4,10 @@ import argparse
 from pathlib import Path
 
 from ..atomic import require_writable_file
+from ..compiled import ensure_cache_folder
 from ..datasets import list_objects, load_natural_lights
 from ..errors import InputError
 from ..progress import Monitor
-from ..sirfs.kernel_cache import ensure_cache_folder
 from .options import Commands, add_command, hints, names
 
 _EXAMPLES = """  isc fit-priors DATA -o priors.npz

@@ -1,14 +1,9 @@
-"""Where compiled kernels are kept between runs, and whether the next solve has to compile them first.
+"""Whether the next solve has to compile its kernels first."""
 
-Numba keeps them beside the source where that can be written, else in the user's cache folder, or where NUMBA_CACHE_DIR says.
-"""
-
-import atexit
-import shutil
 import sys
-import tempfile
 from pathlib import Path
 
+from ..compiled import ensure_cache_folder
 from ..progress import Monitor
 from .solver import compiled_engine_available
 
@@ -33,21 +28,3 @@ def kernels_compiled() -> bool:
     pattern = f"{source.stem}.{code.co_name}-{code.co_firstlineno}.py{sys.version_info[0]}{sys.version_info[1]}*.nbi"
     found = Path(str(kernel.stats.cache_path)).glob(pattern)
     return any(index.stat().st_mtime >= source.stat().st_mtime for index in found)
-
-
-def ensure_cache_folder() -> None:
-    """Gives Numba a folder that lasts as long as this process, where it finds none to write to: it would refuse to work."""
-    if not compiled_engine_available():
-        return
-    import numba
-
-    try:
-        numba.njit(cache=True)(_probe)
-    except RuntimeError:
-        folder = tempfile.mkdtemp(prefix="isc-kernels-")
-        atexit.register(shutil.rmtree, folder, ignore_errors=True)
-        setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010 (the module's own declaration of it is dynamic)
-
-
-def _probe() -> None:
-    """Lies in the kernels' folder, so that Numba looks for a cache where it will look for theirs."""

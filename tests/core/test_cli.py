@@ -438,7 +438,7 @@ def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
     """Numba refuses functions that it cannot cache; here it is forbidden every folder but one that is named, and none is."""
     pytest.importorskip("numba")
     check = (
-        "import os, numba; from isc_core.sirfs.kernel_cache import ensure_cache_folder; ensure_cache_folder()\n"
+        "import os, numba; from isc_core.compiled import ensure_cache_folder; ensure_cache_folder()\n"
         "from isc_core.sirfs import kernels; print(kernels.forward_rows.stats.cache_path)"
     )
     environment = {**os.environ, "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator", "TMPDIR": str(tmp_path)}

@@ -1,0 +1,41 @@
+"""Loops over pixels that NumPy cannot express, compiled where Numba is there and plain Python, slower but alike, where it is not.
+
+Compiled code is kept between runs: beside the source where that can be written, else in the user's cache folder, or where
+NUMBA_CACHE_DIR says; where none of them can be written, in a folder that lasts as long as the process.
+"""
+
+import atexit
+import shutil
+import tempfile
+from collections.abc import Callable
+from typing import TypeVar, cast
+
+Loop = TypeVar("Loop", bound=Callable[..., object])
+
+
+def compiled(loop: Loop) -> Loop:
+    """`loop`, a function on numbers and arrays that Numba can compile, made fast if possible; it releases the interpreter's lock."""
+    try:
+        import numba
+    except ImportError:
+        return loop
+    ensure_cache_folder()
+    return cast(Loop, numba.njit(cache=True, nogil=True, error_model="numpy")(loop))
+
+
+def ensure_cache_folder() -> None:
+    """Gives Numba a folder that lasts as long as this process, where it finds none to write to: it would refuse to work."""
+    try:
+        import numba
+    except ImportError:
+        return
+    try:
+        numba.njit(cache=True)(_probe)
+    except RuntimeError:
+        folder = tempfile.mkdtemp(prefix="isc-kernels-")
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+        setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010 (the module's own declaration of it is dynamic)
+
+
+def _probe() -> None:
+    """Lies among the package's modules, so that Numba looks for a cache where it will look for theirs."""
