@@ -4,6 +4,9 @@ import numpy as np
 
 from ..errors import InputError
 
+# Channels that differ by less than this share of the brightest value are equal: rounding of 16-bit codes is 1.5e-5.
+_GREY = 1e-4
+
 
 def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None) -> None:
     """Raises `InputError` unless `image` is (H, W, 3), finite and >= 0 in a non-empty `mask` (H, W) bool, as is `clipped` or None."""
@@ -17,3 +20,10 @@ def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None
     inside = image[mask]
     if not np.isfinite(inside).all() or inside.min() < 0:
         raise InputError("the image has negative or non-finite values inside the mask: repair or mask out those pixels")
+
+
+def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:
+    """Raises `InputError` where no pixel of `image` (H, W, 3) inside `mask` (H, W) bool has colour that the method could judge by."""
+    inside = image[mask]
+    if np.ptp(inside, axis=1).max() <= _GREY * inside.max():
+        raise InputError(f"the photo has no colour, and {method} tells highlights by colour alone: use --method isc, or a colour photo")
