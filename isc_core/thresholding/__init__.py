@@ -1,0 +1,28 @@
+"""Multilevel thresholds of an image's levels: Otsu's objective, its exact maximum, and the optimisers that the thesis compares.
+
+Each optimiser is a module with `maximise(objective, count, evaluations, seed, options) -> Optimum`; `exact` needs no search at all.
+"""
+
+from ..errors import InputError
+from . import chaotic_clonal, clonal_selection, particle_swarm
+from .optimum import Optimum
+from .otsu import LEVELS, OtsuObjective, exact, quantise
+
+__all__ = ["OPTIMISERS", "OtsuObjective", "Optimum", "exact", "maximise", "quantise"]
+
+OPTIMISERS = ("exact", "chaotic_clonal", "clonal_selection", "particle_swarm")
+
+
+def maximise(optimiser: str, objective: OtsuObjective, count: int, *, evaluations: int = 20_000, seed: int = 0) -> Optimum:
+    """The `count` thresholds that the named optimiser finds within a budget of `evaluations`; the same ones for the same `seed` >= 0.
+
+    `exact` ignores budget and seed. Raises `InputError` for an unknown name, a count outside 1..254 or a budget below one generation.
+    """
+    if not 1 <= count < LEVELS - 1:
+        raise InputError(f"the number of thresholds must lie between 1 and {LEVELS - 2}, not {count}")
+    if optimiser == "exact":
+        return exact(objective, count)
+    for module in (chaotic_clonal, clonal_selection, particle_swarm):
+        if optimiser == module.__name__.rpartition(".")[2]:
+            return module.maximise(objective, count, evaluations, seed)
+    raise InputError(f"no optimiser is called {optimiser!r}: choose one of {', '.join(OPTIMISERS)}")

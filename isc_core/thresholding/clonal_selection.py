@@ -1,0 +1,128 @@
+"""Clonal selection: candidates are cloned, mutated the less the better they are, and the worst are replaced (ClonalG).
+
+Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
+
+Equation: a generation clones each of N antibodies N_c = round(beta N) times and moves the clones' thresholds by steps of the size
+s = 255 exp(-rho f), f in [0, 1] being the affinity scaled from the worst to the best antibody. Each antibody gives way to the best of its
+clones if that is no worse, and the d worst antibodies to new ones.
+
+Citation: L. N. de Castro and F. J. Von Zuben, "Learning and optimization using the clonal selection principle", IEEE Trans. Evolutionary
+Computation 6(3), 239-251 (2002), doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have equally many clones, as they propose
+for optimisation. Ours is the form of the mutation, on integers: a clone moves one threshold, or with the probability `spread` each of them; by
+a step within +-s that is at least one level; where thresholds cross they are sorted.
+
+Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of chance, so that another source can be tried
+with nothing else changed: see `chaotic_clonal`.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from ..errors import InputError
+from .optimum import Account, Optimum
+from .otsu import LEVELS, OtsuObjective
+
+_TOP = LEVELS - 2  # the highest threshold that leaves a level above it
+
+
+@dataclass(frozen=True)
+class ClonalOptions:
+    """`population`: how many antibodies N are kept, >= 2. `clone_share`: clones of each as a share beta of N, > 0.
+    `decay`: rho, how fast mutations shrink with affinity, > 0. `replaced_share`: share d / N of antibodies that each generation replaces, in [0, 1).
+    `spread`: how often a clone moves all of its thresholds instead of one, in [0, 1].
+    """
+
+    population: int = 50
+    clone_share: float = 0.1
+    decay: float = 4.0
+    replaced_share: float = 0.1
+    spread: float = 0.5
+
+
+class Numbers(Protocol):
+    """Where an optimiser takes its chances from."""
+
+    def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
+        """The next numbers, of `shape`, uniform within [0, 1)."""
+
+
+class PseudoRandomNumbers:
+    """NumPy's generator as a source of numbers."""
+
+    def __init__(self, seed: int) -> None:
+        self._generator = np.random.default_rng(seed)
+
+    def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
+        """The next numbers, of `shape`, uniform within [0, 1)."""
+        return self._generator.random(shape)
+
+
+def maximise(
+    objective: OtsuObjective, count: int, evaluations: int = 20_000, seed: int = 0, options: ClonalOptions | None = None
+) -> Optimum:
+    """The best `count` thresholds that ClonalG finds with at most `evaluations`, with pseudo-random numbers from `seed` >= 0.
+
+    Raises `InputError` for unfit options, or a budget below the first population.
+    """
+    return search(objective, count, evaluations, PseudoRandomNumbers(seed), options or ClonalOptions())
+
+
+def search(objective: OtsuObjective, count: int, evaluations: int, numbers: Numbers, options: ClonalOptions) -> Optimum:
+    """`maximise` with any source of numbers."""
+    _check(options)
+    clones = max(1, round(options.clone_share * options.population))
+    replaced = round(options.replaced_share * options.population)
+    account = Account(objective, evaluations, options.population)
+    antibodies = _new(numbers, options.population, count)
+    values = account.evaluate(antibodies)
+    while account.left >= options.population * clones + replaced:
+        offspring = _mutated(
+            np.repeat(antibodies, clones, axis=0), np.repeat(_steps(values, options.decay), clones), numbers, options.spread
+        )
+        offspring_values = account.evaluate(offspring).reshape(-1, clones)
+        best = np.argmax(offspring_values, axis=1)
+        chosen = np.arange(options.population), best
+        better = offspring_values[chosen] >= values
+        antibodies = np.where(better[:, None], offspring.reshape(-1, clones, count)[chosen], antibodies)
+        values = np.where(better, offspring_values[chosen], values)
+        if replaced:
+            worst = np.argsort(values, kind="stable")[:replaced]
+            antibodies[worst] = _new(numbers, replaced, count)
+            values[worst] = account.evaluate(antibodies[worst])
+    return account.close()
+
+
+def mutation_rate(affinity: np.ndarray, decay: float) -> np.ndarray:
+    """exp(-rho f), within (0, 1], of affinities f within [0, 1]."""
+    return np.exp(-decay * affinity)
+
+
+def _check(options: ClonalOptions) -> None:
+    if options.population < 2 or not options.clone_share > 0 or not options.decay > 0:
+        raise InputError("population must be at least 2, clone_share and decay above 0")
+    if not 0 <= options.replaced_share < 1 or not 0 <= options.spread <= 1:
+        raise InputError("replaced_share must lie within [0, 1) and spread within [0, 1]")
+
+
+def _new(numbers: Numbers, size: int, count: int) -> np.ndarray:
+    return np.sort((numbers.uniform((size, count)) * (_TOP + 1)).astype(np.int64), axis=1)
+
+
+def _steps(values: np.ndarray, decay: float) -> np.ndarray:
+    """The largest step (n,) in levels of the clones of antibodies with `values` (n,)."""
+    range_ = np.ptp(values)
+    affinity = (values - values.min()) / range_ if range_ > 0 else np.ones_like(values)
+    return np.maximum(1, _TOP * mutation_rate(affinity, decay))
+
+
+def _mutated(clones: np.ndarray, steps: np.ndarray, numbers: Numbers, spread: float) -> np.ndarray:
+    """The `clones` (n, K), each moved by at most its entry of `steps` (n,) in one threshold or in all, and sorted."""
+    size, count = clones.shape
+    chance = numbers.uniform((size, count + 2))
+    moves = (2 * chance[:, :count] - 1) * steps[:, None]
+    moves = np.sign(moves) * np.ceil(np.abs(moves))
+    only = (chance[:, count] * count).astype(np.int64)
+    moved = (np.arange(count) == only[:, None]) | (chance[:, count + 1] < spread)[:, None]
+    return np.sort(np.clip(clones + np.where(moved, moves, 0).astype(np.int64), 0, _TOP), axis=1)

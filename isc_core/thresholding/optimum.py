@@ -1,0 +1,56 @@
+"""What an optimiser of thresholds returns, and the account that it keeps on the way."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best thresholds that were found.
+
+    `thresholds` (K,) integer levels, ascending; class 0 is everything <= the first; equal ones leave the class between them empty.
+    `value`: the objective there. `evaluations`: how many candidates were evaluated.
+    `history` (m, 2): after each batch of candidates, the evaluations used so far and the best value so far.
+    """
+
+    thresholds: np.ndarray
+    value: float
+    evaluations: int
+    history: np.ndarray
+
+
+class Account:
+    """Evaluates candidates for an optimiser within a budget, and remembers the best one and how the search went."""
+
+    def __init__(self, objective: Callable[[np.ndarray], np.ndarray], budget: int, least: int) -> None:
+        """`objective`: values (n,) of candidates (n, K). `budget`: how many evaluations are allowed. Raises `InputError` if they are fewer than `least`."""
+        if budget < least:
+            raise InputError(
+                f"the search needs at least {least} evaluations, not {budget}: raise the budget or make the population smaller"
+            )
+        self._objective = objective
+        self.left = budget
+        self._used = 0
+        self._best: np.ndarray | None = None
+        self._value = -np.inf
+        self._history: list[tuple[int, float]] = []
+
+    def evaluate(self, thresholds: np.ndarray) -> np.ndarray:
+        """Values (n,) of `thresholds` (n, K), integer and ascending in each row; n must not exceed what is `left`."""
+        values = self._objective(thresholds)
+        self.left -= len(values)
+        self._used += len(values)
+        best = int(np.argmax(values))
+        if values[best] > self._value:
+            self._best, self._value = thresholds[best].copy(), float(values[best])
+        self._history.append((self._used, self._value))
+        return values
+
+    def close(self) -> Optimum:
+        """The best of everything that was evaluated; something must have been."""
+        assert self._best is not None
+        return Optimum(self._best, self._value, self._used, np.array(self._history))

@@ -1,0 +1,70 @@
+"""Particle swarm: candidates fly, drawn to their own best place and to the best of all (Kennedy & Eberhart 1995).
+
+Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
+
+Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best place, g the best of all, u uniform within [0, 1) for
+each coordinate, and the constriction w = .7298, c = 1.49618. Places are real; thresholds are their rounded, sorted values.
+
+Citation: J. Kennedy and R. Eberhart, "Particle swarm optimization", Proc. ICNN'95 4, 1942-1948 (1995), doi:10.1109/ICNN.1995.488968.
+M. Clerc and J. Kennedy, "The particle swarm: explosion, stability, and convergence in a multidimensional complex space", IEEE Trans.
+Evolutionary Computation 6(1), 58-73 (2002), doi:10.1109/4235.985692 (the constriction).
+
+Limits: a swarm that has gathered at a lesser maximum stays there; the rest of its budget is lost.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from .optimum import Account, Optimum
+from .otsu import LEVELS, OtsuObjective
+
+_TOP = LEVELS - 2  # the highest threshold that leaves a level above it
+
+
+@dataclass(frozen=True)
+class SwarmOptions:
+    """`particles`: how many, >= 2. `inertia`: share w of a velocity that is kept, in [0, 1). `attraction`: c, both pulls' strength, > 0.
+    `top_speed`: largest move of a threshold in one step, in levels, > 0.
+    """
+
+    particles: int = 40
+    inertia: float = 0.7298
+    attraction: float = 1.49618
+    top_speed: float = 64.0
+
+
+def maximise(
+    objective: OtsuObjective, count: int, evaluations: int = 20_000, seed: int = 0, options: SwarmOptions | None = None
+) -> Optimum:
+    """The best `count` thresholds that the swarm finds with at most `evaluations`, with pseudo-random numbers from `seed` >= 0.
+
+    Raises `InputError` for unfit options, or a budget below one step of the swarm.
+    """
+    options = options or SwarmOptions()
+    if options.particles < 2 or not 0 <= options.inertia < 1 or not options.attraction > 0 or not options.top_speed > 0:
+        raise InputError("particles must be at least 2, inertia within [0, 1), attraction and top_speed above 0")
+    generator = np.random.default_rng(seed)
+    account = Account(objective, evaluations, options.particles)
+    shape = (options.particles, count)
+    # Sorted, so that the first coordinate of every particle means the lowest threshold.
+    places = np.sort(generator.uniform(0, _TOP, shape), axis=1)
+    velocities = np.zeros(shape)
+    own = places.copy()
+    own_values = account.evaluate(_thresholds(places))
+    while account.left >= options.particles:
+        leader = own[np.argmax(own_values)]
+        pulls = generator.random((2, *shape)) * options.attraction
+        velocities = options.inertia * velocities + pulls[0] * (own - places) + pulls[1] * (leader - places)
+        velocities = np.clip(velocities, -options.top_speed, options.top_speed)
+        places = np.clip(places + velocities, 0, _TOP)
+        values = account.evaluate(_thresholds(places))
+        better = values > own_values
+        own[better] = places[better]
+        own_values = np.maximum(values, own_values)
+    return account.close()
+
+
+def _thresholds(places: np.ndarray) -> np.ndarray:
+    return np.sort(np.rint(places).astype(np.int64), axis=1)
