@@ -5,7 +5,8 @@ Problem: as in `clonal_selection`. The claim is that chaotic numbers in the plac
 Equation: the logistic map x <- 4x (1 - x), made uniform by u = (2 / pi) asin(sqrt(x)), supplies the numbers in three places: the first
 population, the affinity maturation (the mutation of clones) and the new antibodies. Everything else is `clonal_selection.search`.
 
-Citation: H. Akbar, N. Suryana and S. Sahib, International Journal of Signal and Imaging Systems Engineering 8(5) (2015).
+Citation: H. Akbar, N. Suryana and S. Sahib, "Chaotic clonal selection optimisation for multi-threshold segmentation", International
+Journal of Signal and Imaging Systems Engineering 8(5), 298-315 (2015), doi:10.1504/IJSISE.2015.071953.
 
 Limits: consecutive values of one orbit depend on each other (see `logistic_map`). Here consecutive numbers come from different orbits, and
 an orbit gives each eighth of its values: then the numbers are as good as independent, and so the search is as good as with any others.

@@ -8,8 +8,8 @@ clones if that is no worse, and the d worst antibodies to new ones.
 
 Citation: L. N. de Castro and F. J. Von Zuben, "Learning and optimization using the clonal selection principle", IEEE Trans. Evolutionary
 Computation 6(3), 239-251 (2002), doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have equally many clones, as they propose
-for optimisation. Ours is the form of the mutation, on integers: a clone moves one threshold, or with the probability `spread` each of them; by
-a step within +-s that is at least one level; where thresholds cross they are sorted.
+for optimisation. Ours is the form of the mutation, on integers: a clone moves one threshold, or with the probability `spread` each of
+them; by a step within +-s that is at least one level; where thresholds cross they are sorted.
 
 Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of chance, so that another source can be tried
 with nothing else changed: see `chaotic_clonal`.
@@ -30,7 +30,8 @@ _TOP = LEVELS - 2  # the highest threshold that leaves a level above it
 @dataclass(frozen=True)
 class ClonalOptions:
     """`population`: how many antibodies N are kept, >= 2. `clone_share`: clones of each as a share beta of N, > 0.
-    `decay`: rho, how fast mutations shrink with affinity, > 0. `replaced_share`: share d / N of antibodies that each generation replaces, in [0, 1).
+    `decay`: rho, how fast mutations shrink with affinity, > 0.
+    `replaced_share`: share d / N of the antibodies, the worst, that each generation replaces, in [0, 1).
     `spread`: how often a clone moves all of its thresholds instead of one, in [0, 1].
     """
 

@@ -11,8 +11,8 @@ Citation: S. M. Ulam and J. von Neumann, "On combination of stochastic and deter
 Society 53(11), 1120 (1947) (the density). R. M. May, "Simple mathematical models with very complicated dynamics", Nature 261, 459-467
 (1976), doi:10.1038/261459a0 (the bifurcation).
 
-Limits: 0 and .75 are fixed points at r = 4; .25, .5 and 1 lead into them. An orbit in floating point can round onto 1 and thence to 0 (about
-once in 10^8 steps): orbits that reach such a point are started again.
+Limits: 0 and .75 are fixed points at r = 4; .25, .5 and 1 lead into them. An orbit in floating point can round onto 1 and thence to 0
+(about once in 10^8 steps): orbits that reach such a point are started again.
 """
 
 import numpy as np

@@ -27,7 +27,7 @@ class Account:
     """Evaluates candidates for an optimiser within a budget, and remembers the best one and how the search went."""
 
     def __init__(self, objective: Callable[[np.ndarray], np.ndarray], budget: int, least: int) -> None:
-        """`objective`: values (n,) of candidates (n, K). `budget`: how many evaluations are allowed. Raises `InputError` if they are fewer than `least`."""
+        """`objective`: values (n,) of candidates (n, K). `budget`: how many of them are allowed; `InputError` if fewer than `least`."""
         if budget < least:
             raise InputError(
                 f"the search needs at least {least} evaluations, not {budget}: raise the budget or make the population smaller"

@@ -8,8 +8,8 @@ its two ends alone, so a table of 257 x 257 terms holds every objective, and dyn
 best_k(b) = max_a best_{k-1}(a) + term(a, b).
 
 Citation: N. Otsu, "A threshold selection method from gray-level histograms", IEEE Trans. Systems, Man, and Cybernetics 9(1), 62-66 (1979),
-doi:10.1109/TSMC.1979.4310076. P.-S. Liao, T.-S. Chen and P.-C. Chung, "A fast algorithm for multilevel thresholding", Journal of Information
-Science and Engineering 17(5), 713-727 (2001) (the table of terms).
+doi:10.1109/TSMC.1979.4310076. P.-S. Liao, T.-S. Chen and P.-C. Chung, "A fast algorithm for multilevel thresholding", Journal of
+Information Science and Engineering 17(5), 713-727 (2001) (the table of terms).
 
 Limits: several sets of thresholds share the maximum where levels are empty; the exact search returns the lowest ones. The objective knows
 nothing of where pixels lie. Few bright pixels move thresholds little: a class of 1 % of the pixels weighs 1 %.

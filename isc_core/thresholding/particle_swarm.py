@@ -2,8 +2,8 @@
 
 Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
 
-Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best place, g the best of all, u uniform within [0, 1) for
-each coordinate, and the constriction w = .7298, c = 1.49618. Places are real; thresholds are their rounded, sorted values.
+Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best place, g the best of all, u uniform within [0, 1)
+for each coordinate, and the constriction w = .7298, c = 1.49618. Places are real; thresholds are their rounded, sorted values.
 
 Citation: J. Kennedy and R. Eberhart, "Particle swarm optimization", Proc. ICNN'95 4, 1942-1948 (1995), doi:10.1109/ICNN.1995.488968.
 M. Clerc and J. Kennedy, "The particle swarm: explosion, stability, and convergence in a multidimensional complex space", IEEE Trans.
