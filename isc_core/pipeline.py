@@ -138,8 +138,8 @@ def decompose(
         known = _at_scale(evidence, photo, working)
     monitor.report(f"separating ({settings.separator})" if settings.model == "mdr" else "preparing", 0.03)
     with clock.stage("separation"):
-        split = _separate(maps_at, settings)
-        diffuse = split.diffuse if maps_at is working else _separate(working, settings).diffuse
+        split = _separate(maps_at, settings, monitor.part(0.03, 0.07))
+        diffuse = split.diffuse if maps_at is working else _separate(working, settings, monitor.part(0.07, 0.1)).diffuse
     with clock.stage("shape and light"):
         shape = _recover(diffuse, working, settings, known, prior_set, monitor.part(0.1, 0.95))
     monitor.report("maps", 0.96)
@@ -179,14 +179,12 @@ def assemble(photo: Photo, split: Separation, height: np.ndarray, light: np.ndar
     )  # fmt: skip
 
 
-def _separate(photo: Photo, settings: Settings) -> Separation:
+def _separate(photo: Photo, settings: Settings, monitor: Monitor) -> Separation:
     method = settings.separator if settings.model == "mdr" else "none"
-    return separate(method, photo.image, photo.mask, photo.clipped)
+    return separate(method, photo.image, photo.mask, photo.clipped, monitor=monitor)
 
 
-def _recover(
-    diffuse: np.ndarray, photo: Photo, settings: Settings, known: Known, prior_set: PriorSet | None, monitor: Monitor
-) -> _Shape:
+def _recover(diffuse: np.ndarray, photo: Photo, settings: Settings, known: Known, prior_set: PriorSet | None, monitor: Monitor) -> _Shape:
     floor = photo.code_value / 2
     if settings.model in BASELINE_MODELS:
         monitor.report(f"shape and light ({settings.model})", 0.0)
@@ -196,9 +194,7 @@ def _recover(
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, photo.mask) else 3
     priors = (prior_set or shipped_prior_set()).priors(settings.illumination, channels)
-    options = RecoverOptions(
-        shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads)
-    )
+    options = RecoverOptions(shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads))
     weights = isc_weights(settings.illumination, channels)
     light = known.light if known.light is None or channels == 3 else known.light.mean(axis=1, keepdims=True)
     result = recover(

@@ -7,11 +7,13 @@ from pathlib import Path
 from ..photo import read_photo
 from ..progress import Monitor
 from ..result_folder import require_writable_result, save_separation
-from ..separation import METHODS, separate
+from ..separation import IMPROVED, METHODS, separate
+from ..separation.option_text import parse_changes
 from .options import Commands, add_command, add_photo, hints
 
 _EXAMPLES = """  isc separate cup.png --method shen_2013 -o cup-layers
-  isc separate highlights.bmp --transfer linear --method shen_2013 -o layers"""
+  isc separate highlights.bmp --transfer linear --method shen_2013 -o layers
+  isc separate cup.png --method shen_2013 --set ratio_quantile=0.4 -o cup-layers"""
 
 
 def declare(commands: Commands) -> None:
@@ -24,16 +26,34 @@ def declare(commands: Commands) -> None:
     add_photo(parser)
     parser.add_argument("--method", choices=METHODS, required=True, help="how")
     parser.add_argument(
+        "--variant",
+        default=IMPROVED,
+        metavar="NAME",
+        help="improved (default), paper (as published) or, where there is one, sihr (as in that public toolbox)",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        dest="changes",
+        metavar="NAME=VALUE",
+        help="change an option of the method; can be given again; an unknown NAME lists those that there are",
+    )
+    parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier result is replaced"
     )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work."""
+    """Does the work; what can be wrong is found before it begins."""
+    changes = parse_changes(options.method, options.variant, options.changes)
     require_writable_result(options.output, separation=True)
     photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True)
-    monitor.report(f"separating ({options.method})", 0.2)
-    layers = separate(options.method, photo.image, photo.mask, photo.clipped)
+    monitor.report(f"separating ({options.method})", 0.1)
+    layers = separate(
+        options.method, photo.image, photo.mask, photo.clipped,
+        variant=options.variant, changes=changes, monitor=monitor.part(0.1, 0.8),
+    )  # fmt: skip
     monitor.report("writing", 0.8)
     save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
     if photo.original.mask_from == "whole frame" and not options.quiet:
