@@ -23,7 +23,7 @@ from scipy import ndimage
 from ..decomposition import Separation
 from ..errors import InputError
 from ..progress import Monitor
-from .channels import largest, smallest
+from .channels import saturation, smallest
 from .checks import check_arrays, require_colour
 from .layers import white_layers
 
@@ -95,7 +95,7 @@ def _specular_of(image: np.ndarray, domain: np.ndarray, usable: np.ndarray, opti
     low = smallest(image).astype(float)
     level = _threshold(low[domain], options.deviations)
     above = domain & (low > level)
-    if _saturation(image[above]) < options.bright_saturation or not above.any():
+    if saturation(image[above]) < options.bright_saturation or not above.any():
         return np.zeros_like(low)
     excess = np.where(above, low - level, 0)
     regions, count = ndimage.label(above & (excess > options.region_share * excess.max()), _EIGHT)
@@ -114,12 +114,6 @@ def _specular_of(image: np.ndarray, domain: np.ndarray, usable: np.ndarray, opti
 def _threshold(low: np.ndarray, deviations: float) -> float:
     spread = low.std(ddof=1) if len(low) > 1 else 0.0
     return float(low.mean() + deviations * spread)
-
-
-def _saturation(colours: np.ndarray) -> float:
-    """The colour of all pixels (n, 3) together over their largest channels; zero for no pixel. Strong pixels count most."""
-    high = largest(colours).sum(dtype=float)
-    return float((high - smallest(colours).sum(dtype=float)) / high) if high > 0 else 0.0
 
 
 def _means(

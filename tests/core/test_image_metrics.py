@@ -54,7 +54,7 @@ def test_published_similarity(shared: Path, name: str, printed: float) -> None:
     assert ssim_volume(truth, image) == pytest.approx(anchors["input_baseline"]["ssim"], abs=1e-7)
     assert 0.005 < ssim_volume(truth, image) - ssim(truth, image) < 0.04
     whole = np.ones(image.shape[:2], bool)
-    published = shen_2013.Shen2013Options(coloured_share=0)
+    published = shen_2013.VARIANTS["paper"]
     assert ssim_volume(truth, shen_2013.separate(image, whole, published).diffuse) == pytest.approx(
         anchors["Shen2013_fixed"]["ssim"], abs=5e-4
     )
