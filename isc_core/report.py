@@ -22,6 +22,8 @@ from .sirfs.frames import real_sh
 _PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
 _PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
 _MARGIN = 0.06  # room around the object, of the panel's side
+_TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (1.0, 0.42, 0.04), (0.06, 0.3, 1.0), (0.13, 0.13, 0.13)  # linear
+_FULL_ERROR = 0.1  # of the photo's white: errors from here on have the full colour
 
 
 @dataclass(frozen=True)
@@ -66,6 +68,55 @@ def separation_sheet(separation: Separation, image: np.ndarray, mask: np.ndarray
     maps = [(image, "Input", ""), (separation.diffuse, "Diffuse", ""), (separation.specular, "Specular", share)]
     panels = [Panel(gain * frame.scaled(values), frame.coverage, label, remark) for values, label, remark in maps]
     return _sheet(title or "Separation", f"{mask.shape[1]} x {mask.shape[0]} px", panels, columns=3)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A separation to be compared with others: the method's name, a faint remark, the layers."""
+
+    label: str
+    remark: str
+    split: Separation
+
+
+def comparison_sheet(
+    title: str, image: np.ndarray, mask: np.ndarray, answers: Sequence[Answer], truth: tuple[np.ndarray, np.ndarray] | None = None
+) -> Image.Image:
+    """Many separations of one photo, two in a row of six panels: each its diffuse layer, its specular layer and its error.
+
+    `image`, and the true (diffuse, specular) if they are known: (H, W, 3) linear; `mask`: (H, W) bool. Errors of the diffuse layer are
+    orange where too much light was left and blue where too much was taken, in full colour from a tenth of the photo's white on. Without
+    a truth the confidence stands there, white where it is 1. The first three panels are the photo and the truth, or the photo, its
+    smallest channel and its chromaticity, which is all that methods by colour see.
+    """
+    frame, gain = _Frame.around(mask), _exposure(image[mask])
+
+    def panel(values: np.ndarray, label: str, remark: str = "") -> Panel:
+        return Panel(frame.scaled(values), frame.coverage, label, remark)
+
+    if truth is None:
+        low, total = image.min(axis=2, keepdims=True), image.sum(axis=2, keepdims=True)
+        second = panel(gain * np.repeat(low, 3, axis=2), "Smallest channel"), panel(image / np.maximum(total, 1e-9), "Chromaticity")
+    else:
+        share = f"{100 * _share(truth[1], image, mask):.1f} % of the light"
+        second = panel(gain * truth[0], "True diffuse"), panel(gain * truth[1], "True specular", share)
+    panels = [panel(gain * image, "Input"), *second]
+    for answer in answers:
+        split = answer.split
+        share = f"{100 * _share(split.specular, image, mask):.1f} % of the light"
+        panels += [panel(gain * split.diffuse, answer.label, answer.remark), panel(gain * split.specular, "Specular", share)]
+        if truth is None:
+            panels.append(panel(np.repeat(srgb_to_linear(split.confidence)[..., None], 3, axis=2), "Confidence"))
+        else:
+            panels.append(panel(_error_colors(gain * (split.diffuse - truth[0])), "Error", "orange: left over, blue: overdone"))
+    return _sheet(title, f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(answers)} separations", panels, columns=6)
+
+
+def _error_colors(error: np.ndarray) -> np.ndarray:
+    """Errors (H, W, 3), 1 being the photo's white, as colours (H, W, 3), linear."""
+    mean = error.mean(axis=2, keepdims=True)
+    weight = np.clip(np.abs(mean) / _FULL_ERROR, 0, 1)
+    return (1 - weight) * np.array(_NO_ERROR) + weight * np.where(mean > 0, np.array(_TOO_BRIGHT), np.array(_TOO_DARK))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from PIL import Image
 
 from isc_core.decomposition import Decomposition, Provenance, Separation
 from isc_core.photo import srgb_to_linear
-from isc_core.report import contact_sheet, separation_sheet
+from isc_core.report import Answer, comparison_sheet, contact_sheet, separation_sheet
 from tests.core.ball_scene import ball
 
 LABELS = ("input", "diffuse", "specular", "reflectance", "shading", "normals", "height", "light")
@@ -128,3 +128,32 @@ def test_the_sheet_of_a_separation_adds_up(scene: Decomposition) -> None:
     found = panels(sheet, columns=3)
     unclipped = inner() & (found["input"].max(-1) < 0.9)
     assert np.abs(found["diffuse"] + found["specular"] - found["input"])[unclipped].max() < 0.02
+
+
+def comparison_panel(sheet: Image.Image, index: int) -> np.ndarray:
+    top, left = HEAD + index // 6 * (SIDE + LABEL + GAP), EDGE + index % 6 * (SIDE + GAP)
+    return srgb_to_linear(np.asarray(sheet)[top : top + SIDE, left : left + SIDE] / 255.0)
+
+
+def test_a_comparison_shows_where_light_was_left_and_where_too_much_was_taken(scene: Decomposition) -> None:
+    nothing = Separation(scene.image, 0 * scene.image, scene.residual, scene.confidence)
+    exact = Separation(scene.diffuse, scene.specular, scene.residual, scene.confidence)
+    black = Separation(0 * scene.image, scene.image, scene.residual, scene.confidence)
+    answers = [Answer(name, "remark", split) for name, split in (("none", nothing), ("exact", exact), ("black", black))]
+    sheet = comparison_sheet("ball", scene.image, scene.mask, answers, (scene.diffuse, scene.specular))
+    assert sheet.width == 2 * EDGE + 6 * SIDE + 5 * GAP and sheet.height == HEAD + 2 * (SIDE + LABEL) + GAP + EDGE
+    photo, diffuse, specular, _, _, left, found, taken, fine, dark, _, over = (comparison_panel(sheet, k) for k in range(12))
+    unclipped = inner() & (photo.max(-1) < 0.9)
+    assert np.abs(diffuse + specular - photo)[unclipped].max() < 0.02
+    assert np.abs(found - diffuse).max() < 0.01 and np.abs(taken - specular).max() < 0.01 and dark[inner()].max() < 0.01
+    highlight = inner() & (specular.mean(-1) > 0.3)
+    assert highlight.sum() > 100 and (left[highlight][:, 0] > left[highlight][:, 2] + 0.5).all()
+    assert np.ptp(fine[inner()], axis=0).max() < 0.02 and (over[inner()][:, 2] > over[inner()][:, 0] + 0.3).mean() > 0.8
+
+
+def test_a_comparison_without_truth_shows_the_confidence(scene: Decomposition) -> None:
+    exact = Separation(scene.diffuse, scene.specular, scene.residual, scene.confidence)
+    sheet = comparison_sheet("ball", scene.image, scene.mask, [Answer("exact", "", exact)])
+    colour, confidence = comparison_panel(sheet, 2), comparison_panel(sheet, 5)
+    assert np.abs(colour.sum(-1) - 1)[inner()].max() < 0.05
+    assert np.ptp(confidence[inner()], axis=1).max() < 0.01 and confidence[160, 160, 0] > 0.9 > confidence[160, 30, 0]
