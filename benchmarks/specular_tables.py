@@ -1,0 +1,113 @@
+"""The tables of the separations' benchmark, as Markdown."""
+
+from collections.abc import Callable, Iterable, Sequence
+
+import numpy as np
+
+from isc_core.metrics import geometric_mean
+from isc_core.separation import METHODS
+
+from .specular_scores import Row
+
+Cell = Callable[[Row], str]
+_GROUPS = {
+    "shen_zheng": "Shen & Zheng's photos (values as stored, whole frame)",
+    "laboratory": "Laboratory objects of MIT-Berkeley (linear, inside the mask)",
+    "rendered": "Rendered scenes (inside the mask)",
+}
+
+
+def tables(rows: Sequence[Row]) -> str:
+    """All tables that the rows allow."""
+    parts = ["# Separations against the truth\n", "`none` leaves the photo as it is: diffuse = input.\n"]
+    for group, title in _GROUPS.items():
+        found = [row for row in rows if row.group == group]
+        if found:
+            parts += [f"## {title}\n", *_of_group(found)]
+    clean = [row for row in rows if row.group == "clean"]
+    if clean:
+        parts += [
+            "## Photos without any highlight: RMS of what was removed, per cent of the photo's RMS\n",
+            _table(clean, _percent, _worst),
+        ]
+    refused = sorted({f"- {row.method}, {row.image}: {row.refused}" for row in rows if row.refused})
+    if refused:
+        parts += ["## Refused\n", "\n".join(refused) + "\n"]
+    return "\n".join(parts)
+
+
+def _of_group(rows: list[Row]) -> list[str]:
+    return [
+        "PSNR of the diffuse layer, dB / SSIM (3-D) / SSIM (by channel)\n",
+        _table(rows, lambda r: f"{_number(r.psnr, '.2f')} / {_number(r.ssim_volume, '.3f')} / {_number(r.ssim, '.3f')}"),
+        "Mean square error of the diffuse layer, relative to leaving the photo alone: everywhere (in the highlights, elsewhere)\n",
+        _table(
+            rows,
+            lambda r: f"{_number(r.mse_ratio, '.3f')} ({_number(r.mse_inside, '.2f')}, {_number(r.mse_outside, '.2f')})",
+            _geometric("mse_ratio"),
+        ),
+        "Local error (LMSE) of the diffuse layer x 1000 / of the specular layer\n",
+        _table(
+            rows,
+            lambda r: f"{_number(None if r.lmse_diffuse is None else 1000 * r.lmse_diffuse, '.2f')} / {_number(r.lmse_specular, '.3f')}",
+            _geometric("lmse_specular"),
+        ),
+        "Confidence: share of the squared error that leaves with the least confident fifth, per cent / area under the sparsification "
+        "curve / rank correlation with the error\n",
+        _table(
+            rows,
+            lambda r: (
+                f"{_number(None if r.removed is None else 100 * r.removed, '.0f')} / {_number(r.area, '.2f')} / {_number(r.rank, '.2f')}"
+            ),
+        ),
+        "Seconds of this run (megapixels a second)\n",
+        _table(rows, _speed),
+    ]
+
+
+def _table(rows: list[Row], cell: Cell, last: tuple[str, Callable[[list[Row]], str]] | None = None) -> str:
+    """Methods and variants down, photos across; `last` sums up each line."""
+    images = list(dict.fromkeys(row.image for row in rows))
+    known = {(row.method, row.variant, row.image): row for row in rows}
+    heads = ["method", "variant", *images, *([last[0]] if last else [])]
+    lines = ["| " + " | ".join(heads) + " |", "|---" * len(heads) + "|"]
+    for method in METHODS:
+        for variant in dict.fromkeys(row.variant for row in rows if row.method == method):
+            line = [known.get((method, variant, image)) for image in images]
+            cells = [method, variant, *("" if row is None else "refused" if row.refused else cell(row) for row in line)]
+            lines.append("| " + " | ".join([*cells, *([last[1]([row for row in line if row is not None])] if last else [])]) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def _number(value: float | None, form: str) -> str:
+    return "-" if value is None else format(value, form)
+
+
+def _percent(row: Row) -> str:
+    return _number(None if row.change is None else 100 * row.change, ".2f")
+
+
+def _speed(row: Row) -> str:
+    if row.seconds is None or row.megapixels is None:
+        return "-"
+    return f"{row.seconds:.2f} ({row.megapixels / max(row.seconds, 1e-4):.2f})"
+
+
+def _present(rows: Iterable[Row], name: str) -> list[float]:
+    return [value for row in rows if (value := getattr(row, name)) is not None]
+
+
+def _geometric(name: str) -> tuple[str, Callable[[list[Row]], str]]:
+    def of(rows: list[Row]) -> str:
+        values = _present(rows, name)
+        return f"{geometric_mean(values):.3f}" if values else "-"
+
+    return f"geometric mean ({name})", of
+
+
+def _worst_change(rows: list[Row]) -> str:
+    values = _present(rows, "change")
+    return f"{100 * np.max(values):.2f}" if values else "-"
+
+
+_worst = ("worst", _worst_change)
