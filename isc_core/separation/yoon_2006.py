@@ -10,8 +10,8 @@ hangs together with by pairs of like colour: s = (sum I - t f) / 3.
 
 Citation: K.-J. Yoon, Y. Choi and I. S. Kweon, "Fast separation of reflection components using a specularity-invariant image
 representation", ICIP 2006, 973-976, doi:10.1109/ICIP.2006.312650. Ours, as options: the regions are found at once, by union-find, instead
-of by sweeps; t is a quantile over the region's pixels of like colour, since the smallest of all is noise's; F and I are averaged over a
-few pixels before they are compared; the dark guard is relative to the object's brightness; and the object's colourfulness is weighed
+of by sweeps; t is a quantile over the region's pixels of like colour, since the smallest of all is noise's; F is averaged over a few
+pixels before colours are compared; the dark guard is relative to the object's brightness; and the object's colourfulness is weighed
 (`evidence`).
 
 Limits: the light must be white. A region may leak where one paint fades into another. White paint beside a like-hued coloured one is a
@@ -40,7 +40,7 @@ class Yoon2006Options:
     `dark`: a pair is compared if the smallest channel of its first pixel is at least this; >= 0. Where `relative_dark`: if the largest
     channels of both are at least this share of the object's brightness (the 99.9 % quantile of the largest channel).
     `regions`: solve by regions; then `quantile` in [0, 1] of t is taken over a region's pixels that share a cell of the (red, green)
-    plane of F's shares with `cells` cells a side (1 to 1000), and `window`, odd, is the side in pixels of the square over which F and I are
+    plane of F's shares with `cells` cells a side (1 to 1000), and `window`, odd, is the side in pixels of the square over which F is
     averaged before. Else sweep along the pairs at most `sweeps` times, until nothing of more than `tolerance` (absolute) is moved; >= 0.
     `toolbox_order`: pairs only along columns, with the end of a column mistaken and pairs joining columns, as a public toolbox has it.
     `weigh_evidence`: remove less, down to nothing, the less colour the object has.
@@ -147,12 +147,12 @@ def _two_band(image: np.ndarray, domain: np.ndarray, usable: np.ndarray, options
         first = known
     else:
         first = known & (low >= options.dark)
-    layers = [np.where(known, layer, 0) for layer in (image[..., 0] - low, image[..., 1] - low, band, total)]
+    ratio = np.where(known, total / np.where(known, band, 1), 0)
+    layers = [np.where(known, layer, 0) for layer in (image[..., 0] - low, image[..., 1] - low, band)]
     if options.window > 1:
         layers = [ndimage.uniform_filter(layer, options.window, mode="constant") for layer in layers]
-    over = np.where(known, layers[2], 1)
-    red, green, _, around = (np.where(known, layer / over, 0) for layer in layers)
-    return _TwoBand(around, band, red, green, known, first)
+    red, green = (np.where(known, layer / np.where(known, layers[2], 1), 0) for layer in layers[:2])
+    return _TwoBand(ratio, band, red, green, known, first)
 
 
 def _by_regions(pixels: _TwoBand, options: Yoon2006Options) -> np.ndarray:

@@ -13,7 +13,7 @@ from isc_core.separation.yoon_2006 import VARIANTS, Yoon2006Options
 from tests.core.separation_scenes import assert_layers_hold, error_ratio, glossy_disc, highlight_photo, laboratory_photo, psnr
 
 
-@pytest.mark.parametrize(("name", "published", "improved"), [("animals", 32.896, 37.4), ("cups", 33.296, 38.1)])
+@pytest.mark.parametrize(("name", "published", "improved"), [("animals", 32.896, 37.5), ("cups", 33.296, 37.9)])
 def test_figures(shared: Path, name: str, published: float, improved: float) -> None:
     image, truth, mask = highlight_photo(shared, name)
     assert psnr(yoon_2006.separate(image, mask, VARIANTS["sihr"]), truth) == pytest.approx(published, abs=0.01)
@@ -34,7 +34,7 @@ def test_pale_objects_are_left_alone(shared: Path, name: str) -> None:
     assert error_ratio(yoon_2006.separate(image, mask, VARIANTS["sihr"]), image, truth, mask) > 15
 
 
-@pytest.mark.parametrize(("variant", "most"), [("improved", 0.003), ("paper", 0.001), ("sihr", 0.02)])
+@pytest.mark.parametrize(("variant", "most"), [("improved", 0.001), ("paper", 0.001), ("sihr", 0.02)])
 def test_highlights_on_three_paints(variant: str, most: float) -> None:
     image, diffuse, mask = glossy_disc()
     split = yoon_2006.separate(image, mask, VARIANTS[variant])
