@@ -1,5 +1,5 @@
-"""The smallest and the largest channel of every pixel, three times faster than NumPy's reductions along so short an axis, and the
-saturation of many pixels together."""
+"""The smallest and the largest channel of every pixel, three times faster than NumPy's reductions along so short an axis, and what
+methods ask of them: how coloured many pixels are together, and how far above their mean the smallest channel lies."""
 
 import numpy as np
 
@@ -21,3 +21,9 @@ def saturation(colours: np.ndarray) -> float:
     """
     high = largest(colours).sum(dtype=float)
     return float(1 - smallest(colours).sum(dtype=float) / high) if high > 0 else 0.0
+
+
+def fade_in(low: np.ndarray, base: float, fade: float) -> np.ndarray:
+    """The share (...) of a specular layer that counts: none where the smallest channel `low` (...) is at most `base`, all from
+    (1 + fade) base on. A highlight, being white, lies high in the smallest channel; `fade` >= 0, zero for a step."""
+    return np.clip((low - base) / max(fade * base, 1e-30), 0, 1)

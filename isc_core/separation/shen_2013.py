@@ -22,7 +22,7 @@ import numpy as np
 from ..decomposition import Separation
 from ..errors import InputError
 from ..progress import Monitor
-from .channels import largest, saturation, smallest
+from .channels import fade_in, largest, saturation, smallest
 from .checks import check_arrays, require_colour
 from .clipped import explain_clipped
 
@@ -140,13 +140,8 @@ def _specular_of(pixels: _Pixels, options: Shen2013Options) -> tuple[np.ndarray,
             continue
         diffuse_ratio = np.quantile(pixels.high[telling] / pixels.chroma[telling], options.ratio_quantile)
         removed = pixels.high[members] - diffuse_ratio * pixels.chroma[members]
-        specular[members] = np.clip(removed, 0, pixels.low[members]) * _faded(pixels.low[members] / pixels.base, options.fade)
+        specular[members] = np.clip(removed, 0, pixels.low[members]) * fade_in(pixels.low[members], float(pixels.base), options.fade)
     return specular, specular + doubt
-
-
-def _faded(brightness: np.ndarray, fade: float) -> np.ndarray:
-    """The share (n,) of the specular that counts, in [0, 1], by the smallest channel in units of u (n,), all of it above 1."""
-    return np.minimum((brightness - 1) / fade, 1) if fade > 0 else np.ones_like(brightness)
 
 
 def _features(pixels: _Pixels, which: np.ndarray) -> np.ndarray:
