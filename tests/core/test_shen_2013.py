@@ -8,8 +8,8 @@ import pytest
 
 from isc_core.decomposition import Separation
 from isc_core.errors import InputError
+from isc_core.inpainting.pull_push import fill
 from isc_core.separation import METHODS, separate, shen_2013
-from isc_core.separation.clipped import fill
 from isc_core.separation.shen_2013 import VARIANTS, Shen2013Options
 
 RED, GREEN = np.array([0.7, 0.25, 0.15]), np.array([0.2, 0.6, 0.15])

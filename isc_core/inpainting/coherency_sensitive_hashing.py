@@ -1,0 +1,306 @@
+# mypy: disable-error-code="no-untyped-def"
+"""Finds for patches of one image their nearest patches of another by hashing and coherence (Korman & Avidan 2011).
+
+Problem: for each target patch the source patch with the smallest Euclidean distance. Comparing all pairs is exact and takes minutes
+to hours; hashing alone misses many neighbours; images are coherent, so that the neighbour of a good match is often a good match.
+
+Equation: each table hashes a patch v by the bins floor((a_j . v + b_j) / r) of its strongest Walsh-Hadamard coefficients a_j . v, with
+random offsets b_j. Candidates of a target patch are (1) source patches in its bin, (2) the matches of target patches in its bin, (3) the
+matches of its two neighbours that were visited before, moved by one pixel, and (4) source patches in the bin of those. A candidate is
+dropped as soon as the distance of its projections, a lower bound, exceeds the best distance; what survives is compared in full.
+Tables follow each other, with a new offset, another width r and the opposite scan direction each.
+
+Citation: S. Korman and S. Avidan, "Coherency sensitive hashing", ICCV 2011, 1607-1614, doi:10.1109/ICCV.2011.6126421; IEEE TPAMI
+38(6), 1099-1112 (2016), doi:10.1109/TPAMI.2015.2477814. Ours: widths from the data, and distances that are exact in the end.
+
+Limits: approximate; patches are 8 x 8 pixels, neither turned nor scaled. A patch without a likeness gets some source patch, with a
+large distance.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiled import compiled
+from ..errors import InputError
+from .walsh_hadamard import PATCH, opponent, project, strongest
+
+
+@dataclass(frozen=True)
+class CshOptions:
+    """`tables`: how many hash tables are tried one after the other, >= 1; more find better matches.
+    `projections`: Walsh-Hadamard coefficients kept of each patch, 1 to 64 C (8 pixels squared, C channels).
+    `hashed`: how many of them, the strongest, a hash looks at, 1 to `projections`.
+    `candidates`: how many patches of one bin are tried, >= 1.
+    `occupancy`: how many source patches share a patch's bin where bins are narrowest, in the median; > 0.
+    `seed`: of the random offsets, >= 0; the same seed gives the same matches.
+    """
+
+    tables: int = 8
+    projections: int = 24
+    hashed: int = 8
+    candidates: int = 4
+    occupancy: float = 8.0
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Patches of one image, by their upper left corners in raster order.
+
+    `image` (H, W, C) contiguous float32; `rows`, `columns` (n,) intp; `index` (H, W) int32, a corner's place in the list, else -1.
+    """
+
+    image: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    index: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
+@dataclass(frozen=True)
+class Matches:
+    """For target patch i, `source[i]` (n,) int32 is its place in the list of source patches, `distance[i]` (n,) float32 the sum of
+    squared differences of all values of the two patches."""
+
+    source: np.ndarray
+    distance: np.ndarray
+
+
+def patches_within(image: np.ndarray, usable: np.ndarray) -> Patches:
+    """The patches of `image` (H, W, C) whose pixels all lie in `usable` (H, W) bool; possibly none."""
+    return _listed(image, _windows(usable) == PATCH * PATCH)
+
+
+def patches_touching(image: np.ndarray, wanted: np.ndarray) -> Patches:
+    """The patches of `image` (H, W, C), wholly in the frame, that have a pixel in `wanted` (H, W) bool; possibly none."""
+    return _listed(image, _windows(wanted) > 0)
+
+
+def _listed(image: np.ndarray, corners: np.ndarray) -> Patches:
+    rows, columns = np.nonzero(corners)
+    index = np.full(image.shape[:2], -1, np.int32)
+    index[rows, columns] = np.arange(len(rows), dtype=np.int32)
+    return Patches(opponent(image), rows, columns, index)
+
+
+def _windows(flags: np.ndarray) -> np.ndarray:
+    """How many of each patch's pixels are set, by corner: (H - 7, W - 7); empty where the image is smaller than a patch."""
+    if min(flags.shape) < PATCH:
+        return np.zeros((0, 0), np.int32)
+    sums = np.pad(np.cumsum(np.cumsum(flags, axis=0, dtype=np.int32), axis=1, dtype=np.int32), ((1, 0), (1, 0)))
+    return sums[PATCH:, PATCH:] - sums[:-PATCH, PATCH:] - sums[PATCH:, :-PATCH] + sums[:-PATCH, :-PATCH]
+
+
+class CshSearch:
+    """Matches between target patches and a fixed set of source patches: the sources' projections are computed once."""
+
+    def __init__(self, source: Patches, options: CshOptions | None = None) -> None:
+        """Raises `InputError` where there is no source patch, and for options out of range."""
+        self.options = options or CshOptions()
+        _check(self.options, source)
+        self.source = source
+        self._chosen = strongest(source.image, source.rows, source.columns, self.options.projections)
+        self._projected = project(source.image, source.rows, source.columns, self._chosen)
+        self._width = _bin_width(self._projected, self.options)
+
+    def match(self, target: Patches, start: np.ndarray | None = None) -> Matches:
+        """The nearest source patch of each patch of `target`, whose image has as many channels as the sources'.
+
+        `start` (n,) int: matches to begin with, places in the list of sources; else random ones. None gets worse than its start.
+        """
+        rng = np.random.default_rng(self.options.seed)
+        projected = project(target.image, target.rows, target.columns, self._chosen)
+        best = rng.integers(len(self.source), size=len(target)) if start is None else start
+        matches = Matches(best.astype(np.int32), np.full(len(target), np.inf, np.float32))
+        for table in range(self.options.tables):
+            self._try_table(target, projected, matches, table, rng)
+        return matches
+
+    def _try_table(self, target: Patches, projected: np.ndarray, matches: Matches, table: int, rng: np.random.Generator) -> None:
+        """Improves `matches` in place by the candidates of one hash table."""
+        width = self._width * np.float32(_WIDTHS[table % len(_WIDTHS)])
+        offset = rng.random(self.options.hashed, np.float32) * width
+        factors = rng.integers(1 << 62, size=self.options.hashed) | 1
+        bits = len(self.source).bit_length()
+        hashed = [
+            _Hashed(patches.image, patches.rows, patches.columns, patches.index, values, *_buckets(values, width, offset, factors, bits))
+            for patches, values in ((self.source, self._projected), (target, projected))
+        ]
+        salt, forward = int(rng.integers(1 << 30)), table % 2 == 0
+        _sweep(hashed[0], hashed[1], matches.source, matches.distance, matches.source.copy(), self.options.candidates, salt, forward)
+
+
+class _Hashed(NamedTuple):
+    """One image's patches (see `Patches`; `places` is its `index`) with their projections (n, k) and one hash table: `bins` (n,), and
+    the members of bin h, `members[starts[h]:starts[h + 1]]`."""
+
+    image: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    places: np.ndarray
+    projected: np.ndarray
+    bins: np.ndarray
+    starts: np.ndarray
+    members: np.ndarray
+
+
+# Bins go from wide ones, where rare patches find company, to narrow ones, where common patches find their best.
+_WIDTHS = (8.0, 4.0, 2.0, 1.0)
+
+
+def _check(options: CshOptions, source: Patches) -> None:
+    if not len(source):
+        raise InputError(f"there is no source patch: {PATCH} x {PATCH} pixels without a gap are needed")
+    most = PATCH * PATCH * source.image.shape[2]
+    if not 1 <= options.hashed <= options.projections <= most:
+        raise InputError(f"hashed and projections must satisfy 1 <= hashed <= projections <= {most}")
+    if options.tables < 1 or options.candidates < 1 or not options.occupancy > 0 or options.seed < 0:
+        raise InputError("tables and candidates must be at least 1, occupancy above 0, seed at least 0")
+
+
+def _bin_width(values: np.ndarray, options: CshOptions) -> np.float32:
+    """The width at which the median patch, with projections `values` (n, k), shares its bin with `occupancy` patches, to about a tenth."""
+    spread = max(float(np.ptp(values, axis=0).max()), 1e-30)
+    low, high = float(np.log(1e-4 * spread)), float(np.log(2 * spread))
+    factors = np.random.default_rng(options.seed).integers(1 << 62, size=options.hashed) | 1
+    offset = np.zeros(options.hashed, np.float32)
+    while high - low > 0.2:
+        middle = (low + high) / 2
+        bins, starts, _ = _buckets(values, np.float32(np.exp(middle)), offset, factors, len(values).bit_length())
+        low, high = (low, middle) if np.median(np.diff(starts)[bins]) > options.occupancy else (middle, high)
+    return np.float32(np.exp(low))
+
+
+def _buckets(values: np.ndarray, width: np.float32, offset: np.ndarray, factors: np.ndarray, bits: int) -> tuple[np.ndarray, ...]:
+    """The table of patches with projections `values` (n, >= hashed): bins below 2^bits (n,), starts (2^bits + 1,), members (n,)."""
+    bins, members = np.empty(len(values), np.int32), np.empty(len(values), np.int32)
+    starts = np.zeros((1 << bits) + 1, np.int32)
+    _hash(values, width, offset, factors, bits, bins)
+    _sort_into(bins, starts, members)
+    return bins, starts, members
+
+
+@compiled
+def _hash(values, width, offset, factors, bits, bins):
+    """bins[i]: the upper `bits` of sum_j factor_j floor((v_ij + b_j) / r), a multiplicative hash."""
+    inverse = np.float32(1) / width
+    for i in range(values.shape[0]):
+        key = np.int64(0)
+        for j in range(offset.shape[0]):
+            key += np.int64(np.floor((values[i, j] + offset[j]) * inverse)) * factors[j]
+        bins[i] = (key >> (63 - bits)) & ((1 << bits) - 1)
+
+
+@compiled
+def _sort_into(bins, starts, members):
+    """Counting sort: the patches of bin h become members[starts[h]:starts[h + 1]], in rising order. `starts` begins as zeros."""
+    for i in range(bins.shape[0]):
+        starts[bins[i] + 1] += 1
+    for h in range(starts.shape[0] - 1):
+        starts[h + 1] += starts[h]
+    free = starts.copy()
+    for i in range(bins.shape[0]):
+        members[free[bins[i]]] = i
+        free[bins[i]] += 1
+
+
+@compiled
+def _sweep(source, target, match, distance, before, candidates, salt, forward):
+    """One pass over the target patches; `before` are the matches at its start, so that the result does not depend on timing."""
+    count = match.shape[0]
+    step = 1 if forward else -1
+    tried = np.empty(4 * candidates + 4, np.int32)
+    image_s, image_t = source.image, target.image
+    projected_s, projected_t = source.projected, target.projected
+    for n in range(count):
+        i = n if forward else count - 1 - n
+        filled, found = 0, -1
+        if distance[i] == np.inf:
+            tried[0] = match[i]
+            filled = 1
+        for axis in range(2):
+            other = found
+            found = _beside(source, target, match, i, step * (1 - axis), step * axis)
+            if found >= 0 and found != other:
+                tried[filled] = found
+                filled = _draw(source.starts, source.members, source.bins[found], candidates, i + salt, tried, filled + 1)
+        filled = _draw(source.starts, source.members, target.bins[i], candidates, i + salt, tried, filled)
+        alike = filled
+        filled = _draw(target.starts, target.members, target.bins[i], candidates, i + salt, tried, filled)
+        for k in range(alike, filled):
+            tried[k] = before[tried[k]]
+        for k in range(filled):
+            if tried[k] == match[i] and distance[i] < np.inf:
+                continue
+            bound = _projected_distance(projected_s, tried[k], projected_t, i, distance[i])
+            if bound < distance[i]:
+                row_s, column_s, row_t, column_t = source.rows[tried[k]], source.columns[tried[k]], target.rows[i], target.columns[i]
+                total = _distance(image_s, row_s, column_s, image_t, row_t, column_t, distance[i])
+                if total < distance[i]:
+                    distance[i], match[i] = total, tried[k]
+
+
+@compiled
+def _beside(source, target, match, i, down, right):
+    """The source patch that continues the match of target patch i's neighbour, (down, right) before it; -1 where there is none."""
+    row, column = target.rows[i] - down, target.columns[i] - right
+    if row < 0 or column < 0 or row >= target.places.shape[0] or column >= target.places.shape[1]:
+        return -1
+    neighbour = target.places[row, column]
+    if neighbour < 0:
+        return -1
+    row, column = source.rows[match[neighbour]] + down, source.columns[match[neighbour]] + right
+    if row < 0 or column < 0 or row >= source.places.shape[0] or column >= source.places.shape[1]:
+        return -1
+    return source.places[row, column]
+
+
+@compiled
+def _draw(starts, members, bin_, most, turn, drawn, filled):
+    """Appends up to `most` members of a bin to `drawn`, from a place in it that varies with `turn`; returns the new count."""
+    first, size = starts[bin_], starts[bin_ + 1] - starts[bin_]
+    for k in range(min(size, most)):
+        drawn[filled] = members[first + (turn + k) % size]
+        filled += 1
+    return filled
+
+
+@compiled
+def _projected_distance(source, candidate, target, i, enough):
+    """Squared distance of the projections of two patches, rows of `source` and `target`, or some value above `enough`."""
+    total = np.float32(0)
+    for first in range(0, source.shape[1], 8):
+        for k in range(first, min(first + 8, source.shape[1])):
+            difference = source[candidate, k] - target[i, k]
+            total += difference * difference
+        if total >= enough:
+            break
+    return total
+
+
+@compiled
+def _distance(source, row_s, column_s, target, row_t, column_t, enough):
+    """Squared distance of two patches by all their values, or some value above `enough`.
+
+    Four rows at once: sums that do not wait for each other are several times faster than one.
+    """
+    t0, t1, t2, t3 = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
+    for r in range(0, 8, 4):
+        s, t = row_s + r, row_t + r
+        for b in range(8):
+            for c in range(source.shape[2]):
+                d0 = source[s, column_s + b, c] - target[t, column_t + b, c]
+                d1 = source[s + 1, column_s + b, c] - target[t + 1, column_t + b, c]
+                d2 = source[s + 2, column_s + b, c] - target[t + 2, column_t + b, c]
+                d3 = source[s + 3, column_s + b, c] - target[t + 3, column_t + b, c]
+                t0 += d0 * d0
+                t1 += d1 * d1
+                t2 += d2 * d2
+                t3 += d3 * d3
+        if t0 + t1 + t2 + t3 >= enough:
+            break
+    return t0 + t1 + t2 + t3
