@@ -1,0 +1,118 @@
+# mypy: disable-error-code="no-untyped-def"
+"""Fills a hole with texture from the rest of the image, coarse to fine (Wexler, Shechtman & Irani 2007).
+
+Problem: pixels whose values are missing, in an image with texture: every patch that touches the hole should look like some patch
+outside it.
+
+Equation: alternate until settled: each patch p that touches the hole finds its nearest source patch (`coherency_sensitive_hashing`), at
+squared distance d_p; each missing pixel becomes the mean of what the matches say of it, sum_p w_p v_p / sum_p w_p, with
+w_p = g^-e_p exp(-d_p / (2 s)): s is the upper quartile of the distances, e_p how deep the patch's centre lies in the hole, g = 1.3. A
+pyramid starts this where the hole is small; its top is filled smoothly (`pull_push`), and each level starts from the one above.
+
+Citation: Y. Wexler, E. Shechtman and M. Irani, "Space-time completion of video", IEEE TPAMI 29(3), 463-476 (2007),
+doi:10.1109/TPAMI.2007.60.
+
+Limits: it invents what is plausible, not what was there. Patches of 8 x 8 pixels are copied without change of brightness, so that a
+shading that occurs nowhere else is not continued. Where no source patch exists, the fill is smooth.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import ndimage
+
+from ..compiled import compiled
+from ..errors import InputError
+from ..progress import Monitor
+from .coherency_sensitive_hashing import CshOptions, CshSearch, Matches, Patches, patches_touching, patches_within
+from .pull_push import fill, pull, push
+from .walsh_hadamard import PATCH
+
+
+@dataclass(frozen=True)
+class PatchFillOptions:
+    """`iterations`: matching and voting on the finest level, >= 1; each coarser level has one more.
+    `most_iterations`: the limit of that, >= `iterations`.
+    `matching`: how patches are found; its seed decides everything that is random.
+    """
+
+    iterations: int = 2
+    most_iterations: int = 6
+    matching: CshOptions = field(default_factory=lambda: CshOptions(tables=3, candidates=3))
+
+
+def fill_patches(
+    image: np.ndarray, known: np.ndarray, wanted: np.ndarray, options: PatchFillOptions | None = None, monitor: Monitor | None = None
+) -> np.ndarray:
+    """`image` (H, W, C) with the pixels of `wanted` (H, W) bool filled from those of `known` (H, W) bool: (H, W, C) float32.
+
+    Known pixels stay; those that are neither known nor wanted (their values are never read) hold some guess. Reports its progress to
+    `monitor`. Raises `InputError` where nothing is known, a pixel is both, or options are out of range.
+    """
+    options = options or PatchFillOptions()
+    if not 1 <= options.iterations <= options.most_iterations:
+        raise InputError("iterations must be at least 1, most_iterations no less")
+    if not known.any() or (known & wanted).any():
+        raise InputError("a hole needs known pixels around it, and no pixel can be both known and missing: check the mask")
+    values = np.where(known[..., None], image, 0).astype(np.float32)
+    return _filled(values, known, wanted, options, 0, monitor or Monitor())
+
+
+def _filled(
+    values: np.ndarray, known: np.ndarray, wanted: np.ndarray, options: PatchFillOptions, level: int, monitor: Monitor
+) -> np.ndarray:
+    """One level of the pyramid, 0 the finest, after those above it."""
+    if not wanted.any() or min(known.shape) < 2 * PATCH:
+        return fill(values, known)
+    smaller, share = pull(values, known.astype(np.float32))
+    missing = _any_of_four(wanted) & (share == 0)
+    above = _filled(smaller, share > 0, missing, options, level + 1, monitor)
+    current = np.where(known[..., None], values, push(above, known.shape))
+    source = patches_within(current, known)
+    if not len(source):
+        return current
+    search = CshSearch(source, options.matching)
+    depth = ndimage.distance_transform_edt(~known)
+    count = min(options.iterations + level, options.most_iterations)
+    matches = None
+    for turn in range(count):
+        # A level has a quarter of the pixels of the one below it.
+        monitor.report("filling holes", 0.25**level * (0.25 + 0.75 * turn / count))
+        target = patches_touching(current, wanted)
+        matches = search.match(target, None if matches is None else matches.source)
+        current = np.where(known[..., None], values, _voted(current, target, source, matches, depth))
+    return current
+
+
+def _any_of_four(flags: np.ndarray) -> np.ndarray:
+    """Which 2 x 2 blocks of `flags` (H, W) bool have a pixel set; an odd last row or column stands alone."""
+    padded = np.pad(flags, [(0, n % 2) for n in flags.shape])
+    return padded[::2, ::2] | padded[1::2, ::2] | padded[::2, 1::2] | padded[1::2, 1::2]
+
+
+def _voted(current: np.ndarray, target: Patches, source: Patches, matches: Matches, depth: np.ndarray) -> np.ndarray:
+    """The image with each pixel under target patches replaced by the weighted mean of what their matches say."""
+    scale = 2 * max(float(np.quantile(matches.distance, 0.75)), 1e-12)
+    centre = depth[np.minimum(target.rows + PATCH // 2, len(depth) - 1), target.columns + PATCH // 2]
+    # The smallest weight must not vanish: deep in a hole all patches have the same little.
+    weight = np.exp(np.maximum(-matches.distance / scale - np.log(_DEPTH_LOSS) * centre, -60.0))
+    total = np.zeros((*current.shape[:2], current.shape[2] + 1))
+    _vote(current, target.rows, target.columns, source.rows, source.columns, matches.source, weight, total)
+    weights = total[..., -1:]
+    return np.where(weights > 0, total[..., :-1] / np.where(weights > 0, weights, 1), current).astype(np.float32)
+
+
+_DEPTH_LOSS = 1.3
+
+
+@compiled
+def _vote(image, rows, columns, source_rows, source_columns, matches, weight, total):
+    """total[..., :C] += weight times the matched patch, total[..., C] += weight, over every target patch's pixels."""
+    channels = image.shape[2]
+    for i in range(rows.shape[0]):
+        row, column = source_rows[matches[i]], source_columns[matches[i]]
+        for a in range(8):
+            for b in range(8):
+                for c in range(channels):
+                    total[rows[i] + a, columns[i] + b, c] += weight[i] * image[row + a, column + b, c]
+                total[rows[i] + a, columns[i] + b, channels] += weight[i]
