@@ -18,7 +18,7 @@ from isc_core.image_metrics import highlight_region, rank_correlation, sparsific
 from isc_core.metrics import lmse, mse, psnr
 
 # Files that many methods read: with one of them all rows are measured anew.
-_COMMON = ("checks", "clipped", "layers")
+_COMMON = ("channels", "checks", "clipped", "evidence", "layers")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from .sirfs.frames import real_sh
 _PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
 _PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
 _MARGIN = 0.06  # room around the object, of the panel's side
-_TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (1.0, 0.42, 0.04), (0.06, 0.3, 1.0), (0.13, 0.13, 0.13)  # linear
+_TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (1.0, 0.42, 0.04), (0.06, 0.3, 1.0), (0.06, 0.06, 0.06)  # linear
 _FULL_ERROR = 0.1  # of the photo's white: errors from here on have the full colour
 
 
