@@ -2,14 +2,16 @@
 
 Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
 
-Equation: a generation clones each of N antibodies N_c = round(beta N) times and moves the clones' thresholds by steps of the size
-s = 255 exp(-rho f), f in [0, 1] being the affinity scaled from the worst to the best antibody. Each antibody gives way to the best of its
-clones if that is no worse, and the d worst antibodies to new ones.
+Equation: a generation clones each of N antibodies N_c = round(beta N) times and moves the clones' thresholds by at most
+s = 254 exp(-rho f) levels, f in [0, 1] being the antibody's affinity. Each antibody gives way to the best of its clones if that is no
+worse, and the d worst antibodies to new ones.
 
 Citation: L. N. de Castro and F. J. Von Zuben, "Learning and optimization using the clonal selection principle", IEEE Trans. Evolutionary
 Computation 6(3), 239-251 (2002), doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have equally many clones, as they propose
-for optimisation. Ours is the form of the mutation, on integers: a clone moves one threshold, or with the probability `spread` each of
-them; by a step within +-s that is at least one level; where thresholds cross they are sorted.
+for optimisation; N, beta, rho and d are usual values of theirs. Ours are two choices, and the search succeeds by them:
+- the affinity is the rank, scaled to [0, 1]: scaled values are nearly 1 for all but the newest antibodies, and nothing would move far;
+- a clone moves a run of neighbouring thresholds by one common step of at least one level, then sorts them. Good sets of thresholds lie on
+  ridges along which neighbours move together; independent steps rarely follow them, and end one level short of the maximum.
 
 Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of chance, so that another source can be tried
 with nothing else changed: see `chaotic_clonal`.
@@ -32,14 +34,12 @@ class ClonalOptions:
     """`population`: how many antibodies N are kept, >= 2. `clone_share`: clones of each as a share beta of N, > 0.
     `decay`: rho, how fast mutations shrink with affinity, > 0.
     `replaced_share`: share d / N of the antibodies, the worst, that each generation replaces, in [0, 1).
-    `spread`: how often a clone moves all of its thresholds instead of one, in [0, 1].
     """
 
     population: int = 50
     clone_share: float = 0.1
-    decay: float = 4.0
+    decay: float = 5.0
     replaced_share: float = 0.1
-    spread: float = 0.5
 
 
 class Numbers(Protocol):
@@ -79,9 +79,8 @@ def search(objective: OtsuObjective, count: int, evaluations: int, numbers: Numb
     antibodies = _new(numbers, options.population, count)
     values = account.evaluate(antibodies)
     while account.left >= options.population * clones + replaced:
-        offspring = _mutated(
-            np.repeat(antibodies, clones, axis=0), np.repeat(_steps(values, options.decay), clones), numbers, options.spread
-        )
+        steps = np.repeat(_steps(values, options.decay), clones)
+        offspring = _mutated(np.repeat(antibodies, clones, axis=0), steps, numbers)
         offspring_values = account.evaluate(offspring).reshape(-1, clones)
         best = np.argmax(offspring_values, axis=1)
         chosen = np.arange(options.population), best
@@ -103,8 +102,8 @@ def mutation_rate(affinity: np.ndarray, decay: float) -> np.ndarray:
 def _check(options: ClonalOptions) -> None:
     if options.population < 2 or not options.clone_share > 0 or not options.decay > 0:
         raise InputError("population must be at least 2, clone_share and decay above 0")
-    if not 0 <= options.replaced_share < 1 or not 0 <= options.spread <= 1:
-        raise InputError("replaced_share must lie within [0, 1) and spread within [0, 1]")
+    if not 0 <= options.replaced_share < 1:
+        raise InputError("replaced_share must lie within [0, 1)")
 
 
 def _new(numbers: Numbers, size: int, count: int) -> np.ndarray:
@@ -112,18 +111,19 @@ def _new(numbers: Numbers, size: int, count: int) -> np.ndarray:
 
 
 def _steps(values: np.ndarray, decay: float) -> np.ndarray:
-    """The largest step (n,) in levels of the clones of antibodies with `values` (n,)."""
-    range_ = np.ptp(values)
-    affinity = (values - values.min()) / range_ if range_ > 0 else np.ones_like(values)
+    """The largest step (n,) in levels, >= 1, of the clones of antibodies with `values` (n,)."""
+    affinity = np.empty(len(values))
+    affinity[np.argsort(values, kind="stable")] = np.linspace(0, 1, len(values))
     return np.maximum(1, _TOP * mutation_rate(affinity, decay))
 
 
-def _mutated(clones: np.ndarray, steps: np.ndarray, numbers: Numbers, spread: float) -> np.ndarray:
-    """The `clones` (n, K), each moved by at most its entry of `steps` (n,) in one threshold or in all, and sorted."""
+def _mutated(clones: np.ndarray, steps: np.ndarray, numbers: Numbers) -> np.ndarray:
+    """The `clones` (n, K), a run of each one's thresholds moved by one step of at most its entry of `steps` (n,), and sorted."""
     size, count = clones.shape
-    chance = numbers.uniform((size, count + 2))
-    moves = (2 * chance[:, :count] - 1) * steps[:, None]
-    moves = np.sign(moves) * np.ceil(np.abs(moves))
-    only = (chance[:, count] * count).astype(np.int64)
-    moved = (np.arange(count) == only[:, None]) | (chance[:, count + 1] < spread)[:, None]
-    return np.sort(np.clip(clones + np.where(moved, moves, 0).astype(np.int64), 0, _TOP), axis=1)
+    chance = numbers.uniform((size, 3))
+    sway = 2 * chance[:, 0] - 1
+    moves = np.where(sway < 0, -1, 1) * np.maximum(1, np.ceil(np.abs(sway) * steps)).astype(np.int64)
+    ends = np.sort((chance[:, 1:] * count).astype(np.int64), axis=1)
+    column = np.arange(count)
+    moved = (column >= ends[:, :1]) & (column <= ends[:, 1:])
+    return np.sort(np.clip(clones + moved * moves[:, None], 0, _TOP), axis=1)

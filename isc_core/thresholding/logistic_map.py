@@ -82,7 +82,7 @@ class ChaoticNumbers:
         while held < wanted:
             self._advance(self._stride)
             blocks.append(np.minimum(uniformised(self._x), np.nextafter(1, 0)))
-            held += len(blocks[-1])
+            held += len(self._x)
         numbers = np.concatenate(blocks)
         self._block = numbers[wanted:]
         return numbers[:wanted].reshape(shape)
@@ -94,9 +94,11 @@ class ChaoticNumbers:
         return np.where(np.isin(x, DEGENERATE), x + 1e-3, x)
 
     def _advance(self, steps: int) -> None:
+        x = self._x
         for _ in range(steps):
-            self._x = 4 * self._x * (1 - self._x)
-            stuck = np.isin(self._x, DEGENERATE)
-            if stuck.any():
-                self._restarts += 1
-                self._x[stuck] = self._starts(np.flatnonzero(stuck))
+            x = 4 * x * (1 - x)
+        stuck = np.isin(x, DEGENERATE)  # an orbit that met such a point earlier still lies on one
+        if stuck.any():
+            self._restarts += 1
+            x[stuck] = self._starts(np.flatnonzero(stuck))
+        self._x = x
