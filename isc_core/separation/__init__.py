@@ -18,7 +18,7 @@ from ..errors import InputError
 from ..progress import Monitor
 from .checks import check_arrays
 
-METHODS = ("none", "mallick_2006", "yoon_2006", "shen_2009", "yang_2010", "shen_2013")
+METHODS = ("none", "mallick_2006", "yoon_2006", "shen_2009", "yang_2010", "kim_2013", "shen_2013")
 IMPROVED = "improved"
 # The toolbox knows the whole frame only, and nothing of clipping: its figures are found again no other way.
 _TOOLBOX = "sihr"
