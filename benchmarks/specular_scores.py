@@ -28,9 +28,10 @@ class Row:
     `group`: "shen_zheng", "laboratory", "rendered", or "clean" for photos without any highlight. `code`: of the method's source, so that
     a row is measured anew once the method changes. `psnr`: dB, inside the mask, of values of range 1; `ssim` by channel, `ssim_volume` as
     MATLAB. `mse_ratio`: the diffuse layer's mean square error over that of the untouched photo, inside the mask; `mse_inside`,
-    `mse_outside` the highlights. `lmse_*`: Grosse's local error. `removed`: share of the squared error that leaves with the least confident
-    fifth; `area` under the sparsification curve; `rank`: correlation of confidence and squared error. `change`: RMS of what was removed
-    over the photo's RMS. `seconds`: of this run; `megapixels` inside the mask; `refused`: why there is no answer.
+    `mse_outside` the highlights; `specular_ratio`: the specular layer's over that of none. `lmse_*`: Grosse's local error. `removed`: share
+    of the squared error that leaves with the least confident fifth; `area` under the sparsification curve; `rank`: correlation of
+    confidence and squared error. `change`: RMS of what was removed over the photo's RMS. `seconds`: of this run; `megapixels` inside the
+    mask; `refused`: why there is no answer.
     """
 
     group: str
@@ -44,6 +45,7 @@ class Row:
     mse_ratio: float | None = None
     mse_inside: float | None = None
     mse_outside: float | None = None
+    specular_ratio: float | None = None
     lmse_diffuse: float | None = None
     lmse_specular: float | None = None
     removed: float | None = None
@@ -116,6 +118,7 @@ def _against_truth(truth: SeparationTruth, split: Separation) -> dict[str, Any]:
     highlights = highlight_region(specular, mask)
     error = ((answer - diffuse)[mask] ** 2).mean(axis=1)
     curve = sparsification(error, split.confidence[mask])
+    found = np.where(inside, split.specular, 0).astype(np.float64)
     return {
         "psnr": psnr(diffuse, answer, mask),
         "ssim": ssim(diffuse, answer, mask),
@@ -123,8 +126,9 @@ def _against_truth(truth: SeparationTruth, split: Separation) -> dict[str, Any]:
         "mse_ratio": _ratio(diffuse, answer, image, mask),
         "mse_inside": _ratio(diffuse, answer, image, highlights),
         "mse_outside": _ratio(diffuse, answer, image, mask & ~highlights),
+        "specular_ratio": _ratio(specular, found, np.zeros_like(found), mask),
         "lmse_diffuse": lmse(diffuse, answer, mask),
-        "lmse_specular": lmse(specular, split.specular.astype(np.float64), mask) if (specular[mask] > 0).any(axis=0).all() else None,
+        "lmse_specular": lmse(specular, found, mask) if (specular[mask] > 0).any(axis=0).all() else None,
         "removed": curve.removed(0.2),
         "area": curve.area,
         "rank": rank_correlation(split.confidence[mask], error),

@@ -45,7 +45,7 @@ def test_doing_nothing_is_one() -> None:
 def test_what_is_left_counts_squared(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
     answer_with(monkeypatch, share)
     row, _ = measure("laboratory", truth(), "shen_2013", "improved")
-    for ratio in (row.mse_ratio, row.mse_inside, row.mse_outside):
+    for ratio in (row.mse_ratio, row.mse_inside, row.mse_outside, row.specular_ratio):
         assert ratio == pytest.approx((1 - share) ** 2, rel=1e-4)
     assert row.lmse_specular == pytest.approx(0, abs=1e-9) and row.lmse_diffuse is not None and row.lmse_diffuse > 0
     assert row.rank == pytest.approx(-1, abs=0.05)
@@ -70,6 +70,18 @@ def test_a_photo_without_highlights_has_no_truth_to_miss() -> None:
     row, _ = measure("clean", replace(d, image=d.diffuse, specular=0 * d.specular), "shen_2013", "improved")
     assert row.change is not None and row.change > 0 and row.psnr is None
     assert f"| shen_2013 | improved | {100 * row.change:.2f} | {100 * row.change:.2f} |" in tables([row])
+
+
+def test_the_gain_is_one_less_the_geometric_mean_of_ratios() -> None:
+    def row(method: str, image: str, diffuse: float, specular: float) -> Row:
+        return Row(
+            "laboratory", image, method, "improved", psnr=30, mse_ratio=diffuse, specular_ratio=specular, lmse_diffuse=1, lmse_specular=1
+        )
+
+    rows = [row("sparse_coding", "apple", 0.2, 0.5), row("sparse_coding", "paper1", 0.9, 0.5), row("sparse_coding", "phone", 9, 9)]
+    rows += [row("tan_2005", "apple", 0.8, 1), row("tan_2005", "paper1", 0.9, 1), row("tan_2005", "phone", 1, 1)]
+    assert "| tan_2005 | 2 (apple, teabag2, paper1, animals, cups) | 50.0 % | 50.0 % | 0.0 % | 0.0 % |" in tables(rows)
+    assert "Sparse Coding against" not in tables(rows[3:])
 
 
 def test_rows_come_back_from_disk(tmp_path: Path) -> None:
