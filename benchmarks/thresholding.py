@@ -19,7 +19,7 @@ from scipy.stats import mannwhitneyu
 from skimage import data
 from skimage.color import rgb2gray
 
-from isc_core.thresholding import Optimum, OtsuObjective, exact, maximise
+from isc_core.thresholding import Optimum, OtsuObjective, exact, maximise, particle_swarm
 from isc_core.thresholding.clonal_selection import ClonalOptions, mutation_rate, search
 from isc_core.thresholding.logistic_map import DEGENERATE, ChaoticNumbers, bifurcation, density, orbit, uniformised
 
@@ -51,6 +51,10 @@ def _one_orbit(objective: OtsuObjective, count: int, evaluations: int, seed: int
     return search(objective, count, evaluations, OneOrbit(seed), ClonalOptions())
 
 
+def _falling_swarm(objective: OtsuObjective, count: int, evaluations: int, seed: int) -> Optimum:
+    return particle_swarm.maximise(objective, count, evaluations, seed, particle_swarm.FALLING)
+
+
 def _named(name: str) -> Callable[[OtsuObjective, int, int, int], Optimum]:
     return lambda objective, count, evaluations, seed: maximise(name, objective, count, evaluations=evaluations, seed=seed)
 
@@ -59,6 +63,7 @@ OPTIMISERS: dict[str, Callable[[OtsuObjective, int, int, int], Optimum]] = {
     "chaotic_clonal": _named("chaotic_clonal"),
     "clonal_selection": _named("clonal_selection"),
     "particle_swarm": _named("particle_swarm"),
+    "swarm, falling inertia": _falling_swarm,
     "chaotic, one orbit": _one_orbit,
 }
 

@@ -9,6 +9,8 @@ Citation: J. Kennedy and R. Eberhart, "Particle swarm optimization", Proc. ICNN'
 M. Clerc and J. Kennedy, "The particle swarm: explosion, stability, and convergence in a multidimensional complex space", IEEE Trans.
 Evolutionary Computation 6(1), 58-73 (2002), doi:10.1109/4235.985692 (the constriction).
 
+An inertia that falls from .9 to .4 with c = 2 is the other usual setting: `FALLING`. It searches longer before it gathers.
+
 Limits: a swarm that has gathered at a lesser maximum stays there; the rest of its budget is lost.
 """
 
@@ -25,14 +27,19 @@ _TOP = LEVELS - 2  # the highest threshold that leaves a level above it
 
 @dataclass(frozen=True)
 class SwarmOptions:
-    """`particles`: how many, >= 2. `inertia`: share w of a velocity that is kept, in [0, 1). `attraction`: c, both pulls' strength, > 0.
+    """`particles`: how many, >= 2. `attraction`: c, both pulls' strength, > 0.
+    `inertia`, `last_inertia`: share w of a velocity that is kept, at the start and at the end of the budget, linear between; in [0, 1).
     `top_speed`: largest move of a threshold in one step, in levels, > 0.
     """
 
     particles: int = 40
     inertia: float = 0.7298
+    last_inertia: float = 0.7298
     attraction: float = 1.49618
     top_speed: float = 64.0
+
+
+FALLING = SwarmOptions(inertia=0.9, last_inertia=0.4, attraction=2.0)
 
 
 def maximise(
@@ -43,8 +50,7 @@ def maximise(
     Raises `InputError` for unfit options, or a budget below one step of the swarm.
     """
     options = options or SwarmOptions()
-    if options.particles < 2 or not 0 <= options.inertia < 1 or not options.attraction > 0 or not options.top_speed > 0:
-        raise InputError("particles must be at least 2, inertia within [0, 1), attraction and top_speed above 0")
+    _check(options)
     generator = np.random.default_rng(seed)
     account = Account(objective, evaluations, options.particles)
     shape = (options.particles, count)
@@ -56,7 +62,8 @@ def maximise(
     while account.left >= options.particles:
         leader = own[np.argmax(own_values)]
         pulls = generator.random((2, *shape)) * options.attraction
-        velocities = options.inertia * velocities + pulls[0] * (own - places) + pulls[1] * (leader - places)
+        inertia = options.last_inertia + (options.inertia - options.last_inertia) * account.left / evaluations
+        velocities = inertia * velocities + pulls[0] * (own - places) + pulls[1] * (leader - places)
         velocities = np.clip(velocities, -options.top_speed, options.top_speed)
         places = np.clip(places + velocities, 0, _TOP)
         values = account.evaluate(_thresholds(places))
@@ -64,6 +71,13 @@ def maximise(
         own[better] = places[better]
         own_values = np.maximum(values, own_values)
     return account.close()
+
+
+def _check(options: SwarmOptions) -> None:
+    if options.particles < 2 or not options.attraction > 0 or not options.top_speed > 0:
+        raise InputError("particles must be at least 2, attraction and top_speed above 0")
+    if not 0 <= options.inertia < 1 or not 0 <= options.last_inertia < 1:
+        raise InputError("inertia and last_inertia must lie within [0, 1)")
 
 
 def _thresholds(places: np.ndarray) -> np.ndarray:

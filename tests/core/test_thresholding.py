@@ -9,7 +9,7 @@ from benchmarks.thresholding import levels
 from isc_core.errors import InputError
 from isc_core.thresholding import OPTIMISERS, OtsuObjective, chaotic_clonal, clonal_selection, exact, maximise, particle_swarm, quantise
 from isc_core.thresholding.clonal_selection import ClonalOptions, mutation_rate
-from isc_core.thresholding.particle_swarm import SwarmOptions
+from isc_core.thresholding.particle_swarm import FALLING, SwarmOptions
 
 # Exact optima for 3, 4 and 5 thresholds, of an independent program.
 OPTIMA = {
@@ -102,6 +102,18 @@ def test_swarm_finds_easy_optima_and_comes_close_to_others() -> None:
     assert min(maximise("particle_swarm", hard, 5, seed=s).value for s in range(4)) > 0.97 * exact(hard, 5).value
 
 
+def test_swarm_with_falling_inertia_gathers_later() -> None:
+    objective = OtsuObjective.of(levels("coins"))
+    best = exact(objective, 3).value
+
+    def needed(options: SwarmOptions) -> float:
+        found = [particle_swarm.maximise(objective, 3, seed=seed, options=options) for seed in range(4)]
+        assert [f.value for f in found] == pytest.approx([best] * 4, rel=1e-12)
+        return float(np.mean([f.history[np.argmax(f.history[:, 1] >= best * (1 - 1e-12)), 0] for f in found]))
+
+    assert needed(FALLING) > 2 * needed(SwarmOptions())
+
+
 def test_clones_of_better_antibodies_move_less() -> None:
     assert mutation_rate(np.array([0.0, 0.5, 1.0]), 4) == pytest.approx([1, np.exp(-2), np.exp(-4)])
     numbers = clonal_selection.PseudoRandomNumbers(0)
@@ -157,6 +169,12 @@ def test_refuses_what_it_cannot_use() -> None:
     for options in (ClonalOptions(population=1), ClonalOptions(clone_share=0), ClonalOptions(decay=0), ClonalOptions(replaced_share=1)):
         with pytest.raises(InputError):
             chaotic_clonal.maximise(objective, 3, options=options)
-    for swarm in (SwarmOptions(particles=1), SwarmOptions(inertia=1), SwarmOptions(attraction=0), SwarmOptions(top_speed=0)):
+    for swarm in (
+        SwarmOptions(particles=1),
+        SwarmOptions(inertia=1),
+        SwarmOptions(last_inertia=-1),
+        SwarmOptions(attraction=0),
+        SwarmOptions(top_speed=0),
+    ):
         with pytest.raises(InputError):
             particle_swarm.maximise(objective, 3, options=swarm)
