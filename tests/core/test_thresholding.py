@@ -156,6 +156,8 @@ def test_refuses_what_it_cannot_use() -> None:
     for count in (0, 255):
         with pytest.raises(InputError, match="number of thresholds"):
             maximise("exact", objective, count)
+    with pytest.raises(InputError, match="seed"):
+        maximise("clonal_selection", objective, 3, seed=-1)
     with pytest.raises(InputError, match="at least 50 evaluations"):
         maximise("clonal_selection", objective, 3, evaluations=49)
     for bad in (np.zeros(256), np.ones(255), -np.ones(256), np.full(256, np.nan)):
