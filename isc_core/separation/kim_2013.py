@@ -44,7 +44,7 @@ class Kim2013Options:
     """`patch`: side, in pixels, of the square in which the dark channel is the least value; >= 1.
     `base`: b, how many times the mean of the smallest channel counts as diffuse in the dark channel; >= 0. Zero is the published idea.
     `rounds`: how often diffuse colours and specular are found in turn; >= 0. Zero leaves the dark channel.
-    `reach`: how far colours are averaged, as a share of the mask's box (of the root of its area); > 0.
+    `reach`: how far colours are averaged, as a share of the mask's box (of the root of its area); >= .05.
     `hue`: which hues are alike, as a distance in the disc of unit chroma; in [.02, 1].
     `purity`: the chroma, as a share of the mask's largest value, below which a hue says little; > 0.
     `trust`: t, the specular light, in units of u, at which a pixel's say in its paint's colour falls to 1 / e; > 0.
@@ -133,9 +133,12 @@ def separate(
 def _check_options(options: Kim2013Options) -> None:
     if options.patch < 1 or options.rounds < 0 or options.sweeps < 0:
         raise InputError("patch must be at least 1, rounds and sweeps at least 0")
-    positive = (options.reach, options.purity, options.trust, options.prior, options.gradient)
-    if not all(value > 0 for value in positive) or not 0.02 <= options.hue <= 1:
-        raise InputError("reach, purity, trust, prior and gradient must be above 0, hue within [0.02, 1]")
+    positive = (options.purity, options.trust, options.prior, options.gradient)
+    if not all(value > 0 for value in positive):
+        raise InputError("purity, trust, prior and gradient must be above 0")
+    # Smaller cells would need more memory than the image.
+    if not options.reach >= 0.05 or not 0.02 <= options.hue <= 1:
+        raise InputError("reach must be at least 0.05, hue within [0.02, 1]")
     if not (options.base >= 0 and options.smoothness >= 0):
         raise InputError("base and smoothness must be at least 0")
     if not 0 <= options.bright_saturation <= 1 or not (options.fade is None or options.fade > 0):

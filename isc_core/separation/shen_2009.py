@@ -34,8 +34,8 @@ class Shen2009Options:
     `region_share`: a region is where b exceeds this share of its largest value, in [0, 1).
     `ring_width`: side of the square, in pixels, by which a region is widened to find its ring; odd, >= 3.
     `every_region`: each region has its own gain and level. Else one gain, the largest region's, and one level, T, hold everywhere.
-    `bright_saturation`: nothing is removed if the colour (largest minus smallest channel) of the pixels above T is less than this share
-    of their largest channel, in [0, 1]. Zero always removes, like the published method.
+    `bright_saturation`: nothing is removed if the colour (largest minus smallest channel) of the pixels whose smallest channel is above
+    the mean is less than this share of their largest channel, in [0, 1]. Zero always removes, like the published method.
     `whole_frame`: statistics and regions of the whole frame, as the mask-less public implementations have them, not of the mask.
     """
 
@@ -95,7 +95,8 @@ def _specular_of(image: np.ndarray, domain: np.ndarray, usable: np.ndarray, opti
     low = smallest(image).astype(float)
     level = _threshold(low[domain], options.deviations)
     above = domain & (low > level)
-    if saturation(image[above]) < options.bright_saturation or not above.any():
+    bright = domain & (low > low[domain].mean())
+    if not above.any() or saturation(image[bright]) < options.bright_saturation:
         return np.zeros_like(low)
     excess = np.where(above, low - level, 0)
     regions, count = ndimage.label(above & (excess > options.region_share * excess.max()), _EIGHT)
