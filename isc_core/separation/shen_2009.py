@@ -78,7 +78,7 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "shen_2009")
     domain = np.ones_like(mask) if options.whole_frame else mask
-    seen = np.where(domain[..., None], np.nan_to_num(image) if options.whole_frame else image, 0)
+    seen = np.where(domain[..., None] & np.isfinite(image), image, 0)
     usable = domain if clipped is None else domain & ~clipped
     return white_layers(np.where(mask[..., None], image, 0), mask, _specular_of(seen, domain, usable, options), clipped)
 

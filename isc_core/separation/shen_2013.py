@@ -25,6 +25,7 @@ from ..progress import Monitor
 from .channels import fade_in, largest, saturation, smallest
 from .checks import check_arrays, require_colour
 from .clipped import explain_clipped
+from .layers import DOUBT
 
 
 @dataclass(frozen=True)
@@ -52,10 +53,6 @@ VARIANTS: dict[str, Shen2013Options] = {
     "paper": Shen2013Options(bright_saturation=0, fade=0),
     "sihr": Shen2013Options(bright_saturation=0, fade=0, whole_frame=True, label_slip=True),
 }
-
-
-# A highlight can hide in a pixel's smallest channel; the share of it that stays in doubt where the method could decide.
-_DOUBT = 0.3
 
 
 @dataclass(frozen=True)
@@ -116,7 +113,8 @@ def _check_options(options: Shen2013Options) -> None:
 
 def _gather(image: np.ndarray, domain: np.ndarray, clipped: np.ndarray | None) -> _Pixels:
     # Column by column: which pixel founds a cluster depends on the order, and the published figures come from this one.
-    colours = np.nan_to_num(np.asarray(image, np.float32).transpose(1, 0, 2)[domain.T])
+    colours = np.asarray(image, np.float32).transpose(1, 0, 2)[domain.T]
+    colours = np.where(np.isfinite(colours), colours, 0)
     usable = np.ones(len(colours), bool) if clipped is None else ~clipped.T[domain.T]
     low = smallest(colours)
     return _Pixels(colours, largest(colours), low, np.float32(low.mean(dtype=np.float64)), usable)
@@ -125,7 +123,7 @@ def _gather(image: np.ndarray, domain: np.ndarray, clipped: np.ndarray | None) -
 def _specular_of(pixels: _Pixels, options: Shen2013Options) -> tuple[np.ndarray, np.ndarray]:
     """Specular (n,) in [0, low], and the error (n,) to be expected of it."""
     specular = np.zeros_like(pixels.low)
-    doubt = _DOUBT * pixels.low
+    doubt = DOUBT * pixels.low
     bright = np.flatnonzero(pixels.low > pixels.base)
     if not len(bright) or saturation(pixels.colours[bright]) < options.bright_saturation:
         doubt[bright] = pixels.low[bright]

@@ -104,8 +104,9 @@ def test_any_mask_and_noise_keep_the_layers_sound(variant: str) -> None:
     single = np.zeros((40, 50), bool)
     single[3, 4] = True
     for mask in (random.random((40, 50)) > 0.4, single):
-        split = shen_2009.separate(np.where(mask[..., None], image, np.nan), mask, VARIANTS[variant])
-        assert_layers_hold(split, np.where(mask[..., None], image, 0), mask)
+        for unknown in (np.nan, np.inf):
+            split = shen_2009.separate(np.where(mask[..., None], image, unknown), mask, VARIANTS[variant])
+            assert_layers_hold(split, np.where(mask[..., None], image, 0), mask)
 
 
 def test_clipped_cores_are_filled_from_around() -> None:

@@ -105,8 +105,9 @@ def test_the_whole_frame_counts_for_the_toolbox_alone() -> None:
         dark, bright = (shen_2013.separate(scene, mask, VARIANTS[name]) for scene in (image, lit))
         assert differs == (np.abs(dark.diffuse - bright.diffuse).max() > 1e-3)
         assert_layers_hold(bright, lit, mask)
-        nan = shen_2013.separate(np.where(mask[..., None], image, np.nan), mask, VARIANTS[name])
-        assert np.allclose(nan.diffuse, dark.diffuse, atol=1e-6)
+        for unknown in (np.nan, np.inf):
+            blind = shen_2013.separate(np.where(mask[..., None], image, unknown), mask, VARIANTS[name])
+            assert np.allclose(blind.diffuse, dark.diffuse, atol=1e-6)
 
 
 def test_the_specular_layer_fades_in_without_a_jump() -> None:
