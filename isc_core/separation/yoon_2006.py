@@ -22,7 +22,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from ..compiled import compiled
 from ..decomposition import Separation
@@ -30,6 +29,7 @@ from ..errors import InputError
 from ..progress import Monitor
 from .channels import largest, smallest
 from .checks import check_arrays, require_colour
+from .colour_groups import colour_cells, group_quantile, two_band_shares
 from .evidence import colour_evidence
 from .layers import white_layers
 
@@ -148,10 +148,7 @@ def _two_band(image: np.ndarray, domain: np.ndarray, usable: np.ndarray, options
     else:
         first = known & (low >= options.dark)
     ratio = np.where(known, total / np.where(known, band, 1), 0)
-    layers = [np.where(known, layer, 0) for layer in (image[..., 0] - low, image[..., 1] - low, band)]
-    if options.window > 1:
-        layers = [ndimage.uniform_filter(layer, options.window, mode="constant") for layer in layers]
-    red, green = (np.where(known, layer / np.where(known, layers[2], 1), 0) for layer in layers[:2])
+    red, green = two_band_shares(image, known, options.window)
     return _TwoBand(ratio, band, red, green, known, first)
 
 
@@ -162,24 +159,11 @@ def _by_regions(pixels: _TwoBand, options: Yoon2006Options) -> np.ndarray:
         _unite(first, second, parent)
     _flatten(parent)
     known = pixels.known
-    cell = np.minimum(pixels.red[known] * options.cells, options.cells - 1).astype(np.int64) * options.cells
-    cell += np.minimum(pixels.green[known] * options.cells, options.cells - 1).astype(np.int64)
+    cell = colour_cells(pixels.red[known], pixels.green[known], options.cells)
     group = parent[known.ravel()] * options.cells**2 + cell
     ratio = np.zeros(known.shape)
-    ratio[known] = _group_quantile(group, pixels.ratio[known], options.quantile)
+    ratio[known] = group_quantile(group, pixels.ratio[known], options.quantile)
     return ratio
-
-
-def _group_quantile(group: np.ndarray, values: np.ndarray, quantile: float) -> np.ndarray:
-    """For each of `values` (n,) the lower `quantile` of all those with the same whole number in `group` (n,)."""
-    order = np.argsort(values)
-    order = order[np.argsort(group[order], kind="stable")]
-    sorted_group = group[order]
-    starts = np.flatnonzero(np.diff(sorted_group, prepend=-1))
-    sizes = np.diff(starts, append=len(group))
-    found = np.empty_like(values)
-    found[order] = np.repeat(values[order[starts + (quantile * (sizes - 1)).astype(np.int64)]], sizes)
-    return found
 
 
 def _by_sweeps(pixels: _TwoBand, options: Yoon2006Options, monitor: Monitor) -> np.ndarray:

@@ -9,6 +9,7 @@ from scipy import ndimage
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation import yoon_2006
+from isc_core.separation.colour_groups import group_quantile
 from isc_core.separation.yoon_2006 import VARIANTS, Yoon2006Options
 from tests.core.separation_scenes import assert_layers_hold, error_ratio, glossy_disc, highlight_photo, laboratory_photo, psnr
 
@@ -81,7 +82,7 @@ def test_regions_are_those_of_a_flood_fill() -> None:
 def test_quantiles_of_groups() -> None:
     random = np.random.default_rng(1)
     group, values = random.integers(0, 7, 300) * 10**6, random.random(300)
-    found = yoon_2006._group_quantile(group, values, 0.35)
+    found = group_quantile(group, values, 0.35)
     for name in np.unique(group):
         assert (found[group == name] == np.quantile(values[group == name], 0.35, method="lower")).all()
 
