@@ -1,0 +1,347 @@
+"""Removes highlights by sparse coding over a dictionary learnt from specular-free images (the method SC of Akbar 2016).
+
+Problem: a pixel is diffuse plus white specular. Write it as a code over one diffuse atom, the paint's colour, and the highlight atom.
+
+Equation: in CIE XYZ, y = M I, the highlight atom is h = M (1, 1, 1) / |M (1, 1, 1)|. A specular-free image takes white off until what is
+left does not depend on the specular light: SF1 until the largest chromaticity has a fixed value (Tan & Ikeuchi), which leaves the hue,
+SF2 until the smallest channel is 0 (two-band), which leaves the magnitude too. All have the same part F across h as the photo; alpha =
+|F|, t = h.y. The dictionary has an atom a_k = F / |F| + R_k h for every hue k, R_k being a quantile of t / alpha over its pixels: what
+the paint shows alone. So
+
+    y = alpha a_k + beta h,     beta = max(0, t - R_k alpha),     diffuse = y - beta h.
+
+The code is sparse: beta is 0 but where beta > lambda t, and a group switches it on as a whole or not at all. A group is a connected
+region of active pixels without an edge of the specular-free images in it. White paint raises beta as well, but F changes with it; a
+highlight has its own edges of which F takes no notice, and F has edges of which beta takes none. R_k is raised to what all of a group
+shows. A group's code is kept by the product of five ramps, see `_keep`: what cannot be identified is left alone.
+
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016), of which only the outline
+(photo, n specular-free images, dictionary, sparse code, diffuse and specular) is public; the equations here are ours and so are the
+groups. SF1: R. T. Tan and K. Ikeuchi, IEEE TPAMI 27(2), 178-193 (2005), doi:10.1109/TPAMI.2005.36. SF2: K.-J. Yoon, Y. Choi and
+I. S. Kweon, ICIP 2006, doi:10.1109/ICIP.2006.312650. Groups: M. Yuan and Y. Lin, J. R. Statist. Soc. B 68(1), 49-67 (2006),
+doi:10.1111/j.1467-9868.2005.00532.x.
+
+Limits: the light must be white. Near-grey paint keeps its highlights. Broad sheen over most of a paint shifts R_k and stays.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ..compiled import compiled
+from ..decomposition import Separation
+from ..errors import InputError
+from ..progress import Monitor
+from .checks import check_arrays, require_colour
+from .layers import diffuse_layers, white_layers
+
+# Linear Rec.709 to CIE XYZ, and what a specular light of 1 in each channel is there: its length and direction (the highlight atom).
+_XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
+_WHITE = float(np.linalg.norm(_XYZ.sum(axis=1)))
+_HIGHLIGHT = _XYZ.sum(axis=1) / _WHITE
+_TINY = 1e-12
+# The plane across the highlight atom, in which paint and its specular-free images lie alike.
+_FIRST = np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0]))
+_ACROSS = np.stack([_FIRST, np.cross(_HIGHLIGHT, _FIRST)])
+# The histogram of log(t / alpha): its range holds every colour from pure blue to grey within rounding.
+_LOG_RATIOS = np.linspace(-1, 5, 241)
+_LOWER = 0.16  # this quantile lies one standard deviation below the median
+
+
+@dataclass(frozen=True)
+class SparseCodingOptions:
+    """`specular_free`: whose edges part the groups and count as evidence, those of "sf1" (hue), "sf2" (magnitude) or "both".
+    `hues`: how many atoms, equal angles of hue; >= 3. `ratio_quantile`: which quantile of t / alpha is R_k, in (0, 1).
+    `grouped`: whether groups of pixels switch the highlight atom on together, or every pixel for itself by an L1 penalty.
+    `sparsity`: lambda; the least share of its brightness that a pixel of a group has as highlight, or, not grouped, the L1 weight as a
+    share of the brightest pixels; in [0, 1). `edge`: least change, as a share of the highlight, that counts as an edge; in (0, 1).
+    `noise`: changes below this share of the brightest pixels are no edges; in [0, 1). `blur`: standard deviation, in pixels, of the
+    smoothing of codes; >= 0. `region_quantile`: each group's R is raised to this quantile of its own ratios, in [0, 1).
+    """
+
+    specular_free: str = "both"
+    hues: int = 72
+    ratio_quantile: float = 0.5
+    grouped: bool = True
+    sparsity: float = 0.03
+    edge: float = 0.3
+    noise: float = 0.01
+    blur: float = 0.6
+    region_quantile: float = 0.1
+
+
+VARIANTS: dict[str, SparseCodingOptions] = {
+    "improved": SparseCodingOptions(),
+    "paper": SparseCodingOptions(hues=36, grouped=False, sparsity=0.01, blur=0),
+}
+
+
+@dataclass(frozen=True)
+class _Free:
+    """What highlights leave as it is: `alpha` (H, W), the length of a pixel's part across h, `hue` (H, W), its angle in turns, [0, 1).
+    And what they raise: `brightness` (H, W), t, the part along h. Zero outside `mask`."""
+
+    alpha: np.ndarray
+    hue: np.ndarray
+    brightness: np.ndarray
+    mask: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Dictionary:
+    """Per hue (k,): `log_ratio`, log R_k, and `spread`, how far the ratios of paint without highlight scatter around it (log)."""
+
+    log_ratio: np.ndarray
+    spread: np.ndarray
+
+    def at(self, table: np.ndarray, hue: np.ndarray) -> np.ndarray:
+        """A table (k,) read at `hue` (...) in turns, linear between the hues' centres."""
+        place = hue * len(table) - 0.5
+        below = np.floor(place).astype(int)
+        share = place - below
+        return table[below % len(table)] * (1 - share) + table[(below + 1) % len(table)] * share
+
+
+def separate(
+    image: np.ndarray,
+    mask: np.ndarray,
+    options: SparseCodingOptions | None = None,
+    clipped: np.ndarray | None = None,
+    monitor: Monitor | None = None,
+) -> Separation:
+    """Splits a photo under white light into diffuse and specular.
+
+    `image` (H, W, 3), linear Rec.709, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above
+    what was recorded: they shape no atom. Inside the mask 0 <= diffuse <= image; what is outside has no influence.
+
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are negative or not finite, and a photo
+    without colour; `Cancelled` when the monitor says so.
+    """
+    options = options or VARIANTS["improved"]
+    monitor = monitor or Monitor()
+    check_arrays(image, mask, clipped)
+    _check_options(options)
+    require_colour(image, mask, "sparse_coding")
+    image = np.where(mask[..., None], image, 0.0)
+    monitor.report("specular-free images", 0.0)
+    free = _specular_free(image, mask, options.blur)
+    monitor.report("dictionary", 0.3)
+    telling = mask if clipped is None or not (mask & ~clipped).any() else mask & ~clipped
+    dictionary = _learn(free, telling, options)
+    monitor.report("sparse codes", 0.4)
+    if options.grouped:
+        return white_layers(image, mask, _grouped_code(free, dictionary, options) / _WHITE, clipped)
+    return diffuse_layers(image, mask, _diffuse_of_pixels(image, free, dictionary, options), clipped)
+
+
+def _check_options(options: SparseCodingOptions) -> None:
+    if options.specular_free not in ("sf1", "sf2", "both"):
+        raise InputError(f'specular_free must be "sf1", "sf2" or "both", not {options.specular_free!r}')
+    if options.hues < 3 or not 0 < options.ratio_quantile < 1 or not 0 < options.edge < 1 or not 0 <= options.blur < np.inf:
+        raise InputError("hues must be at least 3, ratio_quantile and edge within (0, 1), blur at least 0")
+    if not all(0 <= share < 1 for share in (options.sparsity, options.noise, options.region_quantile)):
+        raise InputError("sparsity, noise and region_quantile must be within [0, 1)")
+
+
+def _specular_free(image: np.ndarray, mask: np.ndarray, blur: float) -> _Free:
+    pixel = _smoothed(image, mask, blur) @ _XYZ.T
+    one, two = pixel @ _ACROSS[0], pixel @ _ACROSS[1]
+    return _Free(np.hypot(one, two), np.arctan2(two, one) / (2 * np.pi) % 1, pixel @ _HIGHLIGHT, mask)
+
+
+def _smoothed(image: np.ndarray, mask: np.ndarray, blur: float) -> np.ndarray:
+    """`image` (H, W, 3) averaged over a Gaussian inside the mask; zero outside."""
+    if blur == 0:
+        return image
+    weight = np.maximum(ndimage.gaussian_filter(mask.astype(float), blur), _TINY)
+    layers = [ndimage.gaussian_filter(image[..., c], blur) / weight for c in range(3)]
+    return np.where(mask[..., None], np.stack(layers, axis=2), 0)
+
+
+def _learn(free: _Free, telling: np.ndarray, options: SparseCodingOptions) -> _Dictionary:
+    """The atoms from the pixels `telling` (H, W) bool: quantiles of log(t / alpha) per hue, pixels weighted by alpha."""
+    k = np.minimum((free.hue[telling] * options.hues).astype(int), options.hues - 1)
+    ratio = np.log(np.maximum(free.brightness[telling], _TINY) / np.maximum(free.alpha[telling], _TINY))
+    size = len(_LOG_RATIOS)
+    place = np.clip((ratio - _LOG_RATIOS[0]) / (_LOG_RATIOS[1] - _LOG_RATIOS[0]), 0, size - 1).astype(int)
+    votes = np.bincount(k * size + place, free.alpha[telling], options.hues * size).reshape(options.hues, size)
+    summed = np.cumsum(ndimage.gaussian_filter1d(votes, 1.0, axis=0, mode="wrap"), axis=1)
+
+    def quantile(q: float) -> np.ndarray:
+        return np.array([np.interp(q * row[-1], row, _LOG_RATIOS) for row in summed])
+
+    middle = quantile(options.ratio_quantile)
+    return _Dictionary(middle, np.maximum(middle - quantile(_LOWER), 0.02))
+
+
+def _diffuse_of_pixels(image: np.ndarray, free: _Free, dictionary: _Dictionary, options: SparseCodingOptions) -> np.ndarray:
+    """Diffuse (H, W, 3), linear RGB: each pixel coded by itself, 1/2 |y - a x - h z|^2 + l (x + z), x, z >= 0, with its hue's atom.
+
+    With unit atoms of inner product c the optimum with both active is x = (p - c q) / (1 - c^2), z = (q - c p) / (1 - c^2), where
+    p = a.y - l and q = h.y - l; if one is negative, the other alone is its p or q.
+    """
+    k = np.minimum((free.hue * options.hues).astype(int), options.hues - 1)
+    atom = _atoms((np.arange(options.hues) + 0.5) / options.hues, dictionary.log_ratio)[k]
+    pixel = image @ _XYZ.T
+    weight = options.sparsity * float(np.quantile(free.brightness[free.mask], 0.99))
+    p, q, c = (atom * pixel).sum(axis=2) - weight, pixel @ _HIGHLIGHT - weight, atom @ _HIGHLIGHT
+    apart = np.maximum(1 - c * c, _TINY)
+    x = np.where(q - c * p <= 0, p, np.where(p - c * q <= 0, 0, (p - c * q) / apart))
+    return (np.maximum(x, 0)[..., None] * atom) @ np.linalg.inv(_XYZ).T
+
+
+def _atoms(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
+    """Unit colours (..., 3) in XYZ of `hue` (...) in turns whose part along h is R times that across it."""
+    angle = 2 * np.pi * hue[..., None]
+    colour = np.cos(angle) * _ACROSS[0] + np.sin(angle) * _ACROSS[1] + np.exp(log_ratio)[..., None] * _HIGHLIGHT
+    return colour / np.linalg.norm(colour, axis=-1, keepdims=True)
+
+
+def _grouped_code(free: _Free, dictionary: _Dictionary, options: SparseCodingOptions) -> np.ndarray:
+    """beta (H, W), the highlight atom's code, of pixels that switch it on in groups."""
+    log_ratio = dictionary.at(dictionary.log_ratio, free.hue)
+    diffuse = np.exp(log_ratio) * free.alpha
+    beta = np.where(free.mask, np.maximum(free.brightness - diffuse, 0), 0)
+    floor = options.noise * float(np.quantile(free.brightness[free.mask], 0.99))
+    active = beta > options.sparsity * free.brightness + floor / 2
+    code = np.zeros(beta.shape)
+    if not active.any():
+        return code
+    angle = 2 * np.pi * free.hue
+    colour = np.stack([np.cos(angle), np.sin(angle), free.alpha, np.exp(log_ratio), beta], axis=2)
+    watched = options.specular_free != "sf2", options.specular_free != "sf1"
+    names, number = np.unique(_groups(colour, active, watched, options.edge, floor)[active], return_inverse=True)
+    group = np.full(beta.shape, -1)
+    group[active] = number
+    evidence = _evidence(colour, group, free.mask, watched, options.edge, floor, len(names))
+    excess = np.log(free.brightness[active] / np.maximum(diffuse[active], _TINY))
+    paint = _Paint(
+        saturation=_saturation(free.hue[active], log_ratio[active]),
+        spread=dictionary.at(dictionary.spread, free.hue[active]),
+        excess=excess,
+    )
+    raised = np.exp(_group_quantile(number, excess, options.region_quantile))[number] * diffuse[active]
+    code[active] = _keep(number, beta[active], paint, evidence)[number] * np.maximum(free.brightness[active] - raised, 0)
+    return code
+
+
+@dataclass(frozen=True)
+class _Paint:
+    """Of each active pixel (n,): `saturation`, 1 - smallest / largest channel, of its atom; how far its atom's pixels `spread`, and how
+    far it lies above the atom, `excess`, both as logarithms of ratios."""
+
+    saturation: np.ndarray
+    spread: np.ndarray
+    excess: np.ndarray
+
+
+def _saturation(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
+    colour = _atoms(hue, log_ratio) @ np.linalg.inv(_XYZ).T
+    return 1 - colour.min(axis=-1) / np.maximum(colour.max(axis=-1), _TINY)
+
+
+def _keep(group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarray) -> np.ndarray:
+    """How much of each group's code is kept, in [0, 1]: the product of five ramps over averages weighted by beta.
+
+    `group`, `beta` (n,) of the active pixels; `evidence` (5, groups) as in `_evidence`. Each ramp asks one question: is the paint
+    coloured, so that it can be told from white; are the atom's other pixels of one paint; does the group stand out from them; does its
+    brightness change where the specular-free images do not; and does it fade at its border, as light does and paint does not.
+    """
+    total = np.maximum(np.bincount(group, beta), _TINY)
+
+    def mean(value: np.ndarray) -> np.ndarray:
+        return np.bincount(group, value * beta) / total
+
+    for_light, for_paint, step, border, peak = evidence
+    return (
+        _ramp(mean(paint.saturation), 0.42, 0.52)
+        * _ramp(-mean(paint.spread), -0.35, -0.25)
+        * _ramp(mean(paint.excess / paint.spread), 1.5, 2.5)
+        * _ramp(for_light / np.maximum(for_light + for_paint, _TINY), 0.5, 0.6)
+        * _ramp(-step / np.maximum(border * peak, _TINY), -0.12, -0.08)
+    )
+
+
+def _ramp(value: np.ndarray, none: float, full: float) -> np.ndarray:
+    return np.clip((value - none) / (full - none), 0, 1)
+
+
+def _group_quantile(group: np.ndarray, value: np.ndarray, quantile: float) -> np.ndarray:
+    """The quantile of `value` (n,) in each `group` (n,) 0, 1, ...: one of its values."""
+    order = np.lexsort((value, group))
+    count = np.bincount(group)
+    first = np.cumsum(count) - count
+    return value[order[first + (count * quantile).astype(int)]]
+
+
+@compiled
+def _change(colour, watched, y, x, v, u):
+    """Between two pixels: the change of the specular-free images in units of beta, the step of beta, and the larger beta.
+
+    `colour` (H, W, 5): cosine and sine of the hue, alpha, R, beta. |F - F'|^2 = (alpha - alpha')^2 + alpha alpha' |u - u'|^2 for unit
+    vectors u of the hue: the second part is SF1's, the first one SF2's; `watched` says which count.
+    """
+    one, two = colour[y, x], colour[v, u]
+    square = 0.0
+    if watched[0]:
+        square += one[2] * two[2] * ((one[0] - two[0]) ** 2 + (one[1] - two[1]) ** 2)
+    if watched[1]:
+        square += (one[2] - two[2]) ** 2
+    return min(one[3], two[3]) * np.sqrt(square), abs(one[4] - two[4]), max(one[4], two[4])
+
+
+@compiled
+def _root(parent, pixel):
+    while parent[pixel] != pixel:
+        parent[pixel] = parent[parent[pixel]]
+        pixel = parent[pixel]
+    return pixel
+
+
+@compiled
+def _groups(colour, active, watched, edge, floor):
+    """Of each pixel (H, W) the first one, as row * W + column, of the region that it is connected with; edges and inactive pixels part."""
+    height, width = active.shape
+    parent = np.arange(height * width)
+    for y in range(height):
+        for x in range(width):
+            for v, u in ((y, x + 1), (y + 1, x)):
+                if v < height and u < width and active[y, x] and active[v, u]:
+                    change, _, peak = _change(colour, watched, y, x, v, u)
+                    if change <= max(edge * peak, floor):
+                        one, two = _root(parent, y * width + x), _root(parent, v * width + u)
+                        parent[max(one, two)] = min(one, two)
+    for pixel in range(height * width):
+        parent[pixel] = _root(parent, pixel)
+    return parent.reshape(height, width)
+
+
+@compiled
+def _evidence(colour, group, mask, watched, edge, floor, count):
+    """Sums (5, count) over the neighbours of each group: changes of beta that speak for light and for paint, steps of beta at the
+    border, how many neighbours the border has, and the largest beta. `group` (H, W) is -1 where not active."""
+    height, width = mask.shape
+    sums = np.zeros((5, count))
+    for y in range(height):
+        for x in range(width):
+            if group[y, x] >= 0:
+                sums[4, group[y, x]] = max(sums[4, group[y, x]], colour[y, x, 4])
+            for v, u in ((y, x + 1), (y + 1, x)):
+                if v == height or u == width or not mask[y, x] or not mask[v, u] or max(group[y, x], group[v, u]) < 0:
+                    continue
+                change, step, peak = _change(colour, watched, y, x, v, u)
+                light = step if change < edge * step else 0.0
+                if change > max(edge * peak, floor) and step < edge * peak:
+                    light += peak
+                paint = step if change >= edge * step and step >= edge * peak else 0.0
+                for one, two in ((group[y, x], group[v, u]), (group[v, u], group[y, x])):
+                    if one >= 0:
+                        sums[0, one] += light
+                        sums[1, one] += paint
+                        if one != two:
+                            sums[2, one] += step
+                            sums[3, one] += 1
+    return sums
