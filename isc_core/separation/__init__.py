@@ -18,7 +18,18 @@ from ..errors import InputError
 from ..progress import Monitor
 from .checks import check_arrays
 
-METHODS = ("none", "mallick_2006", "yoon_2006", "shen_2009", "yang_2010", "kim_2013", "shen_2013")
+METHODS = (
+    "none",
+    "tan_2005",
+    "mallick_2006",
+    "yoon_2006",
+    "shen_2009",
+    "yang_2010",
+    "kim_2013",
+    "shen_2013",
+    "akashi_2016",
+    "sparse_coding",
+)
 IMPROVED = "improved"
 # The toolbox knows the whole frame only, and nothing of clipping: its figures are found again no other way.
 _TOOLBOX = "sihr"
