@@ -12,8 +12,8 @@ the paint shows alone. So
 
 The code is sparse: beta is 0 but where beta > lambda t, and a group switches it on as a whole or not at all. A group is a connected
 region of active pixels without an edge of the specular-free images in it. White paint raises beta as well, but F changes with it; a
-highlight has its own edges of which F takes no notice, and F has edges of which beta takes none. R_k is raised to what all of a group
-shows. A group's code is kept by the product of five ramps, see `_keep`: what cannot be identified is left alone.
+highlight has its own edges of which F takes no notice, and F has edges of which beta takes none. A group's code is kept by the product
+of six ramps, see `_keep`: what cannot be identified is left alone. docs/methods/sparse_coding.md derives all of it.
 
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016), of which only the outline
 (photo, n specular-free images, dictionary, sparse code, diffuse and specular) is public; the equations here are ours and so are the
@@ -59,7 +59,7 @@ class SparseCodingOptions:
     `sparsity`: lambda; the least share of its brightness that a pixel of a group has as highlight, or, not grouped, the L1 weight as a
     share of the brightest pixels; in [0, 1). `edge`: least change, as a share of the highlight, that counts as an edge; in (0, 1).
     `noise`: changes below this share of the brightest pixels are no edges; in [0, 1). `blur`: standard deviation, in pixels, of the
-    smoothing of codes; >= 0. `region_quantile`: each group's R is raised to this quantile of its own ratios, in [0, 1).
+    smoothing before codes are made; >= 0.
     """
 
     specular_free: str = "both"
@@ -70,7 +70,6 @@ class SparseCodingOptions:
     edge: float = 0.3
     noise: float = 0.01
     blur: float = 0.6
-    region_quantile: float = 0.1
 
 
 VARIANTS: dict[str, SparseCodingOptions] = {
@@ -142,8 +141,8 @@ def _check_options(options: SparseCodingOptions) -> None:
         raise InputError(f'specular_free must be "sf1", "sf2" or "both", not {options.specular_free!r}')
     if options.hues < 3 or not 0 < options.ratio_quantile < 1 or not 0 < options.edge < 1 or not 0 <= options.blur < np.inf:
         raise InputError("hues must be at least 3, ratio_quantile and edge within (0, 1), blur at least 0")
-    if not all(0 <= share < 1 for share in (options.sparsity, options.noise, options.region_quantile)):
-        raise InputError("sparsity, noise and region_quantile must be within [0, 1)")
+    if not all(0 <= share < 1 for share in (options.sparsity, options.noise)):
+        raise InputError("sparsity and noise must be within [0, 1)")
 
 
 def _specular_free(image: np.ndarray, mask: np.ndarray, blur: float) -> _Free:
@@ -205,7 +204,8 @@ def _grouped_code(free: _Free, dictionary: _Dictionary, options: SparseCodingOpt
     log_ratio = dictionary.at(dictionary.log_ratio, free.hue)
     diffuse = np.exp(log_ratio) * free.alpha
     beta = np.where(free.mask, np.maximum(free.brightness - diffuse, 0), 0)
-    floor = options.noise * float(np.quantile(free.brightness[free.mask], 0.99))
+    brightest = float(np.quantile(free.brightness[free.mask], 0.99))
+    floor = options.noise * brightest
     active = beta > options.sparsity * free.brightness + floor / 2
     code = np.zeros(beta.shape)
     if not active.any():
@@ -223,8 +223,7 @@ def _grouped_code(free: _Free, dictionary: _Dictionary, options: SparseCodingOpt
         spread=dictionary.at(dictionary.spread, free.hue[active]),
         excess=excess,
     )
-    raised = np.exp(_group_quantile(number, excess, options.region_quantile))[number] * diffuse[active]
-    code[active] = _keep(number, beta[active], paint, evidence)[number] * np.maximum(free.brightness[active] - raised, 0)
+    code[active] = _keep(number, beta[active], paint, evidence, brightest)[number] * beta[active]
     return code
 
 
@@ -243,12 +242,13 @@ def _saturation(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
     return 1 - colour.min(axis=-1) / np.maximum(colour.max(axis=-1), _TINY)
 
 
-def _keep(group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarray) -> np.ndarray:
-    """How much of each group's code is kept, in [0, 1]: the product of five ramps over averages weighted by beta.
+def _keep(group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarray, brightest: float) -> np.ndarray:
+    """How much of each group's code is kept, in [0, 1]: the product of six ramps over averages weighted by beta.
 
-    `group`, `beta` (n,) of the active pixels; `evidence` (5, groups) as in `_evidence`. Each ramp asks one question: is the paint
-    coloured, so that it can be told from white; are the atom's other pixels of one paint; does the group stand out from them; does its
-    brightness change where the specular-free images do not; and does it fade at its border, as light does and paint does not.
+    `group`, `beta` (n,) of the active pixels; `evidence` (5, groups) as in `_evidence`; `brightest`: of the object's t. Each ramp asks
+    one question: is the paint coloured, so that it can be told from white; are the atom's other pixels of one paint; does the group
+    stand out from them; is it bright, as the image of a lamp is; does its brightness change where the specular-free images do not; and
+    does it fade at its border, as light does and paint does not.
     """
     total = np.maximum(np.bincount(group, beta), _TINY)
 
@@ -260,6 +260,7 @@ def _keep(group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarr
         _ramp(mean(paint.saturation), 0.42, 0.52)
         * _ramp(-mean(paint.spread), -0.35, -0.25)
         * _ramp(mean(paint.excess / paint.spread), 1.5, 2.5)
+        * _ramp(mean(beta) / brightest, 0.08, 0.18)
         * _ramp(for_light / np.maximum(for_light + for_paint, _TINY), 0.5, 0.6)
         * _ramp(-step / np.maximum(border * peak, _TINY), -0.12, -0.08)
     )
@@ -267,14 +268,6 @@ def _keep(group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarr
 
 def _ramp(value: np.ndarray, none: float, full: float) -> np.ndarray:
     return np.clip((value - none) / (full - none), 0, 1)
-
-
-def _group_quantile(group: np.ndarray, value: np.ndarray, quantile: float) -> np.ndarray:
-    """The quantile of `value` (n,) in each `group` (n,) 0, 1, ...: one of its values."""
-    order = np.lexsort((value, group))
-    count = np.bincount(group)
-    first = np.cumsum(count) - count
-    return value[order[first + (count * quantile).astype(int)]]
 
 
 @compiled
