@@ -24,6 +24,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..errors import InputError
+from ..progress import Monitor
 from .walsh_hadamard import PATCH, opponent, project, strongest
 
 
@@ -107,16 +108,19 @@ class CshSearch:
         self._projected = project(source.image, source.rows, source.columns, self._chosen)
         self._width = _bin_width(self._projected, self.options)
 
-    def match(self, target: Patches, start: np.ndarray | None = None) -> Matches:
+    def match(self, target: Patches, start: np.ndarray | None = None, monitor: Monitor | None = None) -> Matches:
         """The nearest source patch of each patch of `target`, whose image has as many channels as the sources'.
 
         `start` (n,) int: matches to begin with, places in the list of sources; else random ones. None gets worse than its start.
+        `monitor` hears of each table. Raises `Cancelled`.
         """
         rng = np.random.default_rng(self.options.seed)
         projected = project(target.image, target.rows, target.columns, self._chosen)
         best = rng.integers(len(self.source), size=len(target)) if start is None else start
         matches = Matches(best.astype(np.int32), np.full(len(target), np.inf, np.float32))
         for table in range(self.options.tables):
+            if monitor is not None:
+                monitor.report("matching patches", table / self.options.tables)
             self._try_table(target, projected, matches, table, rng)
         return matches
 

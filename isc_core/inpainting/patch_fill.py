@@ -1,12 +1,11 @@
-# mypy: disable-error-code="no-untyped-def"
 """Fills a hole with texture from the rest of the image, coarse to fine (Wexler, Shechtman & Irani 2007).
 
 Problem: pixels whose values are missing, in an image with texture: every patch that touches the hole should look like some patch
 outside it.
 
 Equation: alternate until settled: each patch p that touches the hole finds its nearest source patch (`coherency_sensitive_hashing`), at
-squared distance d_p; each missing pixel becomes the mean of what the matches say of it, sum_p w_p v_p / sum_p w_p, with
-w_p = g^-e_p exp(-d_p / (2 s)): s is the upper quartile of the distances, e_p how deep the patch's centre lies in the hole, g = 1.3. A
+squared distance d_p; each missing pixel becomes the mean of what the matches say of it, with weights g^-e_p exp(-d_p / (2 s)):
+s is the upper quartile of the distances, e_p how deep the patch's centre lies in the hole, g = 1.3 (`voting`). A
 pyramid starts this where the hole is small; its top is filled smoothly (`pull_push`), and each level starts from the one above.
 
 Citation: Y. Wexler, E. Shechtman and M. Irani, "Space-time completion of video", IEEE TPAMI 29(3), 463-476 (2007),
@@ -21,12 +20,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import ndimage
 
-from ..compiled import compiled
 from ..errors import InputError
 from ..progress import Monitor
-from .coherency_sensitive_hashing import CshOptions, CshSearch, Matches, Patches, patches_touching, patches_within
+from .coherency_sensitive_hashing import CshOptions, CshSearch, Patches, patches_touching, patches_within
 from .pull_push import fill, pull, push
+from .voting import vote
 from .walsh_hadamard import PATCH
+
+# What a vote loses for each pixel of its patch's depth in the hole.
+_DEPTH_LOSS = 1.3
 
 
 @dataclass(frozen=True)
@@ -80,7 +82,8 @@ def _filled(
         monitor.report("filling holes", 0.25**level * (0.25 + 0.75 * turn / count))
         target = patches_touching(current, wanted)
         matches = search.match(target, None if matches is None else matches.source)
-        current = np.where(known[..., None], values, _voted(current, target, source, matches, depth))
+        means, voted = vote(current, target, source, matches, _deepness(target, depth))
+        current = np.where((voted & ~known)[..., None], means, current).astype(np.float32)
     return current
 
 
@@ -90,29 +93,6 @@ def _any_of_four(flags: np.ndarray) -> np.ndarray:
     return padded[::2, ::2] | padded[1::2, ::2] | padded[::2, 1::2] | padded[1::2, 1::2]
 
 
-def _voted(current: np.ndarray, target: Patches, source: Patches, matches: Matches, depth: np.ndarray) -> np.ndarray:
-    """The image with each pixel under target patches replaced by the weighted mean of what their matches say."""
-    scale = 2 * max(float(np.quantile(matches.distance, 0.75)), 1e-12)
-    centre = depth[np.minimum(target.rows + PATCH // 2, len(depth) - 1), target.columns + PATCH // 2]
-    # The smallest weight must not vanish: deep in a hole all patches have the same little.
-    weight = np.exp(np.maximum(-matches.distance / scale - np.log(_DEPTH_LOSS) * centre, -60.0))
-    total = np.zeros((*current.shape[:2], current.shape[2] + 1))
-    _vote(current, target.rows, target.columns, source.rows, source.columns, matches.source, weight, total)
-    weights = total[..., -1:]
-    return np.where(weights > 0, total[..., :-1] / np.where(weights > 0, weights, 1), current).astype(np.float32)
-
-
-_DEPTH_LOSS = 1.3
-
-
-@compiled
-def _vote(image, rows, columns, source_rows, source_columns, matches, weight, total):
-    """total[..., :C] += weight times the matched patch, total[..., C] += weight, over every target patch's pixels."""
-    channels = image.shape[2]
-    for i in range(rows.shape[0]):
-        row, column = source_rows[matches[i]], source_columns[matches[i]]
-        for a in range(8):
-            for b in range(8):
-                for c in range(channels):
-                    total[rows[i] + a, columns[i] + b, c] += weight[i] * image[row + a, column + b, c]
-                total[rows[i] + a, columns[i] + b, channels] += weight[i]
+def _deepness(target: Patches, depth: np.ndarray) -> np.ndarray:
+    """What votes of `target` patches lose (see `voting`): their centres' `depth` (H, W) in the hole, in pixels, times log g."""
+    return np.log(_DEPTH_LOSS) * depth[target.rows + PATCH // 2, target.columns + PATCH // 2]
