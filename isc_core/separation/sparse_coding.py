@@ -66,7 +66,7 @@ class SparseCodingOptions:
     hues: int = 72
     ratio_quantile: float = 0.5
     grouped: bool = True
-    sparsity: float = 0.03
+    sparsity: float = 0.02
     edge: float = 0.3
     noise: float = 0.01
     blur: float = 0.6
