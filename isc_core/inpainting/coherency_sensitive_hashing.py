@@ -17,6 +17,7 @@ Limits: approximate; patches are 8 x 8 pixels, neither turned nor scaled. A patc
 large distance.
 """
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -36,14 +37,16 @@ class CshOptions:
     `candidates`: how many patches of one bin are tried, >= 1.
     `occupancy`: how many source patches share a patch's bin where bins are narrowest, in the median; > 0.
     `seed`: of the random offsets, >= 0; the same seed gives the same matches.
+    `threads`: how many work at a time, >= 1; the matches do not depend on it.
     """
 
     tables: int = 8
-    projections: int = 24
+    projections: int = 23
     hashed: int = 8
     candidates: int = 4
     occupancy: float = 8.0
     seed: int = 0
+    threads: int = 2
 
 
 @dataclass(frozen=True)
@@ -135,7 +138,11 @@ class CshSearch:
             for patches, values in ((self.source, self._projected), (target, projected))
         ]
         salt, forward = int(rng.integers(1 << 30)), table % 2 == 0
-        _sweep(hashed[0], hashed[1], matches.source, matches.distance, matches.source.copy(), self.options.candidates, salt, forward)
+        common = (hashed[0], hashed[1], matches.source, matches.distance, matches.source.copy(), self.options.candidates, salt, forward)
+        ends = np.linspace(0, len(target), _PARTS + 1).astype(int)
+        with ThreadPoolExecutor(self.options.threads) as pool:
+            for done in [pool.submit(_sweep, *common, int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]:
+                done.result()
 
 
 class _Hashed(NamedTuple):
@@ -152,6 +159,8 @@ class _Hashed(NamedTuple):
     members: np.ndarray
 
 
+# Target patches are swept in so many parts, however many threads there are, for the same result.
+_PARTS = 16
 # Bins go from wide ones, where rare patches find company, to narrow ones, where common patches find their best.
 _WIDTHS = (8.0, 4.0, 2.0, 1.0)
 
@@ -162,8 +171,8 @@ def _check(options: CshOptions, source: Patches) -> None:
     most = PATCH * PATCH * source.image.shape[2]
     if not 1 <= options.hashed <= options.projections <= most:
         raise InputError(f"hashed and projections must satisfy 1 <= hashed <= projections <= {most}")
-    if options.tables < 1 or options.candidates < 1 or not options.occupancy > 0 or options.seed < 0:
-        raise InputError("tables and candidates must be at least 1, occupancy above 0, seed at least 0")
+    if min(options.tables, options.candidates, options.threads) < 1 or not options.occupancy > 0 or options.seed < 0:
+        raise InputError("tables, candidates and threads must be at least 1, occupancy above 0, seed at least 0")
 
 
 def _bin_width(values: np.ndarray, options: CshOptions) -> np.float32:
@@ -213,22 +222,21 @@ def _sort_into(bins, starts, members):
 
 
 @compiled
-def _sweep(source, target, match, distance, before, candidates, salt, forward):
-    """One pass over the target patches; `before` are the matches at its start, so that the result does not depend on timing."""
-    count = match.shape[0]
+def _sweep(source, target, match, distance, before, candidates, salt, forward, low, high):
+    """One pass over the target patches [low, high). Of others it reads `before`, the matches at its start: other threads change theirs."""
     step = 1 if forward else -1
     tried = np.empty(4 * candidates + 4, np.int32)
     image_s, image_t = source.image, target.image
     projected_s, projected_t = source.projected, target.projected
-    for n in range(count):
-        i = n if forward else count - 1 - n
+    for n in range(high - low):
+        i = low + n if forward else high - 1 - n
         filled, found = 0, -1
         if distance[i] == np.inf:
             tried[0] = match[i]
             filled = 1
         for axis in range(2):
             other = found
-            found = _beside(source, target, match, i, step * (1 - axis), step * axis)
+            found = _beside(source, target, match, before, low, high, i, step * (1 - axis), step * axis)
             if found >= 0 and found != other:
                 tried[filled] = found
                 filled = _draw(source.starts, source.members, source.bins[found], candidates, i + salt, tried, filled + 1)
@@ -249,7 +257,7 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward):
 
 
 @compiled
-def _beside(source, target, match, i, down, right):
+def _beside(source, target, match, before, low, high, i, down, right):
     """The source patch that continues the match of target patch i's neighbour, (down, right) before it; -1 where there is none."""
     row, column = target.rows[i] - down, target.columns[i] - right
     if row < 0 or column < 0 or row >= target.places.shape[0] or column >= target.places.shape[1]:
@@ -257,7 +265,8 @@ def _beside(source, target, match, i, down, right):
     neighbour = target.places[row, column]
     if neighbour < 0:
         return -1
-    row, column = source.rows[match[neighbour]] + down, source.columns[match[neighbour]] + right
+    beside = match[neighbour] if low <= neighbour < high else before[neighbour]
+    row, column = source.rows[beside] + down, source.columns[beside] + right
     if row < 0 or column < 0 or row >= source.places.shape[0] or column >= source.places.shape[1]:
         return -1
     return source.places[row, column]

@@ -2,8 +2,8 @@
 """Projects image patches on the Walsh-Hadamard basis: few numbers that hold nearly all of a patch.
 
 Problem: comparing two patches of 8 x 8 pixels costs 64 products a channel. Natural images put most of a patch's energy into a few
-coefficients of an orthonormal basis, and any subset of them gives a lower bound of the distance: sum over the subset of
-(a_k - b_k)^2 <= |a - b|^2.
+coefficients of an orthonormal basis, and any subset of them gives a lower bound of the distance: with r_a the length of what the
+subset leaves of a, sum over the subset of (a_k - b_k)^2 + (r_a - r_b)^2 <= |a - b|^2.
 
 Equation: P = H X H^T / 8 for a channel's patch X, H the Hadamard matrix (entries +1 and -1): additions alone, 48 of them along
 each axis by the fast transform. Colour channels are mixed beforehand by an orthonormal matrix with rows grey, red-green, yellow-blue,
@@ -39,13 +39,14 @@ def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: i
     """
     step = max(1, len(rows) // _SAMPLE)
     everything = np.arange(_CELLS * image.shape[2])
-    variance = project(image, rows[::step], columns[::step], everything).var(axis=0)
+    variance = project(image, rows[::step], columns[::step], everything)[:, :-1].var(axis=0)
     return np.argsort(-variance, kind="stable")[:count]
 
 
 def project(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """The coefficients `chosen` (k,) of the patches at `rows`, `columns` (n,): (n, k) float32, of an orthonormal basis."""
-    out = np.empty((len(rows), len(chosen)), np.float32)
+    """The coefficients `chosen` (k,) of the patches at `rows`, `columns` (n,), of an orthonormal basis, and in a last column the length
+    of the rest: (n, k + 1) float32. The squared distance of two rows never exceeds that of their patches."""
+    out = np.empty((len(rows), len(chosen) + 1), np.float32)
     _project(image, rows, columns, chosen, out)
     return out
 
@@ -69,8 +70,13 @@ def _project(image, rows, columns, chosen, out):
             for i in range(8):
                 for j in range(8):
                     full[64 * c + 8 * i + j] = turned[i, j]
+        rest = np.float32(0)
+        for k in range(full.shape[0]):
+            rest += full[k] * full[k]
         for k in range(chosen.shape[0]):
             out[n, k] = full[chosen[k]] * np.float32(0.125)
+            rest -= full[chosen[k]] * full[chosen[k]]
+        out[n, -1] = np.sqrt(max(rest, np.float32(0))) * np.float32(0.125)
 
 
 @compiled

@@ -91,6 +91,8 @@ def test_same_seed_same_matches_and_no_worse_than_the_start() -> None:
     search = CshSearch(source, CshOptions(tables=2))
     once, again = search.match(target), search.match(target)
     assert np.array_equal(once.source, again.source)
+    for threads in (1, 5):
+        assert np.array_equal(CshSearch(source, CshOptions(tables=2, threads=threads)).match(target).source, once.source)
     good = CshSearch(source, CshOptions(tables=8)).match(target)
     assert (search.match(target, start=good.source).distance <= good.distance * (1 + 1e-6)).all()
 
@@ -103,7 +105,10 @@ def test_projections_keep_distances_and_bound_them() -> None:
     assert np.allclose(((whole[1:] - whole[0]) ** 2).sum(axis=1), true, rtol=1e-3)
     chosen = walsh_hadamard.strongest(patches.image, patches.rows, patches.columns, 24)
     assert chosen[0] % 64 == 0 and len(set(chosen)) == 24
-    part = ((whole[1:, chosen] - whole[0, chosen]) ** 2).sum(axis=1)
+    bound = walsh_hadamard.project(patches.image, patches.rows, patches.columns, chosen)
+    part = ((bound[1:] - bound[0]) ** 2).sum(axis=1)
+    assert np.allclose(bound[:, :-1], whole[:, chosen], atol=1e-5)
+    assert np.allclose((bound**2).sum(axis=1), (all_cells**2).sum(axis=1), rtol=1e-4)
     assert (part <= true * (1 + 1e-4)).all() and part.sum() > 0.6 * true.sum()
 
 
