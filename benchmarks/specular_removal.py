@@ -66,7 +66,7 @@ def _without_highlights(objects: Path, light: str, name: str) -> SeparationTruth
 
 
 def measure_all(given: argparse.Namespace) -> list[Row]:
-    """Measures what is not in the table yet, writing the table after each photo; a sheet for each photo with something new."""
+    """Measures what is not in the table yet, writing the table after each row; a sheet for each photo with something new."""
     table = given.output / "rows.csv"
     rows = {} if given.fresh else read_rows(table)
     for case in cases(given.data, given.rendered):
@@ -80,10 +80,10 @@ def measure_all(given: argparse.Namespace) -> list[Row]:
         for method, variant in new:
             row, split = measure(case.group, truth, method, variant)
             rows[row.key] = row
+            write_rows(table, rows.values())
             print(_line(row), flush=True)
             if split is not None and variant == IMPROVED and case.group != "clean":
                 _keep(given.output, case, method, split)
-        write_rows(table, rows.values())
         if case.group != "clean":
             _sheet(given.output, case, truth, rows)
     return list(rows.values())
