@@ -28,6 +28,7 @@ METHODS = (
     "kim_2013",
     "shen_2013",
     "akashi_2016",
+    "chaotic_segmentation",
     "sparse_coding",
 )
 IMPROVED = "improved"
