@@ -80,7 +80,7 @@ def test_the_gain_is_one_less_the_geometric_mean_of_ratios() -> None:
 
     rows = [row("sparse_coding", "apple", 0.2, 0.5), row("sparse_coding", "paper1", 0.9, 0.5), row("sparse_coding", "phone", 9, 9)]
     rows += [row("tan_2005", "apple", 0.8, 1), row("tan_2005", "paper1", 0.9, 1), row("tan_2005", "phone", 1, 1)]
-    assert "| tan_2005 | 2 (apple, teabag2, paper1, animals, cups) | 50.0 % | 50.0 % | 0.0 % | 0.0 % |" in tables(rows)
+    assert "| tan_2005 | improved | 2 (apple, teabag2, paper1, animals, cups) | 50.0 % | 50.0 % | 0.0 % | 0.0 % |" in tables(rows)
     assert "Sparse Coding against" not in tables(rows[3:])
 
 
