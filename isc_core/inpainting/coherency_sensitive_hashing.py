@@ -161,8 +161,8 @@ class _Hashed(NamedTuple):
 
 # Target patches are swept in so many parts, however many threads there are, for the same result.
 _PARTS = 16
-# Bins go from wide ones, where rare patches find company, to narrow ones, where common patches find their best.
-_WIDTHS = (8.0, 4.0, 2.0, 1.0)
+# Wide bins give rare patches company, narrow ones common patches their best.
+_WIDTHS = (8.0, 4.0, 2.0, 16.0, 1.0)
 
 
 def _check(options: CshOptions, source: Patches) -> None:

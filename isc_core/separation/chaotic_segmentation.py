@@ -105,6 +105,8 @@ def separate(
         filled = _repainted(scaled, known, specular, options, monitor.part(0.1, 1.0))
         return diffuse_layers(inside, mask, np.where(specular[..., None], filled * peak, inside), clipped)
     share = colour_evidence(scaled, known | specular) * peak if options.guard else peak
+    if share == 0:
+        return white_layers(inside, mask, np.zeros(mask.shape), clipped)
     removed = share * _white_light(scaled, known, specular, options, monitor.part(0.1, 1.0))
     return white_layers(inside, mask, removed, clipped)
 
