@@ -114,7 +114,7 @@ def _sheet(output: Path, case: Case, truth: SeparationTruth, rows: dict[tuple[st
             with np.load(path) as layers:
                 diffuse, specular, confidence = (layers[name].astype(np.float32) for name in ("diffuse", "specular", "confidence"))
             split = Separation(decode(diffuse), decode(specular), np.zeros_like(diffuse), confidence)
-            answers.append(Answer(method, f"{row.psnr:.1f} dB, error x {row.mse_ratio:.2f}", split))
+            answers.append(Answer(method, f"{row.psnr:.1f} dB, MSE x {row.mse_ratio:.2g}", split))
     sheet = comparison_sheet(
         f"{case.group}: {case.name}", decode(truth.image), truth.mask, answers, (decode(truth.diffuse), decode(truth.specular))
     )
