@@ -131,7 +131,7 @@ class CshSearch:
         """Improves `matches` in place by the candidates of one hash table."""
         width = self._width * np.float32(_WIDTHS[table % len(_WIDTHS)])
         offset = rng.random(self.options.hashed, np.float32) * width
-        factors = rng.integers(1 << 62, size=self.options.hashed) | 1
+        factors = rng.integers(1 << 40, size=self.options.hashed)
         bits = len(self.source).bit_length()
         hashed = [
             _Hashed(patches.image, patches.rows, patches.columns, patches.index, values, *_buckets(values, width, offset, factors, bits))
@@ -179,7 +179,7 @@ def _bin_width(values: np.ndarray, options: CshOptions) -> np.float32:
     """The width at which the median patch, with projections `values` (n, k), shares its bin with `occupancy` patches, to about a tenth."""
     spread = max(float(np.ptp(values, axis=0).max()), 1e-30)
     low, high = float(np.log(1e-4 * spread)), float(np.log(2 * spread))
-    factors = np.random.default_rng(options.seed).integers(1 << 62, size=options.hashed) | 1
+    factors = np.random.default_rng(options.seed).integers(1 << 40, size=options.hashed)
     offset = np.zeros(options.hashed, np.float32)
     while high - low > 0.2:
         middle = (low + high) / 2
@@ -199,13 +199,13 @@ def _buckets(values: np.ndarray, width: np.float32, offset: np.ndarray, factors:
 
 @compiled
 def _hash(values, width, offset, factors, bits, bins):
-    """bins[i]: the upper `bits` of sum_j factor_j floor((v_ij + b_j) / r), a multiplicative hash."""
+    """bins[i]: some `bits` of sum_j factor_j floor((v_ij + b_j) / r), bits that all of the factors' 40 bits mix in; nothing overflows."""
     inverse = np.float32(1) / width
     for i in range(values.shape[0]):
         key = np.int64(0)
         for j in range(offset.shape[0]):
-            key += np.int64(np.floor((values[i, j] + offset[j]) * inverse)) * factors[j]
-        bins[i] = (key >> (63 - bits)) & ((1 << bits) - 1)
+            key = (key + np.int64(np.floor((values[i, j] + offset[j]) * inverse)) * factors[j]) & ((1 << 60) - 1)
+        bins[i] = (key >> 16) & ((1 << bits) - 1)
 
 
 @compiled
