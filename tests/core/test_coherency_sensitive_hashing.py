@@ -113,7 +113,7 @@ def test_projections_keep_distances_and_bound_them() -> None:
 
 
 def test_one_channel_and_small_images() -> None:
-    grey = texture(30, 31, 5)[..., :1]
+    grey = texture(60, 61, 5)[..., :1]
     patches = everywhere(grey)
     assert np.mean(CshSearch(patches).match(patches).source == np.arange(len(patches))) > 0.95
     tiny = everywhere(texture(8, 8, 5))
