@@ -24,7 +24,7 @@ def declare(commands: Commands) -> None:
         "transparency and black border is taken as a whole.", _EXAMPLES,
     )  # fmt: skip
     add_photo(parser)
-    parser.add_argument("--method", choices=METHODS, required=True, help="how")
+    parser.add_argument("--method", choices=METHODS, required=True, metavar="NAME", help=f"how: {', '.join(METHODS)}")
     parser.add_argument(
         "--variant",
         default=IMPROVED,
