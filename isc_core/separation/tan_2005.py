@@ -153,7 +153,7 @@ def _bright(image: np.ndarray, domain: np.ndarray, options: Tan2005Options) -> n
     """Which pixels (H, W) are bright enough to have a chromaticity; black ones never are."""
     high = largest(image)
     scale = float(np.quantile(high[domain], _BRIGHT_QUANTILE)) if options.relative_dark else 1.0
-    return high >= max(options.dark * scale, np.finfo(float).tiny)
+    return (high >= options.dark * scale) & (high > 0)
 
 
 def _specular_of(image: np.ndarray, used: np.ndarray, options: Tan2005Options, monitor: Monitor) -> np.ndarray:

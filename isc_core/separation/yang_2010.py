@@ -118,7 +118,7 @@ def _check_options(options: Yang2010Options) -> None:
 def _too_dark(high: np.ndarray, domain: np.ndarray, options: Yang2010Options) -> np.ndarray:
     """Which pixels (H, W) are too dark to have a chromaticity; black ones always are."""
     scale = float(np.quantile(high[domain], _BRIGHT_QUANTILE)) if options.relative_dark else 1.0
-    return high < max(options.dark * scale, np.finfo(float).tiny)
+    return (high < options.dark * scale) | (high <= 0)
 
 
 def _specular_of(image: np.ndarray, domain: np.ndarray, used: np.ndarray, options: Yang2010Options, monitor: Monitor) -> np.ndarray:

@@ -108,3 +108,17 @@ def test_refuses_what_it_cannot_use() -> None:
             yang_2010.separate(image, mask, Yang2010Options(**wrong))
     with pytest.raises(Cancelled):
         yang_2010.separate(image, mask, monitor=Monitor(cancelled=lambda: True))
+
+
+@pytest.mark.parametrize("variant", list(VARIANTS))
+def test_black_pixels_have_no_chromaticity_in_single_precision_either(variant: str) -> None:
+    image, _, mask = glossy_disc()
+    image[40:50, 50:60] = 0
+    double, single = (yang_2010.separate(image.astype(kind), mask, VARIANTS[variant]) for kind in (np.float64, np.float32))
+    assert double.specular.max() > 0.4 and np.abs(single.specular - double.specular).max() < 1e-4
+
+
+def test_single_precision_on_apple(shared: Path) -> None:
+    image, truth, mask = laboratory_photo(shared, "apple")
+    image = np.where(mask[..., None], image, 0).astype(np.float32)
+    assert error_ratio(yang_2010.separate(image, mask, VARIANTS["sihr"]), image, truth, mask) < 0.35
