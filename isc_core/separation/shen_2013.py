@@ -84,8 +84,8 @@ def separate(
     above what was recorded. Inside the mask 0 <= diffuse <= image and specular has three equal channels. `options` None: the improved
     variant. The work is too short to report to `monitor`.
 
-    The residual is zero except in clipped bright pixels: the method's equation does not hold there, so they stay out of the
-    statistics, their diffuse part comes from around them, and the light that the full channels lost is the residual (<= 0).
+    The residual is zero but where clipped: the method's equation does not hold there, so such pixels stay out of the statistics and
+    `clipped` explains them.
 
     Confidence is exp(-e / u), e being the specular error to be expected: what was removed plus .3 min I, all of min I where the
     object or a cluster was too grey to judge; 0 where clipped.
@@ -102,7 +102,7 @@ def separate(
     split = _spread(image, mask, domain, *_specular_of(pixels, options), pixels.base)
     if clipped is None:
         return split
-    return explain_clipped(split, clipped & mask & (smallest(image) > pixels.base), mask)
+    return explain_clipped(split, clipped & mask, mask)
 
 
 def _check_options(options: Shen2013Options) -> None:
