@@ -14,8 +14,8 @@ I H', from which the objective follows without another pass.
 Citation: Y. Akashi and T. Okatani, "Separation of reflection components by sparse non-negative matrix factorization", Computer Vision
 and Image Understanding 146, 77-85 (2016), doi:10.1016/j.cviu.2015.09.001. Ours in the improved variant: the colours start from the
 peaks of the hue histogram; they are fitted to a sample of the pixels, and every pixel's mix then follows by coordinate descent, which
-reaches the exact minimum for given colours; diffuse is I - w_0 h_0, so that what the fit leaves over is not called a highlight; and an
-object most of whose light would be highlight is taken for white paint and left alone.
+reaches the exact minimum for given colours; diffuse is I - w_0 h_0, so that what the fit leaves over is not called a highlight; and
+all that is removed fades out on objects of grey paint (`evidence`).
 
 Limits: the light must be white. The objective has many minima: random starts differ by 3 dB. White and grey paint on an object that
 is coloured otherwise is taken for a highlight; a colour between another one and white (a pale print on a dark one of the same hue)
@@ -32,7 +32,9 @@ from ..compiled import compiled
 from ..decomposition import Separation
 from ..errors import InputError
 from ..progress import Monitor
+from .channels import largest
 from .checks import check_arrays, require_colour
+from .evidence import colour_evidence
 from .layers import diffuse_layers, white_layers
 
 _BLOCK = 4096
@@ -49,7 +51,7 @@ class Akashi2016Options:
     `squared`: whether the objective that is watched has the squared norm, as the paper says, or the plain norm, as SIHR computes it.
     `own_scale`: whether the brightest value in the mask is taken for 255, or the image's value 1.
     `rest_is_diffuse`: whether diffuse is image - highlight, or W_d H_d alone: the rest then counts as specular.
-    `most_white`: where white would explain a larger share of the mask's light, it is paint and nothing is removed; in [0, 1], 1: never.
+    `weigh_evidence`: remove less, down to nothing, the less colour the object has.
     """
 
     surface_colours: int = 6
@@ -63,7 +65,7 @@ class Akashi2016Options:
     squared: bool = True
     own_scale: bool = True
     rest_is_diffuse: bool = True
-    most_white: float = 0.25
+    weigh_evidence: bool = True
 
 
 # Ten random starts end between 32.7 and 35.9 dB on one of the published images; this seed is one of the better ones.
@@ -76,7 +78,7 @@ _SIHR = Akashi2016Options(
     squared=False,
     own_scale=False,
     rest_is_diffuse=False,
-    most_white=1.0,
+    weigh_evidence=False,
 )
 
 VARIANTS: dict[str, Akashi2016Options] = {
@@ -117,23 +119,24 @@ def separate(
     _check_options(options)
     require_colour(image, mask, "akashi_2016")
     image = np.where(mask[..., None], image, 0.0)
+    linear = mask & (largest(image) > 0)
+    if clipped is not None and (linear & ~clipped).any():
+        linear &= ~clipped
+    share = colour_evidence(image, linear) if options.weigh_evidence else 1.0
+    if share == 0:
+        return white_layers(image, mask, np.zeros(mask.shape), clipped)
     unit = (float(image.max()) if options.own_scale else 1.0) / 255
     pixels = np.ascontiguousarray(image[mask].T) / unit
-    telling = pixels.sum(axis=0) > 0
-    if clipped is not None and (telling & ~clipped[mask]).any():
-        telling &= ~clipped[mask]
+    telling = linear[mask]
     best = _best_fit(pixels, np.flatnonzero(telling), options, monitor)
     codes = _all_codes(pixels, telling, best, options, monitor)
-    removed = np.minimum(codes[0] * best.colours[0, 0], pixels.min(axis=0))
-    if 3 * removed.sum() > options.most_white * pixels.sum():
-        return white_layers(image, mask, np.zeros(mask.shape), clipped)
     if options.rest_is_diffuse:
         white = np.zeros(mask.shape)
-        white[mask] = removed * unit
-        return white_layers(image, mask, white, clipped)
+        white[mask] = np.minimum(codes[0] * best.colours[0, 0], pixels.min(axis=0)) * unit
+        return white_layers(image, mask, share * white, clipped)
     diffuse = np.zeros(image.shape)
     diffuse[mask] = (best.colours[:, 1:] @ codes[1:]).T * unit
-    return diffuse_layers(image, mask, diffuse, clipped)
+    return diffuse_layers(image, mask, image + share * (diffuse - image), clipped)
 
 
 def _check_options(options: Akashi2016Options) -> None:
@@ -141,8 +144,8 @@ def _check_options(options: Akashi2016Options) -> None:
         raise InputError(f'start must be "hue" or "random", not {options.start!r}')
     if min(options.surface_colours, options.starts, options.iterations) < 1 or min(options.seed, options.sample) < 0:
         raise InputError("surface_colours, starts and iterations must be at least 1, seed and sample at least 0")
-    if not options.tolerance > 0 or not options.sparsity >= 0 or not 0 <= options.most_white <= 1:
-        raise InputError("tolerance must be above 0, sparsity at least 0 and most_white within [0, 1]")
+    if not options.tolerance > 0 or not options.sparsity >= 0:
+        raise InputError("tolerance must be above 0, sparsity at least 0")
 
 
 def _best_fit(pixels: np.ndarray, telling: np.ndarray, options: Akashi2016Options, monitor: Monitor) -> _Fit:

@@ -47,13 +47,13 @@ def test_sihr_from_a_sample(shared: Path, name: str, least: float) -> None:
     assert -10 * np.log10(np.mean((diffuse - truth) ** 2)) >= least
 
 
-@pytest.mark.parametrize("name", ["box", "panther"])
+@pytest.mark.parametrize("name", ["box", "frog1"])
 def test_near_grey_objects_are_left_alone(shared: Path, name: str) -> None:
     folder = shared / "data/mit_berkeley_train/laboratory" / name
     image, mask = read(folder / "original.png")[::2, ::2], cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE)[::2, ::2] > 0
     quick = replace(VARIANTS["improved"], sample=1000, iterations=200)
     assert not separate(image, mask, quick).specular.any()
-    assert separate(image, mask, replace(quick, most_white=1.0)).specular.any()
+    assert separate(image, mask, replace(quick, weigh_evidence=False)).specular.any()
 
 
 def test_a_rendered_highlight_is_found() -> None:
