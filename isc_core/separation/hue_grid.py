@@ -27,7 +27,9 @@ def hue_of(image: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     red, green, blue = image[..., 0], image[..., 1], image[..., 2]
     over = np.maximum(high - low, np.finfo(image.dtype).tiny)
     warm = (green - blue) / over
-    hue = np.where(red >= high, np.where(warm < 0, warm + 6, warm), np.where(green >= high, (blue - red) / over + 2, (red - green) / over + 4))
+    hue = np.where(
+        red >= high, np.where(warm < 0, warm + 6, warm), np.where(green >= high, (blue - red) / over + 2, (red - green) / over + 4)
+    )
     return np.where(hue >= 6, 0, hue).astype(image.dtype)
 
 

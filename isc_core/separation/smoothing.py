@@ -1,7 +1,7 @@
 """Averages that stay inside a mask: a Gaussian over the known pixels alone (normalised convolution).
 
-Equation: sum w G f / sum w G, with w = 1 inside the mask and 0 outside. Citation: H. Knutsson and C.-F. Westin, "Normalized and differential
-convolution", CVPR 1993, doi:10.1109/CVPR.1993.341081.
+Equation: sum w G f / sum w G, with w = 1 inside the mask and 0 outside. Citation: H. Knutsson and C.-F. Westin, "Normalized and
+differential convolution", CVPR 1993, doi:10.1109/CVPR.1993.341081.
 """
 
 import numpy as np

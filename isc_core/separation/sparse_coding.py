@@ -136,6 +136,16 @@ def separate(
     return diffuse_layers(image, mask, _diffuse_of_pixels(image, free, dictionary, options), clipped)
 
 
+def grouped_specular(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> np.ndarray:
+    """The specular light (H, W), the same in all channels, that the improved variant finds in groups of pixels, before it is clamped.
+
+    `image` (H, W, 3), zero outside `mask` (H, W) bool; `telling` (H, W) bool, some of the mask: the pixels that shape the atoms.
+    """
+    options = VARIANTS["improved"]
+    free = _specular_free(image, mask, options.blur)
+    return _grouped_code(free, _learn(free, telling, options), options) / _WHITE
+
+
 def _check_options(options: SparseCodingOptions) -> None:
     if options.specular_free not in ("sf1", "sf2", "both"):
         raise InputError(f'specular_free must be "sf1", "sf2" or "both", not {options.specular_free!r}')
