@@ -69,7 +69,7 @@ def _filled(
     smaller, share = pull(values, known.astype(np.float32))
     missing = _any_of_four(wanted) & (share == 0)
     above = _filled(smaller, share > 0, missing, options, level + 1, monitor)
-    current = np.where(known[..., None], values, push(above, known.shape))
+    current = push(values, known, above)
     source = patches_within(current, known)
     if not len(source):
         return current

@@ -19,27 +19,38 @@ def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
 def _pull_push(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
     if weight.all():
         return values
-    coarse_values, coarse_weight = pull(values, weight)
-    pushed = push(_pull_push(coarse_values, coarse_weight), weight.shape)
-    return np.where(weight[..., None] > 0, values, pushed)
+    return push(values, weight > 0, _pull_push(*pull(values, weight)))
 
 
 def pull(values: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Averages of 2 x 2 blocks over their known pixels; a block is known if any of its pixels is."""
-    odd = [(0, n % 2) for n in weight.shape]
-    v, w = np.pad(values, [*odd, (0, 0)]), np.pad(weight, odd)
-    blocks = (v.shape[0] // 2, 2, v.shape[1] // 2, 2)
-    total = w.reshape(blocks).sum(axis=(1, 3))
-    mean = (v * w[..., None]).reshape(*blocks, -1).sum(axis=(1, 3)) / np.maximum(total, 1)[..., None]
+    total = _sum_of_blocks(weight)
+    mean = _sum_of_blocks(values * weight[..., None]) / np.maximum(total, 1)[..., None]
     return mean, (total > 0).astype(np.float32)
 
 
-def push(coarse: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """Bilinear doubling, pixel centres aligned: each fine pixel is 3/4 of its block's value and 1/4 of the next one's."""
-    for axis in (0, 1):
-        last = coarse.shape[axis] - 1
-        at = np.arange(shape[axis])
-        near = at // 2
-        next_ = np.clip(np.where(at % 2, near + 1, near - 1), 0, last)
-        coarse = 0.75 * np.take(coarse, near, axis=axis) + 0.25 * np.take(coarse, next_, axis=axis)
-    return coarse.astype(np.float32)
+def _sum_of_blocks(values: np.ndarray) -> np.ndarray:
+    """Over 2 x 2 blocks of `values` (H, W, ...); zeros complete those of an odd last row or column."""
+    even = np.pad(values, [(0, n % 2) for n in values.shape[:2]] + [(0, 0)] * (values.ndim - 2))
+    rows = even[::2] + even[1::2]
+    return rows[:, ::2] + rows[:, 1::2]
+
+
+def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarray:
+    """`values` (H, W, C) where `known` (H, W) bool; elsewhere `coarse`, half as wide and high, doubled bilinearly.
+
+    Pixel centres are aligned: each fine pixel is 3/4 of its block's value and 1/4 of the next one's, along both axes.
+    """
+    at = np.nonzero(~known)
+    (row, next_row), (column, next_column) = (_blocks_beside(place, size) for place, size in zip(at, coarse.shape, strict=False))
+    here = 0.75 * coarse[row, column] + 0.25 * coarse[row, next_column]
+    there = 0.75 * coarse[next_row, column] + 0.25 * coarse[next_row, next_column]
+    filled = values.copy()
+    filled[at] = 0.75 * here + 0.25 * there
+    return filled
+
+
+def _blocks_beside(place: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
+    """The block, one of `size`, that a fine pixel lies in, and the one that it lies nearest to beside that."""
+    near = place // 2
+    return near, np.clip(near - 1 + place % 2 * 2, 0, size - 1)

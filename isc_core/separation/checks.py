@@ -3,6 +3,7 @@
 import numpy as np
 
 from ..errors import InputError
+from .channels import largest, smallest
 
 # Channels that differ by less than this share of the brightest value are equal: rounding of 16-bit codes is 1.5e-5.
 _GREY = 1e-4
@@ -25,5 +26,5 @@ def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None
 def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:
     """Raises `InputError` where no pixel of `image` (H, W, 3) inside `mask` (H, W) bool has colour that the method could judge by."""
     inside = image[mask]
-    if np.ptp(inside, axis=1).max() <= _GREY * inside.max():
+    if (largest(inside) - smallest(inside)).max() <= _GREY * inside.max():
         raise InputError(f"the photo has no colour, and {method} tells highlights by colour alone: use --method isc, or a colour photo")

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..decomposition import Separation
 from ..inpainting.pull_push import fill
-from .channels import largest, smallest
+from .channels import largest, mean_channel, smallest
 
 # A channel this near to the pixel's largest, which is full, counts as full too: scaling and compression blur the limit.
 _FULL = 0.95
@@ -35,7 +35,7 @@ def explain_clipped(split: Separation, clipped: np.ndarray, mask: np.ndarray) ->
     if not clipped.any() or not known.any():
         return split
     image = (split.diffuse + split.specular + split.residual)[clipped]
-    removed = (split.specular[..., 0] + split.specular[..., 1] + split.specular[..., 2]) / 3
+    removed = mean_channel(split.specular)
     around = fill(np.concatenate([split.diffuse, removed[..., None]], axis=2), known)[clipped]
     high = largest(image)
     full = image >= _FULL * high[:, None]

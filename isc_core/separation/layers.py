@@ -8,6 +8,7 @@ still hide in the smallest channel; u is the mean of the smallest channel over t
 import numpy as np
 
 from ..decomposition import Separation
+from .channels import mean_channel, smallest
 from .clipped import explain_clipped
 
 # A highlight can hide in a pixel's smallest channel; the share of it that stays in doubt where a method could decide.
@@ -19,7 +20,7 @@ def white_layers(image: np.ndarray, mask: np.ndarray, specular: np.ndarray, clip
 
     What is not finite counts as 0. `mask`, `clipped`: (H, W) bool. The residual is 0 but where clipped.
     """
-    low = image.min(axis=2)
+    low = smallest(image)
     white = np.where(mask & np.isfinite(specular), np.clip(specular, 0, low), 0).astype(np.float32)
     diffuse = np.where(mask[..., None], np.maximum(image - white[..., None], 0), 0).astype(np.float32)
     return _finished(image, mask, diffuse, np.repeat(white[..., None], 3, axis=2), clipped)
@@ -37,9 +38,9 @@ def diffuse_layers(image: np.ndarray, mask: np.ndarray, diffuse: np.ndarray, cli
 
 
 def _finished(image: np.ndarray, mask: np.ndarray, diffuse: np.ndarray, specular: np.ndarray, clipped: np.ndarray | None) -> Separation:
-    low = np.where(mask, image.min(axis=2), 0)
-    base = max(float(low[mask].mean()), 1e-30) if mask.any() else 1.0
-    error = specular.mean(axis=2) + DOUBT * low
+    low = np.where(mask, smallest(image), 0)
+    base = max(float(low[mask].mean(dtype=float)), 1e-30) if mask.any() else 1.0
+    error = mean_channel(specular) + DOUBT * low
     confidence = np.where(mask, np.exp(-error / base), 0).astype(np.float32)
     split = Separation(diffuse, specular, np.zeros_like(diffuse), confidence)
     return split if clipped is None else explain_clipped(split, clipped & mask, mask)
