@@ -13,7 +13,7 @@ from .datasets import MitBerkeleyObject
 from .evaluate import Estimate, Runner
 from .pipeline import BASELINE_MODELS, SIRFS_MODELS, Settings
 from .progress import Monitor
-from .separation import separate
+from .separation import BEST, separate
 from .sirfs.contour import occluding_contour
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
@@ -33,7 +33,7 @@ class RunnerOptions:
     """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for `mdr`; `engine`, `threads`: see `SolverOptions`."""
 
     model: str = "sirfs"
-    separator: str = "shen_2013"
+    separator: str = BEST
     engine: str = "auto"
     threads: int = 0
 

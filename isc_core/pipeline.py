@@ -20,7 +20,7 @@ from .decomposition import Decomposition, Provenance, Separation
 from .errors import InputError
 from .photo import Photo, mask_box
 from .progress import Monitor
-from .separation import METHODS, separate
+from .separation import BEST, METHODS, separate
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, light_to_reference, normal_from_reference, real_sh
 from .sirfs.kernel_cache import announce_compilation
@@ -52,7 +52,7 @@ class Settings:
     """
 
     model: str = "mdr"
-    separator: str = "shen_2013"
+    separator: str = BEST
     illumination: str = "natural"
     max_size: int = 512
     full_size: bool = False

@@ -4,15 +4,17 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..photo import read_photo
+import numpy as np
+
+from ..photo import read_linear, read_photo
 from ..progress import Monitor
 from ..result_folder import require_writable_result, save_separation
-from ..separation import IMPROVED, METHODS, separate
+from ..separation import BEST, IMPROVED, METHODS, separate
 from ..separation.option_text import parse_changes
 from .options import Commands, add_command, add_photo, hints
 
-_EXAMPLES = """  isc separate cup.png --method shen_2013 -o cup-layers
-  isc separate highlights.bmp --transfer linear --method shen_2013 -o layers
+_EXAMPLES = """  isc separate cup.png -o cup-layers
+  isc separate highlights.bmp --transfer linear --method shen_2013 --variant paper -o layers
   isc separate cup.png --method shen_2013 --set ratio_quantile=0.4 -o cup-layers"""
 
 
@@ -24,7 +26,7 @@ def declare(commands: Commands) -> None:
         "transparency and black border is taken as a whole.", _EXAMPLES,
     )  # fmt: skip
     add_photo(parser)
-    parser.add_argument("--method", choices=METHODS, required=True, metavar="NAME", help=f"how: {', '.join(METHODS)}")
+    parser.add_argument("--method", choices=METHODS, default=BEST, metavar="NAME", help=f"how: {', '.join(METHODS)} (default {BEST})")
     parser.add_argument(
         "--variant",
         default=IMPROVED,
@@ -40,6 +42,10 @@ def declare(commands: Commands) -> None:
         help="change an option of the method; can be given again; an unknown NAME lists those that there are",
     )
     parser.add_argument(
+        "--prior", type=Path, metavar="FILE",
+        help=f"for {BEST}: a grey image of the photo's size, how probable a visible highlight is: black never, middle grey (0.5) not known",
+    )  # fmt: skip
+    parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier result is replaced"
     )
 
@@ -49,13 +55,19 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     changes = parse_changes(options.method, options.variant, options.changes)
     require_writable_result(options.output, separation=True)
     photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True)
+    prior = None if options.prior is None else _read_prior(options.prior)
     monitor.report(f"separating ({options.method})", 0.1)
     layers = separate(
         options.method, photo.image, photo.mask, photo.clipped,
-        variant=options.variant, changes=changes, monitor=monitor.part(0.1, 0.8),
+        variant=options.variant, changes=changes, prior=prior, monitor=monitor.part(0.1, 0.8),
     )  # fmt: skip
     monitor.report("writing", 0.8)
     save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
     if photo.original.mask_from == "whole frame" and not options.quiet:
         print("isc: note: there is no mask, so the whole image was taken; --mask names one", file=sys.stderr)
     return hints(options, f"look at {options.output / 'preview.png'}")
+
+
+def _read_prior(path: Path) -> np.ndarray:
+    """The stored values of an image, as probabilities (H, W) in [0, 1]."""
+    return np.clip(read_linear(path, "linear").mean(axis=2), 0, 1)

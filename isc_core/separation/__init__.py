@@ -30,7 +30,9 @@ METHODS = (
     "akashi_2016",
     "chaotic_segmentation",
     "sparse_coding",
+    "isc",
 )
+BEST = "isc"
 IMPROVED = "improved"
 # The toolbox knows the whole frame only, and nothing of clipping: its figures are found again no other way.
 _TOOLBOX = "sihr"
@@ -44,23 +46,28 @@ def separate(
     *,
     variant: str = IMPROVED,
     changes: Mapping[str, object] | None = None,
+    prior: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
     """Splits `image` (H, W, 3), linear, under white light, inside `mask` (H, W) bool, by a method.
 
     `clipped` (H, W) bool marks pixels whose true value lies above the recorded one. `variant`: one of `variants(method)`; `changes`:
-    options of the method that differ from it. Nothing outside the mask's box is looked at, but by "sihr", which ignores `clipped`.
+    options of the method that differ from it. `prior` (H, W) in [0, 1]: for "isc" alone, how probable a visible highlight is, .5 where
+    nothing is known. Nothing outside the mask's box is looked at, but by "sihr", which ignores `clipped`.
     Raises `InputError` for unknown names, unfit options and arrays, a photo that the method can do nothing with; `Cancelled`.
     """
     options = method_options(method, variant, changes)
     check_arrays(image, mask, clipped)
+    if prior is not None and (method != BEST or prior.shape != mask.shape):
+        raise InputError(f"a prior is for the method {BEST} alone, and has the photo's size {mask.shape}")
     toolbox = variant == _TOOLBOX
     part = np.s_[:, :] if toolbox else _box(mask)
     inside = image[part], mask[part], None if clipped is None or toolbox else clipped[part]
     if options is None:
         split = _module(method).separate(inside[0], inside[1], clipped=inside[2])
     else:
-        split = _module(method).separate(inside[0], inside[1], options, clipped=inside[2], monitor=monitor)
+        extra = {} if prior is None else {"prior": prior[part]}
+        split = _module(method).separate(inside[0], inside[1], options, clipped=inside[2], monitor=monitor, **extra)
     return Separation(*(_placed(layer, part, mask.shape) for layer in (split.diffuse, split.specular, split.residual, split.confidence)))
 
 
