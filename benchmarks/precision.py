@@ -1,7 +1,7 @@
 """Production (float32, compiled) against double precision and against the plain NumPy engine, with the shipped priors and weights.
 
-  python -m benchmarks.precision               production against float64: losses and scores of the ten objects, both lights
-  python -m benchmarks.precision --numpy       ten fixed states and whole solves in both engines, with the ratio of their times
+python -m benchmarks.precision               production against float64: losses and scores of the ten objects, both lights
+python -m benchmarks.precision --numpy       ten fixed states and whole solves in both engines, with the ratio of their times
 """
 
 import time
@@ -18,7 +18,7 @@ from isc_core.sirfs.prior_file import shipped_prior_set
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import isc_weights
 from isc_core.sirfs.solver import SirfsResult, SolverOptions, solve
-from isc_core.sirfs.workers import Workers
+from isc_core.workers import Workers
 
 from .berkeley import LIGHTS, parser, problem, scores, training_object
 

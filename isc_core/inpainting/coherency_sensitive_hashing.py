@@ -17,8 +17,8 @@ Limits: approximate; patches are 8 x 8 pixels, neither turned nor scaled. A patc
 large distance.
 """
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,6 +26,7 @@ import numpy as np
 from ..compiled import compiled
 from ..errors import InputError
 from ..progress import Monitor
+from ..workers import Workers
 from .walsh_hadamard import PATCH, opponent, project, strongest
 
 
@@ -108,7 +109,7 @@ class CshSearch:
         _check(self.options, source)
         self.source = source
         self._chosen = strongest(source.image, source.rows, source.columns, self.options.projections)
-        self._projected = project(source.image, source.rows, source.columns, self._chosen)
+        self._projected = project(source.image, source.rows, source.columns, self._chosen, self.options.threads)
         self._width = _bin_width(self._projected, self.options)
 
     def match(self, target: Patches, start: np.ndarray | None = None, monitor: Monitor | None = None) -> Matches:
@@ -118,7 +119,7 @@ class CshSearch:
         `monitor` hears of each table. Raises `Cancelled`.
         """
         rng = np.random.default_rng(self.options.seed)
-        projected = project(target.image, target.rows, target.columns, self._chosen)
+        projected = project(target.image, target.rows, target.columns, self._chosen, self.options.threads)
         best = rng.integers(len(self.source), size=len(target)) if start is None else start
         matches = Matches(best.astype(np.int32), np.full(len(target), np.inf, np.float32))
         for table in range(self.options.tables):
@@ -140,9 +141,8 @@ class CshSearch:
         salt, forward = int(rng.integers(1 << 30)), table % 2 == 0
         common = (hashed[0], hashed[1], matches.source, matches.distance, matches.source.copy(), self.options.candidates, salt, forward)
         ends = np.linspace(0, len(target), _PARTS + 1).astype(int)
-        with ThreadPoolExecutor(self.options.threads) as pool:
-            for done in [pool.submit(_sweep, *common, int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]:
-                done.result()
+        with Workers(self.options.threads) as workers:
+            workers.run([partial(_sweep, *common, int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)])
 
 
 class _Hashed(NamedTuple):

@@ -9,12 +9,12 @@ from functools import partial
 
 import numpy as np
 
+from ..workers import Workers
 from . import kernels, reflectance, surface
 from .illumination import C1, C2, C3, C4, C5, light_cost
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
 from .stencils import fold_border
 from .tables import CostTable
-from .workers import Workers
 
 _ROWS_A_BLOCK = 16
 _MOST_BLOCKS = 16

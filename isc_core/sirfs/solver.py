@@ -15,12 +15,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..progress import Monitor
+from ..workers import Workers
 from .illumination import stack, unstack
 from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
 from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, level_shapes, synthesise
-from .workers import Workers
 
 MOST_THREADS = 64  # more only wait for each other
 

@@ -8,8 +8,8 @@ from functools import partial
 import numpy as np
 from numba import njit
 
+from ..workers import Workers
 from .pyramid import TAPS
-from .workers import Workers
 
 _compiled = njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
 _CHUNK = 1024

@@ -110,6 +110,9 @@ def test_projections_keep_distances_and_bound_them() -> None:
     assert np.allclose(bound[:, :-1], whole[:, chosen], atol=1e-5)
     assert np.allclose((bound**2).sum(axis=1), (all_cells**2).sum(axis=1), rtol=1e-4)
     assert (part <= true * (1 + 1e-4)).all() and part.sum() > 0.6 * true.sum()
+    mixed = np.random.default_rng(0).permutation(len(patches))
+    again = walsh_hadamard.project(patches.image, patches.rows[mixed], patches.columns[mixed], chosen, threads=3)
+    assert np.array_equal(again, bound[mixed])
 
 
 def test_one_channel_and_small_images() -> None:

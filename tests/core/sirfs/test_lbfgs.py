@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from isc_core.sirfs.lbfgs import Algebra, LbfgsOptions, NumpyAlgebra, _Memory, minimise
-from isc_core.sirfs.workers import Workers
+from isc_core.workers import Workers
 
 EXACT = LbfgsOptions(loss_tolerance=0.0, gradient_tolerance=1e-9, step_tolerance=0.0, evaluations=5000)
 
