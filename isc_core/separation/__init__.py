@@ -16,6 +16,7 @@ import numpy as np
 from ..decomposition import Separation
 from ..errors import InputError
 from ..progress import Monitor
+from .box import mask_box
 from .checks import check_arrays
 
 METHODS = (
@@ -61,7 +62,7 @@ def separate(
     if prior is not None and (method != BEST or prior.shape != mask.shape):
         raise InputError(f"a prior is for the method {BEST} alone, and has the photo's size {mask.shape}")
     toolbox = variant == _TOOLBOX
-    part = np.s_[:, :] if toolbox else _box(mask)
+    part = np.s_[:, :] if toolbox else mask_box(mask)
     inside = image[part], mask[part], None if clipped is None or toolbox else clipped[part]
     if options is None:
         split = _module(method).separate(inside[0], inside[1], clipped=inside[2])
@@ -96,11 +97,6 @@ def _module(method: str) -> ModuleType:
     if method not in METHODS:
         raise InputError(f"unknown separation method {method!r}: choose one of {', '.join(METHODS)}")
     return importlib.import_module(f".{method}", __package__)
-
-
-def _box(mask: np.ndarray) -> tuple[slice, slice]:
-    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
-    return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)
 
 
 def _placed(layer: np.ndarray, part: tuple[slice, slice], shape: tuple[int, ...]) -> np.ndarray:

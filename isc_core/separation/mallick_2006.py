@@ -13,7 +13,8 @@ Scheme: upwind differences (Rouy & Tourin 1992) and explicit steps; along lines 
 Citation: S. P. Mallick, T. Zickler, P. N. Belhumeur and D. J. Kriegman, "Specularity removal in images and videos: a PDE approach",
 ECCV 2006, LNCS 3951, 550-563, doi:10.1007/11744023_43. Ours, as options: hue and rho are smoothed before they are differentiated; part
 of the erosion is taken back by a dilation with the same g (an opening), which restores what never was a hill; and only pixels whose
-smallest channel is above its mean lose specular, unless all of these together show too little colour to be told from white paint.
+smallest channel is above its mean lose specular, unless all of these together show too little colour to be told from white paint. And on
+large photos s is found on averages over 2 x 2 pixels, repeatedly, and interpolated, so that highlights that grow with the photo still go.
 
 Limits: the light must be white. Erosion has no steady state but the minimum of every region: steps * step is the radius, in pixels, of
 the highlights that it removes, and noise and paler patches of that size go with them. A highlight that touches no diffuse pixel of its
@@ -29,7 +30,9 @@ from scipy import ndimage
 from ..compiled import compiled
 from ..decomposition import Separation
 from ..errors import InputError
+from ..inpainting.pull_push import pull, push
 from ..progress import Monitor
+from .box import mask_box
 from .channels import fade_in, saturation, smallest
 from .checks import check_arrays, require_colour
 from .layers import white_layers
@@ -39,6 +42,8 @@ from .layers import white_layers
 class Mallick2006Options:
     """`steps`, `step`: how many erosion steps, >= 0, of which length in pixels, in (0, .7]; their product is about the radius of the
     highlights that go.
+    `longest`: objects with a longer side, in pixels, are averaged over blocks down to this, and those blocks are the pixels that all
+    lengths here mean; >= 16, or None for the published method.
     `restoring_steps`: steps of dilation that follow, >= 0. Zero is the published erosion, `steps` an opening.
     `smoothing`: standard deviation, in pixels, of the Gaussian that hue and rho get before they are differentiated; >= 0.
     `edge`: tau, where |grad rho| stops the erosion, in 1/255 of the mask's largest value a pixel; >= 0.
@@ -59,11 +64,12 @@ class Mallick2006Options:
     texture: float = 0.1
     bright_saturation: float = 1 / 3
     fade: float | None = 1.0
+    longest: int | None = 640
 
 
 VARIANTS: dict[str, Mallick2006Options] = {
     "improved": Mallick2006Options(),
-    "paper": Mallick2006Options(restoring_steps=0, smoothing=0, edge=3, chroma=1, bright_saturation=0, fade=None),
+    "paper": Mallick2006Options(restoring_steps=0, smoothing=0, edge=3, chroma=1, bright_saturation=0, fade=None, longest=None),
 }
 
 _LEVELS = 255.0
@@ -99,7 +105,8 @@ def separate(
     specular = np.zeros_like(low)
     linear = mask if clipped is None else mask & ~clipped
     if linear.any() and saturation(seen[mask & (low > base)]) >= options.bright_saturation:
-        specular = _specular_of(seen, linear, options, monitor)
+        box = mask_box(mask)
+        specular[box] = _specular_of(seen[box], linear[box], options, monitor)
         if options.fade is not None:
             specular = specular * fade_in(low, base, options.fade)
     return white_layers(seen, mask, specular, clipped)
@@ -112,10 +119,22 @@ def _check_options(options: Mallick2006Options) -> None:
         raise InputError("smoothing and edge must be at least 0, chroma and texture above 0")
     if not 0 <= options.bright_saturation <= 1 or not (options.fade is None or options.fade > 0):
         raise InputError("bright_saturation must be within [0, 1], fade above 0 or none")
+    if options.longest is not None and options.longest < 16:
+        raise InputError("longest must be at least 16 pixels, or none")
 
 
 def _specular_of(image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor) -> np.ndarray:
-    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`."""
+    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`, with no more pixels a side than the options allow."""
+    if options.longest is None or max(mask.shape) <= options.longest:
+        return _hills(image, mask, options, monitor)
+    averages, share = pull(image.astype(np.float32), mask.astype(np.float32))
+    coarse = _specular_of(averages, share > 0, options, monitor)
+    nothing = np.zeros((*mask.shape, 1), np.float32), np.zeros_like(mask)
+    return np.where(mask, push(*nothing, coarse[..., None])[..., 0], 0)
+
+
+def _hills(image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor) -> np.ndarray:
+    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`: what erosion takes off."""
     framed = np.pad(mask, 1)
     scale = _LEVELS / image[mask].max()
     red, green, blue = (np.pad(image[..., c] * scale, 1).astype(np.float32) for c in range(3))

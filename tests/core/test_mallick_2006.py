@@ -67,6 +67,20 @@ def test_highlights_on_two_paints_are_eroded(variant: str, left: float) -> None:
     assert np.mean((split.diffuse - diffuse) ** 2) <= left * np.mean((image - diffuse) ** 2)
 
 
+def test_highlights_of_large_photos_go_as_well() -> None:
+    """720 pixels wide, highlights of 24 pixels' radius: more than the steps reach, but not on averages over 2 x 2 pixels."""
+    image, diffuse, mask = (np.repeat(np.repeat(array, 8, axis=0), 8, axis=1) for array in plate(radius=3))
+    left = {}
+    for longest in (640, None):
+        split = mallick_2006.separate(image, mask, Mallick2006Options(longest=longest))
+        assert_layers_hold(split, image, mask)
+        left[longest] = np.mean((split.diffuse - diffuse) ** 2) / np.mean((image - diffuse) ** 2)
+    assert left[640] < 0.05 and left[640] < 0.4 * left[None]
+    padded = np.pad(image, [(3, 5), (11, 2), (0, 0)], constant_values=np.nan)
+    wide = mallick_2006.separate(padded, np.pad(mask, [(3, 5), (11, 2)]))
+    assert np.allclose(wide.diffuse[3:-5, 11:-2], mallick_2006.separate(image, mask).diffuse, atol=1e-6)
+
+
 def test_an_image_of_one_angle_is_a_steady_state() -> None:
     _, diffuse, mask = plate()
     for options in VARIANTS.values():
@@ -145,6 +159,6 @@ def test_refuses_what_it_cannot_use() -> None:
     with pytest.raises(InputError, match="no colour"):
         mallick_2006.separate(np.repeat(image[..., :1], 3, axis=2), mask)
     wrong = [("steps", -1), ("step", 0.8), ("restoring_steps", -1), ("smoothing", -1), ("edge", np.nan), ("chroma", 0), ("texture", 0)]
-    for name, value in [*wrong, ("bright_saturation", 2), ("fade", 0)]:
+    for name, value in [*wrong, ("bright_saturation", 2), ("fade", 0), ("longest", 8)]:
         with pytest.raises(InputError, match=name):
             mallick_2006.separate(image, mask, Mallick2006Options(**{name: value}))
