@@ -98,6 +98,8 @@ def paint_mixing(specular: np.ndarray, chroma: np.ndarray, ratio: np.ndarray, ma
 
     It is the share of grad s that runs against grad C, times 1 + q; `chroma` C, `ratio` q, all (H, W).
     """
+    if min(mask.shape) < 2:
+        return np.zeros_like(specular)
     down, across = np.gradient(specular)
     chroma_down, chroma_across = np.gradient(chroma)
     inner = ndimage.binary_erosion(mask, iterations=2)
