@@ -37,6 +37,7 @@ from ..errors import InputError
 from ..progress import Monitor
 from .checks import check_arrays, require_colour
 from .layers import diffuse_layers, white_layers
+from .smoothing import masked_gaussian
 
 # Linear Rec.709 to CIE XYZ, and what a specular light of 1 in each channel is there: its length and direction (the highlight atom).
 _XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
@@ -156,18 +157,9 @@ def _check_options(options: SparseCodingOptions) -> None:
 
 
 def _specular_free(image: np.ndarray, mask: np.ndarray, blur: float) -> _Free:
-    pixel = _smoothed(image, mask, blur) @ _XYZ.T
+    pixel = np.where(mask[..., None], masked_gaussian(image, mask, blur), 0) @ _XYZ.T
     one, two = pixel @ _ACROSS[0], pixel @ _ACROSS[1]
     return _Free(np.hypot(one, two), np.arctan2(two, one) / (2 * np.pi) % 1, pixel @ _HIGHLIGHT, mask)
-
-
-def _smoothed(image: np.ndarray, mask: np.ndarray, blur: float) -> np.ndarray:
-    """`image` (H, W, 3) averaged over a Gaussian inside the mask; zero outside."""
-    if blur == 0:
-        return image
-    weight = np.maximum(ndimage.gaussian_filter(mask.astype(float), blur), _TINY)
-    layers = [ndimage.gaussian_filter(image[..., c], blur) / weight for c in range(3)]
-    return np.where(mask[..., None], np.stack(layers, axis=2), 0)
 
 
 def _learn(free: _Free, telling: np.ndarray, options: SparseCodingOptions) -> _Dictionary:
