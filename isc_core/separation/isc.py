@@ -299,7 +299,7 @@ def _mixing(photo: _Photo, found: np.ndarray, share: np.ndarray, trust: np.ndarr
     """The median paint mixing where the candidate `found` (H, W) is strong."""
     inside = np.where(photo.mask, found, 0)
     smooth = _carried_in(inside, np.square(trust), reach=4.0)
-    mixing = paint_mixing(smooth, photo.chroma, _ratio(share), photo.mask, max(0.03 * photo.diagonal, 2.5))
+    mixing = paint_mixing(smooth, photo.chroma, _ratio(share), photo.usable, max(0.03 * photo.diagonal, 2.5))
     values = inside[photo.mask]
     return float(np.median(mixing[photo.mask][values >= 0.3 * np.quantile(values, 0.99)]))
 
@@ -328,7 +328,7 @@ def _by_place(photo: _Photo, usual_chroma: np.ndarray, trust: np.ndarray, option
     gain = ramp(candidate / np.maximum(error, _TINY), (1.0, 3.0))
     gain *= ramp(photo.chroma / np.maximum(usual_chroma, _TINY), options.present) * ramp(photo.low / photo.base, (0.5, 1.2))
     scale = max(0.015 * photo.diagonal, 2.5)
-    gain *= ramp(paint_mixing(candidate, photo.chroma, ratio, mask, scale), options.unmixed_here)
+    gain *= ramp(paint_mixing(candidate, photo.chroma, ratio, photo.usable, scale), options.unmixed_here)
     safe = gain * trust * ramp(1 - share, options.coloured)
     _, rough_here = roughness(candidate * safe, trust, mask, scale, fine=1.5)
     in_groups = grouped_specular(photo.image, mask, photo.usable if photo.usable.any() else mask)
