@@ -30,6 +30,7 @@ prior says where they are. Pale paint that fades in smoothly on a coloured objec
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from ..decomposition import Separation
 from ..errors import InputError
@@ -53,6 +54,8 @@ _BY_HUE, _BY_PLACE = 0.7, 1.0
 _CHROMA_STEP, _SHARE_STEP, _DARK = 0.5, 0.1, 0.03
 # Of the filter by place: its reach as a share of the object's diagonal, the scale of doubt, rounds; and how many times the smallest step.
 _REACH, _DOUBT, _ROUNDS, _SMALLEST_STEP = 0.15, 0.1, 4, 0.01
+# How far around what is proven a highlight may fade out, as a share of the object's diagonal.
+_NEARBY = 0.02
 
 
 @dataclass(frozen=True)
@@ -67,6 +70,7 @@ class IscOptions:
     `clear`: of s over `scatter` times what stays, by hue.
     `scatter_here`: the least relative scatter of a paint's q by place. `coloured`: of 1 - min / max of the paint, by place. `present`: of C
     over that of like pixels. `unmixed_here`, `smooth_by_place`: as above, by place.
+    `proven`: of the gain of pixels whose surroundings are judged more mildly, by `faint`: of s over what it may be in error by.
     """
 
     hues: int = 48
@@ -85,6 +89,8 @@ class IscOptions:
     present: tuple[float, float] = (0.6, 0.9)
     unmixed_here: tuple[float, float] = (0.3, 0.05)
     smooth_by_place: tuple[float, float] = (0.8, 0.5)
+    proven: tuple[float, float] = (0.5, 0.95)
+    faint: tuple[float, float] = (0.2, 1.0)
 
 
 VARIANTS: dict[str, IscOptions] = {"improved": IscOptions()}
@@ -333,7 +339,12 @@ def _by_place(photo: _Photo, usual_chroma: np.ndarray, trust: np.ndarray, option
     _, rough_here = roughness(candidate * safe, trust, mask, scale, fine=1.5)
     in_groups = grouped_specular(photo.image, mask, photo.usable if photo.usable.any() else mask)
     agreed = np.minimum(gain, in_groups / np.maximum(candidate, _TINY))
-    return candidate, np.where(mask, np.maximum(safe * ramp(rough_here, options.smooth_by_place), agreed), 0), share
+    proven = np.where(mask, np.maximum(safe * ramp(rough_here, options.smooth_by_place), agreed), 0)
+    # A highlight fades out: around what is proven, what would not be enough by itself belongs to it.
+    around = ndimage.maximum_filter(ramp(proven, options.proven), 2 * round(_NEARBY * photo.diagonal) + 1)
+    faint = trust * ramp(candidate / np.maximum(error, _TINY), options.faint)
+    faint *= ramp(photo.chroma / np.maximum(usual_chroma, _TINY), options.present)
+    return candidate, np.where(mask, np.maximum(proven, np.minimum(faint, around)), 0), share
 
 
 def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Photo) -> Paths:
