@@ -21,7 +21,7 @@ from .channels import largest, mean_channel, smallest
 # A channel this near to the pixel's largest, which is full, counts as full too: scaling and compression blur the limit.
 _FULL = 0.95
 # From where to where a pixel's smallest channel, and white light in or around it, speak for a highlight: shares of its largest channel.
-_WHITE = (0.5, 0.7)
+_WHITE = (0.6, 0.8)
 _LIT = (0.03, 0.1)
 
 

@@ -53,8 +53,8 @@ def test_full_channels_of_strong_paint_are_no_highlight() -> None:
 
 def test_full_white_speaks_for_itself() -> None:
     split, image, clipped = explained(np.zeros((96, 120)), 1.6)
-    white = clipped & (image.min(axis=2) > 0.75)
-    paint = clipped & (image.min(axis=2) < 0.5)
+    white = clipped & (image.min(axis=2) > 0.85)
+    paint = clipped & (image.min(axis=2) < 0.6)
     assert white.sum() > 20 and paint.sum() > 20
     assert split.specular[white].min() > 0.1 and not split.specular[paint].any()
 
@@ -71,7 +71,7 @@ def test_knowing_what_is_clipped_does_no_harm(shared: Path, method: str) -> None
 @pytest.mark.parametrize("name", ["Basketball", "GlueGun"])
 def test_photos_of_strong_paint_get_no_specks(shared: Path, name: str) -> None:
     photo = read_photo(shared / f"data/photos/{name}.png")
-    strong = photo.clipped & (photo.image.min(axis=2) < 0.5 * photo.image.max(axis=2))
+    strong = photo.clipped & (photo.image.min(axis=2) < 0.6 * photo.image.max(axis=2))
     assert strong.any()
     split = white_layers(photo.image, photo.mask, np.zeros(photo.mask.shape), photo.clipped)
     assert not split.specular[strong].any()
