@@ -169,7 +169,8 @@ def separate(
     options, monitor = options or VARIANTS["improved"], monitor or Monitor()
     check_arrays(image, mask, clipped)
     _check(options, prior, mask)
-    image = np.where(mask[..., None], image, 0).astype(np.float32)
+    unit = _unit(image[mask])
+    image = (np.where(mask[..., None], image, 0) / unit).astype(np.float32)
     usable = mask if clipped is None else mask & ~clipped
     factor = -(-max(mask.shape) // _LONGEST)
     monitor.report("looking at the paints", 0.0)
@@ -183,7 +184,13 @@ def separate(
     specular = np.maximum(judged.by_hue * _at_odds(judged.gain_by_hue, prior), judged.by_place * _at_odds(judged.gain_by_place, prior))
     split = white_layers(image, mask, specular, clipped)
     trusted = np.ones(mask.shape, bool) if clipped is None else ~clipped
-    return Separation(split.diffuse, split.specular, split.residual, np.where(trusted, _confidence(photo, split.specular[..., 0]), 0))
+    confidence = np.where(trusted, _confidence(photo, split.specular[..., 0]), 0)
+    return Separation(unit * split.diffuse, unit * split.specular, unit * split.residual, confidence)
+
+
+def _unit(values: np.ndarray) -> np.float32:
+    """A power of two near the largest value: dividing by it rounds nothing, and the small constants mean the same at any exposure."""
+    return np.float32(2.0 ** np.ceil(np.log2(max(float(values.max()), 1e-30))))
 
 
 def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> None:
