@@ -17,8 +17,8 @@ from isc_core.highlight_set import SeparationTruth
 from isc_core.image_metrics import highlight_region, rank_correlation, sparsification, ssim, ssim_volume
 from isc_core.metrics import lmse, mse, psnr
 
-# Files that many methods read: with one of them all rows are measured anew.
-_COMMON = ("channels", "checks", "clipped", "evidence", "layers")
+# Methods that read another method's file too.
+_BUILT_ON = {"isc": ("sparse_coding",)}
 
 
 @dataclass(frozen=True)
@@ -76,9 +76,12 @@ def measure(group: str, truth: SeparationTruth, method: str, variant: str) -> tu
 
 
 def source_code(method: str) -> str:
-    """Eight digits that change with the method's source file, or with those that all methods share."""
+    """Eight digits that change with the method's source file, and with any that is not a method's own."""
     folder = Path(separation.__file__).parent
-    return hashlib.sha256(b"".join((folder / f"{name}.py").read_bytes() for name in (method, *_COMMON))).hexdigest()[:8]
+    others = set(separation.METHODS) - {method, *_BUILT_ON.get(method, ())}
+    files = [path for path in sorted(folder.glob("*.py")) if path.stem not in others]
+    files += sorted((folder.parent / "inpainting").glob("*.py"))
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:8]
 
 
 def read_rows(path: Path) -> dict[tuple[str, str, str, str], Row]:
