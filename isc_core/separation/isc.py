@@ -82,11 +82,11 @@ class IscOptions:
     smooth_here: tuple[float, float] = (0.8, 0.5)
     unmixed: tuple[float, float] = (0.55, 0.3)
     bright: tuple[float, float] = (0.85, 1.4)
-    clear: tuple[float, float] = (0.3, 1.0)
-    scatter: float = 0.05
+    clear: tuple[float, float] = (0.3, 0.85)
+    scatter: float = 0.035
     scatter_here: float = 0.1
     coloured: tuple[float, float] = (0.35, 0.5)
-    present: tuple[float, float] = (0.6, 0.9)
+    present: tuple[float, float] = (0.62, 1.05)
     unmixed_here: tuple[float, float] = (0.3, 0.05)
     smooth_by_place: tuple[float, float] = (0.8, 0.5)
     proven: tuple[float, float] = (0.5, 0.95)
