@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..errors import InputError
 from ..photo import read_linear, read_photo
 from ..progress import Monitor
 from ..result_folder import require_writable_result, save_separation
@@ -53,9 +54,11 @@ def declare(commands: Commands) -> None:
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work; what can be wrong is found before it begins."""
     changes = parse_changes(options.method, options.variant, options.changes)
+    if options.prior is not None and options.method != BEST:
+        raise InputError(f"--prior is for the method {BEST} alone")
     require_writable_result(options.output, separation=True)
     photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True)
-    prior = None if options.prior is None else _read_prior(options.prior)
+    prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape)
     monitor.report(f"separating ({options.method})", 0.1)
     layers = separate(
         options.method, photo.image, photo.mask, photo.clipped,
@@ -68,6 +71,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     return hints(options, f"look at {options.output / 'preview.png'}")
 
 
-def _read_prior(path: Path) -> np.ndarray:
-    """The stored values of an image, as probabilities (H, W) in [0, 1]."""
-    return np.clip(read_linear(path, "linear").mean(axis=2), 0, 1)
+def _read_prior(path: Path, size: tuple[int, ...]) -> np.ndarray:
+    """The stored values of an image, as probabilities (H, W) in [0, 1]. Raises `InputError` unless it has the photo's size (H, W)."""
+    prior: np.ndarray = np.clip(read_linear(path, "linear").mean(axis=2), 0, 1)
+    if prior.shape != size:
+        raise InputError(f"{path}: the prior must have the photo's size {size}, not {prior.shape}")
+    return prior
