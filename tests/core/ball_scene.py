@@ -50,7 +50,7 @@ def ball(shape: tuple[int, int] = (96, 120), radius: float = 40.0, center: tuple
         confidence=inside(z),
         illumination=LIGHT.copy(),
         provenance=Provenance(
-            settings={"model": "mdr", "separator": "shen_2013", "illumination": "natural"},
+            settings={"model": "mdr", "separator": "isc", "illumination": "natural"},
             seed=7,
             versions={"isc": "0.1.0"},
             timings={"solve": 1.25},

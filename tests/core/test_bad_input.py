@@ -114,7 +114,7 @@ PHOTOS: dict[str, tuple[Maker, str]] = {
 
 
 @pytest.mark.parametrize("case", PHOTOS)
-@pytest.mark.parametrize("command", [("decompose",), ("separate", "--method", "shen_2013")], ids=["decompose", "separate"])
+@pytest.mark.parametrize("command", [("decompose",), ("separate",)], ids=["decompose", "separate"])
 def test_a_photo_that_cannot_be_used(tmp_path: Path, capfd: pytest.CaptureFixture[str], case: str, command: tuple[str, ...]) -> None:
     make, words = PHOTOS[case]
     message = refused(capfd, *command, *make(tmp_path), "-o", tmp_path / "out" / "result")
@@ -252,7 +252,9 @@ OPTIONS = [
     ((), (), "COMMAND"),
     (("decompos", "PHOTO"), (), "decompos"),
     (("separate", "PHOTO", "-o", "OUT"), ("--method", "guess"), "shen_2013"),
-    (("separate", "PHOTO", "-o", "OUT"), (), "--method"),
+    (("separate", "PHOTO", "-o", "OUT"), ("--prior", "nothing.png"), "no such file"),
+    (("separate", "PHOTO", "-o", "OUT"), ("--prior",), "--prior"),
+    (("separate", "PHOTO", "--method", "shen_2013", "--prior", "PHOTO", "-o", "OUT"), (), "--prior is for the method isc alone"),
     (MASK, ("--box", "1,2,3"), "x,y,w,h"),
     (MASK, ("--box", "a,b,c,d"), "x,y,w,h"),
     (MASK, ("--box", "40,40,400,400"), "inside"),

@@ -23,14 +23,15 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.evaluation_runner import RunnerOptions, make_runner
 from isc_core.evidence_files import CODE, read_height, read_light
 from isc_core.exr import read_channels, write_channels
-from isc_core.photo import read_photo
+from isc_core.photo import linear_to_srgb, read_photo
 from isc_core.progress import Monitor
 from isc_core.result_folder import load
-from isc_core.separation import separate
+from isc_core.separation import BEST, separate
 from isc_core.sirfs.prior_file import load_prior_set, shipped_prior_set
 from isc_core.terminal import Interrupts, ProgressBar
-from tests.core.ball_scene import LIGHT, ball
+from tests.core.ball_scene import LIGHT
 from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, run_isc, write_image
+from tests.core.separation_scenes import glossy_disc
 
 COMMANDS = ("decompose", "separate", "mask", "evaluate", "fit-priors")
 
@@ -86,7 +87,7 @@ def test_decompose_writes_a_whole_result(result: Path) -> None:
     found = load(result / "result")
     assert found.identity_errors().broken() == ()
     assert found.mask.shape == ball_codes().shape[:2]
-    assert found.provenance.settings["model"] == "mdr" and found.provenance.settings["separator"] == "shen_2013"
+    assert found.provenance.settings["model"] == "mdr" and found.provenance.settings["separator"] == BEST
     assert found.provenance.input["name"] == "ball.png"
     assert {"maps.exr", "decomposition.json", "mesh.glb", "preview.png"} <= {entry.name for entry in (result / "result").iterdir()}
     assert sorted(entry.name for entry in result.iterdir()) == ["ball.png", "result"]
@@ -227,15 +228,77 @@ def test_a_light_is_read_from_what_people_have(tmp_path: Path, shape: str) -> No
 # --- the other commands -----------------------------------------------------------------------------------------------------------------
 
 
+def disc_photo(folder: Path) -> Path:
+    """A disc of three strong paints with three highlights, a 16-bit PNG; nothing is clipped."""
+    return write_image(folder / "disc.png", np.rint(65535 * np.clip(linear_to_srgb(0.7 * glossy_disc()[0]), 0, 1)).astype(np.uint16))
+
+
+def layer(maps: dict[str, np.ndarray], name: str) -> np.ndarray:
+    return np.stack([maps[f"{name}.{c}"] for c in "RGB"], -1)
+
+
 def test_separate_adds_up(tmp_path: Path) -> None:
-    assert isc("separate", ball_photo(tmp_path), "--method", "shen_2013", "--quiet", "-o", tmp_path / "out") == 0
+    assert isc("separate", disc_photo(tmp_path), "--quiet", "-o", tmp_path / "out") == 0
     maps = read_channels(tmp_path / "out" / "separation.exr")
-    layers = sum(np.stack([maps[f"{name}.{c}"] for c in "RGB"], -1) for name in ("diffuse", "specular", "residual"))
-    photo = read_photo(tmp_path / "ball.png")
+    layers = np.sum([layer(maps, name) for name in ("diffuse", "specular", "residual")], axis=0)
+    photo = read_photo(tmp_path / "disc.png")
     np.testing.assert_allclose(layers[photo.mask], photo.image[photo.mask], atol=1e-5)
-    truth = ball((52, 56), 20.0, (26, 29)).specular.sum()
-    found = sum(maps[f"specular.{c}"].sum() for c in "RGB")
-    assert 0.3 * truth < found < 3 * truth
+    image, diffuse, _ = glossy_disc()
+    truth, found = 0.7 * (image - diffuse).sum(), layer(maps, "specular").sum()
+    assert 0.8 * truth < found < 1.1 * truth
+
+
+def test_separate_uses_the_best_method_unless_told(tmp_path: Path) -> None:
+    photo = disc_photo(tmp_path)
+    for folder, words in (("usual", ()), ("best", ("--method", BEST)), ("other", ("--method", "none"))):
+        assert isc("separate", photo, *words, "--quiet", "-o", tmp_path / folder) == 0
+    usual, best, other = (layer(read_channels(tmp_path / name / "separation.exr"), "specular") for name in ("usual", "best", "other"))
+    assert np.array_equal(usual, best) and usual.max() > 0.2 and not other.any()
+
+
+def grey_ball(folder: Path) -> Path:
+    return write_image(folder / "grey.png", np.repeat(ball_codes().mean(axis=-1, keepdims=True), 3, axis=-1).astype(np.uint16))
+
+
+def test_grey_photos_are_separated_into_themselves(tmp_path: Path) -> None:
+    photo = grey_ball(tmp_path)
+    assert isc("separate", photo, "--quiet", "-o", tmp_path / "out") == 0
+    maps, original = read_channels(tmp_path / "out" / "separation.exr"), read_photo(photo)
+    np.testing.assert_allclose(layer(maps, "diffuse")[original.mask], original.image[original.mask], atol=1e-6)
+    assert not layer(maps, "specular")[~original.clipped].any()
+
+
+def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
+    photo = grey_ball(tmp_path)
+    assert isc("decompose", photo, "--quiet", "-o", tmp_path / "out") == 0
+    found = load(tmp_path / "out")
+    assert found.identity_errors().broken() == ()
+    unclipped = found.mask & ~read_photo(photo).clipped
+    assert not found.specular[unclipped].any() and found.confidence[found.mask].max() < 1
+
+
+def test_a_prior_says_where_highlights_can_be(tmp_path: Path) -> None:
+    """Black: nowhere; middle grey: nothing is said; the left half black: on the right alone."""
+    photo = disc_photo(tmp_path)
+    half = np.full((96, 120), 32768, np.uint16)
+    priors = {"black": 0 * half, "middle": half, "right": np.where(np.arange(120) < 60, 0, half).astype(np.uint16)}
+    assert isc("separate", photo, "--quiet", "-o", tmp_path / "usual") == 0
+    for name, codes in priors.items():
+        prior = write_image(tmp_path / f"{name}.png", codes)
+        assert isc("separate", photo, "--prior", prior, "--quiet", "-o", tmp_path / name) == 0
+    usual, black, middle, right = (
+        layer(read_channels(tmp_path / name / "separation.exr"), "specular") for name in ("usual", "black", "middle", "right")
+    )
+    assert usual[:, :60].max() > 0.2 and not black.any() and np.abs(middle - usual).max() < 1e-3 * usual.max()
+    assert not right[:, :60].any() and np.array_equal(right[:, 60:], middle[:, 60:])
+
+
+def test_a_prior_of_another_size_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    prior = write_image(tmp_path / "prior.png", np.full((96, 119), 128, np.uint8))
+    assert isc("separate", disc_photo(tmp_path), "--prior", prior, "-o", tmp_path / "out") == 2
+    error = capfd.readouterr().err
+    assert "prior.png: the prior must have the photo's size (96, 120), not (96, 119)" in error and error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
 
 
 def test_separate_takes_the_whole_frame_where_nothing_marks_the_object(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -272,7 +335,7 @@ def test_what_is_evaluated_explains_the_image(shared: Path, model: str, light: s
     truth = load_object(shared / "data" / "mit_berkeley_train", "apple", light, input)
     answer = make_runner(RunnerOptions(model), shipped_prior_set())(truth, Monitor())
     product = (answer.shading * answer.reflectance)[truth.valid]
-    diffuse = truth.image if model == "sirfs" else separate("shen_2013", truth.image, truth.valid).diffuse
+    diffuse = truth.image if model == "sirfs" else separate(BEST, truth.image, truth.valid).diffuse
     np.testing.assert_allclose(product, np.maximum(diffuse[truth.valid], 0.5 / 65535), rtol=1e-6)
     assert model == "sirfs" or np.abs(diffuse - truth.image)[truth.valid].max() > 0.001
     assert answer.loss is not None and answer.evaluations is not None
