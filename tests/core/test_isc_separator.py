@@ -254,6 +254,15 @@ def test_a_prior_of_zero_forbids_where_it_is_zero() -> None:
     assert np.abs(split.specular - told.specular)[x >= 0].max() < 1e-6
 
 
+def test_what_was_taken_off_costs_trust() -> None:
+    scene = sectors()
+    split, kept = (separate("isc", scene.image, scene.mask, prior=prior) for prior in (None, np.zeros(scene.mask.shape)))
+    removed = split.specular[..., 0] > 0.05
+    assert removed.sum() > 1000 and (split.confidence[removed] < 0.9 * kept.confidence[removed]).all()
+    untouched = scene.mask & (split.specular[..., 0] == 0)
+    assert untouched.sum() > 1000 and np.array_equal(split.confidence[untouched], kept.confidence[untouched])
+
+
 def test_more_probable_highlights_are_taken_off_more() -> None:
     scene = sectors()
     removed = [separate("isc", scene.image, scene.mask, prior=np.full(scene.mask.shape, p)).specular for p in (0, 0.1, 0.4, 0.5, 0.8, 1)]
