@@ -18,13 +18,13 @@ All statistics are of the mask's pixels. Objects longer than 640 pixels are judg
 are carried over, s itself is computed from the full photo. Where nothing can be proven the pixel stays as it is.
 
 `prior` is the door for what shape and light say: the probability that a highlight can be seen at each pixel. It multiplies the odds of the
-gain there, so .5 says nothing, 0 forbids a highlight and 1 takes all that colour found.
+gain there: .5 says nothing, 0 forbids a highlight, 1 takes all of a candidate that has any gain. What colour refuses stays refused.
 
 Citation: the cues and how they are combined are ours; the diffuse ratio is that of H.-L. Shen and Z.-H. Zheng (2013),
 doi:10.1364/AO.52.004483. See also the modules named above.
 
-Limits: the light must be white. Near-grey paint keeps its highlights, because its q is unknown; so does a photo without colour, unless a
-prior says where they are. Pale paint that fades in smoothly on a coloured object passes for a highlight.
+Limits: the light must be white. Near-grey paint keeps its highlights, because its q is unknown; so does a photo without colour, and so do
+objects with a fine pattern all over. Pale paint that fades in smoothly on a coloured object passes for a highlight.
 """
 
 from dataclasses import dataclass
@@ -38,6 +38,7 @@ from ..progress import Monitor
 from .channels import largest, smallest
 from .checks import check_arrays
 from .edge_aware import Paths
+from .evidence import colour_evidence
 from .highlight_cues import Steps, far_from_borders, noise_level, paint_mixing, ramp, roughness, steps_of
 from .hue_grid import HueGrid, Places, hue_of, quantile
 from .layers import white_layers
@@ -182,7 +183,8 @@ def separate(
     if factor > 1:
         photo, judged = _carried_over(_photo(image, mask, usable), paints, judged, factor)
     specular = np.maximum(judged.by_hue * _at_odds(judged.gain_by_hue, prior), judged.by_place * _at_odds(judged.gain_by_place, prior))
-    split = white_layers(image, mask, specular, clipped)
+    forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
+    split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
     trusted = np.ones(mask.shape, bool) if clipped is None else ~clipped
     confidence = np.where(trusted, _confidence(photo, split.specular[..., 0]), 0)
     return Separation(unit * split.diffuse, unit * split.specular, unit * split.residual, confidence)
@@ -194,12 +196,12 @@ def _unit(values: np.ndarray) -> np.float32:
 
 
 def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> None:
-    if options.hues < 6 or not 0 < options.cell <= 1 or not 0 < options.low_quantile < 1 or not options.borrowed >= 0:
+    if options.hues < 6 or not 0 < options.cell <= 1 or not 0 < options.low_quantile < 1 or not 0 <= options.borrowed < np.inf:
         raise InputError("hues must be at least 6, cell within (0, 1], low_quantile within (0, 1), borrowed at least 0")
-    if options.scatter < 0 or options.scatter_here < 0:
-        raise InputError("scatter and scatter_here cannot be negative")
+    if not (0 <= options.scatter < np.inf and 0 <= options.scatter_here < np.inf):
+        raise InputError("scatter and scatter_here must be numbers from 0 on")
     for name, ends in vars(options).items():
-        if isinstance(ends, tuple) and (len(ends) != 2 or ends[0] == ends[1]):
+        if isinstance(ends, tuple) and (len(ends) != 2 or not np.isfinite(ends).all() or ends[0] == ends[1]):
             raise InputError(f"{name} must be two different numbers, the ends of a ramp")
     if prior is None:
         return
@@ -400,6 +402,9 @@ def _at_odds(gain: np.ndarray, prior: np.ndarray | None) -> np.ndarray:
 
 
 def _confidence(photo: _Photo, specular: np.ndarray) -> np.ndarray:
-    """exp(-e / u) (H, W): e, the error to be expected, is a share of what was removed and of what could hide in the smallest channel."""
-    error = specular + 0.3 * photo.low
+    """exp(-e / u) (H, W): e, the error to be expected, is a share of what was removed and of what could hide in the smallest channel.
+
+    On a pale object colour tells little, and e is up to three times as large.
+    """
+    error = (specular + 0.3 * photo.low) * (3 - 2 * colour_evidence(photo.image, photo.mask))
     return np.where(photo.mask, np.exp(-error / photo.base), 0).astype(np.float32)

@@ -45,6 +45,9 @@ def _one(text: str, kind: object) -> object | None:
     """`text` as one plain type, or None where it is not of it."""
     if typing.get_origin(kind) is typing.Literal:
         return next((value for value in typing.get_args(kind) if str(value) == text), None)
+    if typing.get_origin(kind) is tuple:
+        parts = [_one(piece.strip(), part) for piece, part in zip(text.split(","), typing.get_args(kind), strict=False)]
+        return None if None in parts or len(parts) != len(typing.get_args(kind)) or text.count(",") >= len(parts) else tuple(parts)
     if kind is bool:
         return _WORDS.get(text.lower())
     if kind is str:
@@ -61,4 +64,6 @@ def _one(text: str, kind: object) -> object | None:
 def _named(kind: object) -> str:
     if typing.get_origin(kind) is typing.Literal:
         return "one of " + ", ".join(map(str, typing.get_args(kind)))
+    if typing.get_origin(kind) is tuple:
+        return f"{len(typing.get_args(kind))} numbers with commas between them"
     return "none" if kind is types.NoneType else _KINDS.get(kind, "something that can be set here")  # type: ignore[call-overload]

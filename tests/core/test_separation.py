@@ -192,3 +192,10 @@ def test_the_command_refuses_in_one_line(tmp_path: Path, capfd: pytest.CaptureFi
     assert main(["separate", str(ball_photo(tmp_path)), "--method", "shen_2013", *words, "-o", str(tmp_path / "out")]) == 2
     error = capfd.readouterr().err
     assert message in error and error.count("\n") == 1 and not (tmp_path / "out").exists()
+
+
+def test_a_ramp_is_written_as_two_numbers() -> None:
+    assert parse_changes("isc", words=["smooth=0.5, 0.4"]) == {"smooth": (0.5, 0.4)}
+    for text in ("smooth=0.5", "smooth=0.5,0.4,0.3", "smooth=a,b", "smooth=0.5,"):
+        with pytest.raises(InputError, match="2 numbers with commas"):
+            parse_changes("isc", words=[text])
