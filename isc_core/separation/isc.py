@@ -276,10 +276,10 @@ def _spread(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
 def _judge(photo: _Photo, paints: _Paints, options: IscOptions) -> _Judged:
     """Both candidates and what the evidence leaves of them."""
     places = paints.places(photo, 1)
-    by_hue = _specular(photo.low, photo.chroma, _spread(places.read(paints.share), photo.mask))
+    hue_share, usual_chroma = (_spread(places.read(table), photo.mask) for table in (paints.share, photo.peak * paints.chroma))
+    by_hue = _specular(photo.low, photo.chroma, hue_share)
     trust = far_from_borders(_chroma_steps(photo), photo.mask, blur=1.5, unit=0.6)
-    gain_by_hue = _gain_by_hue(photo, by_hue, _spread(places.read(paints.share), photo.mask), trust, options)
-    usual_chroma = photo.peak * _spread(places.read(paints.chroma), photo.mask)
+    gain_by_hue = _gain_by_hue(photo, by_hue, hue_share, trust, options)
     by_place, gain_by_place, share = _by_place(photo, usual_chroma, trust, options)
     return _Judged(by_hue, gain_by_hue, by_place, gain_by_place, share)
 
