@@ -82,7 +82,7 @@ class IscOptions:
     smooth: tuple[float, float] = (0.43, 0.35)
     smooth_here: tuple[float, float] = (0.8, 0.5)
     unmixed: tuple[float, float] = (0.55, 0.3)
-    bright: tuple[float, float] = (0.85, 1.4)
+    bright: tuple[float, float] = (1.0, 1.6)
     clear: tuple[float, float] = (0.3, 0.85)
     scatter: float = 0.035
     scatter_here: float = 0.1
