@@ -2,15 +2,18 @@
 
 import argparse
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from ..decomposition import Separation
 from ..errors import InputError
-from ..photo import read_linear, read_photo
+from ..photo import Photo, read_linear, read_photo
 from ..progress import Monitor
 from ..result_folder import require_writable_result, save_separation
 from ..separation import BEST, IMPROVED, METHODS, separate
+from ..separation.checks import has_colour
 from ..separation.option_text import parse_changes
 from .options import Commands, add_command, add_photo, hints
 
@@ -66,9 +69,21 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     )  # fmt: skip
     monitor.report("writing", 0.8)
     save_separation(layers, photo.image, options.output, mask=photo.mask, title=options.photo.name)
-    if photo.original.mask_from == "whole frame" and not options.quiet:
-        print("isc: note: there is no mask, so the whole image was taken; --mask names one", file=sys.stderr)
+    for note in [] if options.quiet else _notes(options, photo, layers):
+        print(f"isc: note: {note}", file=sys.stderr)
     return hints(options, f"look at {options.output / 'preview.png'}")
+
+
+def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Iterator[str]:
+    """What a person should know of the result."""
+    if photo.original.mask_from == "whole frame":
+        yield "there is no mask, so the whole image was taken; --mask names one"
+    if options.method == "none" or layers.specular[~photo.clipped].any():
+        return
+    if has_colour(photo.image, photo.mask):
+        yield "no highlight could be proven, so the photo was left as it is"
+    else:
+        yield "the photo has no colour, which tells highlights from paint, so it was left as it is; a colour photo would help"
 
 
 def _read_prior(path: Path, size: tuple[int, ...]) -> np.ndarray:

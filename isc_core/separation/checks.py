@@ -23,8 +23,13 @@ def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None
         raise InputError("the image has negative or non-finite values inside the mask: repair or mask out those pixels")
 
 
+def has_colour(image: np.ndarray, mask: np.ndarray) -> bool:
+    """Whether any pixel of `image` (H, W, 3) inside `mask` (H, W) bool, not empty, differs between its channels by more than rounding."""
+    inside = image[mask]
+    return bool((largest(inside) - smallest(inside)).max() > _GREY * inside.max())
+
+
 def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:
     """Raises `InputError` where no pixel of `image` (H, W, 3) inside `mask` (H, W) bool has colour that the method could judge by."""
-    inside = image[mask]
-    if (largest(inside) - smallest(inside)).max() <= _GREY * inside.max():
+    if not has_colour(image, mask):
         raise InputError(f"the photo has no colour, and {method} tells highlights by colour alone: use --method isc, or a colour photo")

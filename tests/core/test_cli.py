@@ -268,6 +268,13 @@ def test_grey_photos_are_separated_into_themselves(tmp_path: Path) -> None:
     assert not layer(maps, "specular")[~original.clipped].any()
 
 
+def test_a_photo_that_is_left_alone_is_said_to_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert isc("separate", grey_ball(tmp_path), "-o", tmp_path / "grey") == 0
+    assert "no colour" in capsys.readouterr().err
+    assert isc("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "same") == 0
+    assert "left as it is" not in capsys.readouterr().err
+
+
 def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
     photo = grey_ball(tmp_path)
     assert isc("decompose", photo, "--quiet", "-o", tmp_path / "out") == 0
