@@ -26,6 +26,7 @@ from typing import Any
 
 import numpy as np
 
+from isc_core.box import mask_slices
 from isc_core.highlight_set import SeparationTruth
 from isc_core.separation.isc import VARIANTS, IscOptions, separate
 
@@ -64,8 +65,7 @@ def _photos(data: Path) -> tuple[tuple[str, SeparationTruth], ...]:
 
 
 def _cut(truth: SeparationTruth) -> SeparationTruth:
-    rows, columns = (np.flatnonzero(truth.mask.any(axis=axis)) for axis in (1, 0))
-    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    box = mask_slices(truth.mask)
     layers: dict[str, Any] = {
         name: np.ascontiguousarray(getattr(truth, name)[box]) for name in ("image", "mask", "diffuse", "specular", "clipped")
     }

@@ -32,6 +32,7 @@ import OpenEXR
 from PIL import BmpImagePlugin, Image, JpegImagePlugin, PngImagePlugin, PpmImagePlugin, TiffImagePlugin
 from scipy import sparse
 
+from .box import mask_slices
 from .errors import InputError
 
 TRANSFERS = ("auto", "srgb", "linear")
@@ -183,9 +184,7 @@ def read_linear(path: str | Path, transfer: str = "auto") -> np.ndarray:
 # --- the photo --------------------------------------------------------------------------------------------------------------------------
 
 
-def read_photo(
-    path: str | Path, mask_path: str | Path | None = None, transfer: str = "auto", *, whole_frame: bool = False
-) -> Photo:
+def read_photo(path: str | Path, mask_path: str | Path | None = None, transfer: str = "auto", *, whole_frame: bool = False) -> Photo:
     """Reads a photo at full size.
 
     Files: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM, told apart by their content. `transfer`: "srgb", "linear", or "auto" =
@@ -250,8 +249,8 @@ def _code_value(raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndar
 
 def mask_box(mask: np.ndarray) -> tuple[int, int, int, int]:
     """(x, y, width, height) of the smallest box around the true pixels of an (H, W) mask that has some."""
-    columns, rows = np.flatnonzero(mask.any(axis=0)), np.flatnonzero(mask.any(axis=1))
-    return int(columns[0]), int(rows[0]), int(columns[-1] - columns[0] + 1), int(rows[-1] - rows[0] + 1)
+    rows, columns = mask_slices(mask)
+    return int(columns.start), int(rows.start), int(columns.stop - columns.start), int(rows.stop - rows.start)
 
 
 def check_mask(mask: np.ndarray, what: str) -> None:

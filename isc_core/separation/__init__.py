@@ -13,10 +13,10 @@ from types import ModuleType
 
 import numpy as np
 
+from ..box import mask_slices
 from ..decomposition import Separation
 from ..errors import InputError
 from ..progress import Monitor
-from .box import mask_box
 from .checks import check_arrays
 
 METHODS = (
@@ -62,7 +62,7 @@ def separate(
     if prior is not None and (method != BEST or prior.shape != mask.shape):
         raise InputError(f"a prior is for the method {BEST} alone, and has the photo's size {mask.shape}")
     toolbox = variant == _TOOLBOX
-    part = np.s_[:, :] if toolbox else mask_box(mask)
+    part = np.s_[:, :] if toolbox else mask_slices(mask)
     inside = image[part], mask[part], None if clipped is None or toolbox else clipped[part]
     if options is None:
         split = _module(method).separate(inside[0], inside[1], clipped=inside[2])

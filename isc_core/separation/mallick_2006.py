@@ -27,12 +27,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
+from ..box import mask_slices
 from ..compiled import compiled
 from ..decomposition import Separation
 from ..errors import InputError
 from ..inpainting.pull_push import pull, push
 from ..progress import Monitor
-from .box import mask_box
 from .channels import fade_in, saturation, smallest
 from .checks import check_arrays, require_colour
 from .layers import white_layers
@@ -105,7 +105,7 @@ def separate(
     specular = np.zeros_like(low)
     linear = mask if clipped is None else mask & ~clipped
     if linear.any() and saturation(seen[mask & (low > base)]) >= options.bright_saturation:
-        box = mask_box(mask)
+        box = mask_slices(mask)
         specular[box] = _specular_of(seen[box], linear[box], options, monitor)
         if options.fade is not None:
             specular = specular * fade_in(low, base, options.fade)

@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from isc_core.box import mask_slices
 from isc_core.decomposition import Separation
 
 PAINTS = np.array([[0.7, 0.2, 0.1], [0.15, 0.55, 0.2], [0.1, 0.25, 0.6]])
@@ -38,8 +39,7 @@ def laboratory_photo(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, n
     """Image, true diffuse and mask of an object of the laboratory set, cut to the mask's box."""
     folder = shared / "data/mit_berkeley_train/laboratory" / name
     mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 0
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    box = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    box = mask_slices(mask)
     return read(folder / "original.png")[box], read(folder / "diffuse.png")[box], mask[box]
 
 
