@@ -12,6 +12,7 @@ that covers little of it passes; and its two values were chosen on a dozen objec
 import numpy as np
 
 from .channels import saturation
+from .highlight_cues import ramp
 
 # Measured on objects with and without visible highlights: .11-.46 where removal by colour did harm, .54-.74 where it helped.
 _GREY, _COLOURED = 0.45, 0.55
@@ -22,10 +23,4 @@ def colour_evidence(image: np.ndarray, usable: np.ndarray) -> float:
 
     `usable` (H, W) bool: the pixels to judge by. 0 where there are none.
     """
-    return smooth_step(saturation(image[usable]), _GREY, _COLOURED)
-
-
-def smooth_step(value: float, low: float, high: float) -> float:
-    """0 up to `low`, 1 from `high` on, a cubic between."""
-    t = min(max((value - low) / (high - low), 0.0), 1.0)
-    return t * t * (3 - 2 * t)
+    return float(ramp(saturation(image[usable]), (_GREY, _COLOURED)))

@@ -28,6 +28,7 @@ objects with a fine pattern all over. Pale paint that fades in smoothly on a col
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -100,8 +101,8 @@ VARIANTS: dict[str, IscOptions] = {"improved": IscOptions()}
 @dataclass(frozen=True)
 class _Photo:
     """The object at one scale: `image` (H, W, 3), `mask` and `usable` (not clipped) (H, W) bool; smoothed for the ratios by hue: `low`,
-    `high`, their difference `chroma` and the `hue` (H, W). `peak`: the brightest value; `noise`: its standard deviation; `base`: the
-    mean of `low`."""
+    `high`, their difference `chroma` and the `hue` (H, W). `peak`: the brightest value; `base`: the mean of `low`; `noise`: its standard
+    deviation, which nobody asks of a full photo that was judged on averages."""
 
     image: np.ndarray
     mask: np.ndarray
@@ -109,11 +110,20 @@ class _Photo:
     low: np.ndarray
     high: np.ndarray
     hue: np.ndarray
-    peak: float
-    noise: float
-    base: float
 
-    @property
+    @cached_property
+    def peak(self) -> float:
+        return max(float(np.quantile(self.image[self.mask], 0.999)), float(_TINY))
+
+    @cached_property
+    def base(self) -> float:
+        return max(float(self.low[self.mask].mean(dtype=float)), float(_TINY) * self.peak)
+
+    @cached_property
+    def noise(self) -> float:
+        return noise_level(self.image, self.mask)
+
+    @cached_property
     def chroma(self) -> np.ndarray:
         return self.high - self.low
 
@@ -181,7 +191,8 @@ def separate(
     judged = _judge(photo, paints, options)
     monitor.report("taking highlights off", 0.8)
     if factor > 1:
-        photo, judged = _carried_over(_photo(image, mask, usable), paints, judged, factor)
+        photo = _photo(image, mask, usable)
+        judged = _carried_over(photo, paints, judged, factor)
     specular = np.maximum(judged.by_hue * _at_odds(judged.gain_by_hue, prior), judged.by_place * _at_odds(judged.gain_by_place, prior))
     forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
     split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
@@ -233,9 +244,7 @@ def _blocks(image: np.ndarray, mask: np.ndarray, usable: np.ndarray, factor: int
 def _photo(image: np.ndarray, mask: np.ndarray, usable: np.ndarray) -> _Photo:
     smooth = np.where(mask[..., None], masked_gaussian(image, mask, _BY_HUE), 0)
     low, high = smallest(smooth), largest(smooth)
-    peak = max(float(np.quantile(image[mask], 0.999)), float(_TINY))
-    base = max(float(low[mask].mean(dtype=float)), float(_TINY) * peak)
-    return _Photo(image, mask, usable, low, high, hue_of(smooth, low, high), peak, noise_level(image, mask), base)
+    return _Photo(image, mask, usable, low, high, hue_of(smooth, low, high))
 
 
 def _paints(photo: _Photo, options: IscOptions) -> _Paints:
@@ -369,7 +378,7 @@ def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Phot
     return Paths(across, down, reach)
 
 
-def _carried_over(full: _Photo, paints: _Paints, judged: _Judged, factor: int) -> tuple[_Photo, _Judged]:
+def _carried_over(full: _Photo, paints: _Paints, judged: _Judged, factor: int) -> _Judged:
     """What was found on averages of `factor` x `factor` pixels, for the full photo."""
     mask = full.mask
     hue_share = _spread(paints.places(full, factor).read(paints.share), mask)
@@ -378,7 +387,7 @@ def _carried_over(full: _Photo, paints: _Paints, judged: _Judged, factor: int) -
     )
     by_hue = _specular(full.low, full.chroma, hue_share)
     by_place = _specular(full.low, full.chroma, share)
-    return full, _Judged(by_hue, gain_by_hue, by_place, gain_by_place, share)
+    return _Judged(by_hue, gain_by_hue, by_place, gain_by_place, share)
 
 
 def _enlarged(layer: np.ndarray, shape: tuple[int, ...], factor: int) -> np.ndarray:

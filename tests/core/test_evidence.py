@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from isc_core.separation.evidence import colour_evidence, smooth_step
+from isc_core.separation.evidence import colour_evidence
+from isc_core.separation.highlight_cues import ramp
 
 
 @pytest.mark.parametrize(("saturation", "expected"), [(0.0, 0.0), (0.45, 0.0), (0.5, 0.5), (0.55, 1.0), (1.0, 1.0)])
@@ -26,5 +27,5 @@ def test_only_usable_pixels_count() -> None:
 
 
 def test_the_step_is_smooth_and_rises() -> None:
-    values = np.array([smooth_step(x, 0.2, 0.6) for x in np.linspace(0, 1, 201)])
+    values = np.array([ramp(x, (0.2, 0.6)) for x in np.linspace(0, 1, 201)])
     assert values[0] == 0 and values[-1] == 1 and (np.diff(values) >= 0).all() and np.diff(values).max() < 0.02
