@@ -11,6 +11,7 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation import akashi_2016
 from isc_core.separation.akashi_2016 import VARIANTS, Akashi2016Options, separate
+from tests.core.separation_scenes import read
 
 RED, GREEN = np.array([0.8, 0.15, 0.1]), np.array([0.1, 0.6, 0.15])
 QUICK = replace(VARIANTS["improved"], surface_colours=2, sample=1000)
@@ -24,11 +25,6 @@ def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     specular = 0.4 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.03)
     paint = np.where((x > 0)[..., None], RED, GREEN)
     return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
-
-
-def read(path: Path) -> np.ndarray:
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    return stored / np.iinfo(stored.dtype).max
 
 
 @pytest.mark.parametrize(("name", "best"), [("animals", 36.6), ("cups", 37.8)])

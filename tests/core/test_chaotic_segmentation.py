@@ -11,13 +11,9 @@ from isc_core.decomposition import Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation.chaotic_segmentation import VARIANTS, ChaoticSegmentationOptions, find_specular, separate
+from tests.core.separation_scenes import assert_layers_hold, read
 
 PAPER = VARIANTS["paper"]
-
-
-def read(path: Path) -> np.ndarray:
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    return stored / np.iinfo(stored.dtype).max
 
 
 def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -30,14 +26,6 @@ def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
 
 
-def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray) -> None:
-    total = split.diffuse + split.specular + split.residual
-    assert np.abs(total - image)[mask].max() <= 1e-6 * image[mask].max()
-    assert (split.diffuse[mask] >= 0).all() and (split.diffuse[mask] <= image[mask] * (1 + 1e-6)).all()
-    for layer in (split.diffuse, split.specular, split.residual, split.confidence):
-        assert layer.dtype == np.float32 and np.isfinite(layer).all() and not layer[~mask].any()
-
-
 def ratio(split: Separation, image: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
     return float(np.mean((split.diffuse - truth)[mask] ** 2) / np.mean((image - truth)[mask] ** 2))
 
@@ -47,8 +35,8 @@ def test_gains_on_photos_with_truth(shared: Path, name: str, improved: float, pa
     image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
     mask = np.ones(image.shape[:2], bool)
     ours, published = separate(image, mask), separate(image, mask, PAPER)
-    assert_layers_hold(ours, image, mask)
-    assert_layers_hold(published, image, mask)
+    assert_layers_hold(ours, image, mask, tinted=True)
+    assert_layers_hold(published, image, mask, tinted=True)
     assert ratio(ours, image, truth, mask) < improved
     assert ratio(published, image, truth, mask) < paper
 
@@ -64,7 +52,7 @@ def test_laboratory_objects_do_not_get_worse(shared: Path, name: str, limit: flo
 def test_recovers_a_rendered_highlight_across_a_border_of_paints() -> None:
     image, specular, mask = glossy_scene()
     split = separate(image, mask)
-    assert_layers_hold(split, image, mask)
+    assert_layers_hold(split, image, mask, tinted=True)
     assert np.ptp(split.specular, axis=2).max() == 0
     assert np.mean((split.specular[..., 0] - specular)[mask] ** 2) < 0.05 * np.mean(specular[mask] ** 2)
 
@@ -108,7 +96,7 @@ def test_clipped_pixels_are_no_source() -> None:
     recorded = np.minimum(image, 0.8)
     for options in VARIANTS.values():
         split = separate(recorded, mask, options, clipped)
-        assert_layers_hold(split, recorded, mask)
+        assert_layers_hold(split, recorded, mask, tinted=True)
         assert not split.confidence[clipped].any() and not split.residual[~clipped].any()
     truth = image - specular[..., None]
     ours = separate(recorded, mask, clipped=clipped)
@@ -120,7 +108,7 @@ def test_clipped_pixels_are_no_source() -> None:
 def test_little_objects(options: ChaoticSegmentationOptions, shape: tuple[int, int]) -> None:
     image = np.random.default_rng(1).random((*shape, 3)) + [0.2, 0.1, 0]
     mask = np.ones(shape, bool)
-    assert_layers_hold(separate(image, mask, options), image, mask)
+    assert_layers_hold(separate(image, mask, options), image, mask, tinted=True)
 
 
 def test_grey_photos() -> None:
@@ -128,7 +116,7 @@ def test_grey_photos() -> None:
     mask = np.ones((30, 40), bool)
     with pytest.raises(InputError, match="no colour"):
         separate(ramp, mask)
-    assert_layers_hold(separate(ramp, mask, PAPER), ramp, mask)
+    assert_layers_hold(separate(ramp, mask, PAPER), ramp, mask, tinted=True)
     flat = np.full((30, 40, 3), 0.5)
     assert not separate(flat, mask, PAPER).specular.any() and not separate(np.zeros_like(flat), mask, PAPER).specular.any()
 

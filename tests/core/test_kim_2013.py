@@ -6,16 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.decomposition import Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation import kim_2013
 from isc_core.separation.kim_2013 import VARIANTS, Kim2013Options
-
-
-def read(path: Path) -> np.ndarray:
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    return stored / np.iinfo(stored.dtype).max
+from tests.core.separation_scenes import assert_layers_hold, read
 
 
 def plate() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -30,15 +25,6 @@ def plate() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def scene_of(image: np.ndarray, options: Kim2013Options) -> kim_2013._Scene:
     mask = np.ones(image.shape[:2], bool)
     return kim_2013._scene(image, mask, float(image.min(axis=2).mean()), options)
-
-
-def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray) -> None:
-    total = split.diffuse + split.specular + split.residual
-    assert np.abs(total - image)[mask].max() <= 1e-6 * image[mask].max()
-    assert (split.diffuse >= 0).all() and (split.diffuse[mask] <= image[mask] * (1 + 1e-6)).all()
-    assert (split.specular >= 0).all() and np.ptp(split.specular, axis=2).max() == 0
-    for layer in (split.diffuse, split.specular, split.residual, split.confidence):
-        assert np.isfinite(layer).all() and not layer[~mask].any()
 
 
 FIGURES = [("animals", "paper", 32.7), ("cups", "paper", 32.2), ("animals", "improved", 38.0), ("cups", "improved", 39.7)]

@@ -6,16 +6,11 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.decomposition import Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation import mallick_2006
 from isc_core.separation.mallick_2006 import VARIANTS, Mallick2006Options
-
-
-def read(path: Path) -> np.ndarray:
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    return stored / np.iinfo(stored.dtype).max
+from tests.core.separation_scenes import assert_layers_hold, read
 
 
 def plate(radius: float = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -25,15 +20,6 @@ def plate(radius: float = 5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     paint = np.where((x < 45)[..., None], [0.7, 0.3, 0.1], [0.2, 0.3, 0.6])
     diffuse = paint * (0.6 + 0.4 * y / 50)[..., None]
     return diffuse + specular[..., None], diffuse, np.ones(y.shape, bool)
-
-
-def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray) -> None:
-    total = split.diffuse + split.specular + split.residual
-    assert np.abs(total - image)[mask].max() <= 1e-6 * image[mask].max()
-    assert (split.diffuse >= 0).all() and (split.diffuse[mask] <= image[mask] * (1 + 1e-6)).all()
-    assert (split.specular >= 0).all() and np.ptp(split.specular, axis=2).max() == 0
-    for layer in (split.diffuse, split.specular, split.residual, split.confidence):
-        assert np.isfinite(layer).all() and not layer[~mask].any()
 
 
 FIGURES = [("animals", "paper", 33.6), ("cups", "paper", 35.1), ("animals", "improved", 38.6), ("cups", "improved", 36.8)]

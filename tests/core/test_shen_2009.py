@@ -7,15 +7,10 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from isc_core.decomposition import Separation
 from isc_core.errors import InputError
 from isc_core.separation import shen_2009
 from isc_core.separation.shen_2009 import VARIANTS, Shen2009Options
-
-
-def read(path: Path) -> np.ndarray:
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    return stored / np.iinfo(stored.dtype).max
+from tests.core.separation_scenes import assert_layers_hold, read
 
 
 def spots(heights: tuple[float, ...] = (0.3, 0.4)) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -24,15 +19,6 @@ def spots(heights: tuple[float, ...] = (0.3, 0.4)) -> tuple[np.ndarray, np.ndarr
     specular = sum(h * np.clip(1 - np.hypot(x - 30 - 60 * k, y - 30) / 12, 0, 1) for k, h in enumerate(heights))
     diffuse = np.broadcast_to([0.6, 0.3, 0.1], (*y.shape, 3))
     return diffuse + specular[..., None], diffuse, np.ones(y.shape, bool)
-
-
-def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray) -> None:
-    total = split.diffuse + split.specular + split.residual
-    assert np.abs(total - image)[mask].max() <= 1e-6 * image[mask].max()
-    assert (split.diffuse >= 0).all() and (split.diffuse[mask] <= image[mask] * (1 + 1e-6)).all()
-    assert (split.specular >= 0).all() and np.ptp(split.specular, axis=2).max() == 0
-    for layer in (split.diffuse, split.specular, split.residual, split.confidence):
-        assert np.isfinite(layer).all() and not layer[~mask].any()
 
 
 def relative_error(folder: Path, options: Shen2009Options) -> float:

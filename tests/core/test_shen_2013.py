@@ -6,18 +6,13 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.decomposition import Separation
 from isc_core.errors import InputError
 from isc_core.inpainting.pull_push import fill
 from isc_core.separation import METHODS, separate, shen_2013
 from isc_core.separation.shen_2013 import VARIANTS, Shen2013Options
+from tests.core.separation_scenes import assert_layers_hold, read
 
 RED, GREEN = np.array([0.7, 0.25, 0.15]), np.array([0.2, 0.6, 0.15])
-
-
-def read(path: Path) -> np.ndarray:
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    return stored / np.iinfo(stored.dtype).max
 
 
 def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -28,16 +23,6 @@ def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     specular = 0.5 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.02)
     paint = np.where((x > 0)[..., None], RED, GREEN)
     return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
-
-
-def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray) -> None:
-    total = split.diffuse + split.specular + split.residual
-    assert np.abs(total - image)[mask].max() <= 1e-6 * image.max()
-    assert (split.diffuse[mask] >= 0).all() and (split.diffuse[mask] <= image[mask] * (1 + 1e-6)).all()
-    assert (split.specular >= 0).all() and np.ptp(split.specular, axis=2).max() == 0
-    for layer in (split.diffuse, split.specular, split.residual, split.confidence):
-        assert layer.dtype == np.float32 and np.isfinite(layer).all() and not layer[~mask].any()
-    assert (split.confidence >= 0).all() and (split.confidence <= 1).all()
 
 
 FIGURES = {"improved": (37.5, 39.5), "paper": (37.3, 39.2), "sihr": (37.5, 38.3)}

@@ -13,13 +13,9 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation import sparse_coding
 from isc_core.separation.sparse_coding import VARIANTS, SparseCodingOptions, separate
+from tests.core.separation_scenes import read
 
 RED, GREEN, PALE_GREEN = np.array([0.8, 0.15, 0.1]), np.array([0.1, 0.6, 0.15]), np.array([0.62, 0.8, 0.64])
-
-
-def read(path: Path) -> np.ndarray:
-    stored = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
-    return stored / np.iinfo(stored.dtype).max
 
 
 def laboratory(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

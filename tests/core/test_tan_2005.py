@@ -9,7 +9,17 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation import tan_2005
 from isc_core.separation.tan_2005 import VARIANTS, Tan2005Options
-from tests.core.separation_scenes import assert_layers_hold, error_ratio, glossy_disc, highlight_photo, laboratory_photo, psnr
+from tests.core.separation_scenes import (
+    assert_any_mask_and_noise_keep_the_layers_sound,
+    assert_clipped_cores_are_filled_and_inform_nobody,
+    assert_layers_hold,
+    assert_scale_and_surroundings_do_not_matter,
+    error_ratio,
+    glossy_disc,
+    highlight_photo,
+    laboratory_photo,
+    psnr,
+)
 
 
 @pytest.mark.parametrize(("name", "published", "improved"), [("animals", 30.43, 37.6), ("cups", 31.59, 37.2)])
@@ -76,38 +86,16 @@ def test_one_noisy_pixel_does_not_colour_the_surface() -> None:
 
 @pytest.mark.parametrize(("variant", "scale"), [("improved", 1024.0), ("improved", 2.0**-17), ("paper", 1.0)])
 def test_scale_and_surroundings_do_not_matter(variant: str, scale: float) -> None:
-    image, _, mask = glossy_disc()
-    split = tan_2005.separate(image, mask, VARIANTS[variant])
-    assert split.specular.max() > 0.3
-    padded = np.pad(image, [(13, 5), (7, 11), (0, 0)], constant_values=np.nan)
-    wide = tan_2005.separate(scale * padded, np.pad(mask, [(13, 5), (7, 11)]), VARIANTS[variant])
-    assert np.allclose(wide.specular[13:-5, 7:-11] / scale, split.specular, atol=2e-6)
+    assert_scale_and_surroundings_do_not_matter(tan_2005.separate, VARIANTS[variant], scale, least=0.3)
 
 
 @pytest.mark.parametrize("variant", list(VARIANTS))
 def test_any_mask_and_noise_keep_the_layers_sound(variant: str) -> None:
-    random = np.random.default_rng(3)
-    image = random.random((40, 50, 3)) ** 3
-    image[20:24] = image[20:24, :, :1]  # grey
-    image[30:33] = 0
-    single = np.zeros((40, 50), bool)
-    single[3, 4] = True
-    for mask in (random.random((40, 50)) > 0.4, single):
-        split = tan_2005.separate(np.where(mask[..., None], image, np.nan), mask, VARIANTS[variant])
-        assert_layers_hold(split, image, mask)
+    assert_any_mask_and_noise_keep_the_layers_sound(tan_2005.separate, VARIANTS[variant])
 
 
 def test_clipped_cores_are_filled_from_around_and_inform_nobody() -> None:
-    scene, diffuse, mask = glossy_disc(0.9)
-    image = np.minimum(scene, 0.95)
-    clipped = (scene > 0.95).any(axis=2)
-    assert clipped.sum() > 20
-    split = tan_2005.separate(image, mask, clipped=clipped)
-    assert_layers_hold(split, image, mask)
-    assert not split.confidence[clipped].any()
-    wild = tan_2005.separate(np.where(clipped[..., None], [0.9, 0.0, 0.0], image), mask, clipped=clipped)
-    assert np.array_equal(wild.specular[mask & ~clipped], split.specular[mask & ~clipped])
-    assert error_ratio(split, scene, diffuse, clipped) < 0.1
+    assert_clipped_cores_are_filled_and_inform_nobody(tan_2005.separate, at_most=0.1)
 
 
 def test_refuses_what_it_cannot_use() -> None:

@@ -9,7 +9,17 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.separation import yang_2010
 from isc_core.separation.yang_2010 import VARIANTS, Yang2010Options
-from tests.core.separation_scenes import assert_layers_hold, error_ratio, glossy_disc, highlight_photo, laboratory_photo, psnr
+from tests.core.separation_scenes import (
+    assert_any_mask_and_noise_keep_the_layers_sound,
+    assert_clipped_cores_are_filled_and_inform_nobody,
+    assert_layers_hold,
+    assert_scale_and_surroundings_do_not_matter,
+    error_ratio,
+    glossy_disc,
+    highlight_photo,
+    laboratory_photo,
+    psnr,
+)
 
 
 @pytest.mark.parametrize(("name", "published", "improved"), [("animals", 36.46, 37.3), ("cups", 37.50, 38.4)])
@@ -50,25 +60,12 @@ def test_matte_paint_is_left_alone(variant: str) -> None:
 
 @pytest.mark.parametrize(("variant", "scale"), [("improved", 1000.0), ("improved", 1e-5), ("paper", 1.0)])
 def test_scale_and_surroundings_do_not_matter(variant: str, scale: float) -> None:
-    image, _, mask = glossy_disc()
-    split = yang_2010.separate(image, mask, VARIANTS[variant])
-    assert split.specular.max() > 0.4
-    padded = np.pad(image, [(13, 5), (7, 11), (0, 0)], constant_values=np.nan)
-    wide = yang_2010.separate(scale * padded, np.pad(mask, [(13, 5), (7, 11)]), VARIANTS[variant])
-    assert np.allclose(wide.specular[13:-5, 7:-11] / scale, split.specular, atol=2e-6)
+    assert_scale_and_surroundings_do_not_matter(yang_2010.separate, VARIANTS[variant], scale, least=0.4)
 
 
 @pytest.mark.parametrize("variant", list(VARIANTS))
 def test_any_mask_and_noise_keep_the_layers_sound(variant: str) -> None:
-    random = np.random.default_rng(3)
-    image = random.random((40, 50, 3)) ** 3
-    image[20:24] = image[20:24, :, :1]  # grey
-    image[30:33] = 0
-    single = np.zeros((40, 50), bool)
-    single[3, 4] = True
-    for mask in (random.random((40, 50)) > 0.4, single):
-        split = yang_2010.separate(np.where(mask[..., None], image, np.nan), mask, VARIANTS[variant])
-        assert_layers_hold(split, image, mask)
+    assert_any_mask_and_noise_keep_the_layers_sound(yang_2010.separate, VARIANTS[variant])
 
 
 def test_the_filter_is_a_mean_over_places_and_guide() -> None:
@@ -84,16 +81,7 @@ def test_the_filter_is_a_mean_over_places_and_guide() -> None:
 
 
 def test_clipped_cores_are_filled_from_around_and_inform_nobody() -> None:
-    scene, diffuse, mask = glossy_disc(0.9)
-    image = np.minimum(scene, 0.95)
-    clipped = (scene > 0.95).any(axis=2)
-    assert clipped.sum() > 20
-    split = yang_2010.separate(image, mask, clipped=clipped)
-    assert_layers_hold(split, image, mask)
-    assert not split.confidence[clipped].any()
-    wild = yang_2010.separate(np.where(clipped[..., None], [0.9, 0.0, 0.0], image), mask, clipped=clipped)
-    assert np.array_equal(wild.specular[mask & ~clipped], split.specular[mask & ~clipped])
-    assert error_ratio(split, scene, diffuse, clipped) < 0.05
+    assert_clipped_cores_are_filled_and_inform_nobody(yang_2010.separate, at_most=0.05)
 
 
 def test_refuses_what_it_cannot_use() -> None:

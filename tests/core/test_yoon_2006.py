@@ -11,7 +11,17 @@ from isc_core.progress import Monitor
 from isc_core.separation import yoon_2006
 from isc_core.separation.colour_groups import group_quantile
 from isc_core.separation.yoon_2006 import VARIANTS, Yoon2006Options
-from tests.core.separation_scenes import assert_layers_hold, error_ratio, glossy_disc, highlight_photo, laboratory_photo, psnr
+from tests.core.separation_scenes import (
+    assert_any_mask_and_noise_keep_the_layers_sound,
+    assert_clipped_cores_are_filled_and_inform_nobody,
+    assert_layers_hold,
+    assert_scale_and_surroundings_do_not_matter,
+    error_ratio,
+    glossy_disc,
+    highlight_photo,
+    laboratory_photo,
+    psnr,
+)
 
 
 @pytest.mark.parametrize(("name", "published", "improved"), [("animals", 32.896, 37.5), ("cups", 33.296, 37.9)])
@@ -89,38 +99,16 @@ def test_quantiles_of_groups() -> None:
 
 @pytest.mark.parametrize(("variant", "scale"), [("improved", 1000.0), ("improved", 1e-5), ("paper", 1.0)])
 def test_scale_and_surroundings_do_not_matter(variant: str, scale: float) -> None:
-    image, _, mask = glossy_disc()
-    split = yoon_2006.separate(image, mask, VARIANTS[variant])
-    assert split.specular.max() > 0.4
-    padded = np.pad(image, [(13, 5), (7, 11), (0, 0)], constant_values=np.nan)
-    wide = yoon_2006.separate(scale * padded, np.pad(mask, [(13, 5), (7, 11)]), VARIANTS[variant])
-    assert np.allclose(wide.specular[13:-5, 7:-11] / scale, split.specular, atol=2e-6)
+    assert_scale_and_surroundings_do_not_matter(yoon_2006.separate, VARIANTS[variant], scale, least=0.4)
 
 
 @pytest.mark.parametrize("variant", list(VARIANTS))
 def test_any_mask_and_noise_keep_the_layers_sound(variant: str) -> None:
-    random = np.random.default_rng(3)
-    image = random.random((40, 50, 3)) ** 3
-    image[20:24] = image[20:24, :, :1]  # grey
-    image[30:33] = 0
-    single = np.zeros((40, 50), bool)
-    single[3, 4] = True
-    for mask in (random.random((40, 50)) > 0.4, single):
-        split = yoon_2006.separate(np.where(mask[..., None], image, np.nan), mask, VARIANTS[variant])
-        assert_layers_hold(split, image, mask)
+    assert_any_mask_and_noise_keep_the_layers_sound(yoon_2006.separate, VARIANTS[variant])
 
 
 def test_clipped_cores_are_filled_from_around_and_inform_nobody() -> None:
-    scene, diffuse, mask = glossy_disc(0.9)
-    image = np.minimum(scene, 0.95)
-    clipped = (scene > 0.95).any(axis=2)
-    assert clipped.sum() > 20
-    split = yoon_2006.separate(image, mask, clipped=clipped)
-    assert_layers_hold(split, image, mask)
-    assert not split.confidence[clipped].any()
-    wild = yoon_2006.separate(np.where(clipped[..., None], [0.9, 0.0, 0.0], image), mask, clipped=clipped)
-    assert np.array_equal(wild.specular[mask & ~clipped], split.specular[mask & ~clipped])
-    assert error_ratio(split, scene, diffuse, clipped) < 0.05
+    assert_clipped_cores_are_filled_and_inform_nobody(yoon_2006.separate, at_most=0.05)
 
 
 def test_refuses_what_it_cannot_use() -> None:
