@@ -34,9 +34,9 @@ from ..compiled import compiled
 from ..decomposition import Separation
 from ..errors import InputError
 from ..progress import Monitor
-from .channels import fade_in, saturation, smallest
+from .channels import smallest
 from .checks import check_arrays, require_colour
-from .layers import white_layers
+from .layers import bright_layers
 
 
 @dataclass(frozen=True)
@@ -117,17 +117,12 @@ def separate(
     check_arrays(image, mask, clipped)
     _check_options(options)
     require_colour(image, mask, "kim_2013")
-    seen = np.where(mask[..., None], image, 0)
-    low = smallest(seen)
-    base = float(low[mask].mean(dtype=float))
-    specular = np.zeros_like(low)
-    linear = mask if clipped is None else mask & ~clipped
-    if linear.any() and saturation(seen[mask & (low > base)]) >= options.bright_saturation:
+
+    def find(seen: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
         scale = float(seen[mask].max())
-        specular = scale * _specular_of(_scene(seen / scale, linear, base / scale, options), options, monitor)
-        if options.fade is not None:
-            specular = specular * fade_in(low, base, options.fade)
-    return white_layers(seen, mask, specular, clipped)
+        return scale * _specular_of(_scene(seen / scale, linear, base / scale, options), options, monitor)
+
+    return bright_layers(image, mask, clipped, find, least_saturation=options.bright_saturation, fade=options.fade)
 
 
 def _check_options(options: Kim2013Options) -> None:

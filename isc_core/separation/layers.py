@@ -5,10 +5,12 @@ have none of their own, is exp(-e / u): e is the error of the specular light to 
 still hide in the smallest channel; u is the mean of the smallest channel over the mask.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..decomposition import Separation
-from .channels import mean_channel, smallest
+from .channels import fade_in, mean_channel, saturation, smallest
 from .clipped import explain_clipped
 
 # A highlight can hide in a pixel's smallest channel; the share of it that stays in doubt where a method could decide.
@@ -24,6 +26,33 @@ def white_layers(image: np.ndarray, mask: np.ndarray, specular: np.ndarray, clip
     white = np.where(mask & np.isfinite(specular), np.clip(specular, 0, low), 0).astype(np.float32)
     diffuse = np.where(mask[..., None], np.maximum(image - white[..., None], 0), 0).astype(np.float32)
     return _finished(image, mask, diffuse, np.repeat(white[..., None], 3, axis=2), clipped)
+
+
+def bright_layers(
+    image: np.ndarray,
+    mask: np.ndarray,
+    clipped: np.ndarray | None,
+    find: Callable[[np.ndarray, np.ndarray, float], np.ndarray],
+    *,
+    least_saturation: float,
+    fade: float | None,
+) -> Separation:
+    """The layers of a method that can judge coloured objects only, and finds highlights where the smallest channel lies above its mean.
+
+    `find(image, linear, base)` gives the specular light (H, W) of the image, zero outside the mask, from the `linear` (H, W) bool pixels,
+    those of the mask that are not clipped; `base` is the mean of the smallest channel. It is not asked if the pixels above that mean have
+    less `saturation` together than `least_saturation`, in [0, 1]. `fade`: see `channels.fade_in`; None for all of it everywhere.
+    """
+    seen = np.where(mask[..., None], image, 0)
+    low = smallest(seen)
+    base = float(low[mask].mean(dtype=float))
+    specular = np.zeros_like(low)
+    linear = mask if clipped is None else mask & ~clipped
+    if linear.any() and saturation(seen[mask & (low > base)]) >= least_saturation:
+        specular = find(seen, linear, base)
+        if fade is not None:
+            specular = specular * fade_in(low, base, fade)
+    return white_layers(seen, mask, specular, clipped)
 
 
 def diffuse_layers(image: np.ndarray, mask: np.ndarray, diffuse: np.ndarray, clipped: np.ndarray | None = None) -> Separation:

@@ -33,9 +33,8 @@ from ..decomposition import Separation
 from ..errors import InputError
 from ..inpainting.pull_push import pull, push
 from ..progress import Monitor
-from .channels import fade_in, saturation, smallest
 from .checks import check_arrays, require_colour
-from .layers import white_layers
+from .layers import bright_layers
 
 
 @dataclass(frozen=True)
@@ -99,17 +98,13 @@ def separate(
     check_arrays(image, mask, clipped)
     _check_options(options)
     require_colour(image, mask, "mallick_2006")
-    seen = np.where(mask[..., None], image, 0)
-    low = smallest(seen)
-    base = float(low[mask].mean(dtype=float))
-    specular = np.zeros_like(low)
-    linear = mask if clipped is None else mask & ~clipped
-    if linear.any() and saturation(seen[mask & (low > base)]) >= options.bright_saturation:
-        box = mask_slices(mask)
+
+    def find(seen: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
+        box, specular = mask_slices(mask), np.zeros(mask.shape, seen.dtype)
         specular[box] = _specular_of(seen[box], linear[box], options, monitor)
-        if options.fade is not None:
-            specular = specular * fade_in(low, base, options.fade)
-    return white_layers(seen, mask, specular, clipped)
+        return specular
+
+    return bright_layers(image, mask, clipped, find, least_saturation=options.bright_saturation, fade=options.fade)
 
 
 def _check_options(options: Mallick2006Options) -> None:
