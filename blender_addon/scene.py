@@ -9,9 +9,9 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from isc_core.environment import environment_from_shading
 from isc_core.errors import InputError
 
-from .environment import sky_from_shading
 from .result import Placement
 
 NAME = "ISC"
@@ -70,7 +70,7 @@ def light_world(scene: bpy.types.Scene, illumination: np.ndarray) -> bpy.types.W
     nodes, links = world.node_tree.nodes, world.node_tree.links
     nodes.clear()
     picture, background, output = (nodes.new(f"ShaderNode{kind}") for kind in ("TexEnvironment", "Background", "OutputWorld"))
-    picture.image = _sky_image(sky_from_shading(illumination))
+    picture.image = _sky_image(environment_from_shading(illumination))
     links.new(picture.outputs["Color"], background.inputs["Color"])
     links.new(background.outputs["Background"], output.inputs["Surface"])
     scene.world = world
@@ -85,7 +85,8 @@ def _sky_image(sky: np.ndarray) -> bpy.types.Image:
     image = bpy.data.images.new(f"{NAME} sky", columns, rows, float_buffer=True)
     image.colorspace_settings.name = "Linear Rec.709"
     pixels = np.ones((rows, columns, 4), np.float32)
-    pixels[..., :3] = sky[::-1]  # Blender counts rows from below
+    # Blender counts rows from below, and its middle column looks right where ours looks toward the viewer.
+    pixels[..., :3] = np.roll(sky, rows // 2, axis=1)[::-1]
     image.pixels.foreach_set(pixels.ravel())
     image.pack()
     return image

@@ -33,3 +33,8 @@ def load_mitsuba() -> ModuleType:
         mitsuba.set_variant("llvm_ad_rgb" if fast else "scalar_rgb")
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
+
+
+def has_llvm() -> bool:
+    """Whether Mitsuba runs in an LLVM variant. Raises `InputError` where it is not installed."""
+    return str(load_mitsuba().variant()).startswith("llvm")

@@ -1,0 +1,73 @@
+"""What the camera sees of an object before any light is on: a point, a normal and a paint for each pixel.
+
+Place and normal come from the one ray through each pixel's centre, so that nothing is averaged over an edge and truth is exact. Paint is
+averaged over the pixel's footprint, as a camera does, so that prints have no jagged edges.
+
+Limits: what lies before what is decided by the centre alone: outlines are not smoothed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from isc_core.errors import InputError
+
+from .materials import Paint
+from .scene import Scene
+from .tracing import Tracer
+
+_FOOTPRINT = 3  # rays a side of a pixel, for its paint
+_SAME_PLACE = 3.0  # a ray of the footprint counts where it hits within so many pixels of the centre's hit
+
+
+@dataclass(frozen=True)
+class Surface:
+    """The N visible points, in row order of `mask`.
+
+    `mask`: (H, W) bool. `position`: (N, 3) object units; `normal`: (N, 3) unit, toward the viewer; `view`: (N, 3) unit, toward the camera;
+    `uv`: (N, 2). `paint`: the material there, `albedo` and `strength` averaged over the pixel, `gloss` at its centre.
+    """
+
+    mask: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    view: np.ndarray
+    uv: np.ndarray
+    paint: Paint
+
+    def image(self, values: np.ndarray, outside: tuple[float, ...] | float = 0.0) -> np.ndarray:
+        """Values (N[, C]) of the points as a picture (H, W[, C]) float32 that is `outside` elsewhere."""
+        picture = np.empty((*self.mask.shape, *values.shape[1:]), np.float32)
+        picture[...] = outside
+        picture[self.mask] = values
+        return picture
+
+
+def find_surface(scene: Scene, tracer: Tracer) -> Surface:
+    """What `scene.camera` sees. Raises `InputError` where it sees nothing of the object."""
+    origins, directions = (part.reshape(-1, 3) for part in scene.camera.rays())
+    hits = tracer.hits(origins, directions)
+    if not hits.valid.any():
+        raise InputError("the camera sees nothing of the object: its mask would be empty")
+    mask = hits.valid.reshape(scene.camera.height, scene.camera.width)
+    position, uv = hits.position[hits.valid], hits.uv[hits.valid]
+    paint = _footprint_paint(scene, tracer, mask, position, uv)
+    return Surface(mask, position, hits.normal[hits.valid], -directions[hits.valid], uv, paint)
+
+
+def _footprint_paint(scene: Scene, tracer: Tracer, mask: np.ndarray, position: np.ndarray, uv: np.ndarray) -> Paint:
+    centre = scene.material.at(uv)
+    if scene.material.albedo.shape[:2] == (1, 1) and np.ndim(scene.material.strength) == 0:
+        return centre
+    albedo, strength = np.zeros_like(centre.albedo), np.zeros_like(centre.strength)
+    steps = (np.arange(_FOOTPRINT) + 0.5) / _FOOTPRINT
+    near = _SAME_PLACE / scene.camera.pixels_per_unit
+    for down in steps:
+        for across in steps:
+            origins, directions = (part[mask] for part in scene.camera.rays(across, down))
+            hits = tracer.hits(origins, directions)
+            same = hits.valid & (np.linalg.norm(hits.position - position, axis=1) < near)
+            found = scene.material.at(np.where(same[:, None], hits.uv, uv))
+            albedo += found.albedo
+            strength += found.strength
+    return Paint(albedo / _FOOTPRINT**2, strength / _FOOTPRINT**2, centre.gloss)

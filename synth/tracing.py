@@ -1,0 +1,88 @@
+"""Rays against one mesh, in whichever variant Mitsuba runs: what is hit, and what is in the way.
+
+The LLVM variants trace whole arrays of rays at once; `scalar_rgb` traces them one by one, at some millions a second.
+
+Limits: positions are found in float32, to about 1e-6 of the object. Rays that start on the surface are lifted off it by `LIFT`.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from .meshes import Mesh, write_ply
+from .variant import load_mitsuba
+
+# Object units; objects are about 2 wide.
+LIFT = 2e-4
+
+
+@dataclass(frozen=True)
+class Hits:
+    """The nearest hit of each of M rays. `valid`: (M,) bool. `position`: (M, 3); `normal`: (M, 3) unit, interpolated between vertices,
+    turned toward the ray's origin; `uv`: (M, 2). All 0 where nothing is hit."""
+
+    valid: np.ndarray
+    position: np.ndarray
+    normal: np.ndarray
+    uv: np.ndarray
+
+
+class Tracer:
+    """A mesh, ready to be hit. Raises `InputError` where Mitsuba is not installed."""
+
+    def __init__(self, mesh: Mesh) -> None:
+        mi = load_mitsuba()
+        with TemporaryDirectory() as folder:
+            ply = Path(folder) / "object.ply"
+            write_ply(ply, mesh)
+            self.shape = mi.load_dict({"type": "ply", "filename": str(ply)})
+        self.scene = mi.load_dict({"type": "scene", "object": self.shape})
+        self._scalar = mi.variant().startswith("scalar")
+
+    def hits(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
+        """The nearest hits of rays (M, 3), (M, 3)."""
+        columns = self._scalar_hits(origins, directions) if self._scalar else self._array_hits(origins, directions)
+        valid = columns[:, 0] > 0
+        normal = columns[:, 4:7]
+        length = np.linalg.norm(normal, axis=1, keepdims=True)
+        normal = normal / np.where(length > 0, length, 1)
+        normal = np.where((normal * directions).sum(1, keepdims=True) > 0, -normal, normal)
+        return Hits(valid, columns[:, 1:4], normal, columns[:, 7:9])
+
+    def blocked(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray | float) -> np.ndarray:
+        """(M,) bool: whether something stands within `distances` (M,) or one number (infinite for far lights) along the rays (M, 3)."""
+        mi = load_mitsuba()
+        reach = np.broadcast_to(np.minimum(distances, 1e6), (len(origins),)).astype(np.float32)
+        if self._scalar:
+            test, ray = self.scene.ray_test, mi.Ray3f
+            rays = zip(origins.tolist(), directions.tolist(), reach.tolist(), strict=True)
+            return np.fromiter((test(ray(o, d, r, 0.0, [])) for o, d, r in rays), bool, len(origins))
+        rays = mi.Ray3f(_points(origins), _vectors(directions))
+        rays.maxt = mi.Float(reach)
+        return np.array(self.scene.ray_test(rays), dtype=bool)
+
+    def _array_hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        mi = load_mitsuba()
+        hit = self.scene.ray_intersect(mi.Ray3f(_points(origins), _vectors(directions)))
+        valid = np.array(hit.is_valid(), dtype=float)
+        parts = [np.array(part, dtype=float).T for part in (hit.p, hit.sh_frame.n, hit.uv)]
+        return np.hstack([valid[:, None], *parts]) * valid[:, None]
+
+    def _scalar_hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        mi = load_mitsuba()
+        columns = np.zeros((len(origins), 9))
+        for row, (origin, direction) in enumerate(zip(origins.tolist(), directions.tolist(), strict=True)):
+            hit = self.scene.ray_intersect(mi.Ray3f(origin, direction))
+            if hit.is_valid():
+                columns[row] = (1, *hit.p, *hit.sh_frame.n, *hit.uv)
+        return columns
+
+
+def _points(values: np.ndarray) -> object:
+    return load_mitsuba().Point3f(np.ascontiguousarray(values.T, np.float32))
+
+
+def _vectors(values: np.ndarray) -> object:
+    return load_mitsuba().Vector3f(np.ascontiguousarray(values.T, np.float32))
