@@ -83,9 +83,7 @@ class Material:
         albedo = texture_at(np.asarray(self.albedo, float), uv)
         if self.matt:
             return Paint(albedo, np.zeros(len(uv)), np.zeros(len(uv)))
-        strength, gloss = (
-            texture_at(np.asarray(texture, float).reshape(*(np.shape(texture) or (1, 1))), uv) for texture in (self.strength, self.gloss)
-        )
+        strength, gloss = (texture_at(_texture(values), uv) for values in (self.strength, self.gloss))
         return Paint(albedo, strength, gloss)
 
 
@@ -102,3 +100,8 @@ def texture_at(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
     upper = texture[top, left] * (1 - right_share) + texture[top, right] * right_share
     lower = texture[low, left] * (1 - right_share) + texture[low, right] * right_share
     return upper * (1 - low_share) + lower * low_share
+
+
+def _texture(values: float | np.ndarray) -> np.ndarray:
+    """A number as a texture of one texel; a texture as it is."""
+    return np.atleast_2d(np.asarray(values, float))
