@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from isc_core.environment import directions, solid_angles
 from isc_core.errors import InputError
 
 
@@ -110,6 +111,59 @@ def scaled(light: Light, gain: float) -> Light:
     if isinstance(light, PanelLight):
         return PanelLight(light.centre, light.right, light.up, light.radiance * gain)
     return EnvironmentLight(light.radiance * gain)
+
+
+def lights_as_environment(lights: Lights, rows: int) -> np.ndarray:
+    """All lights as seen from the origin: (rows, 2 rows, 3) float32 radiance. Point and directional lights fill one pixel.
+
+    Panels are painted on the pixels whose centres they cover, so that their radiance is kept; one too small for any keeps its irradiance.
+    """
+    towards, solid = directions(rows), solid_angles(rows)
+    total = np.zeros((rows, 2 * rows, 3))
+    for light in lights:
+        if isinstance(light, EnvironmentLight):
+            total += _resampled(light.radiance, rows)
+            continue
+        if isinstance(light, PanelLight):
+            covered = _seen_through(light, towards)
+            if covered.any():
+                total[covered] += light.radiance
+                continue
+        place, irradiance = _beam(light)
+        row, column = np.unravel_index(np.argmax(towards @ place), solid.shape)
+        total[row, column] += irradiance / solid[row, column]
+    return total.astype(np.float32)
+
+
+def _beam(light: DirectionalLight | PointLight | PanelLight) -> tuple[np.ndarray, np.ndarray]:
+    """The direction in which the origin sees a light, and the irradiance across that beam."""
+    if isinstance(light, DirectionalLight):
+        return light.direction, np.asarray(light.irradiance)
+    place = np.asarray(light.position if isinstance(light, PointLight) else light.centre, float)
+    square = float(place @ place)
+    toward = place / np.sqrt(square)
+    if isinstance(light, PointLight):
+        return toward, np.asarray(light.intensity) / square
+    return toward, np.asarray(light.radiance) * light.area * max(0.0, float(-light.normal @ toward)) / square
+
+
+def _seen_through(panel: PanelLight, towards: np.ndarray) -> np.ndarray:
+    """Which of the directions (..., 3) from the origin meet the panel's front."""
+    along = towards @ panel.normal
+    facing = along < -1e-9
+    distance = float(panel.centre @ panel.normal) / np.where(facing, along, -1)
+    met = towards * distance[..., None] - panel.centre
+    inside = [np.abs(met @ side) <= side @ side for side in (panel.right, panel.up)]
+    return facing & (distance > 0) & inside[0] & inside[1]
+
+
+def _resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
+    """An environment with another number of rows: means of blocks where it divides, else the nearest pixels."""
+    factor, rest = divmod(len(radiance), rows)
+    if factor >= 1 and not rest:
+        return np.asarray(radiance, float).reshape(rows, factor, 2 * rows, factor, 3).mean((1, 3))
+    pick = np.minimum(((np.arange(2 * rows) + 0.5) * len(radiance) / rows).astype(int), 2 * len(radiance) - 1)
+    return np.asarray(radiance, float)[pick[:rows]][:, pick]
 
 
 def _check(name: str, value: np.ndarray, shape: tuple[int, ...], *, unit: bool = False, light: bool = False) -> None:
