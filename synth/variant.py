@@ -11,11 +11,21 @@ from types import ModuleType
 from isc_core.errors import InputError
 
 OLDEST_LLVM = 19
+_MISSING = "rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'`"
 
 
 def llvm_is_usable(major: int) -> bool:
     """Whether a libLLVM of this major version (-1: none found) compiles Dr.Jit's kernels."""
     return major >= OLDEST_LLVM
+
+
+def newest_llvm() -> int:
+    """The major version of the libLLVM that Dr.Jit finds, -1 for none; loads no kernel. Raises `InputError` without Dr.Jit."""
+    try:
+        import drjit
+    except ImportError as error:
+        raise InputError(_MISSING) from error
+    return int(drjit.detail.llvm_version()[0])
 
 
 def load_mitsuba() -> ModuleType:
@@ -24,12 +34,11 @@ def load_mitsuba() -> ModuleType:
     Raises `InputError` where Mitsuba is not installed.
     """
     try:
-        import drjit
         import mitsuba
     except ImportError as error:
-        raise InputError("rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'`") from error
+        raise InputError(_MISSING) from error
     if mitsuba.variant() is None:
-        fast = "llvm_ad_rgb" in mitsuba.variants() and llvm_is_usable(drjit.detail.llvm_version()[0])
+        fast = "llvm_ad_rgb" in mitsuba.variants() and llvm_is_usable(newest_llvm())
         mitsuba.set_variant("llvm_ad_rgb" if fast else "scalar_rgb")
     mitsuba.set_log_level(mitsuba.LogLevel.Error)
     return mitsuba
@@ -38,3 +47,12 @@ def load_mitsuba() -> ModuleType:
 def has_llvm() -> bool:
     """Whether Mitsuba runs in an LLVM variant. Raises `InputError` where it is not installed."""
     return str(load_mitsuba().variant()).startswith("llvm")
+
+
+def slower_without() -> str:
+    """One line that says what would make rendering faster here; empty where nothing is amiss. Raises `InputError` without Mitsuba."""
+    if has_llvm():
+        return ""
+    found = newest_llvm()
+    what = "no libLLVM was found" if found < 0 else f"libLLVM {found} is too old"
+    return f"{what}, so rendering is slower (scalar_rgb): install libLLVM {OLDEST_LLVM} or later (Debian: apt-get install libllvm19)"

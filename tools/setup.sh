@@ -64,6 +64,18 @@ printf 'setup: installing isc3d[%s] (once; it takes a few minutes)\n' "$extras"
 pip install --quiet -c constraints.txt setuptools
 pip install --quiet -c constraints.txt --no-build-isolation -e ".[$extras]"
 
+# Mitsuba compiles its kernels with the system's libLLVM, 19 or later; without one it renders all the same, more slowly.
+case $extras in
+*synth*)
+    newest_llvm() {
+        .venv/bin/python -c 'import drjit; print(drjit.detail.llvm_version()[0])' 2>/dev/null || printf '0\n'
+    }
+    if [ "$(uname)" = Linux ] && .venv/bin/python -c 'import drjit' >/dev/null 2>&1 && [ "$(newest_llvm)" -lt 19 ]; then
+        system_packages "fast rendering" libllvm19 || printf 'setup: continuing without libLLVM 19; rendering is slower\n' >&2
+    fi
+    ;;
+esac
+
 # The bpy module draws nothing on a screen, yet it links against the libraries that could.
 case $extras in
 *blender*)

@@ -1,11 +1,16 @@
 """Which of Mitsuba's variants is chosen, and what a user without Mitsuba reads."""
 
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from isc_core.errors import InputError
-from synth.variant import llvm_is_usable, load_mitsuba
+from synth import variant
+from synth.variant import llvm_is_usable, load_mitsuba, slower_without
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.parametrize(("major", "usable"), [(-1, False), (14, False), (15, False), (18, False), (19, True), (21, True)])
@@ -25,3 +30,28 @@ def test_without_mitsuba_the_message_names_the_extra(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     with pytest.raises(InputError, match=r"isc3d\[synth\]"):
         load_mitsuba()
+
+
+@pytest.mark.parametrize("found", [-1, 15])
+def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package(found: int) -> None:
+    """In a process of its own: a variant, once set, stays."""
+    pytest.importorskip("mitsuba", reason="needs the extra `synth`")
+    code = (
+        "import numpy as np\n"
+        "from synth import variant\n"
+        f"variant.newest_llvm = lambda: {found}\n"
+        "from synth.gourd import gourd\n"
+        "from synth.tracing import Tracer\n"
+        "hits = Tracer(gourd(40, 41)).hits(np.array([[0., 0, 9]]), np.array([[0., 0, -1]]))\n"
+        "assert hits.valid.all() and variant.load_mitsuba().variant() == 'scalar_rgb'\n"
+        "print(variant.slower_without())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.count("\n") == 1
+    assert "libllvm19" in done.stdout
+
+
+def test_a_fast_machine_has_nothing_to_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(variant, "has_llvm", lambda: True)
+    assert slower_without() == ""
