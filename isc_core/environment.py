@@ -63,6 +63,23 @@ def environment_from_shading(illumination: np.ndarray, rows: int = 32, iteration
     return np.ascontiguousarray(sky.reshape(rows, 2 * rows, 3), np.float32)
 
 
+def resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
+    """An environment (r, 2 r, 3) with another number of rows: (rows, 2 rows, 3) of the same type of values.
+
+    Each pixel gets the mean radiance of the solid angle that it covers, so that no light is lost or won.
+    """
+    old = len(radiance)
+    down = _shares(np.cos(np.arange(old + 1) * np.pi / old), np.cos(np.arange(rows + 1) * np.pi / rows))
+    across = _shares(np.arange(2 * old + 1) * -np.pi / old, np.arange(2 * rows + 1) * -np.pi / rows)
+    return np.einsum("ri,ijc,sj->rsc", down, radiance, across, optimize=True).astype(np.result_type(radiance, np.float32))
+
+
+def _shares(old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """Between falling edges (n + 1,) and (m + 1,): which share of each new interval lies in each old one, (m, n)."""
+    overlap = np.minimum(old[:-1], new[:-1, None]) - np.maximum(old[1:], new[1:, None])
+    return np.maximum(overlap, 0) / (new[:-1] - new[1:])[:, None]
+
+
 def _kernel(normals: np.ndarray, rows: int) -> np.ndarray:
     """K (N, pixels): the share of each pixel's radiance in the shading of each normal."""
     return np.clip(normals @ directions(rows).reshape(-1, 3).T, 0, None) * solid_angles(rows).reshape(-1) / np.pi

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from isc_core.environment import directions, solid_angles
+from isc_core.environment import directions, resampled, solid_angles
 from isc_core.errors import InputError
 
 
@@ -122,7 +122,7 @@ def lights_as_environment(lights: Lights, rows: int) -> np.ndarray:
     total = np.zeros((rows, 2 * rows, 3))
     for light in lights:
         if isinstance(light, EnvironmentLight):
-            total += _resampled(light.radiance, rows)
+            total += resampled(light.radiance, rows)
             continue
         if isinstance(light, PanelLight):
             covered = _seen_through(light, towards)
@@ -155,15 +155,6 @@ def _seen_through(panel: PanelLight, towards: np.ndarray) -> np.ndarray:
     met = towards * distance[..., None] - panel.centre
     inside = [np.abs(met @ side) <= side @ side for side in (panel.right, panel.up)]
     return facing & (distance > 0) & inside[0] & inside[1]
-
-
-def _resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
-    """An environment with another number of rows: means of blocks where it divides, else the nearest pixels."""
-    factor, rest = divmod(len(radiance), rows)
-    if factor >= 1 and not rest:
-        return np.asarray(radiance, float).reshape(rows, factor, 2 * rows, factor, 3).mean((1, 3))
-    pick = np.minimum(((np.arange(2 * rows) + 0.5) * len(radiance) / rows).astype(int), 2 * len(radiance) - 1)
-    return np.asarray(radiance, float)[pick[:rows]][:, pick]
 
 
 def _check(name: str, value: np.ndarray, shape: tuple[int, ...], *, unit: bool = False, light: bool = False) -> None:

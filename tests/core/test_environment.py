@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.environment import directions, environment_from_shading, shading_under, solid_angles
+from isc_core.environment import directions, environment_from_shading, resampled, shading_under, solid_angles
 from isc_core.sirfs.frames import real_sh
 
 
@@ -52,3 +52,22 @@ def test_light_from_the_left_comes_from_the_left() -> None:
     light[3] = -1  # log shading falls with x
     sky, towards = environment_from_shading(light, rows=16), directions(16)
     assert sky[towards[..., 0] < -0.5].mean() > 3 * sky[towards[..., 0] > 0.5].mean()
+
+
+@pytest.mark.parametrize("rows", [7, 16, 24, 32, 51])
+def test_resampling_loses_no_light_from_any_side(rows: int) -> None:
+    """Exact for the sum; what stays within a pixel keeps its moment only as far as the larger pixels tell."""
+    sky = np.random.default_rng(4).gamma(0.3, size=(24, 48, 3))
+    other = resampled(sky, rows)
+    assert other.shape == (rows, 2 * rows, 3)
+    light, kept = ((r * solid_angles(len(r))[..., None]).sum((0, 1)) for r in (sky, other))
+    np.testing.assert_allclose(kept, light, rtol=1e-12)
+    np.testing.assert_allclose(shading_under(other, facing_normals(40)), shading_under(sky, facing_normals(40)), rtol=0.15)
+    assert other.min() >= sky.min() and other.max() <= sky.max() * (1 + 1e-12)
+
+
+def test_resampling_to_the_same_rows_changes_nothing_and_to_more_can_be_undone() -> None:
+    sky = np.random.default_rng(4).random((6, 12, 3))
+    np.testing.assert_allclose(resampled(sky, 6), sky, rtol=1e-12)
+    np.testing.assert_allclose(resampled(resampled(sky, 18), 6), sky, rtol=1e-12)
+    assert resampled(sky.astype(np.float32), 3).dtype == np.float32

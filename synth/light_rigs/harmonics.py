@@ -1,0 +1,46 @@
+"""Smooth random environments: spherical harmonics of low degree, without what would be negative.
+
+Equation: with P_l the Legendre polynomials and u_k random axes, sum_k g_k P_l(d . u_k) is a random spherical harmonic of degree l, in
+which no direction is preferred (addition theorem: P_l(d . u) is a sum over the Y_lm of the degree). Radiance = max(0, 1 + sum over
+l = 1..degree of such sums), each scaled to a standard deviation that falls with l, as it does in photographed environments.
+
+Citation: R. O. Dror, A. S. Willsky, E. H. Adelson, "Statistical characterization of real-world illumination", Journal of Vision 4(9)
+(2004), doi:10.1167/4.9.11 (the power falls with the degree).
+
+Limits: nothing in it is sharp: no sun, no window; highlights are broad.
+"""
+
+import numpy as np
+from numpy.polynomial.legendre import legval
+
+from isc_core.environment import directions, solid_angles
+
+from ..lights import EnvironmentLight, Light
+from .placing import white
+
+_ROWS = 32
+_COLOUR = 0.04  # standard deviation of the part that differs between channels
+
+
+def harmonic_lights(rng: np.random.Generator) -> tuple[Light, ...]:
+    """One environment of degree 2, 3 or 4, mirrored so that most of its light comes from the viewer's side and from above."""
+    degree, contrast = int(rng.integers(2, 5)), rng.uniform(0.7, 1.7)
+    towards, solid = directions(_ROWS), solid_angles(_ROWS)[..., None]
+    pattern = sum(contrast / l**0.75 * _harmonic(towards, l, rng) for l in range(1, degree + 1))
+    colour = np.stack([_COLOUR * _harmonic(towards, 1, rng) for _ in range(3)], -1)
+    radiance = np.maximum(0, 1 + np.asarray(pattern)[..., None] + colour)
+    radiance *= 4 * np.pi / (radiance * solid).sum((0, 1)).mean()
+    _, up, front = (radiance * solid).sum(-1).ravel() @ towards.reshape(-1, 3)
+    if up < 0:
+        radiance = radiance[::-1]
+    if front < 0:
+        radiance = radiance[:, (_ROWS - 1 - np.arange(2 * _ROWS)) % (2 * _ROWS)]
+    return (EnvironmentLight(radiance * white(rng)),)
+
+
+def _harmonic(towards: np.ndarray, degree: int, rng: np.random.Generator) -> np.ndarray:
+    """A random spherical harmonic at the directions (..., 3): (...), of variance 1 on the average of draws and directions."""
+    axes = rng.normal(size=(2 * degree + 1, 3))
+    axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+    # P_l has the mean square 1 / (2 l + 1) over the sphere, and there are 2 l + 1 of them.
+    return legval(towards @ axes.T, [0] * degree + [1]) @ rng.normal(size=2 * degree + 1)
