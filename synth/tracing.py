@@ -43,6 +43,8 @@ class Tracer:
 
     def hits(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
         """The nearest hits of rays (M, 3), (M, 3)."""
+        if not len(origins):  # Dr.Jit ends the process over arrays without entries
+            return Hits(np.zeros(0, bool), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
         columns = self._scalar_hits(origins, directions) if self._scalar else self._array_hits(origins, directions)
         valid = columns[:, 0] > 0
         normal = columns[:, 4:7]
@@ -53,6 +55,8 @@ class Tracer:
 
     def blocked(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray | float) -> np.ndarray:
         """(M,) bool: whether something stands within `distances` (M,) or one number (infinite for far lights) along the rays (M, 3)."""
+        if not len(origins):
+            return np.zeros(0, bool)
         mi = load_mitsuba()
         reach = np.broadcast_to(np.minimum(distances, 1e6), (len(origins),)).astype(np.float32)
         if self._scalar:
