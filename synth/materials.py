@@ -60,6 +60,8 @@ class Material:
             raise InputError("ior has to be above 1 and at most 3, sigma within 0 and pi/2")
         if self.matt:
             return
+        if any(np.ndim(values) not in (0, 2) or not np.size(values) for values in (self.gloss, self.strength)):
+            raise InputError("the gloss and its strength have to be numbers or (h, w) textures")
         low, high = _RANGES[self.model]
         if not ((np.asarray(self.gloss) >= low) & (np.asarray(self.gloss) <= high)).all():
             raise InputError(f"the gloss of {self.model} has to be from {low:g} to {high:g}")
