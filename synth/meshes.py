@@ -1,4 +1,4 @@
-"""Closed surfaces swept around the y axis, as triangle meshes with smooth normals and texture coordinates."""
+"""Triangle meshes with smooth normals and texture coordinates; among them closed surfaces swept around the y axis."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +18,17 @@ class Mesh:
     def turned(self, degrees_x: float) -> "Mesh":
         """The mesh turned about the x axis; a positive angle tips its top toward the viewer (+z)."""
         c, s = np.cos(np.radians(degrees_x)), np.sin(np.radians(degrees_x))
-        turn = np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
-        return Mesh(self.vertices @ turn.T, self.normals @ turn.T, self.uv, self.faces)
+        return self.rotated(np.array([[1, 0, 0], [0, c, -s], [0, s, c]]))
+
+    def rotated(self, rotation: np.ndarray) -> "Mesh":
+        """The mesh turned by a rotation matrix (3, 3)."""
+        return Mesh(self.vertices @ rotation.T, self.normals @ rotation.T, self.uv, self.faces)
+
+    def fitted(self) -> "Mesh":
+        """The mesh moved so that the middle of its box is the origin, and scaled so that the larger of its x and y extents is 2."""
+        low, high = self.vertices.min(0), self.vertices.max(0)
+        scale = 2 / (high - low)[:2].max()
+        return Mesh((self.vertices - (low + high) / 2) * scale, self.normals, self.uv, self.faces)
 
 
 def swept(points: np.ndarray) -> Mesh:
@@ -31,10 +40,33 @@ def swept(points: np.ndarray) -> Mesh:
     """
     rows, columns = points.shape[:2]
     u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
+    uv = np.stack([u.ravel(), v.ravel()], -1)
+    return Mesh(points.reshape(-1, 3), _grid_normals(points).reshape(-1, 3), uv, grid_faces(rows, columns))
+
+
+def grid_faces(rows: int, columns: int) -> np.ndarray:
+    """The triangles (M, 3) of a grid of vertices in row order; counter-clockwise where rows run down and columns to the right."""
     corner = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel(), corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
-    faces = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
-    return Mesh(points.reshape(-1, 3), _grid_normals(points).reshape(-1, 3), np.stack([u.ravel(), v.ravel()], -1), faces)
+    return np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
+
+
+def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals (N, 3): the sum of the normals of the faces around each vertex, by their area; (0, 0, 1) where that is nothing.
+
+    Vertices that lie in one place have to be one vertex, or they make a crease."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    across = np.cross(b - a, c - a)
+    corners = faces.T.ravel()
+    total = np.stack([np.bincount(corners, np.tile(across[:, i], 3), len(vertices)) for i in range(3)], -1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 0, total / np.where(length > 0, length, 1), (0.0, 0.0, 1.0))
+
+
+def joined(first: Mesh, second: Mesh) -> Mesh:
+    """Two meshes as one; where they overlap, both surfaces stay."""
+    vertices, normals, uv = (np.concatenate([getattr(mesh, part) for mesh in (first, second)]) for part in ("vertices", "normals", "uv"))
+    return Mesh(vertices, normals, uv, np.concatenate([first.faces, second.faces + len(first.vertices)]))
 
 
 def _grid_normals(points: np.ndarray) -> np.ndarray:
