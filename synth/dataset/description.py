@@ -1,0 +1,160 @@
+"""What `scene.json` says: how a scene was made, in which units and frames, and the few numbers that are not maps.
+
+It holds no time and no path, so that the same seed gives the same bytes.
+"""
+
+from dataclasses import asdict, fields
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from isc_core import __version__
+
+from ..camera import Camera
+from ..finishes import gloss_class
+from ..lights import EnvironmentLight, Light
+from ..materials import Material
+from ..recipe import Picture, Recipe
+from ..scene import Scene
+from ..sensor import Sensor
+from ..truth import GroundTruth
+from ..variant import has_llvm, load_mitsuba
+
+SCHEMA_VERSION = 1
+KIND = "isc synth scene"
+UNITS = {
+    "frame": "x right, y up, z toward the viewer; row 0 at the top",
+    "height": "pixels toward the viewer; object units times pixels_per_unit",
+    "light": "linear Rec.709, scene-referred; 1 is the sensor's full scale",
+    "shading": "radiance of a white matt surface: diffuse = reflectance * shading",
+    "environment": "latitude-longitude, row 0 straight up, first column away from the viewer, a quarter along is right",
+}
+ILLUMINATION = (
+    "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, x right, y up, z toward the viewer"
+)
+CONVENTIONS = {
+    "lambert": "f = albedo / pi",
+    "oren_nayar": "f = albedo times Oren & Nayar's rough matt lobe, slope deviation sigma in radians",
+    "blinn_phong": "f = albedo / pi + strength (gloss + 8) / (8 pi) cos(n, h)^gloss: gloss is the exponent, normalised Blinn-Phong",
+    "ggx": "f = albedo / pi + strength D G F / (4 cos cos): gloss is alpha of GGX (Blender's roughness squared), F by Schlick from f0",
+    "roughplastic": "Mitsuba's roughplastic, GGX, nonlinear off: gloss is alpha, the interface's Fresnel term is exact for ior",
+}
+
+
+def describe(split: str, recipe: Recipe, scene: Scene, truth: GroundTruth, checksums: dict[str, str]) -> dict[str, Any]:
+    """The content of `scene.json`, ready for JSON. `checksums`: SHA-256 of the files beside it."""
+    shape, light = recipe.shape, recipe.light
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "kind": KIND,
+        "seed": recipe.seed,
+        "split": split,
+        "object": {"id": shape.name, "family": shape.family, "number": shape.number},
+        "material": {"id": recipe.material.name, **_material(scene.material)},
+        "albedo": {"family": recipe.albedo, "mean": _mean_color(truth.reflectance, truth.mask)},
+        "light": {"id": light.name, "family": light.family, "number": light.number, "sources": [_light(part) for part in scene.lights]},
+        "illumination": {
+            "coefficients": truth.illumination.tolist(),
+            "convention": ILLUMINATION,
+            "light_fit_residual": float(truth.light_fit_residual),
+        },
+        "camera": _camera(scene.camera),
+        "units": UNITS,
+        "render": _render(recipe),
+        "picture": describe_picture(recipe.picture),
+        "measured": {"specular_share": specular_share(truth), "mask_pixels": int(truth.mask.sum())},
+        "versions": versions(),
+        "files": checksums,
+    }
+
+
+def describe_picture(picture: Picture) -> dict[str, Any]:
+    """The settings of a picture that decide what is in the files."""
+    return {
+        "size": picture.size,
+        "samples": picture.samples,
+        "bounces": picture.bounces,
+        "perspective": picture.perspective,
+        "exposure": picture.exposure,
+        "renderer": picture.renderer,
+        "sensor": _sensor(picture.sensor),
+    }
+
+
+def specular_share(truth: GroundTruth) -> float:
+    """The specular layer's part of all light inside the mask, [0, 1]."""
+    specular, diffuse = (float(layer[truth.mask].sum(dtype=np.float64)) for layer in (truth.specular, truth.diffuse))
+    return specular / max(specular + diffuse, 1e-30)
+
+
+def versions() -> dict[str, str]:
+    """Of all that has a say in the numbers."""
+    found = {"isc": __version__}
+    for name in ("mitsuba", "drjit", "numpy"):
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "unknown"
+    return found
+
+
+def _render(recipe: Recipe) -> dict[str, Any]:
+    options = recipe.render_options()
+    kernels = options.renderer == "mitsuba" or (options.renderer == "auto" and has_llvm())
+    return {
+        "samples": options.samples,
+        "seed": options.seed,
+        "interreflection": options.bounces > 0,
+        "bounces": options.bounces,
+        "renderer": "mitsuba" if kernels else "arrays",
+        "variant": str(load_mitsuba().variant()),
+    }
+
+
+def _camera(camera: Camera) -> dict[str, Any]:
+    return {
+        "kind": "perspective" if camera.perspective else "orthographic",
+        "width": camera.width,
+        "height": camera.height,
+        "pixels_per_unit": camera.pixels_per_unit,
+        "distance": camera.distance if camera.perspective else None,
+        "world_to_camera": camera.matrices(),
+    }
+
+
+def _material(material: Material) -> dict[str, Any]:
+    described: dict[str, Any] = {
+        "model": material.model,
+        "convention": CONVENTIONS[material.model],
+        "gloss_class": gloss_class(material),
+    }
+    if not material.matt:
+        described |= {"gloss": _span(material.gloss), "strength": _span(material.strength)}
+    if material.model in ("ggx", "roughplastic"):
+        described |= {"ior": material.ior, "f0": material.f0}
+    if material.model == "oren_nayar":
+        described |= {"sigma": material.sigma}
+    return described
+
+
+def _span(values: float | np.ndarray) -> dict[str, float]:
+    """A texture in three numbers; a number is all of them."""
+    return {"least": float(np.min(values)), "median": float(np.median(values)), "most": float(np.max(values))}
+
+
+def _mean_color(layer: np.ndarray, mask: np.ndarray) -> list[float]:
+    return [float(value) for value in layer[mask].mean(0, dtype=np.float64)]
+
+
+def _light(light: Light) -> dict[str, Any]:
+    """Every number of a light; of an environment only its size, its pixels being in `environment.exr`."""
+    kind = type(light).__name__.removesuffix("Light").lower()
+    if isinstance(light, EnvironmentLight):
+        return {"kind": kind, "rows": len(light.radiance)}
+    return {"kind": kind, **{field.name: np.asarray(getattr(light, field.name), float).tolist() for field in fields(light)}}
+
+
+def _sensor(sensor: Sensor) -> dict[str, Any]:
+    """All but the exposure, which a picture has of its own."""
+    return {name: value for name, value in asdict(sensor).items() if name != "exposure_level"}
