@@ -8,7 +8,8 @@ A varying gloss is one of: worn (matt where it was touched), smudged (broader wi
 Citation: A. Ngan, F. Durand, W. Matusik, "Experimental analysis of BRDF models", EGSR 2005, 117-126, doi:10.2312/EGWR/EGSR05/117-126
 (measured materials fitted with such lobes).
 
-Limits: gloss varies without regard to the albedo's own pattern.
+Limits: gloss varies without regard to the albedo's own pattern. On a white albedo the strongest draws reflect more light than they get, by
+up to a tenth (blinn_phong) or toward grazing angles (ggx), as the sums of lobes in `materials` may.
 """
 
 from dataclasses import replace

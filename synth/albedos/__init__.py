@@ -35,7 +35,7 @@ ALBEDOS: tuple[str, ...] = tuple(_FAMILIES)
 def make_albedo(name: str, rng: np.random.Generator, size: int = 512) -> np.ndarray:
     """A texture of the family `name`, one of `ALBEDOS`: (size, size, 3) float32, linear Rec.709 from `DARKEST` to `BRIGHTEST`.
 
-    `size`: 16 to 4096. Raises `InputError` for another size and for unknown names.
+    `size`: 16 to 4096; the same seed gives another picture in another size. Raises `InputError` for another size and for unknown names.
     """
     if name not in _FAMILIES:
         raise InputError(f"unknown albedo {name!r}: choose {', '.join(ALBEDOS)}")

@@ -1,6 +1,7 @@
 """A user's image as an albedo.
 
-Limits: an image holds light, not reflectance: what is above `BRIGHTEST` becomes `BRIGHTEST`, each channel on its own; nothing is scaled.
+Limits: an image holds light, not reflectance: what is above `BRIGHTEST` becomes `BRIGHTEST`, each channel on its own, before any
+reduction in size; nothing is scaled.
 Its left and right sides meet in a seam unless the image itself goes around.
 """
 

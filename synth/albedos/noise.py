@@ -28,7 +28,7 @@ def _marble(rng: np.random.Generator, size: int) -> np.ndarray:
     """A pale or dark stone with clouds and veins of two widths."""
     stone, vein = (paper(rng), dark(rng)) if rng.random() < 0.7 else (dark(rng), paper(rng))
     if rng.random() < 0.4:
-        stone = pigment(rng) * 0.7
+        stone, vein = pigment(rng) * 0.7, paper(rng)
     result = over(np.broadcast_to(stone, (size, size, 3)), 0.5 * (stone + vein), 0.25 + 0.2 * fractal_noise(rng, size, 2.5))
     for cycles, width, strength in ((1.5, 0.05, 0.8), (4, 0.06, 0.45)):
         field = smooth_noise(rng, size, cycles) + 0.35 * fractal_noise(rng, size, 1.8)

@@ -73,6 +73,14 @@ def test_only_light_above_full_scale_is_clipped() -> None:
     np.testing.assert_array_equal(seen.residual != 0, above)
 
 
+def test_the_layers_of_clipped_light_add_up_exactly_however_bright_it_was() -> None:
+    rng = np.random.default_rng(4)
+    truth = truth_of(rng.uniform(0, 0.9, (64, 64, 3)), np.exp(rng.uniform(0, 12, (64, 64, 3))), np.ones((64, 64), bool))
+    seen = observe(truth, Sensor(), rng)
+    assert (seen.image == 1).all()
+    np.testing.assert_array_equal(seen.diffuse + seen.specular + seen.residual, seen.image)
+
+
 @pytest.mark.parametrize("level", [0.1, 0.5, 0.8])
 def test_noise_has_mean_zero_and_the_stated_variance(level: float) -> None:
     noise = 0.02
