@@ -20,6 +20,7 @@ from isc_core.brdf.ggx import Ggx, density, visible
 from isc_core.brdf.oren_nayar import OrenNayar
 
 from ..materials import Material
+from ..tracing import LIFT
 from .rough_plastic import RoughPlastic
 
 
@@ -36,6 +37,10 @@ class Points:
 
     def __len__(self) -> int:
         return len(self.position)
+
+    def lifted(self) -> np.ndarray:
+        """Where rays from the points start, (N, 3)."""
+        return self.position + LIFT * self.normal
 
     def at(self, chosen: np.ndarray | slice) -> "Points":
         """Those that an index chooses, as often as it does."""
@@ -72,11 +77,11 @@ class Reflection:
 
     def draw(self, rng: np.random.Generator, points: Points, count: int) -> np.ndarray:
         """`count` unit directions (N, count, 3) for each point, as the gloss reflects; by the cosine for matt materials."""
+        if self.matt:
+            return cosine_directions(rng, points, count)
         first, turn = rng.random((2, len(points), count))
         turn = turn * (2 * np.pi)
         frame = _frames(points.normal)
-        if self.matt:
-            return _upright(np.sqrt(first), turn) @ frame
         view = points.view[:, None]
         if self._model == "blinn_phong":
             half = _upright(first ** (1 / (points.gloss[:, None] + 1)), turn) @ frame
@@ -87,7 +92,7 @@ class Reflection:
     def density(self, points: Points, light: np.ndarray) -> np.ndarray:
         """Per steradian (N,), how densely `draw` picks the unit directions (N, 3), all above the horizon."""
         if self.matt:
-            return np.maximum(_dot(points.normal, light), 0) / np.pi
+            return cosine_density(points, light)
         half = points.view + light
         half /= np.sqrt(_dot(half, half))[:, None]
         cosine, deviation = np.clip(_dot(points.normal, half), 0, 1), np.maximum(_dot(points.view, half), 1e-9)
@@ -101,6 +106,11 @@ def cosine_directions(rng: np.random.Generator, points: Points, count: int) -> n
     """`count` unit directions (N, count, 3) above each point, with the density cos / pi."""
     first, turn = rng.random((2, len(points), count))
     return _upright(np.sqrt(first), turn * (2 * np.pi)) @ _frames(points.normal)
+
+
+def cosine_density(points: Points, light: np.ndarray) -> np.ndarray:
+    """Per steradian (N,), how densely `cosine_directions` picks the unit directions (N, 3)."""
+    return np.maximum(_dot(points.normal, light), 0) / np.pi
 
 
 def _upright(cosine: np.ndarray, turn: np.ndarray) -> np.ndarray:

@@ -21,7 +21,6 @@ from isc_core.brdf.ggx import Ggx
 
 from ..variant import load_mitsuba
 
-AIR = 1.000277  # the index around the object, as the plugin has it unless told
 _KNOTS = 64  # of Mitsuba's own table, evenly spaced in the cosine
 
 
@@ -29,7 +28,7 @@ class RoughPlastic:
     """`alpha`: width of the facets' slopes, in [.01, 1]. `ior`: index of refraction, above 1. Raises `InputError` without Mitsuba."""
 
     def __init__(self, alpha: float, ior: float) -> None:
-        self._alpha, self._ior = alpha, ior / AIR
+        self._alpha, self._ior = alpha, ior
         self._cosines, self._through = _transmission(alpha, ior)
 
     def body(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
@@ -56,7 +55,8 @@ def _transmission(alpha: float, ior: float) -> tuple[np.ndarray, np.ndarray]:
     """The cosines of the table's knots and g there: pi f_body(c, 1) = g(c) g(1)."""
     mi = load_mitsuba()
     white = {"type": "rgb", "value": 1.0}
-    plastic = mi.load_dict({"type": "roughplastic", "distribution": "ggx", "alpha": alpha, "int_ior": ior, "diffuse_reflectance": white})
+    facets = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, "int_ior": ior, "ext_ior": 1.0}
+    plastic = mi.load_dict({**facets, "nonlinear": False, "diffuse_reflectance": white})
     context = mi.BSDFContext()
     context.type_mask = mi.BSDFFlags.DiffuseReflection
     knots = np.linspace(0, 1, _KNOTS)
