@@ -1,0 +1,195 @@
+"""A measured or drawn height map as a mesh that the camera sees pixel by pixel as it was.
+
+Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s, y = (H / 2 - r - 1/2) / s and
+z = (height - offset) / s, with s pixels a unit: the mapping of `synth.camera.Camera(W, H, s)`, bit by bit. A vertex stands at each centre,
+with the normal (-dh/dx, -dh/dy, 1) of central differences (one-sided at the rim), and one at each corner of a pixel, at the mean of what
+the pixels around it foretell; so the mesh covers exactly the pixels that have a height.
+
+Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading", doi:10.1109/TPAMI.2014.2377712 (the heights of
+the MIT-Berkeley objects, `Z.mat`).
+
+Limits: one side only, open at the rim and behind. Steps between neighbouring pixels become steep walls, not gaps.
+"""
+
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import scipy.io
+from scipy.io.matlab import MatReadError
+
+from isc_core.errors import InputError
+from isc_core.exr import read_channels
+from synth.camera import LARGEST, SMALLEST, Camera
+from synth.meshes import Mesh
+
+FEWEST = 64  # pixels with a height
+_DEEPEST = 20.0  # of the range of heights to the larger side of the object: beyond it the unit is not the pixel
+_READERS = {".mat": "a MATLAB file", ".npy": "a NumPy array", ".exr": "an OpenEXR file"}
+# Around a pixel's centre, counter-clockwise from the upper left: rows down, columns to the right.
+_CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
+
+
+@dataclass(frozen=True)
+class HeightField:
+    """`mesh`: in the camera's frame. `pixels_per_unit`: s; `width`, `height`: of the map in pixels; `offset`: pixels, the height at
+    z = 0, so that height = z * pixels_per_unit + offset. The object's larger side is 2 units long; it lies where it lies in the map."""
+
+    mesh: Mesh
+    pixels_per_unit: float
+    width: int
+    height: int
+    offset: float
+
+    @property
+    def camera(self) -> Camera:
+        """The camera whose pixels are those of the map."""
+        return Camera(self.width, self.height, self.pixels_per_unit)
+
+
+def read_height(path: str | Path) -> np.ndarray:
+    """A height map (H, W) float64, pixels toward the viewer, NaN outside the object.
+
+    Of a .mat file the variable `depth`; of an .npy file the array; of an .exr file the channel `height.Z`, `Z`, `Y` or the only one, where
+    `mask.A`, if there is one, is at least one half. Raises `InputError` for what cannot be read or cannot be a height map.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in _READERS:
+        raise InputError(f"{path}: heights are read from {', '.join(_READERS)} files")
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    reader = {".mat": _read_mat, ".npy": _read_npy, ".exr": _read_exr}[path.suffix.lower()]
+    return check_height(reader(path), str(path))
+
+
+def check_height(height: np.ndarray, what: str = "this height map") -> np.ndarray:
+    """The map as float64, NaN where it is not finite. Raises `InputError`, which names it by `what`, where it is no map, too small
+    or large, empty, or too deep."""
+    height = np.asarray(height)
+    if height.ndim != 2 or height.dtype.kind not in "fiu":
+        raise InputError(f"{what}: heights are a picture of numbers (H, W), these have shape {height.shape} of {height.dtype}")
+    if not all(SMALLEST <= side <= LARGEST for side in height.shape):
+        size = f"{height.shape[1]} x {height.shape[0]}"
+        raise InputError(f"{what}: {size} pixels cannot be rendered, {SMALLEST} to {LARGEST} a side can: crop or resize it")
+    height = np.where(np.isfinite(height), height, np.nan).astype(np.float64)
+    known = np.isfinite(height)
+    if known.sum() < FEWEST:
+        raise InputError(f"{what}: {known.sum()} pixels have a height, {FEWEST} at least are needed: NaN stands for outside only")
+    deep, side = np.ptp(height[known]), max(_extents(known))
+    if deep > _DEEPEST * side:
+        raise InputError(f"{what}: heights range over {deep:.4g} pixels, the object is {side} wide: give them in pixels, NaN outside")
+    return height
+
+
+def place_height(height: np.ndarray) -> HeightField:
+    """A height map (H, W), pixels toward the viewer, NaN outside, as a mesh and its camera. Raises `InputError` as `check_height` does."""
+    height = check_height(height)
+    known = np.isfinite(height)
+    rows, columns = height.shape
+    scale = max(_extents(known)) / 2
+    offset = float((np.nanmin(height) + np.nanmax(height)) / 2)
+    across, down = _slopes(height)
+    normals = np.stack([-across, down, np.ones_like(across)], -1)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    corner_height, corner_normals = _corners(height, across, down, normals)
+    corner = np.isfinite(corner_height)
+    corner_normals = corner_normals[corner] / np.linalg.norm(corner_normals[corner], axis=-1, keepdims=True)
+
+    def vertices(values: np.ndarray, where: np.ndarray, half: float) -> np.ndarray:
+        row, column = np.nonzero(where)
+        # In the same order of operations as the camera's, so that rays and vertices meet exactly.
+        x, y = (column + half - columns / 2) / scale, (rows / 2 - row - half) / scale
+        return np.stack([x, y, (values[where] - offset) / scale], -1)
+
+    points = np.concatenate([vertices(height, known, 0.5), vertices(corner_height, corner, 0.0)])
+    uv = np.concatenate([_coordinates(known, known, 0.5), _coordinates(corner, known, 0.0)])
+    mesh = Mesh(points, np.concatenate([normals[known], corner_normals]), uv, _fans(known, corner))
+    return HeightField(mesh, scale, columns, rows, offset)
+
+
+def mesh_of_height(height: np.ndarray) -> Mesh:
+    """The mesh alone of `place_height`."""
+    return place_height(height).mesh
+
+
+def _extents(known: np.ndarray) -> tuple[int, int]:
+    """Rows and columns of the box around what is known."""
+    row, column = np.nonzero(known)
+    return int(np.ptp(row)) + 1, int(np.ptp(column)) + 1
+
+
+def _slopes(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Height a pixel to the right and down (H, W): the mean of the differences to the neighbours that are known, 0 where there are none."""
+    slopes = []
+    for axis in (1, 0):
+        step = np.diff(height, axis=axis)
+        pad = [(0, 0), (0, 0)]
+        pad[axis] = (1, 1)
+        steps = np.pad(step, pad, constant_values=np.nan)
+        both = np.stack([np.delete(steps, -1, axis), np.delete(steps, 0, axis)])
+        found = np.isfinite(both)
+        slopes.append(np.where(found, both, 0).sum(0) / np.maximum(found.sum(0), 1))
+    return slopes[0], slopes[1]
+
+
+def _corners(height: np.ndarray, across: np.ndarray, down: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (H + 1, W + 1), NaN away from the object, and normals (H + 1, W + 1, 3), not yet of length 1, at the pixels' corners."""
+    rows, columns = height.shape
+    known = np.isfinite(height)
+    count, total = np.zeros((rows + 1, columns + 1)), np.zeros((rows + 1, columns + 1))
+    sums = np.zeros((rows + 1, columns + 1, 3))
+    for r, c in _CORNERS:
+        at = (slice(r, r + rows), slice(c, c + columns))
+        count[at] += known
+        total[at] += np.where(known, height + across * (c - 0.5) + down * (r - 0.5), 0)
+        sums[at] += np.where(known[..., None], normals, 0)
+    return np.where(count > 0, total / np.maximum(count, 1), np.nan), sums
+
+
+def _fans(known: np.ndarray, corner: np.ndarray) -> np.ndarray:
+    """Four triangles a pixel, from its centre to its sides."""
+    centre = np.arange(known.sum())
+    number = np.full(corner.shape, -1)
+    number[corner] = np.arange(corner.sum()) + len(centre)
+    rows, columns = known.shape
+    ring = [number[r : r + rows, c : c + columns][known] for r, c in _CORNERS]
+    return np.concatenate([np.stack([centre, ring[i], ring[(i + 1) % 4]], -1) for i in range(4)])
+
+
+def _coordinates(where: np.ndarray, known: np.ndarray, half: float) -> np.ndarray:
+    """Texture coordinates of centres (`half` 0.5) or corners (0): the box around the object, centred, its larger side filling [0, 1]."""
+    row, column = np.nonzero(known)
+    middle = np.array([column.min() + column.max() + 1, row.min() + row.max() + 1]) / 2
+    r, c = np.nonzero(where)
+    return np.clip(0.5 + (np.stack([c, r], -1) + half - middle) / max(_extents(known)), 0, 1)
+
+
+def _read_mat(path: Path) -> np.ndarray:
+    try:
+        return np.asarray(scipy.io.loadmat(path, variable_names=["depth"])["depth"])
+    except NotImplementedError as error:
+        raise InputError(f"{path} is a MATLAB 7.3 file: save it with '-v7' and try again") from error
+    except KeyError as error:
+        raise InputError(f"{path} has no variable 'depth': give the Z.mat of an object") from error
+    except (OSError, EOFError, ValueError, TypeError, IndexError, MatReadError, zlib.error) as error:
+        raise InputError(f"{path} is not a readable MATLAB file: save it again") from error
+
+
+def _read_npy(path: Path) -> np.ndarray:
+    try:
+        stored = np.load(path, mmap_mode="r", allow_pickle=False)
+    except (OSError, EOFError, ValueError) as error:
+        raise InputError(f"{path} is not a readable array of numbers: save it with numpy.save") from error
+    if not isinstance(stored, np.ndarray):
+        raise InputError(f"{path} holds several arrays: save the height map alone with numpy.save")
+    return stored
+
+
+def _read_exr(path: Path) -> np.ndarray:
+    channels = read_channels(path)
+    names = [name for name in ("height.Z", "Z", "Y") if name in channels] or list(channels)[: len(channels) == 1]
+    if not names:
+        raise InputError(f"{path} has no channel height.Z, Z or Y, but {', '.join(channels)}: keep one of these names for the heights")
+    height = channels[names[0]]
+    return np.where(channels["mask.A"] >= 0.5, height, np.nan) if "mask.A" in channels else height

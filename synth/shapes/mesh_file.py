@@ -1,0 +1,315 @@
+"""A user's mesh and its colours, from a file that trimesh reads.
+
+Equation: vertices in one place are one; face corners around it are smooth together where the faces beside each other meet at less than
+`CREASE`; the normal is the sum over such a group of the faces' normals, by area. Colours that are no single texture within [0, 1] are
+painted on one, as seen from the front.
+
+Citation: M. Dawson-Haggerty et al., trimesh (2019), https://trimesh.org; glTF 2.0 (ISO/IEC 12113:2022) for what its colours mean.
+
+Limits: the file's own normals, transparency and other maps are not used. The frame is kept: y has to be up, +z toward the viewer, as in
+glTF. Only files in the mesh's own folder, or below it, are opened.
+"""
+
+import io
+import struct
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from isc_core.errors import InputError
+from isc_core.photo import srgb_to_linear
+from synth.materials import texture_at
+from synth.meshes import Mesh
+
+from .texture_coordinates import from_the_front
+
+KINDS = ("glb", "gltf", "obj", "off", "ply", "stl")
+CREASE = 40.0  # degrees between the normals of neighbouring faces; above it their edge is sharp
+MOST_FACES = 3_000_000
+_MOST_BYTES = 1 << 30
+_NO_COLOUR = (102, 102, 102)  # what trimesh gives a material that names none
+_PAINTED = 1024  # pixels a side of a painted texture
+_ERRORS = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, NotImplementedError, EOFError, AssertionError,
+           RecursionError, MemoryError, struct.error, zlib.error)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MeshFile:
+    """`mesh`: centred, its larger x or y extent 2. `albedo`: (h, w, 3) texture for its `uv`, linear in [0, 1], or None where the file has
+    no colours."""
+
+    mesh: Mesh
+    albedo: np.ndarray | None
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One piece of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as `Mesh` has them or None, `texture` (h, w, 3) or None,
+    `colours` (N, 3) or None; linear."""
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None
+    texture: np.ndarray | None
+    colours: np.ndarray | None
+
+
+class _Beside:
+    """The files that a mesh file may ask for: those in its own folder and below. Remembers what was asked for in vain."""
+
+    def __init__(self, path: Path) -> None:
+        self.folder = path.resolve().parent
+        self.missing: list[str] = []
+        self.outside: list[str] = []
+        self.given: list[str] = []
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a file; `FileNotFoundError` where it is absent or elsewhere."""
+        name = str(name).strip().replace("\\", "/")
+        place = (self.folder / name).resolve()
+        if not place.is_relative_to(self.folder):
+            self.outside.append(name)
+        elif not place.is_file():
+            self.missing.append(name)
+        else:
+            self.given.append(name)
+            return place.read_bytes()
+        raise FileNotFoundError(name)
+
+    __getitem__ = get
+
+
+def read_mesh(path: str | Path) -> Mesh:
+    """The mesh alone of `read_mesh_file`."""
+    return read_mesh_file(path).mesh
+
+
+def read_mesh_file(path: str | Path) -> MeshFile:
+    """A closed mesh and its base colour. Raises `InputError` for a file that is absent, unreadable, empty, huge, or refers to a file that
+    is missing or outside its folder, and for a mesh that is open, turned inconsistently, without volume, or has places that are not finite.
+    """
+    path = Path(path)
+    parts = _read_parts(path)
+    vertices = np.concatenate([part.vertices for part in parts])
+    starts = np.cumsum([0] + [len(part.vertices) for part in parts])
+    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts[:-1], strict=True)])
+    vertices, faces, place = _sound(path, vertices, faces)
+    corners, normals = _smooth_corners(vertices, faces, place)
+    lone = parts[0] if len(parts) == 1 else None
+    if lone is not None and lone.uv is not None and _within(lone.uv):
+        uv, albedo = np.clip(lone.uv, 0, 1), lone.texture
+    else:
+        uv = from_the_front(vertices)
+        albedo = _painted(parts, vertices, uv)
+        faces = np.unique(place, return_index=True)[1][place[faces]]  # what lies in one place has one coordinate now
+    # One vertex of the mesh for each vertex of the file in each smooth group around it.
+    groups = len(normals)
+    keys, number = np.unique(faces.ravel() * groups + corners, return_inverse=True)
+    source, group = keys // groups, keys % groups
+    mesh = Mesh(vertices[source], normals[group], uv[source], number.reshape(-1, 3))
+    return MeshFile(mesh, albedo)
+
+
+def _read_parts(path: Path) -> list[_Part]:
+    import trimesh
+
+    kind = path.suffix.lower().lstrip(".")
+    if kind not in KINDS:
+        raise InputError(f"{path}: meshes are read from {', '.join(KINDS)} files")
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file")
+    if path.stat().st_size > _MOST_BYTES:
+        raise InputError(f"{path}: larger than {_MOST_BYTES >> 30} GiB: simplify the mesh first")
+    beside = _Beside(path)
+    try:
+        loaded = trimesh.load(io.BytesIO(path.read_bytes()), file_type=kind, resolver=beside, force="scene", process=False)
+        parts = [part for name in loaded.graph.nodes_geometry for part in [_part(loaded, name, kind)] if part is not None]
+    except _ERRORS as error:
+        _check_references(path, beside)
+        raise InputError(f"{path} is not a readable {kind.upper()} file: export the mesh again") from error
+    _check_references(path, beside)
+    if not parts:
+        raise InputError(f"{path} holds no triangles: export the object as a mesh")
+    pictures = [name for name in beside.given if Path(name).suffix.lower() not in (".mtl", ".bin")]
+    if pictures and all(part.texture is None for part in parts):
+        raise InputError(f"{path}: its texture {pictures[0]} is not a readable image: save it again as PNG")
+    return parts
+
+
+def _check_references(path: Path, beside: _Beside) -> None:
+    if beside.outside:
+        raise InputError(f"{path} refers to {beside.outside[0]}, which is not in its folder: put a copy beside the mesh and refer to that")
+    if beside.missing:
+        raise InputError(f"{path} refers to {beside.missing[0]}, which is missing: put it beside the mesh, or take the reference out")
+
+
+def _part(scene: Any, node: str, kind: str) -> _Part | None:
+    """One piece, moved to its place in the scene; None for what has no faces."""
+    transform, name = scene.graph[node]
+    piece = scene.geometry[name]
+    faces = np.asarray(getattr(piece, "faces", np.empty((0, 3))), dtype=np.int64)
+    if not len(faces):
+        return None
+    vertices = np.asarray(piece.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
+    if np.linalg.det(transform[:3, :3]) < 0:
+        faces = faces[:, ::-1]
+    uv = getattr(piece.visual, "uv", None)
+    # trimesh counts v from the lowest row of a texture, Mesh from the highest.
+    uv = None if uv is None or len(uv) != len(vertices) else np.asarray(uv, float) * (1, -1) + (0, 1)
+    texture = _texture(getattr(piece.visual, "material", None))
+    if texture is not None and uv is None:
+        texture = texture if texture.shape[:2] == (1, 1) else None
+    return _Part(vertices, faces, uv, texture, _vertex_colours(piece.visual, kind, len(vertices)))
+
+
+def _texture(material: Any) -> np.ndarray | None:
+    """A material's base colour (h, w, 3), linear: its image times its factor, or the factor alone as one pixel; None where it has none."""
+    image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
+    factor = getattr(material, "baseColorFactor", None)
+    if image is None and factor is None:
+        factor = getattr(material, "diffuse", None)
+        if factor is None or (np.asarray(factor)[:3] == _NO_COLOUR).all():
+            return None
+    numbers = np.ones(3) if factor is None else np.asarray(factor)[:3]
+    scale = numbers / (255 if numbers.dtype.kind in "iu" else 1)
+    if image is None:
+        return np.clip(scale, 0, 1).reshape(1, 1, 3)
+    return np.clip(srgb_to_linear(np.asarray(image.convert("RGB"), float) / 255) * scale, 0, 1)
+
+
+def _vertex_colours(visual: Any, kind: str, count: int) -> np.ndarray | None:
+    """Colours of the vertices (N, 3), linear; those of glTF are stored so, those of other files as a screen shows them."""
+    if getattr(visual, "kind", None) not in ("vertex", "face"):
+        return None
+    colours = np.asarray(visual.vertex_colors, float)[:, :3] / 255
+    if len(colours) != count:
+        return None
+    return colours if kind in ("glb", "gltf") else srgb_to_linear(colours)
+
+
+def _sound(path: Path, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices centred and scaled, faces without empty ones and turned outward, and the number of each vertex's place."""
+    if len(faces) > MOST_FACES:
+        raise InputError(f"{path} has {len(faces)} faces, at most {MOST_FACES} are used: simplify it first")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{path}: a face refers to a vertex that is not there: export the mesh again")
+    used = vertices[faces.ravel()]
+    if not np.isfinite(used).all():
+        raise InputError(f"{path} has vertices that are not finite numbers: remove them")
+    low, high = used.min(0), used.max(0)
+    if (high - low)[:2].max() <= 0 or not np.isfinite((high - low) ** 2).all():
+        raise InputError(f"{path}: the mesh has no size: all of its vertices lie in one place or one line toward the viewer")
+    vertices = (np.nan_to_num(vertices) - (low + high) / 2) * (2 / (high - low)[:2].max())
+    place = _places(vertices)
+    whole = place[faces]
+    faces = faces[(whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])]
+    _check_closed(path, place[faces])
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
+    if abs(volume) < 1e-9:
+        raise InputError(f"{path}: the mesh encloses no volume: give it a thickness")
+    return vertices, faces if volume > 0 else faces[:, ::-1], place
+
+
+def _places(vertices: np.ndarray) -> np.ndarray:
+    """Numbers (N,), equal for vertices in the same place, to 1e-7 units."""
+    _, place = np.unique(np.rint(vertices * 1e7).astype(np.int64), axis=0, return_inverse=True)
+    return place.reshape(-1)
+
+
+def _check_closed(path: Path, faces: np.ndarray) -> None:
+    """Raises `InputError` unless every edge has as many faces on one side as on the other."""
+    if not len(faces):
+        raise InputError(f"{path}: none of its faces has an area: export the mesh again")
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    forward = edges[:, 0] < edges[:, 1]
+    key = edges.min(1) * (edges.max() + 1) + edges.max(1)
+    _, number, count = np.unique(key, return_inverse=True, return_counts=True)
+    unpaired = int((count % 2).sum())
+    if unpaired:
+        raise InputError(f"{path}: the mesh is open, {unpaired} edges have a face on one side only: fill its holes, or give it a thickness")
+    if np.bincount(number.reshape(-1), np.where(forward, 1, -1)).any():
+        raise InputError(f"{path}: neighbouring faces are turned opposite ways: recalculate the normals so that all point outward")
+
+
+def _smooth_corners(vertices: np.ndarray, faces: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The smooth group (3 M,) of each corner of the faces in order, and the groups' unit normals (G, 3)."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    across = np.cross(b - a, c - a)
+    length = np.linalg.norm(across, axis=1)
+    facing = across / np.where(length > 0, length, 1)[:, None]
+    whole, count = place[faces], len(faces)
+    # Half edges: from corner i of a face to its next one; partners run the other way between the same places.
+    start, end = whole.ravel(), np.roll(whole, -1, 1).ravel()
+    corner, after = np.arange(3 * count), (np.arange(3 * count) // 3) * 3 + (np.arange(3 * count) % 3 + 1) % 3
+    size = int(whole.max()) + 1
+    order = np.argsort(np.minimum(start, end) * size + np.maximum(start, end), kind="stable")
+    first, second = order[0::2], order[1::2]
+    smooth = (facing[first // 3] * facing[second // 3]).sum(1) > np.cos(np.radians(CREASE))
+    # An empty face has no direction of its own: it goes with its neighbours.
+    smooth |= (length[first // 3] == 0) | (length[second // 3] == 0)
+    smooth &= start[first] == end[second]
+    first, second = first[smooth], second[smooth]
+    links = np.concatenate([np.stack([corner[first], after[second]]), np.stack([after[first], corner[second]])], axis=1)
+    graph = coo_matrix((np.ones(links.shape[1], bool), (links[0], links[1])), shape=(3 * count, 3 * count))
+    groups, group = connected_components(graph, directed=False)
+    total = np.stack([np.bincount(group, np.repeat(across[:, i], 3), groups) for i in range(3)], -1)
+    norm = np.linalg.norm(total, axis=1, keepdims=True)
+    return group, np.where(norm > 0, total / np.where(norm > 0, norm, 1), (0.0, 0.0, 1.0))
+
+
+def _within(uv: np.ndarray) -> bool:
+    return bool(np.isfinite(uv).all() and (uv >= -1e-3).all() and (uv <= 1.001).all())
+
+
+def _painted(parts: list[_Part], vertices: np.ndarray, front: np.ndarray) -> np.ndarray | None:
+    """The colours of all parts on one texture, at the coordinates `front` of the vertices; where several lie, the one before the others."""
+    if all(part.texture is None and part.colours is None for part in parts):
+        return None
+    if len(parts) == 1 and parts[0].texture is not None and parts[0].texture.shape[:2] == (1, 1):
+        return parts[0].texture
+    texture, depth = np.zeros((_PAINTED**2, 3)), np.full(_PAINTED**2, -np.inf)
+    start = 0
+    for part in parts:
+        own = slice(start, start + len(part.vertices))
+        _paint(part, vertices[own, 2], front[own], texture, depth)
+        start += len(part.vertices)
+    # What no face covers takes the colour of the nearest that one does.
+    empty = np.isinf(depth).reshape(_PAINTED, _PAINTED)
+    row, column = distance_transform_edt(empty, return_distances=False, return_indices=True)
+    return texture.reshape(_PAINTED, _PAINTED, 3)[row, column]
+
+
+def _paint(part: _Part, z: np.ndarray, front: np.ndarray, texture: np.ndarray, depth: np.ndarray) -> None:
+    """Puts one part's colours into a texture (h w, 3) where it is before what is there, by points spread over its faces."""
+    place = front[part.faces] * _PAINTED
+    longest = np.linalg.norm(place - np.roll(place, 1, 1), axis=-1).max(1)
+    steps = 2 ** np.ceil(np.log2(np.maximum(1.5 * longest, 1))).astype(int)
+    for step in np.unique(steps):
+        i, j = np.nonzero(np.add.outer(np.arange(step + 1), np.arange(step + 1)) <= step)
+        weights = np.stack([i, j, step - i - j], -1) / step
+        for faces in np.array_split(part.faces[steps == step], max(1, (steps == step).sum() * len(weights) // 2_000_000)):
+            cell = np.clip(np.floor(weights @ front[faces] * _PAINTED).astype(int), 0, _PAINTED - 1)
+            index, near = (cell[..., 1] * _PAINTED + cell[..., 0]).ravel(), (weights @ z[faces][..., None]).ravel()
+            order = np.argsort(near)  # the nearest last: it is the one that stays
+            order = order[near[order] >= depth[index[order]]]
+            colours = _colours_of(part, faces, weights).reshape(-1, 3)
+            depth[index[order]], texture[index[order]] = near[order], colours[order]
+
+
+def _colours_of(part: _Part, faces: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The colours (M, P, 3) at the points of faces (M, 3) with barycentric weights (P, 3); a mid grey where a part has none."""
+    if part.colours is not None:
+        return weights @ part.colours[faces]
+    if part.texture is None:
+        return np.full((len(faces), len(weights), 3), 0.5)
+    if part.uv is None:
+        return np.broadcast_to(part.texture[0, 0], (len(faces), len(weights), 3))
+    uv = (weights @ np.nan_to_num(part.uv)[faces]).reshape(-1, 2)
+    return texture_at(part.texture, np.stack([uv[:, 0], np.mod(uv[:, 1], 1)], -1)).reshape(len(faces), len(weights), 3)
