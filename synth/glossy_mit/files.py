@@ -1,0 +1,176 @@
+"""The files of one object under one light at one level, laid out as the set lays them out.
+
+`laboratory/OBJECT` holds what is read of a photographed object, `natural/OBJECT` the same diffuse image as the natural folder has it, so
+that both readers find it. 16-bit files hold linear values of 1/65535; original = diffuse + specular exactly, in codes.
+
+Equation: one gain for all levels of an object under a light, so that the brightest value of the highest level, and of the shading, is just
+below 1: nothing is clipped, and levels differ in the specular layer only. The gain goes into the light's constant coefficient too.
+
+Limits: a diffuse value below one code becomes one code, because the set's readers take 0 for "no object here".
+"""
+
+import io
+import json
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import scipy.io
+
+from isc_core.atomic import new_folder
+from isc_core.exr import write_channels
+from isc_core.sirfs.frames import light_to_reference
+
+from ..dataset.scene_folder import checksum
+from .layers import Layers
+from .source import Source
+
+RECORD = "object.json"
+_MATLAB_HEADER = b"MATLAB 5.0 MAT-file, written by isc synth glossy-mit".ljust(116)
+_WHITE = 65535
+_BRIGHTEST = 0.9999
+LABORATORY_FILES = (
+    RECORD, "original.png", "diffuse.png", "specular.png", "specular.exr", "reflectance.png", "shading.png", "mask.png",
+    "depth_valid.png", "shading_corrected_color.mat", "Z.mat", "L.mat", "crop_idx.mat",
+)  # fmt: skip
+NATURAL_FILES = ("L.mat", "diffuse.png", "shading_color.png", "reflectance.png", "mask.png")
+
+
+@dataclass(frozen=True)
+class Exposed:
+    """An object under one light, scaled for its files. `shading`, `diffuse`, `gloss`: (N, 3), the gloss at strength 1; `gain`: by which
+    they were multiplied; `light`: (9, 3) coefficients of our convention that belong to this `shading`."""
+
+    source: Source
+    layers: Layers
+    gain: float
+
+    @cached_property
+    def shading(self) -> np.ndarray:
+        return self.gain * self.layers.shading
+
+    @cached_property
+    def diffuse(self) -> np.ndarray:
+        return self.source.reflectance * self.shading
+
+    @cached_property
+    def light(self) -> np.ndarray:
+        light = self.layers.light.copy()
+        light[0] += np.log(self.gain) * np.sqrt(4 * np.pi)
+        return light
+
+    def strength(self, level: float) -> float:
+        """Of the gloss, so that it holds `level` per cent of all light."""
+        return strength_for(level, self.diffuse, self.gain * self.layers.gloss)
+
+    def specular(self, level: float) -> np.ndarray:
+        """The specular layer (N, 3)."""
+        return self.strength(level) * self.gain * self.layers.gloss
+
+    @cached_property
+    def diffuse_codes(self) -> np.ndarray:
+        return np.maximum(_codes(self.diffuse), 1)
+
+    @cached_property
+    def shared_files(self) -> dict[str, bytes]:
+        """What does not depend on the level: the files' contents by name, those of the natural folder as `natural/NAME`."""
+        whole, light = self.source.whole, light_to_reference(self.light)
+        mask = np.full(len(self.diffuse), _WHITE, np.uint16)
+        files = {
+            "diffuse.png": _png(whole(self.diffuse_codes)),
+            "reflectance.png": _png(whole(_codes(self.source.reflectance))),
+            "shading.png": _png(whole(_codes(self.shading.mean(-1)))),
+            "mask.png": _png(whole(mask)),
+            "depth_valid.png": _png(whole(mask.astype(np.uint8))),
+            "shading_corrected_color.mat": _matlab({"shading_correct": whole(self.shading)}),
+            "Z.mat": _matlab({"depth": whole(self.source.height[self.source.mask], np.nan)}),
+            "L.mat": _matlab({"color_lights": {"diffuse": light, "shading": light}}),
+            "crop_idx.mat": self.source.crop_file,
+        }
+        natural = {name: files[name] for name in NATURAL_FILES if name in files}
+        natural |= {"L.mat": _matlab({"L": light}), "shading_color.png": _png(whole(_codes(self.shading)))}
+        return files | {f"natural/{name}": content for name, content in natural.items()}
+
+
+def exposed(source: Source, layers: Layers, highest_level: float) -> Exposed:
+    """The layers scaled so that even at the highest level nothing is brighter than the files can hold."""
+    diffuse = source.reflectance * layers.shading
+    image = diffuse + strength_for(highest_level, diffuse, layers.gloss) * layers.gloss
+    return Exposed(source, layers, _BRIGHTEST / float(max(image.max(), layers.shading.max())))
+
+
+def strength_for(level: float, diffuse: np.ndarray, gloss: np.ndarray) -> float:
+    """What the gloss is multiplied by to hold `level` per cent of the sum of both layers; 0 where there is no gloss at all."""
+    mirrored = float(gloss.sum(dtype=float))
+    return level / (100 - level) * float(diffuse.sum(dtype=float)) / mirrored if mirrored > 0 else 0.0
+
+
+def write_object(root: Path, picture: Exposed, level: float) -> None:
+    """Writes natural/OBJECT and then laboratory/OBJECT, each whole or not at all. Raises `InputError` where that is impossible."""
+    name, shared = picture.source.name, picture.shared_files
+    with new_folder(root / "natural" / name, NATURAL_FILES) as folder:
+        for file in NATURAL_FILES:
+            (folder / file).write_bytes(shared[f"natural/{file}"])
+    specular = picture.specular(level)
+    codes = _codes(specular)
+    frame = picture.source.whole(specular.astype(np.float32))
+    with new_folder(root / "laboratory" / name, LABORATORY_FILES) as folder:
+        for file in LABORATORY_FILES:
+            if file in shared:
+                (folder / file).write_bytes(shared[file])
+        (folder / "specular.png").write_bytes(_png(picture.source.whole(codes)))
+        (folder / "original.png").write_bytes(_png(picture.source.whole(picture.diffuse_codes + codes)))
+        write_channels(folder / "specular.exr", {channel: frame[..., k] for k, channel in enumerate("RGB")})
+        record = describe(picture, level, codes) | {"files": {file: checksum(folder / file) for file in LABORATORY_FILES[1:]}}
+        (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
+
+
+def is_written(root: Path, name: str) -> bool:
+    """Whether all files of an object are there; folders appear whole, so that they are what they were."""
+    natural, laboratory = ((root / light / name, files) for light, files in (("natural", NATURAL_FILES), ("laboratory", LABORATORY_FILES)))
+    return all((folder / file).is_file() for folder, files in (natural, laboratory) for file in files)
+
+
+def describe(picture: Exposed, level: float, codes: np.ndarray) -> dict[str, Any]:
+    """What `object.json` says, but for the checksums. `codes`: (N, 3) of the specular layer."""
+    specular, layers = picture.specular(level), picture.layers
+    both = float(specular.sum(dtype=float) + picture.diffuse.sum(dtype=float))
+    in_codes = float(codes.sum(dtype=float) / (codes.sum(dtype=float) + picture.diffuse_codes.sum(dtype=float)))
+    brightest = picture.diffuse_codes.astype(int) + codes
+    panel = None if layers.panel is None else {key: np.asarray(value).tolist() for key, value in asdict(layers.panel).items()}
+    return {
+        "object": picture.source.name,
+        "pixels": len(specular),
+        "specular_share": float(specular.sum(dtype=float)) / both,
+        "specular_share_of_codes": in_codes,
+        "clipped_share": float((brightest > _WHITE).any(-1).mean()),
+        "brightest_code": int(brightest.max()),
+        "gain": picture.gain,
+        "gloss_strength": picture.strength(level),
+        "light_fit_residual": layers.light_residual,
+        "environment_fit_residual": layers.environment_residual,
+        "gloss_noise": layers.noise,
+        "panel": panel,
+    }
+
+
+def _codes(values: np.ndarray) -> np.ndarray:
+    return np.rint(np.clip(values, 0, 1) * _WHITE).astype(np.uint16)
+
+
+def _png(pixels: np.ndarray) -> bytes:
+    """A PNG of (h, w) or (h, w, 3) codes."""
+    done, content = cv2.imencode(".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels, [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    if not done:
+        raise OSError("the PNG encoder gave nothing")
+    return content.tobytes()
+
+
+def _matlab(variables: dict[str, Any]) -> bytes:
+    """A MATLAB 5 file; its header names no date, so that equal values give equal bytes."""
+    stream = io.BytesIO()
+    scipy.io.savemat(stream, variables, do_compression=True)
+    return _MATLAB_HEADER + stream.getvalue()[len(_MATLAB_HEADER) :]

@@ -1,0 +1,138 @@
+"""The two layers of an object under each light: shading exactly as the set has it, and the gloss beside it.
+
+Equation: shading = exp(SH(normal)) [+ P], gloss = G(environment) [+ G(panel)], where `isc_core.environment` fits the environment to
+exp(SH), P is the panel's irradiance over pi, and G the normalised Blinn-Phong lobe of strength 1 (see `gloss`). In the physical variant
+`synth.rendering` renders both layers under environment and panel, with the object's own shadows.
+
+Limits: what lights the object from behind is a guess. The physical variant has the grain of its samples, `noise` says of which size.
+"""
+
+from dataclasses import dataclass, replace
+from zlib import crc32
+
+import numpy as np
+
+from isc_core.environment import environment_from_shading, shading_under
+from isc_core.progress import Monitor
+from isc_core.sirfs.frames import real_sh
+
+from ..light_rigs.placing import toward
+from ..lights import EnvironmentLight, PanelLight, panel_toward_origin
+from ..materials import Material
+from ..rendering import RenderOptions, light_surface
+from ..surface import Surface
+from ..tracing import Tracer
+from ..truth import fit_light
+from .gloss import environment_gloss, panel_layers
+from .settings import GlossySettings
+from .source import Source
+
+_PANEL_DISTANCE = 4.0
+_PANEL_SHARE = 0.75  # of the shading that the set's own light gives on the average
+_ENVIRONMENT_ROWS = 32
+
+
+@dataclass(frozen=True)
+class Layers:
+    """An object under one light. `shading`, `gloss`: (N, 3) >= 0, the gloss at strength 1. `light`: (9, 3), the log-shading coefficients:
+    the set's own, or those that fit best where there are none; `light_residual`: RMS of shading less exp(SH), over the RMS of shading.
+    `environment_residual`: the same of the environment's shading to the set's own. `noise`: RMS standard error of the gloss, over its RMS.
+    `panel`: the panel that was added, or None."""
+
+    shading: np.ndarray
+    gloss: np.ndarray
+    light: np.ndarray
+    light_residual: float
+    environment_residual: float
+    noise: float
+    panel: PanelLight | None
+
+
+@dataclass(frozen=True)
+class _Part:
+    """What one light gives: `shading`, `gloss` (N, 3), and the `variance` (N, 3) of the gloss."""
+
+    shading: np.ndarray
+    gloss: np.ndarray
+    variance: np.ndarray
+
+    def plus(self, other: "_Part", gain: float) -> "_Part":
+        """Both lights at once, the other one `gain` times as bright."""
+        return _Part(self.shading + gain * other.shading, self.gloss + gain * other.gloss, self.variance + gain**2 * other.variance)
+
+    @property
+    def noise(self) -> float:
+        return _relative_rms(np.sqrt(self.variance), self.gloss)
+
+
+def make_layers(source: Source, settings: GlossySettings, monitor: Monitor, tracer: Tracer | None = None) -> dict[str, Layers]:
+    """The layers under each of `settings.LIGHTS`. `tracer`: the object, for the physical variant; without one nothing casts a shadow.
+
+    Raises `Cancelled`; `InputError` where the physical variant cannot be rendered here."""
+    surface = surface_of(source, settings.exponent)
+    panel = _panel(source, settings)
+    monitor.report(f"{source.name}: panel", 0.0)
+    under_panel = _lit(surface, panel, settings, tracer, monitor.part(0, 0.3))
+    made = {}
+    for step, (name, light) in enumerate(source.lights.items()):
+        monitor.report(f"{source.name}: {name} light", 0.3 + 0.35 * step)
+        own = np.exp(real_sh(source.normal) @ light)
+        environment = environment_from_shading(light, _ENVIRONMENT_ROWS)
+        residual = _relative_rms(shading_under(environment, source.normal) - own, own)
+        part = _lit(surface, EnvironmentLight(environment), settings, tracer, monitor.part(0.3 + 0.35 * step, 0.65 + 0.35 * step))
+        if tracer is None:
+            made[name] = Layers(own, part.gloss, light, 0.0, residual, 0.0, None)
+            part = _Part(own, part.gloss, part.variance)
+        else:
+            made[name] = _fitted(source, part, residual, None)
+        gain = _PANEL_SHARE * float(own.mean()) / max(float(under_panel.shading.mean()), 1e-12)
+        brighter = replace(panel, radiance=gain * panel.radiance)
+        made[f"{name}-area"] = _fitted(source, part.plus(under_panel, gain), residual, brighter)
+    return made
+
+
+def surface_of(source: Source, exponent: float) -> Surface:
+    """The object's points as the renderer takes them, where `synth.shapes.height_field` has them: object units, the crop's middle at 0."""
+    (rows, columns), height = np.nonzero(source.mask), source.height[source.mask]
+    down, across = source.mask.shape
+    place = np.stack([columns + 0.5 - across / 2, down / 2 - rows - 0.5, height - (height.min() + height.max()) / 2], -1)
+    view = np.broadcast_to(np.array([0.0, 0.0, 1.0]), place.shape)
+    uv = np.full((len(place), 2), 0.5)
+    return Surface(source.mask, place / source.pixels_per_unit, source.normal, view, uv, _material(exponent).at(uv))
+
+
+def _material(exponent: float) -> Material:
+    return Material(np.ones((1, 1, 3)), "blinn_phong", gloss=exponent, strength=1.0)
+
+
+def _lit(
+    surface: Surface, light: EnvironmentLight | PanelLight, settings: GlossySettings, tracer: Tracer | None, monitor: Monitor
+) -> _Part:
+    """One light, traced where there is something to trace."""
+    if tracer is not None:
+        options = RenderOptions(samples=settings.samples, seed=settings.seed)
+        lit = light_surface(surface, _material(settings.exponent), (light,), tracer, options, monitor)
+        return _Part(lit.shading, lit.specular, lit.specular_variance)
+    if isinstance(light, PanelLight):
+        shading, gloss = panel_layers(light, surface.position, surface.normal, settings.exponent)
+    else:
+        shading, gloss = np.zeros_like(surface.normal), environment_gloss(light.radiance, surface.normal, settings.exponent)
+    return _Part(shading, gloss, np.zeros_like(gloss))
+
+
+def _fitted(source: Source, part: _Part, residual: float, panel: PanelLight | None) -> Layers:
+    """Layers whose shading has no coefficients of its own."""
+    coefficients, misfit = fit_light(source.normal, part.shading)
+    return Layers(part.shading, part.gloss, coefficients, misfit, residual, part.noise, panel)
+
+
+def _panel(source: Source, settings: GlossySettings) -> PanelLight:
+    """A white panel above or at a side, drawn by the seed and the object's name."""
+    rng = np.random.default_rng([settings.seed, crc32(source.name.encode())])
+    place = _PANEL_DISTANCE * toward(rng.uniform(25, 50), rng.uniform(-75, 75))
+    sides = 2 * _PANEL_DISTANCE * np.tan(np.radians(rng.uniform(10, 20, 2)) / 2)
+    return panel_toward_origin(tuple(place), (sides[0], sides[1]), (1.0, 1.0, 1.0))
+
+
+def _relative_rms(left: np.ndarray, whole: np.ndarray) -> float:
+    return float(np.sqrt(np.square(left).mean() / max(float(np.square(whole).mean()), 1e-30)))
