@@ -16,13 +16,13 @@ import numpy as np
 
 from isc_core.progress import Monitor
 
-from ..lights import Light
+from ..lights import EnvironmentLight, Light, PanelLight
 from ..materials import Material
 from ..surface import Surface
 from ..tracing import Tracer
 from . import Lit, RenderOptions
 from .bounced_light import World, bounced_paths
-from .direct_light import Paths, Sums, add_exactly, body_without_shadows, draw_paths, trace_paths
+from .direct_light import Paths, Sums, add_exactly, draw_paths, trace_paths, unshadowed
 from .light_sampling import Sampler, sampler_of
 from .reflection import Points, Reflection
 
@@ -36,7 +36,8 @@ def light_surface(
     """Lights the points of `surface`, see `synth.rendering.light_surface`. Raises `Cancelled`."""
     points = Points(surface.position, surface.normal, surface.view, surface.paint.strength, surface.paint.gloss)
     samples = (options.samples, options.samples)
-    sampled = [(light, sampler) for light in lights if (sampler := sampler_of(light)) is not None]
+    wide = [light for light in lights if isinstance(light, PanelLight | EnvironmentLight)]
+    sampled = [(light, sampler) for light in wide if (sampler := sampler_of(light)) is not None]
     world = World(material, Reflection(material), lights, [sampler for _, sampler in sampled], tracer)
     parts = len(sampled) + bool(options.bounces)
     total = Sums(len(points))
@@ -56,15 +57,14 @@ def _add_direct(
     total: Sums,
     points: Points,
     world: World,
-    source: tuple[Light, Sampler],
+    source: tuple[PanelLight | EnvironmentLight, Sampler],
     samples: tuple[int, int],
     seed: tuple[int, int],
     pool: ThreadPoolExecutor,
     monitor: Monitor,
 ) -> None:
     """Adds one light that has a size."""
-    baseline, known = body_without_shadows(points, world.reflection, source[0])
-    total.body += known
+    known = unshadowed(points, world.reflection, source[0])
 
     def draw(chunk: slice) -> Paths:
         return draw_paths(np.random.default_rng((*seed, chunk.start)), points.at(chunk), world.reflection, source[1], samples)
@@ -72,7 +72,7 @@ def _add_direct(
     chunks = _chunks(len(points), sum(samples))
     for number, (chunk, paths) in enumerate(_ahead(pool, draw, chunks)):
         monitor.report("lighting", number / len(chunks))
-        total.add(chunk, paths, samples, trace_paths(points.at(chunk), paths, world.tracer), baseline[chunk])
+        total.add(chunk, paths, trace_paths(points.at(chunk), paths, world.tracer), known.at(chunk))
 
 
 def _add_bounced(
@@ -83,7 +83,7 @@ def _add_bounced(
     for number, chunk in enumerate(chunks):
         monitor.report("light between parts of the object", number / len(chunks))
         paths = bounced_paths(np.random.default_rng((*seed, chunk.start)), points.at(chunk), world, samples, bounces)
-        total.add(chunk, paths, samples, np.ones(len(paths.point), bool))
+        total.add(chunk, paths, np.ones(len(paths.point), bool))
 
 
 def _chunks(count: int, samples: int) -> list[slice]:

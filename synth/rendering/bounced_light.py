@@ -48,6 +48,8 @@ def bounced_paths(rng: np.random.Generator, points: Points, world: World, sample
     return Paths(
         point=point[hit],
         strategy=(sample[hit] >= samples[0]).astype(int),
+        half=sample[hit] % 2,
+        samples=samples,
         direction=direction,
         reach=np.full(len(hit), np.inf),
         light=arriving * (cosine / density)[:, None],
@@ -67,7 +69,7 @@ def _arriving(rng: np.random.Generator, points: Points, direction: np.ndarray, w
         add_exactly(sums, places, world.reflection, light, world.tracer)
     for sampler in world.samplers:
         paths = draw_paths(rng, places, world.reflection, sampler, (1, 1))
-        sums.add(everything, paths, (1, 1), trace_paths(places, paths, world.tracer))
+        sums.add(everything, paths, trace_paths(places, paths, world.tracer))
     leaving = paint.albedo * sums.body + sums.gloss
     if bounces > 1 and len(hit):
         leaving += _one_more(rng, places, paint.albedo, world, bounces - 1)

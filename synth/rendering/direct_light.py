@@ -8,8 +8,9 @@ toward the light and one where the gloss reflects (matt: by the cosine); with n_
 
     f V L cos / sum_k n_k p_k          (the balance heuristic)
 
-Under environments the body only estimates what it loses: b times the closed form without shadows, plus (V f - b / pi) L cos / ..., where b
-is pi f for light along the normal. A matt convex body has no noise at all.
+Of the body only its loss is estimated: a times the closed form S without shadows, for a body that reflects a constant b, plus
+(V f - a b) L cos / .... b is f for light along the normal; a is the share of the light that is not in shadow, for each half of the samples
+as the other half sees it, which keeps the mean right. So there is no noise on a matt convex body, and none in full shadow.
 
 Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", SIGGRAPH 1995,
 doi:10.1145/218380.218498; control variates: J. M. Hammersley, D. C. Handscomb, "Monte Carlo methods" (1964),
@@ -23,9 +24,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lights import DirectionalLight, EnvironmentLight, Light, PointLight
+from ..lights import DirectionalLight, EnvironmentLight, Light, PanelLight, PointLight
 from ..tracing import Tracer
-from .irradiance import unoccluded_shading
+from .irradiance import unoccluded_panel, unoccluded_shading
 from .light_sampling import Sampler
 from .reflection import Points, Reflection
 
@@ -36,17 +37,18 @@ class Sums:
     def __init__(self, count: int) -> None:
         self.body, self.gloss, self.body_variance, self.gloss_variance = np.zeros((4, count, 3))
 
-    def add(self, chunk: slice, paths: "Paths", samples: tuple[int, int], clear: np.ndarray, baseline: np.ndarray | None = None) -> None:
-        """Adds the samples of a chunk of points, so many of either strategy at each point. `clear`: (M,), which reach their light.
-        `baseline`: (chunk,), of the body's f at each point, what is known without samples."""
-        body = clear * paths.body
-        if baseline is not None:
-            body = body - baseline[paths.point]
+    def add(self, chunk: slice, paths: "Paths", clear: np.ndarray, unshadowed: "Unshadowed | None" = None) -> None:
+        """Adds the samples of a chunk of points. `clear`: (M,), which reach their light. `unshadowed`: of the chunk's points."""
         count = chunk.stop - chunk.start
+        body = clear * paths.body
+        if unshadowed is not None:
+            share = _clear_share(paths, clear, count)
+            self.body[chunk] += share.mean(0)[:, None] * unshadowed.body
+            body = body - unshadowed.reflected[paths.point] * share[1 - paths.half, paths.point]
         cell = paths.strategy * count + paths.point
         for lobe, mean, noise in ((body, self.body, self.body_variance), (clear * paths.gloss, self.gloss, self.gloss_variance)):
             for channel in range(3):
-                total, variance = _sum_and_variance(lobe * paths.light[:, channel], cell, count, samples)
+                total, variance = _sum_and_variance(lobe * paths.light[:, channel], cell, count, paths.samples)
                 mean[chunk, channel] += total
                 noise[chunk, channel] += variance
 
@@ -54,11 +56,13 @@ class Sums:
 @dataclass(frozen=True)
 class Paths:
     """M samples that bring light unless something is in the way. `point`: (M,), which point of the chunk. `strategy`: (M,), 0 or 1, what
-    drew it. `direction`: (M, 3); `reach`: (M,), how far the light is; `light`: (M, 3), L cos / sum n p; `body`, `gloss`: (M,), f of both
-    lobes."""
+    drew it; `samples`: how many each draws at a point. `half`: (M,), 0 or 1, each with half of the samples. `direction`: (M, 3); `reach`:
+    (M,), how far the light is; `light`: (M, 3), L cos / sum n p; `body`, `gloss`: (M,), f of both lobes."""
 
     point: np.ndarray
     strategy: np.ndarray
+    half: np.ndarray
+    samples: tuple[int, int]
     direction: np.ndarray
     reach: np.ndarray
     light: np.ndarray
@@ -81,6 +85,8 @@ def draw_paths(rng: np.random.Generator, points: Points, reflection: Reflection,
     return Paths(
         point=point,
         strategy=(sample >= samples[0]).astype(int),
+        half=sample % 2,
+        samples=samples,
         direction=direction,
         reach=seen.distance[bright],
         light=seen.radiance[bright] * (cosine[point, sample] / density)[:, None],
@@ -94,13 +100,34 @@ def trace_paths(points: Points, paths: Paths, tracer: Tracer) -> np.ndarray:
     return ~tracer.blocked(points.lifted()[paths.point], paths.direction, paths.reach)
 
 
-def body_without_shadows(points: Points, reflection: Reflection, light: Light) -> tuple[np.ndarray, np.ndarray]:
-    """A constant f (N,) that is much like the body's, and the radiance (N, 3) that it would have without shadows; 0 unless under an
-    environment."""
-    if not isinstance(light, EnvironmentLight):
-        return np.zeros(len(points)), np.zeros((len(points), 3))
-    baseline = reflection.body(points, points.normal)
-    return baseline, np.pi * baseline[:, None] * unoccluded_shading(light.radiance, points.normal)
+@dataclass(frozen=True)
+class Unshadowed:
+    """The body of N points without shadows, in closed form. `reflected`: (N,), a constant f that is much like the body's; `body`: (N, 3),
+    the radiance under one light of a body that reflects so."""
+
+    reflected: np.ndarray
+    body: np.ndarray
+
+    def at(self, chosen: slice) -> "Unshadowed":
+        """That of some of the points."""
+        return Unshadowed(self.reflected[chosen], self.body[chosen])
+
+
+def unshadowed(points: Points, reflection: Reflection, light: PanelLight | EnvironmentLight) -> Unshadowed:
+    """The points under one light that has a size, as if the object cast no shadow."""
+    reflected = reflection.body(points, points.normal)
+    if isinstance(light, EnvironmentLight):
+        shading = unoccluded_shading(light.radiance, points.normal)
+    else:
+        shading = unoccluded_panel(light, points.position, points.normal)
+    return Unshadowed(reflected, np.pi * reflected[:, None] * shading)
+
+
+def _clear_share(paths: Paths, clear: np.ndarray, count: int) -> np.ndarray:
+    """The share of the light that reaches each point, (2, count), as either half of the samples sees it; 1 where one has none."""
+    cell, light = paths.half * count + paths.point, paths.light.sum(1)
+    reached, all_of_it = (np.bincount(cell, weight, 2 * count).reshape(2, count) for weight in (clear * light, light))
+    return np.where(all_of_it > 0, reached / np.where(all_of_it > 0, all_of_it, 1), 1)
 
 
 def _sum_and_variance(values: np.ndarray, cell: np.ndarray, count: int, samples: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
