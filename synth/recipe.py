@@ -30,6 +30,7 @@ from .albedos import image_albedo, make_albedo
 from .camera import Camera
 from .finishes import make_material
 from .light_rigs import make_lights
+from .light_rigs.files import read_panorama
 from .lights import EnvironmentLight, Light
 from .materials import Material, Model
 from .meshes import Mesh
@@ -37,9 +38,11 @@ from .rendering import Renderer, RenderOptions
 from .scene import Scene
 from .sensor import Sensor, observe
 from .shapes import make_shape
+from .shapes.height_field import mesh_of_height, read_height
+from .shapes.mesh_file import read_mesh_file
 from .truth import GroundTruth, exposed, render_truth
 
-# Families that are read from a user's file instead of drawn.
+# Families that are read from a user's file instead of drawn; "mesh" is also the paint that a mesh brings along.
 MESH_FILE, HEIGHT_FILE, IMAGE_FILE = "mesh", "height", "image"
 _DISTANCE = 5.0  # of a pinhole, object units: as one photographs things on a table
 _FILL = (0.85, 0.90)  # of the picture's side, by the object
@@ -76,6 +79,16 @@ class Sources:
     natural_lights: Path | None = None
     hdr: tuple[Path, ...] = ()
 
+    def check(self) -> bool:
+        """Reads the files once, before any work, and says whether the mesh has colours. Raises `InputError`."""
+        if self.height is not None:
+            read_height(self.height)
+        if self.albedo_image is not None:
+            image_albedo(self.albedo_image)
+        for path in self.hdr:
+            read_panorama(path)
+        return self.mesh is not None and read_mesh_file(self.mesh).albedo is not None
+
 
 @dataclass(frozen=True)
 class Picture:
@@ -101,7 +114,7 @@ class Picture:
 @dataclass(frozen=True)
 class Recipe:
     """One scene. `seed` >= 0. `shape`, `material`, `light`: the members. `model`: the material's reflectance, of `MODELS`; `albedo`: the
-    family of its paint, of `ALBEDOS` or "image". `picture`, `sources`: shared by all scenes of a run."""
+    family of its paint, of `ALBEDOS`, "image" or "mesh". `picture`, `sources`: shared by all scenes of a run."""
 
     seed: int
     shape: Part
@@ -156,12 +169,8 @@ def camera_around(mesh: Mesh, size: int, fill: float, perspective: bool = False)
 def _mesh(recipe: Recipe) -> Mesh:
     shape, sources = recipe.shape, recipe.sources
     if shape.family == MESH_FILE:
-        from .shapes.mesh_file import read_mesh
-
-        return _centred(read_mesh(_given(sources.mesh, "--mesh")))
+        return _centred(read_mesh_file(_given(sources.mesh, "--mesh")).mesh)
     if shape.family == HEIGHT_FILE:
-        from .shapes.height_field import mesh_of_height, read_height
-
         return _centred(mesh_of_height(read_height(_given(sources.height, "--height"))))
     return _centred(make_shape(shape.family, shape.generator("shape")))
 
@@ -173,8 +182,13 @@ def _centred(mesh: Mesh) -> Mesh:
 
 
 def _material(recipe: Recipe) -> Material:
+    albedo: np.ndarray | None
     if recipe.albedo == IMAGE_FILE:
         albedo = image_albedo(_given(recipe.sources.albedo_image, "--albedo-image"))
+    elif recipe.albedo == MESH_FILE:
+        albedo = read_mesh_file(_given(recipe.sources.mesh, "--mesh")).albedo
+        if albedo is None:
+            raise InputError(f"{recipe.sources.mesh} has no colours of its own: name other --albedos")
     else:
         albedo = make_albedo(recipe.albedo, recipe.material.generator("albedo"))
     return make_material(cast(Model, recipe.model), albedo, recipe.material.generator("gloss"))

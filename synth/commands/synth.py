@@ -21,6 +21,7 @@ from ..rendering import Renderer
 from ..sensor import DEPTHS, Sensor
 from ..shapes import SHAPES
 from ..variant import slower_without
+from . import glossy_mit
 
 _EXAMPLES = """  isc synth --count 200 --size 128 -o scenes              about six of ten scenes to train on, the others held out
   isc synth --count 20 --shapes lathe --materials ggx --lights area --clip --bits 8 --noise 0.01 -o photos
@@ -42,6 +43,7 @@ def declare(commands: Commands) -> None:
     parser.add_argument("--seed", type=count, default=0, metavar="S", help="of the first scene (default %(default)s)")
     _add_choices(parser)
     _add_picture(parser)
+    glossy_mit.declare(parser.add_subparsers(title="another data set", metavar="SET"))
 
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:
@@ -53,8 +55,10 @@ def _add_choices(parser: argparse.ArgumentParser) -> None:
     what.add_argument(
         "--lights", type=names, metavar="a,b", help=f"of {', '.join(RIGS)} (default: {drawn}, and those whose files are given)"
     )
-    what.add_argument("--mesh", type=Path, metavar="FILE", help="a mesh of your own, instead of --shapes or beside them")
-    what.add_argument("--height", type=Path, metavar="FILE", help="a height map of your own (.mat with Z, or .npy), likewise")
+    what.add_argument(
+        "--mesh", type=Path, metavar="FILE", help="a mesh of your own, in its own colours, instead of --shapes or beside them"
+    )
+    what.add_argument("--height", type=Path, metavar="FILE", help="a height map of your own (Z.mat, .npy, .exr), likewise")
     what.add_argument(
         "--albedo-image", type=Path, metavar="FILE", help="an image to paint objects with, instead of --albedos or beside them"
     )
@@ -85,7 +89,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     sources = _sources(options)
     sensor = Sensor(clip=options.clip or options.bits > 0, noise=options.noise, bits=options.bits)
     picture = Picture(options.size, options.samples, options.bounces, options.perspective, options.exposure, sensor, options.renderer)
-    wanted = Run(options.count, options.seed, _choices(options, sources), picture, sources)
+    wanted = Run(options.count, options.seed, _choices(options, sources, sources.check()), picture, sources)
     if (advice := slower_without()) and not options.quiet:
         print(f"isc: {advice}", file=sys.stderr)
     outcome = make_dataset(wanted, options.output, monitor)
@@ -93,12 +97,16 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     return hints(options, f"{outcome.made} scenes made{kept}: {options.output / 'README.md'} describes them")
 
 
-def _choices(options: argparse.Namespace, sources: Sources) -> Choices:
-    """The families asked for; files that are given take part, and where nothing was named beside them, alone."""
+def _choices(options: argparse.Namespace, sources: Sources, painted: bool) -> Choices:
+    """The families asked for; files that are given take part, and where nothing was named beside them, alone. `painted`: whether the mesh
+    has colours, which are its paint unless another is named."""
     usual = Choices()
     own = [name for name, path in ((MESH_FILE, sources.mesh), (HEIGHT_FILE, sources.height)) if path]
     shapes = _together(options.shapes, tuple(own), () if own else usual.shapes)
-    albedos = _together(options.albedos, (IMAGE_FILE,) if sources.albedo_image else (), () if sources.albedo_image else usual.albedos)
+    paints = [IMAGE_FILE] if sources.albedo_image else [MESH_FILE] if painted and shapes == (MESH_FILE,) and not options.albedos else []
+    albedos = _together(options.albedos, tuple(paints), () if paints else usual.albedos)
+    if MESH_FILE in albedos and not painted:
+        raise InputError("the mesh has no colours of its own: name other --albedos")
     from_files = tuple(name for name, given in (("natural", sources.natural_lights), ("hdr", sources.hdr)) if given)
     lights = _together(options.lights, () if options.lights else from_files, usual.lights)
     return Choices(shapes, options.materials or usual.materials, albedos, lights, options.splits or ())

@@ -30,6 +30,7 @@ from .splits import SPLITS, Choices, make_pools
 SCHEMA_VERSION = 1
 KIND = "isc synth data set"
 MOST_SCENES = 100_000  # seeds have five digits in folder names
+_LOOKING = 0.02  # of the whole, for what is there already
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
@@ -84,10 +85,10 @@ def make_dataset(run: Run, out: Path, monitor: Monitor | None = None) -> Outcome
     _write_root(out, run, settings, planned, complete=False)
     missing = []
     for index, scene in enumerate(planned):
-        monitor.report("looking for finished scenes", 0.02 * index / len(planned))
+        monitor.report("looking for finished scenes", _LOOKING * index / len(planned))
         if not is_finished(out / scene.split / scene.recipe.name, scene):
             missing.append(scene)
-    _make(missing, len(planned), out, monitor.part(0.02 if len(missing) < len(planned) else 0.0, 1.0))
+    _make(missing, len(planned), out, monitor.part(_LOOKING, 1.0))
     _write_root(out, run, settings, planned, complete=True)
     return Outcome(len(missing), len(planned) - len(missing))
 
@@ -99,6 +100,7 @@ def _make(missing: list[Planned], total: int, out: Path, monitor: Monitor) -> No
         within = monitor.part(index / len(missing), (index + 1) / len(missing))
         within.report(text, 0.0)
         scene_itself, truth = photograph(scene.recipe, Monitor(_constant(text, within), within.cancelled))
+        within.report(text, 0.9)
         write_scene(out / scene.split / scene.recipe.name, scene.split, scene.recipe, scene_itself, truth)
         del scene_itself, truth
         gc.collect()  # renderers hold their buffers in reference cycles

@@ -37,7 +37,8 @@ _GLOSSY_WEIGHT = 3  # of a glossy model beside a matt one
 @dataclass(frozen=True)
 class Choices:
     """The families that scenes are drawn from, by name: `shapes`, `materials` (models), `albedos`, `lights`; and the `splits` wanted, an
-    empty one meaning all that can be. "mesh", "height" and "image" are the user's files. Raises `InputError` for unknown names."""
+    empty one meaning all that can be. "mesh", "height" and "image" are the user's files ("mesh" among
+    the albedos: its own colours). Raises `InputError` for unknown names."""
 
     shapes: tuple[str, ...] = SHAPES
     materials: tuple[str, ...] = MODELS
@@ -49,7 +50,7 @@ class Choices:
         known = {
             "shape": (self.shapes, (*SHAPES, MESH_FILE, HEIGHT_FILE)),
             "material": (self.materials, MODELS),
-            "albedo": (self.albedos, (*ALBEDOS, IMAGE_FILE)),
+            "albedo": (self.albedos, (*ALBEDOS, IMAGE_FILE, MESH_FILE)),
             "light": (self.lights, RIGS),
             "split": (self.splits, SPLITS),
         }
@@ -95,8 +96,9 @@ def make_pools(choices: Choices, sources: Sources) -> Pools:
     """The members of all families chosen. Raises `InputError` where a split that was asked for has nothing held out."""
     shapes = tuple(_Member(part, held) for name in choices.shapes for part, held in _members(name, _shapes_of(name, sources)))
     lights = tuple(_Member(part, held) for name in choices.lights for part, held in _members(name, _lights_of(name, sources)))
-    if IMAGE_FILE in choices.albedos and sources.albedo_image is None:
-        raise InputError(f"the albedo {IMAGE_FILE!r} is read from a file: give --albedo-image FILE")
+    for name, path, option in ((IMAGE_FILE, sources.albedo_image, "--albedo-image"), (MESH_FILE, sources.mesh, "--mesh")):
+        if name in choices.albedos and path is None:
+            raise InputError(f"the albedo {name!r} is read from a file: give {option} FILE")
     materials = tuple(member for model in choices.materials for member in _materials(model, choices.albedos))
     pools = {"shape": shapes, "material": materials, "light": lights}
     lacking = {kind for kind, members in pools.items() if not any(member.held_out for member in members)}
@@ -133,10 +135,10 @@ def _lights_of(name: str, sources: Sources) -> int:
 def _materials(model: str, albedos: tuple[str, ...]) -> list[_Member]:
     found = []
     for albedo in albedos:
-        own = albedo == IMAGE_FILE
+        own = albedo in (IMAGE_FILE, MESH_FILE)
         for turn in range(_ROUNDS):
             number = turn if own else turn * len(ALBEDOS) + ALBEDOS.index(albedo)
-            found.append(_Member(Part(f"{model}_image" if own else model, number), turn % _EVERY == _EVERY - 1, model, albedo))
+            found.append(_Member(Part(f"{model}_{albedo}" if own else model, number), turn % _EVERY == _EVERY - 1, model, albedo))
     return found
 
 
