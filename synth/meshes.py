@@ -52,13 +52,17 @@ def grid_faces(rows: int, columns: int) -> np.ndarray:
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit normals (N, 3): the sum of the normals of the faces around each vertex, by their area; (0, 0, 1) where that is nothing.
+    """Unit normals (N, 3): the mean of those of the faces around each vertex, by sin(angle) / (product of the sides) there, which is exact
+    where the vertices lie on a sphere (N. Max 1999, doi:10.1080/10867651.1999.10487501); (0, 0, 1) where there are none.
 
     Vertices that lie in one place have to be one vertex, or they make a crease."""
-    a, b, c = (vertices[faces[:, i]] for i in range(3))
-    across = np.cross(b - a, c - a)
-    corners = faces.T.ravel()
-    total = np.stack([np.bincount(corners, np.tile(across[:, i], 3), len(vertices)) for i in range(3)], -1)
+    corner = vertices[faces]
+    sides = corner - np.roll(corner, 1, axis=1)
+    square = (sides**2).sum(-1)
+    across = np.cross(sides[:, 1], sides[:, 2])
+    product = square * np.roll(square, -1, axis=1)  # of the two sides that meet at each corner
+    weights = (across[:, None] / np.where(product > 0, product, np.inf)[..., None]).reshape(-1, 3)
+    total = np.stack([np.bincount(faces.ravel(), weights[:, i], len(vertices)) for i in range(3)], -1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.where(length > 0, length, 1), (0.0, 0.0, 1.0))
 

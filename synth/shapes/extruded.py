@@ -19,7 +19,7 @@ _COLUMNS, _CAP, _EDGE, _WALL = 600, 16, 12, 10
 KINDS = ("star", "gear", "flower", "heart", "letter", "polygon")
 _OFTEN = (0.2, 0.18, 0.18, 0.08, 0.2, 0.16)
 _LETTERS = {
-    "L": [(-0.35, 1), (-0.35, -0.35), (0.8, -0.35), (0.8, -0.95), (-0.95, -0.95), (-0.95, 1)],
+    "L": [(-0.35, 1), (-0.95, 1), (-0.95, -0.95), (0.8, -0.95), (0.8, -0.35), (-0.35, -0.35)],
     "T": [(0.3, 0.3), (0.95, 0.3), (0.95, 0.9), (-0.95, 0.9), (-0.95, 0.3), (-0.3, 0.3), (-0.3, -1.1), (0.3, -1.1)],
     "X": [(0.38, 0), (1, 0.95), (0.4, 0.95), (0, 0.4), (-0.4, 0.95), (-1, 0.95), (-0.38, 0), (-1, -0.95), (-0.4, -0.95), (0, -0.4),
           (0.4, -0.95), (1, -0.95)],
@@ -34,7 +34,8 @@ _MIDDLE = {"L": (-0.65, -0.65), "T": (0, 0.6), "Y": (0, 0.05), "arrow": (0.25, 0
 @dataclass(frozen=True)
 class Extrusion:
     """`polygon`: (n, 2) corners counter-clockwise, all of it seen from the origin. `depth`: from front to back. `rounding`: of its corners;
-    `edge`: radius of the edge between front and wall, at most; `dome`: how much the front's middle stands out per squared unit."""
+    `edge`: radius of the edge between front and wall, at most; `dome`: how much the front's middle stands out per squared unit, less than
+    half the depth in all."""
 
     polygon: np.ndarray
     depth: float
@@ -45,7 +46,8 @@ class Extrusion:
     def mesh(self) -> Mesh:
         """The surface, its front toward +z. It is textured from the front, and on over the edge along the wall."""
         outline, normal, tightest = smooth_outline(self.polygon, self.rounding)
-        edge = min(self.edge, 0.8 * tightest, 0.45 * self.depth)
+        lowest = self.depth / 2 - self.dome * float((outline**2).sum(1).max())  # of the front's rim
+        edge = min(self.edge, 0.8 * tightest, 0.9 * lowest)
         rim = outline - edge * normal
         scale = np.linspace(0, 1, _CAP)[:, None, None]
         lean = np.linspace(0, np.pi / 2, _EDGE + 1)[1:, None, None]
@@ -83,7 +85,7 @@ def random_polygon(kind: str, rng: np.random.Generator) -> np.ndarray:
     turn = np.linspace(0, 2 * np.pi, 721)[:-1] + np.pi / 2
     if kind == "heart":
         points = np.stack([16 * np.sin(turn) ** 3, 13 * np.cos(turn) - 5 * np.cos(2 * turn) - 2 * np.cos(3 * turn) - np.cos(4 * turn)], -1)
-        return points[::-1] / 16 - (0, 0.0)
+        return points[::-1] / 16
     if kind == "flower":
         radius = 1 + rng.uniform(0.08, 0.2) * np.cos(int(rng.integers(4, 10)) * turn)
         return radius[:, None] * np.stack([np.cos(turn), np.sin(turn)], -1)
