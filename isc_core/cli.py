@@ -1,7 +1,8 @@
 """The command `isc`: runs a sub-command and turns how it ended into an exit code and at most one line.
 
-0: done. 2: something given cannot be used, or the machine has no room for it; one line on stderr says what to do. 130: cancelled by
-Ctrl-C (the first lets the work stop at its next step, the second stops it at once). Nothing half-written is left in any case.
+0: done. 1: done, but what was measured breaks a bound; stderr says which. 2: something given cannot be used, or the machine has no room
+for it; one line on stderr says what to do. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the second stops it
+at once). Nothing half-written is left in any case.
 """
 
 import contextlib
@@ -10,9 +11,9 @@ import re
 import sys
 from collections.abc import Sequence
 
-from .errors import Cancelled, InputError
+from .errors import Cancelled, InputError, Rejected
 
-SUCCESS, BROKEN_PIPE, REFUSED, CANCELLED = 0, 1, 2, 130
+SUCCESS, BROKEN_PIPE, REJECTED, REFUSED, CANCELLED = 0, 1, 1, 2, 130
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -23,6 +24,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return code
     except InputError as error:
         return _refuse(str(error))
+    except Rejected as verdict:
+        for line in str(verdict).splitlines():
+            print(f"isc: rejected: {line}", file=sys.stderr)
+        return REJECTED
     except (Cancelled, KeyboardInterrupt):
         print("isc: cancelled", file=sys.stderr)
         return CANCELLED

@@ -1,4 +1,4 @@
-"""The two ways in which ISC ends early on purpose."""
+"""The ways in which ISC ends on purpose other than by success."""
 
 
 class InputError(ValueError):
@@ -10,3 +10,10 @@ class InputError(ValueError):
 
 class Cancelled(Exception):
     """The user asked to stop. The command line exits with 130; nothing half-written is left."""
+
+
+class Rejected(Exception):
+    """The work was done and its result is written, but what was measured breaks a bound.
+
+    The message says which, a line each. The command line prints it and exits with 1.
+    """

@@ -1,0 +1,79 @@
+"""`isc validate`: how large the errors of every stage are on rendered scenes, what causes them, and whether they are accepted."""
+
+import argparse
+import shlex
+from pathlib import Path
+
+from isc_core.atomic import require_writable_file
+from isc_core.commands.options import Commands, add_command, count, hints, names
+from isc_core.errors import InputError, Rejected
+from isc_core.pipeline import ILLUMINATIONS
+from isc_core.progress import Monitor
+from isc_core.separation import BEST, METHODS
+
+_EXAMPLES = """  isc synth --count 60 --size 128 -o scenes
+  isc validate scenes -o validation                     then open validation/report.html
+  isc validate scenes -o shen --separator shen_2013 --bounds none
+  isc validate scenes -o validation --update-bounds bounds.json"""
+_NO_BOUNDS = "none"
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands, "validate", run, "errors of every stage on rendered scenes, their causes, and whether they are accepted",
+        "Runs the stages over a dataset of isc synth: tables of errors with confidence intervals, an error budget by swapping in the truth "
+        "for one stage at a time, slices by gloss, light, albedo and size, and pictures. Writes a folder with report.html, report.json and "
+        "summary.md. Exits with 1 where a bound is broken; the maps that show why are then in its folder evidence.", _EXAMPLES,
+    )  # fmt: skip
+    parser.add_argument("dataset", metavar="DATASET", type=Path, help="a folder that isc synth wrote")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier report is replaced"
+    )
+    parser.add_argument("--split", metavar="NAME", help="run one split of the dataset (default: all)")
+    parser.add_argument("--scenes", type=count, default=0, metavar="N", help="run N scenes, drawn by --seed (default: all)")
+    parser.add_argument("--stages", type=names, metavar="a,b", help="separation, sirfs (default: all, and the chain with its error budget)")
+    parser.add_argument("--separator", choices=METHODS, default=BEST, metavar="NAME", help="how to separate (default %(default)s)")
+    parser.add_argument("--illumination", choices=ILLUMINATIONS, default=ILLUMINATIONS[0], help="which lights SIRFS expects")
+    parser.add_argument("--seed", type=count, default=0, metavar="S", help="of everything drawn at random (default 0)")
+    parser.add_argument("--bounds", metavar="FILE", help="bounds to judge by (default: those of the package; none: judge nothing)")
+    parser.add_argument("--update-bounds", type=Path, metavar="FILE", help="write bounds that this run keeps with a margin")
+    parser.add_argument("--renders", type=count, default=3, metavar="N", help="how many scenes to render again as a check (default 3)")
+    parser.add_argument("--threads", type=count, default=0, metavar="N", help="how many scenes at once (0: one for each core)")
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work; what can be wrong is found before it begins. Raises `Rejected` where a bound is broken, with the report written."""
+    from ..validation.bounds import SHIPPED, bounds_from, read_bounds, write_bounds
+    from ..validation.folder import require_writable_report, write_report
+    from ..validation.run import RunOptions
+    from ..validation.stages import StageOptions, find_stages
+    from ..validation.validate import validate
+
+    settings = StageOptions(options.separator, options.illumination)
+    wanted = RunOptions(options.split, options.scenes, find_stages(options.stages), settings, options.seed, options.threads)
+    bounds_file = SHIPPED if options.bounds is None else Path(options.bounds)
+    bounds = () if options.bounds == _NO_BOUNDS or (options.bounds is None and not SHIPPED.is_file()) else read_bounds(bounds_file)
+    require_writable_report(options.output)
+    if options.update_bounds is not None:
+        require_writable_file(options.update_bounds)
+    if options.output.resolve() == options.dataset.resolve():
+        raise InputError("the report cannot replace the dataset: name another folder for -o")
+    outcome = validate(options.dataset, wanted, bounds, options.renders, _command(options), monitor.part(0, 0.9))
+    write_report(outcome, options.output, monitor.part(0.9, 1))
+    if options.update_bounds is not None:
+        write_bounds(options.update_bounds, bounds_from(outcome.figures))
+    if outcome.failures:
+        raise Rejected("\n".join([*outcome.failures, f"look at {options.output / 'report.html'}"]))
+    return [*outcome.notes, *hints(options, f"look at {options.output / 'report.html'}")]
+
+
+def _command(options: argparse.Namespace) -> str:
+    """The command that makes the report again."""
+    words = ["isc", "validate", str(options.dataset), "-o", str(options.output)]
+    for name, default in (("split", None), ("scenes", 0), ("separator", BEST), ("illumination", ILLUMINATIONS[0]), ("bounds", None)):
+        if (value := getattr(options, name)) != default:
+            words += [f"--{name}", str(value)]
+    if options.stages:
+        words += ["--stages", ",".join(options.stages)]
+    return shlex.join([*words, "--seed", str(options.seed)])

@@ -1,0 +1,112 @@
+"""The best, the median and the worst scene of each stage, run once more for their pictures and maps: no run has to keep all of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isc_core.exr import write_channels
+from isc_core.progress import Monitor
+
+from ..dataset.reading import read_truth
+from ..truth import GroundTruth
+from .bounds import Verdict
+from .figures import CHAIN, Figure, scene_value
+from .markdown import number
+from .run import RunOptions, SceneResult, side_by_side
+from .stages import Picture, Stage, find_stages, given
+
+_RANKS = ("best", "median", "worst")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene to look at: its `rank` on a `stage`, its name, its figure in words, the pictures."""
+
+    stage: str
+    rank: str
+    scene: str
+    remark: str
+    pictures: tuple[Picture, ...]
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Which stage, which rank, which scene, and its value."""
+
+    stage: Stage[Any, Any]
+    rank: str
+    scene: SceneResult
+    value: float
+
+
+def make_cases(scenes: Sequence[SceneResult], options: RunOptions, monitor: Monitor) -> tuple[Case, ...]:
+    """The cases of every stage, by its first metric. Raises `InputError`, `Cancelled`."""
+    places = [place for stage in options.stages for place in _places(stage, scenes)]
+
+    def run(place: _Place, own: Monitor) -> Case:
+        truth = read_truth(place.scene.facts.folder)
+        answer = place.stage.run(given(truth, place.stage.needs), options.settings, own)
+        facts = place.scene.facts
+        kind = f"{facts.gloss_class} {facts.model}, {facts.albedo}, light {facts.light_kind}"
+        remark = f"{place.stage.metrics[0].title} {number(place.value)}; {kind}; specular {100 * facts.specular_share:.1f} % of the light"
+        return Case(place.stage.name, place.rank, facts.name, remark, place.stage.shown(truth, answer))
+
+    return side_by_side(run, places, options.threads, "drawing", monitor) if places else ()
+
+
+def worst_scenes(verdict: Verdict, figures: Sequence[Figure], scenes: Sequence[SceneResult], many: int = 2) -> tuple[SceneResult, ...]:
+    """The scenes of a bound's slice that break it most."""
+    bound = verdict.bound
+    figure = next(f for f in figures if (f.stage, f.metric.name, f.group.kind, f.group.value) == _key(verdict))
+    values = [(value, k) for k in figure.group.members if (value := scene_value(scenes[k], bound.stage, bound.metric)) is not None]
+    ordered = sorted(values, reverse=not figure.metric.larger_is_better)
+    return tuple(scenes[k] for _, k in ordered[:many])
+
+
+def write_evidence(folder: Path, scene: SceneResult, stage: str, options: RunOptions, monitor: Monitor) -> tuple[str, ...]:
+    """Writes FOLDER/truth.exr and FOLDER/STAGE.exr of one scene; of the chain, what each of its stages made of the photo.
+
+    Gives the names of the files. Raises `InputError`, `Cancelled`.
+    """
+    truth = read_truth(scene.facts.folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    write_channels(folder / "truth.exr", _truth_maps(truth))
+    names = ["truth.exr"]
+    diffuse = None
+    for found in find_stages(None if stage == CHAIN else (stage,)):
+        inputs = given(truth, () if stage == CHAIN else found.needs, diffuse)
+        answer = found.run(inputs, options.settings, monitor)
+        diffuse = getattr(answer, "diffuse", diffuse)
+        name = f"{'chain_' if stage == CHAIN else ''}{found.name}.exr"
+        write_channels(folder / name, found.maps(answer))
+        names.append(name)
+    return tuple(names)
+
+
+def _key(verdict: Verdict) -> tuple[str, str, str, str]:
+    bound = verdict.bound
+    return bound.stage, bound.metric, bound.kind, bound.value
+
+
+def _places(stage: Stage[Any, Any], scenes: Sequence[SceneResult]) -> list[_Place]:
+    metric = stage.metrics[0]
+    values = [(value, k) for k, scene in enumerate(scenes) if (value := scene_value(scene, stage.name, metric.name)) is not None]
+    ordered = sorted(values, reverse=metric.larger_is_better)
+    if not ordered:
+        return []
+    picks = dict.fromkeys((0, len(ordered) // 2, len(ordered) - 1))
+    ranks = _RANKS if len(picks) == 3 else _RANKS[::2][: len(picks)]
+    return [_Place(stage, rank, scenes[ordered[pick][1]], ordered[pick][0]) for rank, pick in zip(ranks, picks, strict=True)]
+
+
+def _truth_maps(truth: GroundTruth) -> dict[str, np.ndarray]:
+    maps = {name: values for name, values in truth.arrays().items() if values.shape[:2] == truth.mask.shape}
+    letters = {2: ("Y",), 3: ("R", "G", "B")}
+    return {
+        f"{name}.{letter}": np.asarray(values, np.float32).reshape(*truth.mask.shape, -1)[..., k]
+        for name, values in maps.items()
+        for k, letter in enumerate(letters[values.ndim])
+    }
