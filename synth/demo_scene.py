@@ -6,55 +6,64 @@ Writes `photo.png` (sRGB, 16 bits, with alpha: what a person would take) and `tr
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
-import cv2
 import numpy as np
 
 from isc_core.atomic import new_folder, require_writable
 from isc_core.errors import InputError
 from isc_core.exr import write_channels
 
+from .camera import SMALLEST, Camera
 from .gourd import gourd, painted_skin
-from .ground_truth import GroundTruth, Material, View, render
-from .lighting import soft_sky, softbox
-from .variant import load_mitsuba
+from .lights import EnvironmentLight, Light, panel_toward_origin
+from .materials import Material
+from .rendering import RenderOptions
+from .scene import Scene
+from .sensor import write_photo
+from .truth import GroundTruth, exposed, render_truth
 
+SIZE, SAMPLES = 320, 64
+_IN_VIEW = 2.3  # object units, the side of the picture
 _FILES = ("truth.exr", "photo.png")
 _LAYERS = ("image", "diffuse", "specular", "reflectance", "shading")
 
 
-def demo_lights() -> dict[str, Any]:
-    """The lights of the demo, as Mitsuba emitters. Raises `InputError` where Mitsuba is not installed."""
-    mi = load_mitsuba()
-    return {
-        "sky": {"type": "envmap", "bitmap": mi.Bitmap(soft_sky()), "scale": 0.55},
-        "key": softbox(mi, (-5.0, 5.5, 7.0), (1.7, 1.7), (88.0, 80.0, 68.0)),
-        "fill": softbox(mi, (7.0, 1.5, 4.0), (0.8, 3.2), (16.0, 20.0, 27.0)),
-    }
+def demo_scene(size: int = SIZE) -> Scene:
+    """The gourd, tipped toward the viewer, in a picture of `size` x `size` pixels. Raises `InputError` for an impossible size."""
+    return Scene(
+        gourd().turned(14),
+        Material(painted_skin(), "ggx", gloss=0.1, strength=1.0, ior=1.5),
+        demo_lights(),
+        Camera(size, size, size / _IN_VIEW),
+    )
 
 
-def demo_object(view: View) -> GroundTruth:
+def demo_lights() -> tuple[Light, ...]:
+    """A soft sky, a warm softbox above to the left, and a cool one to the right."""
+    return (
+        EnvironmentLight(0.55 * soft_sky()),
+        panel_toward_origin((-5.0, 5.5, 7.0), (1.7, 1.7), (88.0, 80.0, 68.0)),
+        panel_toward_origin((7.0, 1.5, 4.0), (0.8, 3.2), (16.0, 20.0, 27.0)),
+    )
+
+
+def demo_object(size: int = SIZE, samples: int = SAMPLES) -> GroundTruth:
     """Renders the demo's object, exposed so that only its highlights reach 1. Raises `InputError` where Mitsuba is not installed."""
-    lights = demo_lights()
-    truth = render(gourd().turned(14), Material(painted_skin()), lights, view)
-    return exposed(truth)
+    scene = demo_scene(size)
+    return exposed(scene, render_truth(scene, RenderOptions(samples=samples)), level=0.9, layer="image")[1]
 
 
-def exposed(truth: GroundTruth, share: float = 0.995) -> GroundTruth:
-    """The same scene with the light scaled so that `share` of the object's values stay below 0.9."""
-    gain = 0.9 / max(float(np.quantile(truth.image[truth.mask], share)), 1e-6) if truth.mask.any() else 1.0
-    lit = {name: getattr(truth, name) * np.float32(gain) for name in ("image", "diffuse", "specular", "shading")}
-    return GroundTruth(**lit, reflectance=truth.reflectance, normal=truth.normal, height=truth.height, mask=truth.mask, alpha=truth.alpha)
-
-
-def write_photo(path: Path, truth: GroundTruth) -> None:
-    """Writes the image as a camera would: sRGB, clipped at 1, 16-bit PNG, the mask as alpha. Raises `InputError` if it cannot."""
-    linear = np.clip(truth.image, 0, 1)
-    encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    pixels = np.dstack([encoded[..., ::-1], truth.mask])
-    if not cv2.imwrite(str(path), np.rint(pixels * 65535).astype(np.uint16)):
-        raise InputError(f"{path} cannot be written: choose a folder that you may write to")
+def soft_sky(rows: int = 64) -> np.ndarray:
+    """An environment of low frequencies, (rows, 2 rows, 3) float32, linear radiance, row 0 straight up: sky, horizon, ground, a window."""
+    polar = (np.arange(rows) + 0.5) * np.pi / rows
+    turn = (np.arange(2 * rows) + 0.5) * np.pi / rows
+    up = np.cos(polar)[:, None, None]
+    sky, horizon, ground = np.array([0.30, 0.42, 0.62]), np.array([0.62, 0.55, 0.46]), np.array([0.20, 0.15, 0.11])
+    height = np.clip(up, 0, 1) ** 0.6
+    below = np.clip(-up, 0, 1) ** 0.5
+    gradient = np.where(up >= 0, horizon + (sky - horizon) * height, horizon + (ground - horizon) * below)
+    window = np.exp(3 * (np.sin(polar)[:, None] * np.cos(turn - 0.5 * np.pi)[None] - 1))[..., None] * np.array([0.75, 0.55, 0.35])
+    return np.ascontiguousarray(gradient + window, np.float32)
 
 
 def write_truth(path: Path, truth: GroundTruth) -> None:
@@ -69,14 +78,14 @@ def main(arguments: list[str] | None = None) -> int:
     """The command. Returns 0, or 2 after one line about what was wrong."""
     parser = argparse.ArgumentParser(prog="python -m synth.demo_scene", description="Render a glossy object with its ground truth.")
     parser.add_argument("-o", "--output", type=Path, required=True, help="folder for photo.png and truth.exr")
-    parser.add_argument("--size", type=int, default=View.size, help="side of the image in pixels (default: %(default)s)")
-    parser.add_argument("--samples", type=int, default=View.samples, help="rays per pixel (default: %(default)s)")
+    parser.add_argument("--size", type=int, default=SIZE, help="side of the image in pixels (default: %(default)s)")
+    parser.add_argument("--samples", type=int, default=SAMPLES, help="rays per pixel (default: %(default)s)")
     options = parser.parse_args(arguments)
     try:
-        if options.size < 8 or options.samples < 1:
-            raise InputError("--size must be 8 or more and --samples 1 or more")
+        if options.size < SMALLEST or options.samples < 2:
+            raise InputError(f"--size must be {SMALLEST} or more and --samples 2 or more")
         require_writable(options.output, _FILES)
-        truth = demo_object(View(size=options.size, samples=options.samples))
+        truth = demo_object(options.size, options.samples)
         with new_folder(options.output, _FILES) as folder:
             write_truth(folder / "truth.exr", truth)
             write_photo(folder / "photo.png", truth)
