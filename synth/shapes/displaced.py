@@ -31,9 +31,9 @@ def displacement(directions: np.ndarray, rng: np.random.Generator, style: str) -
     """The logarithm of the radius (N,) in the unit directions (N, 3), of one of `STYLES`."""
     broad = 0.1 * smooth_field(directions, rng, 0.25)
     if style == "gentle":
-        return broad + rng.uniform(0.05, 0.12) * smooth_field(directions, rng, rng.uniform(0.3, 0.5))
+        return broad + rng.uniform(0.06, 0.14) * smooth_field(directions, rng, rng.uniform(0.3, 0.5))
     if style == "lumpy":
-        return broad + rng.uniform(0.03, 0.06) * smooth_field(directions, rng, rng.uniform(0.7, 1.3))
+        return broad + rng.uniform(0.035, 0.07) * smooth_field(directions, rng, rng.uniform(0.7, 1.3))
     if style == "dented":
         return broad + _dents(directions, rng, int(rng.integers(6, 25)))
     if style == "crumpled":

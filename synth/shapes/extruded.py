@@ -72,7 +72,7 @@ def extruded(rng: np.random.Generator) -> Mesh:
     polygon = random_polygon(kind, rng)
     depth = rng.uniform(0.35, 0.9)
     rounding = rng.uniform(0.03, 0.05) if kind in ("gear", "letter") else rng.uniform(0.06, 0.12)
-    dome = rng.uniform(0.03, 0.3) * depth / (polygon**2).sum(1).max()
+    dome = rng.uniform(0.08, 0.38) * depth / (polygon**2).sum(1).max()
     body = Extrusion(polygon, depth, rounding, rng.uniform(0.05, 0.2), dome)
     return posed(body.mesh(), rng, (8, 30), 32, 8)
 

@@ -59,12 +59,14 @@ def lathe_form(name: str, rng: np.random.Generator) -> Mesh:
     """One of `FORMS` with random proportions, posed. Cups have a handle, as a rule."""
     wide, tall = np.exp(rng.normal(size=2) * (0.14, 0.1))
     base = np.array(_SOLID.get(name) or _HOLLOW[name], float) * (wide, tall)
-    base[1:-1, 0] *= np.exp(0.05 * rng.normal(size=len(base) - 2))
+    base[1:-1, 0] *= np.exp(0.035 * rng.normal(size=len(base) - 2))
     wall = rng.uniform(0.05, 0.08)
     outline = base if name in _SOLID else hollow(base, wall)
     body = revolved(outline, smoothing=rng.uniform(0.02, 0.05) if name in _SOLID else 0.3 * wall)
     if name == "cup" and rng.random() < 0.75:
-        body = joined(body, _handle(float(np.interp(0.0, base[::-1, 1], base[::-1, 0])) - wall / 2, 0.45 * tall, rng))
+        half = 0.45 * tall
+        ends = PchipInterpolator(base[-2::-1, 1], base[-2::-1, 0])((half, -half)) - wall / 2
+        body = joined(body, _handle(ends, half, rng))
         return posed(body.rotated(Rotation.from_euler("y", rng.uniform(-55, 55), degrees=True).as_matrix()), rng, _ABOVE["cup"], 1)
     lean = 25 if name in ("egg", "pear") else 4
     return posed(body, rng, _ABOVE.get(name, (5, 25)), 10, lean)
@@ -113,17 +115,17 @@ def _coordinates(radius: np.ndarray, height: np.ndarray, turn: np.ndarray) -> np
     girth = np.pi * np.quantile(radius[top:], 0.8)
     whole = max(girth, down[-1])
     folded = np.where(np.abs(turn) > np.pi / 2, np.sign(turn) * np.pi - turn, turn) / np.pi
-    u, v = np.meshgrid(0.5 + folded * girth / whole, 0.5 + (down - down[-1] / 2) / whole)
+    u, v = np.meshgrid(0.5 + 0.99 * folded * girth / whole, 0.5 + (down - down[-1] / 2) / whole)
     return np.clip(np.stack([u.ravel(), v.ravel()], -1), 0, 1)
 
 
-def _handle(radius: float, half: float, rng: np.random.Generator) -> Mesh:
-    """A bent tube, closed at both ends, that leaves a wall at (radius, +-half) toward +x."""
+def _handle(ends: np.ndarray, half: float, rng: np.random.Generator) -> Mesh:
+    """A bent tube, closed at both ends, that leaves a wall toward +x at the radii `ends` (2,) and heights half, -half."""
     along = np.linspace(0, 1, 90)
-    bend = np.pi * (along - 0.5)
     out = rng.uniform(0.4, 0.6)
-    path = np.stack([radius + out * np.cos(bend) ** rng.uniform(0.6, 1.0), -half * np.sin(bend) * rng.uniform(0.8, 1.0)], -1)
-    path[[0, -1], 0] = radius
+    path = np.stack(
+        [ends[0] + (ends[1] - ends[0]) * along + out * np.sin(np.pi * along) ** rng.uniform(0.6, 1.0), half * np.cos(np.pi * along)], -1
+    )
     toward = np.gradient(path, axis=0)
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
     turn = np.linspace(0, 2 * np.pi, 49)

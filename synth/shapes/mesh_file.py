@@ -1,7 +1,8 @@
 """A user's mesh and its colours, from a file that trimesh reads.
 
 Equation: vertices in one place are one; face corners around it are smooth together where the faces beside each other meet at less than
-`CREASE`; the normal is the sum over such a group of the faces' normals, by area. Colours that are no single texture within [0, 1] are
+`CREASE`; the normal is the sum over such a group of the faces' normals,
+each times the face's angle there. Colours that are no single texture within [0, 1] are
 painted on one, as seen from the front.
 
 Citation: M. Dawson-Haggerty et al., trimesh (2019), https://trimesh.org; glTF 2.0 (ISO/IEC 12113:2022) for what its colours mean.
@@ -13,11 +14,12 @@ glTF. Only files in the mesh's own folder, or below it, are opened.
 import io
 import struct
 import zlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL import Image
 from scipy.ndimage import distance_transform_edt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
@@ -33,10 +35,12 @@ KINDS = ("glb", "gltf", "obj", "off", "ply", "stl")
 CREASE = 40.0  # degrees between the normals of neighbouring faces; above it their edge is sharp
 MOST_FACES = 3_000_000
 _MOST_BYTES = 1 << 30
+_UNREADABLE = "model.gltf"  # what trimesh asks for where a glTF file is not JSON
 _NO_COLOUR = (102, 102, 102)  # what trimesh gives a material that names none
-_PAINTED = 1024  # pixels a side of a painted texture
+_PAINTED = 768  # pixels a side of a painted texture
 _ERRORS = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, NotImplementedError, EOFError, AssertionError,
-           RecursionError, MemoryError, struct.error, zlib.error)  # fmt: skip
+           RecursionError, MemoryError, struct.error, zlib.error,
+           Image.DecompressionBombError)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,8 @@ class _Beside:
         """The bytes of a file; `FileNotFoundError` where it is absent or elsewhere."""
         name = str(name).strip().replace("\\", "/")
         place = (self.folder / name).resolve()
+        if name == _UNREADABLE:
+            raise FileNotFoundError(name)
         if not place.is_relative_to(self.folder):
             self.outside.append(name)
         elif not place.is_file():
@@ -136,10 +142,21 @@ def _read_parts(path: Path) -> list[_Part]:
     _check_references(path, beside)
     if not parts:
         raise InputError(f"{path} holds no triangles: export the object as a mesh")
-    pictures = [name for name in beside.given if Path(name).suffix.lower() not in (".mtl", ".bin")]
-    if pictures and all(part.texture is None for part in parts):
-        raise InputError(f"{path}: its texture {pictures[0]} is not a readable image: save it again as PNG")
+    for name in tuple(beside.given):
+        if Path(name).suffix.lower() not in (".mtl", ".bin") and not _is_image(beside.get(name)):
+            raise InputError(f"{path}: its texture {name} is not a readable image: save it again as PNG")
+    if kind == "obj" and not beside.given:  # trimesh invents a grey material for an OBJ file that names none
+        return [replace(part, texture=None) for part in parts]
     return parts
+
+
+def _is_image(data: bytes) -> bool:
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            image.load()
+    except _ERRORS:
+        return False
+    return True
 
 
 def _check_references(path: Path, beside: _Beside) -> None:
@@ -156,7 +173,8 @@ def _part(scene: Any, node: str, kind: str) -> _Part | None:
     faces = np.asarray(getattr(piece, "faces", np.empty((0, 3))), dtype=np.int64)
     if not len(faces):
         return None
-    vertices = np.asarray(piece.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
+    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused later, by name
+        vertices = np.asarray(piece.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
     if np.linalg.det(transform[:3, :3]) < 0:
         faces = faces[:, ::-1]
     uv = getattr(piece.visual, "uv", None)
@@ -259,9 +277,16 @@ def _smooth_corners(vertices: np.ndarray, faces: np.ndarray, place: np.ndarray) 
     links = np.concatenate([np.stack([corner[first], after[second]]), np.stack([after[first], corner[second]])], axis=1)
     graph = coo_matrix((np.ones(links.shape[1], bool), (links[0], links[1])), shape=(3 * count, 3 * count))
     groups, group = connected_components(graph, directed=False)
-    total = np.stack([np.bincount(group, np.repeat(across[:, i], 3), groups) for i in range(3)], -1)
+    angle = _angles(vertices[faces]).ravel()
+    total = np.stack([np.bincount(group, angle * np.repeat(facing[:, i], 3), groups) for i in range(3)], -1)
     norm = np.linalg.norm(total, axis=1, keepdims=True)
     return group, np.where(norm > 0, total / np.where(norm > 0, norm, 1), (0.0, 0.0, 1.0))
+
+
+def _angles(corner: np.ndarray) -> np.ndarray:
+    """The angles (M, 3) of triangles (M, 3, 3), radians; 0 where a side has no length."""
+    ahead, behind = np.roll(corner, -1, 1) - corner, np.roll(corner, 1, 1) - corner
+    return np.arctan2(np.linalg.norm(np.cross(ahead, behind), axis=-1), (ahead * behind).sum(-1))
 
 
 def _within(uv: np.ndarray) -> bool:
@@ -288,13 +313,16 @@ def _painted(parts: list[_Part], vertices: np.ndarray, front: np.ndarray) -> np.
 
 def _paint(part: _Part, z: np.ndarray, front: np.ndarray, texture: np.ndarray, depth: np.ndarray) -> None:
     """Puts one part's colours into a texture (h w, 3) where it is before what is there, by points spread over its faces."""
-    place = front[part.faces] * _PAINTED
-    longest = np.linalg.norm(place - np.roll(place, 1, 1), axis=-1).max(1)
-    steps = 2 ** np.ceil(np.log2(np.maximum(1.5 * longest, 1))).astype(int)
+    x, y = (part.vertices[part.faces, i] for i in range(2))
+    toward = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) > (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
+    shown = part.faces[toward]  # of a closed mesh the others are behind these
+    place = front[shown] * _PAINTED
+    longest = np.linalg.norm(place - np.roll(place, 1, 1), axis=-1).max(1, initial=0)
+    steps = np.ceil(1.25 ** np.ceil(np.log(np.maximum(1.2 * longest, 1)) / np.log(1.25))).astype(int)
     for step in np.unique(steps):
         i, j = np.nonzero(np.add.outer(np.arange(step + 1), np.arange(step + 1)) <= step)
         weights = np.stack([i, j, step - i - j], -1) / step
-        for faces in np.array_split(part.faces[steps == step], max(1, (steps == step).sum() * len(weights) // 2_000_000)):
+        for faces in np.array_split(shown[steps == step], max(1, (steps == step).sum() * len(weights) // 2_000_000)):
             cell = np.clip(np.floor(weights @ front[faces] * _PAINTED).astype(int), 0, _PAINTED - 1)
             index, near = (cell[..., 1] * _PAINTED + cell[..., 0]).ravel(), (weights @ z[faces][..., None]).ravel()
             order = np.argsort(near)  # the nearest last: it is the one that stays

@@ -1,7 +1,8 @@
 """Random height fields, as closed slabs: crumpled paper, folded cloth, carved reliefs, quilts.
 
 Equation: paper, sums of |triangle waves| in random directions, bent by a smooth field; cloth, waves whose phase a smooth field bends;
-relief, smooth steps of a smooth field's level sets on a slightly domed plate; quilt, |sin u sin v|^(1/2) cushions.
+relief, smooth steps of a smooth field's level sets on a slightly domed plate; quilt, cushions
+|sin u sin v|^(1/2), rounded at their seams.
 
 Citation: see `synth.shapes.fields`; K. Perlin, "An image synthesizer", Computer Graphics 19(3) (1985), doi:10.1145/325165.325247 (phase
 bent by noise).
@@ -45,7 +46,7 @@ def relief_height(place: np.ndarray, rng: np.random.Generator, style: str) -> np
     if style == "quilt":
         turn, count = rng.uniform(0, np.pi), rng.uniform(1.5, 3) * np.pi
         u, v = (np.cos(turn + a) * place[..., 0] + np.sin(turn + a) * place[..., 1] for a in (0, np.pi / 2))
-        waves = (np.sin(count * u) ** 2 + 0.002) * (np.sin(count * v) ** 2 + 0.002)
+        waves = (np.sin(count * u) ** 2 + 0.03) * (np.sin(count * v) ** 2 + 0.03)
         return dome + rng.uniform(0.3, 0.7) / count * waves**0.25 + 0.3 * low
     level = smooth_field(place, rng, rng.uniform(0.5, 0.9))
     steps = sum(np.tanh((level - at) * 7) for at in rng.uniform(-1, 1, int(rng.integers(1, 4))))

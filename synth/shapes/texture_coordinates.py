@@ -11,6 +11,7 @@ Limits: what is drawn grows up to T / sin(T) along the rim; from the front it is
 import numpy as np
 
 _FRONT = np.radians(120)  # how far around an object its front reaches: what is seen of it when it is turned by 30 degrees
+_EDGE = 0.495  # of the texture from its middle: u wraps around, and its ends do not match
 
 
 def from_directions(directions: np.ndarray) -> np.ndarray:
@@ -30,4 +31,4 @@ def from_the_front(vertices: np.ndarray) -> np.ndarray:
 def _around(away: np.ndarray, radius: np.ndarray) -> np.ndarray:
     """Coordinates at `radius`, in [0, 1], from the texture's middle on the side of `away` (N, 2), y up."""
     length = np.linalg.norm(away, axis=1)
-    return np.clip(0.5 + away * (0.5 * radius / np.where(length > 0, length, 1))[:, None] * (1, -1), 0, 1)
+    return np.clip(0.5 + away * (_EDGE * radius / np.where(length > 0, length, 1))[:, None] * (1, -1), 0, 1)

@@ -67,7 +67,7 @@ def test_normals_are_unit_and_those_of_the_faces(name: str) -> None:
         normal, solid = facing(mesh)
         agreement = np.stack([(mesh.normals[mesh.faces[:, i]] * normal).sum(1) for i in range(3)])[:, solid]
         assert agreement.min() > 0.1  # at the edge of a slab, which is a crease on one side
-        assert np.quantile(agreement, 0.03) > 0.97
+        assert np.quantile(agreement, 0.03) > 0.95
 
 
 @every
