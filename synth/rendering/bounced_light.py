@@ -48,7 +48,7 @@ def bounced_paths(rng: np.random.Generator, points: Points, world: World, sample
     return Paths(
         point=point[hit],
         strategy=(sample[hit] >= samples[0]).astype(int),
-        half=sample[hit] % 2,
+        half=(sample[hit] - np.where(sample[hit] >= samples[0], samples[0], 0)) % 2,
         samples=samples,
         direction=direction,
         reach=np.full(len(hit), np.inf),

@@ -30,6 +30,8 @@ from .irradiance import unoccluded_panel, unoccluded_shading
 from .light_sampling import Sampler
 from .reflection import Points, Reflection
 
+_ENOUGH = 4  # samples that can be halved and still have a variance in either half
+
 
 class Sums:
     """The lobes of N points as they grow, (N, 3) each, and the variances of both."""
@@ -40,15 +42,18 @@ class Sums:
     def add(self, chunk: slice, paths: "Paths", clear: np.ndarray, unshadowed: "Unshadowed | None" = None) -> None:
         """Adds the samples of a chunk of points. `clear`: (M,), which reach their light. `unshadowed`: of the chunk's points."""
         count = chunk.stop - chunk.start
-        body = clear * paths.body
+        body, gloss = clear * paths.body, clear * paths.gloss
+        halves = min(paths.samples) >= _ENOUGH
         if unshadowed is not None:
-            share = _clear_share(paths, clear, count)
+            share = _clear_share(paths, clear, count) if halves else np.ones((2, count))
             self.body[chunk] += share.mean(0)[:, None] * unshadowed.body
             body = body - unshadowed.reflected[paths.point] * share[1 - paths.half, paths.point]
-        cell = paths.strategy * count + paths.point
-        for lobe, mean, noise in ((body, self.body, self.body_variance), (clear * paths.gloss, self.gloss, self.gloss_variance)):
+        group = 2 * paths.strategy + paths.half if halves else paths.strategy
+        sizes = [(many + 1 - half) // 2 for many in paths.samples for half in (0, 1)] if halves else list(paths.samples)
+        cell = group * count + paths.point
+        for lobe, mean, noise in ((body, self.body, self.body_variance), (gloss, self.gloss, self.gloss_variance)):
             for channel in range(3):
-                total, variance = _sum_and_variance(lobe * paths.light[:, channel], cell, count, paths.samples)
+                total, variance = _sum_and_variance(lobe * paths.light[:, channel], cell, count, sizes)
                 mean[chunk, channel] += total
                 noise[chunk, channel] += variance
 
@@ -85,7 +90,7 @@ def draw_paths(rng: np.random.Generator, points: Points, reflection: Reflection,
     return Paths(
         point=point,
         strategy=(sample >= samples[0]).astype(int),
-        half=sample % 2,
+        half=(sample - np.where(sample >= samples[0], samples[0], 0)) % 2,
         samples=samples,
         direction=direction,
         reach=seen.distance[bright],
@@ -130,11 +135,11 @@ def _clear_share(paths: Paths, clear: np.ndarray, count: int) -> np.ndarray:
     return np.where(all_of_it > 0, reached / np.where(all_of_it > 0, all_of_it, 1), 1)
 
 
-def _sum_and_variance(values: np.ndarray, cell: np.ndarray, count: int, samples: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Sums (count,) of samples over the strategies, and their variances. `cell`: strategy * count + point; what lacks is 0."""
-    sums = np.bincount(cell, values, 2 * count).reshape(2, count)
-    squares = np.bincount(cell, values * values, 2 * count).reshape(2, count)
-    many = np.array(samples, float)[:, None]
+def _sum_and_variance(values: np.ndarray, cell: np.ndarray, count: int, sizes: list[int]) -> tuple[np.ndarray, np.ndarray]:
+    """Sums (count,) of samples over groups of equal law, and their variances. `cell`: group * count + point; `sizes`: samples of each group
+    at a point, those that bring nothing need not be listed."""
+    sums, squares = (np.bincount(cell, values**power, len(sizes) * count).reshape(len(sizes), count) for power in (1, 2))
+    many = np.array(sizes, float)[:, None]
     spread = np.maximum(squares - sums**2 / many, 0) * many / np.maximum(many - 1, 1)
     return sums.sum(0), spread.sum(0)
 
