@@ -113,12 +113,16 @@ def _render(recipe: Recipe) -> dict[str, Any]:
 
 
 def _camera(camera: Camera) -> dict[str, Any]:
+    """`view_width`: object units across the picture at the origin (Blender's orthographic scale). `focal_length`: pixels."""
     return {
         "kind": "perspective" if camera.perspective else "orthographic",
         "width": camera.width,
         "height": camera.height,
         "pixels_per_unit": camera.pixels_per_unit,
+        "view_width": camera.width / camera.pixels_per_unit,
         "distance": camera.distance if camera.perspective else None,
+        "focal_length": camera.distance * camera.pixels_per_unit if camera.perspective else None,
+        "principal_point": [camera.width / 2, camera.height / 2],
         "world_to_camera": camera.matrices(),
     }
 

@@ -138,6 +138,24 @@ def test_the_description_says_how_and_in_which_frame(made: Path) -> None:
     assert set(CONVENTIONS) == set(MODELS)
 
 
+@pytest.mark.parametrize("perspective", [False, True])
+def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it(tmp_path: Path, perspective: bool) -> None:
+    """Heights, taken back into space and through the OpenCV matrix, land on the centres of their pixels."""
+    make_dataset(Run(1, 5, CHOICES, replace(PICTURE, perspective=perspective)), tmp_path / "set")
+    folder = list_scenes(tmp_path / "set")[0]
+    truth, camera = read_truth(folder), json.loads((folder / "scene.json").read_text())["camera"]
+    rows, columns = np.nonzero(truth.mask)
+    z = truth.height[truth.mask].astype(float) / camera["pixels_per_unit"]
+    nearer = 1 - z / camera["distance"] if perspective else 1.0
+    x = (columns + 0.5 - 16) / camera["pixels_per_unit"] * nearer
+    y = (16 - rows - 0.5) / camera["pixels_per_unit"] * nearer
+    seen = np.array(camera["world_to_camera"]["opencv"]) @ np.stack([x, y, z, np.ones_like(z)])
+    scale = camera["focal_length"] / seen[2] if perspective else 32 / camera["view_width"]
+    across, down = (seen[i] * scale + camera["principal_point"][i] for i in range(2))
+    assert np.abs(across - columns - 0.5).max() < 1e-3 and np.abs(down - rows - 0.5).max() < 1e-3
+    assert (seen[2] > 0).all()
+
+
 def test_the_same_seed_gives_the_same_bytes(made: Path, tmp_path: Path) -> None:
     make_dataset(replace(RUN, count=2), tmp_path / "again")
     ours, theirs = contents(tmp_path / "again"), contents(made)

@@ -132,6 +132,16 @@ def test_a_run_makes_scenes_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFi
     assert picture["sensor"] == {"clip": True, "noise": 0.01, "bits": 8}, "codes imply clipping"
 
 
+@pytest.mark.parametrize("quiet", [False, True])
+def test_slow_rendering_is_explained_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, quiet: bool
+) -> None:
+    pytest.importorskip("mitsuba", reason="needs the extra `synth`")
+    monkeypatch.setattr("synth.commands.synth.slower_without", lambda: "libLLVM 15 is too old: install libllvm19")
+    assert synth(tmp_path / "set", *(QUICK if quiet else QUICK[:-1])) == 0
+    assert capsys.readouterr().err.count("isc: libLLVM 15 is too old: install libllvm19\n") == (not quiet)
+
+
 def test_the_command_in_the_readme_makes_the_same_scenes(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     assert synth(tmp_path / "one", *QUICK, "--exposure", "0.4", "--clip", "--lights", "sh", "--perspective") == 0
