@@ -152,9 +152,11 @@ class PaintLobes:
 
 @dataclass(frozen=True)
 class PlasticLobes:
-    """Mitsuba's rough plastic, `plugin`, whose parameters are uniform."""
+    """Mitsuba's rough plastic, `plugin`, whose parameters are uniform. `drawn`: lobes alike, whose directions are taken: the plugin would
+    draw few for the gloss, which is faint and bright at once."""
 
     plugin: Lanes
+    drawn: PaintLobes
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
         mi = load_mitsuba()
@@ -164,25 +166,25 @@ class PlasticLobes:
         return body, gloss
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        return self.plugin.pdf(load_mitsuba().BSDFContext(), _interaction(view), light)
+        return self.drawn.density(view, light)
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
-        drawn, _ = self.plugin.sample(load_mitsuba().BSDFContext(), _interaction(view), choice, place)
-        return drawn.wo
+        return self.drawn.sample(view, choice, place)
 
 
 def lobes_of(material: Material, paint: Paint) -> Lobes:
     """The lobes of a material at points whose paint is known, a lane each. Raises `InputError` where Mitsuba is not installed."""
     dr, mi = load_drjit(), load_mitsuba()
-    if material.model == "roughplastic":
-        return PlasticLobes(rough_plastic(float(material.gloss), material.ior))
     sigma, f0, strength, gloss = mi.Float(material.sigma), mi.Float(material.f0), mi.Float(paint.strength), mi.Float(paint.gloss)
     # What is opaque is no constant of a kernel, so that the next scene finds the kernel compiled.
     dr.make_opaque(sigma, f0, strength, gloss)
     if material.model == "blinn_phong":
         return PaintLobes(0.0, strength, BlinnPhongGloss(gloss))
+    facets = PaintLobes(0.0, strength, GgxGloss(gloss, f0))
+    if material.model == "roughplastic":
+        return PlasticLobes(rough_plastic(float(material.gloss), material.ior), facets)
     if material.model == "ggx":
-        return PaintLobes(0.0, strength, GgxGloss(gloss, f0))
+        return facets
     return PaintLobes(sigma if material.model == "oren_nayar" else 0.0)
 
 

@@ -8,19 +8,21 @@ light with the density p and one toward what the lobes reflect with q, and both 
     V f_r L cos / (p + q)                                        the balance heuristic; V: nothing stands between
 
 The body takes its shading without shadows from a closed form, S, so that only what shadows change is drawn:
-k S + (V f_r - k / pi) L cos / (p + q), for k = pi f_r with the light along the normal. On a convex Lambertian object that has no variance.
-Mean and variance are gathered by Welford's updates; samples are independent, the variance of the mean is sum of squares / (n (n - 1)).
+a k S + (V f_r - a k / pi) L cos / (p + q), k = pi f_r with the light along the normal, a the share of the light that gets there. That share
+is estimated by the other half of the samples, so the mean stays right. A convex Lambertian object has no variance, full shadow neither.
+Samples are independent: the variance of a mean is their sum of squares / (n (n - 1)), gathered by Welford's updates.
 
 Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", SIGGRAPH 1995,
 doi:10.1145/218380.218498. B. P. Welford, "Note on a method for calculating corrected sums of squares and products", Technometrics 4(3),
 419-420 (1962), doi:10.1080/00401706.1962.10490022. W. Jakob et al., Dr.Jit, 2022, doi:10.1145/3528223.3530099.
 
-Limits: LLVM variants only. Light paths that bounce have no closed form. float32.
+Limits: LLVM variants only; float32. Where a rare shadow or glint is met by no sample, neither the mean nor the variance knows of it:
+compare renders of like numbers of samples, or take many.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -28,31 +30,19 @@ from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..lights import Light
-from ..materials import Material
+from ..materials import Material, Paint
 from ..surface import Surface
-from ..tracing import LIFT, Tracer
+from ..tracing import Tracer
 from ..variant import has_llvm, load_mitsuba
 from . import Lit, RenderOptions
-from .bsdfs import Lanes, Lobes, load_drjit, lobes_of
+from .bsdfs import Lanes, load_drjit, lobes_of
+from .mitsuba_bounces import World, bounced_light
+from .mitsuba_direct import Points, beam_light, generator, one_sample, points_at
 from .mitsuba_lights import Beam, WideLight, kernel_light
 
+_POINTS = 1 << 17  # points at a time: memory
 _AT_ONCE = 1 << 22  # light paths between two reports
-
-
-@dataclass(frozen=True)
-class Points:
-    """Points that are lit, a lane each. `origin`: the position lifted off the surface, where rays start. `frame`: z along the normal.
-    `view`: in that frame."""
-
-    position: Lanes
-    origin: Lanes
-    frame: Lanes
-    view: Lanes
-    lobes: Lobes
-
-    def values(self, direction: Lanes) -> tuple[Lanes, Lanes]:
-        """f_r cos of body and gloss for light from a direction."""
-        return self.lobes.values(self.view, self.frame.to_local(direction))
+_DIVISIBLE = 4  # samples: from so many on each half has a variance of its own
 
 
 def light_surface(
@@ -62,119 +52,153 @@ def light_surface(
     if not has_llvm():
         raise InputError("Mitsuba's kernels need libLLVM 19 or later (Debian's package: libllvm19): install it, or take renderer 'arrays'")
     random = np.random.default_rng(options.seed)
-    points = _points(surface.position, surface.normal, surface.view, lobes_of(material, surface.paint))
-    total = Lit(*(np.zeros((len(surface.position), 3)) for _ in range(4)))
-    for k, light in enumerate(lights):
-        part = monitor.part(k / len(lights), (k + 1) / len(lights))
-        kernel = kernel_light(light)
-        seed = int(random.integers(1 << 31))
-        if isinstance(kernel, Beam):
-            total = _sum(total, _beam(points, kernel, tracer))
-        elif kernel is not None:
-            total = _sum(total, _wide(points, surface, kernel, tracer, options.samples, seed, part))
-        part.report("light", 1.0)
+    world = World(material, [kernel for light in lights if (kernel := kernel_light(light)) is not None], tracer)
+    count = len(surface.position)
+    starts = range(0, count, _POINTS)
+    pieces = [
+        _light(
+            _piece(surface, slice(start, start + _POINTS)),
+            world,
+            options,
+            random,
+            monitor.part(start / count, min(1, (start + _POINTS) / count)),
+        )
+        for start in starts
+    ]
+    return Lit(*(np.concatenate([getattr(piece, field.name) for piece in pieces]) for field in fields(Lit)))
+
+
+def _piece(surface: Surface, chosen: slice) -> Surface:
+    """Some of the points of a surface, under the same mask."""
+    paint = Paint(surface.paint.albedo[chosen], surface.paint.strength[chosen], surface.paint.gloss[chosen])
+    places = (part[chosen] for part in (surface.position, surface.normal, surface.view, surface.uv))
+    return Surface(surface.mask, *places, paint)
+
+
+def _light(surface: Surface, world: World, options: RenderOptions, random: np.random.Generator, monitor: Monitor) -> Lit:
+    # Two lanes a point, so that each half of the samples has moments of its own.
+    halves = 2 if options.samples >= _DIVISIBLE else 1
+    paint = Paint(*(np.concatenate([part] * halves) for part in (surface.paint.albedo, surface.paint.strength, surface.paint.gloss)))
+    places = (np.tile(part, (halves, 1)) for part in (surface.position, surface.normal, surface.view))
+    points = points_at(*places, lobes_of(world.material, paint))
+    count = len(surface.position)
+    total = _dark(count)
+    jobs = len(world.lights) + bool(options.bounces)
+    for k, light in enumerate(world.lights):
+        part, seed = monitor.part(k / jobs, (k + 1) / jobs), int(random.integers(1 << 32))
+        part.report("light", 0.0)
+        if isinstance(light, Beam):
+            total = _sum(total, _exact(points, count, light, world.tracer))
+        else:
+            gathered = _gather(points, halves * count, light, world.tracer, -(-options.samples // halves), seed, part)
+            total = _sum(total, _joined(gathered.moments(halves), _known(points, surface, light)))
+    if options.bounces:
+        total = _sum(total, bounced_light(surface, world, options, random, monitor.part((jobs - 1) / jobs, 1)))
+    monitor.report("light", 1.0)
     return total
 
 
-def _points(position: np.ndarray, normal: np.ndarray, view: np.ndarray, lobes: Lobes) -> Points:
-    dr, mi = load_drjit(), load_mitsuba()
-    place, across, toward = (mi.Vector3f(np.ascontiguousarray(part.T, np.float32)) for part in (position, normal, view))
-    frame, origin = mi.Frame3f(across), place + LIFT * across
-    local = frame.to_local(toward)
-    dr.eval(place, origin, frame, local)
-    return Points(mi.Point3f(place), mi.Point3f(origin), frame, local, lobes)
+def _dark(count: int) -> Lit:
+    return Lit(*(np.zeros((count, 3)) for _ in range(4)))
 
 
-def _visible(points: Points, direction: Lanes, distance: Lanes, needed: Lanes, tracer: Tracer) -> Lanes:
-    """Whether nothing stands between the points and what is `distance` away; only where that is needed."""
-    mi = load_mitsuba()
-    ray = mi.Ray3f(points.origin, direction)
-    ray.maxt = mi.Float(distance)
-    return needed & ~tracer.scene.ray_test(ray, needed)
+def _exact(points: Points, count: int, light: Beam, tracer: Tracer) -> Lit:
+    parts = [np.array(colour, float).T[:count] for colour in beam_light(points, light, tracer)]
+    return Lit(*parts, *(np.zeros_like(part) for part in parts))
 
 
-def _beam(points: Points, light: Beam, tracer: Tracer) -> Lit:
-    dr = load_drjit()
-    direction, distance, irradiance = light.arriving(points.position)
-    body, gloss = points.values(direction)
-    seen = _visible(points, direction, distance, body > 0, tracer)
-    body, gloss = (np.array(dr.select(seen, value * irradiance, 0), float).T for value in (body, gloss))
-    return Lit(body, gloss, np.zeros_like(body), np.zeros_like(gloss))
+def _flat(points: Points) -> Lanes:
+    """The albedo of a Lambertian body that is much like the points' own: as theirs, lit along the normal."""
+    return math.pi * points.lobes.values(points.view, load_mitsuba().Vector3f(0, 0, 1))[0]
 
 
-def one_sample(points: Points, light: WideLight, tracer: Tracer, random: Lanes, share: Lanes) -> tuple[Lanes, Lanes]:
-    """The colours that one sample of a light gives to body and gloss; the body's less `share` of its closed form."""
-    dr, mi = load_drjit(), load_mitsuba()
-
-    def draw() -> Lanes:
-        return mi.Point2f(random.next_float32(), random.next_float32())
-
-    toward = light.sample(points.position, draw(), draw())
-    mirrored = points.frame.to_world(points.lobes.sample(points.view, random.next_float32(), draw()))
-    body, gloss = mi.Color3f(0), mi.Color3f(0)
-    for direction in (toward, mirrored):
-        local = points.frame.to_local(direction)
-        radiance, distance, density = light.along(points.position, direction)
-        density += points.lobes.density(points.view, local)
-        useful = (local.z > 0) & (density > 0)
-        radiance = dr.select(useful, radiance / dr.select(useful, density, 1), 0)
-        matt, shiny = points.lobes.values(points.view, local)
-        seen = _visible(points, direction, distance, useful & (dr.max(radiance) > 0), tracer)
-        body += radiance * (dr.select(seen, matt, 0) - share * local.z / math.pi)
-        gloss += radiance * dr.select(seen, shiny, 0)
-    return body, gloss
-
-
-def _wide(points: Points, surface: Surface, light: WideLight, tracer: Tracer, samples: int, seed: int, monitor: Monitor) -> Lit:
-    dr, mi = load_drjit(), load_mitsuba()
+def _known(points: Points, surface: Surface, light: WideLight) -> np.ndarray:
+    """The shading, (N, 3), of such a body without shadows."""
     count = len(surface.position)
-    share = math.pi * points.lobes.values(points.view, mi.Vector3f(0, 0, 1))[0]
-    dr.eval(share)
-    gathered = _Gathered(count, seed)
-    chunk = max(1, _AT_ONCE // count)
+    return light.unoccluded(surface.position, surface.normal) * np.resize(np.array(_flat(points), float), 2 * count)[:count, None]
+
+
+def _gather(points: Points, lanes: int, light: WideLight, tracer: Tracer, samples: int, seed: int, monitor: Monitor) -> "_Gathered":
+    flat = _flat(points)
+    load_drjit().eval(flat)
+    gathered, chunk = _Gathered(lanes, seed), max(1, _AT_ONCE // lanes)
     for start in range(0, samples, chunk):
         monitor.report("light", start / samples)
-        gathered.add(lambda random: one_sample(points, light, tracer, random, share), min(chunk, samples - start))
-    lit = gathered.lit()
-    flat = light.unoccluded(surface.position, surface.normal) * np.array(share, float)[:, None]
-    return Lit(lit.shading + flat, lit.specular, lit.shading_variance, lit.specular_variance)
+        gathered.add(lambda random: one_sample(points, light, tracer, random, flat), min(chunk, samples - start))
+    return gathered
+
+
+@dataclass(frozen=True)
+class _Moments:
+    """Of `count` samples of (plain, more, gloss), see `one_sample`: (N, 3) each. `means`; `spreads`: sums of squares about the mean;
+    `common`: sum of products of plain and more about their means."""
+
+    count: int
+    means: list[np.ndarray]
+    spreads: list[np.ndarray]
+    common: np.ndarray
+
+    def clear_share(self) -> np.ndarray:
+        """The share of the light that gets to each point, (N, 1) in [0, 1]."""
+        plain, more = (mean.sum(axis=1, keepdims=True) for mean in self.means[:2])
+        return np.clip(1 + more / np.where(plain > 0, plain, 1), 0, 1)
+
+    def lit(self, known: np.ndarray, share: np.ndarray) -> Lit:
+        """With `share` of the plain light replaced by what it is `known` to be, (N, 3)."""
+        drawn, pairs = 1 - share, max(self.count * (self.count - 1), 1)
+        body = known + self.means[1] + drawn * (self.means[0] - known)
+        spread = self.spreads[1] + 2 * drawn * self.common + drawn**2 * self.spreads[0]
+        # Where no sample met the light at all, nothing is known of its shadow.
+        unmet = np.where(self.means[0] > 0, 0, known**2)
+        return Lit(body, self.means[2], np.maximum(spread, 0) / pairs + unmet, self.spreads[2] / pairs)
+
+
+def _joined(parts: list[_Moments], known: np.ndarray) -> Lit:
+    """All parts, each with the share that the other one found; a single one takes all the light as known."""
+    total, samples = _dark(len(known)), sum(part.count for part in parts)
+    for number, part in enumerate(parts):
+        share = parts[1 - number].clear_share() if len(parts) == 2 else np.ones((len(known), 1))
+        lit, weight = part.lit(known, share), part.count / samples
+        means, variances = (lit.shading, lit.specular), (lit.shading_variance, lit.specular_variance)
+        total = _sum(total, Lit(*(weight * mean for mean in means), *(weight**2 * variance for variance in variances)))
+    return total
 
 
 class _Gathered:
-    """Means and sums of squares of a pair of colours, a lane each."""
+    """Means and spreads of three colours as samples come in, a lane for each point."""
 
     def __init__(self, lanes: int, seed: int) -> None:
         dr, mi = load_drjit(), load_mitsuba()
-        self.random = mi.PCG32(lanes)
-        first, second = mi.sample_tea_32(dr.opaque(mi.UInt32, seed), dr.arange(mi.UInt32, lanes))
-        self.random.seed(mi.UInt64(first), mi.UInt64(second))
-        self.count = 0
-        self.means = [dr.zeros(mi.Color3f, lanes) for _ in range(2)]
-        self.squares = [dr.zeros(mi.Color3f, lanes) for _ in range(2)]
-        dr.make_opaque(self.random, self.means, self.squares)
+        self.random, self.count = generator(lanes, seed), 0
+        self.means, self.spreads = ([dr.zeros(mi.Color3f, lanes) for _ in range(3)] for _ in range(2))
+        self.common = dr.zeros(mi.Color3f, lanes)
+        dr.make_opaque(self.means, self.spreads, self.common)
 
-    def add(self, estimate: Callable[[Lanes], tuple[Lanes, Lanes]], samples: int) -> None:
+    def add(self, estimate: Callable[[Lanes], tuple[Lanes, ...]], samples: int) -> None:
+        """Adds samples of colours that `estimate` makes of random numbers: in one kernel, which does not depend on their number."""
         dr, mi = load_drjit(), load_mitsuba()
         end = dr.opaque(mi.UInt32, self.count + samples)
 
-        def step(k: Lanes, random: Lanes, means: list[Lanes], squares: list[Lanes]) -> tuple[Lanes, ...]:
+        def step(k: Lanes, random: Lanes, means: list[Lanes], spreads: list[Lanes], common: Lanes) -> tuple[Lanes, ...]:
             k = k + 1
-            new_means, new_squares = [], []
-            for value, mean, square in zip(estimate(random), means, squares, strict=True):
-                away = value - mean
-                new_means.append(mean + away / mi.Float(k))
-                new_squares.append(square + away * (value - new_means[-1]))
-            return k, random, new_means, new_squares
+            values = estimate(random)
+            away = [value - mean for value, mean in zip(values, means, strict=True)]
+            means = [mean + part / mi.Float(k) for mean, part in zip(means, away, strict=True)]
+            left = [value - mean for value, mean in zip(values, means, strict=True)]
+            spreads = [spread + a * b for spread, a, b in zip(spreads, away, left, strict=True)]
+            return k, random, means, spreads, common + away[0] * left[1]
 
-        state = (dr.opaque(mi.UInt32, self.count), self.random, self.means, self.squares)
-        _, self.random, self.means, self.squares = dr.while_loop(state, lambda k, *_: k < end, step)
-        dr.eval(self.random, self.means, self.squares)
+        state = (dr.opaque(mi.UInt32, self.count), self.random, self.means, self.spreads, self.common)
+        _, self.random, self.means, self.spreads, self.common = dr.while_loop(state, lambda k, *_: k < end, step)
+        dr.eval(self.random, self.means, self.spreads, self.common)
         self.count += samples
 
-    def lit(self) -> Lit:
-        parts = [np.array(part, float).T for part in (*self.means, *self.squares)]
-        spread = self.count * (self.count - 1)
-        return Lit(parts[0], parts[1], parts[2] / spread, parts[3] / spread)
+    def moments(self, halves: int) -> list[_Moments]:
+        """What came in so far, of each half of the lanes."""
+        means, spreads, common = (
+            [np.split(np.array(part, float).T, halves) for part in parts] for parts in (self.means, self.spreads, [self.common])
+        )
+        return [_Moments(self.count, [m[k] for m in means], [s[k] for s in spreads], common[0][k]) for k in range(halves)]
 
 
 def _sum(a: Lit, b: Lit) -> Lit:

@@ -1,0 +1,103 @@
+"""Light that parts of the object send to each other, on Mitsuba's arrays.
+
+Equation: at each point a direction is drawn toward what the lobes reflect, with the density q; it brings f_r cos / q times what leaves the
+part of the object that it meets: direct light there by one sample of each light, albedo * body + gloss, and, while bounces remain, what a
+direction drawn there brings in the same way. What meets nothing brings nothing: that light is direct.
+
+Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
+
+Limits: paths of `bounces` reflections more than the last one; longer ones are left out. Materials are read by NumPy between the waves of
+rays. Glints of glints are met by chance only: noisy.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from isc_core.progress import Monitor
+
+from ..materials import Material, Paint
+from ..surface import Surface
+from ..tracing import Tracer
+from ..variant import load_mitsuba
+from . import Lit, RenderOptions
+from .bsdfs import load_drjit, lobes_of
+from .mitsuba_direct import beam_light, generator, one_sample, points_at
+from .mitsuba_lights import Beam, WideLight
+
+_AT_ONCE = 1 << 18  # light paths
+
+
+@dataclass(frozen=True)
+class World:
+    """What light meets. `lights`: none of them black."""
+
+    material: Material
+    lights: list[Beam | WideLight]
+    tracer: Tracer
+
+
+def bounced_light(surface: Surface, world: World, options: RenderOptions, random: np.random.Generator, monitor: Monitor) -> Lit:
+    """What comes to the N points of `surface` from other parts of the object. Raises `Cancelled`."""
+    count = len(surface.position)
+    sums, squares = np.zeros((2, count, 3)), np.zeros((2, count, 3))
+    wave = max(1, min(options.samples, _AT_ONCE // count))
+    for start in range(0, options.samples, wave):
+        monitor.report("light between parts of the object", start / options.samples)
+        size = min(wave, options.samples - start)
+        position, normal, view = (np.tile(part, (size, 1)) for part in (surface.position, surface.normal, surface.view))
+        paint = surface.paint
+        many = Paint(np.tile(paint.albedo, (size, 1)), np.tile(paint.strength, size), np.tile(paint.gloss, size))
+        lobes = np.stack(_arriving(position, normal, view, many, world, options.bounces, random)).reshape(2, size, count, 3)
+        sums += lobes.sum(axis=1)
+        squares += (lobes**2).sum(axis=1)
+    means = sums / options.samples
+    variances = np.maximum(squares / options.samples - means**2, 0) / (options.samples - 1)
+    return Lit(means[0], means[1], variances[0], variances[1])
+
+
+def _arriving(
+    position: np.ndarray, normal: np.ndarray, view: np.ndarray, paint: Paint, world: World, bounces: int, random: np.random.Generator
+) -> tuple[np.ndarray, np.ndarray]:
+    """One sample of what other parts of the object give to body (for albedo 1) and gloss of the points: (N, 3) each."""
+    dr, mi = load_drjit(), load_mitsuba()
+    points = points_at(position, normal, view, lobes_of(world.material, paint))
+    numbers = generator(len(position), int(random.integers(1 << 32)))
+    place = mi.Point2f(numbers.next_float32(), numbers.next_float32())
+    local = points.lobes.sample(points.view, numbers.next_float32(), place)
+    density = points.lobes.density(points.view, local)
+    useful = (local.z > 0) & (density > 0)
+    weights = [dr.select(useful, value / dr.select(useful, density, 1), 0) for value in points.lobes.values(points.view, local)]
+    toward, origin = points.frame.to_world(local), points.origin
+    dr.eval(weights, useful, toward, origin)
+    direction = np.array(toward, float).T
+    hits = world.tracer.hits(np.array(origin, float).T, direction)
+    met = hits.valid & np.array(useful, bool)
+    body, gloss = np.zeros((2, len(position), 3))
+    if met.any():
+        leaving = _leaving(hits.position[met], hits.normal[met], -direction[met], world.material.at(hits.uv[met]), world, bounces, random)
+        body[met], gloss[met] = (np.array(weight, float)[met, None] * leaving for weight in weights)
+    return body, gloss
+
+
+def _leaving(
+    position: np.ndarray, normal: np.ndarray, view: np.ndarray, paint: Paint, world: World, bounces: int, random: np.random.Generator
+) -> np.ndarray:
+    """One sample of the radiance that points send toward `view`: (N, 3)."""
+    dr = load_drjit()
+    points = points_at(position, normal, view, lobes_of(world.material, paint))
+    numbers = generator(len(position), int(random.integers(1 << 32)))
+    body, gloss = (np.zeros((len(position), 3)) for _ in range(2))
+    for light in world.lights:
+        if isinstance(light, Beam):
+            matt, shiny = beam_light(points, light, world.tracer)
+        else:
+            plain, more, shiny = one_sample(points, light, world.tracer, numbers, 1.0)
+            matt = plain + more
+        dr.eval(matt, shiny, numbers)
+        body += np.array(matt, float).T
+        gloss += np.array(shiny, float).T
+    if bounces > 1:
+        further = _arriving(position, normal, view, paint, world, bounces - 1, random)
+        body, gloss = body + further[0], gloss + further[1]
+    return paint.albedo * body + gloss

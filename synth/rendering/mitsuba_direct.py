@@ -1,0 +1,98 @@
+"""One sample of the light that comes to points straight from a light, the lobes apart, on Mitsuba's arrays.
+
+Equation: see `mitsuba_lobes`.
+
+Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", SIGGRAPH 1995,
+doi:10.1145/218380.218498.
+
+Limits: lights do not hide each other.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..tracing import LIFT, Tracer
+from ..variant import load_mitsuba
+from .bsdfs import Lanes, Lobes, load_drjit
+from .mitsuba_lights import Beam, WideLight
+
+
+@dataclass(frozen=True)
+class Points:
+    """Points that are lit, a lane each. `origin`: the position lifted off the surface, where rays start. `frame`: z along the normal.
+    `view`: in that frame."""
+
+    position: Lanes
+    origin: Lanes
+    frame: Lanes
+    view: Lanes
+    lobes: Lobes
+
+    def values(self, direction: Lanes) -> tuple[Lanes, Lanes]:
+        """f_r cos of body and gloss for light from a direction."""
+        return self.lobes.values(self.view, self.frame.to_local(direction))
+
+
+def points_at(position: np.ndarray, normal: np.ndarray, view: np.ndarray, lobes: Lobes) -> Points:
+    """Points from arrays (N, 3) in the camera's frame."""
+    dr, mi = load_drjit(), load_mitsuba()
+    place, across, toward = (mi.Vector3f(np.ascontiguousarray(part.T, np.float32)) for part in (position, normal, view))
+    frame, origin = mi.Frame3f(across), place + LIFT * across
+    local = frame.to_local(toward)
+    dr.eval(place, origin, frame, local)
+    return Points(mi.Point3f(place), mi.Point3f(origin), frame, local, lobes)
+
+
+def _visible(points: Points, direction: Lanes, distance: Lanes, needed: Lanes, tracer: Tracer) -> Lanes:
+    """Whether nothing stands between the points and what is `distance` away; only where that is needed."""
+    mi = load_mitsuba()
+    ray = mi.Ray3f(points.origin, direction)
+    ray.maxt = mi.Float(distance)
+    return needed & ~tracer.scene.ray_test(ray, needed)
+
+
+def beam_light(points: Points, light: Beam, tracer: Tracer) -> tuple[Lanes, Lanes]:
+    """The colours that a directional or point light gives to body and gloss: no noise."""
+    dr = load_drjit()
+    direction, distance, irradiance = light.arriving(points.position)
+    body, gloss = points.values(direction)
+    seen = _visible(points, direction, distance, body > 0, tracer)
+    return dr.select(seen, body * irradiance, 0), dr.select(seen, gloss * irradiance, 0)
+
+
+def generator(lanes: int, seed: int) -> Lanes:
+    """Random numbers for each lane, all of one seed (below 2^32)."""
+    dr, mi = load_drjit(), load_mitsuba()
+    random = mi.PCG32(lanes)
+    first, second = mi.sample_tea_32(dr.opaque(mi.UInt32, seed), dr.arange(mi.UInt32, lanes))
+    random.seed(mi.UInt64(first), mi.UInt64(second))
+    dr.eval(random)
+    return random
+
+
+def one_sample(points: Points, light: WideLight, tracer: Tracer, random: Lanes, flat: Lanes) -> tuple[Lanes, Lanes, Lanes]:
+    """The colours that one sample of a light gives: what it gives without shadows to a body that reflects `flat` / pi everywhere, how much
+    more it gives to the body itself, and what it gives to the gloss."""
+    dr, mi = load_drjit(), load_mitsuba()
+
+    def draw() -> Lanes:
+        return mi.Point2f(random.next_float32(), random.next_float32())
+
+    toward = light.sample(points.position, draw(), draw())
+    mirrored = points.frame.to_world(points.lobes.sample(points.view, random.next_float32(), draw()))
+    plain, more, gloss = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
+    for direction in (toward, mirrored):
+        local = points.frame.to_local(direction)
+        radiance, distance, density = light.along(points.position, direction)
+        density += points.lobes.density(points.view, local)
+        useful = (local.z > 0) & (density > 0)
+        radiance = dr.select(useful, radiance / dr.select(useful, density, 1), 0)
+        matt, shiny = points.lobes.values(points.view, local)
+        seen = _visible(points, direction, distance, useful & (dr.max(radiance) > 0), tracer)
+        even = flat * local.z / math.pi
+        plain += radiance * even
+        more += radiance * (dr.select(seen, matt, 0) - even)
+        gloss += radiance * dr.select(seen, shiny, 0)
+    return plain, more, gloss
