@@ -47,6 +47,7 @@ MESH_FILE, HEIGHT_FILE, IMAGE_FILE = "mesh", "height", "image"
 _DISTANCE = 5.0  # of a pinhole, object units: as one photographs things on a table
 _FILL = (0.85, 0.90)  # of the picture's side, by the object
 _LEVEL = (0.50, 0.75)  # of the brightest matt light
+_MOST_CLIPPED = 0.1  # of the image's values: what a photographer still accepts as highlights
 _FRAMING, _EXPOSURE, _SAMPLES, _NOISE = range(4)  # streams of a scene's seed
 
 
@@ -94,7 +95,8 @@ class Sources:
 class Picture:
     """How scenes are taken. `size`: of the square picture's side, pixels. `samples`, `bounces`, `renderer`: see `RenderOptions`.
     `perspective`: a pinhole instead of an orthographic camera. `exposure`: what 99.5 % of the diffuse layer's values stay below, > 0;
-    None draws it for each scene from .5 to .75. `sensor`: what becomes of the light. Raises `InputError` for impossible values."""
+    None draws it for each scene from .5 to .75, and takes less where more than a tenth of the image would be above 1. `sensor`: what
+    becomes of the light. Raises `InputError` for impossible values."""
 
     size: int = 256
     samples: int = 64
@@ -151,10 +153,11 @@ def photograph(recipe: Recipe, monitor: Monitor | None = None) -> tuple[Scene, G
     """The scene with its lights set, and its truth as the sensor sees it. Raises `InputError`, `Cancelled`."""
     scene = build(recipe)
     truth = render_truth(scene, recipe.render_options(), monitor)
-    level = recipe.picture.exposure
-    if level is None:
-        level = float(np.random.default_rng(recipe.stream(_EXPOSURE)).uniform(*_LEVEL))
-    scene, truth = exposed(scene, truth, level)
+    drawn = float(np.random.default_rng(recipe.stream(_EXPOSURE)).uniform(*_LEVEL))
+    wanted = recipe.picture.exposure
+    scene, truth = exposed(scene, truth, drawn if wanted is None else wanted)
+    if wanted is None and (truth.image[truth.mask] > 1).mean() > _MOST_CLIPPED:
+        scene, truth = exposed(scene, truth, 1.0, 1 - _MOST_CLIPPED, "image")
     return scene, observe(truth, recipe.picture.sensor, np.random.default_rng(recipe.stream(_NOISE)))
 
 

@@ -74,7 +74,10 @@ def _add_picture(parser: argparse.ArgumentParser) -> None:
     how.add_argument("--bounces", type=count, default=usual.bounces, metavar="N", help="of light within the object (default %(default)s)")
     how.add_argument("--perspective", action="store_true", help="a pinhole camera instead of an orthographic one")
     how.add_argument(
-        "--exposure", type=positive, metavar="X", help="what 99.5 %% of the matt light stays below (default: .5 to .75, by the scene)"
+        "--exposure",
+        type=positive,
+        metavar="X",
+        help="what 99.5 %% of the matt light stays below (default: .5 to .75 by the scene, less for mirrors)",
     )
     how.add_argument("--clip", action="store_true", help="lose what is brighter than 1, as sensors do")
     how.add_argument("--noise", type=_share, default=0.0, metavar="X", help="the sensor's noise, of full scale (default: none)")

@@ -107,6 +107,15 @@ def test_the_same_recipe_gives_the_same_truth_well_exposed() -> None:
     assert np.allclose(gain, (one.diffuse[one.mask] / darker.diffuse[darker.mask]).mean(), rtol=1e-4), "the lights are those of the maps"
 
 
+def test_an_object_that_mirrors_more_than_it_scatters_is_not_burnt_out() -> None:
+    pytest.importorskip("mitsuba", reason="needs the extra `synth`")
+    dark = replace(RECIPE, shape=Part("height_field", 15), material=Part("blinn_phong", 17), albedo="grey", light=Part("sh", 3))
+    burnt = photograph(replace(dark, picture=replace(SMALL, exposure=0.75)))[1]
+    truth = photograph(dark)[1]
+    assert (burnt.image[burnt.mask] > 1).mean() > 0.3
+    assert 0.09 < (truth.image[truth.mask] > 1).mean() < 0.11, "a tenth, to a pixel"
+
+
 def test_the_sensor_works_on_the_scene_of_the_seed() -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     noisy = replace(RECIPE, picture=replace(SMALL, exposure=2.0, sensor=Sensor(noise=0.01, bits=8)))
