@@ -48,17 +48,18 @@ class Extrusion:
         outline, normal, tightest = smooth_outline(self.polygon, self.rounding)
         lowest = self.depth / 2 - self.dome * float((outline**2).sum(1).max())  # of the front's rim
         edge = min(self.edge, 0.8 * tightest, 0.9 * lowest)
-        rim = outline - edge * normal
+        # The rounding begins at the slope with which the domed front ends, so that there is no crease between them.
+        begin = np.arctan(2 * self.dome * np.maximum((outline * normal).sum(1), 0))[:, None]
+        rim = outline - edge * (1 - np.sin(begin)) * normal
         scale = np.linspace(0, 1, _CAP)[:, None, None]
-        lean = np.linspace(0, np.pi / 2, _EDGE + 1)[1:, None, None]
-        front_z = self.depth / 2 - self.dome * (rim**2).sum(-1)
         cap = _lifted(rim * scale, self.depth / 2 - self.dome * ((rim * scale) ** 2).sum(-1))
-        bend = _lifted(rim + edge * np.sin(lean) * normal, front_z + edge * (np.cos(lean[..., 0]) - 1))
+        lean = begin + (np.pi / 2 - begin) * np.linspace(0, 1, _EDGE + 1)[1:, None, None]
+        fall = edge * (np.cos(lean) - np.cos(begin))[..., 0]
+        bend = _lifted(rim + edge * (np.sin(lean) - np.sin(begin)) * normal, cap[-1, :, 2] + fall)
         front = np.concatenate([cap, bend])
-        up = np.broadcast_to((0.0, 0.0, 1.0), (*outline.shape[:1], 3))
         out = np.concatenate([normal, np.zeros((len(normal), 1))], -1)
         cap_normals = np.concatenate([2 * self.dome * cap[..., :2], np.ones((*cap.shape[:2], 1))], -1)
-        normals = np.concatenate([cap_normals, np.cos(lean) * up + np.sin(lean) * out])
+        normals = np.concatenate([cap_normals, _bend_normals(bend, out, lean)])
         down = np.linspace(0, 1, _WALL + 2)[1:-1, None, None]
         wall = front[-1] * (1 - down) + front[-1] * (1, 1, -1) * down
         points = np.concatenate([front, wall, front[::-1] * (1, 1, -1)])
@@ -125,6 +126,16 @@ def _evenly(polygon: np.ndarray, count: int) -> np.ndarray:
 
 def _lifted(plane: np.ndarray, z: np.ndarray) -> np.ndarray:
     return np.concatenate([plane, np.broadcast_to(z, plane.shape[:2])[..., None]], -1)
+
+
+def _bend_normals(bend: np.ndarray, out: np.ndarray, lean: np.ndarray) -> np.ndarray:
+    """Normals (rows, columns, 3) of the rounding, whose rows run down at the angles `lean` and whose columns face `out` (columns, 3)."""
+    ring = bend[:, :-1]
+    along = np.roll(ring, -1, 1) - np.roll(ring, 1, 1)
+    down = np.cos(lean) * out - np.sin(lean) * (0.0, 0.0, 1.0)
+    normals = np.cross(down[:, :-1], along)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    return np.concatenate([normals, normals[:, :1]], 1)
 
 
 def _mesh(points: np.ndarray, normals: np.ndarray, outward: np.ndarray) -> Mesh:
