@@ -4,7 +4,6 @@ import argparse
 from pathlib import Path
 
 from isc_core.commands.options import Commands, add_command, count, hints, names, positive
-from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..glossy_mit.run import make_glossy
@@ -52,4 +51,4 @@ def _levels(text: str) -> tuple[float, ...]:
     try:
         return tuple(float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(f"--levels {text!r}: give per cents with commas between them, like 10,25,50") from None
+        raise argparse.ArgumentTypeError(f"{text!r} is not per cents with commas between them, like 10,25,50") from None

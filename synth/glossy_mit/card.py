@@ -20,11 +20,12 @@ the set's; all pictures are linear, 16 bits a channel, 1/65535 a code, 0 outside
 
 | file in `laboratory/OBJECT/` | what |
 |---|---|
-| `original.png` | diffuse + specular, exactly, in codes; nothing is clipped |
+| `original.png` | diffuse + specular, exactly, in codes; highlights clip at 65535 where `clipped_share` is above 0 |
 | `diffuse.png` | reflectance x shading; at least one code inside the mask |
-| `specular.png`, `specular.exr` | the gloss: codes, and float32 channels R, G, B of the same scale |
+| `specular.png` | the gloss, in codes, as far as the original holds it |
+| `specular.exr` | the gloss, not clipped: float32 channels R, G, B of the same scale |
 | `reflectance.png` | the set's own |
-| `shading_corrected_color.mat` | `shading_correct` (rows, columns, 3), float64; `shading.png`: its mean over the channels |
+| `shading_corrected_color.mat` | `shading_correct` (rows, columns, 3); `shading.png`: its mean over the channels |
 | `mask.png`, `depth_valid.png` | the set's mask where the reflectance is above 0 and all heights around a pixel are known |
 | `Z.mat` | `depth` (rows, columns): height toward the viewer in pixels, the set's own, NaN outside the mask |
 | `L.mat` | `color_lights.diffuse` (9, 3): {coefficients}, in the set's convention |

@@ -3,8 +3,9 @@
 `laboratory/OBJECT` holds what is read of a photographed object, `natural/OBJECT` the same diffuse image as the natural folder has it, so
 that both readers find it. 16-bit files hold linear values of 1/65535; original = diffuse + specular exactly, in codes.
 
-Equation: one gain for all levels of an object under a light, so that the brightest value of the highest level, and of the shading, is just
-below 1: nothing is clipped, and levels differ in the specular layer only. The gain goes into the light's constant coefficient too.
+Equation: one gain for all levels of an object under a light, so that they differ in the specular layer only: the brightest value of the
+highest level, and of the shading, comes just below 1. Only where this would leave the diffuse layer in the dark (99 % of it below 0.02)
+it is lifted to there, and highlights clip, in the original and the specular codes. The gain goes into the light's constant coefficient.
 
 Limits: a diffuse value below one code becomes one code, because the set's readers take 0 for "no object here".
 """
@@ -32,6 +33,7 @@ RECORD = "object.json"
 _MATLAB_HEADER = b"MATLAB 5.0 MAT-file, written by isc synth glossy-mit".ljust(116)
 _WHITE = 65535
 _BRIGHTEST = 0.9999
+_DARKEST = 0.02  # what 99 % of the diffuse layer stays below, at least
 LABORATORY_FILES = (
     RECORD, "original.png", "diffuse.png", "specular.png", "specular.exr", "reflectance.png", "shading.png", "mask.png",
     "depth_valid.png", "shading_corrected_color.mat", "Z.mat", "L.mat", "crop_idx.mat",
@@ -67,8 +69,12 @@ class Exposed:
         return strength_for(level, self.diffuse, self.gain * self.layers.gloss)
 
     def specular(self, level: float) -> np.ndarray:
-        """The specular layer (N, 3)."""
+        """The specular layer (N, 3), nothing clipped."""
         return self.strength(level) * self.gain * self.layers.gloss
+
+    def specular_codes(self, level: float) -> np.ndarray:
+        """Its codes (N, 3), of what the clipped original still holds of it."""
+        return np.minimum(_codes(self.specular(level)), _WHITE - self.diffuse_codes)
 
     @cached_property
     def diffuse_codes(self) -> np.ndarray:
@@ -85,7 +91,7 @@ class Exposed:
             "shading.png": _png(whole(_codes(self.shading.mean(-1)))),
             "mask.png": _png(whole(mask)),
             "depth_valid.png": _png(whole(mask.astype(np.uint8))),
-            "shading_corrected_color.mat": _matlab({"shading_correct": whole(self.shading)}),
+            "shading_corrected_color.mat": _matlab({"shading_correct": whole(self.shading.astype(np.float32))}),
             "Z.mat": _matlab({"depth": whole(self.source.height[self.source.mask], np.nan)}),
             "L.mat": _matlab({"color_lights": {"diffuse": light, "shading": light}}),
             "crop_idx.mat": self.source.crop_file,
@@ -96,10 +102,12 @@ class Exposed:
 
 
 def exposed(source: Source, layers: Layers, highest_level: float) -> Exposed:
-    """The layers scaled so that even at the highest level nothing is brighter than the files can hold."""
+    """The layers scaled as the module says, for levels up to `highest_level`."""
     diffuse = source.reflectance * layers.shading
     image = diffuse + strength_for(highest_level, diffuse, layers.gloss) * layers.gloss
-    return Exposed(source, layers, _BRIGHTEST / float(max(image.max(), layers.shading.max())))
+    usual = float(np.quantile(diffuse.max(-1), 0.99))
+    unclipped, lifted = _BRIGHTEST / float(image.max()), _DARKEST / max(usual, 1e-12)
+    return Exposed(source, layers, min(max(unclipped, lifted), _BRIGHTEST / float(layers.shading.max())))
 
 
 def strength_for(level: float, diffuse: np.ndarray, gloss: np.ndarray) -> float:
@@ -115,7 +123,7 @@ def write_object(root: Path, picture: Exposed, level: float) -> None:
         for file in NATURAL_FILES:
             (folder / file).write_bytes(shared[f"natural/{file}"])
     specular = picture.specular(level)
-    codes = _codes(specular)
+    codes = picture.specular_codes(level)
     frame = picture.source.whole(specular.astype(np.float32))
     with new_folder(root / "laboratory" / name, LABORATORY_FILES) as folder:
         for file in LABORATORY_FILES:
@@ -139,15 +147,14 @@ def describe(picture: Exposed, level: float, codes: np.ndarray) -> dict[str, Any
     specular, layers = picture.specular(level), picture.layers
     both = float(specular.sum(dtype=float) + picture.diffuse.sum(dtype=float))
     in_codes = float(codes.sum(dtype=float) / (codes.sum(dtype=float) + picture.diffuse_codes.sum(dtype=float)))
-    brightest = picture.diffuse_codes.astype(int) + codes
+    clipped = (picture.diffuse + specular > 1).any(-1)
     panel = None if layers.panel is None else {key: np.asarray(value).tolist() for key, value in asdict(layers.panel).items()}
     return {
         "object": picture.source.name,
         "pixels": len(specular),
         "specular_share": float(specular.sum(dtype=float)) / both,
         "specular_share_of_codes": in_codes,
-        "clipped_share": float((brightest > _WHITE).any(-1).mean()),
-        "brightest_code": int(brightest.max()),
+        "clipped_share": float(clipped.mean()),
         "gain": picture.gain,
         "gloss_strength": picture.strength(level),
         "light_fit_residual": layers.light_residual,

@@ -16,7 +16,6 @@ from isc_core.environment import environment_from_shading, shading_under
 from isc_core.progress import Monitor
 from isc_core.sirfs.frames import real_sh
 
-from ..light_rigs.placing import toward
 from ..lights import EnvironmentLight, PanelLight, panel_toward_origin
 from ..materials import Material
 from ..rendering import RenderOptions, light_surface
@@ -28,8 +27,12 @@ from .settings import GlossySettings
 from .source import Source
 
 _PANEL_DISTANCE = 4.0
+_PANEL_ANGLES = (10.0, 20.0)  # degrees, between which its sides are seen
+_TILTS = (8.0, 27.0)  # degrees from the viewer, of normals that mirror it
+_FEW = 0.02  # of the pixels
 _PANEL_SHARE = 0.75  # of the shading that the set's own light gives on the average
 _ENVIRONMENT_ROWS = 32
+_PROBES = 4096  # about as many pixels tell how well the environment fits
 
 
 @dataclass(frozen=True)
@@ -70,7 +73,7 @@ def make_layers(source: Source, settings: GlossySettings, monitor: Monitor, trac
 
     Raises `Cancelled`; `InputError` where the physical variant cannot be rendered here."""
     surface = surface_of(source, settings.exponent)
-    panel = _panel(source, settings)
+    panel = _panel(surface, source.name, settings.seed)
     monitor.report(f"{source.name}: panel", 0.0)
     under_panel = _lit(surface, panel, settings, tracer, monitor.part(0, 0.3))
     made = {}
@@ -78,7 +81,8 @@ def make_layers(source: Source, settings: GlossySettings, monitor: Monitor, trac
         monitor.report(f"{source.name}: {name} light", 0.3 + 0.35 * step)
         own = np.exp(real_sh(source.normal) @ light)
         environment = environment_from_shading(light, _ENVIRONMENT_ROWS)
-        residual = _relative_rms(shading_under(environment, source.normal) - own, own)
+        some = slice(None, None, max(1, len(own) // _PROBES))
+        residual = _relative_rms(shading_under(environment, source.normal[some]) - own[some], own[some])
         part = _lit(surface, EnvironmentLight(environment), settings, tracer, monitor.part(0.3 + 0.35 * step, 0.65 + 0.35 * step))
         if tracer is None:
             made[name] = Layers(own, part.gloss, light, 0.0, residual, 0.0, None)
@@ -126,12 +130,19 @@ def _fitted(source: Source, part: _Part, residual: float, panel: PanelLight | No
     return Layers(part.shading, part.gloss, coefficients, misfit, residual, part.noise, panel)
 
 
-def _panel(source: Source, settings: GlossySettings) -> PanelLight:
-    """A white panel above or at a side, drawn by the seed and the object's name."""
-    rng = np.random.default_rng([settings.seed, crc32(source.name.encode())])
-    place = _PANEL_DISTANCE * toward(rng.uniform(25, 50), rng.uniform(-75, 75))
-    sides = 2 * _PANEL_DISTANCE * np.tan(np.radians(rng.uniform(10, 20, 2)) / 2)
-    return panel_toward_origin(tuple(place), (sides[0], sides[1]), (1.0, 1.0, 1.0))
+def _panel(surface: Surface, name: str, seed: int) -> PanelLight:
+    """A white panel that the object mirrors toward the viewer somewhere, on the upper side if it can; drawn by the seed and the name."""
+    rng = np.random.default_rng([seed, crc32(name.encode())])
+    tilt = np.degrees(np.arccos(np.clip(surface.normal[:, 2], -1, 1)))
+    usual = np.flatnonzero((tilt > _TILTS[0]) & (tilt < _TILTS[1]) & (surface.normal[:, 1] > 0))
+    if len(usual) < _FEW * len(tilt):
+        off = np.abs(tilt - np.mean(_TILTS))
+        usual = np.flatnonzero(off <= np.quantile(off, _FEW))
+    pick = int(rng.choice(usual))
+    normal = surface.normal[pick]
+    centre = surface.position[pick] + _PANEL_DISTANCE * (2 * normal[2] * normal - (0, 0, 1))
+    sides = 2 * _PANEL_DISTANCE * np.tan(np.radians(rng.uniform(*_PANEL_ANGLES, 2)) / 2)
+    return panel_toward_origin(tuple(centre), (sides[0], sides[1]), (1.0, 1.0, 1.0))
 
 
 def _relative_rms(left: np.ndarray, whole: np.ndarray) -> float:
