@@ -54,33 +54,32 @@ def light_surface(
     random = np.random.default_rng(options.seed)
     world = World(material, [kernel for light in lights if (kernel := kernel_light(light)) is not None], tracer)
     count = len(surface.position)
-    starts = range(0, count, _POINTS)
-    pieces = [
-        _light(
-            _piece(surface, slice(start, start + _POINTS)),
-            world,
-            options,
-            random,
-            monitor.part(start / count, min(1, (start + _POINTS) / count)),
-        )
-        for start in starts
-    ]
+    pieces = []
+    for start in range(0, count, _POINTS):
+        end = min(start + _POINTS, count)
+        pieces.append(_light(_piece(surface, slice(start, end)), world, options, random, monitor.part(start / count, end / count)))
     return Lit(*(np.concatenate([getattr(piece, field.name) for piece in pieces]) for field in fields(Lit)))
 
 
 def _piece(surface: Surface, chosen: slice) -> Surface:
     """Some of the points of a surface, under the same mask."""
     paint = Paint(surface.paint.albedo[chosen], surface.paint.strength[chosen], surface.paint.gloss[chosen])
-    places = (part[chosen] for part in (surface.position, surface.normal, surface.view, surface.uv))
-    return Surface(surface.mask, *places, paint)
+    return Surface(
+        mask=surface.mask,
+        position=surface.position[chosen],
+        normal=surface.normal[chosen],
+        view=surface.view[chosen],
+        uv=surface.uv[chosen],
+        paint=paint,
+    )
 
 
 def _light(surface: Surface, world: World, options: RenderOptions, random: np.random.Generator, monitor: Monitor) -> Lit:
     # Two lanes a point, so that each half of the samples has moments of its own.
     halves = 2 if options.samples >= _DIVISIBLE else 1
     paint = Paint(*(np.concatenate([part] * halves) for part in (surface.paint.albedo, surface.paint.strength, surface.paint.gloss)))
-    places = (np.tile(part, (halves, 1)) for part in (surface.position, surface.normal, surface.view))
-    points = points_at(*places, lobes_of(world.material, paint))
+    position, normal, view = (np.tile(part, (halves, 1)) for part in (surface.position, surface.normal, surface.view))
+    points = points_at(position, normal, view, lobes_of(world.material, paint))
     count = len(surface.position)
     total = _dark(count)
     jobs = len(world.lights) + bool(options.bounces)
