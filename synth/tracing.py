@@ -5,6 +5,7 @@ The LLVM variants trace whole arrays of rays at once; `scalar_rgb` traces them o
 Limits: positions are found in float32, to about 1e-6 of the object. Rays that start on the surface are lifted off it by `LIFT`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -61,7 +62,7 @@ class Tracer:
         reach = np.broadcast_to(np.minimum(distances, 1e6), (len(origins),)).astype(np.float32)
         if self._scalar:
             test, ray = self.scene.ray_test, mi.Ray3f
-            rays = zip(origins.tolist(), directions.tolist(), reach.tolist(), strict=True)
+            rays = zip(_rows(origins), _rows(directions), reach.tolist(), strict=True)
             return np.fromiter((test(ray(o, d, r, 0.0, [])) for o, d, r in rays), bool, len(origins))
         rays = mi.Ray3f(_points(origins), _vectors(directions))
         rays.maxt = mi.Float(reach)
@@ -77,11 +78,16 @@ class Tracer:
     def _scalar_hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         mi = load_mitsuba()
         columns = np.zeros((len(origins), 9))
-        for row, (origin, direction) in enumerate(zip(origins.tolist(), directions.tolist(), strict=True)):
+        for row, (origin, direction) in enumerate(zip(_rows(origins), _rows(directions), strict=True)):
             hit = self.scene.ray_intersect(mi.Ray3f(origin, direction))
             if hit.is_valid():
                 columns[row] = (1, *hit.p, *hit.sh_frame.n, *hit.uv)
         return columns
+
+
+def _rows(values: np.ndarray) -> Iterator[tuple[float, ...]]:
+    """The rows of (M, 3) one by one; as tuples, for as many lists would keep the garbage collector busy."""
+    return zip(*values.T.tolist(), strict=True)
 
 
 def _points(values: np.ndarray) -> object:
