@@ -2,7 +2,7 @@
 
 Equation: the exponent p is log-uniform over `EXPONENTS`; alpha of facets is that whose lobe is nearest (`isc_core.brdf.roughness`): .028 to
 .44. Strength of blinn_phong: log-uniform over `STRENGTHS`, about the share of light that the gloss mirrors; insulators have .02 to .08
-along the normal and more toward grazing angles, which that model does not have. Strength of ggx: 1 (bare) to 3 (coated), ior 1.3 to 1.8.
+along the normal and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to 1.5 (coated twice), ior 1.3 to 1.8.
 A varying gloss is one of: worn (matt where it was touched), smudged (broader within smudges), striped (matt bands).
 
 Citation: A. Ngan, F. Durand, W. Matusik, "Experimental analysis of BRDF models", EGSR 2005, 117-126, doi:10.2312/EGWR/EGSR05/117-126
@@ -26,7 +26,8 @@ from .materials import MATT, MODELS, Material, Model
 FINISHES: tuple[str, ...] = MODELS
 VARYING: tuple[str, ...] = ("blinn_phong", "ggx")
 EXPONENTS = (5.0, 2000.0)
-STRENGTHS = (0.02, 0.2)
+STRENGTHS = (0.02, 0.15)
+FACET_STRENGTHS = (0.6, 1.5)
 BROAD_BELOW, SHARP_ABOVE = 30.0, 300.0
 _CHANCE = 0.25  # of a varying gloss, where it is left to chance
 _TEXELS = 256
@@ -50,7 +51,7 @@ def make_material(model: str, albedo: np.ndarray, rng: np.random.Generator, vary
     if model == "blinn_phong":
         material = Material(albedo, "blinn_phong", exponent, _log_uniform(rng, *STRENGTHS))
     else:
-        strength = float(rng.uniform(1, 3)) if model == "ggx" else 1.0
+        strength = float(rng.uniform(*FACET_STRENGTHS)) if model == "ggx" else 1.0
         material = Material(albedo, cast(Model, model), float(fitted_alpha(exponent)), strength, float(rng.uniform(1.3, 1.8)))
     if model in VARYING and (varied_by_chance if varying is None else varying):
         return _varied(material, exponent, rng)
