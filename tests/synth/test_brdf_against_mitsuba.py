@@ -23,7 +23,7 @@ LIGHTS = {
     "point": {"type": "point", "position": [-1.5, 2.0, 2.5], "intensity": {"type": "rgb", "value": 1.0}},
 }
 BLACK, GREY = ({"type": "rgb", "value": [value] * 3} for value in (0.0, 0.5))
-LOBES = {
+LOBES: dict[str, tuple[dict[str, object], Model]] = {
     "blinn_phong 8": ({"model": "blinn_phong", "albedo": BLACK, "gloss": 8.0, "strength": 0.3}, BlinnPhong(0.3, 8.0)),
     "blinn_phong 2000": ({"model": "blinn_phong", "albedo": BLACK, "gloss": 2000.0, "strength": 0.3}, BlinnPhong(0.3, 2000.0)),
     "ggx .05": ({"model": "ggx", "albedo": BLACK, "gloss": 0.05, "strength": 1.0, "ior": 1.5}, Ggx(0.05, 0.04)),
