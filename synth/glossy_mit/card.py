@@ -13,10 +13,11 @@ Made by
 from the MIT-Berkeley intrinsic images (R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman 2009, doi:10.1109/ICCV.2009.5459428;
 J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712). **Derived from research data under its own terms: not to be redistributed.**
 
-Light: {light}. Specular: {level:g} % of the light inside the mask (the sum over its pixels and channels).
+Light: {light}.
+Specular: {level:g} % of the light inside the mask (the sum over its pixels and channels).
 
-`isc evaluate {last} --dataset mit-berkeley --input original` (or `--input diffuse`) reads this folder. The files, their frame and crop are
-the set's; all pictures are linear, 16 bits a channel, 1/65535 a code, 0 outside the mask.
+`isc evaluate {last} --dataset mit-berkeley --input original` (or `--input diffuse`) reads this folder.
+The files, their frame and crop are the set's; all pictures are linear, 16 bits a channel, 1/65535 a code, 0 outside the mask.
 
 | file in `laboratory/OBJECT/` | what |
 |---|---|
@@ -35,8 +36,10 @@ the set's; all pictures are linear, 16 bits a channel, 1/65535 a code, 0 outside
 `natural/OBJECT/` holds `diffuse.png`, `shading_color.png` and `L.mat` of the SAME light, under the names of the set's natural half: what
 reads that half finds this object too, with that half's expectations of lights.
 
-Shading is {shading}. The gloss is a normalised Blinn-Phong lobe of exponent {exponent:g} under a non-negative environment fitted to
-exp(SH(normal)) (`environment_fit_residual`: RMS of what is left over the RMS of the shading){panel}. {shadows}
+Shading is {shading}.
+The gloss is a normalised Blinn-Phong lobe of exponent {exponent:g} under a non-negative environment fitted to exp(SH(normal)){panel}
+(`environment_fit_residual`: RMS of what the fit leaves, over the RMS of that shading).
+{shadows}
 All levels of an object under one light share one gain, so that they differ in the specular layer only. `scene.json` holds the settings,
 the versions and every object's record.
 """

@@ -50,6 +50,8 @@ def make_glossy(
     for name in names:
         for illumination in ILLUMINATIONS:
             check_request(root, name, illumination, "diffuse")
+    if out.resolve().is_relative_to(root.resolve()):
+        raise InputError(f"{out} is inside the data set that is read: choose a folder outside of {root}")
     _require_this_run(out, settings)
     _write_json(out / RUN, {"kind": KIND, "settings": settings.to_json()})
     roots = _known_roots(out, settings)

@@ -19,7 +19,7 @@ class GlossySettings:
     `physical`: also the variant that is rendered with shadows. Raises `InputError` outside these ranges."""
 
     levels: tuple[float, ...] = (10.0, 25.0, 50.0)
-    samples: int = 128
+    samples: int = 256
     seed: int = 0
     exponent: float = 100.0
     physical: bool = False

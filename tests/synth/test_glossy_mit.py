@@ -329,6 +329,14 @@ def test_folders_of_something_else_are_left_alone(small: Path, tmp_path: Path) -
     assert contents(foreign) == {"thesis.tex": b"mine"}
 
 
+def test_nothing_is_written_into_the_data_set(small: Path) -> None:
+    before = contents(small)
+    for out in (small, small / "glossy", small / "natural" / ".." / "glossy"):
+        with pytest.raises(InputError, match="inside the data set"):
+            make_glossy(small, out, GlossySettings())
+    assert contents(small) == before
+
+
 def test_what_is_missing_is_named(small: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="unknown object 'nut': choose from bump"):
         make_glossy(small, tmp_path / "out", GlossySettings(), ["bump", "nut"])
