@@ -9,12 +9,14 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from isc_core.atomic import new_folder, require_writable
+from isc_core.exr import write_channels
 from isc_core.progress import Monitor
 
 from .cases import make_cases, worst_scenes, write_evidence
 from .html import page
 from .markdown import summary
 from .outcome import Outcome, to_json
+from .run import SceneResult
 
 FILES = ("report.json", "report.html", "summary.md")
 _EVIDENCE = re.compile(r"evidence/[^/\\]+/[a-z_]+\.exr")
@@ -39,20 +41,22 @@ def write_report(outcome: Outcome, folder: Path, monitor: Monitor) -> None:
 
 def _write_evidence(outcome: Outcome, folder: Path, monitor: Monitor) -> tuple[str, ...]:
     """The scenes that broke a bound or a check; the names of the files, relative to `folder`."""
-    wanted: dict[tuple[str, str], None] = {}
-    by_name = {scene.facts.name: scene for scene in outcome.measured}
+    wanted: dict[tuple[str, str], SceneResult] = {}
     for verdict in outcome.verdicts:
         if verdict.broken:
-            for scene in worst_scenes(verdict, outcome.figures, outcome.measured):
-                wanted[scene.facts.name, verdict.bound.stage] = None
-    for check in outcome.checks:
-        if not check.passed and check.scene in by_name:
-            wanted[check.scene, ""] = None
+            worst = worst_scenes(verdict, outcome.figures, outcome.measured)
+            wanted |= {(scene.facts.name, verdict.bound.stage): scene for scene in worst}
     names: list[str] = []
-    for done, (name, stage) in enumerate(wanted):
+    for done, ((name, stage), scene) in enumerate(wanted.items()):
         monitor.report("keeping evidence", done / len(wanted))
-        files = write_evidence(folder / "evidence" / name, by_name[name], stage, outcome.options, monitor)
+        files = write_evidence(folder / "evidence" / name, scene, stage, outcome.options, monitor.part(1, 1))
         names += [f"evidence/{name}/{file}" for file in files]
+    for check in outcome.checks:
+        if not check.passed and check.maps:
+            place = folder / "evidence" / check.scene
+            place.mkdir(parents=True, exist_ok=True)
+            write_channels(place / "render_check.exr", check.maps)
+            names.append(f"evidence/{check.scene}/render_check.exr")
     return tuple(dict.fromkeys(names))
 
 

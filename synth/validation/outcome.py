@@ -84,7 +84,7 @@ def to_json(outcome: Outcome, evidence: Sequence[str]) -> dict[str, Any]:
         "evidence": list(evidence),
         "figures": [_figure(figure) for figure in outcome.figures],
         "budget": [_budget(found) for found in outcome.budgets],
-        "checks": [asdict(check) | {"passed": check.passed} for check in outcome.checks],
+        "checks": [_check(check) for check in outcome.checks],
         "bounds": [asdict(verdict) for verdict in outcome.verdicts],
         "scenes": [_scene(scene) for scene in outcome.scenes],
     }
@@ -104,6 +104,10 @@ def _budget(found: Budget) -> dict[str, Any]:
     shares = {share.truth: {"share": asdict(share.share), "alone": asdict(share.alone)} for share in found.shares}
     rest = {"rest": asdict(found.rest), "rest_with_exact_normals": asdict(found.exact)}
     return {"metric": found.metric.name, "error": asdict(found.error), "shares": shares} | rest
+
+
+def _check(check: RenderCheck) -> dict[str, Any]:
+    return {"scene": check.scene, "what": check.what, "error": check.error, "limit": check.limit, "passed": check.passed}
 
 
 def _scene(scene: SceneResult) -> dict[str, Any]:

@@ -118,14 +118,23 @@ def side_by_side(
     """`task` of every item, in the items' order, some at once. Raises what a task raised, and `Cancelled`."""
     quiet = Monitor(cancelled=monitor.cancelled)
     results: dict[int, Result] = {}
+    start = time.monotonic()
     with ThreadPoolExecutor(thread_count(SolverOptions(threads=threads))) as pool:
         futures: dict[Future[Result], int] = {pool.submit(task, item, quiet): k for k, item in enumerate(items)}
         waiting = set(futures)
         try:
             while waiting:
-                monitor.report(f"{what}, {len(results)} of {len(items)} done", len(results) / len(items))
+                monitor.report(f"{what}{_time_left(time.monotonic() - start, len(results), len(items))}", len(results) / len(items))
                 done, waiting = wait(waiting, _POLL_SECONDS, FIRST_COMPLETED)
                 results.update({futures[future]: future.result() for future in done})
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
     return tuple(results[k] for k in range(len(items)))
+
+
+def _time_left(seconds: float, done: int, total: int) -> str:
+    """How far the work is and, after the first item, how long the rest may take."""
+    if not done:
+        return f" {total} scenes"
+    left = seconds / done * (total - done)
+    return f" {done} of {total}" + (f", {left:.0f} s left" if left < 90 else f", {left / 60:.0f} min left")
