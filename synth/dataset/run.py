@@ -20,7 +20,8 @@ from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..recipe import Picture, Recipe, Sources, photograph
-from ..variant import load_mitsuba
+from ..rendering.bsdfs import load_drjit
+from ..variant import has_llvm, load_mitsuba
 from .card import card
 from .description import describe_picture
 from .reading import MANIFEST, read_description, read_json, require_intact
@@ -31,6 +32,7 @@ SCHEMA_VERSION = 1
 KIND = "isc synth data set"
 MOST_SCENES = 100_000  # seeds have five digits in folder names
 _LOOKING = 0.02  # of the whole, for what is there already
+_KERNELS_KEPT = 50  # scenes after which compiled kernels are let go; those needed again come from Dr.Jit's files
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
@@ -103,7 +105,16 @@ def _make(missing: list[Planned], total: int, out: Path, monitor: Monitor) -> No
         within.report(text, 0.9)
         write_scene(out / scene.split / scene.recipe.name, scene.split, scene.recipe, scene_itself, truth)
         del scene_itself, truth
-        gc.collect()  # renderers hold their buffers in reference cycles
+        _tidy(index)
+
+
+def _tidy(index: int) -> None:
+    """Keeps the memory of a long run flat: renderers hold buffers in reference cycles, and Dr.Jit keeps every kernel that it compiled."""
+    gc.collect()
+    if index % _KERNELS_KEPT == _KERNELS_KEPT - 1 and has_llvm():
+        drjit = load_drjit()
+        drjit.flush_kernel_cache()
+        drjit.flush_malloc_cache()
 
 
 def _constant(text: str, monitor: Monitor) -> Callable[[str, float], None]:

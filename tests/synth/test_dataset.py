@@ -156,7 +156,9 @@ def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it
     assert (seen[2] > 0).all()
 
 
-def test_the_same_seed_gives_the_same_bytes(made: Path, tmp_path: Path) -> None:
+def test_the_same_seed_gives_the_same_bytes(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the renderer's kernels were let go in between."""
+    monkeypatch.setattr(run_module, "_KERNELS_KEPT", 1)
     make_dataset(replace(RUN, count=2), tmp_path / "again")
     ours, theirs = contents(tmp_path / "again"), contents(made)
     scenes = [name for name in ours if name.endswith(("scene.json", "maps.exr"))]
