@@ -237,6 +237,15 @@ def test_the_object_stands_in_its_own_light(waisted: Seen) -> None:
     np.testing.assert_allclose(result.shading[~shadowed & (lambertian > 0.05), 0], lambertian[~shadowed & (lambertian > 0.05)], rtol=1e-6)
 
 
+@pytest.mark.parametrize("samples", [2, 3, 5])
+def test_few_samples_have_a_variance_too(waisted: Seen, samples: int) -> None:
+    result = lit(waisted, materials()["ggx"], sky(), samples=samples)
+    # The body has none where no sample met a shadow.
+    for variance, share in ((result.shading_variance, 0.1), (result.specular_variance, 0.8)):
+        assert np.isfinite(variance).all()
+        assert (variance.max(1) > 0).mean() > share
+
+
 @pytest.mark.parametrize("light", ["panel", "environment"])
 def test_the_variance_is_that_of_repeated_renders(waisted: Seen, light: str) -> None:
     runs = [lit(waisted, materials()["blinn_phong"], lights()[light], samples=16, seed=seed) for seed in range(20)]

@@ -67,6 +67,17 @@ def test_arrays_and_kernels_agree(waisted: Seen, material: str, light: str, tmp_
 
 
 @needs_llvm
+@pytest.mark.parametrize("light", ["directional", "environment"])
+def test_arrays_and_kernels_agree_on_light_that_bounces(waisted: Seen, light: str) -> None:
+    one, other = (render(waisted, "ggx", light, renderer, seed, bounces=2) for renderer, seed in (("arrays", 1), ("mitsuba", 2)))
+    direct = render(waisted, "ggx", light, "mitsuba", 2)
+    for layer in ("shading", "specular"):
+        result = compared(waisted.surface, one, other, layer)[2]
+        assert result.accepted, f"{layer}: {result.text()}"
+        assert not compared(waisted.surface, one, direct, layer)[2].accepted
+
+
+@needs_llvm
 def test_the_comparison_finds_two_per_cent(waisted: Seen) -> None:
     """What the test above is able to see."""
     one, other = render(waisted, "ggx", "environment", "arrays", 1), render(waisted, "ggx", "environment", "mitsuba", 2)
