@@ -44,12 +44,13 @@ class Sums:
         count = chunk.stop - chunk.start
         body, gloss = clear * paths.body, clear * paths.gloss
         halves = min(paths.samples) >= _ENOUGH
-        if unshadowed is not None:
-            share = _clear_share(paths, clear, count) if halves else np.ones((2, count))
-            self.body[chunk] += share.mean(0)[:, None] * unshadowed.body
-            body = body - unshadowed.reflected[paths.point] * share[1 - paths.half, paths.point]
         group = 2 * paths.strategy + paths.half if halves else paths.strategy
         sizes = [(many + 1 - half) // 2 for many in paths.samples for half in (0, 1)] if halves else list(paths.samples)
+        if unshadowed is not None:
+            share = _clear_share(paths, clear, count)[::-1] if halves else np.ones((2, count))
+            first = sizes[0] / paths.samples[0]
+            self.body[chunk] += (first * share[0] + (1 - first) * share[1])[:, None] * unshadowed.body
+            body = body - unshadowed.reflected[paths.point] * share[paths.half, paths.point]
         cell = group * count + paths.point
         for lobe, mean, noise in ((body, self.body, self.body_variance), (gloss, self.gloss, self.gloss_variance)):
             for channel in range(3):
