@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,7 +15,10 @@ from .bounds import Verdict
 from .figures import CHAIN, Figure, scene_value
 from .markdown import number
 from .run import RunOptions, SceneResult, side_by_side
-from .stages import Picture, Stage, find_stages, given
+from .separation_stage import SEPARATION
+from .sirfs_stage import SIRFS
+from .stages import Metric, Picture, find_stages, given
+from .substitution import METRICS
 
 _RANKS = ("best", "median", "worst")
 
@@ -34,27 +36,44 @@ class Case:
 
 @dataclass(frozen=True)
 class _Place:
-    """Which stage, which rank, which scene, and its value."""
+    """Which stage, "chain" being one too, by which metric, which rank, which scene, and its value."""
 
-    stage: Stage[Any, Any]
+    stage: str
+    metric: Metric
     rank: str
     scene: SceneResult
     value: float
 
 
 def make_cases(scenes: Sequence[SceneResult], options: RunOptions, monitor: Monitor) -> tuple[Case, ...]:
-    """The cases of every stage, by its first metric. Raises `InputError`, `Cancelled`."""
-    places = [place for stage in options.stages for place in _places(stage, scenes)]
+    """The cases of the chain, if it was run, and of every stage, by their first metric. Raises `InputError`, `Cancelled`."""
+    ranked = [(stage.name, stage.metrics[0]) for stage in options.stages]
+    if any(scene.chain is not None for scene in scenes):
+        ranked.append((CHAIN, METRICS[0]))
+    places = [place for stage, metric in ranked for place in _places(stage, metric, scenes)]
 
     def run(place: _Place, own: Monitor) -> Case:
-        truth = read_truth(place.scene.facts.folder)
-        answer = place.stage.run(given(truth, place.stage.needs), options.settings, own)
-        facts = place.scene.facts
+        truth, facts = read_truth(place.scene.facts.folder), place.scene.facts
         kind = f"{facts.gloss_class} {facts.model}, {facts.albedo}, light {facts.light_kind}"
-        remark = f"{place.stage.metrics[0].title} {number(place.value)}; {kind}; specular {100 * facts.specular_share:.1f} % of the light"
-        return Case(place.stage.name, place.rank, facts.name, remark, place.stage.shown(truth, answer))
+        remark = f"{place.metric.title} {number(place.value)}; {kind}; specular {100 * facts.specular_share:.1f} % of the light"
+        pictures = _chain_pictures(truth, options, own) if place.stage == CHAIN else _stage_pictures(place.stage, truth, options, own)
+        return Case(place.stage, place.rank, facts.name, remark, pictures)
 
     return side_by_side(run, places, options.threads, "drawing", monitor) if places else ()
+
+
+def _stage_pictures(name: str, truth: GroundTruth, options: RunOptions, monitor: Monitor) -> tuple[Picture, ...]:
+    (stage,) = find_stages((name,))
+    return stage.shown(truth, stage.run(given(truth, stage.needs), options.settings, monitor))
+
+
+def _chain_pictures(truth: GroundTruth, options: RunOptions, monitor: Monitor) -> tuple[Picture, ...]:
+    """What shape and light become of the photo, with the diffuse layers beside the photo."""
+    split = SEPARATION.run(given(truth, ()), options.settings, monitor)
+    answer = SIRFS.run(given(truth, (), split.diffuse), options.settings, monitor)
+    photo, *rest = SIRFS.shown(truth, answer)
+    layers = [picture for picture in SEPARATION.shown(truth, split) if picture.caption.startswith("diffuse")]
+    return (photo, *layers, *rest)
 
 
 def worst_scenes(verdict: Verdict, figures: Sequence[Figure], scenes: Sequence[SceneResult], many: int = 2) -> tuple[SceneResult, ...]:
@@ -91,15 +110,14 @@ def _key(verdict: Verdict) -> tuple[str, str, str, str]:
     return bound.stage, bound.metric, bound.kind, bound.value
 
 
-def _places(stage: Stage[Any, Any], scenes: Sequence[SceneResult]) -> list[_Place]:
-    metric = stage.metrics[0]
-    values = [(value, k) for k, scene in enumerate(scenes) if (value := scene_value(scene, stage.name, metric.name)) is not None]
+def _places(stage: str, metric: Metric, scenes: Sequence[SceneResult]) -> list[_Place]:
+    values = [(value, k) for k, scene in enumerate(scenes) if (value := scene_value(scene, stage, metric.name)) is not None]
     ordered = sorted(values, reverse=metric.larger_is_better)
     if not ordered:
         return []
     picks = dict.fromkeys((0, len(ordered) // 2, len(ordered) - 1))
     ranks = _RANKS if len(picks) == 3 else _RANKS[::2][: len(picks)]
-    return [_Place(stage, rank, scenes[ordered[pick][1]], ordered[pick][0]) for rank, pick in zip(ranks, picks, strict=True)]
+    return [_Place(stage, metric, rank, scenes[ordered[pick][1]], ordered[pick][0]) for rank, pick in zip(ranks, picks, strict=True)]
 
 
 def _truth_maps(truth: GroundTruth) -> dict[str, np.ndarray]:

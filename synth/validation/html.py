@@ -38,7 +38,8 @@ svg text{fill:#e6e6e3;font:13px system-ui,sans-serif}svg .faint{fill:#96999e}cod
 def page(outcome: Outcome, cases: Sequence[Case], evidence: Sequence[str]) -> str:
     """The whole page. `evidence`: files kept, relative to the page."""
     parts = [_head(outcome), _budget_part(outcome.budgets)]
-    parts += [_stage_part(stage, outcome, cases) for stage in dict.fromkeys(f.stage for f in outcome.figures)]
+    stages = dict.fromkeys(f.stage for f in outcome.figures)
+    parts += [_stage_part(stage, outcome, cases) for stage in sorted(stages, key=lambda stage: stage != CHAIN)]
     parts += [_judged(outcome, evidence), _made(outcome)]
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>ISC validation</title><style>{_STYLE}</style>'
     return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n' + "\n".join(parts) + "\n</body></html>\n"

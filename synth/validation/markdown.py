@@ -34,10 +34,12 @@ def percent(interval: Interval) -> str:
 
 def verdict_line(outcome: Outcome) -> str:
     """Accepted or rejected, and by how much was judged."""
-    judged = f"{len(outcome.verdicts)} bounds and {len(outcome.checks)} checks of renders"
+    broken = sum(verdict.broken for verdict in outcome.verdicts)
+    failed = sum(not check.passed for check in outcome.checks)
     if outcome.failures:
-        return f"Rejected: {len(outcome.failures)} of {judged} failed."
-    return f"Accepted: {judged} are kept." if outcome.verdicts or outcome.checks else "Nothing was judged: no bounds, no checks."
+        return f"Rejected: {broken} of {len(outcome.verdicts)} bounds broken, {failed} of {len(outcome.checks)} checks of the data failed."
+    bounds = f"{len(outcome.verdicts)} bounds" if outcome.verdicts else "no bounds were given"
+    return f"Accepted: {bounds}; {len(outcome.checks)} checks of the data passed."
 
 
 def findings(outcome: Outcome) -> tuple[str, ...]:

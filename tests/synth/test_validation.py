@@ -44,11 +44,12 @@ def sphere(share: float = 0.3, grey: bool = False) -> GroundTruth:
     shading = np.where(inside, np.exp(real_sh(normal) @ light), 0)
     specular = np.where(inside, share * np.maximum(normal @ np.array([0.3, 0.4, 0.866]), 0)[..., None] ** 60 * np.ones(3), 0)
     diffuse, nothing = reflectance * shading, np.zeros((SIZE, SIZE, 3), np.float32)
-    maps = (diffuse + specular, diffuse, specular, nothing, reflectance, shading, normal)
-    flat = np.zeros((SIZE, SIZE), np.float32)
+    flat, height = np.zeros((SIZE, SIZE), np.float32), np.where(mask, z, 0)
+    layers = (diffuse + specular, diffuse, specular, nothing, reflectance, shading, normal, height)
+    image, diffuse, specular, residual, reflectance, shading, normal, height = (np.asarray(layer, np.float32) for layer in layers)
     return GroundTruth(
-        *(np.asarray(values, np.float32) for values in maps), np.where(mask, z, 0).astype(np.float32), mask, flat, flat, nothing, nothing,
-        light, 0.0, np.zeros((4, 8, 3)),
+        image, diffuse, specular, residual, reflectance, shading, normal, height, mask, flat, flat, nothing, nothing, light, 0.0,
+        np.zeros((4, 8, 3)),
     )  # fmt: skip
 
 
