@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .variant import load_mitsuba
 
 # Object units; objects are about 2 wide.
 LIFT = 2e-4
+_VECTOR = 64  # bytes
 
 
 @dataclass(frozen=True)
@@ -70,10 +72,14 @@ class Tracer:
 
     def _array_hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         mi = load_mitsuba()
+        import drjit
+
         hit = self.scene.ray_intersect(mi.Ray3f(_points(origins), _vectors(directions)))
-        valid = np.array(hit.is_valid(), dtype=float)
-        parts = [np.array(part, dtype=float).T for part in (hit.p, hit.sh_frame.n, hit.uv)]
-        return np.hstack([valid[:, None], *parts]) * valid[:, None]
+        # Part by part: a whole vector becomes an array by a kernel that is compiled anew for every number of rays.
+        parts = [hit.is_valid(), *hit.p, *hit.sh_frame.n, *hit.uv]
+        drjit.eval(parts)
+        columns = np.stack([np.array(part, dtype=float) for part in parts], axis=1)
+        return columns * columns[:, :1]
 
     def _scalar_hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         mi = load_mitsuba()
@@ -91,8 +97,22 @@ def _rows(values: np.ndarray) -> Iterator[tuple[float, ...]]:
 
 
 def _points(values: np.ndarray) -> object:
-    return load_mitsuba().Point3f(np.ascontiguousarray(values.T, np.float32))
+    return load_mitsuba().Point3f(*_parts(values))
 
 
 def _vectors(values: np.ndarray) -> object:
-    return load_mitsuba().Vector3f(np.ascontiguousarray(values.T, np.float32))
+    return load_mitsuba().Vector3f(*_parts(values))
+
+
+def _parts(values: np.ndarray) -> list[object]:
+    return [lanes(part) for part in values.T]
+
+
+def lanes(values: np.ndarray) -> Any:
+    """Numbers (N,) as an array of Dr.Jit, in an LLVM variant. Dr.Jit reads them where they lie, and its kernels have it in them whether
+    that is a multiple of a vector's length: here it always is, so that no kernel is compiled twice."""
+    room = np.empty(values.size + _VECTOR // 4, np.float32)
+    start = -room.ctypes.data % _VECTOR // 4
+    aligned = room[start : start + values.size]
+    aligned[:] = values
+    return load_mitsuba().Float(aligned)

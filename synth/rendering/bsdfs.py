@@ -18,7 +18,10 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, Protocol
 
+import numpy as np
+
 from ..materials import Material, Paint
+from ..tracing import lanes
 from ..variant import load_mitsuba
 
 # Arrays of Dr.Jit, whose types depend on the variant.
@@ -172,12 +175,21 @@ class PlasticLobes:
         return self.drawn.sample(view, choice, place)
 
 
+def rows_of(colour: Lanes) -> np.ndarray:
+    """A colour or vector with an entry for each lane as an array (N, 3).
+
+    Part by part: Dr.Jit turns a whole one by a kernel that has the number of lanes in it, and is compiled anew for every other number.
+    """
+    load_drjit().eval(colour)
+    return np.stack([np.array(part, float) for part in colour], axis=1)
+
+
 def lobes_of(material: Material, paint: Paint) -> Lobes:
     """The lobes of a material at points whose paint is known, a lane each. Raises `InputError` where Mitsuba is not installed."""
     dr, mi = load_drjit(), load_mitsuba()
-    sigma, f0, strength, gloss = mi.Float(material.sigma), mi.Float(material.f0), mi.Float(paint.strength), mi.Float(paint.gloss)
+    sigma, f0, strength, gloss = mi.Float(material.sigma), mi.Float(material.f0), lanes(paint.strength), lanes(paint.gloss)
     # What is opaque is no constant of a kernel, so that the next scene finds the kernel compiled.
-    dr.make_opaque(sigma, f0, strength, gloss)
+    dr.make_opaque(sigma, f0)
     if material.model == "blinn_phong":
         return PaintLobes(0.0, strength, BlinnPhongGloss(gloss))
     facets = PaintLobes(0.0, strength, GgxGloss(gloss, f0))

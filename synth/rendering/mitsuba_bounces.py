@@ -21,7 +21,7 @@ from ..surface import Surface
 from ..tracing import Tracer
 from ..variant import load_mitsuba
 from . import Lit, RenderOptions
-from .bsdfs import load_drjit, lobes_of
+from .bsdfs import load_drjit, lobes_of, rows_of
 from .mitsuba_direct import beam_light, generator, one_sample, points_at
 from .mitsuba_lights import Beam, WideLight
 
@@ -70,8 +70,8 @@ def _arriving(
     weights = [dr.select(useful, value / dr.select(useful, density, 1), 0) for value in points.lobes.values(points.view, local)]
     toward, origin = points.frame.to_world(local), points.origin
     dr.eval(weights, useful, toward, origin)
-    direction = np.array(toward, float).T
-    hits = world.tracer.hits(np.array(origin, float).T, direction)
+    direction = rows_of(toward)
+    hits = world.tracer.hits(rows_of(origin), direction)
     met = hits.valid & np.array(useful, bool)
     body, gloss = np.zeros((2, len(position), 3))
     if met.any():
@@ -95,8 +95,8 @@ def _leaving(
             plain, more, shiny = one_sample(points, light, world.tracer, numbers, 1.0)
             matt = plain + more
         dr.eval(matt, shiny, numbers)
-        body += np.array(matt, float).T
-        gloss += np.array(shiny, float).T
+        body += rows_of(matt)
+        gloss += rows_of(shiny)
     if bounces > 1:
         further = _arriving(position, normal, view, paint, world, bounces - 1, random)
         body, gloss = body + further[0], gloss + further[1]

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..tracing import LIFT, Tracer
+from ..tracing import LIFT, Tracer, lanes
 from ..variant import load_mitsuba
 from .bsdfs import Lanes, Lobes, load_drjit
 from .mitsuba_lights import Beam, WideLight
@@ -38,7 +38,7 @@ class Points:
 def points_at(position: np.ndarray, normal: np.ndarray, view: np.ndarray, lobes: Lobes) -> Points:
     """Points from arrays (N, 3) in the camera's frame."""
     dr, mi = load_drjit(), load_mitsuba()
-    place, across, toward = (mi.Vector3f(np.ascontiguousarray(part.T, np.float32)) for part in (position, normal, view))
+    place, across, toward = (mi.Vector3f(*(lanes(column) for column in part.T)) for part in (position, normal, view))
     frame, origin = mi.Frame3f(across), place + LIFT * across
     local = frame.to_local(toward)
     dr.eval(place, origin, frame, local)

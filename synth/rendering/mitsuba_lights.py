@@ -18,6 +18,7 @@ import numpy as np
 from isc_core.environment import solid_angles
 
 from ..lights import DirectionalLight, EnvironmentLight, Light, PanelLight, PointLight
+from ..tracing import lanes
 from ..variant import load_mitsuba
 from .bsdfs import Lanes, load_drjit
 from .irradiance import unoccluded_panel, unoccluded_shading
@@ -53,11 +54,11 @@ class Sky:
         share = power / power.sum()
         in_row = share.sum(axis=1)
         self.rows = mi.UInt32(rows)
-        self.below = mi.Float(np.cumsum(in_row))
-        self.before = mi.Float((np.cumsum(share, axis=1) / np.maximum(in_row, 1e-300)[:, None]).ravel())
-        self.density = mi.Float((share / solid).ravel())
-        self.colours = [mi.Float(self._radiance[..., channel].ravel()) for channel in range(3)]
-        dr.make_opaque(self.rows, self.below, self.before, self.density, self.colours)
+        self.below = lanes(np.cumsum(in_row))
+        self.before = lanes((np.cumsum(share, axis=1) / np.maximum(in_row, 1e-300)[:, None]).ravel())
+        self.density = lanes((share / solid).ravel())
+        self.colours = [lanes(self._radiance[..., channel].ravel()) for channel in range(3)]
+        dr.make_opaque(self.rows)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
         dr, mi = load_drjit(), load_mitsuba()

@@ -35,7 +35,7 @@ from ..surface import Surface
 from ..tracing import Tracer
 from ..variant import has_llvm, load_mitsuba
 from . import Lit, RenderOptions
-from .bsdfs import Lanes, load_drjit, lobes_of
+from .bsdfs import Lanes, load_drjit, lobes_of, rows_of
 from .mitsuba_bounces import World, bounced_light
 from .mitsuba_direct import Points, beam_light, generator, one_sample, points_at
 from .mitsuba_lights import Beam, WideLight, kernel_light
@@ -102,7 +102,7 @@ def _dark(count: int) -> Lit:
 
 
 def _exact(points: Points, count: int, light: Beam, tracer: Tracer) -> Lit:
-    parts = [np.array(colour, float).T[:count] for colour in beam_light(points, light, tracer)]
+    parts = [rows_of(colour)[:count] for colour in beam_light(points, light, tracer)]
     return Lit(*parts, *(np.zeros_like(part) for part in parts))
 
 
@@ -194,10 +194,9 @@ class _Gathered:
 
     def moments(self, halves: int) -> list[_Moments]:
         """What came in so far, of each half of the lanes."""
-        means, spreads, common = (
-            [np.split(np.array(part, float).T, halves) for part in parts] for parts in (self.means, self.spreads, [self.common])
-        )
-        return [_Moments(self.count, [m[k] for m in means], [s[k] for s in spreads], common[0][k]) for k in range(halves)]
+        means, spreads = ([np.split(rows_of(part), halves) for part in parts] for parts in (self.means, self.spreads))
+        common = np.split(rows_of(self.common), halves)
+        return [_Moments(self.count, [part[k] for part in means], [part[k] for part in spreads], common[k]) for k in range(halves)]
 
 
 def _sum(a: Lit, b: Lit) -> Lit:
