@@ -14,7 +14,7 @@ from isc_core.brdf.lambert import Lambert
 from isc_core.brdf.model import Model
 from isc_core.brdf.oren_nayar import OrenNayar
 from isc_core.brdf.shading import directional, radiance
-from isc_core.environment import directions, shading_under
+from isc_core.environment import directions, shading_under, solid_angles
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.sirfs.frames import real_sh
@@ -149,10 +149,35 @@ def test_a_white_sky_shows_the_energy_of_the_gloss(name: str) -> None:
     np.testing.assert_allclose(found.shading, 1.0, rtol=1e-4)
 
 
+@pytest.mark.parametrize("name", ["oren_nayar", "blinn_phong 20", "ggx .5"])
+def test_a_sky_is_the_quadrature_of_the_models(name: str) -> None:
+    material, body, gloss = MATERIALS[name]
+    light = sky()
+    surface, found = lit(ball(), material, light, size=12, samples=512)
+    rows, finer = len(light.radiance), 6
+    toward = directions(rows * finer).reshape(-1, 3)
+    power = (light.radiance[..., 0].repeat(finer, axis=0).repeat(finer, axis=1) * solid_angles(rows * finer)).ravel()
+    strength = 2.0 if name == "ggx .5" else 1.0
+    for part, variance, model, factor in (
+        (found.shading, found.shading_variance, body, 1.0),
+        (found.specular, found.specular_variance, gloss, strength),
+    ):
+        expected = np.array(
+            [
+                factor * (model.value(normal, view, toward) * np.maximum(toward @ normal, 0)) @ power
+                for normal, view in zip(surface.normal, surface.view, strict=True)
+            ]
+        )
+        accept((part[:, 0] - expected)[:, None], variance[:, :1], 512, tolerance=2e-3 * max(expected.max(), 1e-9))
+
+
 def accept(difference: np.ndarray, variance: np.ndarray, samples: int, tolerance: float) -> None:
     """Each point up to its noise. Lists of points have no neighbours, so only the test of single pixels counts."""
     result = pixel_test(difference[None], variance[None], PixelTestOptions(level=1e-3, tolerance=tolerance, samples=samples))
     assert result.beyond == 0, result.text()
+    # All points together: a small bias that no single one shows. Those of different points are independent.
+    bias, noise = np.abs(difference[:, 0].mean()), np.sqrt(variance[:, 0].sum()) / len(variance)
+    assert bias <= 4.5 * noise + tolerance / 4
 
 
 @pytest.mark.parametrize("light", [PANEL, sky()], ids=["panel", "sky"])
