@@ -153,7 +153,7 @@ def test_a_white_sky_shows_the_energy_of_the_gloss(name: str) -> None:
 def test_a_sky_is_the_quadrature_of_the_models(name: str) -> None:
     material, body, gloss = MATERIALS[name]
     light = sky()
-    surface, found = lit(ball(), material, light, size=12, samples=512)
+    surface, found = lit(ball(), material, light, size=12, samples=2048)
     rows, finer = len(light.radiance), 6
     toward = directions(rows * finer).reshape(-1, 3)
     power = (light.radiance[..., 0].repeat(finer, axis=0).repeat(finer, axis=1) * solid_angles(rows * finer)).ravel()
@@ -168,7 +168,7 @@ def test_a_sky_is_the_quadrature_of_the_models(name: str) -> None:
                 for normal, view in zip(surface.normal, surface.view, strict=True)
             ]
         )
-        accept((part[:, 0] - expected)[:, None], variance[:, :1], 512, tolerance=2e-3 * max(expected.max(), 1e-9))
+        accept((part[:, 0] - expected)[:, None], variance[:, :1], 2048, tolerance=2e-3 * max(expected.max(), 1e-9))
 
 
 def accept(difference: np.ndarray, variance: np.ndarray, samples: int, tolerance: float) -> None:
