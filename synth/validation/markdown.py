@@ -28,8 +28,8 @@ def with_interval(interval: Interval) -> str:
 def percent(interval: Interval) -> str:
     """A share and its interval in per cent: "42 % [30, 55]"."""
     if interval.low is None or interval.high is None:
-        return f"{100 * interval.value:.0f} %"
-    return f"{100 * interval.value:.0f} % [{100 * interval.low:.0f}, {100 * interval.high:.0f}]"
+        return f"{round(100 * interval.value)} %"
+    return f"{round(100 * interval.value)} % [{round(100 * interval.low)}, {round(100 * interval.high)}]"
 
 
 def verdict_line(outcome: Outcome) -> str:

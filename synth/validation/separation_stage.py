@@ -26,22 +26,25 @@ _DROPPED = 0.2
 
 @dataclass(frozen=True)
 class SeparationScores:
-    """Inside the mask, of linear values. None: not defined, where the scene has no specular light, or no error to sort.
+    """Inside the mask, of linear values. None: not defined. All but `taken` are of scenes with specular light, since a method that leaves a
+    matt scene alone has errors of zero, which would rule every geometric mean.
 
     `mse_*`: mean square errors; `lmse_*`: Grosse's local error; `psnr_*`: dB for a white of 1, 120 at most. `mse_ratio`: diffuse error over
     that of the untouched photo. `removed`: share of the squared error that leaves with the least confident fifth of the pixels. `rank`:
-    correlation of confidence and squared error, -1 the best.
+    correlation of confidence and squared error, -1 the best. `taken`: of scenes without specular light, the RMS of what was taken from the
+    photo over the photo's own.
     """
 
-    mse_diffuse: float
-    mse_specular: float
-    lmse_diffuse: float | None
-    lmse_specular: float | None
-    psnr_diffuse: float
-    psnr_specular: float
-    mse_ratio: float | None
-    removed: float | None
-    rank: float | None
+    mse_diffuse: float | None = None
+    mse_specular: float | None = None
+    lmse_diffuse: float | None = None
+    lmse_specular: float | None = None
+    psnr_diffuse: float | None = None
+    psnr_specular: float | None = None
+    mse_ratio: float | None = None
+    removed: float | None = None
+    rank: float | None = None
+    taken: float | None = None
 
 
 def run_separation(inputs: Inputs, options: StageOptions, monitor: Monitor) -> Separation:
@@ -52,19 +55,20 @@ def run_separation(inputs: Inputs, options: StageOptions, monitor: Monitor) -> S
 def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores:
     """The errors of both layers. Raises `ValueError` for an empty mask."""
     mask = truth.mask
-    nothing = mse(truth.diffuse, truth.image, mask)
+    nothing, wrong = mse(truth.diffuse, truth.image, mask), mse(truth.diffuse, answer.diffuse, mask)
+    if nothing <= _LEAST:
+        return SeparationScores(taken=math.sqrt(wrong / max(float(np.square(truth.image[mask].astype(float)).mean()), _LEAST)))
     squared = np.square(answer.diffuse[mask].astype(float) - truth.diffuse[mask]).mean(axis=1)
-    wrong = mse(truth.diffuse, answer.diffuse, mask)
-    sortable = wrong > _LEAST
     confidence = answer.confidence[mask]
+    sortable = wrong > _LEAST
     return SeparationScores(
         mse_diffuse=wrong,
         mse_specular=mse(truth.specular, answer.specular, mask),
         lmse_diffuse=_local(truth.diffuse, answer.diffuse, mask),
-        lmse_specular=_local(truth.specular, answer.specular, mask) if nothing > _LEAST else None,
+        lmse_specular=_local(truth.specular, answer.specular, mask),
         psnr_diffuse=min(_EQUAL, psnr(truth.diffuse, answer.diffuse, mask)),
         psnr_specular=min(_EQUAL, psnr(truth.specular, answer.specular, mask)),
-        mse_ratio=wrong / nothing if nothing > _LEAST else None,
+        mse_ratio=wrong / nothing,
         removed=sparsification(squared, confidence).removed(_DROPPED) if sortable else None,
         rank=rank_correlation(confidence, squared) if sortable and np.ptp(confidence) > 0 else None,
     )
@@ -108,6 +112,7 @@ SEPARATION = Stage(
         Metric("psnr_specular", "specular PSNR", "dB", geometric=False, larger_is_better=True, margin=0.5),
         Metric("removed", "error in the least confident fifth", geometric=False, larger_is_better=True, margin=0.05),
         Metric("rank", "rank of confidence and error", geometric=False, margin=0.05),
+        Metric("taken", "taken from matt scenes, RMS", geometric=False, margin=0.005),
     ),
     run=run_separation,
     score=score_separation,

@@ -89,10 +89,12 @@ def test_confidence_that_knows_the_error_ranks_and_removes_it() -> None:
     assert good.rank < -0.9 and bad.rank > 0.9 and good.removed > 0.9 > 0.1 > bad.removed
 
 
-def test_a_matt_scene_has_no_ratio_instead_of_a_division_by_zero() -> None:
+def test_of_a_matt_scene_only_what_was_taken_counts() -> None:
     truth = sphere(share=0.0)
-    scores = score_separation(truth, Separation(truth.diffuse, truth.specular, truth.residual, np.ones((SIZE, SIZE), np.float32)))
-    assert scores.mse_ratio is None and scores.lmse_specular is None
+    left = Separation(truth.diffuse, truth.specular, truth.residual, np.ones((SIZE, SIZE), np.float32))
+    assert score_separation(truth, left) == SeparationScores(taken=0.0)
+    robbed = score_separation(truth, replace(left, diffuse=0.9 * truth.diffuse, specular=0.1 * truth.diffuse))
+    assert robbed.taken == pytest.approx(0.1, rel=1e-5) and robbed.mse_ratio is None
 
 
 def test_the_exact_answer_has_no_error() -> None:
@@ -254,7 +256,7 @@ def test_a_bound_breaks_only_where_the_whole_interval_is_beyond(name: str, low: 
 def test_a_run_keeps_its_own_bounds_and_they_survive_the_file(tmp_path: Path) -> None:
     figures = all_figures((SEPARATION,), results(list(np.random.default_rng(1).uniform(0.2, 0.9, 12))), 0)
     bounds = bounds_from(figures)
-    assert len(bounds) == len(SEPARATION.metrics)
+    assert len(bounds) == len(SEPARATION.metrics) - 1  # no scene is matt
     write_bounds(tmp_path / "bounds.json", bounds)
     assert read_bounds(tmp_path / "bounds.json") == bounds
     assert not any(verdict.broken for verdict in judge(bounds, figures))
