@@ -1,0 +1,54 @@
+"""The result of an edit: the layers of the picture as it would have been.
+
+Equation: image' = diffuse' + specular' + residual'. The residual is what the sensor lost under a highlight, so it goes with that:
+residual' = residual min(1, specular' / specular). A pixel whose layers are unchanged keeps the photo's own value, bit by bit, which the
+rounded sum would not.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..decomposition import Decomposition
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
+
+
+@dataclass(frozen=True)
+class Edited:
+    """`image`, `diffuse`, `specular`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and specular >= 0.
+
+    `notes`: what a person should know of the edit, a sentence each.
+    """
+
+    image: np.ndarray
+    diffuse: np.ndarray
+    specular: np.ndarray
+    notes: tuple[str, ...] = ()
+
+
+def edited(d: Decomposition, diffuse: np.ndarray | None = None, specular: np.ndarray | None = None, notes: tuple[str, ...] = ()) -> Edited:
+    """The scene with another diffuse or specular layer (H, W, 3); None keeps the present one. Negative light becomes 0."""
+    new_diffuse = d.diffuse if diffuse is None else _layer(diffuse, d.mask)
+    new_specular = d.specular if specular is None else _layer(specular, d.mask)
+    before, after = d.specular.sum(-1, keepdims=True), new_specular.sum(-1, keepdims=True)
+    kept = np.minimum(1, np.divide(after, before, out=np.ones_like(before), where=before > 0))
+    same = ((new_diffuse == d.diffuse) & (new_specular == d.specular)).all(-1, keepdims=True)
+    total = np.maximum(new_diffuse + new_specular + d.residual * kept, 0)
+    return Edited(np.where(same, d.image, total), new_diffuse, new_specular, notes)
+
+
+def luminance(color: np.ndarray) -> np.ndarray:
+    """(...) of linear Rec.709 (..., 3), float64."""
+    return np.asarray(color, float) @ LUMINANCE
+
+
+def white_of(layer: np.ndarray, mask: np.ndarray) -> float:
+    """The layer's white: the 99.5th percentile of its brightest channel over the lit pixels of the mask; 1 if none is lit."""
+    bright = layer[mask].max(-1)
+    lit = bright[bright > 0]
+    return float(np.percentile(lit, 99.5)) if lit.size else 1.0
+
+
+def _layer(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    return np.where(mask[..., None], np.maximum(values, 0), 0).astype(np.float32)
