@@ -1,0 +1,246 @@
+"""Lobes are found again in images that were made of them, and what cannot be known is said to be unknown."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isc_core.brdf.blinn_phong import BlinnPhong
+from isc_core.brdf.fitting import LobeFitOptions, fit_lobe
+from isc_core.brdf.fitting.environment_response import respond_to, surroundings
+from isc_core.brdf.fitting.response import respond
+from isc_core.brdf.fitting.result import NARROW, NO_LIGHT, SMOOTH
+from isc_core.brdf.ggx import Ggx
+from isc_core.brdf.model import Lobe
+from isc_core.brdf.roughness import alpha_from_exponent
+from isc_core.brdf.shading import Lights, directional, environment, radiance
+from isc_core.environment import directions, solid_angles
+from isc_core.errors import Cancelled, InputError
+from isc_core.progress import Monitor
+
+VIEW = np.array([0.0, 0, 1])
+KEY = np.array([-0.48, 0.6, 0.64])
+COLOUR = np.array([3.0, 2.5, 2.0])
+
+
+def ball(size: int = 96) -> tuple[np.ndarray, np.ndarray]:
+    """Normals (size, size, 3) and mask of an ellipsoid that nearly fills the picture."""
+    y, x = np.meshgrid(np.linspace(1, -1, size) / 0.9, np.linspace(-1, 1, size) / 0.9, indexing="ij")
+    square = x * x + y * y
+    mask = square < 0.97
+    normal = np.dstack([x, 0.8 * y, np.sqrt(np.where(mask, 1 - square, 1))])
+    normal[~mask] = VIEW
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True), mask
+
+
+def seen(lobe: Lobe, lights: Lights, size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Specular image, normals and mask."""
+    normal, mask = ball(size)
+    return np.where(mask[..., None], radiance(lobe, normal, VIEW, lights), 0), normal, mask
+
+
+def angle(a: np.ndarray | None, b: np.ndarray) -> float:
+    """Degrees between two unit vectors."""
+    assert a is not None
+    return float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))
+
+
+@pytest.mark.parametrize("model", ["ggx", "blinn_phong"])
+def test_the_response_is_that_of_the_brdf_and_its_gradient_that_of_differences(model: str) -> None:
+    rng = np.random.default_rng(0)
+    normal = rng.normal(size=(60, 3)) + (0, 0, 1.5)
+    normal[:, 2] = np.abs(normal[:, 2])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    for alpha in (0.05, 0.2, 0.6):
+        lobe = Ggx(alpha, 0.04) if model == "ggx" else BlinnPhong(1.0, 2 / alpha**2 - 2)
+        answer = respond(model, normal, KEY, alpha)  # type: ignore[arg-type]
+        np.testing.assert_allclose(answer.value, radiance(lobe, normal, VIEW, directional(KEY, 1.0))[:, 0], rtol=1e-9, atol=1e-12)
+        step = 1e-6
+        up, down = (respond(model, normal, KEY, alpha * np.exp(s)).value for s in (step, -step))  # type: ignore[arg-type]
+        scale = answer.value.max()
+        np.testing.assert_allclose(answer.by_log_alpha, (up - down) / (2 * step), rtol=1e-5, atol=1e-6 * scale)
+        for across in (np.array([0.8, 0, 0.6]), np.cross(KEY, [0.8, 0, 0.6])):
+            turned = [KEY + s * across for s in (step, -step)]
+            up, down = (respond(model, normal, t / np.linalg.norm(t), alpha).value for t in turned)  # type: ignore[arg-type]
+            np.testing.assert_allclose(answer.by_light @ across, (up - down) / (2 * step), rtol=1e-4, atol=1e-5 * scale / alpha)
+
+
+@pytest.mark.parametrize("alpha", [0.05, 0.1, 0.25, 0.45])
+def test_a_lobe_under_one_light_is_found_exactly(alpha: float) -> None:
+    fit = fit_lobe(*seen(Ggx(alpha), directional(KEY, COLOUR)))
+    assert fit.determined and len(fit.lights) == 1
+    assert fit.alpha == pytest.approx(alpha, rel=1e-3)
+    np.testing.assert_allclose(fit.strength_light, COLOUR, rtol=1e-3)
+    assert angle(fit.direction, KEY) < 0.05
+    assert fit.explained > 0.9999
+    assert fit.blender_roughness == pytest.approx(np.sqrt(alpha), rel=1e-3)
+
+
+@pytest.mark.parametrize("exponent", [20.0, 300.0])
+def test_a_blinn_phong_lobe_is_found_exactly(exponent: float) -> None:
+    scene = seen(BlinnPhong(0.3, exponent), directional(KEY, COLOUR))
+    fit = fit_lobe(*scene, options=LobeFitOptions(model="blinn_phong"))
+    assert fit.exponent == pytest.approx(exponent, rel=3e-3)
+    assert fit.alpha == pytest.approx(float(alpha_from_exponent(exponent)), rel=2e-3)
+    np.testing.assert_allclose(fit.strength_light, 0.3 * COLOUR, rtol=3e-3)
+    assert angle(fit.direction, KEY) < 0.1
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_several_lights_are_counted(count: int) -> None:
+    towards = np.array([KEY, [0.6, 0.0, 0.8], [-0.1, -0.7, np.sqrt(0.5)]])[:count]
+    power = np.array([[3.0], [2.0], [1.5]])[:count] * [1, 0.9, 0.8]
+    fit = fit_lobe(*seen(Ggx(0.12), Lights(towards, power)))
+    assert len(fit.lights) == count
+    assert fit.alpha == pytest.approx(0.12, rel=0.01)
+    for light, direction, strength in zip(fit.lights, towards, power, strict=True):
+        assert angle(light.direction, direction) < 0.3
+        np.testing.assert_allclose(light.strength_light, strength, rtol=0.02)
+
+
+def test_a_known_direction_is_kept() -> None:
+    fit = fit_lobe(*seen(Ggx(0.2), directional(KEY, COLOUR)), light_direction=KEY)
+    np.testing.assert_array_equal(fit.direction, KEY)
+    assert fit.lights[0].cone == 0
+    assert fit.alpha == pytest.approx(0.2, rel=1e-3)
+
+
+def test_the_intervals_grow_with_the_noise_and_hold_the_truth() -> None:
+    specular, normal, mask = seen(Ggx(0.2), directional(KEY, COLOUR))
+    inside, widths = [], []
+    for noise in (0.02, 0.1):
+        for seed in range(12):
+            drawn = np.random.default_rng(seed).normal(size=specular.shape) * noise * specular.max()
+            fit = fit_lobe(np.maximum(specular + drawn, 0), normal, mask)
+            assert fit.alpha_interval is not None
+            inside.append(fit.alpha_interval.low < 0.2 < fit.alpha_interval.high)
+            widths.append(np.log(fit.alpha_interval.high / fit.alpha_interval.low))
+    assert np.mean(widths[12:]) > 1.5 * np.mean(widths[:12]) > 0
+
+
+def test_wrong_normals_widen_the_intervals_when_said_so() -> None:
+    scene = seen(Ggx(0.2), directional(KEY, COLOUR))
+    sure, unsure = fit_lobe(*scene), fit_lobe(*scene, options=LobeFitOptions(normal_error=15))
+    assert sure.lights[0].cone < 0.1 and 10 < unsure.lights[0].cone < 40
+    assert unsure.alpha_interval is not None
+    assert unsure.alpha_interval.low < 0.18 and unsure.alpha_interval.high > 0.22
+
+
+def test_pixels_without_confidence_and_clipped_ones_do_not_spoil_the_fit() -> None:
+    specular, normal, mask = seen(Ggx(0.15), directional(KEY, COLOUR))
+    clip = 0.3 * specular.max()
+    clipped = (specular > clip).any(-1)
+    fit = fit_lobe(np.minimum(specular, clip), normal, mask, clipped=clipped)
+    assert fit.alpha == pytest.approx(0.15, rel=0.02)
+    spoilt, confidence = specular.copy(), np.ones(mask.shape)
+    spoilt[60:80, 50:70], confidence[60:80, 50:70] = specular.max(), 0
+    assert fit_lobe(spoilt, normal, mask, confidence).alpha == pytest.approx(0.15, rel=0.01)
+
+
+def test_without_specular_light_nothing_is_invented() -> None:
+    normal, mask = ball()
+    for fit in (fit_lobe(np.zeros(normal.shape), normal, mask), fit_lobe(np.ones(normal.shape), normal, np.zeros_like(mask))):
+        assert fit.reason == NO_LIGHT and not fit.determined
+        assert fit.alpha is None and fit.lights == () and not fit.predicted.any()
+
+
+def test_a_smooth_light_leaves_alpha_undetermined() -> None:
+    normal, mask = ball()
+    towards, solid = directions(16), solid_angles(16)
+    smooth = np.exp(0.8 * towards[..., 1] + 0.5 * towards[..., 0])[..., None] * np.ones(3)
+    lights = environment(towards.reshape(-1, 3), solid.ravel(), smooth.reshape(-1, 3))
+    specular = np.zeros(normal.shape)
+    specular[mask] = radiance(Ggx(0.3), normal[mask], VIEW, lights)
+    fit = fit_lobe(specular, normal, mask)
+    assert not fit.determined and fit.alpha is None
+
+
+def test_a_highlight_narrower_than_a_pixel_gives_an_upper_bound() -> None:
+    specular, normal, mask = seen(Ggx(0.01), directional(KEY, COLOUR), 48)
+    fit = fit_lobe(specular, normal, mask)
+    assert fit.reason == NARROW and not fit.determined
+    assert fit.alpha is not None and fit.alpha >= 0.01
+
+
+def test_the_response_to_an_environment_is_the_sum_over_its_pixels() -> None:
+    rng = np.random.default_rng(1)
+    sky = 0.2 + rng.random((16, 32, 3)).cumsum(1) / 16
+    sky[4, 17] += 30
+    normal = np.array([[0.0, 0, 1], [0.3, 0.4, np.sqrt(0.75)], [-0.6, 0.0, 0.8]])
+    lights = environment(directions(16).reshape(-1, 3), solid_angles(16).ravel(), sky.reshape(-1, 3))
+    for model, lobe in (("ggx", Ggx(0.4)), ("blinn_phong", BlinnPhong(1.0, 2 / 0.4**2 - 2))):
+        found = respond_to(surroundings(sky), model, normal, 0.4)  # type: ignore[arg-type]
+        np.testing.assert_allclose(found, radiance(lobe, normal, VIEW, lights), rtol=0.05)
+
+
+def test_under_a_known_environment_strength_and_alpha_are_found() -> None:
+    normal, mask = ball()
+    towards, solid = directions(24), solid_angles(24)
+    sky = np.full((24, 48, 3), 0.1)
+    sky[5:8, 26:30] += (20, 18, 15)
+    lights = environment(towards.reshape(-1, 3), solid.ravel(), sky.reshape(-1, 3))
+    specular = np.zeros(normal.shape)
+    specular[mask] = 0.7 * radiance(Ggx(0.2), normal[mask], VIEW, lights)
+    fit = fit_lobe(specular, normal, mask, environment=sky)
+    assert fit.determined
+    assert fit.alpha == pytest.approx(0.2, rel=0.05)
+    np.testing.assert_allclose(fit.strength, 0.7, rtol=0.05)
+    assert fit.explained > 0.99
+
+
+def test_under_an_even_environment_alpha_is_undetermined() -> None:
+    normal, mask = ball(48)
+    mask &= normal[..., 2] > 0.6  # toward grazing angles the gloss of rough surfaces does look different
+    sky = np.ones((16, 32, 3))
+    specular = np.zeros(normal.shape)
+    specular[mask] = respond_to(surroundings(sky), "ggx", normal[mask], 0.3)
+    specular *= np.random.default_rng(0).uniform(0.7, 1.3, mask.shape)[..., None]
+    fit = fit_lobe(specular, normal, mask, environment=sky)
+    assert fit.reason == SMOOTH and fit.alpha is None
+
+
+def test_the_same_input_gives_the_same_answer_and_it_is_ready_for_json() -> None:
+    scene = seen(Ggx(0.2), directional(KEY, COLOUR))
+    first, second = fit_lobe(*scene), fit_lobe(*scene)
+    text = json.dumps(first.to_json(), allow_nan=False)
+    assert text == json.dumps(second.to_json(), allow_nan=False)
+    np.testing.assert_array_equal(first.predicted, second.predicted)
+    assert json.loads(text)["alpha"] == first.alpha
+
+
+def test_brighter_light_changes_the_product_alone() -> None:
+    specular, normal, mask = seen(Ggx(0.2), directional(KEY, COLOUR))
+    dim, bright = fit_lobe(specular, normal, mask), fit_lobe(1000 * specular, normal, mask)
+    assert dim.strength_light is not None
+    assert bright.alpha == pytest.approx(dim.alpha, rel=1e-5)
+    np.testing.assert_allclose(bright.strength_light, 1000 * dim.strength_light, rtol=1e-5)
+
+
+def test_what_does_not_fit_together_is_refused() -> None:
+    specular, normal, mask = seen(Ggx(0.2), directional(KEY, COLOUR), 24)
+    broken = specular.copy()
+    broken[12, 12] = np.nan
+    sky = np.ones((8, 16, 3))
+    for arguments, keywords in (
+        ((specular[:-1], normal, mask), {}),
+        ((specular, 2 * normal, mask), {}),
+        ((broken, normal, mask), {}),
+        ((-specular, normal, mask), {}),
+        ((specular, normal, mask.astype(float)), {}),
+        ((specular, normal, mask, np.full(mask.shape, 2.0)), {}),
+        ((specular, normal, mask), {"light_direction": np.array([1.0, 1, 1])}),
+        ((specular, normal, mask), {"light_direction": KEY, "environment": sky}),
+        ((specular, normal, mask), {"environment": sky[:, :-1]}),
+        ((specular, normal, mask), {"environment": -sky}),
+    ):
+        with pytest.raises(InputError):
+            fit_lobe(*arguments, **keywords)  # type: ignore[arg-type]
+    for options in ({"model": "mirror"}, {"most_lights": 4}, {"normal_error": 90}, {"floor": 0}):
+        with pytest.raises(InputError):
+            replace(LobeFitOptions(), **options)  # type: ignore[arg-type]
+
+
+def test_it_can_be_cancelled() -> None:
+    with pytest.raises(Cancelled):
+        fit_lobe(*seen(Ggx(0.2), directional(KEY, COLOUR), 24), monitor=Monitor(cancelled=lambda: True))
