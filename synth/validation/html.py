@@ -17,6 +17,7 @@ from .stages import all_stages
 from .substitution import Budget
 
 _COLORS = {"diffuse": "#e08a3c", "shape": "#5b9bd5", "light": "#e3c94b", "rest": "#8d8f94"}
+_LABELS = 290  # where the bars' names end, pixels
 _STYLE = """
 :root{color-scheme:dark}*{box-sizing:border-box}
 body{margin:0 auto;max-width:1180px;padding:2rem 1.5rem 4rem;background:#141517;color:#e6e6e3;font:16px/1.5 system-ui,sans-serif}
@@ -79,7 +80,7 @@ def _budget_part(budgets: Sequence[Budget]) -> str:
 
 def budget_chart(budgets: Sequence[Budget]) -> str:
     """Bars of shares, a group for each error, with whiskers for the intervals; an SVG element."""
-    left, right, bar, gap = 210.0, 190.0, 15, 16
+    left, right, bar, gap = _LABELS + 10.0, 190.0, 15, 16
     width = 1000.0
     entries = [(found, [*((TRUTH_TITLES[s.truth], _COLORS[s.truth], s.share) for s in found.shares)]) for found in budgets]
     rows = [(found.metric.title, [*shares, ("left with all truths", _COLORS["rest"], found.rest)]) for found, shares in entries]
@@ -110,7 +111,7 @@ def _bar(x: Callable[[float], float], y: float, height: float, name: str, color:
         drawn += (
             f'<line x1="{x(interval.low):.1f}" x2="{x(interval.high):.1f}" y1="{middle}" y2="{middle}" stroke="#fff" stroke-width="1.5"/>'
         )
-    text = f'<text x="200" y="{y + height - 2:.0f}" text-anchor="end" class="faint">{escape(name)}</text>'
+    text = f'<text x="{_LABELS}" y="{y + height - 2:.0f}" text-anchor="end" class="faint">{escape(name)}</text>'
     return drawn + text + f'<text x="{end + 14:.0f}" y="{y + height - 2:.0f}">{escape(percent(interval))}</text>'
 
 
