@@ -13,6 +13,7 @@ several pages the first is read.
 """
 
 import contextlib
+import errno
 import functools
 import hashlib
 import io
@@ -386,6 +387,32 @@ def read_raster(path: str | Path) -> Raster:
         raise InputError(f"{path}: the {kind} file is damaged, incomplete or of an unusual kind: save it again as a plain PNG") from error
     values = np.ascontiguousarray(raster.values)
     return replace(raster, values=values, sha256=hashlib.sha256(data).hexdigest())
+
+
+def recoded(raster: Raster, transfer: str, image: np.ndarray, changed: np.ndarray) -> Raster:
+    """`raster` with `image` (H, W, 3), linear, coded as the file is ("srgb" or "linear") where `changed` (H, W); other values stay bit by
+    bit. Codes are rounded and cut to the coding's range; a grey file gets three channels if its new pixels have colour."""
+    values = raster.values
+    if values.shape[2] == 1 and (np.ptp(image[changed], axis=-1) > 0).any():
+        values = _as_rgb(values)
+    coded = image[changed][:, : values.shape[2]]
+    coded = linear_to_srgb(coded) if transfer == "srgb" else coded
+    result = values.copy()
+    result[changed] = coded if raster.peak is None else np.rint(np.clip(coded, 0, 1) * raster.peak)
+    return replace(raster, values=result)
+
+
+def write_png(path: Path, raster: Raster) -> None:
+    """Writes integer codes and their alpha as a PNG of 8 or 16 bits, as they are. Raises `OSError` when it cannot be written."""
+    assert raster.peak is not None, "floats have no codes"
+    kind = raster.values.dtype
+    planes = _as_rgb(raster.values)[..., ::-1] if raster.alpha is not None or raster.values.shape[2] == 3 else raster.values
+    if raster.alpha is not None:
+        planes = np.concatenate([planes, np.rint(raster.alpha * float(np.iinfo(kind).max)).astype(kind)[..., None]], axis=2)
+    done, data = cv2.imencode(".png", np.ascontiguousarray(planes))
+    if not done:
+        raise OSError(errno.EIO, "the PNG could not be coded")
+    path.write_bytes(data.tobytes())
 
 
 @contextlib.contextmanager

@@ -112,6 +112,29 @@ def comparison_sheet(
     return _sheet(title, f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(answers)} separations", panels, columns=6)
 
 
+@dataclass(frozen=True)
+class Shown:
+    """A map of the object on a sheet: `values` (H, W, 3) linear, `mask` (H, W) bool, a label, a faint remark. `own`: in an exposure of its
+    own."""
+
+    values: np.ndarray
+    mask: np.ndarray
+    label: str
+    remark: str = ""
+    own: bool = False
+
+
+def edit_sheet(title: str, subtitle: str, maps: Sequence[Shown], others: Sequence[Panel] = (), columns: int = 4) -> Image.Image:
+    """What an edit did: `maps`, in the exposure of the first of them, then `others`, (320, 320) pixels each, as they are."""
+    first = _exposure(maps[0].values[maps[0].mask])
+    panels = []
+    for shown in maps:
+        frame, gain = _Frame.around(shown.mask), _exposure(shown.values[shown.mask]) if shown.own else first
+        panels.append(Panel(gain * frame.scaled(shown.values), frame.coverage, shown.label, shown.remark))
+    panels += others
+    return _sheet(title, subtitle, panels, min(columns, len(panels)))
+
+
 def _error_colors(error: np.ndarray) -> np.ndarray:
     """Errors (H, W, 3), 1 being the photo's white, as colours (H, W, 3), linear."""
     mean = error.mean(axis=2, keepdims=True)

@@ -36,10 +36,12 @@ _SKY_ROWS = 16
 
 @dataclass(frozen=True)
 class Gloss:
-    """`exponent`: the new lobe's, in [1, 1e5]; None keeps it. `present`: the present lobe's, None for the fitted one. `gain` >= 0: of the
-    specular layer. `metal` in [0, 1]: the share of metal. `method`: "remap" or "render". Raises `InputError`."""
+    """`exponent`: the new lobe's, in [1, 1e5]; None for `sharper` > 0 times the present one's. `present`: the present lobe's, None for the
+    fitted one. `gain` >= 0: of the specular layer. `metal` in [0, 1]: the share of metal. `method`: "remap" or "render".
+    Raises `InputError`."""
 
     exponent: float | None = None
+    sharper: float = 1.0
     present: float | None = None
     gain: float = 1.0
     metal: float = 0.0
@@ -49,6 +51,7 @@ class Gloss:
         for name in ("exponent", "present"):
             if getattr(self, name) is not None:
                 check_range(name, getattr(self, name), 1, 1e5)
+        check_range("sharper", self.sharper, 1e-3, 1e3)
         check_range("gain", self.gain, 0, np.inf)
         check_range("metal", self.metal, 0, 1)
         if self.method not in METHODS:
@@ -58,7 +61,8 @@ class Gloss:
 def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None = None) -> Edited:
     """The scene with another gloss. `light`: to render under; None for the one that best explains the specular layer."""
     notes: list[str] = []
-    specular = d.specular if gloss.exponent is None and gloss.method == "remap" else _new_lobe(d, gloss, light, notes)
+    same = gloss.exponent is None and gloss.sharper == 1 and gloss.method == "remap"
+    specular = d.specular if same else _new_lobe(d, gloss, light, notes)
     if gloss.gain != 1:
         specular = specular * gloss.gain
     if gloss.metal == 0:
@@ -91,7 +95,7 @@ def _new_lobe(d: Decomposition, gloss: Gloss, light: DirectionalLight | None, no
     if not fit.determined:
         notes.append("no single light and lobe explain the specular layer: the present exponent is a guess")
     present = gloss.present or (fit.exponent if fit.determined and fit.exponent else USUAL_EXPONENT)
-    exponent = gloss.exponent or present
+    exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
     if gloss.method == "remap":
         return remapped(d.specular, d.mask, present, exponent)
     under = light or fit.light

@@ -23,7 +23,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, nnls
 
 from ..brdf.blinn_phong import BlinnPhong
 from ..brdf.shading import directional, radiance
@@ -80,6 +80,19 @@ def explain_shading(d: Decomposition) -> LightEstimate:
     spread = np.square(samples.values - samples.values.mean(0)).sum()
     explained = _explained(samples.values - model(light, rest), spread)
     return LightEstimate(DirectionalLight(light, np.pi * rest[:3], rest[3:]), explained, cone if explained > 0 else 180.0)
+
+
+def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[DirectionalLight, float]:
+    """The light from the unit vector `direction` (3,) that fits the shading best, and the share of it that it explains, in [0, 1]."""
+    samples = _samples(d, d.shading)
+    facing = np.maximum(samples.normal @ direction, 0)
+    design = np.stack([facing, np.ones_like(facing)], 1)
+    fits = [nnls(design, column) for column in samples.values.T]
+    strength, ambient = np.transpose([fit[0] for fit in fits])
+    whole = float(np.square(samples.values - samples.values.mean(0)).sum())
+    rest = sum(float(fit[1]) ** 2 for fit in fits)
+    explained = float(np.clip(1 - rest / whole, 0, 1)) if whole > 1e-12 * samples.values.size else 0.0
+    return DirectionalLight(direction, np.pi * strength, ambient), explained
 
 
 def explain_specular(d: Decomposition) -> LightEstimate:

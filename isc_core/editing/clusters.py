@@ -1,0 +1,96 @@
+"""Which parts of an object have the same paint: clusters of its reflectance by colour.
+
+Equation: k-means over the Oklab (L / 3, a, b) of the reflectance, brightness scaled so that its 99.5th percentile is white: hue and
+saturation count, lightness only a little, for shading that was taken for paint is mostly lightness. Starts: each next centre is the one of
+a few random pixels that lowers the total distance most (k-means++, greedy), with a seed of its own; then alternating means. Clusters are
+numbered by size, the largest first.
+
+Citation: S. Lloyd 1982, doi:10.1109/TIT.1982.1056489; D. Arthur, S. Vassilvitskii, "k-means++", SODA 2007, doi:10.5555/1283383.1283494.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..decomposition import Decomposition
+from ..errors import InputError
+from .chroma import to_oklab
+from .dichromatic import masked_blur
+from .edited import white_of
+
+LARGEST_COUNT = 12
+_LIGHTNESS = 1 / 3
+_ROUNDS, _TRIES, _SAMPLES = 60, 12, 20000
+_SOFT = 0.5  # sigma in pixels that smooths a cluster's outline
+
+
+@dataclass(frozen=True)
+class Clusters:
+    """`labels`: (H, W) int, 0 for the largest cluster, -1 outside the mask. `colors`: (K, 3) linear, each cluster's mean reflectance.
+    `shares`: (K,) of the object's pixels, falling."""
+
+    labels: np.ndarray
+    colors: np.ndarray
+    shares: np.ndarray
+
+    def weight(self, number: int) -> np.ndarray:
+        """(H, W) in [0, 1]: how much each pixel belongs to the cluster `number`, 1 being the largest; its outline is slightly soft.
+
+        Raises `InputError` for a number that is not there.
+        """
+        if not 1 <= number <= len(self.shares):
+            raise InputError(f"there is no cluster {number}: choose one of 1 to {len(self.shares)}, see clusters.png")
+        return np.clip(masked_blur((self.labels == number - 1).astype(float), self.labels >= 0, _SOFT), 0, 1)
+
+
+def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
+    """Splits the object into at most `count` paints, 1 to 12; fewer where there are not so many colours. The same seed, the same clusters.
+
+    Raises `InputError` for another count.
+    """
+    if not 1 <= count <= LARGEST_COUNT:
+        raise InputError(f"{count} clusters are not possible: give 1 to {LARGEST_COUNT}")
+    paint = np.maximum(d.reflectance[d.mask].astype(float), 0)
+    points = to_oklab(paint / white_of(d.reflectance, d.mask)) * np.array([_LIGHTNESS, 1.0, 1.0])
+    centers = _means(points[:: max(1, len(points) // _SAMPLES)], count, np.random.default_rng(seed))
+    labels = _nearest(points, centers)
+    sizes = np.bincount(labels, minlength=len(centers))
+    order = np.argsort(-sizes, kind="stable")[: int((sizes > 0).sum())]
+    rank = np.zeros(len(centers), int)
+    rank[order] = np.arange(len(order))
+    picture = np.full(d.mask.shape, -1)
+    picture[d.mask] = rank[labels]
+    colors = np.stack([paint[rank[labels] == k].mean(0) for k in range(len(order))])
+    return Clusters(picture, colors, sizes[order] / len(points))
+
+
+def _means(points: np.ndarray, count: int, generator: np.random.Generator) -> np.ndarray:
+    centers = points.mean(0, keepdims=True)
+    if count > 1:
+        centers = _starts(points, count, generator)
+    for _ in range(_ROUNDS):
+        labels = _nearest(points, centers)
+        sizes = np.bincount(labels, minlength=len(centers))
+        sums = np.stack([np.bincount(labels, weights=column, minlength=len(centers)) for column in points.T], 1)
+        moved = np.where(sizes[:, None] > 0, sums / np.maximum(sizes, 1)[:, None], centers)
+        if np.abs(moved - centers).max() < 1e-7:
+            break
+        centers = moved
+    return centers
+
+
+def _starts(points: np.ndarray, count: int, generator: np.random.Generator) -> np.ndarray:
+    centers = [points[generator.integers(len(points))]]
+    distance = np.square(points - centers[0]).sum(1)
+    while len(centers) < count and distance.max() > 1e-10:
+        tries = generator.choice(len(points), _TRIES, p=distance / distance.sum())
+        totals = [np.minimum(distance, np.square(points - points[i]).sum(1)) for i in tries]
+        best = int(np.argmin([total.sum() for total in totals]))
+        centers.append(points[tries[best]])
+        distance = totals[best]
+    return np.stack(centers)
+
+
+def _nearest(points: np.ndarray, centers: np.ndarray) -> np.ndarray:
+    # The points' own squares are the same for all centres.
+    return np.argmin(np.square(centers).sum(1) - 2 * points @ centers.T, axis=1)

@@ -1,0 +1,100 @@
+"""Bringing an edit back into the photo, at its full size.
+
+Problem: the maps may be smaller than the photo, whose detail the edited picture should keep; pixels outside the object must not change.
+Equation: what is brought back is the CHANGE, e = image' - image. Around each pixel k of the maps it is taken to be an affine function of
+the photo's colour I (the guided filter, in colour),
+
+    e ~ A_k I + b_k,     A_k = (cov_k(I) + epsilon)^-1 cov_k(I, e),     b_k = mean_k e - A_k^T mean_k I,
+
+over a window inside the mask; A and b, smooth, are enlarged and applied to the full photo, and what they leave of e is enlarged as it is.
+A highlight that is taken away or a paint that is changed so ends at the photo's own edges. At the photo's own size e is added as it is.
+
+Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013, doi:10.1109/TPAMI.2012.213; enlarging the coefficients:
+K. He, J. Sun, "Fast guided filter" (2015), arXiv:1505.00996.
+
+Limits: detail that the maps do not hold changes only as its colour says. Where the photo is clipped, so is the edit.
+"""
+
+import numpy as np
+from scipy import ndimage
+
+from ..decomposition import Decomposition
+from ..errors import InputError
+from ..photo import Photo, mask_box
+from .edited import Edited, white_of
+
+_RADIUS = 2  # of the window, in pixels of the maps
+_EPSILON = 1e-4  # of the white's square: contrasts below a hundredth of the white tell nothing
+_CHUNK = 1_000_000  # pixels at a time
+_OFF = 3.0  # pixels of the maps that the object's box may differ
+
+
+def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray, np.ndarray]:
+    """The edited photo (H, W, 3) float32, linear, >= 0, at the size of `photo`, and where it differs from it, (H, W) bool.
+
+    `photo`: the one that the result was made of, at full size, with the same mask. Nothing outside the mask changes. Raises `InputError`
+    where photo, mask and result do not fit.
+    """
+    scale = scale_of(d, photo)
+    change = np.where(d.mask[..., None], edit.image - d.image, 0).astype(np.float32)
+    full = change if scale == 1 and change.shape == photo.image.shape else enlarged_change(d, change, photo, scale)
+    changed = photo.mask & (full != 0).any(-1)
+    image = photo.image.copy()
+    image[changed] = np.maximum(image[changed] + full[changed], 0)
+    return image, changed
+
+
+def scale_of(d: Decomposition, photo: Photo) -> float:
+    """Map pixels to one photo pixel. Raises `InputError` where the photo or its mask is not that of the result."""
+    stated = d.provenance.input.get("scale")
+    size = d.provenance.input.get("size")
+    if not isinstance(stated, int | float) or not 0 < stated <= 1 or not isinstance(size, list):
+        raise InputError("the result does not say at which scale of its photo the maps are: decompose the photo again")
+    height, width = photo.mask.shape
+    expected = tuple(max(1, int(np.ceil(n * stated - 1e-6))) for n in (height, width))
+    if size != [width, height] or expected != d.mask.shape:
+        raise InputError(
+            f"the result was made of a photo of {' x '.join(map(str, size))} pixels, this one has {width} x {height}: give the same photo"
+        )
+    boxes = np.array(mask_box(photo.mask)) * stated, np.array(mask_box(d.mask))
+    if np.abs(boxes[0] - boxes[1]).max() > _OFF:
+        raise InputError("the photo's mask is not the one that the result was made with: give the same mask with --mask")
+    return float(stated)
+
+
+def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: float) -> np.ndarray:
+    """The change (h, w, 3) of the maps' image, led by the colours of the full photo: (H, W, 3) float32, 0 outside its mask."""
+    result = np.zeros(photo.image.shape, np.float32)
+    if not change.any():
+        return result
+    slope, offset = _affine(d.image.astype(float), change.astype(float), d.mask, _EPSILON * white_of(d.image, d.mask) ** 2)
+    slope, offset = (_means(values, d.mask) for values in (slope, offset))
+    rest = change - np.einsum("hwgc,hwg->hwc", slope, d.image) - offset
+    planes = np.concatenate([slope.reshape(*d.mask.shape, 9), offset + rest], -1)
+    nearest = ndimage.distance_transform_edt(~d.mask, return_distances=False, return_indices=True)
+    planes = planes[tuple(nearest)].astype(np.float32)
+    rows, columns = np.nonzero(photo.mask)
+    for start in range(0, len(rows), _CHUNK):
+        at = rows[start : start + _CHUNK], columns[start : start + _CHUNK]
+        places = [(index + 0.5) * scale - 0.5 for index in at]
+        found = np.stack([ndimage.map_coordinates(planes[..., k], places, order=1, mode="nearest") for k in range(12)], -1)
+        result[at] = np.einsum("ngc,ng->nc", found[:, :9].reshape(-1, 3, 3), photo.image[at]) + found[:, 9:]
+    return result
+
+
+def _affine(guide: np.ndarray, values: np.ndarray, mask: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray]:
+    """A (h, w, 3, 3) and b (h, w, 3) of values ~ A^T guide + b around each pixel of the mask; nothing useful outside."""
+    mean_guide, mean_values = _means(guide, mask), _means(values, mask)
+    own = _means(guide[..., :, None] * guide[..., None, :], mask) - mean_guide[..., :, None] * mean_guide[..., None, :]
+    common = _means(guide[..., :, None] * values[..., None, :], mask) - mean_guide[..., :, None] * mean_values[..., None, :]
+    slope = np.linalg.solve(own + epsilon * np.eye(3), common)
+    return slope, mean_values - np.einsum("hwgc,hwg->hwc", slope, mean_guide)
+
+
+def _means(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Means (h, w, ...) over windows, of the mask's pixels alone; 0 where a window has none."""
+    size = (2 * _RADIUS + 1,) * 2 + (1,) * (values.ndim - 2)
+    inside = mask.reshape(mask.shape + (1,) * (values.ndim - 2)).astype(float)
+    weight = ndimage.uniform_filter(inside, size, mode="constant")
+    total = ndimage.uniform_filter(values * inside, size, mode="constant")
+    return np.where(weight > 1e-9, total / np.maximum(weight, 1e-9), 0)

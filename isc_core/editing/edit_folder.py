@@ -1,0 +1,109 @@
+"""The files of an edit: the picture, in the photo's own coding, and what a person looks at first.
+
+`edit.json` says what was asked for and what was found; `edited.png` has the photo's depth, coding and alpha (none for a photo of floats);
+`edited.exr` is the same picture in linear light, colours multiplied by alpha as is usual there; `before_after.png` the sheet; `clusters.png`,
+of recolouring, the parts to choose from. A folder appears whole or not at all.
+
+Limits: of a float photo whose pixels are partly transparent, those outside the mask are kept to the rounding of that product.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..atomic import new_folder, require_writable
+from ..decomposition import Decomposition
+from ..exr import write_channels
+from ..photo import Photo, Raster, recoded, write_png
+from ..report import Panel, Shown, edit_sheet
+from .clusters import Clusters
+from .compositing import composite
+from .edited import Edited
+
+FILES = ("edit.json", "edited.png", "edited.exr", "before_after.png", "clusters.png")
+_FADED = 0.06
+
+
+@dataclass(frozen=True)
+class Original:
+    """The photo to bring the edit back into: its light and mask at full size, and its file's values."""
+
+    photo: Photo
+    raster: Raster
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What stands on the sheet: its title, a faint second line, and panels that follow the pictures."""
+
+    title: str
+    subtitle: str = ""
+    others: Sequence[Panel] = ()
+
+
+@dataclass(frozen=True)
+class Record:
+    """What `edit.json` tells, JSON-ready: the `action`, its `parameters`, what was `measured`."""
+
+    action: str
+    parameters: Mapping[str, Any] = field(default_factory=dict)
+    measured: Mapping[str, Any] = field(default_factory=dict)
+
+
+def require_writable_edit(folder: Path | str) -> None:
+    """Tells before the work whether an edit could be written to `folder`. Raises `InputError`."""
+    require_writable(folder, FILES)
+
+
+def save_edit(
+    d: Decomposition, edit: Edited, folder: Path | str, record: Record, sheet: Sheet, *,
+    original: Original | None = None, clusters: Clusters | None = None,
+) -> None:  # fmt: skip
+    """Writes the folder of an edit; the picture is the photo's where there is one, else the maps'.
+
+    Raises `InputError` if the folder is not ours or cannot be written, or the photo is not the result's.
+    """
+    image, mask, before, raster = _picture(d, edit, original)
+    pair = [Shown(before, mask, "Before"), Shown(image, mask, "After")]
+    layers = [Shown(edit.diffuse, d.mask, "Diffuse, after"), Shown(edit.specular, d.mask, "Specular, after")]
+    with new_folder(folder, FILES) as partial:
+        if raster.peak is not None:
+            write_png(partial / "edited.png", raster)
+        alpha = raster.alpha
+        cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
+        planes = {name: image[..., c] * cover for c, name in enumerate("RGB")}
+        write_channels(partial / "edited.exr", planes if alpha is None else planes | {"A": alpha})
+        edit_sheet(sheet.title, sheet.subtitle, [*pair, *layers], sheet.others).save(partial / "before_after.png")
+        if clusters is not None:
+            cluster_sheet(d, clusters).save(partial / "clusters.png")
+        text = {"schema_version": 1, **record.__dict__, "notes": list(edit.notes), "of_photo": original is not None}
+        (partial / "edit.json").write_text(json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
+    """A picture of the clusters, (a Pillow image): the reflectance with all but one faded, for each of them, under its number."""
+    shown = [Shown(d.reflectance, d.mask, "Reflectance")]
+    for number, share in enumerate(clusters.shares, 1):
+        weight = clusters.weight(number)[..., None]
+        grey = np.full(3, _FADED * float(d.reflectance[d.mask].max()))
+        values = weight * d.reflectance + (1 - weight) * grey
+        shown.append(Shown(values, d.mask, f"Cluster {number}", f"{100 * share:.0f} % of the object"))
+    return edit_sheet("Clusters", "isc edit RESULT recolour --cluster N", shown)
+
+
+def _picture(d: Decomposition, edit: Edited, original: Original | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, Raster]:
+    """The edited light, its mask, the light before, and the values to be stored."""
+    if original is not None:
+        photo = original.photo
+        image, changed = composite(d, edit, photo)
+        return image, photo.mask, photo.image, recoded(original.raster, photo.original.transfer, image, changed)
+    given = d.provenance.input
+    bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
+    peak = None if bits == 32 else 65535 if bits == 16 else 255
+    kind = np.float32 if peak is None else np.uint16 if bits == 16 else np.uint8
+    empty = Raster(np.zeros(d.image.shape, kind), d.mask.astype(np.float32), peak, 32 if peak is None else bits)
+    return edit.image, d.mask, d.image, recoded(empty, transfer, edit.image, d.mask)

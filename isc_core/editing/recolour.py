@@ -1,0 +1,102 @@
+"""Recolouring: another paint under the same light and the same gloss (thesis, figure 4.51).
+
+Equation, for a reflectance r with luminance Y(r), in Oklab (L, a, b) with hue h and chroma C:
+h' = h + shift, C' = saturation C, or, for a target colour, the target's hue and the chroma C_target L / L_target, which is the target's own
+paint in more or less light; back in linear light it is scaled to Y(r') = value Y(r), so that texture and shading stay as they were. A
+colour that cannot be that bright moves toward grey at that luminance just until it can. diffuse' = ((1 - w) r + w r') shading, w being the
+region's weight; the specular layer is not touched.
+
+Citation: B. Ottosson 2020 (Oklab, see `chroma`); S. Akbar 2016 (recolouring).
+
+Limits: what the separation left of the highlights in the diffuse layer is painted too. Black and pure white paint take hardly any colour.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..brdf.model import check_range
+from ..decomposition import Decomposition
+from ..errors import InputError
+from .chroma import from_oklab, to_oklab
+from .edited import Edited, edited, luminance, white_of
+
+
+@dataclass(frozen=True)
+class Paint:
+    """`hue`: degrees that the hue turns. `saturation`, `value` >= 0: factors of chroma and of luminance. `target`: (3,) linear colour in
+    [0, 1] that the paint becomes first, or None. `target_luminance`: on average it becomes as bright as the target, too.
+    Raises `InputError`."""
+
+    hue: float = 0.0
+    saturation: float = 1.0
+    value: float = 1.0
+    target: np.ndarray | None = None
+    target_luminance: bool = False
+
+    def __post_init__(self) -> None:
+        check_range("hue", self.hue, -1e6, 1e6)
+        check_range("saturation", self.saturation, 0, 100)
+        check_range("value", self.value, 0, 100)
+        if self.target is not None:
+            check_range("colour", self.target, 0, 1)
+            if np.shape(self.target) != (3,):
+                raise InputError("a target colour has three numbers")
+        if self.target_luminance and (self.target is None or not np.any(self.target)):
+            raise InputError("the brightness of a target colour is to be taken, but there is none, or it is black")
+
+    @property
+    def changes(self) -> bool:
+        """Whether anything is asked for."""
+        return self.target is not None or self.hue % 360 != 0 or self.saturation != 1 or self.value != 1
+
+
+def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -> Edited:
+    """The scene with other paint. `region`: (H, W) in [0, 1], where and how much; None for the whole object.
+
+    Raises `InputError` for a region of another size, or of nothing of the object.
+    """
+    if region is not None and region.shape != d.mask.shape:
+        raise InputError(f"the region is {region.shape}, the maps {d.mask.shape}: give one of their size")
+    weight = np.where(d.mask, 1.0 if region is None else region, 0.0)
+    check_range("the region's weight", weight, 0, 1)
+    if not weight.any():
+        raise InputError("the region holds nothing of the object: mark the part to be recoloured in white")
+    if not paint.changes:
+        return edited(d)
+    inside = weight > 0
+    share = weight[inside][:, None]
+    old = np.maximum(d.reflectance[inside].astype(float), 0)
+    new = repainted(old, paint, white_of(d.reflectance, d.mask), share)
+    diffuse = d.diffuse.copy()
+    diffuse[inside] = (1 - share) * d.diffuse[inside] + share * new * d.shading[inside]
+    return edited(d, diffuse)
+
+
+def repainted(reflectance: np.ndarray, paint: Paint, white: float, weight: np.ndarray) -> np.ndarray:
+    """The reflectance (N, 3) >= 0 in the new paint. `white`: the brightest that paint gets. `weight` (N, 1): of each in the average."""
+    old = luminance(reflectance)
+    lab = to_oklab(reflectance)
+    lightness, chroma, hue = lab[:, 0], np.hypot(lab[:, 1], lab[:, 2]), np.arctan2(lab[:, 2], lab[:, 1])
+    wanted = paint.value * old
+    if paint.target is not None:
+        goal = to_oklab(np.maximum(paint.target, 1e-6))
+        chroma = float(np.hypot(goal[1], goal[2])) * lightness / float(goal[0])
+        hue = np.full_like(hue, np.arctan2(goal[2], goal[1]))
+        if paint.target_luminance:
+            mean = float((weight[:, 0] * old).sum() / weight.sum())
+            wanted = wanted * float(luminance(paint.target)) / max(mean, 1e-9)
+    hue, chroma = hue + np.deg2rad(paint.hue), chroma * paint.saturation
+    color = from_oklab(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], -1))
+    return _at_luminance(np.maximum(color, 0), wanted, np.maximum(white * max(paint.value, 1.0), reflectance.max(-1)))
+
+
+def _at_luminance(color: np.ndarray, wanted: np.ndarray, most: np.ndarray) -> np.ndarray:
+    """Colours (N, 3) >= 0 scaled to the luminance `wanted` (N,), and mixed with the grey of it where a channel would exceed `most` (N,)."""
+    now = luminance(color)
+    grey = np.broadcast_to(wanted[:, None], color.shape)
+    scaled = np.where(now[:, None] > 1e-12, color * (wanted / np.maximum(now, 1e-12))[:, None], grey)
+    excess = scaled.max(-1) - wanted
+    room = np.maximum(most - wanted, 0)
+    share = np.where(excess > room, room / np.maximum(excess, 1e-12), 1)[:, None]
+    return grey + share * (scaled - grey)

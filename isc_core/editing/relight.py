@@ -1,0 +1,136 @@
+"""Relighting: the object under the recovered light turned, or under another light.
+
+Equation: diffuse' = reflectance S'(n), S' by the new light: exp(sum_k L'_k Y_k(n)), one distant light with an ambient rest, or an
+environment's K L of `environment`. What becomes of the highlights is a choice:
+keep     they stay as they are;
+scale    each pixel's follow its own shading, specular' = specular S' / S, at most fourfold: dimmed where the light has gone, not moved;
+remove   they go;
+render   a lobe is rendered under the new light, with the strength under which it has the present layer's energy in the recovered light.
+
+Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317; S. Akbar 2016 (relighting).
+
+Limits: no cast shadows, old or new: those of the photo stay in the reflectance. Light from behind the object was seen by no normal.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..brdf.model import check_range
+from ..brdf.shading import sh_shading
+from ..decomposition import Decomposition
+from ..environment import environment_from_shading, resampled, shading_under
+from ..errors import InputError
+from .edited import Edited, edited, luminance
+from .lights import DirectionalLight
+from .lobes import Lobe, lobe_in, lobe_under
+
+HIGHLIGHTS = ("auto", "keep", "scale", "remove", "render")
+_MOST = 4.0  # times: how much brighter scaling makes a highlight
+_ROWS = 32  # of environments that matt surfaces are lit by
+_LOBE_ROWS = 16  # and of those that a lobe is rendered in, where every sample costs
+
+
+@dataclass(frozen=True)
+class NewLight:
+    """A light of one of three kinds, the others None. `coefficients` (9, 3): of log shading. `sun`: one distant light. `sky`: environment
+    (rows, 2 rows, 3) of linear radiance >= 0, see `environment`. Raises `InputError` unless there is exactly one, and sound."""
+
+    coefficients: np.ndarray | None = None
+    sun: DirectionalLight | None = None
+    sky: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if sum(part is not None for part in (self.coefficients, self.sun, self.sky)) != 1:
+            raise InputError("a new light is one of: coefficients, one distant light, an environment")
+        if self.sky is not None:
+            rows = len(self.sky)
+            if np.shape(self.sky) != (rows, 2 * rows, 3) or rows < 2:
+                raise InputError(
+                    f"an environment is twice as wide as high, this one is {np.shape(self.sky)[1]} x {rows}: use a full panorama"
+                )
+            check_range("the environment's radiance", self.sky, 0, np.inf)
+
+    def shading(self, normals: np.ndarray) -> np.ndarray:
+        """(N, 3) of white matt surfaces with the unit normals (N, 3)."""
+        if self.coefficients is not None:
+            return sh_shading(normals, self.coefficients)
+        if self.sun is not None:
+            return self.sun.shading(normals)
+        return shading_under(np.asarray(self._sky(_ROWS), float), np.asarray(normals, float))
+
+    def lobe(self, lobe: Lobe, normals: np.ndarray) -> np.ndarray:
+        """(N, 3): what a lobe of strength 1 shows of this light on unit normals (N, 3)."""
+        if self.sun is not None:
+            ambient = np.broadcast_to(self.sun.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
+            return lobe_under(lobe, normals, self.sun) + lobe_in(lobe, normals, ambient)
+        return lobe_in(lobe, normals, self._sky(_LOBE_ROWS))
+
+    def _sky(self, rows: int) -> np.ndarray:
+        if self.coefficients is not None:
+            return environment_from_shading(self.coefficients, rows)
+        assert self.sky is not None
+        return resampled(self.sky, rows) if len(self.sky) > rows else self.sky
+
+
+@dataclass(frozen=True)
+class Relighting:
+    """`highlights`: one of `HIGHLIGHTS`; "auto" renders where a lobe is given and scales otherwise. `lobe`: to render. `exposure` > 0:
+    factor of the new light. `same_brightness`: the new light is first made as bright, on average over the object, as the present one.
+    Raises `InputError`."""
+
+    highlights: str = "auto"
+    lobe: Lobe | None = None
+    exposure: float = 1.0
+    same_brightness: bool = False
+
+    def __post_init__(self) -> None:
+        if self.highlights not in HIGHLIGHTS:
+            raise InputError(f'unknown choice "{self.highlights}" for the highlights: {", ".join(HIGHLIGHTS)}')
+        check_range("exposure", self.exposure, 1e-6, 1e6)
+
+
+def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None) -> Edited:
+    """The scene under `light`. The recovered light itself, at exposure 1, returns the image as it is.
+
+    Raises `InputError` for a light that leaves the object black.
+    """
+    choice = choice or Relighting()
+    if light.coefficients is not None and np.array_equal(light.coefficients, d.illumination) and choice.exposure == 1:
+        return edited(d)
+    normals = d.normal[d.mask].astype(float)
+    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
+    new = light.shading(normals)
+    if not luminance(new).any():
+        raise InputError("no part of the object sees the new light: bring it to the front, or give it an ambient rest")
+    old = d.shading[d.mask].astype(float)
+    factor = choice.exposure
+    if choice.same_brightness:
+        factor *= float(luminance(d.reflectance[d.mask] * old).sum() / luminance(d.reflectance[d.mask] * new).sum())
+    shading = np.zeros(d.image.shape)
+    shading[d.mask] = new * factor
+    highlights, note = _highlights(d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor)
+    return edited(d, d.reflectance * shading, highlights, (note,) if note else ())
+
+
+def _highlights(
+    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: float
+) -> tuple[np.ndarray, str]:
+    """The new specular layer, and what to say of it."""
+    how = choice.highlights if choice.highlights != "auto" else "render" if choice.lobe is not None else "scale"
+    present = d.specular
+    if how == "keep" or not present[d.mask].any():
+        return present, ""
+    if how == "remove":
+        return np.zeros_like(present), ""
+    result = np.zeros(present.shape)
+    if how == "scale":
+        result[d.mask] = present[d.mask] * np.minimum(ratio, _MOST)
+        told = "" if choice.highlights == "scale" else "no lobe is known, so the highlights follow the shading and do not move"
+        return result, told
+    lobe = choice.lobe or Lobe()
+    before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
+    strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
+    result[d.mask] = strength * factor * light.lobe(lobe, normals)
+    smooth = light.sun is None
+    return result, "the highlights are rendered in a smooth light, so they are broad" if smooth and light.coefficients is not None else ""
