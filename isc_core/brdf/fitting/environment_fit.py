@@ -16,6 +16,7 @@ from scipy.optimize import minimize_scalar
 from ...errors import InputError
 from .environment_response import Surroundings, respond_to, surroundings, table_of
 from .lamps import ALPHAS
+from .observed import Observed
 from .pixels import Pixels
 from .result import CONVENTION, FOUND, NARROW, NO_LIGHT, SMOOTH, UNLIKE, Interval, LobeFit, LobeFitOptions
 from .uncertainty import covariance, naive_variance
@@ -40,10 +41,9 @@ class _Try:
     weight: np.ndarray
 
 
-def fit_under(
-    radiance: np.ndarray, pixels: Pixels, specular: np.ndarray, normal: np.ndarray, mask: np.ndarray, options: LobeFitOptions
-) -> LobeFit:
-    """The fit under `radiance` (rows, 2 rows, 3); `specular`, `normal` (H, W, 3), `mask` (H, W): the picture. Raises `InputError`."""
+def fit_under(radiance: np.ndarray, seen: Observed, pixels: Pixels, options: LobeFitOptions) -> LobeFit:
+    """The fit under `radiance` (rows, 2 rows, 3) to the picture and the pixels chosen of it. Raises `InputError`."""
+    specular, normal, mask = seen.specular, seen.normal, seen.mask
     sky = _checked(radiance)
     convention, empty = CONVENTION[options.model], np.zeros(specular.shape, np.float32)
     if not radiance.any():

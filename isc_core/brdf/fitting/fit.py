@@ -14,7 +14,7 @@ Limits: lights are far and small. A light of some width widens the lobe: seen fr
 as squares are. White gloss, one roughness for the whole object, no shadows cast on the highlight.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import nnls
@@ -23,13 +23,17 @@ from ...errors import InputError
 from ...progress import Monitor
 from ..directions import unit
 from .environment_fit import fit_under
-from .lamps import ALPHAS, Fitted, Freedom, Lamps, minimise, predicted
+from .lamps import ALPHAS, Fitted, Lamps, Problem, contributions, minimise, predicted
+from .observed import Observed, observe
 from .pixels import Pixels, choose_pixels
+from .response import sky_response
 from .result import CONVENTION, FOUND, NARROW, NO_LIGHT, SMOOTH, UNLIKE, Interval, LobeFit, LobeFitOptions, LobeLight
-from .starts import brightest_half_vector, light_of_half_vector
+from .starts import bright_half_vectors, light_of_half_vector
 from .uncertainty import covariance, naive_variance
 
 _START_ALPHAS = (0.06, 0.2, 0.45)
+_FEW_STEPS = 7
+_LADDER = (2.0, 4.0)
 _WIDEST = 0.7  # an alpha as large as that is a light as smooth as shading
 _CONE = 1.515  # deviations, each way, that hold 68 % in two dimensions
 _NARROWEST_PIXELS = 6  # within half of the peak
@@ -47,99 +51,77 @@ def fit_lobe(
     light_direction: np.ndarray | None = None,
     environment: np.ndarray | None = None,
     clipped: np.ndarray | None = None,
+    height: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> LobeFit:
     """Fits a lobe to `specular` (H, W, 3), linear, >= 0, seen from (0, 0, 1), on the unit normals (H, W, 3), inside `mask` (H, W) bool.
 
-    `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the light is a lower bound. Either the light
+    `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the light is a lower bound.
+    `height` (H, W) in pixels toward the viewer: with it lights may be near, else they are taken to be infinitely far. Either the light
     is found, or it is given: `light_direction` (3,), a unit vector, or `environment` (rows, 2 rows, 3), see `isc_core.environment`.
     What cannot be known is said in the result. Raises `InputError` for arrays that do not fit together, `Cancelled`.
     """
     options, monitor = options or LobeFitOptions(), monitor or Monitor()
-    scene = _checked(specular, normal, mask, confidence, clipped)
+    seen = observe(specular, normal, mask, confidence, clipped, height)
     if light_direction is not None and environment is not None:
         raise InputError("give light_direction or environment, not both")
-    monitor.report("fitting the gloss", 0.0)
-    if scene.peak <= options.darkest:
-        return _nothing(scene, options, NO_LIGHT)
-    noise = (options.floor, options.relative)
-    pixels = choose_pixels(scene.specular, scene.normal, scene.inside, scene.confidence, scene.clipped, noise, options.most_pixels)
-    if environment is not None:
-        return fit_under(np.asarray(environment, float), pixels, scene.specular, scene.normal, scene.mask, options)
     fixed = None if light_direction is None else unit(light_direction, "light_direction")
     if fixed is not None and fixed.shape != (3,):
         raise InputError(f"light_direction has shape {fixed.shape}: give one unit vector (3,)")
-    fitted = _search(pixels, options, fixed, monitor)
+    monitor.report("fitting the gloss", 0.0)
+    if seen.peak <= options.darkest:
+        return _nothing(seen, options, NO_LIGHT)
+    pixels = choose_pixels(seen, (options.floor, options.relative), options.most_pixels)
+    if environment is not None:
+        return fit_under(np.asarray(environment, float), seen, pixels, options)
+    problem = Problem(pixels, options.model, options.thresholded, directions=fixed is None, nearness=seen.place is not None)
+    fitted = _search(problem, options, fixed, monitor)
     monitor.report("how sure the gloss is", 0.7)
-    return _answer(scene, pixels, fitted, options, fixed is None)
+    return _answer(seen, problem, fitted, options)
 
 
-@dataclass(frozen=True)
-class _Scene:
-    """The checked arrays; `inside`: pixels that count."""
-
-    specular: np.ndarray
-    normal: np.ndarray
-    mask: np.ndarray
-    inside: np.ndarray
-    confidence: np.ndarray
-    clipped: np.ndarray
-
-    @property
-    def peak(self) -> float:
-        """The brightest mean over the channels."""
-        return float(self.specular[self.inside].mean(axis=1).max()) if self.inside.any() else 0.0
-
-
-def _checked(
-    specular: np.ndarray, normal: np.ndarray, mask: np.ndarray, confidence: np.ndarray | None, clipped: np.ndarray | None
-) -> _Scene:
-    specular, normal, mask = np.asarray(specular, float), np.asarray(normal, float), np.asarray(mask)
-    shape = mask.shape
-    confidence = np.ones(shape) if confidence is None else np.asarray(confidence, float)
-    clipped = np.zeros(shape, bool) if clipped is None else np.asarray(clipped)
-    if mask.ndim != 2 or mask.dtype != bool or specular.shape != (*shape, 3) or normal.shape != (*shape, 3):
-        shapes = f"specular {specular.shape}, normal {normal.shape} and mask {shape} {mask.dtype}"
-        raise InputError(f"{shapes} have to be (H, W, 3), (H, W, 3) and (H, W) bool")
-    if confidence.shape != shape or clipped.shape != shape or clipped.dtype != bool:
-        raise InputError("confidence and clipped have to be (H, W) as the mask is, clipped of bool")
-    if not (np.isfinite(specular[mask]).all() and (specular[mask] >= 0).all()):
-        raise InputError("the specular image has to be finite and 0 or more inside the mask")
-    if not (np.isfinite(confidence[mask]).all() and (confidence[mask] >= 0).all() and (confidence[mask] <= 1).all()):
-        raise InputError("the confidence has to be within [0, 1] inside the mask")
-    unit(normal[mask], "normal")
-    return _Scene(specular, normal, mask, mask & (confidence > 0) & (normal[..., 2] > 0), confidence, clipped)
-
-
-def _search(pixels: Pixels, options: LobeFitOptions, fixed: np.ndarray | None, monitor: Monitor) -> Fitted:
+def _search(problem: Problem, options: LobeFitOptions, fixed: np.ndarray | None, monitor: Monitor) -> Fitted:
     """One light after the other, as long as each is worth its parameters."""
-    freedom = Freedom(directions=fixed is None)
-    best = _first(pixels, options, fixed, freedom)
+    pixels = problem.pixels
+    best = _first(problem, fixed)
     for count in range(2, options.most_lights + 1 if fixed is None else 2):
         monitor.report("looking for another light", 0.2 * count)
-        left = pixels.value - predicted(options.model, best.lamps, pixels.normal).sum(axis=0)
-        half = brightest_half_vector(pixels.normal, left, pixels.weight)
-        amplitude = _amplitude(best.lamps.alpha, 0.3 * pixels.peak)
-        lamps = replace(
-            best.lamps,
-            directions=np.vstack([best.lamps.directions, light_of_half_vector(half)]),
-            log_amplitudes=np.append(best.lamps.log_amplitudes, amplitude),
-        )
-        more = minimise(pixels, options.model, lamps, freedom)
+        left = pixels.value - predicted(problem, best.lamps, pixels.normal, pixels.place)
+        more = _best_of(problem, [_with_another(best.lamps, half, 0.3 * pixels.peak) for half in _peaks(pixels, left, 2)])
         if not _worth(best, more, pixels):
             break
         best = more
     return best
 
 
-def _first(pixels: Pixels, options: LobeFitOptions, fixed: np.ndarray | None, freedom: Freedom) -> Fitted:
-    half = brightest_half_vector(pixels.normal, pixels.value, pixels.weight)
-    direction = light_of_half_vector(half) if fixed is None else fixed
-    sky = float(np.log(0.01 * pixels.peak))
-    starts = [Lamps(direction[None], np.array([_amplitude(a, pixels.peak)]), sky, float(np.log(a))) for a in _START_ALPHAS]
-    tried = [minimise(pixels, options.model, start, freedom, steps=8) for start in starts]
-    best = min(tried, key=lambda fit: fit.loss)
-    return minimise(pixels, options.model, best.lamps, freedom)
+def _first(problem: Problem, fixed: np.ndarray | None) -> Fitted:
+    pixels = problem.pixels
+    towards = [light_of_half_vector(half) for half in _peaks(pixels, pixels.value, 3)] if fixed is None else [fixed]
+    base = float(np.log((0.1 if problem.thresholded else 0.01) * pixels.peak))
+    near = np.full(1, 0.1 if problem.nearness else 0.0)
+    return _best_of(
+        problem,
+        [Lamps(d[None], near, np.array([_amplitude(a, pixels.peak)]), base, float(np.log(a))) for d in towards for a in _START_ALPHAS],
+    )
+
+
+def _best_of(problem: Problem, starts: list[Lamps]) -> Fitted:
+    """A few steps from each, all the way from the best."""
+    tried = [minimise(problem, start, steps=_FEW_STEPS) for start in starts]
+    return minimise(problem, min(tried, key=lambda fit: fit.loss).lamps)
+
+
+def _peaks(pixels: Pixels, value: np.ndarray, count: int) -> list[np.ndarray]:
+    return bright_half_vectors(pixels.normal, value, pixels.weight, count)
+
+
+def _with_another(lamps: Lamps, half: np.ndarray, peak: float) -> Lamps:
+    return replace(
+        lamps,
+        directions=np.vstack([lamps.directions, light_of_half_vector(half)]),
+        nearness=np.append(lamps.nearness, lamps.nearness.mean()),
+        log_amplitudes=np.append(lamps.log_amplitudes, _amplitude(lamps.alpha, peak)),
+    )
 
 
 def _amplitude(alpha: float, peak: float) -> float:
@@ -154,87 +136,99 @@ def _worth(less: Fitted, more: Fitted, pixels: Pixels) -> bool:
     return bool(pieces * gain > 3 * np.log(pieces) and more.loss < (1 - _GAIN) * less.loss and less.loss > 1e-3 * len(pixels.value))
 
 
-def _answer(scene: _Scene, pixels: Pixels, fitted: Fitted, options: LobeFitOptions, turning: bool) -> LobeFit:
+def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOptions) -> LobeFit:
+    pixels = problem.pixels
     spread = covariance(fitted.jacobian, fitted.residual, fitted.weight, pixels)
-    image, colours = _coloured(scene, pixels, fitted, options)
-    explained = _explained(scene, image)
-    lights = _lights(fitted, spread, colours, options, turning)
+    image, gains, explained = _coloured(seen, problem, fitted)
+    lights = _lights(problem, fitted, spread, gains, options)
     convention = CONVENTION[options.model]
     at = fitted.lamps.count + 1
     sd = float(np.sqrt(spread[at, at] + np.radians(options.normal_error) ** 2))
-    reason = _reason(pixels, fitted, options, turning, explained, sd)
+    reason = _reason(problem, fitted, explained, sd)
     alpha: float | None = fitted.lamps.alpha
     low, high = float(max(fitted.lamps.alpha * np.exp(-sd), ALPHAS[0])), float(min(fitted.lamps.alpha * np.exp(min(sd, 20)), 1.0))
     interval: Interval | None = Interval(low, high)
     if reason == NARROW:
-        alpha = max(high, _step(scene, pixels))
+        alpha = max(high, _step(seen, pixels))
         interval = Interval(ALPHAS[0], alpha)
     elif reason != FOUND:
         alpha = interval = None
     return LobeFit(convention, reason == FOUND, reason, alpha, interval, lights, None, None, explained, image)
 
 
-def _lights(fitted: Fitted, spread: np.ndarray, colours: np.ndarray, options: LobeFitOptions, turning: bool) -> tuple[LobeLight, ...]:
-    """The lights, the brightest first. `spread`: the covariance; `colours` (K, 3): strength x light."""
-    systematic, count = np.radians(options.normal_error), fitted.lamps.count
+def _lights(problem: Problem, fitted: Fitted, spread: np.ndarray, gains: np.ndarray, options: LobeFitOptions) -> tuple[LobeLight, ...]:
+    """The lights, the brightest first, as they arrive where their highlight is. `spread`: the covariance; `gains` (K, 3): of the channels
+    over the mean amplitude."""
+    systematic, count, lamps = np.radians(options.normal_error), fitted.lamps.count, fitted.lamps
+    shares = contributions(problem.model, lamps, problem.pixels.normal, problem.pixels.place)
     lights = []
-    for k in np.argsort(-colours.mean(axis=1), kind="stable"):
+    for k in range(count):
+        weight = problem.pixels.weight * shares[k] ** 2
+        middle = weight @ problem.pixels.place / max(float(weight.sum()), 1e-300)
+        toward = lamps.directions[k] - lamps.nearness[k] * middle
+        length = float(np.linalg.norm(toward))
+        colour = gains[k] * np.exp(lamps.log_amplitudes[k]) / length**2
         factor = float(np.exp(min(np.sqrt(spread[k, k] + (2 * systematic) ** 2), 20)))
         cone = 0.0
-        if turning:
+        if problem.directions:
             at = count + 2 + 2 * k
             turn = (spread[at, at] + spread[at + 1, at + 1]) / 2
             cone = float(min(np.degrees(_CONE * np.sqrt(turn + systematic**2)), 180))
-        lights.append(LobeLight(fitted.lamps.directions[k], cone, colours[k], Interval(colours[k] / factor, colours[k] * factor)))
-    return tuple(lights)
+        lights.append(LobeLight(toward / length, cone, colour, Interval(colour / factor, colour * factor)))
+    return tuple(sorted(lights, key=lambda light: -float(light.strength_light.mean())))
 
 
-def _step(scene: _Scene, pixels: Pixels) -> float:
+def _step(seen: Observed, pixels: Pixels) -> float:
     """How far the normal turns from the highlight's peak to a neighbouring pixel, radians: what the picture can resolve."""
-    row, column = pixels.place[int(np.argmax(pixels.value))]
+    row, column = pixels.cell[int(np.argmax(pixels.value))]
     near = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
-    cosines = (scene.normal[near] @ scene.normal[row, column])[scene.inside[near]]
+    cosines = (seen.normal[near] @ seen.normal[row, column])[seen.inside[near]]
     return float(np.clip(np.arccos(np.clip(cosines.min(), -1, 1)), ALPHAS[0], 1))
 
 
-def _reason(pixels: Pixels, fitted: Fitted, options: LobeFitOptions, turning: bool, explained: float, sd: float) -> str:
+def _reason(problem: Problem, fitted: Fitted, explained: float, sd: float) -> str:
     if explained < _LEAST_EXPLAINED:
         return UNLIKE
-    if pixels.bright < _NARROWEST_PIXELS:
+    if problem.pixels.bright < _NARROWEST_PIXELS:
         return NARROW
-    if fitted.lamps.alpha > _WIDEST or _reaches(pixels, fitted, options, turning, sd, (2.0, 4.0)):
-        return SMOOTH
-    return FOUND
+    return SMOOTH if fitted.lamps.alpha > _WIDEST or _wider_does(problem, fitted, sd) else FOUND
 
 
-def _reaches(pixels: Pixels, fitted: Fitted, options: LobeFitOptions, turning: bool, sd: float, ladder: tuple[float, ...]) -> bool:
-    """Whether an alpha that is one of `ladder` times the best explains the image within one deviation, everything else fitted anew."""
-    naive = naive_variance(fitted.jacobian, fitted.weight, fitted.lamps.count + 1)
-    allowed = sd**2 / max(naive, 1e-300)
-    for factor in ladder:
+def _wider_does(problem: Problem, fitted: Fitted, sd: float) -> bool:
+    """Whether an alpha twice or four times as large explains the image within one deviation, everything else fitted anew."""
+    allowed = sd**2 / max(naive_variance(fitted.jacobian, fitted.weight, fitted.lamps.count + 1), 1e-300)
+    for factor in _LADDER:
         log_alpha = float(np.clip(fitted.lamps.log_alpha + np.log(factor), *np.log(ALPHAS)))
         start = replace(fitted.lamps, log_alpha=log_alpha, log_amplitudes=fitted.lamps.log_amplitudes + 2 * np.log(factor))
-        if minimise(pixels, options.model, start, Freedom(turning, False), steps=10).loss - fitted.loss < allowed:
+        if minimise(replace(problem, alpha=False), start, steps=10).loss - fitted.loss < allowed:
             return True
     return False
 
 
-def _coloured(scene: _Scene, pixels: Pixels, fitted: Fitted, options: LobeFitOptions) -> tuple[np.ndarray, np.ndarray]:
-    """The predicted image and the strength x light (K, 3) of each light: amplitudes per channel, the shapes kept."""
-    shapes = predicted(options.model, fitted.lamps, pixels.normal)
+def _coloured(seen: Observed, problem: Problem, fitted: Fitted) -> tuple[np.ndarray, np.ndarray, float]:
+    """The predicted image, the gains (K, 3) of the channels of each light, its shape kept, and how much of the image is explained."""
+    pixels, lamps = problem.pixels, fitted.lamps
+    shapes = contributions(problem.model, lamps, pixels.normal, pixels.place)
     root = np.sqrt(fitted.weight) / pixels.sigma
-    gains = np.stack([nnls((shapes * root).T, pixels.colour[:, c] * root)[0] for c in range(3)], axis=1)
-    image = np.zeros(scene.specular.shape, np.float32)
-    image[scene.mask] = predicted(options.model, fitted.lamps, scene.normal[scene.mask]).T @ gains
-    return image, gains[:-1] * np.exp(fitted.lamps.log_amplitudes)[:, None]
+    level = np.exp(lamps.log_base)
+    if problem.thresholded:
+        root, colour = np.where(pixels.value > pixels.dark, root, 0), pixels.colour + level
+    else:
+        shapes, colour = np.vstack([shapes, level * sky_response(pixels.normal)]), pixels.colour
+    gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
+    place = np.zeros((int(seen.mask.sum()), 3)) if seen.place is None else seen.place[seen.mask]
+    everywhere = contributions(problem.model, lamps, seen.normal[seen.mask], place)
+    if not problem.thresholded:
+        everywhere = np.vstack([everywhere, level * sky_response(seen.normal[seen.mask])])
+    values = everywhere.T @ gains
+    image = np.zeros(seen.specular.shape, np.float32)
+    image[seen.mask] = values
+    counted, given = seen.inside[seen.mask], seen.specular[seen.mask]
+    left = given - (np.maximum(values - level, 0) if problem.thresholded else values)
+    explained = 1 - np.square(left[counted]).sum() / max(float(np.square(given[counted]).sum()), 1e-300)
+    return image, gains[: lamps.count], float(np.clip(explained, 0, 1))
 
 
-def _explained(scene: _Scene, image: np.ndarray) -> float:
-    total = float(np.square(scene.specular[scene.inside]).sum())
-    left = float(np.square(scene.specular[scene.inside] - image[scene.inside]).sum())
-    return float(np.clip(1 - left / max(total, 1e-300), 0, 1))
-
-
-def _nothing(scene: _Scene, options: LobeFitOptions, reason: str) -> LobeFit:
-    empty = np.zeros(scene.specular.shape, np.float32)
+def _nothing(seen: Observed, options: LobeFitOptions, reason: str) -> LobeFit:
+    empty = np.zeros(seen.specular.shape, np.float32)
     return LobeFit(CONVENTION[options.model], False, reason, None, None, (), None, None, 0.0, empty)

@@ -1,12 +1,14 @@
-"""One lobe under a few far lights, and the nonlinear least squares that fits it.
+"""One lobe under a few lights, and the nonlinear least squares that fits it.
 
-Equation: the specular light, mean over the channels, is
+Equation: the specular light, mean over the channels, at the place p (in radii of the object from its middle) is
 
-    s(n) = sum_k a_k y(n; l_k, alpha) + b F(n),        y of `response`, F the mirrored uniform sky,
+    s(n, p) = sum_k a_k y(n; l, alpha) / |v|^2 + b,        v = l_k - q_k p,  l = v / |v|,  y of `response`,
 
-over log a_k, log b, log alpha and the directions l_k, which move in their tangent planes. The loss is Charbonnier's,
-sum_i w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s(n_i) - s_i) / sigma_i: quadratic for small errors, linear for large ones. Steps are
-Levenberg-Marquardt's with re-weighting; the gradient is exact.
+over log a_k, log alpha, the base b, the directions l_k, which move in their tangent planes, and the nearness q_k >= 0 (0: infinitely far;
+1 / q radii from the middle). The base is a mirrored uniform sky, exp(c) F(n); or, where a separator made the image, -exp(c): it sees a
+highlight only above an unknown level, so its image is max(0, s). The loss is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1),
+r_i = (s - s_i) / sigma_i: quadratic for small errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting; the gradient
+is exact.
 
 Citation: D. W. Marquardt, SIAM J. Appl. Math. 11(2) (1963), doi:10.1137/0111030; P. Charbonnier, L. Blanc-Feraud, G. Aubert, M. Barlaud,
 IEEE TIP 6(2) (1997), doi:10.1109/83.551699.
@@ -22,16 +24,20 @@ from .pixels import Pixels
 from .response import LobeModel, respond, sky_response
 
 ALPHAS = (0.004, 0.98)
+_NEAREST = 0.6
 _LOWEST_TILT = 0.2  # least z of the half vector: farther behind the object no light reaches what the viewer sees
+_USUAL_LEVEL, _LEVEL_SPREAD, _LEVEL_WEIGHT = 0.15, 0.7, 20.0  # what is known beforehand of a separator's level, as a share of the peak
+_USUAL_NEARNESS, _NEARNESS_WEIGHT = 0.3, 0.1  # q is below the first; a weak hint, where the image says nothing
 
 
 @dataclass(frozen=True)
 class Lamps:
-    """K lights: unit `directions` (K, 3), log of `amplitudes` (K,), of `sky` and of `alpha`."""
+    """K lights: unit `directions` (K, 3), `nearness` (K,), log of `amplitudes` (K,), of the `base` and of `alpha`."""
 
     directions: np.ndarray
+    nearness: np.ndarray
     log_amplitudes: np.ndarray
-    log_sky: float
+    log_base: float
     log_alpha: float
 
     @property
@@ -46,17 +52,21 @@ class Lamps:
 
 
 @dataclass(frozen=True)
-class Freedom:
-    """What may move: the `directions`, `alpha`."""
+class Problem:
+    """What is fitted to, and what may move: the `directions`, their `nearness`, `alpha`. `thresholded`: the base is a separator's level."""
 
+    pixels: Pixels
+    model: LobeModel
+    thresholded: bool = False
     directions: bool = True
+    nearness: bool = False
     alpha: bool = True
 
 
 @dataclass(frozen=True)
 class Fitted:
     """`lamps` at the minimum, its `loss`, the `residual` (N,) in sigmas, the `jacobian` (N, P) of it and the weights (N,) in force there.
-    Columns: log amplitudes (K), log sky, log alpha if free, then two of each direction if free (`tangents`)."""
+    Columns: log amplitudes (K), base, log alpha if free, two of each direction if free (`tangents`), nearness (K) if free."""
 
     lamps: Lamps
     loss: float
@@ -65,17 +75,15 @@ class Fitted:
     weight: np.ndarray
 
 
-def minimise(pixels: Pixels, model: LobeModel, start: Lamps, freedom: Freedom, steps: int = 40) -> Fitted:
+def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
     """The minimum near `start`; deterministic."""
-    best = _measured(pixels, model, start, freedom)
+    best = _measured(problem, start)
     damping = 1e-2
     for _ in range(steps):
-        scaled = best.jacobian * best.weight[:, None]
-        curvature, gradient = scaled.T @ best.jacobian, scaled.T @ best.residual
+        curvature, gradient = _normal_equations(problem, best)
         diagonal = np.diag(curvature)
         ridge = np.diag(damping * diagonal + 1e-9 * max(float(diagonal.max()), 1e-300) + 1e-300)
-        step = -np.linalg.solve(curvature + ridge, gradient)
-        tried = _measured(pixels, model, _moved(best.lamps, step, freedom), freedom)
+        tried = _measured(problem, _moved(best.lamps, -np.linalg.solve(curvature + ridge, gradient), problem))
         if tried.loss < best.loss:
             small = best.loss - tried.loss < 1e-7 * best.loss
             best, damping = tried, max(damping / 5, 1e-7)
@@ -88,10 +96,28 @@ def minimise(pixels: Pixels, model: LobeModel, start: Lamps, freedom: Freedom, s
     return best
 
 
-def predicted(model: LobeModel, lamps: Lamps, normal: np.ndarray) -> np.ndarray:
-    """(K + 1, N): each light's part of the specular light, then the sky's."""
-    parts = [np.exp(a) * respond(model, normal, d, lamps.alpha).value for d, a in zip(lamps.directions, lamps.log_amplitudes, strict=True)]
-    return np.stack([*parts, np.exp(lamps.log_sky) * sky_response(normal)])
+def contributions(model: LobeModel, lamps: Lamps, normal: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(K, N): each light's part of the specular light on normals (N, 3) at the places (N, 3)."""
+    parts = []
+    for direction, near, log_amplitude in zip(lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True):
+        light, length = arriving(direction, near, place)
+        parts.append(np.exp(log_amplitude) * respond(model, normal, light, lamps.alpha).value / length**2)
+    return np.stack(parts)
+
+
+def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(N,): the specular light, mean over the channels."""
+    total = contributions(problem.model, lamps, normal, place).sum(axis=0) + _base(problem, lamps, normal)
+    return np.maximum(total, 0)
+
+
+def arriving(direction: np.ndarray, nearness: float, place: np.ndarray) -> tuple[np.ndarray, np.ndarray | float]:
+    """The unit directions toward a light, (3,) if far, else (N, 3), and its distance over that from the middle."""
+    if nearness == 0:
+        return direction, 1.0
+    toward = direction - nearness * place
+    length = np.maximum(np.sqrt((toward * toward).sum(axis=1)), 1e-6)
+    return toward / length[:, None], length
 
 
 def tangents(direction: np.ndarray) -> np.ndarray:
@@ -102,37 +128,75 @@ def tangents(direction: np.ndarray) -> np.ndarray:
     return np.stack([first, np.cross(direction, first)])
 
 
-def _measured(pixels: Pixels, model: LobeModel, lamps: Lamps, freedom: Freedom) -> Fitted:
-    columns, by_alpha, turns = [], np.zeros(len(pixels.value)), []
-    for direction, log_amplitude in zip(lamps.directions, lamps.log_amplitudes, strict=True):
-        answer = respond(model, pixels.normal, direction, lamps.alpha)
-        amplitude = np.exp(log_amplitude)
-        columns.append(amplitude * answer.value)
-        by_alpha += amplitude * answer.by_log_alpha
-        if freedom.directions:
-            turns += list((amplitude * answer.by_light @ tangents(direction).T).T)
-    columns.append(np.exp(lamps.log_sky) * sky_response(pixels.normal))
-    left = (np.sum(columns, axis=0) - pixels.value) / pixels.sigma
-    jacobian = np.stack([*columns, *([by_alpha] if freedom.alpha else []), *turns], axis=1) / pixels.sigma[:, None]
+def _base(problem: Problem, lamps: Lamps, normal: np.ndarray) -> np.ndarray:
+    return np.exp(lamps.log_base) * (-np.ones(len(normal)) if problem.thresholded else sky_response(normal))
+
+
+def _measured(problem: Problem, lamps: Lamps) -> Fitted:
+    pixels, columns, turns, nearer = problem.pixels, [], [], []
+    by_alpha = np.zeros(len(pixels.value))
+    for direction, near, log_amplitude in zip(lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True):
+        light, length = arriving(direction, near, pixels.place)
+        answer = respond(problem.model, pixels.normal, light, lamps.alpha)
+        scale = np.exp(log_amplitude) / length**2
+        columns.append(scale * answer.value)
+        by_alpha += scale * answer.by_log_alpha
+        if problem.directions or problem.nearness:
+            along = (answer.by_light * light).sum(axis=1) + 2 * answer.value
+            by_toward = (answer.by_light - along[:, None] * light) * (np.ones(1) * scale / length)[:, None]
+            turns += list((by_toward @ tangents(direction).T).T) if problem.directions else []
+            nearer += [-(by_toward * pixels.place).sum(axis=1)] if problem.nearness else []
+    columns.append(_base(problem, lamps, pixels.normal))
+    total = np.sum(columns, axis=0)
+    left = (total - pixels.value) / pixels.sigma
+    jacobian = np.stack([*columns, *([by_alpha] if problem.alpha else []), *turns, *nearer], axis=1) / pixels.sigma[:, None]
     silent = pixels.clipped & (left > 0)
+    if problem.thresholded:
+        silent |= (pixels.value <= pixels.dark) & (total < pixels.value)
     left = np.where(silent, 0, left)
     root = np.sqrt(1 + left**2)
-    loss = float(pixels.weight @ (2 * (root - 1)))
+    loss = float(pixels.weight @ (2 * (root - 1))) + sum(_hints(problem, lamps)[0])
     return Fitted(lamps, loss, left, jacobian, np.where(silent, 0, pixels.weight / root))
 
 
-def _moved(lamps: Lamps, step: np.ndarray, freedom: Freedom) -> Lamps:
+def _hints(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.ndarray]:
+    """What is known beforehand: losses, and as for the columns of the jacobian, halves of gradients and curvatures (P,)."""
+    count = lamps.count
+    turning = 2 * count if problem.directions else 0
+    size = count + 1 + int(problem.alpha) + turning + (count if problem.nearness else 0)
+    gradient, curvature, losses = np.zeros(size), np.zeros(size), []
+    if problem.thresholded:
+        off = (lamps.log_base - np.log(_USUAL_LEVEL * problem.pixels.peak)) / _LEVEL_SPREAD
+        losses.append(_LEVEL_WEIGHT * off**2)
+        gradient[count], curvature[count] = _LEVEL_WEIGHT * off / _LEVEL_SPREAD, _LEVEL_WEIGHT / _LEVEL_SPREAD**2
+    if problem.nearness:
+        losses.append(_NEARNESS_WEIGHT * float(np.square(lamps.nearness / _USUAL_NEARNESS).sum()))
+        gradient[-count:] = _NEARNESS_WEIGHT * lamps.nearness / _USUAL_NEARNESS**2
+        curvature[-count:] = _NEARNESS_WEIGHT / _USUAL_NEARNESS**2
+    return losses, gradient, curvature
+
+
+def _normal_equations(problem: Problem, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
+    _, gradient, curvature = _hints(problem, fitted.lamps)
+    scaled = fitted.jacobian * fitted.weight[:, None]
+    return scaled.T @ fitted.jacobian + np.diag(curvature), scaled.T @ fitted.residual + gradient
+
+
+def _moved(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
     count = lamps.count
     step = np.clip(step, -1.5, 1.5)
     log_alpha, at = lamps.log_alpha, count + 1
-    if freedom.alpha:
+    if problem.alpha:
         log_alpha, at = float(np.clip(log_alpha + np.clip(step[at], -0.7, 0.7), *np.log(ALPHAS))), at + 1
-    directions = lamps.directions
-    if freedom.directions:
+    directions, nearness = lamps.directions, lamps.nearness
+    if problem.directions:
         directions = np.stack([_turned(d, np.clip(step[at + 2 * k : at + 2 * k + 2], -0.4, 0.4)) for k, d in enumerate(directions)])
+    if problem.nearness:
+        # Not quite 0, where the light would count as infinitely far and its derivative would be lost.
+        nearness = np.clip(nearness + np.clip(step[-count:], -0.15, 0.15), 1e-6, _NEAREST)
     amplitudes = np.clip(lamps.log_amplitudes + step[:count], -200, 200)
-    sky = float(np.clip(lamps.log_sky + step[count], -200, 200))
-    return replace(lamps, directions=directions, log_amplitudes=amplitudes, log_sky=sky, log_alpha=log_alpha)
+    base = float(np.clip(lamps.log_base + step[count], -200, 200))
+    return replace(lamps, directions=directions, nearness=nearness, log_amplitudes=amplitudes, log_base=base, log_alpha=log_alpha)
 
 
 def _turned(direction: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -13,32 +13,35 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_BRIGHT = 0.03  # of the peak
+from .observed import Observed
+
+_BRIGHT, _DARK = 0.03, 1e-3  # of the peak
 _PEAK_PIXELS = 5  # the peak is the mean of that many: one hot pixel is no highlight
 
 
 @dataclass(frozen=True)
 class Pixels:
-    """N pixels: `normal` (N, 3), `colour` (N, 3) and its mean `value` (N,), `sigma` and `weight` (N,), `clipped` (N,) bool,
-    `place` (N, 2) rows and columns; `peak` of the highlight, `bright`: how many pixels of the picture reach half of it."""
+    """N pixels: `normal` (N, 3), `place` (N, 3) (zeros where not known), `colour` (N, 3) and its mean `value` (N,), `sigma` and `weight`
+    (N,), `clipped` (N,) bool, `cell` (N, 2): rows and columns. `peak` of the highlight; `dark`: as good as no light; `bright`: how many
+    pixels of the picture reach half of the peak."""
 
     normal: np.ndarray
+    place: np.ndarray
     colour: np.ndarray
     value: np.ndarray
     sigma: np.ndarray
     weight: np.ndarray
     clipped: np.ndarray
-    place: np.ndarray
+    cell: np.ndarray
     peak: float
+    dark: float
     bright: int
 
 
-def choose_pixels(
-    specular: np.ndarray, normal: np.ndarray, inside: np.ndarray, confidence: np.ndarray, clipped: np.ndarray,
-    noise: tuple[float, float], most: int,
-) -> Pixels:  # fmt: skip
-    """At most about `most` of the pixels `inside` (H, W). `noise`: the floor as a share of the peak, and the relative part."""
-    value = specular[inside].mean(axis=1)
+def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixels:
+    """At most about `most` of the pixels inside. `noise`: the floor as a share of the peak, and the relative part."""
+    inside = seen.inside
+    value = seen.specular[inside].mean(axis=1)
     order = np.argsort(-value, kind="stable")
     peak = float(value[order[:_PEAK_PIXELS]].mean())
     bright = int((value > _BRIGHT * peak).sum())
@@ -51,13 +54,15 @@ def choose_pixels(
     taken = np.concatenate(parts)
     sigma = np.sqrt((noise[0] * peak) ** 2 + (noise[1] * value[taken]) ** 2)
     return Pixels(
-        normal=normal[inside][taken],
-        colour=specular[inside][taken],
+        normal=seen.normal[inside][taken],
+        place=np.zeros((len(taken), 3)) if seen.place is None else seen.place[inside][taken],
+        colour=seen.specular[inside][taken],
         value=value[taken],
         sigma=np.maximum(sigma, np.finfo(float).tiny),
-        weight=np.concatenate(weights) * confidence[inside][taken],
-        clipped=clipped[inside][taken],
-        place=np.argwhere(inside)[taken],
+        weight=np.concatenate(weights) * seen.confidence[inside][taken],
+        clipped=seen.clipped[inside][taken],
+        cell=np.argwhere(inside)[taken],
         peak=peak,
+        dark=_DARK * peak,
         bright=int((value > 0.5 * peak).sum()),
     )

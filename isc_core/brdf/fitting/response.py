@@ -30,19 +30,21 @@ class Response:
 
 
 def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: float) -> Response:
-    """The answer of surfaces with unit normals (N, 3) to a light from the unit direction (3,); `alpha` in (0, 1)."""
-    view_cos, light_cos = normal[:, 2], normal @ light
+    """The answer of surfaces with unit normals (N, 3) to light from the unit direction (3,) or (N, 3); `alpha` in (0, 1)."""
+    view_cos, light_cos = normal[:, 2], (normal * light).sum(axis=1)
     lit = (view_cos > _LEAST) & (light_cos > _LEAST)
     view_cos, light_cos = np.where(lit, view_cos, 1), np.where(lit, light_cos, 1)
     total = light + (0, 0, 1)
-    length = max(float(np.sqrt(total @ total)), 1e-9)
+    length = np.maximum(np.sqrt((total * total).sum(axis=-1, keepdims=True)), 1e-9)
     half = total / length
-    half_cos = np.clip(normal @ half, 0, 1)
+    half_cos = np.clip((normal * half).sum(axis=1), 0, 1)
+    deviation = half[..., 2:]
     lobe = _ggx if model == "ggx" else _blinn_phong
-    value, by_alpha, by_half, by_cos, by_deviation = lobe(view_cos, light_cos, half_cos, float(half[2]), alpha)
+    value, by_alpha, by_half, by_cos, by_deviation = lobe(view_cos, light_cos, half_cos, deviation[..., 0], alpha)
     value = np.where(lit, value, 0)
-    across = (np.array([0, 0, 1]) - half[2] * half) / length
-    by_light = (by_half / length - 0)[:, None] * (normal - half_cos[:, None] * half) + by_cos[:, None] * normal + by_deviation * across
+    across = ((0, 0, 1) - deviation * half) / length
+    turned = (normal - half_cos[:, None] * half) / length
+    by_light = by_half[:, None] * turned + by_cos[:, None] * normal + np.asarray(by_deviation)[..., None] * across
     return Response(value, value * by_alpha, value[:, None] * by_light)
 
 
@@ -52,10 +54,10 @@ def sky_response(normal: np.ndarray) -> np.ndarray:
 
 
 # Both lobes: y, and the derivatives of log y by log alpha, n . h, n . l and the deviation v . h.
-_Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]
+_Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
 
-def _ggx(view_cos: np.ndarray, light_cos: np.ndarray, half_cos: np.ndarray, deviation: float, alpha: float) -> _Parts:
+def _ggx(view_cos: np.ndarray, light_cos: np.ndarray, half_cos: np.ndarray, deviation: np.ndarray, alpha: float) -> _Parts:
     square = alpha**2
     view_root, light_root = (np.sqrt(square + (1 - square) * c * c) for c in (view_cos, light_cos))
     fresnel = F0 + (1 - F0) * (1 - deviation) ** 5
@@ -69,10 +71,10 @@ def _ggx(view_cos: np.ndarray, light_cos: np.ndarray, half_cos: np.ndarray, devi
     return value, by_alpha, by_half, by_cos, -5 * (1 - F0) * (1 - deviation) ** 4 / fresnel
 
 
-def _blinn_phong(view_cos: np.ndarray, light_cos: np.ndarray, half_cos: np.ndarray, deviation: float, alpha: float) -> _Parts:
-    del view_cos, deviation
+def _blinn_phong(view_cos: np.ndarray, light_cos: np.ndarray, half_cos: np.ndarray, deviation: np.ndarray, alpha: float) -> _Parts:
+    del view_cos
     exponent = 2 / alpha**2 - 2
     safe = np.maximum(half_cos, 1e-9)
     value = (exponent + 8) / (8 * np.pi) * safe**exponent * light_cos
     by_alpha = -4 / alpha**2 * (1 / (exponent + 8) + np.log(safe))
-    return value, by_alpha, exponent / safe, 1 / light_cos, 0.0
+    return value, by_alpha, exponent / safe, 1 / light_cos, np.zeros_like(deviation)

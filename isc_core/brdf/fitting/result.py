@@ -25,7 +25,8 @@ FOUND = "determined"
 class LobeFitOptions:
     """`model`: of the lobe. `most_lights`: 1 to 3. `most_pixels`: that are looked at, >= 100. `normal_error`: of the normals, degrees,
     [0, 90): 0 for exact ones, about 15 for recovered ones; it widens the intervals. `floor`: deviation of the specular light as a share of
-    its peak; `relative`: as a share of itself. `darkest`: radiance >= 0 that is no highlight yet. Raises `InputError` outside these."""
+    its peak; `relative`: as a share of itself. `darkest`: radiance >= 0 that is no highlight yet. `thresholded`: the specular image was made
+    by a separator, which sees only what rises above an unknown level. Raises `InputError` outside these."""
 
     model: LobeModel = "ggx"
     most_lights: int = 3
@@ -34,6 +35,7 @@ class LobeFitOptions:
     floor: float = 0.02
     relative: float = 0.1
     darkest: float = 1e-6
+    thresholded: bool = False
 
     def __post_init__(self) -> None:
         if self.model not in CONVENTION:
@@ -71,7 +73,7 @@ class LobeFit:
     `alpha`: None where it is not known at all; where the highlight is narrower than a pixel, the upper bound. `alpha_interval`: likewise.
     `lights`: the brightest first; none where there is no specular light or an environment was given. `strength`, `strength_interval`: of
     the lobe (3,), where an environment was given, else None. `explained`: share of the squared specular image, in [0, 1].
-    `predicted`: (H, W, 3) float32, the specular image of the fit, 0 outside the mask.
+    `predicted`: (H, W, 3) float32, the specular image of the fit, 0 outside the mask; what a separator left out is in it.
     """
 
     model: str

@@ -15,23 +15,30 @@ import numpy as np
 from scipy import ndimage
 
 _CELLS = 41
-_BLUR = 1.0  # cells
+_BLUR, _APART = 1.0, 5.0  # cells
 
 
-def brightest_half_vector(normal: np.ndarray, value: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The unit normal (3,) around which `value` (N,), which may be negative, is highest on the average; `normal` (N, 3), `weight` (N,)."""
+def bright_half_vectors(normal: np.ndarray, value: np.ndarray, weight: np.ndarray, count: int) -> list[np.ndarray]:
+    """Unit normals (3,) around which `value` (N,), which may be negative, is highest on the average, the highest first; the last is that of
+    the brightest pixel. `normal` (N, 3), `weight` (N,)."""
     flat = normal[:, :2] / np.sqrt(1 + np.clip(normal[:, 2], 0, 1))[:, None]
     cell = np.clip(np.floor((flat + 1) / 2 * _CELLS).astype(int), 0, _CELLS - 1)
     index = cell[:, 0] * _CELLS + cell[:, 1]
     total = np.bincount(index, weight * value, _CELLS**2).reshape(_CELLS, _CELLS)
-    count = np.bincount(index, weight, _CELLS**2).reshape(_CELLS, _CELLS)
-    total, count = (ndimage.gaussian_filter(a, _BLUR, mode="constant") for a in (total, count))
-    mean = total / (count + 0.05 * max(float(count.max()), 1e-300))
-    best = np.unravel_index(int(np.argmax(mean)), mean.shape)
-    near = np.exp(-((cell - best) ** 2).sum(axis=1) / (2 * (1.5 * _BLUR) ** 2)) * weight * np.maximum(value, 0)
-    middle = near @ normal
-    length = float(np.linalg.norm(middle))
-    return middle / length if length > 0 else np.array([0.0, 0, 1])
+    number = np.bincount(index, weight, _CELLS**2).reshape(_CELLS, _CELLS)
+    total, number = (ndimage.gaussian_filter(a, _BLUR, mode="constant") for a in (total, number))
+    mean = total / (number + 0.05 * max(float(number.max()), 1e-300))
+    rows, columns = np.indices(mean.shape)
+    found = []
+    for _ in range(count - 1):
+        best = np.unravel_index(int(np.argmax(mean)), mean.shape)
+        near = np.exp(-((cell - best) ** 2).sum(axis=1) / (2 * (1.5 * _BLUR) ** 2)) * weight * np.maximum(value, 0)
+        middle = near @ normal
+        length = float(np.linalg.norm(middle))
+        if length > 0:
+            found.append(middle / length)
+        mean = np.where((rows - best[0]) ** 2 + (columns - best[1]) ** 2 < _APART**2, -np.inf, mean)
+    return [*found, normal[int(np.argmax(value * (weight > 0)))]]
 
 
 def light_of_half_vector(half: np.ndarray) -> np.ndarray:

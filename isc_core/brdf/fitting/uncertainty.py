@@ -24,7 +24,7 @@ def covariance(jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray, p
     """(P, P), of the columns of the jacobian (N, P) of the residual (N,), both in sigmas, with weights (N,)."""
     bread = _inverse((jacobian * weight[:, None]).T @ jacobian)
     side = max(3.0, float(np.sqrt(pixels.bright / np.pi)))
-    cell = np.floor(pixels.place / side).astype(int)
+    cell = np.floor(pixels.cell / side).astype(int)
     _, block = np.unique(cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1], return_inverse=True)
     scores = jacobian * (weight * residual)[:, None]
     sums = np.stack([np.bincount(block, column) for column in scores.T], axis=1)
