@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from .brdf.fitting import LobeFit
 from .sirfs.frames import real_sh
 
 
@@ -70,6 +71,7 @@ class Decomposition:
     `normal`: (H, W, 3) float32 unit vectors, x right, y up, z toward the viewer; (0, 0, 1) outside the mask.
     `height`: (H, W) float32, pixels, toward the viewer; 0 outside. `mask`: (H, W) bool. `confidence`: (H, W) in [0, 1].
     `illumination`: (9, 3) float64; log shading_c(n) = sum_k illumination[k, c] Y_k(n), orthonormal real spherical harmonics.
+    `brdf`: the lobe fitted to the specular layer; None where no fit was tried.
     """
 
     image: np.ndarray
@@ -84,6 +86,7 @@ class Decomposition:
     confidence: np.ndarray
     illumination: np.ndarray
     provenance: Provenance
+    brdf: LobeFit | None = None
 
     def identity_errors(self) -> IdentityErrors:
         """How well the maps fit each other inside the mask. Raises `ValueError` for an empty mask."""

@@ -11,7 +11,8 @@ import numpy as np
 from . import baselines
 from .datasets import MitBerkeleyObject
 from .evaluate import Estimate, Runner
-from .pipeline import BASELINE_MODELS, SIRFS_MODELS, Settings
+from .models.mbp import split_reflectance
+from .pipeline import BASELINE_MODELS, Settings
 from .progress import Monitor
 from .separation import BEST, separate
 from .sirfs.contour import occluding_contour
@@ -30,7 +31,8 @@ _HALF_CODE = 0.5 / 65535  # the images have 16 bits; a separation may leave less
 
 @dataclass(frozen=True)
 class RunnerOptions:
-    """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for `mdr`; `engine`, `threads`: see `SolverOptions`."""
+    """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for `mdr` and `mbp`;
+    `engine`, `threads`: see `SolverOptions`."""
 
     model: str = "sirfs"
     separator: str = BEST
@@ -56,6 +58,8 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
         if truth.illumination not in tables:
             tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
         result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor)
+        if options.model == "mbp":
+            log_image = _log_separated_reflectance(truth, result, options)
         return _estimate(truth, log_image, result.height, result.light, result)
 
     return run
@@ -75,10 +79,18 @@ def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors,
 
 
 def _log_diffuse(truth: MitBerkeleyObject, options: RunnerOptions) -> np.ndarray:
-    """Log of the diffuse image (H, W, 3), 0 where it is not valid."""
-    diffuse = truth.image
-    if options.model in SIRFS_MODELS and options.model != "sirfs":
-        diffuse = separate(options.separator, truth.image, truth.valid).diffuse
+    """Log of what shape and light are recovered from (H, W, 3), 0 where it is not valid: the diffuse image, if separation comes first."""
+    diffuse = truth.image if options.model != "mdr" else separate(options.separator, truth.image, truth.valid).diffuse
+    return _log(diffuse, truth)
+
+
+def _log_separated_reflectance(truth: MitBerkeleyObject, result: SirfsResult, options: RunnerOptions) -> np.ndarray:
+    """Log of the diffuse image (H, W, 3), 0 where it is not valid, if what SIRFS took for reflectance is separated."""
+    shading = np.exp(_log_shading(normal_from_reference(normals(result.height)), result.light))
+    return _log(split_reflectance(truth.image, shading, truth.valid, None, options.separator).diffuse, truth)
+
+
+def _log(diffuse: np.ndarray, truth: MitBerkeleyObject) -> np.ndarray:
     return np.where(truth.valid[..., None], np.log(np.maximum(diffuse, _HALF_CODE)), 0.0)
 
 
@@ -94,8 +106,13 @@ def _estimate(
 
     `log_shading` (H, W, 3): a method's own, where it has one; else that of the light on the normals.
     """
-    normal, illumination = normal_from_reference(normals(height)), light_from_reference(light)
-    log_shading = real_sh(normal) @ illumination if log_shading is None else log_shading
+    normal = normal_from_reference(normals(height))
+    log_shading = _log_shading(normal, light) if log_shading is None else log_shading
     reflectance = np.where(truth.valid[..., None], np.exp(log_image - log_shading), 0.0)
     loss, evaluations = (None, None) if result is None else (result.terms.total, result.evaluations)
-    return Estimate(height, normal, np.exp(log_shading), reflectance, illumination, loss, evaluations)
+    return Estimate(height, normal, np.exp(log_shading), reflectance, light_from_reference(light), loss, evaluations)
+
+
+def _log_shading(normal: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """(H, W, 3) of normals in the camera's frame under a light in the reference's convention."""
+    return real_sh(normal) @ light_from_reference(light)

@@ -1,7 +1,8 @@
 """The files of a result: what other programs read and what a person looks at first.
 
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`, `mesh.glb`, `preview.png`, and under `maps/`
-the main maps once more as single-layer files, for programs that cannot read multilayer ones. A separation's folder holds
+the main maps once more as single-layer files, for programs that cannot read multilayer ones. Where a lobe was fitted, `maps.exr` has one
+layer more, `lobe`: the specular image that the fit predicts. A separation's folder holds
 `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears whole or not at all (see `atomic`).
 """
 
@@ -16,6 +17,8 @@ import numpy as np
 from PIL import Image
 
 from .atomic import new_folder, require_writable
+from .brdf.fitting import LobeFit
+from .brdf_record import lobe_fit_from_json
 from .decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from .errors import InputError
 from .exr import read_channels, write_channels
@@ -26,6 +29,7 @@ from .report import contact_sheet, separation_sheet
 
 SCHEMA_VERSION = 1
 LAYERS = {**dict.fromkeys(COLOR_MAPS, "RGB"), "normal": "XYZ", "height": "Z", "mask": "A", "confidence": "Y"}
+LOBE = {"lobe": "RGB"}
 SINGLE = {"diffuse": "RGB", "specular": "RGB", "reflectance": "RGB", "shading": "RGB", "normal": "RGB", "height": "Y"}
 DECOMPOSITION_FILES = ("decomposition.json", "maps.exr", "mesh.glb", "preview.png", *(f"maps/{name}.exr" for name in SINGLE))
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # smaller results have not been seen
@@ -40,6 +44,8 @@ def save(decomposition: Decomposition, folder: Path | str, *, mesh: MeshOptions 
     """
     monitor = monitor or Monitor()
     channels = _channels({name: getattr(decomposition, name) for name in LAYERS}, LAYERS)
+    if decomposition.brdf is not None:
+        channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
     if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
     with new_folder(folder, DECOMPOSITION_FILES) as partial:
@@ -65,12 +71,14 @@ def load(folder: Path | str) -> Decomposition:
     if not (folder / "decomposition.json").is_file():
         raise InputError(f"{folder} is not a result folder (it has no decomposition.json): give the folder that isc decompose wrote")
     description = _read_json(folder / "decomposition.json")
-    maps = _layers(folder / "maps.exr")
+    channels = read_channels(folder / "maps.exr")
+    maps = _layers(channels, LAYERS, folder / "maps.exr")
     return Decomposition(
         **{name: maps[name] for name in (*COLOR_MAPS, "normal", "height", "confidence")},
         mask=maps["mask"] > 0.5,
         illumination=_coefficients(description, folder),
         provenance=_provenance(description, folder),
+        brdf=_brdf(description, channels, folder),
     )
 
 
@@ -119,7 +127,7 @@ def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "illumination": {"coefficients": d.illumination, "convention": convention},
-        "brdf": None,
+        "brdf": None if d.brdf is None else d.brdf.to_json(),
         "mesh": {**built.describe(), "illumination": {"coefficients": built.illumination(d.illumination), "convention": convention}},
         "settings": p.settings,
         "seed": p.seed,
@@ -154,9 +162,8 @@ def _channels(maps: Mapping[str, np.ndarray], layers: Mapping[str, str]) -> dict
     return channels
 
 
-def _layers(path: Path) -> dict[str, np.ndarray]:
-    channels = read_channels(path)
-    names = {layer: [f"{layer}.{letter}" for letter in letters] for layer, letters in LAYERS.items()}
+def _layers(channels: Mapping[str, np.ndarray], layers: Mapping[str, str], path: Path) -> dict[str, np.ndarray]:
+    names = {layer: [f"{layer}.{letter}" for letter in letters] for layer, letters in layers.items()}
     if missing := [name for group in names.values() for name in group if name not in channels]:
         raise InputError(f"{path} lacks the channel {missing[0]}: it is not a result of isc decompose, or is damaged")
     if broken := [name for group in names.values() for name in group if not np.isfinite(channels[name]).all()]:
@@ -188,6 +195,17 @@ def _coefficients(description: Mapping[str, Any], folder: Path) -> np.ndarray:
     if light.shape != (9, 3) or not np.isfinite(light).all():
         raise InputError(f"{folder / 'decomposition.json'} has no illumination of 9 x 3 numbers: it is damaged")
     return light
+
+
+def _brdf(description: Mapping[str, Any], channels: Mapping[str, np.ndarray], folder: Path) -> LobeFit | None:
+    """The fit; None where none was tried, as in results of earlier versions."""
+    if description.get("brdf") is None:
+        return None
+    predicted = _layers(channels, LOBE, folder / "maps.exr")["lobe"]
+    try:
+        return lobe_fit_from_json(description["brdf"], predicted)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(f"{folder / 'decomposition.json'} has no usable brdf: it is damaged ({error})") from error
 
 
 def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:

@@ -11,6 +11,7 @@ import OpenEXR
 import pytest
 from PIL import Image
 
+from isc_core.brdf.fitting import LobeFit, fit_lobe
 from isc_core.decomposition import Decomposition, Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.photo import srgb_to_linear
@@ -34,6 +35,11 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def copy(tmp_path: Path) -> Path:
     save(ball((24, 30), 9.0, (12, 15)), tmp_path / "copy")
     return tmp_path / "copy"
+
+
+def fitted(d: Decomposition) -> Decomposition:
+    """The result with the lobe that its own highlight shows."""
+    return replace(d, brdf=fit_lobe(d.specular, d.normal, d.mask))
 
 
 def channels(path: Path) -> dict[str, np.ndarray]:
@@ -102,6 +108,66 @@ def test_it_is_read_back_bit_by_bit(saved: Path) -> None:
         assert (after == before).all(), name
     assert back.provenance == d.provenance
     assert back.identity_errors().broken() == ()
+
+
+def test_the_fitted_lobe_is_read_back_number_by_number(tmp_path: Path) -> None:
+    d = fitted(ball((48, 60), 20.0, (22, 33)))
+    assert d.brdf is not None
+    assert d.brdf.determined
+    save(d, tmp_path / "out")
+    back = load(tmp_path / "out").brdf
+    assert back is not None
+    assert back.to_json() == d.brdf.to_json()
+    assert (back.predicted == d.brdf.predicted).all()
+    assert back.predicted.max() > 0.1
+    record = json.loads((tmp_path / "out" / "decomposition.json").read_text())["brdf"]
+    assert record["model"].startswith("ggx: f_r =")
+    assert record["alpha_interval_68"][0] < record["alpha"] < record["alpha_interval_68"][1]
+
+
+def test_a_fit_that_knows_nothing_is_read_back_with_its_reason(tmp_path: Path) -> None:
+    d = ball((24, 30), 9.0, (12, 15))
+    save(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)), tmp_path / "out")
+    back = load(tmp_path / "out").brdf
+    assert back is not None
+    assert (back.determined, back.alpha, back.lights) == (False, None, ())
+    assert "no specular light" in back.reason
+    assert not back.predicted.any()
+
+
+def test_a_fit_under_an_environment_is_read_back(tmp_path: Path) -> None:
+    d = ball((48, 60), 20.0, (22, 33))
+    sky = np.full((8, 16, 3), 0.02)
+    sky[2, 9] = (40.0, 38.0, 35.0)
+    fit = fit_lobe(d.specular, d.normal, d.mask, environment=sky)
+    assert fit.strength is not None
+    save(replace(d, brdf=fit), tmp_path / "out")
+    back = load(tmp_path / "out").brdf
+    assert isinstance(back, LobeFit)
+    assert back.to_json() == fit.to_json()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"alpha": "rough"},
+        {"determined": None},
+        {"lights": 3},
+        {"lights": [{}]},
+        {"explained": None},
+        {"alpha_interval_68": [0.1]},
+        {"strength": [1]},
+    ],
+    ids=str,
+)
+def test_a_damaged_fit_is_one_clear_line(tmp_path: Path, changes: dict[str, object]) -> None:
+    folder = tmp_path / "out"
+    save(fitted(ball((24, 30), 9.0, (12, 15))), folder)
+    record = json.loads((folder / "decomposition.json").read_text())["brdf"]
+    damage_json(folder, brdf={**record, **changes})
+    with pytest.raises(InputError, match="brdf") as caught:
+        load(folder)
+    assert "\n" not in str(caught.value)
 
 
 def test_the_light_of_the_mesh_is_the_recovered_one_over_k(saved: Path) -> None:

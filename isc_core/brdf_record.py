@@ -1,0 +1,64 @@
+"""A lobe fit as it stands in `decomposition.json`, read back: what `LobeFit.to_json` wrote."""
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from .brdf.fitting import Interval, LobeFit, LobeLight
+
+
+def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> LobeFit:
+    """The fit that wrote `record`; `predicted` (H, W, 3): its specular image, which is not part of it.
+
+    Raises `KeyError`, `TypeError` or `ValueError` where the record is not one of a fit.
+    """
+    alpha, strength = record["alpha"], record["strength"]
+    return LobeFit(
+        model=str(record["model"]),
+        determined=_truth(record["determined"]),
+        reason=str(record["reason"]),
+        alpha=None if alpha is None else _number(alpha),
+        alpha_interval=_interval(record["alpha_interval_68"], ()),
+        lights=tuple(_light(light) for light in record["lights"]),
+        strength=None if strength is None else _numbers(strength, (3,)),
+        strength_interval=_interval(record["strength_interval_68"], (3,)),
+        explained=_number(record["explained"]),
+        predicted=predicted,
+    )
+
+
+def _light(record: Mapping[str, Any]) -> LobeLight:
+    interval = _interval(record["strength_light_interval_68"], (3,))
+    if interval is None:
+        raise ValueError("a light without an interval")
+    return LobeLight(
+        _numbers(record["direction"], (3,)), _number(record["cone_68_degrees"]), _numbers(record["strength_light"], (3,)), interval
+    )
+
+
+def _interval(record: Any, shape: tuple[int, ...]) -> Interval | None:
+    if record is None:
+        return None
+    low, high = record
+    return Interval(_number(low), _number(high)) if shape == () else Interval(_numbers(low, shape), _numbers(high, shape))
+
+
+def _numbers(values: Any, shape: tuple[int, ...]) -> np.ndarray:
+    array = np.array(values, np.float64)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise ValueError(f"{values} instead of numbers of shape {shape}")
+    return array
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise ValueError(f"{value} instead of a number")
+    return float(value)
+
+
+def _truth(value: Any) -> bool:
+    if not isinstance(value, bool):
+        raise ValueError(f"{value} instead of true or false")
+    return value

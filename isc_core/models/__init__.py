@@ -1,0 +1,21 @@
+"""The models: how separation, shape and light are joined to explain one photo. One model a file, and one function that knows their names.
+
+A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, and the `baselines` to compare with.
+"""
+
+from .baseline import baseline
+from .mbp import mbp
+from .mdr import mdr
+from .plain import sirfs
+from .settings import Settings
+from .task import Answer, Task
+
+_SOLVERS = {"mdr": mdr, "mbp": mbp, "sirfs": sirfs}
+
+
+def solve(task: Task) -> Answer:
+    """What the model that `task.settings` names makes of the photo. Raises `InputError`, `Cancelled`."""
+    return _SOLVERS.get(task.settings.model, baseline)(task)
+
+
+__all__ = ["Answer", "Settings", "Task", "solve"]

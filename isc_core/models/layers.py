@@ -1,0 +1,36 @@
+"""The steps that several models take: separating a photo, and shading a recovered shape."""
+
+import numpy as np
+
+from ..decomposition import Separation
+from ..photo import Photo
+from ..progress import Monitor
+from ..separation import separate
+from ..sirfs.frames import light_from_reference, normal_from_reference, real_sh
+from ..sirfs.stencils import normals
+from .task import Task
+
+
+def separated(photo: Photo, method: str, monitor: Monitor | None = None) -> Separation:
+    """The photo's layers by a method of `separation.METHODS`. Raises `InputError`, `Cancelled`."""
+    return separate(method, photo.image, photo.mask, photo.clipped, monitor=monitor)
+
+
+def unseparated(task: Task) -> tuple[Separation, np.ndarray]:
+    """All light taken as diffuse: the layers of the maps' photo, and the diffuse image (H, W, 3) of the working one."""
+    task.monitor.report("preparing", 0.03)
+    with task.clock.stage("separation"):
+        split = separated(task.maps, "none")
+        return split, split.diffuse if task.one_scale else separated(task.working, "none").diffuse
+
+
+def shaded(height: np.ndarray, light: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Normals (H, W, 3), camera frame, (0, 0, 1) outside the mask, and shading (H, W, 3), 0 outside, float32: shading = exp(SH(normal)).
+
+    `height` (H, W) and `light` (9, 3) in the reference convention.
+    """
+    normal = normal_from_reference(normals(height)).astype(np.float32)
+    normal[~mask] = (0, 0, 1)
+    shading = np.zeros((*mask.shape, 3), np.float32)
+    shading[mask] = np.exp(real_sh(normal[mask].astype(float)) @ light_from_reference(light))
+    return normal, shading

@@ -1,0 +1,45 @@
+"""The lobe that a model's specular layer shows on the shape that it recovered, and what is to be said of it.
+
+Limits: recovered normals are taken to be 15 degrees off, which widens the intervals. The fit is that of `brdf.fitting`, with its limits.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..brdf.fitting import LobeFit, LobeFitOptions, fit_lobe
+from ..brdf.fitting.response import LobeModel
+from ..decomposition import Separation
+from ..progress import Monitor
+from .layers import shaded
+from .shape import Shape
+from .task import Task
+
+_NORMAL_ERROR = 15.0  # degrees, of recovered normals
+_NOTHING = 0.01  # of the photo's white: specular light that is nowhere brighter is none
+MATT = "no highlights were found: the object is matt, or they cannot be told from its paint"
+
+
+@dataclass(frozen=True)
+class FittedLobe:
+    """`brdf`: the fit; `status`: what a person should know of it, as the entry "gloss" of a result's status."""
+
+    brdf: LobeFit
+
+    @property
+    def status(self) -> dict[str, str]:
+        """Why the gloss is not determined, or that it is."""
+        return {"gloss": self.brdf.reason if self.brdf.lights else MATT}
+
+
+def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, model: LobeModel = "ggx") -> FittedLobe:
+    """Fits the lobe to the specular layer of `split` under the normals of `shape`; clipped pixels count as lower bounds.
+
+    Where the data cannot tell, the fit says so: that is no error. Raises `Cancelled`.
+    """
+    photo = task.maps
+    with task.clock.stage("gloss"):
+        normal, _ = shaded(shape.height, shape.light, photo.mask)
+        white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
+        options = LobeFitOptions(model=model, normal_error=_NORMAL_ERROR if task.known.height is None else 0.0, darkest=_NOTHING * white)
+        return FittedLobe(fit_lobe(split.specular, normal, photo.mask, options=options, clipped=photo.clipped, monitor=monitor))

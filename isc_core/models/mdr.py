@@ -1,0 +1,26 @@
+"""Modified Dichromatic Reflectance: the specular light is separated first, SIRFS sees the diffuse image.
+
+Equation: image = reflectance * shading + specular.
+
+Citation: S. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016; no DOI); the dichromatic model:
+S. A. Shafer 1985, doi:10.1002/col.5080100409.
+
+Limits: what the separation leaves or takes too much of, SIRFS believes.
+"""
+
+from .layers import separated
+from .lobe import fit_specular
+from .shape import recover_shape
+from .task import Answer, Task
+
+
+def mdr(task: Task) -> Answer:
+    """Separation, then shape and light of the diffuse image, then the lobe of the specular one. Raises `InputError`, `Cancelled`."""
+    method, monitor = task.settings.separator, task.monitor
+    monitor.report(f"separating ({method})", 0.03)
+    with task.clock.stage("separation"):
+        split = separated(task.maps, method, monitor.part(0.03, 0.07))
+        diffuse = split.diffuse if task.one_scale else separated(task.working, method, monitor.part(0.07, 0.1)).diffuse
+    shape = recover_shape(diffuse, task, monitor.part(0.1, 0.92))
+    lobe = fit_specular(split, shape, task, monitor.part(0.92, 0.96))
+    return Answer(split, shape.height, shape.light, shape.status | lobe.status, lobe.brdf)

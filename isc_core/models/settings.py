@@ -1,0 +1,51 @@
+"""What a decomposition is asked for: the names of the models, and what they can be told."""
+
+from dataclasses import dataclass
+
+from .. import baselines
+from ..errors import InputError
+from ..separation import BEST, METHODS
+
+SIRFS_MODELS = ("mdr", "mbp", "sirfs")
+SEPARATING_MODELS = ("mdr", "mbp")
+BASELINE_MODELS = tuple(baselines.METHODS)
+MODELS = SIRFS_MODELS + BASELINE_MODELS
+LATER_MODELS = ("joint",)
+ILLUMINATIONS = ("natural", "laboratory")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a decomposition is asked for.
+
+    `model`: one of `MODELS`. `separator`: one of `separation.METHODS`, used by `SEPARATING_MODELS`. `illumination`: "natural" or
+    "laboratory", which lights to expect. `max_size`: the object's long side in pixels at which the maps are made, 0 for the photo's;
+    SIRFS is solved at a size of its own, `recover.SOLVE_SIZE`. `full_size`: the maps are then brought to the photo's resolution.
+    `engine`, `threads`: see `SolverOptions`. `seed`: written into the result; no step of these models draws random numbers.
+    `shading_only`: shape-from-shading mode, an object of one colour.
+    """
+
+    model: str = "mdr"
+    separator: str = BEST
+    illumination: str = "natural"
+    max_size: int = 512
+    full_size: bool = False
+    engine: str = "auto"
+    threads: int = 0
+    seed: int = 0
+    shading_only: bool = False
+
+    def check(self) -> None:
+        """Raises `InputError` for values that mean nothing."""
+        if self.model in LATER_MODELS:
+            raise InputError(f"the model {self.model} is not available yet: choose {', '.join(MODELS)}")
+        for name, value, known in (
+            ("model", self.model, MODELS),
+            ("separator", self.separator, METHODS),
+            ("illumination", self.illumination, ILLUMINATIONS),
+            ("engine", self.engine, ("auto", "numba", "numpy")),
+        ):
+            if value not in known:
+                raise InputError(f'unknown {name} "{value}": choose {", ".join(known)}')
+        if self.max_size < 0 or self.threads < 0:
+            raise InputError("--max-size and --threads cannot be negative: 0 means no limit and all cores")

@@ -1,0 +1,67 @@
+"""Shape and light of a diffuse image by SIRFS, as the models ask for it, and how that ended."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..progress import Monitor
+from ..sirfs.kernel_cache import announce_compilation
+from ..sirfs.prior_file import shipped_prior_set
+from ..sirfs.recover import Known, Recovered, RecoverOptions, recover
+from ..sirfs.resampling import resample_height
+from ..sirfs.settings import isc_weights
+from ..sirfs.solver import SolverOptions
+from .task import Task
+
+
+@dataclass(frozen=True)
+class Shape:
+    """`height` (H, W) in pixels of the maps and `light` (9, 3), reference convention; `status`: how they were found, JSON-ready."""
+
+    height: np.ndarray
+    light: np.ndarray
+    status: dict[str, Any]
+
+
+def recover_shape(diffuse: np.ndarray, task: Task, monitor: Monitor) -> Shape:
+    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps. Raises `InputError`, `Cancelled`."""
+    settings, working = task.settings, task.working
+    announce_compilation(settings.engine, monitor)
+    channels = 1 if _is_grey(diffuse, working.mask) else 3
+    priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
+    options = RecoverOptions(shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads))
+    weights = isc_weights(settings.illumination, channels)
+    known = task.known
+    light = known.light if known.light is None or channels == 3 else known.light.mean(axis=1, keepdims=True)
+    with task.clock.stage("shape and light"):
+        result = recover(
+            diffuse[..., :channels], working.mask, working.code_value / 2, priors, weights, options,
+            known=Known(known.height, light, known.depth), monitor=monitor,
+        )  # fmt: skip
+    return Shape(height_of_maps(result.height, task), np.broadcast_to(result.light, (9, 3)).copy(), _status(result))
+
+
+def height_of_maps(height: np.ndarray, task: Task) -> np.ndarray:
+    """The working height (h, w) on the grid of the maps and in its pixels, smoothly: (H, W)."""
+    if task.one_scale:
+        return height
+    return resample_height(height, task.maps.mask.shape, task.maps.scale / task.working.scale)
+
+
+def _is_grey(image: np.ndarray, mask: np.ndarray) -> bool:
+    inside = image[mask]
+    return bool(np.array_equal(inside[:, 0], inside[:, 1]) and np.array_equal(inside[:, 0], inside[:, 2]))
+
+
+def _status(result: Recovered) -> dict[str, Any]:
+    trouble = "the solver ran out of evaluations, so the result may not be its best: a cleaner mask or the other --illumination may help"
+    return {
+        "converged": result.converged,
+        "reason": result.reason,
+        "loss": result.terms.total,
+        "terms": dict(result.terms.__dict__),
+        "iterations": result.iterations,
+        "evaluations": result.evaluations,
+        "help": "" if result.converged else trouble,
+    }

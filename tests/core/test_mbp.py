@@ -1,0 +1,123 @@
+"""The models that separate, on a scene with known parts: identities, the order of their steps, and nothing invented on a matt object."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isc_core.brdf.ggx import Ggx
+from isc_core.brdf.shading import directional, radiance
+from isc_core.decomposition import Decomposition
+from isc_core.models.lobe import MATT
+from isc_core.models.mbp import split_reflectance
+from isc_core.photo import Photo, PhotoSource
+from isc_core.pipeline import Evidence, Settings, decompose
+from isc_core.separation import separate
+from tests.core.ball_scene import ball
+
+LAMP = np.array([-0.42, 0.5, 0.757])
+LAMP /= np.linalg.norm(LAMP)
+
+
+def glossy(shape: tuple[int, int] = (76, 90), radius: float = 34.0) -> Decomposition:
+    """The ball of one red paint, without a pattern, under the gloss of a lamp: alpha .15, strength x light 1.5."""
+    d = ball(shape, radius, (shape[0] / 2, shape[1] / 2))
+    inside = d.mask[..., None]
+    reflectance = np.where(inside, [0.52, 0.12, 0.07], 0).astype(np.float32)
+    gloss = radiance(Ggx(0.15, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(LAMP, 1.5))
+    diffuse, specular = reflectance * d.shading, np.where(inside, gloss, 0).astype(np.float32)
+    return replace(d, image=diffuse + specular, diffuse=diffuse, specular=specular, reflectance=reflectance)
+
+
+def photo_of(d: Decomposition, image: np.ndarray) -> Photo:
+    source = PhotoSource("0" * 64, (image.shape[1], image.shape[0]), 12, "linear", "file")
+    return Photo(image.astype(np.float32), d.mask, 1 / 4095, np.zeros(d.mask.shape, bool), source)
+
+
+def truth_of(d: Decomposition) -> Evidence:
+    return Evidence(height=d.height.astype(float), light=d.illumination)
+
+
+@pytest.mark.parametrize("model", ["mdr", "mbp"])
+@pytest.mark.parametrize("full_size", [False, True])
+def test_the_identities_hold_and_the_layers_are_the_scene_s(model: str, full_size: bool) -> None:
+    d = glossy()
+    found = decompose(photo_of(d, d.image), Settings(model=model, max_size=60, full_size=full_size), evidence=truth_of(d))
+    assert found.identity_errors().broken() == ()
+    assert found.mask.shape == (d.mask.shape if full_size else found.mask.shape)
+    assert min(found.diffuse.min(), found.specular.min()) >= 0
+    assert found.specular.sum() > 0
+    if full_size:
+        inner = d.normal[..., 2] > 0.5
+        assert np.abs(found.specular - d.specular)[inner].mean() < 0.5 * d.specular[inner].mean()
+
+
+@pytest.mark.parametrize("model", ["mdr", "mbp"])
+def test_the_lobe_of_a_known_shape_is_found(model: str) -> None:
+    d = glossy()
+    brdf = decompose(photo_of(d, d.image), Settings(model=model), evidence=truth_of(d)).brdf
+    assert brdf is not None
+    assert brdf.determined, brdf.reason
+    assert brdf.alpha == pytest.approx(0.15, rel=0.5)
+    assert brdf.direction is not None
+    assert np.degrees(np.arccos(brdf.direction @ LAMP)) < 5
+    assert brdf.model.startswith("ggx" if model == "mdr" else "blinn_phong")
+
+
+def test_the_whole_chain_keeps_the_identities() -> None:
+    """Shape and light unknown: SIRFS is really solved."""
+    d = glossy((52, 60), 23.0)
+    found = decompose(photo_of(d, d.image), Settings(model="mbp"))
+    assert found.identity_errors().broken() == ()
+    assert found.provenance.status["converged"]
+    assert found.provenance.settings["separator"] == "isc"
+    assert found.brdf is not None
+
+
+def test_plain_sirfs_has_no_lobe() -> None:
+    d = glossy((52, 60), 23.0)
+    found = decompose(photo_of(d, d.image), Settings(model="sirfs"), evidence=truth_of(d))
+    assert found.brdf is None
+    assert not found.specular.any()
+
+
+@pytest.mark.parametrize("model", ["mdr", "mbp"])
+def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
+    d = glossy()
+    found = decompose(photo_of(d, d.diffuse), Settings(model=model), evidence=truth_of(d))
+    assert found.specular.sum() < 3e-3 * found.image.sum()
+    assert found.brdf is not None
+    assert not found.brdf.determined
+    assert found.brdf.alpha is None
+    assert "no specular light" in found.brdf.reason
+    assert found.provenance.status["gloss"] == MATT
+
+
+def test_it_is_the_reflectance_that_is_separated() -> None:
+    """With the true shading: the layers are those of image / shading, times the shading."""
+    d = glossy()
+    split = split_reflectance(d.image, d.shading, d.mask, None, "isc")
+    painted = np.where(d.mask[..., None], d.image / np.where(d.mask[..., None], d.shading, 1), 0).astype(np.float32)
+    expected = separate("isc", painted, d.mask)
+    for name in ("diffuse", "specular"):
+        layer = getattr(split, name)
+        assert np.abs(layer - getattr(expected, name) * d.shading).max() < 1e-4 * d.image.max(), name
+        assert not layer[~d.mask].any()
+    assert np.abs(d.image - split.diffuse - split.specular - split.residual)[d.mask].max() < 1e-6
+
+
+def test_how_sirfs_shares_out_brightness_does_not_matter() -> None:
+    d = glossy()
+    usual, brighter = (split_reflectance(d.image, factor * d.shading, d.mask, None, "isc") for factor in (1, 8))
+    assert np.allclose(usual.diffuse, brighter.diffuse, atol=1e-6)
+    assert usual.specular.any()
+
+
+def test_a_highlight_takes_the_colour_of_the_light() -> None:
+    """White light is what separations look for; in the reflectance the light's colour is gone, and the layers get it back."""
+    d, tint = glossy(), np.array([1.0, 0.8, 0.55], np.float32)
+    split = split_reflectance(d.image * tint, d.shading * tint, d.mask, None, "isc")
+    core = split.specular[split.specular.sum(-1) > 0.5 * split.specular.sum(-1).max()]
+    white = split_reflectance(d.image, d.shading, d.mask, None, "isc").specular
+    expected = white[white.sum(-1) > 0.5 * white.sum(-1).max()].mean(0) * tint
+    assert core.mean(0) == pytest.approx(expected, rel=1e-3)
