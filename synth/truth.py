@@ -78,9 +78,11 @@ def render_truth(scene: Scene, options: RenderOptions | None = None, monitor: Mo
     tracer = Tracer(scene.mesh)
     surface = find_surface(scene, tracer)
     lit = light_surface(surface, scene.material, scene.lights, tracer, options or RenderOptions(), monitor)
-    illumination, misfit = fit_light(surface.normal, lit.shading)
+    # In a penumbra the estimate of few samples may be below 0; light is not.
+    found = np.maximum(lit.shading, 0)
+    illumination, misfit = fit_light(surface.normal, found)
     picture = surface.image
-    shading, reflectance, specular = picture(lit.shading), picture(surface.paint.albedo), picture(lit.specular)
+    shading, reflectance, specular = picture(found), picture(surface.paint.albedo), picture(lit.specular)
     diffuse = reflectance * shading
     return GroundTruth(
         image=diffuse + specular,

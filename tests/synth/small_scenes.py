@@ -1,6 +1,7 @@
 """Small scenes with known answers, for the tests of the renderers."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from synth.meshes import Mesh, swept
 from synth.scene import Scene
 from synth.surface import Surface, find_surface
 from synth.tracing import Tracer
+from synth.variant import load_mitsuba
 
 GREY = np.full((2, 2, 3), 0.5)
 
@@ -78,3 +80,20 @@ def materials() -> dict[str, Material]:
         "ggx_narrow": Material(GREY, "ggx", 0.05, 1.0),
         "roughplastic": Material(GREY, "roughplastic", 0.2, 1.0),
     }
+
+
+def mitsuba_camera(size: int, half: float = 1.0, samples: int = 1) -> dict[str, Any]:
+    """A camera of Mitsuba's own: `size` x `size` pixels that see [-half, half]^2 along -z; one sample is the ray through the centre."""
+    look = load_mitsuba().ScalarTransform4f().look_at([0, 0, 10], [0, 0, 0], [0, 1, 0])
+    wide = look @ load_mitsuba().ScalarTransform4f().scale([half, half, 1])
+    film = {
+        "type": "hdrfilm",
+        "width": size,
+        "height": size,
+        "rfilter": {"type": "box"},
+        "pixel_format": "rgb",
+        "component_format": "float32",
+    }
+    centre: dict[str, Any] = {"type": "stratified", "sample_count": 1, "jitter": False}
+    sampler = centre if samples == 1 else {"type": "independent", "sample_count": samples}
+    return {"type": "orthographic", "near_clip": 0.1, "far_clip": 100.0, "to_world": wide, "film": film, "sampler": sampler}

@@ -14,6 +14,7 @@ from isc_core.brdf.oren_nayar import OrenNayar
 from isc_core.errors import InputError
 from synth.rendering.bsdf_plugin import register
 from synth.variant import has_llvm, load_mitsuba
+from tests.synth.small_scenes import mitsuba_camera
 
 SIZE, HALF = 24, 1.1
 SUN = np.array([0.6, 0.0, 0.8])
@@ -36,19 +37,7 @@ LOBES: dict[str, tuple[dict[str, object], Model]] = {
 def rendered(bsdf: dict[str, object], light: dict[str, object], samples: int = 1) -> np.ndarray:
     """A unit sphere by Mitsuba's `direct` integrator, through pixel centres."""
     mi = load_mitsuba()
-    transform = mi.ScalarTransform4f().look_at([0, 0, 10], [0, 0, 0], [0, 1, 0]) @ mi.ScalarTransform4f().scale([HALF, HALF, 1])
-    film = {
-        "type": "hdrfilm",
-        "width": SIZE,
-        "height": SIZE,
-        "rfilter": {"type": "box"},
-        "pixel_format": "rgb",
-        "component_format": "float32",
-    }
-    sampler = (
-        {"type": "stratified", "sample_count": 1, "jitter": False} if samples == 1 else {"type": "independent", "sample_count": samples}
-    )
-    sensor = {"type": "orthographic", "near_clip": 0.1, "far_clip": 100.0, "to_world": transform, "film": film, "sampler": sampler}
+    sensor = mitsuba_camera(SIZE, HALF, samples)
     sphere = {"type": "sphere", "bsdf": bsdf}
     integrator = {"type": "direct", "hide_emitters": True}
     scene = mi.load_dict({"type": "scene", "integrator": integrator, "sphere": sphere, "light": light, "sensor": sensor})

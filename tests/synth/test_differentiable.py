@@ -10,6 +10,7 @@ from isc_core.brdf.ggx import Ggx
 from isc_core.brdf.lambert import Lambert
 from synth.rendering.bsdf_plugin import register
 from synth.variant import has_llvm, load_mitsuba
+from tests.synth.small_scenes import mitsuba_camera
 
 SIZE = 16
 SUN = np.array([0.6, 0.0, 0.8])
@@ -35,17 +36,7 @@ def derivative(parameters: dict[str, object], name: str) -> np.ndarray:
     import drjit as dr
 
     mi = load_mitsuba()
-    film = {
-        "type": "hdrfilm",
-        "width": SIZE,
-        "height": SIZE,
-        "rfilter": {"type": "box"},
-        "pixel_format": "rgb",
-        "component_format": "float32",
-    }
-    look = mi.ScalarTransform4f().look_at([0, 0, 10], [0, 0, 0], [0, 1, 0])
-    sampler = {"type": "stratified", "sample_count": 1, "jitter": False}
-    sensor = {"type": "orthographic", "near_clip": 0.1, "far_clip": 100.0, "to_world": look, "film": film, "sampler": sampler}
+    sensor = mitsuba_camera(SIZE)
     sun = {"type": "directional", "direction": (-SUN).tolist(), "irradiance": {"type": "rgb", "value": 1.0}}
     sphere = {"type": "sphere", "bsdf": {"type": register(), **parameters}}
     scene = mi.load_dict({"type": "scene", "integrator": {"type": "direct"}, "sphere": sphere, "sun": sun, "sensor": sensor})
