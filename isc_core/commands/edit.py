@@ -3,7 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -39,29 +39,39 @@ _EXAMPLES = """  isc edit cup light-direction -o light                          
 
 every action takes --photo, --mask, --transfer and -o; `isc edit RESULT ACTION --help` shows what else."""
 
-_LOOKS = {"glossier": {"sharper": 4.0}, "rougher": {"sharper": 0.25}, "metallic": {"metal": 1.0}}
-_OTHER_LIGHTS = (("from the left", (-0.7, 0.2, 0.68)), ("from the right", (0.7, 0.2, 0.68)), ("from above", (0.0, 0.8, 0.6)))
+_LOOKS = {"glossier": {"sharper": 2.5, "gain": 1.5}, "rougher": {"sharper": 0.4}, "metallic": {"metal": 1.0}}
+_OTHER_LIGHTS = (
+    ("from the left", (-0.8, 0.2, 0.5)),
+    ("from the right", (0.8, 0.2, 0.5)),
+    ("from above", (0.0, 0.85, 0.5)),
+    ("from below", (0.0, -0.85, 0.5)),
+    ("from the front", (0.0, 0.0, 1.0)),
+)
+_USUAL_LEVEL = 0.7
 _OF_THE_COMMAND = ("run", "act", "quiet", "output", "action", "usual")
 _PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp")
 
 
 @dataclass(frozen=True)
 class _Done:
-    """What an action hands back: the edit, what it measured (JSON-ready), panels for the sheet, the clusters, lines for people."""
+    """What an action hands back: the edit, what it measured (JSON-ready), panels for the sheet, the clusters, lines for people;
+    whether the sheet shows the layers."""
 
     edit: Edited
     measured: Mapping[str, object]
     panels: tuple[Panel, ...] = ()
     clusters: Clusters | None = None
     lines: tuple[str, ...] = ()
+    layers: bool = True
 
 
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
         commands, "edit", run, "other light, gloss or colour for a decomposed photo",
-        "Edits what isc decompose found: RESULT is its folder. Writes a folder with the picture (edited.png, edited.exr), before_after.png "
-        "(look at this first) and edit.json. With --photo the edit is brought back into the photo, at its size and in its coding.", _EXAMPLES,
+        "Edits what isc decompose found: RESULT is its folder. Writes a folder with the picture (edited.png, edited.exr), "
+        "before_after.png (look at this first) and edit.json. With --photo the edit is brought back into the photo, "
+        "at its size and in its coding.", _EXAMPLES,
     )  # fmt: skip
     parser.add_argument("result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action", parser_class=Parser)
@@ -87,7 +97,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     monitor.report("writing", 0.7)
     parameters = {name: _plain(value) for name, value in vars(options).items() if name not in _OF_THE_COMMAND}
     name = Path(str(d.provenance.input.get("name", ""))).name or options.result.name
-    sheet = Sheet(f"{name}: {options.action}", _said(options), done.panels)
+    sheet = Sheet(f"{name}: {options.action}", _said(options), done.panels, done.layers)
     record = Record(options.action, parameters, done.measured)
     save_edit(d, done.edit, options.output, record, sheet, original=original, clusters=done.clusters)
     monitor.report("writing", 1.0)
@@ -102,23 +112,24 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 def _light_direction(d: Decomposition, options: argparse.Namespace) -> _Done:
     del options
     shading, specular = explain_shading(d), explain_specular(d)
-    edit = relight(d, NewLight(sun=shading.light), Relighting(highlights="keep")) if shading.light.shading(d.normal[d.mask]).any() else None
-    panels = [_ball(np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination), "Recovered light", "on a white ball")]
+    edit = relight(d, NewLight(sun=shading.light), Relighting(highlights="keep"))
+    panels = [_recovered_ball(d)]
     for label, found in (("Best for the shading", shading), ("Best for the highlights", specular)):
-        if found.light.irradiance.any():
-            panels.append(_ball(render_sphere(found.light, exponent=found.exponent)[0], label, _short(found)))
+        remark = _short(found)
+        panels.append(_ball(_directed(found.light, found.exponent), label, remark) if found.determined else _no_ball(label, remark))
     for label, direction in _OTHER_LIGHTS:
-        light, share = share_explained(d, toward(*direction))
-        panels.append(_ball(render_sphere(light)[0], f"Light {label}", f"explains {100 * share:.0f} %"))
+        _, share = share_explained(d, toward(*direction))
+        panels.append(_ball(_directed(DirectionalLight(toward(*direction))), f"Light {label}", f"explains {100 * share:.0f} %"))
     measured = {"shading": _measured(shading), "specular": _measured(specular)}
     lines = [f"{label}: {_long(found)}" for label, found in (("shading", shading), ("highlights", specular))]
-    return _Done(edit or Edited(d.image, d.diffuse, d.specular), measured, tuple(panels), None, tuple(lines))
+    return _Done(edit, measured, tuple(panels), None, tuple(lines), layers=False)
 
 
 def _highlight(d: Decomposition, options: argparse.Namespace) -> _Done:
     lobe = _lobe(options) or Lobe()
     light = _chosen_light(d, options)
-    edit = add_highlight(d, light, lobe, level=options.strength, replacing=options.replace)
+    level = options.strength if options.replace or options.strength is not None else _USUAL_LEVEL
+    edit = add_highlight(d, light, lobe, level=level, replacing=options.replace)
     ball = _ball(render_sphere(light, exponent=lobe.exponent)[0], "The light", "on a white ball")
     return _Done(edit, {"direction": _plain(light.direction)}, (ball,))
 
@@ -129,7 +140,8 @@ def _gloss(d: Decomposition, options: argparse.Namespace) -> _Done:
         raise InputError(f"--exponent says how sharp, and so does --look {options.look}: give one of them")
     sharper = usual.get("sharper", 1.0)
     metal = options.metal if options.metal is not None else usual.get("metal", 0.0)
-    gloss = Gloss(options.exponent, sharper, options.present, options.gain, metal, options.method)
+    gain = options.gain if options.gain is not None else usual.get("gain", 1.0)
+    gloss = Gloss(options.exponent, sharper, options.present, gain, metal, options.method)
     return _Done(change_gloss(d, gloss), {})
 
 
@@ -163,9 +175,8 @@ def _relight(d: Decomposition, options: argparse.Namespace) -> _Done:
     choice = Relighting(options.highlights, _lobe(options), options.exposure, not fixed)
     edit = relight(d, light, choice)
     ball = _ball(light.shading(sphere_normals(320)[0].reshape(-1, 3)).reshape(320, 320, 3), "New light", "on a white ball")
-    old = _ball(np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination), "Recovered light", "on a white ball")
     measured = {} if light.coefficients is None else {"coefficients": _plain(light.coefficients)}
-    return _Done(edit, measured, (old, ball))
+    return _Done(edit, measured, (_recovered_ball(d), ball))
 
 
 # --- lights, lobes, regions, photos -----------------------------------------------------------------------------------------------------
@@ -191,7 +202,7 @@ def _new_light(d: Decomposition, options: argparse.Namespace, rotation: np.ndarr
         raise InputError("--color and --ambient belong to the light of --direction: give that too")
     if options.direction is not None:
         color = np.ones(3) if options.color is None else options.color
-        ambient = 0.1 if options.ambient is None else options.ambient
+        ambient = 0.15 if options.ambient is None else options.ambient
         return NewLight(sun=DirectionalLight(rotation @ toward(*options.direction), np.pi * color, ambient * color)), False
     if options.light is not None and options.light.suffix.lower() in _PICTURES:
         if turned:
@@ -253,6 +264,19 @@ def _ball(color: np.ndarray, label: str, remark: str) -> Panel:
     return Panel(color * 0.95 / max(float(np.percentile(color[coverage > 0.5].max(-1), 99.5)), 1e-9), coverage, label, remark)
 
 
+def _recovered_ball(d: Decomposition) -> Panel:
+    return _ball(np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination), "Recovered light", "on a white ball")
+
+
+def _directed(light: DirectionalLight, exponent: float | None = None) -> np.ndarray:
+    """A ball in the directed part of the light alone: an ambient rest hides where it comes from."""
+    return render_sphere(replace(light, ambient=np.zeros(3)), exponent=exponent)[0]
+
+
+def _no_ball(label: str, remark: str) -> Panel:
+    return Panel(np.full((320, 320, 3), 0.03), sphere_normals(320)[1], label, remark)
+
+
 def _short(found: LightEstimate) -> str:
     return f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}°" if found.determined else "undetermined"
 
@@ -262,7 +286,8 @@ def _long(found: LightEstimate) -> str:
         return f"undetermined: no single light explains it ({100 * found.explained:.0f} % at best)"
     x, y, z = found.light.direction
     lobe = "" if found.exponent is None else f", exponent {found.exponent:.0f}"
-    return f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees, explains {100 * found.explained:.0f} %{lobe}"
+    share = f"explains {100 * found.explained:.0f} %"
+    return f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees, {share}{lobe}"
 
 
 def _measured(found: LightEstimate) -> dict[str, object]:
@@ -326,7 +351,9 @@ def _add_direction(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--direction", type=_number, nargs=3, metavar=("X", "Y", "Z"), help="toward the light: right, up, toward the viewer; of any length"
     )
-    parser.add_argument("--color", type=_color, metavar="RRGGBB", help="of that light, as in web pages")
+    parser.add_argument(
+        "--color", type=_color, metavar="RRGGBB", help="of that light, as in web pages (default ffffff, the photo's own white)"
+    )
 
 
 def _add_highlight(parser: argparse.ArgumentParser) -> None:
@@ -338,20 +365,19 @@ def _add_highlight(parser: argparse.ArgumentParser) -> None:
     _add_lobe(parser)
     parser.add_argument(
         "--strength", type=_number, metavar="S",
-        help="1: as bright as the photo's white (default: as much light as the present highlights have; 1 if there are none)",
+        help="1: as bright as the photo's white (default 0.7; with --replace, as much light as was there)",
     )  # fmt: skip
     parser.add_argument("--replace", action="store_true", help="take the present highlights away")
 
 
 def _add_gloss(parser: argparse.ArgumentParser) -> None:
-    usual = Gloss()
-    parser.add_argument("--look", choices=tuple(_LOOKS), help="a good start: four times the exponent, a quarter of it, or metal")
+    parser.add_argument("--look", choices=tuple(_LOOKS), help="a good start: a sharper and stronger lobe, a wider one, or metal")
     parser.add_argument("--exponent", type=_number, metavar="P", help="the new Blinn-Phong exponent, 1 to 1e5")
     parser.add_argument("--present", type=_number, metavar="P", help="the present one (default: fitted)")
-    parser.add_argument("--gain", type=_number, default=usual.gain, metavar="G", help="of the highlights (default %(default)s)")
+    parser.add_argument("--gain", type=_number, metavar="G", help="factor of the highlights (default 1; 1.5 for --look glossier)")
     parser.add_argument("--metal", type=_number, metavar="M", help="how much of a metal, 0 to 1 (default 0; 1 for --look metallic)")
     parser.add_argument(
-        "--method", choices=METHODS, default=usual.method, help="change the present highlights (default), or render new ones on the shape"
+        "--method", choices=METHODS, default=Gloss().method, help="change the present highlights (default), or render new ones on the shape"
     )
 
 
@@ -389,10 +415,10 @@ def _add_relight(parser: argparse.ArgumentParser) -> None:
         parser.add_argument(f"--{name}", type=_number, default=0.0, metavar="DEGREES", help=f"turns the light: {text}")
     parser.add_argument(
         "--light", type=Path, metavar="FILE",
-        help="another light: a result folder, a JSON file or .npy of 9 x 3 coefficients, or a panorama (.exr, .hdr, .png, twice as wide as high)",
+        help="another light: a result folder, a JSON file or .npy of 9 x 3 coefficients, or a panorama, twice as wide as high",
     )  # fmt: skip
     _add_direction(parser)
-    parser.add_argument("--ambient", type=_number, metavar="A", help="of what --direction does not reach, to its light (default 0.1)")
+    parser.add_argument("--ambient", type=_number, metavar="A", help="of what --direction does not reach, to its light (default 0.15)")
     parser.add_argument("--exposure", type=_number, default=1.0, metavar="F", help="factor of the new light (default %(default)s)")
     parser.add_argument(
         "--highlights", choices=HIGHLIGHTS, default="auto",

@@ -2,7 +2,7 @@
 
 Equations. Remapping needs no shape: under one light the specular layer is s = w c^p, so that an exponent q makes of it, pixel by pixel,
 
-    s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),     m the pixel's largest channel, w the layer's white,
+    s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),     m the pixel's largest channel, w the layer's brightest but for a few,
 
 with the usual factor, which keeps the energy, and a gain g. Rendering draws the lobe anew on the recovered shape under the light that best
 explains the layer. Metal has no body colour of its own: of the share M of metal the diffuse light goes, the highlight takes the colour of
@@ -25,13 +25,14 @@ from ..brdf.model import check_range
 from ..decomposition import Decomposition
 from ..environment import environment_from_shading
 from ..errors import InputError
-from .edited import Edited, edited, luminance, white_of
+from .edited import Edited, edited, light_color, luminance, white_of
 from .light_direction import explain_specular
 from .lights import DirectionalLight
 from .lobes import USUAL_EXPONENT, Lobe, lobe_in, lobe_under, strength_of
 
 METHODS = ("remap", "render")
 _SKY_ROWS = 16
+_CENTRE = 99.9  # percentile: the lobe's own centre, but for a few wrong pixels
 
 
 @dataclass(frozen=True)
@@ -68,7 +69,8 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
     if gloss.metal == 0:
         return edited(d, specular=specular, notes=tuple(notes))
     paint = np.maximum(d.reflectance, 0)
-    tint = paint / np.maximum(paint.max(-1, keepdims=True), 1e-6)
+    seen = paint * light_color(d)
+    tint = seen / np.maximum(seen.max(-1, keepdims=True), 1e-6)
     sky = environment_from_shading(d.illumination, _SKY_ROWS)
     lobe = Lobe(gloss.exponent or gloss.present or USUAL_EXPONENT)
     mirrored = np.zeros_like(d.image)
@@ -81,7 +83,7 @@ def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: f
     """The specular layer (H, W, 3) of a lobe of exponent `present`, as one of `exponent` would have it; unchanged where they are equal."""
     if exponent == present:
         return specular
-    level = np.minimum(specular.max(-1, keepdims=True) / white_of(specular, mask), 1)
+    level = np.minimum(specular.max(-1, keepdims=True) / white_of(specular, mask, _CENTRE), 1)
     shape = np.where(level > 1e-6, np.maximum(level, 1e-6) ** (exponent / present - 1), 0)
     return specular * shape * ((exponent + 8) / (present + 8))
 

@@ -1,9 +1,9 @@
 """Which parts of an object have the same paint: clusters of its reflectance by colour.
 
-Equation: k-means over the Oklab (L / 3, a, b) of the reflectance, brightness scaled so that its 99.5th percentile is white: hue and
-saturation count, lightness only a little, for shading that was taken for paint is mostly lightness. Starts: each next centre is the one of
-a few random pixels that lowers the total distance most (k-means++, greedy), with a seed of its own; then alternating means. Clusters are
-numbered by size, the largest first.
+Equation: k-means over (a / L, b / L, L / 5) in Oklab of the reflectance in the light's mean colour, brightness scaled so that its 99.5th
+percentile is white. The ratios do not change when shading was taken for paint, which scales L, a and b alike. Starts: each next centre is
+the one of a few random pixels that lowers the total distance most (k-means++, greedy), with a seed of its own; then alternating means;
+then centres that an eye would hardly tell apart become one. Clusters are numbered by size, the largest first.
 
 Citation: S. Lloyd 1982, doi:10.1109/TIT.1982.1056489; D. Arthur, S. Vassilvitskii, "k-means++", SODA 2007, doi:10.5555/1283383.1283494.
 """
@@ -16,18 +16,19 @@ from ..decomposition import Decomposition
 from ..errors import InputError
 from .chroma import to_oklab
 from .dichromatic import masked_blur
-from .edited import white_of
+from .edited import light_color, white_of
 
 LARGEST_COUNT = 12
-_LIGHTNESS = 1 / 3
+_LIGHTNESS, _DARK = 0.2, 0.15  # the weight of L; below the second the ratios are mostly noise
+_ALIKE = 0.045  # centres nearer than this are one paint
 _ROUNDS, _TRIES, _SAMPLES = 60, 12, 20000
 _SOFT = 0.5  # sigma in pixels that smooths a cluster's outline
 
 
 @dataclass(frozen=True)
 class Clusters:
-    """`labels`: (H, W) int, 0 for the largest cluster, -1 outside the mask. `colors`: (K, 3) linear, each cluster's mean reflectance.
-    `shares`: (K,) of the object's pixels, falling."""
+    """`labels`: (H, W) int, 0 for the largest cluster, -1 outside the mask. `colors`: (K, 3) linear, each cluster's mean in the light's
+    mean colour. `shares`: (K,) of the object's pixels, falling."""
 
     labels: np.ndarray
     colors: np.ndarray
@@ -50,10 +51,12 @@ def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
     """
     if not 1 <= count <= LARGEST_COUNT:
         raise InputError(f"{count} clusters are not possible: give 1 to {LARGEST_COUNT}")
-    paint = np.maximum(d.reflectance[d.mask].astype(float), 0)
-    points = to_oklab(paint / white_of(d.reflectance, d.mask)) * np.array([_LIGHTNESS, 1.0, 1.0])
+    seen = np.maximum(d.reflectance * light_color(d), 0)
+    paint = seen[d.mask]
+    lab = to_oklab(paint / white_of(seen, d.mask))
+    points = np.stack([_LIGHTNESS * lab[:, 0], *(lab[:, 1:] / np.maximum(lab[:, :1], _DARK)).T], -1)
     centers = _means(points[:: max(1, len(points) // _SAMPLES)], count, np.random.default_rng(seed))
-    labels = _nearest(points, centers)
+    labels = _joined(centers)[_nearest(points, centers)]
     sizes = np.bincount(labels, minlength=len(centers))
     order = np.argsort(-sizes, kind="stable")[: int((sizes > 0).sum())]
     rank = np.zeros(len(centers), int)
@@ -62,6 +65,16 @@ def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
     picture[d.mask] = rank[labels]
     colors = np.stack([paint[rank[labels] == k].mean(0) for k in range(len(order))])
     return Clusters(picture, colors, sizes[order] / len(points))
+
+
+def _joined(centers: np.ndarray) -> np.ndarray:
+    """(K,) for each centre the first one that it is alike to, along a chain of likeness."""
+    label = np.arange(len(centers))
+    near = np.linalg.norm(centers[:, None] - centers, axis=-1) < _ALIKE
+    for i, j in np.argwhere(near):
+        label[label == label[j]] = min(label[i], label[j])
+        label[label == label[i]] = min(label[i], label[j])
+    return label
 
 
 def _means(points: np.ndarray, count: int, generator: np.random.Generator) -> np.ndarray:

@@ -4,10 +4,12 @@ Problem: the maps may be smaller than the photo, whose detail the edited picture
 Equation: what is brought back is the CHANGE, e = image' - image. Around each pixel k of the maps it is taken to be an affine function of
 the photo's colour I (the guided filter, in colour),
 
-    e ~ A_k I + b_k,     A_k = (cov_k(I) + epsilon)^-1 cov_k(I, e),     b_k = mean_k e - A_k^T mean_k I,
+    e ~ A_k I + b_k,     A_k = (cov_k(I) + epsilon)^-1 (cov_k(I, e) + epsilon P_k),     b_k = mean_k e - A_k^T mean_k I,
 
-over a window inside the mask; A and b, smooth, are enlarged and applied to the full photo, and what they leave of e is enlarged as it is.
-A highlight that is taken away or a paint that is changed so ends at the photo's own edges. At the photo's own size e is added as it is.
+over a window inside the mask. Where the window's colours tell nothing, A falls back to P, the change as a factor of each channel,
+mean_k e / mean_k I, at most 1: so texture finer than the maps gets the contrast of its new light (the
+published filter has P = 0). A and b, smooth, are enlarged and applied to the full photo, and what they leave of e is enlarged as it is. A
+highlight that is taken away or a paint that is changed so ends at the photo's own edges. At the photo's own size e is added as it is.
 
 Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013, doi:10.1109/TPAMI.2012.213; enlarging the coefficients:
 K. He, J. Sun, "Fast guided filter" (2015), arXiv:1505.00996.
@@ -87,7 +89,8 @@ def _affine(guide: np.ndarray, values: np.ndarray, mask: np.ndarray, epsilon: fl
     mean_guide, mean_values = _means(guide, mask), _means(values, mask)
     own = _means(guide[..., :, None] * guide[..., None, :], mask) - mean_guide[..., :, None] * mean_guide[..., None, :]
     common = _means(guide[..., :, None] * values[..., None, :], mask) - mean_guide[..., :, None] * mean_values[..., None, :]
-    slope = np.linalg.solve(own + epsilon * np.eye(3), common)
+    factor = np.clip(mean_values / np.maximum(mean_guide, np.sqrt(epsilon)), -1, 1)
+    slope = np.linalg.solve(own + epsilon * np.eye(3), common + epsilon * factor[..., None, :] * np.eye(3))
     return slope, mean_values - np.einsum("hwgc,hwg->hwc", slope, mean_guide)
 
 

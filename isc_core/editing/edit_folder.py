@@ -1,8 +1,8 @@
 """The files of an edit: the picture, in the photo's own coding, and what a person looks at first.
 
 `edit.json` says what was asked for and what was found; `edited.png` has the photo's depth, coding and alpha (none for a photo of floats);
-`edited.exr` is the same picture in linear light, colours multiplied by alpha as is usual there; `before_after.png` the sheet; `clusters.png`,
-of recolouring, the parts to choose from. A folder appears whole or not at all.
+`edited.exr` is the same picture in linear light, colours multiplied by alpha as is usual there; `before_after.png` is the sheet;
+`clusters.png`, of recolouring, shows the parts to choose from. A folder appears whole or not at all.
 
 Limits: of a float photo whose pixels are partly transparent, those outside the mask are kept to the rounding of that product.
 """
@@ -22,7 +22,7 @@ from ..photo import Photo, Raster, recoded, write_png
 from ..report import Panel, Shown, edit_sheet
 from .clusters import Clusters
 from .compositing import composite
-from .edited import Edited
+from .edited import Edited, light_color, white_of
 
 FILES = ("edit.json", "edited.png", "edited.exr", "before_after.png", "clusters.png")
 _FADED = 0.06
@@ -38,11 +38,12 @@ class Original:
 
 @dataclass(frozen=True)
 class Sheet:
-    """What stands on the sheet: its title, a faint second line, and panels that follow the pictures."""
+    """What stands on the sheet: its title, a faint second line, panels that follow the pictures, and whether the layers are shown."""
 
     title: str
     subtitle: str = ""
     others: Sequence[Panel] = ()
+    layers: bool = True
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def save_edit(
     """
     image, mask, before, raster = _picture(d, edit, original)
     pair = [Shown(before, mask, "Before"), Shown(image, mask, "After")]
-    layers = [Shown(edit.diffuse, d.mask, "Diffuse, after"), Shown(edit.specular, d.mask, "Specular, after")]
+    layers = [Shown(edit.diffuse, d.mask, "Diffuse, after"), Shown(edit.specular, d.mask, "Specular, after")] if sheet.layers else []
     with new_folder(folder, FILES) as partial:
         if raster.peak is not None:
             write_png(partial / "edited.png", raster)
@@ -77,7 +78,9 @@ def save_edit(
         cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
         planes = {name: image[..., c] * cover for c, name in enumerate("RGB")}
         write_channels(partial / "edited.exr", planes if alpha is None else planes | {"A": alpha})
-        edit_sheet(sheet.title, sheet.subtitle, [*pair, *layers], sheet.others).save(partial / "before_after.png")
+        edit_sheet(sheet.title, sheet.subtitle, [*pair, *layers], sheet.others, columns=4 if sheet.layers else 5).save(
+            partial / "before_after.png"
+        )
         if clusters is not None:
             cluster_sheet(d, clusters).save(partial / "clusters.png")
         text = {"schema_version": 1, **record.__dict__, "notes": list(edit.notes), "of_photo": original is not None}
@@ -86,11 +89,12 @@ def save_edit(
 
 def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
     """A picture of the clusters, (a Pillow image): the reflectance with all but one faded, for each of them, under its number."""
-    shown = [Shown(d.reflectance, d.mask, "Reflectance")]
+    paint = d.reflectance * light_color(d)
+    shown = [Shown(paint, d.mask, "Reflectance")]
     for number, share in enumerate(clusters.shares, 1):
         weight = clusters.weight(number)[..., None]
-        grey = np.full(3, _FADED * float(d.reflectance[d.mask].max()))
-        values = weight * d.reflectance + (1 - weight) * grey
+        grey = np.full(3, _FADED * white_of(paint, d.mask))
+        values = weight * paint + (1 - weight) * grey
         shown.append(Shown(values, d.mask, f"Cluster {number}", f"{100 * share:.0f} % of the object"))
     return edit_sheet("Clusters", "isc edit RESULT recolour --cluster N", shown)
 

@@ -32,7 +32,7 @@ def edited(d: Decomposition, diffuse: np.ndarray | None = None, specular: np.nda
     new_diffuse = d.diffuse if diffuse is None else _layer(diffuse, d.mask)
     new_specular = d.specular if specular is None else _layer(specular, d.mask)
     before, after = d.specular.sum(-1, keepdims=True), new_specular.sum(-1, keepdims=True)
-    kept = np.minimum(1, np.divide(after, before, out=np.ones_like(before), where=before > 0))
+    kept = np.divide(after, before, out=np.ones_like(before), where=before > after)
     same = ((new_diffuse == d.diffuse) & (new_specular == d.specular)).all(-1, keepdims=True)
     total = np.maximum(new_diffuse + new_specular + d.residual * kept, 0)
     return Edited(np.where(same, d.image, total), new_diffuse, new_specular, notes)
@@ -43,11 +43,18 @@ def luminance(color: np.ndarray) -> np.ndarray:
     return np.asarray(color, float) @ LUMINANCE
 
 
-def white_of(layer: np.ndarray, mask: np.ndarray) -> float:
-    """The layer's white: the 99.5th percentile of its brightest channel over the lit pixels of the mask; 1 if none is lit."""
+def light_color(d: Decomposition) -> np.ndarray:
+    """(3,) the mean colour of the light on the object, of luminance 1. One photo leaves open how much of a tint is light and how much is
+    paint; `reflectance * light_color` is the paint as the photo shows it, and is what colours are chosen for."""
+    mean = d.shading[d.mask].mean(0, dtype=float)
+    return np.maximum(mean, 1e-3 * mean.max()) / float(luminance(np.maximum(mean, 1e-3 * mean.max())))
+
+
+def white_of(layer: np.ndarray, mask: np.ndarray, percentile: float = 99.5) -> float:
+    """The layer's white: this percentile of its brightest channel over the lit pixels of the mask; 1 if none is lit."""
     bright = layer[mask].max(-1)
     lit = bright[bright > 0]
-    return float(np.percentile(lit, 99.5)) if lit.size else 1.0
+    return float(np.percentile(lit, percentile)) if lit.size else 1.0
 
 
 def _layer(values: np.ndarray, mask: np.ndarray) -> np.ndarray:

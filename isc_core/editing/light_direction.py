@@ -35,8 +35,10 @@ VIEW = np.array([0.0, 0.0, 1.0])
 _SAMPLES, _GRID, _BLOCKS = 3000, 600, 8
 _EXPONENTS = (6.0, 25.0, 100.0, 400.0)
 _STARTS = 3
+_SHARPEST = 2000.0
+_RIM = 0.25  # the outline's normals are the least certain, and what the separation finds there is mostly background
 _ROBUST = 0.2  # of the white: errors from here on count linearly
-_LEAST_SHARE, _WIDEST_CONE = 0.1, 30.0
+_LEAST_SHARE, _WIDEST_CONE = 0.2, 30.0
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
 
 def explain_specular(d: Decomposition) -> LightEstimate:
     """The distant light, and the exponent of the lobe, that best explain the specular layer. Where there is none nothing is explained."""
-    samples = _samples(d, d.specular)
+    samples = _samples(d, d.specular, _RIM)
     if not samples.values.any():
         return LightEstimate(DirectionalLight(VIEW, np.zeros(3)), 0.0, 180.0, None)
 
@@ -109,7 +111,7 @@ def explain_specular(d: Decomposition) -> LightEstimate:
         lobe = lobe_light(samples.normal, light, exponent)
         strength = np.maximum(lobe @ samples.values / (lobe @ lobe), 1e-6 * samples.scale)
         rest = np.append(strength, np.log(exponent))
-        found = _refined(samples, model, light, rest, np.array([0, 0, 0, np.log(1.0)]), np.array([np.inf] * 3 + [np.log(5000.0)]))
+        found = _refined(samples, model, light, rest, np.array([0, 0, 0, np.log(1.0)]), np.array([np.inf] * 3 + [np.log(_SHARPEST)]))
         fits.append((_robust_cost(samples, model(*found[:2])), found))
     light, rest, cone = min(fits, key=lambda fit: fit[0])[1]
     explained = _explained(samples.values - model(light, rest), np.square(samples.values).sum())
@@ -122,8 +124,10 @@ def lobe_light(normal: np.ndarray, light: np.ndarray, exponent: float) -> np.nda
     return radiance(BlinnPhong(1.0, exponent), normal, VIEW, directional(light, 1.0))[..., 0]
 
 
-def _samples(d: Decomposition, layer: np.ndarray) -> _Samples:
-    rows, columns = np.nonzero(d.mask)
+def _samples(d: Decomposition, layer: np.ndarray, rim: float = 0.0) -> _Samples:
+    """Some of the pixels, evenly; without those whose normal's z is below `rim`, unless that is nearly all of them."""
+    inside = d.mask & (d.normal[..., 2] >= rim)
+    rows, columns = np.nonzero(inside if inside.sum() > 0.2 * d.mask.sum() else d.mask)
     step = max(1, len(rows) // _SAMPLES)
     rows, columns = rows[::step], columns[::step]
     across, down = (_BLOCKS * (places - places.min()) // (np.ptp(places) + 1) for places in (columns, rows))

@@ -1,6 +1,6 @@
 """Recolouring: another paint under the same light and the same gloss (thesis, figure 4.51).
 
-Equation, for a reflectance r with luminance Y(r), in Oklab (L, a, b) with hue h and chroma C:
+Equation, for a paint r, the reflectance times the light's mean colour, with luminance Y(r), in Oklab (L, a, b) with hue h and chroma C:
 h' = h + shift, C' = saturation C, or, for a target colour, the target's hue and the chroma C_target L / L_target, which is the target's own
 paint in more or less light; back in linear light it is scaled to Y(r') = value Y(r), so that texture and shading stay as they were. A
 colour that cannot be that bright moves toward grey at that luminance just until it can. diffuse' = ((1 - w) r + w r') shading, w being the
@@ -19,7 +19,7 @@ from ..brdf.model import check_range
 from ..decomposition import Decomposition
 from ..errors import InputError
 from .chroma import from_oklab, to_oklab
-from .edited import Edited, edited, luminance, white_of
+from .edited import Edited, edited, light_color, luminance, white_of
 
 
 @dataclass(frozen=True)
@@ -66,17 +66,18 @@ def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -
         return edited(d)
     inside = weight > 0
     share = weight[inside][:, None]
-    old = np.maximum(d.reflectance[inside].astype(float), 0)
-    new = repainted(old, paint, white_of(d.reflectance, d.mask), share)
+    tint = light_color(d)
+    old = np.maximum(d.reflectance[inside] * tint, 0)
+    new = repainted(old, paint, white_of(d.reflectance * tint, d.mask), share)
     diffuse = d.diffuse.copy()
-    diffuse[inside] = (1 - share) * d.diffuse[inside] + share * new * d.shading[inside]
+    diffuse[inside] = (1 - share) * d.diffuse[inside] + share * new * (d.shading[inside] / tint)
     return edited(d, diffuse)
 
 
-def repainted(reflectance: np.ndarray, paint: Paint, white: float, weight: np.ndarray) -> np.ndarray:
-    """The reflectance (N, 3) >= 0 in the new paint. `white`: the brightest that paint gets. `weight` (N, 1): of each in the average."""
-    old = luminance(reflectance)
-    lab = to_oklab(reflectance)
+def repainted(old_paint: np.ndarray, paint: Paint, white: float, weight: np.ndarray) -> np.ndarray:
+    """Paints (N, 3) >= 0, linear, changed. `white`: the brightest that paint gets. `weight` (N, 1): of each in the average."""
+    old = luminance(old_paint)
+    lab = to_oklab(old_paint)
     lightness, chroma, hue = lab[:, 0], np.hypot(lab[:, 1], lab[:, 2]), np.arctan2(lab[:, 2], lab[:, 1])
     wanted = paint.value * old
     if paint.target is not None:
@@ -88,7 +89,7 @@ def repainted(reflectance: np.ndarray, paint: Paint, white: float, weight: np.nd
             wanted = wanted * float(luminance(paint.target)) / max(mean, 1e-9)
     hue, chroma = hue + np.deg2rad(paint.hue), chroma * paint.saturation
     color = from_oklab(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], -1))
-    return _at_luminance(np.maximum(color, 0), wanted, np.maximum(white * max(paint.value, 1.0), reflectance.max(-1)))
+    return _at_luminance(np.maximum(color, 0), wanted, np.maximum(white * max(paint.value, 1.0), old_paint.max(-1)))
 
 
 def _at_luminance(color: np.ndarray, wanted: np.ndarray, most: np.ndarray) -> np.ndarray:

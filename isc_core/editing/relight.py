@@ -21,7 +21,7 @@ from ..brdf.shading import sh_shading
 from ..decomposition import Decomposition
 from ..environment import environment_from_shading, resampled, shading_under
 from ..errors import InputError
-from .edited import Edited, edited, luminance
+from .edited import Edited, edited, light_color, luminance
 from .lights import DirectionalLight
 from .lobes import Lobe, lobe_in, lobe_under
 
@@ -76,13 +76,14 @@ class NewLight:
 @dataclass(frozen=True)
 class Relighting:
     """`highlights`: one of `HIGHLIGHTS`; "auto" renders where a lobe is given and scales otherwise. `lobe`: to render. `exposure` > 0:
-    factor of the new light. `same_brightness`: the new light is first made as bright, on average over the object, as the present one.
+    factor of the new light. `balanced`: the new light's white is taken to be the present light's mean colour, and it is made as bright, on
+    average over the object, as the present one; for lights that are not told in the photo's units.
     Raises `InputError`."""
 
     highlights: str = "auto"
     lobe: Lobe | None = None
     exposure: float = 1.0
-    same_brightness: bool = False
+    balanced: bool = False
 
     def __post_init__(self) -> None:
         if self.highlights not in HIGHLIGHTS:
@@ -104,9 +105,10 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
     if not luminance(new).any():
         raise InputError("no part of the object sees the new light: bring it to the front, or give it an ambient rest")
     old = d.shading[d.mask].astype(float)
-    factor = choice.exposure
-    if choice.same_brightness:
-        factor *= float(luminance(d.reflectance[d.mask] * old).sum() / luminance(d.reflectance[d.mask] * new).sum())
+    factor = np.full(3, choice.exposure)
+    if choice.balanced:
+        tint = light_color(d)
+        factor = factor * tint * float(luminance(d.reflectance[d.mask] * old).sum() / luminance(d.reflectance[d.mask] * new * tint).sum())
     shading = np.zeros(d.image.shape)
     shading[d.mask] = new * factor
     highlights, note = _highlights(d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor)
@@ -114,7 +116,7 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
 
 
 def _highlights(
-    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: float
+    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray
 ) -> tuple[np.ndarray, str]:
     """The new specular layer, and what to say of it."""
     how = choice.highlights if choice.highlights != "auto" else "render" if choice.lobe is not None else "scale"

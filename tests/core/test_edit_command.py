@@ -1,0 +1,152 @@
+"""`isc edit`: each action ends with pictures, a mistake with one line and nothing written."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from isc_core.cli import main
+from isc_core.photo import linear_to_srgb
+from isc_core.result_folder import save
+from tests.core.ball_scene import LIGHT, ball
+
+FILES = {"edit.json", "edited.png", "edited.exr", "before_after.png"}
+
+
+@pytest.fixture(scope="module")
+def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result folder, `ball`, and the photo that it is of."""
+    folder = tmp_path_factory.mktemp("edit")
+    scene = ball()
+    scene.provenance.input.update(size=[120, 96], scale=1.0, bit_depth=16, transfer="srgb", mask_from="alpha")
+    save(scene, folder / "ball")
+    codes = np.rint(65535 * np.clip(linear_to_srgb(scene.image), 0, 1)).astype(np.uint16)
+    cv2.imwrite(str(folder / "photo.png"), np.dstack([codes[..., ::-1], 65535 * scene.mask.astype(np.uint16)]))
+    (folder / "light.json").write_text(json.dumps(LIGHT[::-1].tolist()))
+    np.save(folder / "light.npy", LIGHT)
+    cv2.imwrite(str(folder / "sky.png"), np.random.default_rng(0).integers(0, 255, (16, 32, 3), np.uint8))
+    cv2.imwrite(str(folder / "region.png"), np.uint8(255 * (np.arange(120) < 60)) * np.ones((96, 1), np.uint8))
+    return folder
+
+
+ACTIONS = [
+    "light-direction",
+    "highlight --direction -0.5 0.6 -0.1 --color ff8000 --exponent 30",
+    "highlight --like specular --alpha 0.2 --strength 0.5 --replace",
+    "gloss --look glossier",
+    "gloss --look metallic --exponent 20 --gain 0.8",
+    "gloss --exponent 10 --present 60 --method render",
+    "dichromatic --remove specular --diffuse-gamma 1.4",
+    "dichromatic --specular-gain 2 --specular-sharpen 1.5 --specular-radius 4",
+    "recolour --hue -40 --saturation 1.5 --region {}/region.png",
+    "recolour --color #2060c0 --match-brightness --cluster 2 --clusters 2",
+    "relight --yaw 60 --pitch -20",
+    "relight --light {}/light.json --roll 10",
+    "relight --light {}/light.npy",
+    "relight --light {}/sky.png --exponent 40",
+    "relight --direction -1 0 1 --ambient 0.3 --color ffe0c0 --highlights remove",
+]
+
+
+@pytest.mark.parametrize("action", ACTIONS)
+def test_every_action_writes_its_pictures(work: Path, tmp_path: Path, action: str, capsys: pytest.CaptureFixture[str]) -> None:
+    words = action.format(work).split()
+    assert main(["edit", str(work / "ball"), *words, "-o", str(tmp_path / "out"), "--quiet"]) == 0
+    found = {path.name for path in (tmp_path / "out").iterdir()}
+    assert found - {"clusters.png"} == FILES
+    assert ("clusters.png" in found) == (words[0] == "recolour")
+    told = json.loads((tmp_path / "out" / "edit.json").read_text())
+    assert told["action"] == words[0] and told["schema_version"] == 1
+    output = capsys.readouterr()
+    assert not output.err
+    assert ("shading: from" in output.out) == (words[0] == "light-direction")
+
+
+def test_an_edit_of_the_photo_keeps_what_is_not_the_object(work: Path, tmp_path: Path) -> None:
+    arguments = [
+        "edit",
+        str(work / "ball"),
+        "recolour",
+        "--hue",
+        "90",
+        "--photo",
+        str(work / "photo.png"),
+        "-o",
+        str(tmp_path / "out"),
+        "--quiet",
+    ]
+    assert main(arguments) == 0
+    before, after = (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in (work / "photo.png", tmp_path / "out" / "edited.png"))
+    mask = ball().mask
+    assert after.dtype == np.uint16 and np.array_equal(after[~mask], before[~mask]) and np.array_equal(after[..., 3], before[..., 3])
+    assert not np.array_equal(after[mask], before[mask])
+
+
+def test_an_edit_of_nothing_is_the_photo(work: Path, tmp_path: Path) -> None:
+    for words in ("dichromatic", "recolour --hue 360", "relight --yaw 360", f"relight --light {work}/light.npy", "gloss"):
+        arguments = ["edit", str(work / "ball"), *words.split(), "--photo", str(work / "photo.png"), "-o", str(tmp_path / "out"), "--quiet"]
+        assert main(arguments) == 0
+        before, after = (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in (work / "photo.png", tmp_path / "out" / "edited.png"))
+        assert np.array_equal(before, after), words
+
+
+MISTAKES = {
+    "": "ACTION",
+    "paint": "invalid choice",
+    "gloss --metal 2": "metal",
+    "gloss --look glossier --exponent 9": "give one of them",
+    "gloss --exponent -5": "exponent",
+    "highlight --direction 0 0 0": "no direction",
+    "highlight --exponent 9 --alpha 0.2": "give one of them",
+    "highlight --color banana": "rrggbb",
+    "highlight --strength -1": "strength",
+    "dichromatic --diffuse-gain -1": "gain",
+    "dichromatic --specular-gamma nan": "not a number",
+    "recolour --cluster 9": "no cluster 9",
+    "recolour --clusters 99": "clusters are not possible",
+    "recolour --cluster 1 --region {}/region.png": "give one of them",
+    "recolour --region {}/sky.png": "photo's size",
+    "recolour --match-brightness": "brightness",
+    "relight --light {}/nothing.json": "cannot read the light",
+    "relight --light {}/region.png": "twice as wide as high",
+    "relight --light {}/light.npy --direction 0 0 1": "give one of them",
+    "relight --light {}/sky.png --yaw 3": "not turned",
+    "relight --ambient 3": "--direction",
+    "relight --direction 0 0 -1 --ambient 0": "no part of the object",
+    "relight --exposure 0": "exposure",
+    "relight --yaw 9 --mask {}/region.png": "--photo",
+    "relight --yaw 9 --photo {}/region.png": "",
+    "relight --yaw 9 --photo {}/nothing.png": "no such file",
+}
+
+
+@pytest.mark.parametrize(("words", "told"), MISTAKES.items())
+def test_a_mistake_is_one_line_and_writes_nothing(
+    work: Path, tmp_path: Path, words: str, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    output = tmp_path / "out"
+    assert main(["edit", str(work / "ball"), *words.format(work).split(), "-o", str(output), "--quiet"]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("isc: error: ") and error.count("\n") == 1 and told in error
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_folder_that_is_not_ours_is_left_alone(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    for folder in (work / "ball", tmp_path):
+        assert main(["edit", str(work / "ball"), "gloss", "-o", str(folder), "--quiet"]) == 2
+    assert main(["edit", str(tmp_path), "gloss", "-o", str(tmp_path / "out"), "--quiet"]) == 2
+    assert (tmp_path / "mine.txt").read_text() == "mine" and "decomposition.json" in capsys.readouterr().err
+
+
+def test_every_action_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["edit", "--help"]) == 0
+    actions = [action.split()[0] for action in ACTIONS]
+    shown = capsys.readouterr().out
+    assert all(action in shown for action in actions)
+    for action in dict.fromkeys(actions):
+        assert main(["edit", "anything", action, "--help"]) == 0
+        shown = capsys.readouterr().out
+        assert "--photo" in shown and "--output" in shown and "%(" not in shown

@@ -1,0 +1,318 @@
+"""Edits: doing nothing changes nothing, layers stay apart, lights turn as rotations do, colours change and textures do not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isc_core.decomposition import Decomposition
+from isc_core.editing.blinn_phong_extension import Gloss, change_gloss, remapped
+from isc_core.editing.chroma import from_oklab, to_oklab
+from isc_core.editing.clusters import find_clusters
+from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers, masked_blur
+from isc_core.editing.edited import LUMINANCE, light_color, luminance
+from isc_core.editing.highlights import add_highlight
+from isc_core.editing.light_direction import explain_specular
+from isc_core.editing.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
+from isc_core.editing.lobes import Lobe, lobe_in, lobe_under
+from isc_core.editing.recolour import Paint, recolour
+from isc_core.editing.relight import NewLight, Relighting, relight
+from isc_core.environment import directions, solid_angles
+from isc_core.errors import InputError
+from isc_core.sirfs.frames import real_sh
+from tests.core.ball_scene import LIGHT, ball
+
+
+@pytest.fixture(scope="module")
+def scene() -> Decomposition:
+    """A ball with a residual where the highlight clips."""
+    d = ball()
+    residual = np.minimum(0.9 - d.diffuse - d.specular, 0) * d.mask[..., None]
+    return replace(d, residual=residual, image=d.diffuse + d.specular + residual)
+
+
+def test_edits_that_ask_for_nothing_return_the_image_bit_by_bit(scene: Decomposition) -> None:
+    for edit in (
+        edit_layers(scene, DichromaticEdit()),
+        recolour(scene, Paint()),
+        recolour(scene, Paint(hue=360.0)),
+        relight(scene, NewLight(coefficients=scene.illumination)),
+        relight(scene, NewLight(coefficients=turned_light(scene.illumination, turn(yaw=360, pitch=-720)))),
+        change_gloss(scene, Gloss()),
+        add_highlight(scene, DirectionalLight(toward(0, 0, 1)), level=0.0),
+    ):
+        assert np.array_equal(edit.image, scene.image)
+        assert np.array_equal(edit.diffuse, scene.diffuse)
+        assert np.array_equal(edit.specular, scene.specular)
+
+
+def test_no_edit_touches_what_is_outside_the_mask_or_the_scene(scene: Decomposition) -> None:
+    before = scene.image.copy()
+    sun = DirectionalLight(toward(-1, 1, 1), ambient=np.full(3, 0.2))
+    for edit in (
+        edit_layers(scene, DichromaticEdit(LayerEdit(2, 1.3, 0.5), LayerEdit(0.5, 0.6, 2))),
+        recolour(scene, Paint(hue=100, saturation=1.4, value=0.8)),
+        relight(scene, NewLight(sun=sun), Relighting("render", Lobe(30))),
+        change_gloss(scene, Gloss(exponent=200, present=60, metal=0.5)),
+        add_highlight(scene, sun),
+    ):
+        assert not edit.image[~scene.mask].any()
+        assert not np.array_equal(edit.image[scene.mask], scene.image[scene.mask])
+        assert np.isfinite(edit.image).all() and (edit.image >= 0).all()
+        assert edit.image.dtype == np.float32
+    assert np.array_equal(scene.image, before)
+
+
+# --- dichromatic ------------------------------------------------------------------------------------------------------------------------
+
+
+def test_removing_a_layer_leaves_the_other(scene: Decomposition) -> None:
+    matt = edit_layers(scene, DichromaticEdit(specular=LayerEdit(gain=0)))
+    lit = scene.specular.any(-1)
+    assert np.array_equal(matt.image[lit], scene.diffuse[lit])
+    assert not matt.specular.any()
+    gloss = edit_layers(scene, DichromaticEdit(diffuse=LayerEdit(gain=0)))
+    assert np.array_equal(gloss.specular, scene.specular) and not gloss.diffuse.any()
+
+
+def test_a_gain_is_linear(scene: Decomposition) -> None:
+    clear = replace(scene, residual=np.zeros_like(scene.residual), image=scene.diffuse + scene.specular)
+    images = [edit_layers(clear, DichromaticEdit(specular=LayerEdit(gain=g))).image for g in (1, 2, 3)]
+    assert np.abs(images[2] - images[1] - (images[1] - images[0])).max() < 1e-6
+    assert np.abs(images[1] - images[0] - clear.specular).max() < 1e-6
+
+
+def test_gamma_keeps_the_hue_and_the_white(scene: Decomposition) -> None:
+    edit = edit_layers(scene, DichromaticEdit(diffuse=LayerEdit(gamma=2.0)))
+    old, new = scene.diffuse[scene.mask], edit.diffuse[scene.mask]
+    assert np.abs(new * old.max(-1, keepdims=True) - old * new.max(-1, keepdims=True)).max() < 1e-5
+    white = np.percentile(old.max(-1), 99.5)
+    level = old.max(-1) / white
+    assert new.max(-1) / white == pytest.approx(level**2, abs=1e-5)
+
+
+def test_sharpening_stays_inside_the_mask_and_flat_is_flat() -> None:
+    mask = np.zeros((40, 40), bool)
+    mask[8:30, 10:33] = True
+    assert masked_blur(mask * 0.7, mask, 3.0)[mask] == pytest.approx(0.7)
+    flat = replace(ball(), mask=np.ones((96, 120), bool), diffuse=np.full((96, 120, 3), 0.4, np.float32))
+    edit = edit_layers(flat, DichromaticEdit(diffuse=LayerEdit(sharpen=3.0)))
+    assert edit.diffuse == pytest.approx(0.4, abs=1e-6)
+    d = ball()
+    contrast = [edit_layers(d, DichromaticEdit(diffuse=LayerEdit(sharpen=s))).diffuse[d.mask].std() for s in (-1, 0, 1)]
+    assert contrast[0] < contrast[1] < contrast[2]
+
+
+# --- recolouring ------------------------------------------------------------------------------------------------------------------------
+
+
+def test_oklab_is_there_and_back_and_grey_has_no_chroma() -> None:
+    color = np.random.default_rng(0).uniform(0, 2, (100, 3))
+    assert from_oklab(to_oklab(color)) == pytest.approx(color, abs=1e-9)
+    assert to_oklab(np.ones(3)) == pytest.approx([1, 0, 0], abs=1e-4)
+    assert to_oklab(np.array([1.0, 0, 0])) == pytest.approx([0.628, 0.2249, 0.1258], abs=1e-3)
+
+
+def test_recolouring_leaves_gloss_shading_and_texture(scene: Decomposition) -> None:
+    edit = recolour(scene, Paint(hue=70, saturation=0.8))
+    assert np.array_equal(edit.specular, scene.specular)
+    new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
+    old = scene.reflectance[scene.mask] * light_color(scene)
+    assert luminance(new) == pytest.approx(luminance(old), rel=1e-4)
+    assert np.abs(new - old).max() > 0.05
+
+
+def test_a_target_colour_is_reached_at_the_texture_s_luminance(scene: Decomposition) -> None:
+    target = np.array([0.05, 0.2, 0.1])
+    edit = recolour(scene, Paint(target=target))
+    new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
+    chroma = new / new.sum(-1, keepdims=True)
+    assert chroma == pytest.approx(np.broadcast_to(target / target.sum(), chroma.shape), abs=0.02)
+    bright = recolour(scene, Paint(target=target, target_luminance=True)).diffuse[scene.mask] / scene.shading[scene.mask]
+    assert luminance(bright * light_color(scene)).mean() == pytest.approx(target @ LUMINANCE, rel=0.01)
+
+
+def test_no_colour_is_brighter_than_the_paint_was(scene: Decomposition) -> None:
+    edit = recolour(scene, Paint(target=np.array([0.0, 0.0, 1.0])))
+    seen = scene.reflectance * light_color(scene)
+    new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
+    assert new.max() <= seen.max() * 1.001
+    assert luminance(new) == pytest.approx(luminance(seen[scene.mask]), rel=1e-4)
+
+
+def test_a_region_is_where_paint_changes(scene: Decomposition) -> None:
+    region = np.zeros(scene.mask.shape)
+    region[:, :60] = 1
+    edit = recolour(scene, Paint(hue=90), region)
+    assert np.array_equal(edit.image[:, 60:], scene.image[:, 60:])
+    assert not np.array_equal(edit.image[:, :60], scene.image[:, :60])
+
+
+def test_clusters_are_the_paints_and_the_same_each_time(scene: Decomposition) -> None:
+    found = find_clusters(scene, 2, seed=5)
+    red = scene.reflectance[..., 0] > 0.3
+    agreement = (found.labels[scene.mask] == 0) == red[scene.mask]
+    assert agreement.mean() in (0.0, 1.0)
+    assert np.array_equal(found.labels, find_clusters(scene, 2, seed=5).labels)
+    assert found.shares.sum() == pytest.approx(1) and found.shares[0] >= found.shares[1]
+    assert len(find_clusters(scene, 6).shares) == 2  # there are no more paints
+    for other in range(4):
+        assert len(find_clusters(scene, 3, seed=other).shares) == 2
+    weights = found.weight(1) + found.weight(2)
+    assert weights[scene.mask] == pytest.approx(1, abs=1e-6)
+
+
+def test_one_grey_paint_is_one_cluster(scene: Decomposition) -> None:
+    grey = replace(scene, reflectance=np.where(scene.mask[..., None], 0.4, scene.reflectance * 0), shading=scene.shading * 0 + 0.5)
+    assert len(find_clusters(grey, 5).shares) == 1
+
+
+# --- lights -----------------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_turned_light_shades_turned_normals() -> None:
+    normals = sphere_directions(200)
+    rotation = turn(33.0, -71.0, 140.0)
+    turned = real_sh(normals) @ turned_light(LIGHT, rotation)
+    assert np.abs(turned - real_sh(normals @ rotation) @ LIGHT).max() < 1e-12
+
+
+def test_turns_compose_and_come_back() -> None:
+    first, second = turn(20, 30, 40), turn(-50, 10, 5)
+    twice = turned_light(turned_light(LIGHT, first), second)
+    assert np.abs(twice - turned_light(LIGHT, second @ first)).max() < 1e-12
+    assert np.abs(turned_light(turned_light(LIGHT, first), first.T) - LIGHT).max() < 1e-12
+    assert np.array_equal(turned_light(LIGHT, turn(360, 360, -360)), LIGHT)
+
+
+@pytest.mark.parametrize(
+    ("angles", "start", "end"), [((90, 0, 0), (0, 0, 1), (1, 0, 0)), ((0, 90, 0), (0, 1, 0), (0, 0, 1)), ((0, 0, 90), (1, 0, 0), (0, 1, 0))]
+)
+def test_yaw_pitch_and_roll_turn_as_they_say(angles: tuple, start: tuple, end: tuple) -> None:
+    assert np.array_equal(turn(*angles) @ np.array(start, float), np.array(end, float))
+
+
+def test_relighting_is_reflectance_times_shading(scene: Decomposition) -> None:
+    sun = DirectionalLight(toward(0.3, 0.2, 0.9), np.array([3.0, 2.0, 1.0]), np.full(3, 0.1))
+    edit = relight(scene, NewLight(sun=sun), Relighting("remove"))
+    expected = scene.reflectance[scene.mask] * sun.shading(scene.normal[scene.mask])
+    assert edit.diffuse[scene.mask] == pytest.approx(expected, abs=1e-5)
+    assert not edit.specular.any()
+
+
+def test_a_uniform_sky_shades_evenly_and_a_balanced_light_is_as_bright(scene: Decomposition) -> None:
+    sky = np.broadcast_to([0.5, 0.5, 0.5], (16, 32, 3))
+    even = relight(scene, NewLight(sky=sky), Relighting("remove"))
+    assert even.diffuse[scene.mask] == pytest.approx(0.5 * scene.reflectance[scene.mask], rel=0.01)
+    balanced = relight(scene, NewLight(sky=sky), Relighting("remove", balanced=True))
+    assert luminance(balanced.diffuse[scene.mask]).sum() == pytest.approx(luminance(scene.diffuse[scene.mask]).sum(), rel=1e-3)
+
+
+def test_highlights_are_kept_scaled_removed_or_rendered(scene: Decomposition) -> None:
+    light = NewLight(coefficients=turned_light(scene.illumination, turn(yaw=80)))
+    kept, scaled, removed = (relight(scene, light, Relighting(how)) for how in ("keep", "scale", "remove"))
+    assert np.array_equal(kept.specular, scene.specular) and not removed.specular.any()
+    ratio = kept.diffuse[scene.mask] / scene.diffuse[scene.mask]
+    assert scaled.specular[scene.mask] == pytest.approx(scene.specular[scene.mask] * np.minimum(ratio, 4), abs=1e-5)
+    assert relight(scene, light).notes
+    rendered = relight(scene, NewLight(coefficients=scene.illumination), Relighting("render", Lobe(40), exposure=2.0))
+    assert luminance(rendered.specular[scene.mask]).sum() == pytest.approx(2 * luminance(scene.specular[scene.mask]).sum(), rel=1e-3)
+
+
+# --- gloss ------------------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_lobe_in_a_sky_with_one_bright_spot_is_the_lobe_under_that_light() -> None:
+    rows = 32
+    sky = np.zeros((rows, 2 * rows, 3))
+    sky[10, 36] = 5.0
+    sun = DirectionalLight(directions(rows)[10, 36], sky[10, 36] * solid_angles(rows)[10, 36])
+    normals = sphere_directions(400)[:190]
+    for lobe in (Lobe(30.0), Lobe(alpha=0.3)):
+        expected = lobe_under(lobe, normals, sun)
+        assert lobe_in(lobe, normals, sky) == pytest.approx(expected, abs=0.03 * expected.max())
+
+
+def test_remapping_makes_one_exponent_of_another(scene: Decomposition) -> None:
+    z = np.where(scene.mask, scene.normal[..., 2], 0)[..., None]
+    wide, sharp = (np.repeat((p + 8) * z.astype(float) ** p, 3, 2) for p in (20, 80))
+    ones = np.ones_like(scene.mask)
+    assert np.abs(remapped(wide, ones, 20, 80) - sharp).max() < 0.03 * sharp.max()
+    assert np.array_equal(remapped(wide, ones, 20, 20), wide)
+
+
+def test_a_new_highlight_is_where_its_light_says_and_as_strong_as_before(scene: Decomposition) -> None:
+    light = DirectionalLight(toward(-0.6, 0.4, 0.7))
+    edit = add_highlight(scene, light, Lobe(60.0), replacing=True)
+    assert luminance(edit.specular).sum() == pytest.approx(luminance(scene.specular).sum(), rel=1e-4)
+    found = explain_specular(replace(scene, specular=edit.specular))
+    assert np.rad2deg(np.arccos(found.light.direction @ light.direction)) < 1
+    assert found.exponent == pytest.approx(60, rel=0.05)
+    added = add_highlight(scene, light, level=0.5)
+    assert (added.specular >= scene.specular).all()
+    assert (added.specular - scene.specular).max() == pytest.approx(0.5 * np.percentile(scene.image[scene.mask].max(-1), 99.5), rel=0.1)
+
+
+def test_a_light_from_behind_gives_no_highlight_and_says_so(scene: Decomposition) -> None:
+    edit = add_highlight(scene, DirectionalLight(toward(0, 0, -1)), level=1.0)
+    assert np.array_equal(edit.image, scene.image) and edit.notes
+
+
+def test_glossier_is_narrower_rougher_is_wider(scene: Decomposition) -> None:
+    areas = []
+    for exponent in (20.0, 60.0, 240.0):
+        layer = change_gloss(scene, Gloss(exponent=exponent, present=60)).specular[..., 0]
+        areas.append(int((layer > 0.3 * layer.max()).sum()))
+    assert areas[0] > areas[1] > areas[2] > 0
+
+
+def test_metal_has_no_body_and_the_colour_of_the_paint(scene: Decomposition) -> None:
+    edit = change_gloss(scene, Gloss(metal=1.0))
+    assert not edit.diffuse.any()
+    red = scene.mask & (scene.reflectance[..., 0] > 0.3)
+    color = edit.specular[red].sum(0)
+    assert color[0] > 2 * color[2]
+
+
+def test_a_matt_object_says_that_it_has_no_gloss_to_change(scene: Decomposition) -> None:
+    matt = replace(scene, specular=np.zeros_like(scene.specular), residual=np.zeros_like(scene.residual), image=scene.diffuse)
+    edit = change_gloss(matt, Gloss(exponent=100))
+    assert np.array_equal(edit.image, matt.image) and "no specular light" in edit.notes[0]
+
+
+# --- what cannot be -----------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: LayerEdit(gain=-1),
+        lambda: LayerEdit(gamma=0),
+        lambda: LayerEdit(radius=float("nan")),
+        lambda: Gloss(exponent=0.5),
+        lambda: Gloss(metal=1.5),
+        lambda: Gloss(method="magic"),
+        lambda: Paint(saturation=-1),
+        lambda: Paint(target=np.array([2.0, 0, 0])),
+        lambda: Paint(target_luminance=True),
+        lambda: Lobe(alpha=2.0),
+        lambda: toward(0, 0, 0),
+        lambda: DirectionalLight(np.array([1.0, 1, 1])),
+        lambda: DirectionalLight(toward(0, 0, 1), irradiance=-np.ones(3)),
+        lambda: NewLight(),
+        lambda: NewLight(sky=np.ones((4, 9, 3))),
+        lambda: Relighting("somehow"),
+        lambda: Relighting(exposure=0),
+        lambda: turned_light(LIGHT, 2 * np.eye(3)),
+        lambda: turn(yaw=float("inf")),
+        lambda: find_clusters(ball(), 0),
+        lambda: find_clusters(ball(), 2).weight(3),
+        lambda: recolour(ball(), Paint(hue=3), np.ones((3, 3))),
+        lambda: recolour(ball(), Paint(hue=3), np.zeros((96, 120))),
+        lambda: relight(ball(), NewLight(sun=DirectionalLight(toward(0, 0, -1)))),
+    ],
+)
+def test_impossible_parameters_are_one_clear_error(make: object) -> None:
+    with pytest.raises(InputError) as refused:
+        make()  # type: ignore[operator]
+    assert "\n" not in str(refused.value)

@@ -1,0 +1,166 @@
+"""Edits brought back into the photo: outside the mask nothing changes, in any file format; inside the edit arrives at full size."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from isc_core.decomposition import Decomposition, Provenance
+from isc_core.editing.compositing import composite
+from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
+from isc_core.editing.edit_folder import Original, Record, Sheet, save_edit
+from isc_core.editing.edited import Edited
+from isc_core.editing.recolour import Paint, recolour
+from isc_core.errors import InputError
+from isc_core.exr import read_channels, write_channels
+from isc_core.photo import Photo, PhotoSource, linear_to_srgb, read_linear, read_photo, read_raster
+from tests.core.ball_scene import ball
+
+SCALE = 0.5
+MATT = DichromaticEdit(specular=LayerEdit(gain=0))
+
+
+def photo_of(scene: Decomposition, background: float = 0.3) -> Photo:
+    """The scene's picture before a background, as a photo of its own size."""
+    image = np.where(scene.mask[..., None], scene.image, background).astype(np.float32)
+    height, width = scene.mask.shape
+    source = PhotoSource("0" * 64, (width, height), 16, "linear", "file")
+    return Photo(image, scene.mask, 1 / 65535, np.zeros_like(scene.mask), source)
+
+
+def half_size(full: Decomposition) -> Decomposition:
+    """The same ball at half its size, as the working maps of the photo `full`."""
+    height, width = full.mask.shape
+    half = ball((height // 2, width // 2), 40.0, (48.0, 60.0))
+    return replace(half, provenance=Provenance(input={"scale": SCALE, "size": [width, height], "name": "ball.png"}))
+
+
+@pytest.fixture(scope="module")
+def full() -> Decomposition:
+    return ball((192, 240), 80.0, (96.5, 120.5))
+
+
+def test_at_the_photo_s_own_size_the_edit_is_the_edit() -> None:
+    scene = ball()
+    edit = recolour(scene, Paint(hue=90))
+    image, changed = composite(scene, edit, photo_of(scene))
+    assert image[scene.mask] == pytest.approx(edit.image[scene.mask], abs=1e-6)
+    assert np.array_equal(image[~scene.mask], photo_of(scene).image[~scene.mask])
+    assert not changed[~scene.mask].any()
+
+
+def test_no_edit_is_the_photo_bit_by_bit_at_any_size(full: Decomposition) -> None:
+    half = half_size(full)
+    photo = photo_of(full)
+    image, changed = composite(half, Edited(half.image, half.diffuse, half.specular), photo)
+    assert np.array_equal(image, photo.image) and not changed.any()
+
+
+@pytest.mark.parametrize("change", [MATT, DichromaticEdit(diffuse=LayerEdit(gain=0.5))])
+def test_an_enlarged_edit_is_near_the_edit_made_at_full_size(full: Decomposition, change: DichromaticEdit) -> None:
+    half, photo = half_size(full), photo_of(full)
+    image, _ = composite(half, edit_layers(half, change), photo)
+    wanted = edit_layers(full, change).image
+    inner = full.mask & (full.normal[..., 2] > 0.3)
+    done = np.abs(image - wanted)[inner].mean()
+    nothing = np.abs(photo.image - wanted)[inner].mean()
+    assert done < 0.1 * nothing
+    assert np.array_equal(image[~full.mask], photo.image[~full.mask])
+
+
+def test_edges_of_the_paint_stay_as_sharp_as_the_photo_s(full: Decomposition) -> None:
+    """A texture finer than the maps survives a change of the light: its contrast follows."""
+    generator = np.random.default_rng(2)
+    texture = 1 + 0.2 * generator.uniform(-1, 1, full.mask.shape)[..., None].astype(np.float32)
+    half, photo = half_size(full), photo_of(full)
+    photo = replace(photo, image=photo.image * texture)
+    image, _ = composite(half, edit_layers(half, DichromaticEdit(LayerEdit(gain=0.5), LayerEdit(gain=0.5))), photo)
+    inner = full.mask & (full.normal[..., 2] > 0.5)
+    fine = [np.abs(np.diff(picture[..., 0], axis=1))[inner[:, 1:]].mean() for picture in (photo.image, image)]
+    assert fine[1] == pytest.approx(0.5 * fine[0], rel=0.15)
+
+
+def test_another_photo_or_mask_is_refused(full: Decomposition) -> None:
+    half, photo = half_size(full), photo_of(full)
+    edit = edit_layers(half, MATT)
+    smaller = replace(photo, image=photo.image[:150], mask=photo.mask[:150])
+    shifted = replace(photo, mask=np.roll(photo.mask, 15, axis=1))
+    for wrong in (smaller, shifted):
+        with pytest.raises(InputError, match="give the same"):
+            composite(half, edit, wrong)
+
+
+# --- files ------------------------------------------------------------------------------------------------------------------------------
+
+
+def coded(full: Decomposition, kind: type, transfer: str) -> tuple[np.ndarray, np.ndarray]:
+    """RGB codes of the ball before noise, and an alpha with every value, opaque enough on the object."""
+    generator = np.random.default_rng(4)
+    image = np.where(full.mask[..., None], full.image, generator.uniform(0, 1, full.image.shape))
+    peak = np.iinfo(kind).max
+    values = np.rint(np.clip(linear_to_srgb(image) if transfer == "srgb" else image, 0, 1) * peak).astype(kind)
+    alpha = np.where(full.mask, generator.integers(peak // 2 + 1, peak, full.mask.shape), generator.integers(0, peak // 2, full.mask.shape))
+    return values, alpha.astype(kind)
+
+
+@pytest.mark.parametrize(("kind", "transfer"), [(np.uint8, "srgb"), (np.uint16, "srgb"), (np.uint16, "linear")])
+def test_png_keeps_depth_coding_alpha_and_all_other_pixels(full: Decomposition, tmp_path: Path, kind: type, transfer: str) -> None:
+    values, alpha = coded(full, kind, transfer)
+    cv2.imwrite(str(tmp_path / "photo.png"), np.dstack([values[..., ::-1], alpha]))
+    photo = read_photo(tmp_path / "photo.png", transfer=transfer)
+    half = half_size(full)
+    original = Original(photo, read_raster(tmp_path / "photo.png"))
+    save_edit(half, recolour(half, Paint(hue=120)), tmp_path / "out", Record("recolour"), Sheet("t"), original=original)
+    written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
+    assert written.dtype == kind
+    assert np.array_equal(written[..., 3], alpha)
+    assert np.array_equal(written[~full.mask][:, :3], values[~full.mask][:, ::-1])
+    assert not np.array_equal(written[full.mask][:, :3], values[full.mask][:, ::-1])
+    again = read_linear(tmp_path / "out" / "edited.png", transfer)
+    exact, _ = composite(half, recolour(half, Paint(hue=120)), photo)
+    step = 1 / np.iinfo(kind).max
+    assert np.abs(linear_to_srgb(again) - linear_to_srgb(np.clip(exact, 0, 1)))[full.mask].max() < (
+        step if transfer == "srgb" else 13 * step
+    )
+
+
+def test_a_grey_photo_gets_colour_only_where_it_is_painted(full: Decomposition, tmp_path: Path) -> None:
+    values = coded(full, np.uint8, "srgb")[0][..., 1]
+    cv2.imwrite(str(tmp_path / "photo.png"), values)
+    cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255 * full.mask))
+    photo = read_photo(tmp_path / "photo.png", tmp_path / "mask.png")
+    half = half_size(full)
+    original = Original(photo, read_raster(tmp_path / "photo.png"))
+    save_edit(half, recolour(half, Paint(hue=120)), tmp_path / "out", Record("recolour"), Sheet("t"), original=original)
+    written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(written[~full.mask], np.repeat(values[~full.mask][:, None], 3, 1))
+
+
+def test_exr_stays_linear_and_unchanged_outside(full: Decomposition, tmp_path: Path) -> None:
+    light = np.where(full.mask[..., None], 3 * full.image, np.random.default_rng(1).uniform(0, 9, full.image.shape)).astype(np.float32)
+    alpha = full.mask.astype(np.float32)
+    write_channels(tmp_path / "photo.exr", {**{c: light[..., k] for k, c in enumerate("RGB")}, "A": alpha})
+    photo = read_photo(tmp_path / "photo.exr")
+    half = half_size(full)
+    original = Original(photo, read_raster(tmp_path / "photo.exr"))
+    half = replace(half, image=half.image * 3, diffuse=half.diffuse * 3, specular=half.specular * 3, shading=half.shading * 3)
+    save_edit(half, edit_layers(half, MATT), tmp_path / "out", Record("dichromatic"), Sheet("t"), original=original)
+    written = read_channels(tmp_path / "out" / "edited.exr")
+    assert set(written) == {"R", "G", "B", "A"}
+    assert np.array_equal(written["A"], alpha)
+    for k, name in enumerate("RGB"):
+        assert np.array_equal(written[name][~full.mask], light[..., k][~full.mask])
+    assert written["R"].max() > 1
+    assert not (tmp_path / "out" / "edited.png").exists()
+    assert written["R"][full.mask].sum() < light[..., 0][full.mask].sum()
+
+
+def test_without_a_photo_the_maps_picture_is_written_with_the_mask_as_alpha(tmp_path: Path) -> None:
+    scene = ball()
+    save_edit(scene, edit_layers(scene, MATT), tmp_path / "out", Record("dichromatic"), Sheet("t"))
+    written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
+    assert np.array_equal(written[..., 3], 255 * scene.mask.astype(np.uint8))
+    channels = read_channels(tmp_path / "out" / "edited.exr")
+    assert np.stack([channels[c] for c in "RGB"], -1) == pytest.approx(edit_layers(scene, MATT).image, abs=1e-6)
