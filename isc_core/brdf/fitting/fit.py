@@ -26,8 +26,10 @@ from .environment_fit import fit_under
 from .lamps import ALPHAS, Fitted, Lamps, Problem, contributions, minimise, predicted
 from .observed import Observed, observe
 from .pixels import Pixels, choose_pixels
+from .recovered import fit_recovered
 from .response import sky_response
 from .result import CONVENTION, FOUND, NARROW, NO_LIGHT, SMOOTH, UNLIKE, Interval, LobeFit, LobeFitOptions, LobeLight
+from .smooth_light import smooth_loss
 from .starts import bright_half_vectors, light_of_half_vector
 from .uncertainty import covariance, naive_variance
 
@@ -35,6 +37,7 @@ _START_ALPHAS = (0.06, 0.2, 0.45)
 _FEW_STEPS = 7
 _LADDER = (2.0, 4.0)
 _WIDEST = 0.7  # an alpha as large as that is a light as smooth as shading
+_WIDE = 0.35  # an alpha as large as that may be a smooth light
 _CONE = 1.515  # deviations, each way, that hold 68 % in two dimensions
 _NARROWEST_PIXELS = 6  # within half of the peak
 _GAIN = 0.15  # of the loss: less, and another light explains nothing
@@ -52,12 +55,14 @@ def fit_lobe(
     environment: np.ndarray | None = None,
     clipped: np.ndarray | None = None,
     height: np.ndarray | None = None,
+    shading: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> LobeFit:
     """Fits a lobe to `specular` (H, W, 3), linear, >= 0, seen from (0, 0, 1), on the unit normals (H, W, 3), inside `mask` (H, W) bool.
 
     `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the light is a lower bound.
-    `height` (H, W) in pixels toward the viewer: with it lights may be near, else they are taken to be infinitely far. Either the light
+    `height` (H, W) in pixels toward the viewer: with it lights may be near, else they are taken to be infinitely far.
+    `shading` (H, W, 3), of a white matt surface: needed where `options.recovered`, for all this then is from one photo. Either the light
     is found, or it is given: `light_direction` (3,), a unit vector, or `environment` (rows, 2 rows, 3), see `isc_core.environment`.
     What cannot be known is said in the result. Raises `InputError` for arrays that do not fit together, `Cancelled`.
     """
@@ -74,10 +79,23 @@ def fit_lobe(
     pixels = choose_pixels(seen, (options.floor, options.relative), options.most_pixels)
     if environment is not None:
         return fit_under(np.asarray(environment, float), seen, pixels, options)
+    if options.recovered:
+        return fit_recovered(seen, pixels, _checked_shading(shading, seen), fixed, options)
     problem = Problem(pixels, options.model, options.thresholded, directions=fixed is None, nearness=seen.place is not None)
     fitted = _search(problem, options, fixed, monitor)
     monitor.report("how sure the gloss is", 0.7)
     return _answer(seen, problem, fitted, options)
+
+
+def _checked_shading(shading: np.ndarray | None, seen: Observed) -> np.ndarray:
+    if shading is None:
+        raise InputError("a recovered specular image is held against the shading: give shading, or recovered=False")
+    shading = np.asarray(shading, float)
+    if shading.shape != seen.specular.shape or not (np.isfinite(shading[seen.mask]).all() and (shading[seen.mask] >= 0).all()):
+        raise InputError(
+            f"shading has shape {shading.shape}: give (H, W, 3) as the specular image is, finite and 0 or more inside the mask"
+        )
+    return shading
 
 
 def _search(problem: Problem, options: LobeFitOptions, fixed: np.ndarray | None, monitor: Monitor) -> Fitted:
@@ -191,7 +209,9 @@ def _reason(problem: Problem, fitted: Fitted, explained: float, sd: float) -> st
         return UNLIKE
     if problem.pixels.bright < _NARROWEST_PIXELS:
         return NARROW
-    return SMOOTH if fitted.lamps.alpha > _WIDEST or _wider_does(problem, fitted, sd) else FOUND
+    alpha = fitted.lamps.alpha
+    smooth = alpha > _WIDEST or (alpha > _WIDE and smooth_loss(problem.pixels) < fitted.loss)
+    return SMOOTH if smooth or _wider_does(problem, fitted, sd) else FOUND
 
 
 def _wider_does(problem: Problem, fitted: Fitted, sd: float) -> bool:

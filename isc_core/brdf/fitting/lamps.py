@@ -5,10 +5,10 @@ Equation: the specular light, mean over the channels, at the place p (in radii o
     s(n, p) = sum_k a_k y(n; l, alpha) / |v|^2 + b,        v = l_k - q_k p,  l = v / |v|,  y of `response`,
 
 over log a_k, log alpha, the base b, the directions l_k, which move in their tangent planes, and the nearness q_k >= 0 (0: infinitely far;
-1 / q radii from the middle). The base is a mirrored uniform sky, exp(c) F(n); or, where a separator made the image, -exp(c): it sees a
-highlight only above an unknown level, so its image is max(0, s). The loss is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1),
-r_i = (s - s_i) / sigma_i: quadratic for small errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting; the gradient
-is exact.
+1 / q radii from the middle). The base is a mirrored uniform sky, exp(c) F(n); or, where a separator made the image, -exp(c): it sees
+a highlight only above an unknown level, so its image is max(0, s). The loss is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1),
+r_i = (s - s_i) / sigma_i: quadratic for small errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting; gradients
+are exact.
 
 Citation: D. W. Marquardt, SIAM J. Appl. Math. 11(2) (1963), doi:10.1137/0111030; P. Charbonnier, L. Blanc-Feraud, G. Aubert, M. Barlaud,
 IEEE TIP 6(2) (1997), doi:10.1109/83.551699.
@@ -121,11 +121,13 @@ def arriving(direction: np.ndarray, nearness: float, place: np.ndarray) -> tuple
 
 
 def tangents(direction: np.ndarray) -> np.ndarray:
-    """Two unit vectors (2, 3) across a unit direction and each other."""
-    axis = np.eye(3)[int(np.argmin(np.abs(direction)))]
-    first = np.cross(direction, axis)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(direction, first)])
+    """Two unit vectors (2, 3) across a unit direction and each other (Duff et al. 2017, JCGT 6(1), no DOI)."""
+    x, y, z = direction
+    # Divided by 1 + |z|, which is never near 0.
+    sign = 1.0 if z >= 0 else -1.0
+    a = -1 / (sign + z)
+    b = x * y * a
+    return np.array([[1 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])
 
 
 def _base(problem: Problem, lamps: Lamps, normal: np.ndarray) -> np.ndarray:
@@ -178,8 +180,14 @@ def _hints(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.
 
 def _normal_equations(problem: Problem, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
     _, gradient, curvature = _hints(problem, fitted.lamps)
-    scaled = fitted.jacobian * fitted.weight[:, None]
-    return scaled.T @ fitted.jacobian + np.diag(curvature), scaled.T @ fitted.residual + gradient
+    return product(fitted.jacobian, fitted.weight, fitted.jacobian) + np.diag(curvature), (
+        product(fitted.jacobian, fitted.weight, fitted.residual[:, None])[:, 0] + gradient
+    )
+
+
+def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """sum_n left_ni weight_n right_nj, (P, Q). Not by BLAS, whose threads take longer to wake than a few columns need."""
+    return np.einsum("ni,nj->ij", left * weight[:, None], right)
 
 
 def _moved(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:

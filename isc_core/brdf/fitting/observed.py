@@ -10,8 +10,8 @@ from ..directions import unit
 
 @dataclass(frozen=True)
 class Observed:
-    """`specular` (H, W, 3), `normal` (H, W, 3), `mask` (H, W) bool, `confidence` (H, W), `clipped` (H, W) bool. `inside` (H, W): pixels that
-    count. `place` (H, W, 3): where each pixel's surface is, in radii of the object (half of the longer side of the mask's box) from the
+    """`specular` (H, W, 3), `normal` (H, W, 3), `mask` (H, W) bool, `confidence` (H, W), `clipped` (H, W) bool. `inside` (H, W): what
+    counts. `place` (H, W, 3): where each pixel's surface is, in radii of the object (half of the longer side of the mask's box) from the
     middle of that box; None where the height is not known."""
 
     specular: np.ndarray

@@ -25,8 +25,9 @@ FOUND = "determined"
 class LobeFitOptions:
     """`model`: of the lobe. `most_lights`: 1 to 3. `most_pixels`: that are looked at, >= 100. `normal_error`: of the normals, degrees,
     [0, 90): 0 for exact ones, about 15 for recovered ones; it widens the intervals. `floor`: deviation of the specular light as a share of
-    its peak; `relative`: as a share of itself. `darkest`: radiance >= 0 that is no highlight yet. `thresholded`: the specular image was made
-    by a separator, which sees only what rises above an unknown level. Raises `InputError` outside these."""
+    its peak; `relative`: as a share of itself. `darkest`: radiance >= 0 that is no highlight yet. `thresholded`: the specular image is a
+    separator's, which sees only what rises above an unknown level. `recovered`: normals and shading too were recovered from the
+    same photo, see `recovered`. Raises `InputError` outside these."""
 
     model: LobeModel = "ggx"
     most_lights: int = 3
@@ -36,6 +37,7 @@ class LobeFitOptions:
     relative: float = 0.1
     darkest: float = 1e-6
     thresholded: bool = False
+    recovered: bool = False
 
     def __post_init__(self) -> None:
         if self.model not in CONVENTION:

@@ -15,6 +15,7 @@ Limits: a fit that errs alike everywhere does not know of it: `normal_error` has
 
 import numpy as np
 
+from .lamps import product
 from .pixels import Pixels
 
 _FEWEST = 4.0  # blocks; a highlight is at least cut in four
@@ -22,7 +23,7 @@ _FEWEST = 4.0  # blocks; a highlight is at least cut in four
 
 def covariance(jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray, pixels: Pixels) -> np.ndarray:
     """(P, P), of the columns of the jacobian (N, P) of the residual (N,), both in sigmas, with weights (N,)."""
-    bread = _inverse((jacobian * weight[:, None]).T @ jacobian)
+    bread = _inverse(product(jacobian, weight, jacobian))
     side = max(3.0, float(np.sqrt(pixels.bright / np.pi)))
     cell = np.floor(pixels.cell / side).astype(int)
     _, block = np.unique(cell[:, 0] * (cell[:, 1].max() + 1) + cell[:, 1], return_inverse=True)
@@ -36,7 +37,7 @@ def covariance(jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray, p
 
 def naive_variance(jacobian: np.ndarray, weight: np.ndarray, column: int) -> float:
     """Of one column, were all errors independent and of their stated size."""
-    return float(_inverse((jacobian * weight[:, None]).T @ jacobian)[column, column])
+    return float(_inverse(product(jacobian, weight, jacobian))[column, column])
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:

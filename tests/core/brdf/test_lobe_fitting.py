@@ -244,3 +244,78 @@ def test_what_does_not_fit_together_is_refused() -> None:
 def test_it_can_be_cancelled() -> None:
     with pytest.raises(Cancelled):
         fit_lobe(*seen(Ggx(0.2), directional(KEY, COLOUR), 24), monitor=Monitor(cancelled=lambda: True))
+
+
+def whole_chain(alpha: float, strength: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Specular image, cut off at a level as separators do, wavy normals, mask, and the shading of a white matt surface."""
+    specular, normal, mask = seen(Ggx(alpha), directional(KEY, np.pi * strength))
+    shading = np.where(
+        mask[..., None], radiance(BlinnPhong(0, 1), normal, VIEW, directional(KEY)) + np.maximum(normal @ KEY, 0)[..., None], 0
+    )
+    row, column = np.indices(mask.shape)
+    wavy = normal + 0.2 * np.dstack([np.sin(row / 3), np.cos(column / 4), 0 * row])
+    wavy[..., 2] = np.maximum(wavy[..., 2], 0.05)
+    cut = np.maximum(specular - 0.2 * specular.max(), 0)
+    return cut, wavy / np.linalg.norm(wavy, axis=-1, keepdims=True), mask, shading
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.2, 0.4])
+def test_what_was_recovered_from_one_photo_gives_alpha_by_the_brightness_of_the_highlight(alpha: float) -> None:
+    specular, normal, mask, shading = whole_chain(alpha)
+    fit = fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=shading)
+    assert fit.determined and fit.alpha is not None
+    assert abs(np.log(fit.alpha / alpha)) < np.log(1.5)
+    assert fit.strength_light is not None
+    assert abs(fit.strength_light.mean() / np.pi - 1) < 0.4
+    assert angle(fit.direction, KEY) < 25
+
+
+def test_the_recovered_fit_does_not_depend_on_the_exposure() -> None:
+    specular, normal, mask, shading = whole_chain(0.2)
+    options = LobeFitOptions(recovered=True)
+    dim = fit_lobe(specular, normal, mask, options=options, shading=shading)
+    bright = fit_lobe(50 * specular, normal, mask, options=options, shading=50 * shading)
+    assert bright.alpha == pytest.approx(dim.alpha, rel=1e-9)
+    np.testing.assert_allclose(bright.strength_light, 50 * np.asarray(dim.strength_light), rtol=1e-9)
+
+
+def test_what_a_separator_leaves_on_a_matt_object_is_no_gloss() -> None:
+    _, normal, mask, shading = whole_chain(0.2)
+    crumbs = np.zeros_like(shading)
+    crumbs[40:44, 50:53] = 0.05
+    fit = fit_lobe(crumbs, normal, mask, options=LobeFitOptions(recovered=True), shading=shading)
+    assert fit.reason == NO_LIGHT and fit.alpha is None and fit.lights == ()
+
+
+def test_recovered_images_need_their_shading() -> None:
+    specular, normal, mask, shading = whole_chain(0.2)
+    for given in (None, shading[:-1], -shading):
+        with pytest.raises(InputError):
+            fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=given)
+
+
+def test_a_separators_level_is_found() -> None:
+    specular, normal, mask = seen(Ggx(0.15), directional(KEY, COLOUR))
+    cut = np.maximum(specular - 0.15 * specular.max(), 0)
+    known, unknown = (fit_lobe(cut, normal, mask, options=LobeFitOptions(thresholded=t)) for t in (True, False))
+    assert known.alpha == pytest.approx(0.15, rel=0.1)
+    assert unknown.alpha is None or abs(np.log(unknown.alpha / 0.15)) > abs(np.log(known.alpha / 0.15))  # type: ignore[operator]
+
+
+def test_a_near_light_is_told_from_a_far_one() -> None:
+    normal, mask = ball()
+    row, column = np.indices(mask.shape)
+    radius = 48 * 0.9
+    depth = np.sqrt(np.maximum(0, 1 - ((column - 47.5) / radius) ** 2 - ((47.5 - row) / radius) ** 2))
+    round_normal = np.where(mask[..., None], np.dstack([(column - 47.5) / radius, (47.5 - row) / radius, depth]), VIEW)
+    round_normal /= np.linalg.norm(round_normal, axis=-1, keepdims=True)
+    place = np.dstack([(column - 47.5) / radius, (47.5 - row) / radius, depth - 0.5])
+    toward = 3 * KEY - place
+    distance = np.linalg.norm(toward, axis=-1)
+    arriving = toward / distance[..., None]
+    value = Ggx(0.15).value(round_normal, VIEW, arriving) * np.maximum((round_normal * arriving).sum(-1), 0) * 9 / distance**2
+    specular = np.where(mask, value, 0)[..., None] * np.ones(3)
+    far = fit_lobe(specular, round_normal, mask)
+    near = fit_lobe(specular, round_normal, mask, height=depth * radius)
+    assert far.alpha is not None and near.alpha is not None
+    assert abs(near.alpha / 0.15 - 1) < 0.05 < abs(far.alpha / 0.15 - 1)
