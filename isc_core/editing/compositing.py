@@ -26,7 +26,7 @@ from ..photo import Photo, mask_box
 from .edited import Edited, white_of
 
 _RADIUS = 2  # of the window, in pixels of the maps
-_EPSILON = 1e-4  # of the white's square: contrasts below a hundredth of the white tell nothing
+_EPSILON = 1e-3  # of the white's square: contrasts below a thirtieth of the white tell little
 _CHUNK = 1_000_000  # pixels at a time
 _OFF = 3.0  # pixels of the maps that the object's box may differ
 

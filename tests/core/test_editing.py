@@ -237,7 +237,7 @@ def test_remapping_makes_one_exponent_of_another(scene: Decomposition) -> None:
     z = np.where(scene.mask, scene.normal[..., 2], 0)[..., None]
     wide, sharp = (np.repeat((p + 8) * z.astype(float) ** p, 3, 2) for p in (20, 80))
     ones = np.ones_like(scene.mask)
-    assert np.abs(remapped(wide, ones, 20, 80) - sharp).max() < 0.03 * sharp.max()
+    assert np.abs(remapped(wide, ones, 20, 80) - sharp).max() < 0.05 * sharp.max()
     assert np.array_equal(remapped(wide, ones, 20, 20), wide)
 
 
