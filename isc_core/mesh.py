@@ -18,11 +18,15 @@ Base colour: k * reflectance, with k such that the 99.5th percentile of the refl
 belongs to it is the recovered one divided by k, that is log shading - log k. Beyond the mask the texture repeats the nearest colour
 inside, so that filtering draws no dark fringe.
 
+Gloss: roughness and specular level are the fitted lobe's, the level times k, as the base colour is. A level up to 1, and its variation
+over the object in a texture's alpha, are KHR_materials_specular's factor; what lies above 1 is its colour.
+
 Reference: Khronos Group (2021), glTF 2.0 specification, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 
 Limits: one sheet without a back; steps of one cell along the silhouette; reflectances above 1/k are cut (at most 0.5 % of the pixels).
 """
 
+import io
 from dataclasses import dataclass, field
 from math import ceil, log, pi, sqrt
 from typing import Any
@@ -33,6 +37,7 @@ from PIL import Image
 from scipy import ndimage
 
 from .errors import InputError
+from .gloss import NOT_FITTED, Gloss
 from .photo import linear_to_srgb
 
 _BRIGHT = 0.9  # linear base colour that the 99.5th percentile of the reflectance is given
@@ -46,8 +51,7 @@ class MeshOptions:
     `longest_side`: metres, of the mask's bounding box; `metres_per_pixel` takes its place where it is given.
     `max_faces`: the grid takes every n-th pixel so as to stay below; the usual value spares 512 x 512 pixels.
     `rim`: rings of border pixels whose height is limited (0: none). `bleed`: pixels by which the texture runs on beyond the mask.
-    `roughness`, `metallic`: glTF factors in [0, 1].
-    `fitted`: whether these two come from a fit, or are just usual values.
+    `roughness`, `metallic`: glTF factors in [0, 1], usual values; a fitted gloss has a roughness of its own.
     """
 
     longest_side: float = 0.1
@@ -57,7 +61,6 @@ class MeshOptions:
     bleed: int = 16
     roughness: float = 0.5
     metallic: float = 0.0
-    fitted: bool = False
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ class MeshResult:
     """A mesh with its material and how it relates to the maps.
 
     `mesh`: metres, +Y up, facing +Z. `reflectance_scale`: k, base colour = k * reflectance. `metres_per_pixel`: of the maps.
-    `origin`: (column, row, height) in pixels of the world's origin. `stride`: pixels from vertex to vertex. `options`: as given.
+    `origin`: (column, row, height) in pixels of the world's origin. `stride`: pixels from vertex to vertex. `options`, `gloss`: as given.
     """
 
     mesh: trimesh.Trimesh
@@ -74,6 +77,12 @@ class MeshResult:
     origin: tuple[float, float, float]
     stride: int
     options: MeshOptions = field(default_factory=MeshOptions)
+    gloss: Gloss = field(default_factory=Gloss)
+
+    @property
+    def specular(self) -> float:
+        """The specular level for the base colour, >= 0; 1, plastic, where it is not known."""
+        return 1.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
 
     def illumination(self, recovered: np.ndarray) -> np.ndarray:
         """The light, (9, 3), that gives the photo's diffuse image with the base colour: `recovered` divided by k."""
@@ -85,7 +94,25 @@ class MeshResult:
         """The content of a `.glb` file. Equal meshes give equal bytes."""
         scene = trimesh.Scene()
         scene.add_geometry(self.mesh, node_name="object", geom_name="object")
-        return bytes(scene.export(file_type="glb", include_normals=True))
+        return bytes(scene.export(file_type="glb", include_normals=True, buffer_postprocessor=self._add_specular))
+
+    def _add_specular(self, buffers: dict[str, bytes], tree: dict[str, Any]) -> None:
+        """Writes KHR_materials_specular into glTF's tree and the texture's picture among its buffers, which trimesh cannot."""
+        if self.gloss.specular is None:
+            return
+        variation = self.gloss.variation
+        largest = 1.0 if variation is None else float(variation.max())
+        level = self.specular * largest
+        extension: dict[str, Any] = {"specularFactor": min(level, 1.0)}
+        if level > 1:
+            extension["specularColorFactor"] = [level] * 3
+        if variation is not None:
+            extension["specularTexture"] = {"index": len(tree["textures"])}
+            tree["textures"].append({"source": len(tree["images"])})
+            tree["images"].append({"bufferView": len(buffers), "mimeType": "image/png"})
+            buffers["specular"] = _alpha_png(variation / largest)
+        tree["materials"][0]["extensions"] = {"KHR_materials_specular": extension}
+        tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), "KHR_materials_specular"]
 
     def describe(self) -> dict[str, Any]:
         """What a reader needs beside the file, ready for JSON."""
@@ -96,21 +123,32 @@ class MeshResult:
             "stride": self.stride,
             "vertices": len(self.mesh.vertices),
             "faces": len(self.mesh.faces),
-            "roughness": {"value": self.options.roughness, "source": "fitted" if self.options.fitted else "not fitted"},
-            "metallic": {"value": self.options.metallic, "source": "fitted" if self.options.fitted else "not fitted"},
+            "roughness": {"value": _roughness(self.options, self.gloss), "source": self.gloss.roughness_source},
+            "specular": {
+                "value": self.specular,
+                "source": self.gloss.specular_source,
+                "texture": self.gloss.variation is not None,
+                "convention": "factor of the reflectance along the normal, 1 is .04; KHR_materials_specular",
+            },
+            "metallic": {"value": self.options.metallic, "source": NOT_FITTED},
         }
 
 
 def build_mesh(
-    height: np.ndarray, normal: np.ndarray, mask: np.ndarray, reflectance: np.ndarray, options: MeshOptions | None = None
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    reflectance: np.ndarray,
+    options: MeshOptions | None = None,
+    gloss: Gloss | None = None,
 ) -> MeshResult:
     """Builds the mesh of the pixels inside the mask.
 
     `height`: (H, W), pixels toward the viewer. `normal`: (H, W, 3), unit, camera frame. `mask`: (H, W) bool.
-    `reflectance`: (H, W, 3), linear, >= 0. All finite inside the mask.
+    `reflectance`: (H, W, 3), linear, >= 0. All finite inside the mask. `gloss`: of its surface, usual values where it says nothing.
     Raises `InputError` if the mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
     """
-    options = options or MeshOptions()
+    options, gloss = options or MeshOptions(), gloss or Gloss()
     _require_sound(height, normal, mask, reflectance, options)
     stride, cells = _grid_cells(mask, options.max_faces)
     limited = limit_rim(height, mask, options.rim)
@@ -126,11 +164,11 @@ def build_mesh(
     visual = trimesh.visual.TextureVisuals(
         # trimesh counts v from the bottom of the texture and turns it over when it writes.
         uv=np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
-        material=_material(color, detail, options),
+        material=_material(color, detail, options, gloss),
     )
     normals = smooth.reshape(-1, 3)[used].astype(np.float64)
     mesh = trimesh.Trimesh((pixels - middle) * size, faces, vertex_normals=normals, visual=visual, process=False)
-    return MeshResult(mesh, k, float(size), (float(middle[0]), float(-middle[1]), float(middle[2])), stride, options)
+    return MeshResult(mesh, k, float(size), (float(middle[0]), float(-middle[1]), float(middle[2])), stride, options, gloss)
 
 
 def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[np.ndarray, float]:
@@ -263,12 +301,25 @@ def _interpolated(grid: np.ndarray, shape: tuple[int, ...], stride: int) -> np.n
     return np.where(right >= down, upper, lower).astype(np.float32)
 
 
-def _material(color: np.ndarray, detail: np.ndarray, options: MeshOptions) -> trimesh.visual.material.PBRMaterial:
+def _roughness(options: MeshOptions, gloss: Gloss) -> float:
+    return options.roughness if gloss.roughness is None else gloss.roughness
+
+
+def _alpha_png(values: np.ndarray) -> bytes:
+    """(H, W) in [0, 1] as the alpha of a white PNG, with room up to a multiple of 4 bytes, as buffers have to begin there."""
+    pixels = np.full((*values.shape, 4), 255, np.uint8)
+    pixels[..., 3] = np.rint(255 * np.clip(values, 0, 1))
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="png")
+    return stream.getvalue() + bytes(-len(stream.getvalue()) % 4)
+
+
+def _material(color: np.ndarray, detail: np.ndarray, options: MeshOptions, gloss: Gloss) -> trimesh.visual.material.PBRMaterial:
     return trimesh.visual.material.PBRMaterial(
         name="recovered",
         baseColorTexture=Image.fromarray(color),
         normalTexture=Image.fromarray(detail),
         metallicFactor=options.metallic,
-        roughnessFactor=options.roughness,
+        roughnessFactor=_roughness(options, gloss),
         doubleSided=True,  # the mesh has no back: seen from behind it should not vanish
     )

@@ -22,6 +22,7 @@ from .brdf_record import lobe_fit_from_json
 from .decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from .errors import InputError
 from .exr import read_channels, write_channels
+from .gloss import gloss_of
 from .mesh import MeshOptions, MeshResult, build_mesh
 from .photo import linear_to_srgb
 from .progress import Monitor
@@ -56,7 +57,8 @@ def save(decomposition: Decomposition, folder: Path | str, *, mesh: MeshOptions 
             values = getattr(decomposition, name)
             write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
         monitor.report("building the mesh", 0.4)
-        built = build_mesh(decomposition.height, decomposition.normal, decomposition.mask, decomposition.reflectance, mesh)
+        d = decomposition
+        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, gloss_of(d))
         (partial / "mesh.glb").write_bytes(built.glb())
         monitor.report("drawing the preview", 0.7)
         contact_sheet(decomposition).save(partial / "preview.png")

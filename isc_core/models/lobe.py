@@ -16,7 +16,7 @@ from .shape import Shape
 from .task import Task
 
 _NORMAL_ERROR = 15.0  # degrees, of recovered normals
-_NOTHING = 0.01  # of the photo's white: specular light that is nowhere brighter is none
+_NOTHING = 0.03  # of the photo's white: specular light that is nowhere brighter is none
 MATT = "no highlights were found: the object is matt, or they cannot be told from its paint"
 
 
@@ -41,5 +41,9 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
     with task.clock.stage("gloss"):
         normal, _ = shaded(shape.height, shape.light, photo.mask)
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
-        options = LobeFitOptions(model=model, normal_error=_NORMAL_ERROR if task.known.height is None else 0.0, darkest=_NOTHING * white)
-        return FittedLobe(fit_lobe(split.specular, normal, photo.mask, options=options, clipped=photo.clipped, monitor=monitor))
+        exact = task.known.height is not None
+        options = LobeFitOptions(model, normal_error=0.0 if exact else _NORMAL_ERROR, darkest=_NOTHING * white, thresholded=True)
+        fit = fit_lobe(
+            split.specular, normal, photo.mask, options=options, clipped=photo.clipped, height=shape.height, monitor=monitor
+        )  # fmt: skip
+        return FittedLobe(fit)

@@ -1,15 +1,22 @@
 """A result folder becomes a Blender scene whose render is the photo's diffuse image. Runs the command as a user does."""
 
 import importlib.util
+import json
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from blender_addon.headless import main
+from blender_addon.result import read_placement
+from isc_core.brdf.fitting import fit_lobe
+from isc_core.brdf.ggx import Ggx
+from isc_core.brdf.shading import directional, radiance
 from isc_core.decomposition import Decomposition, Provenance
 from isc_core.result_folder import save
 from isc_core.sirfs.frames import real_sh
@@ -70,6 +77,54 @@ def linear_picture(path: Path) -> tuple[np.ndarray, np.ndarray]:
     pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]].astype(float) / 65535
     coded = pixels[..., :3]
     return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4), pixels[..., 3]
+
+
+def glossy(strength: float) -> Decomposition:
+    """The ball under the gloss of a lamp, alpha .2, with the lobe that fits."""
+    d = ball()
+    lamp = np.array([-0.37, 0.46, 0.807])
+    lamp /= np.linalg.norm(lamp)
+    gloss = strength * radiance(Ggx(0.2, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(lamp, 1.0))
+    specular = np.where(d.mask[..., None], gloss, 0).astype(np.float32)
+    return replace(d, image=d.diffuse + specular, specular=specular, brdf=fit_lobe(specular, d.normal, d.mask))
+
+
+@needs_bpy
+@pytest.mark.parametrize("strength", [0.0, 0.6])
+def test_the_material_has_the_fitted_gloss(tmp_path: Path, strength: float) -> None:
+    """Roughness and specular level of the shader are those of the fit; what has no highlights has no gloss."""
+    from blender_addon.scene import build
+
+    save(glossy(strength), tmp_path / "result")
+    placement = read_placement(tmp_path / "result")
+    assert placement.gloss_is_fitted == (strength > 0)
+    scene = build(placement)
+    shader = principled(scene)
+    record = json.loads((tmp_path / "result" / "decomposition.json").read_text())
+    level = shader.inputs["Specular IOR Level"].default_value * shader.inputs["Specular Tint"].default_value[0]
+    assert level == pytest.approx(0.5 * record["mesh"]["specular"]["value"], rel=1e-5)
+    if strength > 0:
+        assert shader.inputs["Roughness"].default_value == pytest.approx(record["brdf"]["blender_roughness"], rel=1e-5)
+        assert record["brdf"]["blender_roughness"] == pytest.approx(0.2**0.5, rel=0.05)
+        assert record["mesh"]["specular"]["source"] == "fitted"
+    else:
+        assert level == 0
+
+
+@needs_bpy
+def test_a_gloss_that_was_not_fitted_is_kept_on_demand_only(tmp_path: Path) -> None:
+    from blender_addon.scene import build
+
+    save(ball(), tmp_path / "result")
+    placement = read_placement(tmp_path / "result")
+    levels = [principled(build(placement, gloss=keep)).inputs["Specular IOR Level"].default_value for keep in (False, True)]
+    assert levels == [0, 0.5]
+
+
+def principled(scene: Any) -> Any:
+    """The shader of the scene's only mesh."""
+    (mesh,) = (thing for thing in scene.objects if thing.type == "MESH")
+    return next(node for node in mesh.material_slots[0].material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
 
 
 @needs_bpy

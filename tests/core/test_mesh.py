@@ -16,6 +16,7 @@ from scipy import ndimage
 
 from isc_core.decomposition import Decomposition
 from isc_core.errors import InputError
+from isc_core.gloss import FITTED, Gloss
 from isc_core.mesh import MeshOptions, MeshResult, _interpolated, base_color, build_mesh, limit_rim
 from isc_core.photo import srgb_to_linear
 from isc_core.sirfs.frames import real_sh
@@ -262,6 +263,55 @@ def test_the_material_is_what_was_asked_for() -> None:
     assert result.describe()["roughness"] == {"value": 0.4, "source": "not fitted"}
 
 
+def glossy(specular: float, variation: np.ndarray | None = None, roughness: float = 0.3) -> MeshResult:
+    """The ball's mesh with a fitted gloss whose level for the base colour is `specular`."""
+    d = ball()
+    k = built(d).reflectance_scale
+    gloss = Gloss(roughness, specular / k, FITTED, FITTED, variation)
+    return build_mesh(d.height, d.normal, d.mask, d.reflectance, gloss=gloss)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.4, 1.0, 3.0])
+def test_a_fitted_gloss_is_in_the_file(level: float) -> None:
+    result = glossy(level)
+    tree = gltf(result.glb())
+    material = tree["materials"][0]
+    assert tree["extensionsUsed"] == ["KHR_materials_specular"]
+    assert material["pbrMetallicRoughness"]["roughnessFactor"] == 0.3
+    extension = material["extensions"]["KHR_materials_specular"]
+    assert extension["specularFactor"] * max(extension.get("specularColorFactor", [1])) == pytest.approx(level)
+    assert extension["specularFactor"] <= 1
+    described = result.describe()
+    assert described["roughness"] == {"value": 0.3, "source": "fitted"}
+    assert described["specular"]["value"] == pytest.approx(level)
+    assert (described["specular"]["source"], described["specular"]["texture"]) == ("fitted", False)
+
+
+def test_a_gloss_that_varies_is_a_texture_in_the_alpha_channel() -> None:
+    d = ball()
+    variation = np.where(np.indices(d.mask.shape)[1] > 60, 1.25, 0.5)
+    blob = glossy(0.4, variation).glb()
+    tree = gltf(blob)
+    extension = tree["materials"][0]["extensions"]["KHR_materials_specular"]
+    assert extension["specularFactor"] == pytest.approx(0.4 * 1.25)
+    image = tree["images"][tree["textures"][extension["specularTexture"]["index"]]["source"]]
+    view = tree["bufferViews"][image["bufferView"]]
+    assert view["byteOffset"] % 4 == 0
+    start = 20 + struct.unpack_from("<I", blob, 12)[0] + 8 + view["byteOffset"]
+    with Image.open(io.BytesIO(blob[start : start + view["byteLength"]])) as picture:
+        alpha = np.asarray(picture)[..., 3] / 255
+    assert np.abs(alpha * extension["specularFactor"] - 0.4 * variation).max() < 0.002
+    assert tree["buffers"][0]["byteLength"] == view["byteOffset"] + view["byteLength"]
+    assert len(reopened(glossy(0.4, variation)).faces) > 100
+
+
+def test_an_unknown_gloss_leaves_the_extension_out() -> None:
+    tree = gltf(built(ball()).glb())
+    assert "extensionsUsed" not in tree
+    assert "extensions" not in tree["materials"][0]
+    assert built(ball()).describe()["specular"]["source"] == "not fitted"
+
+
 def test_equal_maps_give_equal_bytes() -> None:
     assert built(ball()).glb() == built(ball()).glb()
 
@@ -318,3 +368,25 @@ def test_blender_opens_it_upright(tmp_path: Path) -> None:
     assert shader.inputs["Roughness"].default_value == pytest.approx(0.5)
     assert shader.inputs["Base Color"].is_linked
     assert shader.inputs["Normal"].is_linked
+
+
+@pytest.mark.parametrize(("level", "varies"), [(0.4, False), (3.0, False), (0.0, False), (0.4, True)])
+def test_blender_gets_the_fitted_gloss(tmp_path: Path, level: float, varies: bool) -> None:
+    """Blender's level of 0.5 is the extension's 1."""
+    bpy = pytest.importorskip("bpy", reason="needs the bpy module (extra `blender`)")
+    variation = np.where(np.indices(ball().mask.shape)[1] > 60, 1.0, 0.5) if varies else None
+    (tmp_path / "mesh.glb").write_bytes(glossy(level, variation).glb())
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert bpy.ops.import_scene.gltf(filepath=str(tmp_path / "mesh.glb")) == {"FINISHED"}
+    material = next(o for o in bpy.data.objects if o.type == "MESH").data.materials[0]
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    assert shader.inputs["Roughness"].default_value == pytest.approx(0.3)
+    socket, tint = shader.inputs["Specular IOR Level"], shader.inputs["Specular Tint"].default_value
+    assert shader.inputs["IOR"].default_value == pytest.approx(1.5)
+    if varies:
+        factor = socket.links[0].from_node
+        assert factor.operation == "MULTIPLY"
+        assert factor.inputs[1].default_value == pytest.approx(0.5 * level)
+        assert factor.inputs[0].links[0].from_socket.name == "Alpha"
+    else:
+        assert socket.default_value * tint[0] == pytest.approx(0.5 * level)

@@ -1,0 +1,98 @@
+"""What renderers are told of the gloss, on a ball whose lobe, lamp and paint are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isc_core.brdf.fitting import Interval, LobeFit, LobeFitOptions, fit_lobe
+from isc_core.brdf.fitting.response import LobeModel
+from isc_core.brdf.ggx import Ggx
+from isc_core.brdf.shading import directional, radiance
+from isc_core.decomposition import Decomposition
+from isc_core.gloss import BOUND, FITTED, NONE_FOUND, NOT_FITTED, gloss_of, specular_variation
+from tests.core.ball_scene import ball
+
+LAMP = np.array([-0.3, 0.4, 0.866]) / np.linalg.norm([-0.3, 0.4, 0.866])
+VIEW = np.array([0.0, 0.0, 1.0])
+
+
+def lit(alpha: float, strength: float | np.ndarray, lamp: float = 2.0, sky: float = 0.4, model: LobeModel = "ggx") -> Decomposition:
+    """A ball under a lamp of irradiance `lamp` and an even sky that is not mirrored; `strength`: of the lobe, 1 is f0 = .04."""
+    d = ball()
+    normal = d.normal.astype(float)
+    inside = d.mask[..., None]
+    gloss = radiance(Ggx(alpha, 0.04), normal, VIEW, directional(LAMP, lamp)) * np.asarray(strength)[..., None] * inside
+    shading = (lamp / np.pi * np.maximum(normal @ LAMP, 0) + sky)[..., None] * inside * np.ones(3)
+    return replace(
+        d, specular=gloss.astype(np.float32), shading=shading, brdf=fit_lobe(gloss, normal, d.mask, options=LobeFitOptions(model))
+    )
+
+
+@pytest.mark.parametrize("strength", [0.3, 1.0, 4.0])
+def test_roughness_and_level_are_the_scene_s(strength: float) -> None:
+    gloss = gloss_of(lit(0.2, strength))
+    assert gloss.roughness == pytest.approx(0.2**0.5, rel=0.02)
+    assert gloss.specular == pytest.approx(strength, rel=0.05)
+    assert (gloss.roughness_source, gloss.specular_source) == (FITTED, FITTED)
+    assert gloss.variation is None
+
+
+def test_the_lamp_s_brightness_does_not_matter() -> None:
+    dim, bright = (gloss_of(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((0.5, 0.4), (8.0, 0.1)))
+    assert dim == pytest.approx(bright, rel=0.03)
+
+
+def test_a_lobe_of_blinn_and_phong_has_about_the_same_level() -> None:
+    """Their shapes differ by a quarter; a factor of f0 would be 25."""
+    assert gloss_of(lit(0.2, 1.0, model="blinn_phong")).specular == pytest.approx(1.0, rel=0.5)
+
+
+def test_a_lamp_that_the_shading_does_not_show_leaves_the_level_open() -> None:
+    d = lit(0.2, 1.0)
+    gloss = gloss_of(replace(d, shading=np.ones_like(d.shading)))
+    assert gloss.specular is None
+    assert (gloss.roughness_source, gloss.specular_source) == (FITTED, NOT_FITTED)
+
+
+def test_a_matt_object_has_no_gloss() -> None:
+    d = ball()
+    gloss = gloss_of(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))
+    assert (gloss.roughness, gloss.specular) == (None, 0.0)
+    assert (gloss.roughness_source, gloss.specular_source) == (NOT_FITTED, NONE_FOUND)
+
+
+def test_without_a_fit_nothing_is_said() -> None:
+    assert (gloss_of(ball()).roughness, gloss_of(ball()).specular) == (None, None)
+
+
+def test_an_upper_bound_is_called_one() -> None:
+    d = lit(0.2, 1.0)
+    assert d.brdf is not None
+    narrow = replace(d.brdf, determined=False, reason="narrow", alpha=0.01, alpha_interval=Interval(0.004, 0.01))
+    gloss = gloss_of(replace(d, brdf=narrow))
+    assert gloss.roughness == pytest.approx(0.1)
+    assert (gloss.roughness_source, gloss.specular) == (BOUND, None)
+    unknown: LobeFit = replace(narrow, alpha=None, alpha_interval=None)
+    assert gloss_of(replace(d, brdf=unknown)).roughness_source == NOT_FITTED
+
+
+def test_gloss_that_differs_between_paints_becomes_a_texture() -> None:
+    d = ball()
+    chequered = (np.indices(d.mask.shape) // 16).sum(0) % 2 == 0
+    d = lit(0.5, np.where(chequered, 1.0, 0.4))
+    found = specular_variation(d)
+    assert found is not None
+    assert found.min() >= 0
+    lit_well = d.brdf is not None and d.brdf.predicted[..., 0] > 0.3 * d.brdf.predicted.max()
+    glossy, dull = (np.median(found[lit_well & side]) for side in (chequered, ~chequered))
+    assert dull / glossy == pytest.approx(0.4, abs=0.15)
+
+
+@pytest.mark.parametrize("alpha", [0.1, 0.6])
+def test_even_gloss_has_no_texture(alpha: float) -> None:
+    """Neither where the lobe covers the object, noise included, nor where a small highlight says nothing of the rest."""
+    d = lit(alpha, 1.0)
+    noise = np.random.default_rng(0).normal(0, 0.05, d.mask.shape)[..., None] * d.specular
+    assert specular_variation(replace(d, specular=np.maximum(d.specular + noise, 0))) is None
+    assert specular_variation(ball()) is None
