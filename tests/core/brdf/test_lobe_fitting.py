@@ -303,7 +303,7 @@ def test_a_separators_level_is_found() -> None:
 
 
 def test_a_near_light_is_told_from_a_far_one() -> None:
-    normal, mask = ball()
+    _, mask = ball()
     row, column = np.indices(mask.shape)
     radius = 48 * 0.9
     depth = np.sqrt(np.maximum(0, 1 - ((column - 47.5) / radius) ** 2 - ((47.5 - row) / radius) ** 2))
