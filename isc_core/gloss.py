@@ -5,7 +5,8 @@ shading tells how bright it is, and the strength remains.
 
 Equation: S(n) = a max(0, n . l) + b is fitted to the shading, l being the fit's brightest light, a, b >= 0. A lamp of irradiance E gives
 matt white E / pi max(0, n . l): E = pi a, level = strength x light / E, for a base colour equal to the reflectance. 1 is the gloss of
-plastic, f0 = .04; Blinn-Phong's strength, which has no f0, is divided by .04.
+plastic, f0 = .04; Blinn-Phong's strength, which has f0 in it, is divided by .04. Where a is less than a third of the brightest shading, the
+lamp is not to be seen in it (recovered lights are smooth, and directions wrong by tens of degrees): that brightest shading stands for a.
 
 Variation: t(x) = sum w p s / sum w p^2 around x, s the specular image, p the predicted one. It is believed where the fit explains most of
 the specular image, p is bright on a quarter of the object, and t found on every second block of pixels explains the other ones clearly
@@ -14,7 +15,8 @@ better than one level does.
 Citation: glTF's extension KHR_materials_specular, Khronos Group 2021 (no DOI). M. Stone, "Cross-validatory choice and assessment of
 statistical predictions", JRSS B 36 (1974), doi:10.1111/j.2517-6161.1974.tb00994.x.
 
-Limits: a lamp that the shading does not show leaves the level unknown. A lobe of the wrong form, or wrong normals, varies too.
+Limits: a lamp that the shading does not show leaves the level uncertain by a factor of 3. A lobe of the wrong form, or wrong normals,
+varies too.
 """
 
 from dataclasses import dataclass
@@ -28,8 +30,9 @@ from .brdf.fitting.response import F0
 from .decomposition import Decomposition
 
 FITTED, BOUND, NONE_FOUND, NOT_FITTED = "fitted", "upper bound", "no highlights found", "not fitted"
-_LEAST_LAMP = 0.05  # of the mean shading: a weaker lamp cannot be told from none
-_BRIGHTEST = 1 / F0  # a level that mirrors all light
+_BRIGHTEST_SHADING = 97.0  # percentile
+_LEAST_LAMP = 1 / 3  # of it: a weaker lamp cannot be told from none
+_MOST = 1 / F0  # a level that mirrors all light
 _BLOCK = 0.03  # of the object's diagonal
 _COVERED, _BRIGHT, _EXPLAINED, _GAIN = 0.25, 0.1, 0.6, 0.3
 _EVEN = 0.01  # of the specular light's squares: what one level leaves less of is even
@@ -92,10 +95,10 @@ def _level(d: Decomposition, fit: LobeFit) -> float | None:
     facing = np.maximum(d.normal[d.mask].astype(float) @ fit.direction, 0)
     shading = d.shading[d.mask].mean(-1, dtype=float)
     lamp, _ = nnls(np.stack([facing, np.ones_like(facing)], 1), shading)[0]
-    if lamp < _LEAST_LAMP * shading.mean():
-        return None
+    brightest = float(np.percentile(shading, _BRIGHTEST_SHADING))
+    lamp = lamp if lamp > _LEAST_LAMP * brightest else brightest
     level = float(fit.strength_light.mean()) / (np.pi * lamp)
-    return min(level / F0 if fit.model.startswith("blinn_phong") else level, _BRIGHTEST)
+    return min(level / F0 if fit.model.startswith("blinn_phong") else level, _MOST)
 
 
 def _constant(seen: np.ndarray, predicted: np.ndarray, known: np.ndarray) -> float:

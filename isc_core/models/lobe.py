@@ -1,6 +1,8 @@
 """The lobe that a model's specular layer shows on the shape that it recovered, and what is to be said of it.
 
-Limits: recovered normals are taken to be 15 degrees off, which widens the intervals. The fit is that of `brdf.fitting`, with its limits.
+Where the shape was given, the fit is to its normals; else to what is left of recovered ones, see `brdf.fitting.recovered`.
+
+Limits: those of `brdf.fitting`.
 """
 
 from dataclasses import dataclass
@@ -15,9 +17,8 @@ from .layers import shaded
 from .shape import Shape
 from .task import Task
 
-_NORMAL_ERROR = 15.0  # degrees, of recovered normals
 _NOTHING = 0.03  # of the photo's white: specular light that is nowhere brighter is none
-MATT = "no highlights were found: the object is matt, or they cannot be told from its paint"
+MATT = "next to no highlights were found: the object is matt, or they cannot be told from its paint"
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,11 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
     """
     photo = task.maps
     with task.clock.stage("gloss"):
-        normal, _ = shaded(shape.height, shape.light, photo.mask)
+        normal, shading = shaded(shape.height, shape.light, photo.mask)
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
-        exact = task.known.height is not None
-        options = LobeFitOptions(model, normal_error=0.0 if exact else _NORMAL_ERROR, darkest=_NOTHING * white, thresholded=True)
+        options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None)
         fit = fit_lobe(
-            split.specular, normal, photo.mask, options=options, clipped=photo.clipped, height=shape.height, monitor=monitor
+            split.specular, normal, photo.mask,
+            options=options, clipped=photo.clipped, height=shape.height, shading=shading, monitor=monitor,
         )  # fmt: skip
         return FittedLobe(fit)

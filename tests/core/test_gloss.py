@@ -39,7 +39,7 @@ def test_roughness_and_level_are_the_scene_s(strength: float) -> None:
 
 
 def test_the_lamp_s_brightness_does_not_matter() -> None:
-    dim, bright = (gloss_of(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((0.5, 0.4), (8.0, 0.1)))
+    dim, bright = (gloss_of(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((1.0, 0.4), (8.0, 0.1)))
     assert dim == pytest.approx(bright, rel=0.03)
 
 
@@ -48,11 +48,21 @@ def test_a_lobe_of_blinn_and_phong_has_about_the_same_level() -> None:
     assert gloss_of(lit(0.2, 1.0, model="blinn_phong")).specular == pytest.approx(1.0, rel=0.5)
 
 
-def test_a_lamp_that_the_shading_does_not_show_leaves_the_level_open() -> None:
+def test_a_lamp_that_the_shading_does_not_show_is_taken_to_be_all_of_it() -> None:
     d = lit(0.2, 1.0)
-    gloss = gloss_of(replace(d, shading=np.ones_like(d.shading)))
-    assert gloss.specular is None
-    assert (gloss.roughness_source, gloss.specular_source) == (FITTED, NOT_FITTED)
+    gloss = gloss_of(replace(d, shading=3 * np.ones_like(d.shading)))
+    assert gloss.specular == pytest.approx(2 / (3 * np.pi), rel=0.05)
+
+
+def test_both_lobes_of_a_recovered_scene_have_the_same_level() -> None:
+    """The convention of the strength differs by f0, the picture that it stands for does not."""
+    d = lit(0.2, 1.0)
+    models: tuple[LobeModel, LobeModel] = ("ggx", "blinn_phong")
+    fits = [fit_lobe(d.specular, d.normal, d.mask, options=LobeFitOptions(model, recovered=True), shading=d.shading) for model in models]
+    assert fits[0].predicted.max() == pytest.approx(fits[1].predicted.max(), rel=0.1)
+    levels = [gloss_of(replace(d, brdf=fit)).specular for fit in fits]
+    assert levels[0] == pytest.approx(levels[1])
+    assert levels[0] == pytest.approx(1.0, rel=0.7)
 
 
 def test_a_matt_object_has_no_gloss() -> None:
