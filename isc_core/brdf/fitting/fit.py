@@ -27,7 +27,6 @@ from .lamps import ALPHAS, Fitted, Lamps, Problem, contributions, minimise, pred
 from .observed import Observed, observe
 from .pixels import Pixels, choose_pixels
 from .recovered import fit_recovered
-from .response import sky_response
 from .result import CONVENTION, FOUND, NARROW, NO_LIGHT, SMOOTH, UNLIKE, Interval, LobeFit, LobeFitOptions, LobeLight
 from .smooth_light import smooth_loss
 from .starts import bright_half_vectors, light_of_half_vector
@@ -35,6 +34,7 @@ from .uncertainty import covariance, naive_variance
 
 _START_ALPHAS = (0.06, 0.2, 0.45)
 _FEW_STEPS = 7
+_PIXELS_UNDER_SKY = 600  # each has to look at the whole environment
 _LADDER = (2.0, 4.0)
 _WIDEST = 0.7  # an alpha as large as that is a light as smooth as shading
 _WIDE = 0.35  # an alpha as large as that may be a smooth light
@@ -76,7 +76,8 @@ def fit_lobe(
     monitor.report("fitting the gloss", 0.0)
     if seen.peak <= options.darkest:
         return _nothing(seen, options, NO_LIGHT)
-    pixels = choose_pixels(seen, (options.floor, options.relative), options.most_pixels)
+    most = options.most_pixels if environment is None else min(options.most_pixels, _PIXELS_UNDER_SKY)
+    pixels = choose_pixels(seen, (options.floor, options.relative), most)
     if environment is not None:
         return fit_under(np.asarray(environment, float), seen, pixels, options)
     if options.recovered:
@@ -115,7 +116,7 @@ def _search(problem: Problem, options: LobeFitOptions, fixed: np.ndarray | None,
 def _first(problem: Problem, fixed: np.ndarray | None) -> Fitted:
     pixels = problem.pixels
     towards = [light_of_half_vector(half) for half in _peaks(pixels, pixels.value, 3)] if fixed is None else [fixed]
-    base = float(np.log((0.1 if problem.thresholded else 0.01) * pixels.peak))
+    base = np.array([0.1 * pixels.peak]) if problem.thresholded else np.zeros(len(problem.basis(pixels.normal[:1])))
     near = np.full(1, 0.1 if problem.nearness else 0.0)
     return _best_of(
         problem,
@@ -160,7 +161,7 @@ def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOp
     image, gains, explained = _coloured(seen, problem, fitted)
     lights = _lights(problem, fitted, spread, gains, options)
     convention = CONVENTION[options.model]
-    at = fitted.lamps.count + 1
+    at = fitted.lamps.count + len(fitted.lamps.base)
     sd = float(np.sqrt(spread[at, at] + np.radians(options.normal_error) ** 2))
     reason = _reason(problem, fitted, explained, sd)
     alpha: float | None = fitted.lamps.alpha
@@ -189,7 +190,7 @@ def _lights(problem: Problem, fitted: Fitted, spread: np.ndarray, gains: np.ndar
         factor = float(np.exp(min(np.sqrt(spread[k, k] + (2 * systematic) ** 2), 20)))
         cone = 0.0
         if problem.directions:
-            at = count + 2 + 2 * k
+            at = count + len(lamps.base) + 1 + 2 * k
             turn = (spread[at, at] + spread[at + 1, at + 1]) / 2
             cone = float(min(np.degrees(_CONE * np.sqrt(turn + systematic**2)), 180))
         lights.append(LobeLight(toward / length, cone, colour, Interval(colour / factor, colour * factor)))
@@ -216,7 +217,7 @@ def _reason(problem: Problem, fitted: Fitted, explained: float, sd: float) -> st
 
 def _wider_does(problem: Problem, fitted: Fitted, sd: float) -> bool:
     """Whether an alpha twice or four times as large explains the image within one deviation, everything else fitted anew."""
-    allowed = sd**2 / max(naive_variance(fitted.jacobian, fitted.weight, fitted.lamps.count + 1), 1e-300)
+    allowed = sd**2 / max(naive_variance(fitted.jacobian, fitted.weight, fitted.lamps.count + len(fitted.lamps.base)), 1e-300)
     for factor in _LADDER:
         log_alpha = float(np.clip(fitted.lamps.log_alpha + np.log(factor), *np.log(ALPHAS)))
         start = replace(fitted.lamps, log_alpha=log_alpha, log_amplitudes=fitted.lamps.log_amplitudes + 2 * np.log(factor))
@@ -230,23 +231,30 @@ def _coloured(seen: Observed, problem: Problem, fitted: Fitted) -> tuple[np.ndar
     pixels, lamps = problem.pixels, fitted.lamps
     shapes = contributions(problem.model, lamps, pixels.normal, pixels.place)
     root = np.sqrt(fitted.weight) / pixels.sigma
-    level = np.exp(lamps.log_base)
     if problem.thresholded:
-        root, colour = np.where(pixels.value > pixels.dark, root, 0), pixels.colour + level
+        root, colour = np.where(pixels.value > pixels.dark, root, 0), pixels.colour + lamps.base[0]
     else:
-        shapes, colour = np.vstack([shapes, level * sky_response(pixels.normal)]), pixels.colour
+        sky = lamps.base @ problem.basis(pixels.normal)
+        # The sky's colour is taken to be the lamps' on the average: it is too weak to have one of its own.
+        colour = pixels.colour - sky[:, None] * _mean_colour(pixels)
     gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
     place = np.zeros((int(seen.mask.sum()), 3)) if seen.place is None else seen.place[seen.mask]
-    everywhere = contributions(problem.model, lamps, seen.normal[seen.mask], place)
+    inside = seen.normal[seen.mask]
+    values = contributions(problem.model, lamps, inside, place).T @ gains
     if not problem.thresholded:
-        everywhere = np.vstack([everywhere, level * sky_response(seen.normal[seen.mask])])
-    values = everywhere.T @ gains
+        values = np.maximum(values + (lamps.base @ problem.basis(inside))[:, None] * _mean_colour(pixels), 0)
     image = np.zeros(seen.specular.shape, np.float32)
     image[seen.mask] = values
     counted, given = seen.inside[seen.mask], seen.specular[seen.mask]
-    left = given - (np.maximum(values - level, 0) if problem.thresholded else values)
+    left = given - (np.maximum(values - lamps.base[0], 0) if problem.thresholded else values)
     explained = 1 - np.square(left[counted]).sum() / max(float(np.square(given[counted]).sum()), 1e-300)
-    return image, gains[: lamps.count], float(np.clip(explained, 0, 1))
+    return image, gains, float(np.clip(explained, 0, 1))
+
+
+def _mean_colour(pixels: Pixels) -> np.ndarray:
+    """(3,), of mean 1."""
+    colour = pixels.weight @ pixels.colour
+    return colour / max(float(colour.mean()), 1e-300)
 
 
 def _nothing(seen: Observed, options: LobeFitOptions, reason: str) -> LobeFit:

@@ -5,10 +5,10 @@ Equation: the specular light, mean over the channels, at the place p (in radii o
     s(n, p) = sum_k a_k y(n; l, alpha) / |v|^2 + b,        v = l_k - q_k p,  l = v / |v|,  y of `response`,
 
 over log a_k, log alpha, the base b, the directions l_k, which move in their tangent planes, and the nearness q_k >= 0 (0: infinitely far;
-1 / q radii from the middle). The base is a mirrored uniform sky, exp(c) F(n); or, where a separator made the image, -exp(c): it sees
-a highlight only above an unknown level, so its image is max(0, s). The loss is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1),
-r_i = (s - s_i) / sigma_i: quadratic for small errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting; gradients
-are exact.
+1 / q radii from the middle). The base is a mirrored smooth sky, sum_j c_j B_j(n), see `sky_basis`; or, where a separator made the image,
+-c: it sees a highlight only above an unknown level, so its image is max(0, s). The loss is Charbonnier's,
+sum_i w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s - s_i) / sigma_i: quadratic for small errors, linear for large ones. Steps are
+Levenberg-Marquardt's with re-weighting; gradients are exact.
 
 Citation: D. W. Marquardt, SIAM J. Appl. Math. 11(2) (1963), doi:10.1137/0111030; P. Charbonnier, L. Blanc-Feraud, G. Aubert, M. Barlaud,
 IEEE TIP 6(2) (1997), doi:10.1109/83.551699.
@@ -21,23 +21,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .pixels import Pixels
-from .response import LobeModel, respond, sky_response
+from .response import LobeModel, respond, sky_basis
 
 ALPHAS = (0.004, 0.98)
 _NEAREST = 0.6
 _LOWEST_TILT = 0.2  # least z of the half vector: farther behind the object no light reaches what the viewer sees
 _USUAL_LEVEL, _LEVEL_SPREAD, _LEVEL_WEIGHT = 0.15, 0.7, 20.0  # what is known beforehand of a separator's level, as a share of the peak
+_USUAL_SKY, _SKY_WEIGHT = 0.1, 0.1  # of the mirrored sky, as a share of the peak; a weak hint too
 _USUAL_NEARNESS, _NEARNESS_WEIGHT = 0.3, 0.1  # q is below the first; a weak hint, where the image says nothing
 
 
 @dataclass(frozen=True)
 class Lamps:
-    """K lights: unit `directions` (K, 3), `nearness` (K,), log of `amplitudes` (K,), of the `base` and of `alpha`."""
+    """K lights: unit `directions` (K, 3), `nearness` (K,), log of `amplitudes` (K,) and of `alpha`, `base` (B,): c."""
 
     directions: np.ndarray
     nearness: np.ndarray
     log_amplitudes: np.ndarray
-    log_base: float
+    base: np.ndarray
     log_alpha: float
 
     @property
@@ -62,11 +63,15 @@ class Problem:
     nearness: bool = False
     alpha: bool = True
 
+    def basis(self, normal: np.ndarray) -> np.ndarray:
+        """(B, N): what the base is made of, on unit normals (N, 3)."""
+        return -np.ones((1, len(normal))) if self.thresholded else sky_basis(normal)
+
 
 @dataclass(frozen=True)
 class Fitted:
     """`lamps` at the minimum, its `loss`, the `residual` (N,) in sigmas, the `jacobian` (N, P) of it and the weights (N,) in force there.
-    Columns: log amplitudes (K), base, log alpha if free, two of each direction if free (`tangents`), nearness (K) if free."""
+    Columns: log amplitudes (K), base (B), log alpha if free, two of each direction if free (`tangents`), nearness (K) if free."""
 
     lamps: Lamps
     loss: float
@@ -107,7 +112,7 @@ def contributions(model: LobeModel, lamps: Lamps, normal: np.ndarray, place: np.
 
 def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndarray) -> np.ndarray:
     """(N,): the specular light, mean over the channels."""
-    total = contributions(problem.model, lamps, normal, place).sum(axis=0) + _base(problem, lamps, normal)
+    total = contributions(problem.model, lamps, normal, place).sum(axis=0) + lamps.base @ problem.basis(normal)
     return np.maximum(total, 0)
 
 
@@ -130,10 +135,6 @@ def tangents(direction: np.ndarray) -> np.ndarray:
     return np.array([[1 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])
 
 
-def _base(problem: Problem, lamps: Lamps, normal: np.ndarray) -> np.ndarray:
-    return np.exp(lamps.log_base) * (-np.ones(len(normal)) if problem.thresholded else sky_response(normal))
-
-
 def _measured(problem: Problem, lamps: Lamps) -> Fitted:
     pixels, columns, turns, nearer = problem.pixels, [], [], []
     by_alpha = np.zeros(len(pixels.value))
@@ -148,10 +149,10 @@ def _measured(problem: Problem, lamps: Lamps) -> Fitted:
             by_toward = (answer.by_light - along[:, None] * light) * (np.ones(1) * scale / length)[:, None]
             turns += list((by_toward @ tangents(direction).T).T) if problem.directions else []
             nearer += [-(by_toward * pixels.place).sum(axis=1)] if problem.nearness else []
-    columns.append(_base(problem, lamps, pixels.normal))
-    total = np.sum(columns, axis=0)
+    basis = problem.basis(pixels.normal)
+    total = np.sum(columns, axis=0) + lamps.base @ basis
     left = (total - pixels.value) / pixels.sigma
-    jacobian = np.stack([*columns, *([by_alpha] if problem.alpha else []), *turns, *nearer], axis=1) / pixels.sigma[:, None]
+    jacobian = np.stack([*columns, *basis, *([by_alpha] if problem.alpha else []), *turns, *nearer], axis=1) / pixels.sigma[:, None]
     silent = pixels.clipped & (left > 0)
     if problem.thresholded:
         silent |= (pixels.value <= pixels.dark) & (total < pixels.value)
@@ -165,12 +166,17 @@ def _hints(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.
     """What is known beforehand: losses, and as for the columns of the jacobian, halves of gradients and curvatures (P,)."""
     count = lamps.count
     turning = 2 * count if problem.directions else 0
-    size = count + 1 + int(problem.alpha) + turning + (count if problem.nearness else 0)
+    size = count + len(lamps.base) + int(problem.alpha) + turning + (count if problem.nearness else 0)
     gradient, curvature, losses = np.zeros(size), np.zeros(size), []
     if problem.thresholded:
-        off = (lamps.log_base - np.log(_USUAL_LEVEL * problem.pixels.peak)) / _LEVEL_SPREAD
-        losses.append(_LEVEL_WEIGHT * off**2)
-        gradient[count], curvature[count] = _LEVEL_WEIGHT * off / _LEVEL_SPREAD, _LEVEL_WEIGHT / _LEVEL_SPREAD**2
+        off, slope = np.log(lamps.base[0] / (_USUAL_LEVEL * problem.pixels.peak)) / _LEVEL_SPREAD, 1 / (_LEVEL_SPREAD * lamps.base[0])
+        losses.append(_LEVEL_WEIGHT * float(off) ** 2)
+        gradient[count], curvature[count] = _LEVEL_WEIGHT * off * slope, _LEVEL_WEIGHT * slope**2
+    else:
+        usual = _USUAL_SKY * problem.pixels.peak
+        losses.append(_SKY_WEIGHT * float(np.square(lamps.base / usual).sum()))
+        gradient[count : count + len(lamps.base)] = _SKY_WEIGHT * lamps.base / usual**2
+        curvature[count : count + len(lamps.base)] = _SKY_WEIGHT / usual**2
     if problem.nearness:
         losses.append(_NEARNESS_WEIGHT * float(np.square(lamps.nearness / _USUAL_NEARNESS).sum()))
         gradient[-count:] = _NEARNESS_WEIGHT * lamps.nearness / _USUAL_NEARNESS**2
@@ -192,8 +198,7 @@ def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarr
 
 def _moved(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
     count = lamps.count
-    step = np.clip(step, -1.5, 1.5)
-    log_alpha, at = lamps.log_alpha, count + 1
+    log_alpha, at = lamps.log_alpha, count + len(lamps.base)
     if problem.alpha:
         log_alpha, at = float(np.clip(log_alpha + np.clip(step[at], -0.7, 0.7), *np.log(ALPHAS))), at + 1
     directions, nearness = lamps.directions, lamps.nearness
@@ -202,9 +207,11 @@ def _moved(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
     if problem.nearness:
         # Not quite 0, where the light would count as infinitely far and its derivative would be lost.
         nearness = np.clip(nearness + np.clip(step[-count:], -0.15, 0.15), 1e-6, _NEAREST)
-    amplitudes = np.clip(lamps.log_amplitudes + step[:count], -200, 200)
-    base = float(np.clip(lamps.log_base + step[count], -200, 200))
-    return replace(lamps, directions=directions, nearness=nearness, log_amplitudes=amplitudes, log_base=base, log_alpha=log_alpha)
+    amplitudes = np.clip(lamps.log_amplitudes + np.clip(step[:count], -1.5, 1.5), -200, 200)
+    base = lamps.base + step[count : count + len(lamps.base)]
+    if problem.thresholded:
+        base = np.clip(base, lamps.base / 3, lamps.base * 3)
+    return replace(lamps, directions=directions, nearness=nearness, log_amplitudes=amplitudes, base=base, log_alpha=log_alpha)
 
 
 def _turned(direction: np.ndarray, step: np.ndarray) -> np.ndarray:

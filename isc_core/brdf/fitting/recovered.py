@@ -19,7 +19,7 @@ through the whole chain; each left out in turn, alpha was within a factor 1.5 on
 Citation: the brightness of highlights as a measure of gloss: J. A. Ferwerda, F. Pellacini, D. P. Greenberg, "A psychophysically-based
 model of surface gloss perception", SPIE 4299 (2001), doi:10.1117/12.429501. Facets: B. Walter et al., doi:10.2312/EGWR/EGSR07/195-206.
 
-Limits: insulators (metals mirror ten times as much) under lights that are small beside the highlight; one light, the strongest. The strength
+Limits: insulators (metals mirror ten times as much) under lights that are small beside the highlight; one light, the strongest. Strength
 is relative to the shading that was given: how dark a paint is, one photo does not tell, so the shading's own scale may be off by two.
 """
 
@@ -56,7 +56,8 @@ def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction
     normal = blurred_normals(seen.normal, seen.mask)
     towards, cone = (_half_way(seen, normal), _CONE) if direction is None else (direction, 0.0)
     colour = (pixels.weight * pixels.value) @ pixels.colour
-    product = np.pi * brightest * np.exp(_STRENGTH_OFFSET) * colour / max(float(colour.mean()), 1e-300)
+    mirrored = 1.0 if options.model == "ggx" else F0  # the strength of Blinn-Phong's lobe has f0 in it
+    product = mirrored * np.pi * brightest * np.exp(_STRENGTH_OFFSET) * colour / max(float(colour.mean()), 1e-300)
     light = LobeLight(towards, cone, product, Interval(product * np.exp(-_STRENGTH_SPREAD), product * np.exp(_STRENGTH_SPREAD)))
     image, explained = _predicted(seen, normal, light, alpha, options)
     reason = SMOOTH if alpha > _WIDEST else NARROW if pixels.bright < _NARROWEST_PIXELS else FOUND
@@ -90,7 +91,7 @@ def _half_way(seen: Observed, normal: np.ndarray) -> np.ndarray:
 
 def _predicted(seen: Observed, normal: np.ndarray, light: LobeLight, alpha: float, options: LobeFitOptions) -> tuple[np.ndarray, float]:
     """The specular image of the answer on the blurred normals, and the share of the given one that it explains."""
-    lamps = Lamps(light.direction[None], np.zeros(1), np.zeros(1), -np.inf, float(np.log(alpha)))
+    lamps = Lamps(light.direction[None], np.zeros(1), np.zeros(1), np.zeros(1), float(np.log(alpha)))
     inside = normal[seen.mask]
     image = np.zeros(seen.specular.shape, np.float32)
     image[seen.mask] = contributions(options.model, lamps, inside, np.zeros_like(inside))[0][:, None] * light.strength_light

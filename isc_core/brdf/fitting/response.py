@@ -53,6 +53,13 @@ def sky_response(normal: np.ndarray) -> np.ndarray:
     return F0 + (1 - F0) * (1 - np.clip(normal[:, 2], 0, 1)) ** 5
 
 
+def sky_basis(normal: np.ndarray) -> np.ndarray:
+    """(4, N): what the gloss mirrors of a smooth sky is about a mix of these: even light, what Fresnel adds toward grazing angles, slow and
+    fast, and light that grows upward in the mirrored view."""
+    grazing = 1 - np.clip(normal[:, 2], 0, 1)
+    return np.stack([np.ones(len(normal)), grazing**2, grazing**5, 2 * normal[:, 2] * normal[:, 1]])
+
+
 # Both lobes: y, and the derivatives of log y by log alpha, n . h, n . l and the deviation v . h.
 _Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
 
