@@ -17,7 +17,7 @@ from ..editing.edited import Edited
 from ..editing.highlights import add_highlight
 from ..editing.light_direction import LightEstimate, explain_shading, explain_specular, share_explained
 from ..editing.lights import DirectionalLight, toward, turn, turned_light
-from ..editing.lobes import USUAL_EXPONENT, Lobe
+from ..editing.lobes import USUAL_EXPONENT, Lobe, known_lobe
 from ..editing.recolour import Paint, recolour
 from ..editing.relight import HIGHLIGHTS, NewLight, Relighting, relight
 from ..editing.spheres import render_sphere, sphere_normals
@@ -126,11 +126,11 @@ def _light_direction(d: Decomposition, options: argparse.Namespace) -> _Done:
 
 
 def _highlight(d: Decomposition, options: argparse.Namespace) -> _Done:
-    lobe = _lobe(options) or Lobe()
+    lobe = _lobe(options) or known_lobe(d) or Lobe()
     light = _chosen_light(d, options)
     level = options.strength if options.replace or options.strength is not None else _USUAL_LEVEL
     edit = add_highlight(d, light, lobe, level=level, replacing=options.replace)
-    ball = _ball(render_sphere(light, exponent=lobe.exponent)[0], "The light", "on a white ball")
+    ball = _ball(render_sphere(light, exponent=lobe.nearest_exponent)[0], "The light", "on a white ball")
     return _Done(edit, {"direction": _plain(light.direction)}, (ball,))
 
 
@@ -422,7 +422,7 @@ def _add_relight(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--exposure", type=_number, default=1.0, metavar="F", help="factor of the new light (default %(default)s)")
     parser.add_argument(
         "--highlights", choices=HIGHLIGHTS, default="auto",
-        help="what becomes of them (auto: rendered with --exponent or --alpha, else scaled as the shading)",
+        help="what becomes of them (auto: rendered if the lobe is known, fitted or given, else scaled as the shading)",
     )  # fmt: skip
     _add_lobe(parser)
 

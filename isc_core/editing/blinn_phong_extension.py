@@ -28,7 +28,7 @@ from ..errors import InputError
 from .edited import Edited, edited, light_color, luminance, white_of
 from .light_direction import explain_specular
 from .lights import DirectionalLight
-from .lobes import USUAL_EXPONENT, Lobe, lobe_in, lobe_under, strength_of
+from .lobes import USUAL_EXPONENT, Lobe, known_lobe, lobe_in, lobe_under, strength_of
 
 METHODS = ("remap", "render")
 _SKY_ROWS = 16
@@ -93,10 +93,11 @@ def _new_lobe(d: Decomposition, gloss: Gloss, light: DirectionalLight | None, no
     if not d.specular[d.mask].any():
         notes.append("the object has no specular light to change: isc edit RESULT highlight gives it some")
         return d.specular
-    fit = explain_specular(d)
-    if not fit.determined:
+    fit, known = explain_specular(d), known_lobe(d)
+    present = gloss.present or (known.nearest_exponent if known is not None else fit.exponent if fit.determined else None)
+    if present is None:
         notes.append("no single light and lobe explain the specular layer: the present exponent is a guess")
-    present = gloss.present or (fit.exponent if fit.determined and fit.exponent else USUAL_EXPONENT)
+        present = USUAL_EXPONENT
     exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
     if gloss.method == "remap":
         return remapped(d.specular, d.mask, present, exponent)

@@ -15,18 +15,18 @@ from ..decomposition import Decomposition
 from ..errors import InputError
 from .edited import Edited, edited, luminance
 from .lights import DirectionalLight
-from .lobes import Lobe, lobe_under, strength_of
+from .lobes import Lobe, known_lobe, lobe_under, strength_of
 
 
 def add_highlight(
     d: Decomposition, light: DirectionalLight, lobe: Lobe | None = None, *, level: float | None = None, replacing: bool = False
 ) -> Edited:
     """The scene with a highlight of `lobe` under `light`, of which direction and colour count, on top of the present specular layer or
-    instead of it. `level`: see `lobes.strength_of`; 0 adds none.
+    instead of it. `lobe`: None for the fitted one, or the usual one. `level`: see `lobes.strength_of`; 0 adds none.
 
     Raises `InputError` for a light without light.
     """
-    lobe = lobe or Lobe()
+    lobe = lobe or known_lobe(d) or Lobe()
     power = float(luminance(light.irradiance))
     if power <= 0:
         raise InputError("the light of the highlight is black: give it a colour")

@@ -19,6 +19,7 @@ from scipy import ndimage
 from ..brdf.blinn_phong import BlinnPhong
 from ..brdf.ggx import Ggx
 from ..brdf.model import Model, check_range
+from ..brdf.roughness import exponent_from_alpha, fitted_exponent
 from ..brdf.shading import Lights, directional, radiance
 from ..decomposition import Decomposition
 from ..environment import directions, solid_angles
@@ -27,6 +28,7 @@ from .light_direction import VIEW
 from .lights import DirectionalLight
 
 USUAL_EXPONENT = 60.0
+_FITTED_ALPHA = 0.5  # the largest alpha of `fitted_exponent`
 _TABLE = 65  # samples of the stereographic plane along an axis
 _TOO_BRIGHT = 2.0  # of the photo's white: kept energy never asks for more at a lobe's centre
 
@@ -50,6 +52,23 @@ class Lobe:
     def model(self) -> Model:
         """The reflectance model, without a strength of its own."""
         return BlinnPhong(1.0, self.exponent) if self.alpha is None else Ggx(self.alpha, 1.0)
+
+    @property
+    def nearest_exponent(self) -> float:
+        """The Blinn-Phong exponent, at least 1, whose lobe is about this one's."""
+        if self.alpha is None:
+            return self.exponent
+        rule = fitted_exponent if self.alpha <= _FITTED_ALPHA else exponent_from_alpha
+        return max(float(rule(self.alpha)), 1.0)
+
+
+def known_lobe(d: Decomposition) -> Lobe | None:
+    """The lobe that was fitted to the photo, or None where there was no fit or its roughness is undetermined."""
+    fit = d.brdf
+    if fit is None or not fit.determined or fit.alpha is None:
+        return None
+    alpha = float(np.clip(fit.alpha, 0.01, 1))
+    return Lobe(alpha=alpha) if fit.model.startswith("ggx") else Lobe(float(np.clip(exponent_from_alpha(alpha), 1, 1e5)))
 
 
 def lobe_under(lobe: Lobe, normal: np.ndarray, light: DirectionalLight) -> np.ndarray:

@@ -23,7 +23,7 @@ from ..environment import environment_from_shading, resampled, shading_under
 from ..errors import InputError
 from .edited import Edited, edited, light_color, luminance
 from .lights import DirectionalLight
-from .lobes import Lobe, lobe_in, lobe_under
+from .lobes import Lobe, known_lobe, lobe_in, lobe_under
 
 HIGHLIGHTS = ("auto", "keep", "scale", "remove", "render")
 _MOST = 4.0  # times: how much brighter scaling makes a highlight
@@ -75,9 +75,9 @@ class NewLight:
 
 @dataclass(frozen=True)
 class Relighting:
-    """`highlights`: one of `HIGHLIGHTS`; "auto" renders where a lobe is given and scales otherwise. `lobe`: to render. `exposure` > 0:
-    factor of the new light. `balanced`: the new light's white is taken to be the present light's mean colour, and it is made as bright, on
-    average over the object, as the present one; for lights that are not told in the photo's units.
+    """`highlights`: one of `HIGHLIGHTS`; "auto" renders where a lobe is known and scales otherwise. `lobe`: to render, None for the fitted
+    one. `exposure` > 0: factor of the new light. `balanced`: the new light's white is taken to be the present light's mean colour, and it
+    is made as bright, on average over the object, as the present one; for lights that are not told in the photo's units.
     Raises `InputError`."""
 
     highlights: str = "auto"
@@ -119,7 +119,8 @@ def _highlights(
     d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray
 ) -> tuple[np.ndarray, str]:
     """The new specular layer, and what to say of it."""
-    how = choice.highlights if choice.highlights != "auto" else "render" if choice.lobe is not None else "scale"
+    lobe = choice.lobe or known_lobe(d)
+    how = choice.highlights if choice.highlights != "auto" else "render" if lobe is not None else "scale"
     present = d.specular
     if how == "keep" or not present[d.mask].any():
         return present, ""
@@ -130,7 +131,7 @@ def _highlights(
         result[d.mask] = present[d.mask] * np.minimum(ratio, _MOST)
         told = "" if choice.highlights == "scale" else "no lobe is known, so the highlights follow the shading and do not move"
         return result, told
-    lobe = choice.lobe or Lobe()
+    lobe = lobe or Lobe()
     before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
     strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
     result[d.mask] = strength * factor * light.lobe(lobe, normals)

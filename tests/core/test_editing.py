@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from isc_core.brdf.fitting import LobeFit
 from isc_core.decomposition import Decomposition
 from isc_core.editing.blinn_phong_extension import Gloss, change_gloss, remapped
 from isc_core.editing.chroma import from_oklab, to_oklab
@@ -217,6 +218,20 @@ def test_highlights_are_kept_scaled_removed_or_rendered(scene: Decomposition) ->
     assert relight(scene, light).notes
     rendered = relight(scene, NewLight(coefficients=scene.illumination), Relighting("render", Lobe(40), exposure=2.0))
     assert luminance(rendered.specular[scene.mask]).sum() == pytest.approx(2 * luminance(scene.specular[scene.mask]).sum(), rel=1e-3)
+
+
+def fitted(scene: Decomposition, determined: bool) -> Decomposition:
+    return replace(scene, brdf=LobeFit("ggx: of the test", determined, "", 0.2, None, (), None, None, 0.9, scene.specular))
+
+
+def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decomposition) -> None:
+    light = NewLight(coefficients=turned_light(scene.illumination, turn(yaw=80)))
+    by_fit = relight(fitted(scene, True), light)
+    assert not any("no lobe" in note for note in by_fit.notes)
+    assert np.array_equal(by_fit.specular, relight(scene, light, Relighting("render", Lobe(alpha=0.2))).specular)
+    assert np.array_equal(relight(fitted(scene, False), light).specular, relight(scene, light, Relighting("scale")).specular)
+    sharper = change_gloss(fitted(scene, True), Gloss(exponent=100))
+    assert np.array_equal(sharper.specular, change_gloss(scene, Gloss(exponent=100, present=Lobe(alpha=0.2).nearest_exponent)).specular)
 
 
 # --- gloss ------------------------------------------------------------------------------------------------------------------------------
