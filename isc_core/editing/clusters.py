@@ -15,33 +15,40 @@ import numpy as np
 from ..decomposition import Decomposition
 from ..errors import InputError
 from .chroma import to_oklab
-from .dichromatic import masked_blur
 from .edited import light_color, white_of
+from .guided import affine_fit
 
 LARGEST_COUNT = 12
 _LIGHTNESS, _DARK = 0.2, 0.15  # the weight of L; below the second the ratios are mostly noise
 _ALIKE = 0.045  # centres nearer than this are one paint
 _ROUNDS, _TRIES, _SAMPLES = 60, 12, 20000
-_SOFT = 0.5  # sigma in pixels that smooths a cluster's outline
+_SOFT = 1e-3  # of the white's square: contrasts of the paint that do not matter
+_SURE = 0.7  # shares within 15 % of none and all are none and all
 
 
 @dataclass(frozen=True)
 class Clusters:
     """`labels`: (H, W) int, 0 for the largest cluster, -1 outside the mask. `colors`: (K, 3) linear, each cluster's mean in the light's
-    mean colour. `shares`: (K,) of the object's pixels, falling."""
+    mean colour. `shares`: (K,) of the object's pixels, falling. `paint`: (H, W, 3), what they are clusters of."""
 
     labels: np.ndarray
     colors: np.ndarray
     shares: np.ndarray
+    paint: np.ndarray
 
     def weight(self, number: int) -> np.ndarray:
-        """(H, W) in [0, 1]: how much each pixel belongs to the cluster `number`, 1 being the largest; its outline is slightly soft.
+        """(H, W) in [0, 1]: how much each pixel belongs to the cluster `number`, 1 being the largest. Along its outline pixels are mixtures
+        of two paints: how much of each follows from their colour.
 
         Raises `InputError` for a number that is not there.
         """
         if not 1 <= number <= len(self.shares):
             raise InputError(f"there is no cluster {number}: choose one of 1 to {len(self.shares)}, see clusters.png")
-        return np.clip(masked_blur((self.labels == number - 1).astype(float), self.labels >= 0, _SOFT), 0, 1)
+        mask = self.labels >= 0
+        member = (self.labels == number - 1).astype(float)[..., None]
+        slope, offset = affine_fit(self.paint, member, mask, _SOFT * white_of(self.paint, mask) ** 2)
+        share = np.einsum("hwgc,hwg->hwc", slope, self.paint)[..., 0] + offset[..., 0]
+        return np.where(mask, np.clip((share - 0.5) / _SURE + 0.5, 0, 1), 0)
 
 
 def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
@@ -64,7 +71,7 @@ def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
     picture = np.full(d.mask.shape, -1)
     picture[d.mask] = rank[labels]
     colors = np.stack([paint[rank[labels] == k].mean(0) for k in range(len(order))])
-    return Clusters(picture, colors, sizes[order] / len(points))
+    return Clusters(picture, colors, sizes[order] / len(points), seen)
 
 
 def _joined(centers: np.ndarray) -> np.ndarray:

@@ -2,13 +2,9 @@
 
 Problem: the maps may be smaller than the photo, whose detail the edited picture should keep; pixels outside the object must not change.
 Equation: what is brought back is the CHANGE, e = image' - image. Around each pixel k of the maps it is taken to be an affine function of
-the photo's colour I (the guided filter, in colour),
-
-    e ~ A_k I + b_k,     A_k = (cov_k(I) + epsilon)^-1 (cov_k(I, e) + epsilon P_k),     b_k = mean_k e - A_k^T mean_k I,
-
-over a window inside the mask. Where the window's colours tell nothing, A falls back to P, the change as a factor of each channel,
-mean_k e / mean_k I, at most 1: so texture finer than the maps gets the contrast of its new light (the
-published filter has P = 0). A and b, smooth, are enlarged and applied to the full photo, and what they leave of e is enlarged as it is. A
+the photo's colour I, e ~ A_k^T I + b_k (see `guided`). Where the window's colours tell nothing A falls back to the change as a factor of
+each channel, mean_k e / mean_k I, at most 1: so texture finer than the maps gets the contrast of its new light. A and b, smooth, are
+enlarged and applied to the full photo, and what they leave of e is enlarged as it is. A
 highlight that is taken away or a paint that is changed so ends at the photo's own edges. At the photo's own size e is added as it is.
 
 Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013, doi:10.1109/TPAMI.2012.213; enlarging the coefficients:
@@ -24,8 +20,8 @@ from ..decomposition import Decomposition
 from ..errors import InputError
 from ..photo import Photo, mask_box
 from .edited import Edited, white_of
+from .guided import affine_fit, window_means
 
-_RADIUS = 2  # of the window, in pixels of the maps
 _EPSILON = 1e-3  # of the white's square: contrasts below a thirtieth of the white tell little
 _CHUNK = 1_000_000  # pixels at a time
 _OFF = 3.0  # pixels of the maps that the object's box may differ
@@ -69,8 +65,10 @@ def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: f
     result = np.zeros(photo.image.shape, np.float32)
     if not change.any():
         return result
-    slope, offset = _affine(d.image.astype(float), change.astype(float), d.mask, _EPSILON * white_of(d.image, d.mask) ** 2)
-    slope, offset = (_means(values, d.mask) for values in (slope, offset))
+    epsilon = _EPSILON * white_of(d.image, d.mask) ** 2
+    mean_image, mean_change = (window_means(values.astype(float), d.mask) for values in (d.image, change))
+    factor = np.clip(mean_change / np.maximum(mean_image, np.sqrt(epsilon)), -1, 1)
+    slope, offset = affine_fit(d.image.astype(float), change.astype(float), d.mask, epsilon, factor[..., None, :] * np.eye(3))
     rest = change - np.einsum("hwgc,hwg->hwc", slope, d.image) - offset
     planes = np.concatenate([slope.reshape(*d.mask.shape, 9), offset + rest], -1)
     nearest = ndimage.distance_transform_edt(~d.mask, return_distances=False, return_indices=True)
@@ -82,22 +80,3 @@ def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: f
         found = np.stack([ndimage.map_coordinates(planes[..., k], places, order=1, mode="nearest") for k in range(12)], -1)
         result[at] = np.einsum("ngc,ng->nc", found[:, :9].reshape(-1, 3, 3), photo.image[at]) + found[:, 9:]
     return result
-
-
-def _affine(guide: np.ndarray, values: np.ndarray, mask: np.ndarray, epsilon: float) -> tuple[np.ndarray, np.ndarray]:
-    """A (h, w, 3, 3) and b (h, w, 3) of values ~ A^T guide + b around each pixel of the mask; nothing useful outside."""
-    mean_guide, mean_values = _means(guide, mask), _means(values, mask)
-    own = _means(guide[..., :, None] * guide[..., None, :], mask) - mean_guide[..., :, None] * mean_guide[..., None, :]
-    common = _means(guide[..., :, None] * values[..., None, :], mask) - mean_guide[..., :, None] * mean_values[..., None, :]
-    factor = np.clip(mean_values / np.maximum(mean_guide, np.sqrt(epsilon)), -1, 1)
-    slope = np.linalg.solve(own + epsilon * np.eye(3), common + epsilon * factor[..., None, :] * np.eye(3))
-    return slope, mean_values - np.einsum("hwgc,hwg->hwc", slope, mean_guide)
-
-
-def _means(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Means (h, w, ...) over windows, of the mask's pixels alone; 0 where a window has none."""
-    size = (2 * _RADIUS + 1,) * 2 + (1,) * (values.ndim - 2)
-    inside = mask.reshape(mask.shape + (1,) * (values.ndim - 2)).astype(float)
-    weight = ndimage.uniform_filter(inside, size, mode="constant")
-    total = ndimage.uniform_filter(values * inside, size, mode="constant")
-    return np.where(weight > 1e-9, total / np.maximum(weight, 1e-9), 0)
