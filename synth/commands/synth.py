@@ -39,7 +39,7 @@ def declare(commands: Commands) -> None:
         "preview.png (look at this first), maps.exr and scene.json; README.md describes the set.", _EXAMPLES,
     )  # fmt: skip
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="the folder to write; an interrupted run in it goes on")
-    parser.add_argument("--count", type=count, metavar="N", help="how many scenes")
+    parser.add_argument("--count", type=count, default=20, metavar="N", help="how many scenes (default %(default)s)")
     parser.add_argument("--seed", type=count, default=0, metavar="S", help="of the first scene (default %(default)s)")
     _add_choices(parser)
     _add_picture(parser)
@@ -87,8 +87,8 @@ def _add_picture(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work; what can be wrong is found before it begins."""
-    if options.count is None or options.output is None:
-        raise InputError("give the number of scenes and their folder: isc synth --count N -o DIR (see `isc synth --help`)")
+    if options.output is None:
+        raise InputError("give the folder to write: isc synth -o DIR (see `isc synth --help`)")
     sources = _sources(options)
     sensor = Sensor(clip=options.clip or options.bits > 0, noise=options.noise, bits=options.bits)
     picture = Picture(options.size, options.samples, options.bounces, options.perspective, options.exposure, sensor, options.renderer)
