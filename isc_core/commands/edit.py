@@ -253,7 +253,7 @@ def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     photo = read_photo(options.photo, options.mask, transfer)
     if given.get("sha256") != photo.original.sha256 and not options.quiet:
         print("isc: note: the photo's file is not the one that was decomposed; the edit is brought into it all the same", file=sys.stderr)
-    return Original(photo, read_raster(options.photo))
+    return Original(photo, read_raster(options.photo), options.photo)
 
 
 # --- words ------------------------------------------------------------------------------------------------------------------------------

@@ -93,15 +93,19 @@ def _new_lobe(d: Decomposition, gloss: Gloss, light: DirectionalLight | None, no
     if not d.specular[d.mask].any():
         notes.append("the object has no specular light to change: isc edit RESULT highlight gives it some")
         return d.specular
-    fit, known = explain_specular(d), known_lobe(d)
-    present = gloss.present or (known.nearest_exponent if known is not None else fit.exponent if fit.determined else None)
+    known = known_lobe(d)
+    present = gloss.present or (known.nearest_exponent if known is not None else None)
+    asks_light = gloss.method == "render" and light is None
+    fit = explain_specular(d) if present is None or asks_light else None
+    if present is None and fit is not None and fit.determined:
+        present = fit.exponent
     if present is None:
         notes.append("no single light and lobe explain the specular layer: the present exponent is a guess")
         present = USUAL_EXPONENT
     exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
-    if gloss.method == "remap":
+    under = light or (fit.light if fit is not None else None)
+    if gloss.method == "remap" or under is None:
         return remapped(d.specular, d.mask, present, exponent)
-    under = light or fit.light
     tone = replace(under, irradiance=under.irradiance / float(luminance(under.irradiance)))
     rendered = lobe_under(Lobe(exponent), d.normal, tone)
     return strength_of(d, Lobe(exponent), rendered, None) * rendered

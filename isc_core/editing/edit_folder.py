@@ -4,7 +4,8 @@
 `edited.exr` is the same picture in linear light, colours multiplied by alpha as is usual there; `before_after.png` is the sheet;
 `clusters.png`, of recolouring, shows the parts to choose from. A folder appears whole or not at all.
 
-Limits: of a float photo whose pixels are partly transparent, those outside the mask are kept to the rounding of that product.
+Limits: of a float photo with partly transparent pixels those outside the mask are kept bit by bit only where its file is an EXR with plain
+R, G, B; else to the rounding of the product with alpha.
 """
 
 import json
@@ -17,7 +18,7 @@ import numpy as np
 
 from ..atomic import new_folder, require_writable
 from ..decomposition import Decomposition
-from ..exr import write_channels
+from ..exr import read_channels, write_channels
 from ..photo import Photo, Raster, recoded, write_png
 from ..report import Panel, Shown, edit_sheet
 from .clusters import Clusters
@@ -30,10 +31,11 @@ _FADED = 0.06
 
 @dataclass(frozen=True)
 class Original:
-    """The photo to bring the edit back into: its light and mask at full size, and its file's values."""
+    """The photo to bring the edit back into: its light and mask at full size, its file's values, and the file."""
 
     photo: Photo
     raster: Raster
+    path: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -69,15 +71,12 @@ def save_edit(
     Raises `InputError` if the folder is not ours or cannot be written, or the photo is not the result's.
     """
     image, mask, before, raster = _picture(d, edit, original)
-    pair = [Shown(before, mask, "Before"), Shown(image, mask, "After")]
+    pair = [Shown(before, mask, "Before"), Shown(image, mask, "After" if sheet.layers else "In the best light")]
     layers = [Shown(edit.diffuse, d.mask, "Diffuse, after"), Shown(edit.specular, d.mask, "Specular, after")] if sheet.layers else []
     with new_folder(folder, FILES) as partial:
         if raster.peak is not None:
             write_png(partial / "edited.png", raster)
-        alpha = raster.alpha
-        cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
-        planes = {name: image[..., c] * cover for c, name in enumerate("RGB")}
-        write_channels(partial / "edited.exr", planes if alpha is None else planes | {"A": alpha})
+        write_channels(partial / "edited.exr", _linear_planes(image, mask, raster, original))
         edit_sheet(sheet.title, sheet.subtitle, [*pair, *layers], sheet.others, columns=4 if sheet.layers else 5).save(
             partial / "before_after.png"
         )
@@ -85,6 +84,19 @@ def save_edit(
             cluster_sheet(d, clusters).save(partial / "clusters.png")
         text = {"schema_version": 1, **record.__dict__, "notes": list(edit.notes), "of_photo": original is not None}
         (partial / "edit.json").write_text(json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def _linear_planes(image: np.ndarray, mask: np.ndarray, raster: Raster, original: Original | None) -> dict[str, np.ndarray]:
+    """R, G, B times alpha, and A; outside the mask what the photo's own EXR file stores, which that product may round."""
+    alpha = raster.alpha
+    cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
+    planes = {name: image[..., c] * cover for c, name in enumerate("RGB")}
+    if original is not None and original.path is not None and original.path.suffix.lower() == ".exr":
+        stored = read_channels(original.path)
+        for name in planes:
+            if name in stored and stored[name].shape == mask.shape:
+                planes[name] = np.where(mask, planes[name], stored[name])
+    return planes if alpha is None else planes | {"A": alpha}
 
 
 def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:

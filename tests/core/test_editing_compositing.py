@@ -140,11 +140,12 @@ def test_a_grey_photo_gets_colour_only_where_it_is_painted(full: Decomposition, 
 
 def test_exr_stays_linear_and_unchanged_outside(full: Decomposition, tmp_path: Path) -> None:
     light = np.where(full.mask[..., None], 3 * full.image, np.random.default_rng(1).uniform(0, 9, full.image.shape)).astype(np.float32)
-    alpha = full.mask.astype(np.float32)
+    generator = np.random.default_rng(7)
+    alpha = np.where(full.mask, 1, generator.choice([0, 0.1, 0.3, 0.47], full.mask.shape)).astype(np.float32)
     write_channels(tmp_path / "photo.exr", {**{c: light[..., k] for k, c in enumerate("RGB")}, "A": alpha})
     photo = read_photo(tmp_path / "photo.exr")
     half = half_size(full)
-    original = Original(photo, read_raster(tmp_path / "photo.exr"))
+    original = Original(photo, read_raster(tmp_path / "photo.exr"), tmp_path / "photo.exr")
     half = replace(half, image=half.image * 3, diffuse=half.diffuse * 3, specular=half.specular * 3, shading=half.shading * 3)
     save_edit(half, edit_layers(half, MATT), tmp_path / "out", Record("dichromatic"), Sheet("t"), original=original)
     written = read_channels(tmp_path / "out" / "edited.exr")
