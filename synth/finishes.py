@@ -2,7 +2,8 @@
 
 Equation: the exponent p is log-uniform over `EXPONENTS`; alpha of facets is that whose lobe is nearest (`isc_core.brdf.roughness`): .028 to
 .44. Strength of blinn_phong: log-uniform over `STRENGTHS`, about the share of light that the gloss mirrors; insulators have .02 to .08
-along the normal and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to 1.5 (coated twice), ior 1.3 to 1.8.
+along the normal and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to 1.5 (coated twice), ior 1.3
+to 1.8.
 A varying gloss is one of: worn (matt where it was touched), smudged (broader within smudges), striped (matt bands).
 
 Citation: A. Ngan, F. Durand, W. Matusik, "Experimental analysis of BRDF models", EGSR 2005, 117-126, doi:10.2312/EGWR/EGSR05/117-126
