@@ -37,7 +37,7 @@ LIGHTS = ("directional", "directional", "small", "point", "area", "directional",
 _ALBEDOS = ("uniform", "patches", "print", "noise")
 _SAMPLES = 48
 _LEVEL = 0.6
-CALIBRATED = 78  # scenes before this one were used to calibrate `brdf.fitting.recovered`
+CALIBRATED = 123  # scenes before this one were used to calibrate `brdf.fitting.recovered`
 
 
 @dataclass(frozen=True)

@@ -39,6 +39,8 @@ _LADDER = (2.0, 4.0)
 _WIDEST = 0.7  # an alpha as large as that is a light as smooth as shading
 _WIDE = 0.35  # an alpha as large as that may be a smooth light
 _CONE = 1.515  # deviations, each way, that hold 68 % in two dimensions
+# What even exact images leave, the sky being modelled roughly: of log alpha, of log strength, of directions in radians.
+_MODEL_ALPHA, _MODEL_STRENGTH, _MODEL_TURN = 0.003, 0.01, 0.003
 _NARROWEST_PIXELS = 6  # within half of the peak
 _GAIN = 0.15  # of the loss: less, and another light explains nothing
 _LEAST_EXPLAINED = 0.25
@@ -162,7 +164,7 @@ def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOp
     lights = _lights(problem, fitted, spread, gains, options)
     convention = CONVENTION[options.model]
     at = fitted.lamps.count + len(fitted.lamps.base)
-    sd = float(np.sqrt(spread[at, at] + np.radians(options.normal_error) ** 2))
+    sd = float(np.sqrt(spread[at, at] + np.radians(options.normal_error) ** 2 + _MODEL_ALPHA**2))
     reason = _reason(problem, fitted, explained, sd)
     alpha: float | None = fitted.lamps.alpha
     low, high = float(max(fitted.lamps.alpha * np.exp(-sd), ALPHAS[0])), float(min(fitted.lamps.alpha * np.exp(min(sd, 20)), 1.0))
@@ -187,12 +189,12 @@ def _lights(problem: Problem, fitted: Fitted, spread: np.ndarray, gains: np.ndar
         toward = lamps.directions[k] - lamps.nearness[k] * middle
         length = float(np.linalg.norm(toward))
         colour = gains[k] * np.exp(lamps.log_amplitudes[k]) / length**2
-        factor = float(np.exp(min(np.sqrt(spread[k, k] + (2 * systematic) ** 2), 20)))
+        factor = float(np.exp(min(np.sqrt(spread[k, k] + (2 * systematic) ** 2 + _MODEL_STRENGTH**2), 20)))
         cone = 0.0
         if problem.directions:
             at = count + len(lamps.base) + 1 + 2 * k
             turn = (spread[at, at] + spread[at + 1, at + 1]) / 2
-            cone = float(min(np.degrees(_CONE * np.sqrt(turn + systematic**2)), 180))
+            cone = float(min(np.degrees(_CONE * np.sqrt(turn + systematic**2 + _MODEL_TURN**2)), 180))
         lights.append(LobeLight(toward / length, cone, colour, Interval(colour / factor, colour * factor)))
     return tuple(sorted(lights, key=lambda light: -float(light.strength_light.mean())))
 
