@@ -15,6 +15,7 @@ from pathlib import PurePath
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
+from .brdf.fitting import LobeFit
 from .decomposition import Decomposition, Separation
 from .photo import linear_to_srgb, srgb_to_linear
 from .sirfs.frames import real_sh
@@ -40,7 +41,7 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     """The sheet of a decomposition: eight panels, 4 x 2, with a title taken from its provenance.
 
     The title reads `input["name"]`, `settings["model"]`, `settings["separator"]`, `settings["illumination"]`, `status["loss"]`,
-    `status["converged"]`, as far as they are there.
+    `status["converged"]`, as far as they are there, and the fitted gloss.
     """
     d = decomposition
     frame = _Frame.around(d.mask)
@@ -245,7 +246,16 @@ def _title(d: Decomposition) -> tuple[str, str]:
         words.append(f"loss {loss:.2f}")
     if isinstance(converged := status.get("converged"), bool):
         words.append("converged" if converged else "stopped early")
+    if d.brdf is not None:
+        words.append(_gloss(d.brdf))
     return name, "   ·   ".join(words)
+
+
+def _gloss(fit: LobeFit) -> str:
+    """The fit in a few words; roughness as Blender and glTF count it."""
+    if fit.blender_roughness is None:
+        return "gloss undetermined" if fit.lights else "no highlights"
+    return f"roughness {'' if fit.determined else 'at most '}{fit.blender_roughness:.2f}"
 
 
 def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> Image.Image:

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from isc_core.brdf.fitting import fit_lobe
 from isc_core.decomposition import Decomposition, Provenance, Separation
 from isc_core.photo import srgb_to_linear
-from isc_core.report import Answer, comparison_sheet, contact_sheet, separation_sheet
+from isc_core.report import Answer, _title, comparison_sheet, contact_sheet, separation_sheet
 from tests.core.ball_scene import ball
 
 LABELS = ("input", "diffuse", "specular", "reflectance", "shading", "normals", "height", "light")
@@ -157,3 +158,13 @@ def test_a_comparison_without_truth_shows_the_confidence(scene: Decomposition) -
     colour, confidence = comparison_panel(sheet, 2), comparison_panel(sheet, 5)
     assert np.abs(colour.sum(-1) - 1)[inner()].max() < 0.05
     assert np.ptp(confidence[inner()], axis=1).max() < 0.01 and confidence[160, 160, 0] > 0.9 > confidence[160, 30, 0]
+
+
+def test_the_title_says_what_was_fitted() -> None:
+    d = ball()
+    fit = fit_lobe(d.specular, d.normal, d.mask)
+    assert fit.blender_roughness is not None
+    assert _title(replace(d, brdf=fit))[1].endswith(f"roughness {fit.blender_roughness:.2f}")
+    assert _title(replace(d, brdf=replace(fit, determined=False)))[1].endswith(f"roughness at most {fit.blender_roughness:.2f}")
+    assert _title(replace(d, brdf=replace(fit, alpha=None)))[1].endswith("gloss undetermined")
+    assert _title(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))[1].endswith("no highlights")
