@@ -73,8 +73,8 @@ def _budget_part(budgets: Sequence[Budget]) -> str:
         "Truth is swapped in for one stage's answer at a time, alone and beside the other truths. A share is what the truth of a stage "
         "saves of the final error, averaged over the orders in which truths can be given; shares and what is left add up to all of it. "
         "A negative share says that the chain does better with that stage's error than without it. What is left with all truths no stage "
-        "can remove: rendered shading is not the exponential of nine spherical harmonics of the normal. Shape and light are not scored where "
-        "they are given themselves. Errors are geometric means."
+        "can remove: rendered shading is not the exponential of nine spherical harmonics of the normal. Shape and light are not scored "
+        "where they are given themselves. Errors are geometric means."
     )
     return f"<h2>Error budget</h2><p>{escape(text)}</p>{budget_chart(budgets)}{_table(heading, rows)}"
 
