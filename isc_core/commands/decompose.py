@@ -102,7 +102,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     save(result, options.output, monitor=monitor.part(0.8, 1.0))
     status = result.provenance.status
     trouble = [] if status.get("converged", True) else [f"note: {status['help']}"]
-    return hints(options, *trouble, f"look at {options.output / 'preview.png'}")
+    gloss = [f"gloss: {status['gloss']}"] if status.get("gloss") else []
+    return hints(options, *trouble, *gloss, f"look at {options.output / 'preview.png'}")
 
 
 def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:

@@ -35,7 +35,7 @@ def declare(commands: Commands) -> None:
     )
     parser.add_argument("--illumination", choices=(*ILLUMINATIONS, "both"), help="default: both, or laboratory for --input original")
     parser.add_argument("--model", metavar="NAME", help="as for isc decompose (default: sirfs, or mdr for --input original)")
-    parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of mdr (default %(default)s)")
+    parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of mdr and mbp (default %(default)s)")
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
     add_engine(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")

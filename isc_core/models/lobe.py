@@ -11,6 +11,7 @@ import numpy as np
 
 from ..brdf.fitting import LobeFit, LobeFitOptions, fit_lobe
 from ..brdf.fitting.response import LobeModel
+from ..brdf.roughness import blender_from_alpha
 from ..decomposition import Separation
 from ..progress import Monitor
 from .layers import shaded
@@ -29,8 +30,16 @@ class FittedLobe:
 
     @property
     def status(self) -> dict[str, str]:
-        """Why the gloss is not determined, or that it is."""
-        return {"gloss": self.brdf.reason if self.brdf.lights else MATT}
+        """The roughness with its interval, or why it is not determined."""
+        fit = self.brdf
+        if not fit.lights:
+            return {"gloss": MATT}
+        if not fit.determined or fit.alpha is None or fit.alpha_interval is None:
+            return {"gloss": fit.reason}
+        low, likely, high = (
+            float(blender_from_alpha(np.clip(a, 0, 1))) for a in (fit.alpha_interval.low, fit.alpha, fit.alpha_interval.high)
+        )
+        return {"gloss": f"roughness {likely:.2f}, {low:.2f} to {high:.2f} with a probability of 68 %"}
 
 
 def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, model: LobeModel = "ggx") -> FittedLobe:
