@@ -34,11 +34,10 @@ class FittedLobe:
         fit = self.brdf
         if not fit.lights:
             return {"gloss": MATT}
-        if not fit.determined or fit.alpha is None or fit.alpha_interval is None:
+        span = fit.alpha_interval
+        if not fit.determined or fit.alpha is None or span is None:
             return {"gloss": fit.reason}
-        low, likely, high = (
-            float(blender_from_alpha(np.clip(a, 0, 1))) for a in (fit.alpha_interval.low, fit.alpha, fit.alpha_interval.high)
-        )
+        low, likely, high = (float(blender_from_alpha(np.clip(alpha, 0, 1))) for alpha in (span.low, fit.alpha, span.high))
         return {"gloss": f"roughness {likely:.2f}, {low:.2f} to {high:.2f} with a probability of 68 %"}
 
 
