@@ -17,29 +17,42 @@ from .task import Task
 
 @dataclass(frozen=True)
 class Shape:
-    """`height` (H, W) in pixels of the maps and `light` (9, 3), reference convention; `status`: how they were found, JSON-ready."""
+    """`height` (H, W) in pixels of the maps and `light` (9, 3), reference convention; `status`: how they were found, JSON-ready.
+    `working_height` (h, w): at the working scale."""
 
     height: np.ndarray
     light: np.ndarray
     status: dict[str, Any]
+    working_height: np.ndarray
 
 
-def recover_shape(diffuse: np.ndarray, task: Task, monitor: Monitor) -> Shape:
-    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps. Raises `InputError`, `Cancelled`."""
+def recover_shape(diffuse: np.ndarray, task: Task, monitor: Monitor, doubtful: np.ndarray | None = None) -> Shape:
+    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps; `doubtful`: see `recover`.
+
+    Raises `InputError`, `Cancelled`.
+    """
+    result = _recover(diffuse, task, monitor, doubtful, task.known)
+    return Shape(height_of_maps(result.height, task), np.broadcast_to(result.light, (9, 3)).copy(), _status(result), result.height)
+
+
+def energy_of(diffuse: np.ndarray, shape: Shape, task: Task, doubtful: np.ndarray) -> float:
+    """The SIRFS objective of the working photo's `diffuse` (H, W, 3) at `shape`, over the pixels that are not `doubtful` (H, W)."""
+    return _recover(diffuse, task, Monitor(), doubtful, Known(shape.working_height, shape.light, task.known.depth)).terms.total
+
+
+def _recover(diffuse: np.ndarray, task: Task, monitor: Monitor, doubtful: np.ndarray | None, known: Known) -> Recovered:
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
     priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
     options = RecoverOptions(shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads))
     weights = isc_weights(settings.illumination, channels)
-    known = task.known
     light = known.light if known.light is None or channels == 3 else known.light.mean(axis=1, keepdims=True)
     with task.clock.stage("shape and light"):
-        result = recover(
+        return recover(
             diffuse[..., :channels], working.mask, working.code_value / 2, priors, weights, options,
-            known=Known(known.height, light, known.depth), monitor=monitor,
+            known=Known(known.height, light, known.depth), doubtful=doubtful, monitor=monitor,
         )  # fmt: skip
-    return Shape(height_of_maps(result.height, task), np.broadcast_to(result.light, (9, 3)).copy(), _status(result))
 
 
 def height_of_maps(height: np.ndarray, task: Task) -> np.ndarray:

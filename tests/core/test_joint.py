@@ -1,0 +1,148 @@
+"""Joint MDR on scenes with known parts: grey paint under a lamp, which colour cannot tell from a highlight, and matt objects."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isc_core.brdf.ggx import Ggx
+from isc_core.brdf.shading import directional, radiance
+from isc_core.decomposition import Decomposition
+from isc_core.models import Settings, Task
+from isc_core.models.joint import Doubt, JointOptions, doubt, joint, repaint
+from isc_core.models.mdr import mdr
+from isc_core.models.task import Answer
+from isc_core.photo import Photo, PhotoSource
+from isc_core.separation.highlight_cue import features, highlight_excess, reduced
+from isc_core.sirfs.frames import light_to_reference
+from isc_core.sirfs.recover import Known
+from tests.core.ball_scene import ball
+
+LAMP = np.array([-0.42, 0.5, 0.757])
+LAMP /= np.linalg.norm(LAMP)
+
+
+def grey_ball(gloss: float, alpha: float = 0.1) -> Decomposition:
+    """A ball of two grey paints; `gloss`: irradiance of the lamp that the gloss mirrors."""
+    d = ball((92, 100), 42.0, (46, 50))
+    inside = d.mask[..., None]
+    reflectance = np.where(inside, 0.25 + 0.6 * d.reflectance[..., :1], 0) * np.ones(3, np.float32)
+    shine = radiance(Ggx(alpha, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(LAMP, max(gloss, 1e-6)))
+    diffuse, specular = reflectance * d.shading, np.where(inside, shine if gloss else 0, 0).astype(np.float32)
+    scale = np.float32(1 / (diffuse + specular).max())
+    return replace(d, image=scale * (diffuse + specular), diffuse=scale * diffuse, specular=scale * specular, reflectance=reflectance)
+
+
+def photo_of(d: Decomposition) -> Photo:
+    source = PhotoSource("0" * 64, (d.image.shape[1], d.image.shape[0]), 12, "linear", "file")
+    return Photo(d.image.astype(np.float32), d.mask, 1 / 4095, np.zeros(d.mask.shape, bool), source)
+
+
+def task_of(d: Decomposition, known: bool = True) -> Task:
+    """With the true shape and light, so that nothing but the separation is asked for; or without them."""
+    photo = photo_of(d)
+    truth = Known(d.height.astype(float), light_to_reference(d.illumination)) if known else Known()
+    return Task(photo, photo, Settings(illumination="laboratory"), truth)
+
+
+@pytest.fixture(scope="module")
+def glossy() -> tuple[Decomposition, Answer]:
+    d = grey_ball(10)
+    return d, joint(task_of(d))
+
+
+def error(d: Decomposition, answer: Answer) -> float:
+    return float(np.square(answer.split.diffuse - d.diffuse)[d.mask].mean())
+
+
+def test_a_highlight_on_grey_paint_is_taken_off(glossy: tuple[Decomposition, Answer]) -> None:
+    d, answer = glossy
+    nothing = float(np.square(d.specular)[d.mask].mean())
+    assert error(d, mdr(task_of(d))) > 0.5 * nothing
+    assert error(d, answer) < 0.5 * nothing
+    assert answer.status["joint"].startswith("highlights were taken off")
+
+
+def test_the_layers_sum_up_and_are_not_negative(glossy: tuple[Decomposition, Answer]) -> None:
+    d, answer = glossy
+    split = answer.split
+    assert np.abs(split.diffuse + split.specular + split.residual - d.image)[d.mask].max() < 1e-5
+    assert min(split.diffuse.min(), split.specular.min()) > -1e-6
+    assert split.confidence.min() >= 0 and split.confidence.max() <= 1
+    assert not (split.diffuse[~d.mask].any() or split.specular[~d.mask].any())
+
+
+def test_shape_and_light_are_found_without_the_highlight(glossy: tuple[Decomposition, Answer]) -> None:
+    d, _ = glossy
+    task = task_of(d, known=False)
+    found = joint(task)
+    assert found.status["joint"].startswith("highlights were taken off")
+    assert error(d, found) < 0.5 * error(d, mdr(task_of(d)))
+
+
+def test_the_same_again(glossy: tuple[Decomposition, Answer]) -> None:
+    d, answer = glossy
+    again = joint(task_of(d))
+    np.testing.assert_array_equal(again.height, answer.height)
+    np.testing.assert_array_equal(again.split.diffuse, answer.split.diffuse)
+
+
+def test_a_matt_object_is_what_mdr_makes_of_it() -> None:
+    d = grey_ball(0)
+    found, start = joint(task_of(d)), mdr(task_of(d))
+    np.testing.assert_array_equal(found.split.diffuse, start.split.diffuse)
+    np.testing.assert_array_equal(found.height, start.height)
+    assert "no highlights" in found.status["joint"]
+
+
+def test_a_step_that_does_not_lower_the_energy_is_not_taken() -> None:
+    d = grey_ball(10)
+    task, start = task_of(d), mdr(task_of(d))
+    found = joint(task, JointOptions(change_of_variables=-1e6))
+    np.testing.assert_array_equal(found.split.diffuse, start.split.diffuse)
+    np.testing.assert_array_equal(found.height, start.height)
+    assert "did not fall" in found.status["joint"]
+
+
+def test_the_cue_does_not_depend_on_the_exposure_or_on_what_is_outside() -> None:
+    d = grey_ball(10)
+    expected = highlight_excess(d.image, d.mask)
+    np.testing.assert_allclose(highlight_excess(4 * d.image, d.mask), expected, atol=1e-4)
+    other = np.where(d.mask[..., None], d.image, 7)
+    np.testing.assert_allclose(highlight_excess(other, d.mask), expected, atol=1e-5)
+    assert expected.min() == 0 and expected.dtype == np.float32
+
+
+def test_the_cue_is_highest_where_the_highlight_is() -> None:
+    d = grey_ball(10)
+    true = np.log(np.maximum(d.image, 1e-9) / np.maximum(d.diffuse, 1e-9)).mean(axis=2)
+    found = highlight_excess(d.image, d.mask)
+    assert found[d.mask & (true > 0.8)].mean() > 5 * found[d.mask & (true < 0.1)].mean()
+
+
+def test_features_are_finite_for_any_shape() -> None:
+    rng = np.random.default_rng(5)
+    for shape in ((3, 200), (1, 1), (400, 380)):
+        mask = np.ones(shape, bool)
+        small, inside, _ = reduced(rng.random((*shape, 3)) * (rng.random(shape) > 0.3)[..., None], mask)
+        found = features(small, inside)
+        assert found.shape == (inside.sum(), 34) and np.isfinite(found).all()
+
+
+def test_paint_is_continued_under_the_highlight() -> None:
+    mask = np.zeros((40, 40), bool)
+    mask[4:36, 4:36] = True
+    doubtful = np.zeros_like(mask)
+    doubtful[15:25, 15:25] = True
+    shading = np.linspace(0.5, 1, 40)[None, :, None] * np.ones((40, 40, 3))
+    diffuse = np.where(mask[..., None], 0.4 * shading, 0)
+    image = diffuse + 0.3 * doubtful[..., None]
+    found = repaint(Doubt(image, doubtful), shading, mask, image)
+    np.testing.assert_allclose(found, diffuse, atol=1e-6)
+
+
+def test_what_colour_has_taken_off_is_not_taken_twice() -> None:
+    d = grey_ball(10)
+    found = doubt(d.image, d.diffuse, d.mask)
+    assert found is not None
+    assert found.doubtful.sum() < 0.1 * doubt(d.image, d.image, d.mask).doubtful.sum()  # type: ignore[union-attr]
