@@ -18,9 +18,8 @@ QUICK = ("--size", "32", "--samples", "4", "--renderer", "arrays", "--shapes", "
 TETRAHEDRON = "v 1 1 1\nv -1 -1 1\nv -1 1 -1\nv 1 -1 -1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 
-def synth(out: Path | None, *arguments: str, count: int | None = 1) -> int:
-    given = () if count is None else ("--count", str(count))
-    return main(["synth", *given, *arguments, *(() if out is None else ("-o", str(out)))])
+def synth(out: Path | None, *arguments: str, count: int = 1) -> int:
+    return main(["synth", "--count", str(count), *arguments, *(() if out is None else ("-o", str(out)))])
 
 
 def refusal(capsys: pytest.CaptureFixture[str]) -> str:
@@ -111,10 +110,9 @@ def test_bad_input_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert not (tmp_path / "set").exists()
 
 
-def test_count_and_folder_are_needed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for out, count in ((None, 1), (tmp_path / "set", None)):
-        assert synth(out, count=count) == 2
-        assert "isc synth --count N -o DIR" in refusal(capsys)
+def test_a_folder_is_needed(capsys: pytest.CaptureFixture[str]) -> None:
+    assert synth(None) == 2
+    assert "isc synth -o DIR" in refusal(capsys)
 
 
 def test_a_run_makes_scenes_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
