@@ -65,12 +65,13 @@ def check_request(root: str | Path, name: str, illumination: str, input: str) ->
     known = list_objects(root, illumination)
     if name not in known:
         raise InputError(f"unknown object '{name}': choose from {', '.join(known)}")
-    if illumination == "natural" and input == "original":
-        raise InputError("the natural images have no highlights: use --input diffuse, or --illumination laboratory")
+    if illumination == "natural" and input == "original" and not (_folder(Path(root), "natural") / name / "original.png").is_file():
+        raise InputError("the natural images of this set have no highlights: use --input diffuse, or --illumination laboratory")
 
 
 def load_object(root: str | Path, name: str, illumination: str = "natural", input: str = "diffuse") -> MitBerkeleyObject:
-    """One object of the set. `input`: "diffuse" (without highlights) or "original" (as photographed; laboratory only).
+    """One object of the set. `input`: "diffuse" (without highlights) or "original" (as photographed; laboratory light, or the
+    glossy sets of `isc synth glossy-mit`).
 
     Height, reflectance, mask and crop always come from the laboratory folder. Raises `InputError` for an unknown name or
     option, and for a missing, damaged or mis-sized file.

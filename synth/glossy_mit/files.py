@@ -1,7 +1,7 @@
 """The files of one object under one light at one level, laid out as the set lays them out.
 
-`laboratory/OBJECT` holds what is read of a photographed object, `natural/OBJECT` the same diffuse image as the natural folder has it, so
-that both readers find it. 16-bit files hold linear values of 1/65535; original = diffuse + specular exactly, in codes.
+`laboratory/OBJECT` holds what is read of a photographed object, `natural/OBJECT` the same images as the natural folder has them, so
+that both readers find them. 16-bit files hold linear values of 1/65535; original = diffuse + specular exactly, in codes.
 
 Equation: one gain for all levels of an object under a light, so that they differ in the specular layer only: the brightest value of the
 highest level, and of the shading, comes just below 1. Only where this would leave the diffuse layer in the dark (99 % of it below 0.02)
@@ -38,7 +38,7 @@ LABORATORY_FILES = (
     RECORD, "original.png", "diffuse.png", "specular.png", "specular.exr", "reflectance.png", "shading.png", "mask.png",
     "depth_valid.png", "shading_corrected_color.mat", "Z.mat", "L.mat", "crop_idx.mat",
 )  # fmt: skip
-NATURAL_FILES = ("L.mat", "diffuse.png", "shading_color.png", "reflectance.png", "mask.png")
+NATURAL_FILES = ("L.mat", "original.png", "diffuse.png", "shading_color.png", "reflectance.png", "mask.png")
 
 
 @dataclass(frozen=True)
@@ -119,18 +119,19 @@ def strength_for(level: float, diffuse: np.ndarray, gloss: np.ndarray) -> float:
 def write_object(root: Path, picture: Exposed, level: float) -> None:
     """Writes natural/OBJECT and then laboratory/OBJECT, each whole or not at all. Raises `InputError` where that is impossible."""
     name, shared = picture.source.name, picture.shared_files
-    with new_folder(root / "natural" / name, NATURAL_FILES) as folder:
-        for file in NATURAL_FILES:
-            (folder / file).write_bytes(shared[f"natural/{file}"])
     specular = picture.specular(level)
     codes = picture.specular_codes(level)
+    original = {"original.png": _png(picture.source.whole(picture.diffuse_codes + codes))}
+    natural = {file.removeprefix("natural/"): content for file, content in shared.items() if file.startswith("natural/")} | original
+    with new_folder(root / "natural" / name, NATURAL_FILES) as folder:
+        for file in NATURAL_FILES:
+            (folder / file).write_bytes(natural[file])
     frame = picture.source.whole(specular.astype(np.float32))
     with new_folder(root / "laboratory" / name, LABORATORY_FILES) as folder:
         for file in LABORATORY_FILES:
-            if file in shared:
-                (folder / file).write_bytes(shared[file])
+            if file in shared | original:
+                (folder / file).write_bytes((shared | original)[file])
         (folder / "specular.png").write_bytes(_png(picture.source.whole(codes)))
-        (folder / "original.png").write_bytes(_png(picture.source.whole(picture.diffuse_codes + codes)))
         write_channels(folder / "specular.exr", {channel: frame[..., k] for k, channel in enumerate("RGB")})
         record = describe(picture, level, codes) | {"files": {file: checksum(folder / file) for file in LABORATORY_FILES[1:]}}
         (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
