@@ -112,10 +112,11 @@ class Stage(Generic[Answer, Marks]):
 
 def all_stages() -> tuple[Stage[Any, Any], ...]:
     """Every stage that there is, in the order of the chain."""
+    from .lobe_stage import GLOSS
     from .separation_stage import SEPARATION
     from .sirfs_stage import SIRFS
 
-    return SEPARATION, SIRFS
+    return SEPARATION, SIRFS, GLOSS
 
 
 def find_stages(names: tuple[str, ...] | None) -> tuple[Stage[Any, Any], ...]:
