@@ -32,7 +32,8 @@ def declare(commands: Commands) -> None:
     )
     parser.add_argument("--split", metavar="NAME", help="run one split of the dataset (default: all)")
     parser.add_argument("--scenes", type=count, default=0, metavar="N", help="run N scenes, drawn by --seed (default: all)")
-    parser.add_argument("--stages", type=names, metavar="a,b", help="separation, sirfs, gloss (default: all, and the chain with its error budget)")
+    stages = "separation, sirfs, gloss (default: all, and the chain with its error budget)"
+    parser.add_argument("--stages", type=names, metavar="a,b", help=stages)
     parser.add_argument("--separator", choices=METHODS, default=BEST, metavar="NAME", help="how to separate (default %(default)s)")
     parser.add_argument("--illumination", choices=ILLUMINATIONS, default=ILLUMINATIONS[0], help="which lights SIRFS expects")
     parser.add_argument("--seed", type=count, default=0, metavar="S", help="of everything drawn at random (default 0)")
