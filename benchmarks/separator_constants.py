@@ -44,7 +44,7 @@ def candidates(count: int) -> list[IscOptions]:
 
 
 def _changed(options: IscOptions, random: np.random.Generator) -> IscOptions:
-    names = random.choice([field.name for field in fields(options)], size=_CHANGED, replace=False)
+    names = random.choice([field.name for field in fields(options) if field.type is not bool], size=_CHANGED, replace=False)
     changes: dict[str, Any] = {name: _moved(getattr(options, name), random) for name in names}
     return replace(options, **changes)
 

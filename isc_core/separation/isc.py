@@ -40,6 +40,7 @@ from .channels import largest, smallest
 from .checks import check_arrays
 from .edge_aware import Paths
 from .evidence import colour_evidence
+from .filter_statistics import highlight_prior
 from .highlight_cues import Steps, far_from_borders, noise_level, paint_mixing, ramp, roughness, steps_of
 from .hue_grid import HueGrid, Places, hue_of, quantile
 from .layers import white_layers
@@ -73,6 +74,7 @@ class IscOptions:
     `scatter_here`: the least relative scatter of a paint's q by place. `coloured`: of 1 - min / max of the paint, by place. `present`: of C
     over that of like pixels. `unmixed_here`, `smooth_by_place`: as above, by place.
     `proven`: of the gain of pixels whose surroundings are judged more mildly, by `faint`: of s over what it may be in error by.
+    `filters`: whether the filter statistics have a say as well, see `filter_statistics`: fewer false highlights, fewer true ones.
     """
 
     hues: int = 48
@@ -93,6 +95,7 @@ class IscOptions:
     smooth_by_place: tuple[float, float] = (0.8, 0.5)
     proven: tuple[float, float] = (0.5, 0.95)
     faint: tuple[float, float] = (0.2, 1.0)
+    filters: bool = False
 
 
 VARIANTS: dict[str, IscOptions] = {"improved": IscOptions()}
@@ -180,6 +183,9 @@ def separate(
     options, monitor = options or VARIANTS["improved"], monitor or Monitor()
     check_arrays(image, mask, clipped)
     _check(options, prior, mask)
+    if options.filters:
+        found = highlight_prior(image, mask)
+        prior = found if prior is None else _at_odds(found, prior)
     unit = _unit(image[mask])
     image = (np.where(mask[..., None], image, 0) / unit).astype(np.float32)
     usable = mask if clipped is None else mask & ~clipped
