@@ -1,0 +1,100 @@
+"""The light's colour from highlights, on balls whose light is known."""
+
+import numpy as np
+import pytest
+
+from isc_core.errors import InputError
+from isc_core.illuminant import Illuminant, IlluminantOptions, estimate_illuminant, tinted, whitened
+
+LIGHT = np.array([1.15, 1.0, 0.85])
+PAINTS = np.array([[0.6, 0.15, 0.1], [0.1, 0.5, 0.15], [0.15, 0.2, 0.6], [0.5, 0.45, 0.1]])
+
+
+def ball(paints: np.ndarray, light: np.ndarray, gloss: float, size: int = 120) -> tuple[np.ndarray, np.ndarray]:
+    """A ball with one sector for each paint, which all meet under the highlight."""
+    y, x = (np.mgrid[:size, :size] - (size - 1) / 2) / (0.46 * size)
+    mask = x**2 + y**2 < 1
+    z = np.sqrt(np.maximum(1 - x**2 - y**2, 0))
+    sector = ((np.arctan2(y, x) / (2 * np.pi) + 0.5) * len(paints)).astype(int) % len(paints)
+    shading = 0.3 + 0.7 * z
+    image = light * (paints[sector] * shading[..., None] + gloss * (z**25)[..., None])
+    return np.where(mask[..., None], image, 0), mask
+
+
+def angle(colour: np.ndarray, other: np.ndarray) -> float:
+    return float(np.degrees(np.arccos(np.clip(colour @ other / np.linalg.norm(colour) / np.linalg.norm(other), -1, 1))))
+
+
+@pytest.mark.parametrize("light", [np.ones(3), LIGHT, LIGHT[::-1], np.array([0.9, 1.2, 0.9])])
+def test_several_paints_give_the_light(light):
+    found = estimate_illuminant(*ball(PAINTS, light, 0.5))
+    assert found.determined and found.confidence > 0.5
+    assert angle(found.colour, light) < 2
+    assert found.colour.mean() == pytest.approx(1, abs=1e-12) and found.colour.min() > 0
+
+
+def test_one_paint_is_not_enough_and_stays_nearer_to_white():
+    found = estimate_illuminant(*ball(PAINTS[:1], LIGHT, 0.5))
+    assert not found.determined
+    assert angle(found.colour, LIGHT) < angle(np.ones(3), LIGHT)
+    # The one plane of paint and light must hold what is said.
+    normal = np.cross(PAINTS[0] * LIGHT, LIGHT)
+    assert abs(normal @ found.colour) / np.linalg.norm(normal) < 0.02
+
+
+@pytest.mark.parametrize("gloss", [0.0, 0.5])
+def test_white_where_nothing_can_be_said(gloss):
+    grey = np.full((1, 3), 0.4)
+    paints = PAINTS if gloss == 0 else grey
+    found = estimate_illuminant(*ball(paints, np.ones(3), gloss))
+    assert not found.determined and found.reason
+    assert angle(found.colour, np.ones(3)) < 0.5
+
+
+def test_exposure_turning_and_surroundings_do_not_matter():
+    image, mask = ball(PAINTS, LIGHT, 0.5)
+    found = estimate_illuminant(image, mask)
+    np.testing.assert_allclose(estimate_illuminant(image * 37, mask).colour, found.colour, atol=1e-9)
+    np.testing.assert_allclose(estimate_illuminant(np.rot90(image), np.rot90(mask)).colour, found.colour, atol=2e-3)
+    around = np.where(mask[..., None], image, 9.0)
+    np.testing.assert_array_equal(estimate_illuminant(around, mask).colour, found.colour)
+
+
+def test_clipped_pixels_say_nothing():
+    image, mask = ball(PAINTS, LIGHT, 0.5)
+    cut = np.minimum(image, 0.7)
+    found = estimate_illuminant(cut, mask, (image >= 0.7).any(axis=2))
+    assert angle(found.colour, LIGHT) < angle(np.ones(3), LIGHT)
+    assert not estimate_illuminant(image, mask, mask).determined
+
+
+def test_less_is_believed_the_less_is_usual():
+    image, mask = ball(PAINTS, LIGHT, 0.5)
+    near, far = (estimate_illuminant(image, mask, options=IlluminantOptions(usual=usual)) for usual in (0.005, 0.2))
+    assert near.confidence < far.confidence
+    assert angle(near.colour, np.ones(3)) < angle(far.colour, np.ones(3))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_whitened_and_back(dtype):
+    image = np.random.default_rng(0).random((9, 8, 3)).astype(dtype)
+    white = whitened(image, LIGHT)
+    assert white.dtype == dtype
+    np.testing.assert_allclose(tinted(white, LIGHT), image, rtol=4 * np.finfo(dtype).eps)
+    np.testing.assert_array_equal(whitened(image, np.ones(3)), image)
+    layers = white * dtype(0.25), white * dtype(0.75)
+    np.testing.assert_allclose(sum(tinted(layer, LIGHT) for layer in layers), image, rtol=8 * np.finfo(dtype).eps)
+
+
+def test_what_does_not_fit_is_refused():
+    image, mask = ball(PAINTS, LIGHT, 0.5)
+    for arrays in ((image[..., 0], mask), (image, mask[1:]), (image, np.zeros_like(mask))):
+        with pytest.raises(InputError, match="the light's colour needs"):
+            estimate_illuminant(*arrays)
+    for options in (IlluminantOptions(usual=0), IlluminantOptions(doubt=-1), IlluminantOptions(enough=2)):
+        with pytest.raises(InputError, match="usual must be"):
+            estimate_illuminant(image, mask, options=options)
+    for colour in (np.array([1.0, 0, 1]), np.ones(4), np.array([np.nan, 1, 1])):
+        with pytest.raises(InputError, match="three numbers above 0"):
+            whitened(image, colour)
+    assert isinstance(estimate_illuminant(image, mask), Illuminant)
