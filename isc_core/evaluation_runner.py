@@ -11,10 +11,12 @@ import numpy as np
 from . import baselines
 from .datasets import MitBerkeleyObject
 from .evaluate import Estimate, Runner
+from .models.joint import JointOptions, doubt, lowers_energy, repaint
 from .models.mbp import split_reflectance
 from .pipeline import BASELINE_MODELS, Settings
 from .progress import Monitor
 from .separation import BEST, separate
+from .separation.highlight_cue import CueNetwork
 from .sirfs.contour import occluding_contour
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
@@ -31,7 +33,7 @@ _HALF_CODE = 0.5 / 65535  # the images have 16 bits; a separation may leave less
 
 @dataclass(frozen=True)
 class RunnerOptions:
-    """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for `mdr` and `mbp`;
+    """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for the models that separate;
     `engine`, `threads`: see `SolverOptions`."""
 
     model: str = "sirfs"
@@ -44,8 +46,11 @@ class RunnerOptions:
         Settings(model=self.model, separator=self.separator, engine=self.engine, threads=self.threads).check()
 
 
-def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
-    """What `evaluate` runs on each object. Raises `InputError` for unknown options."""
+def make_runner(options: RunnerOptions, prior_set: PriorSet, network: CueNetwork | None = None) -> Runner:
+    """What `evaluate` runs on each object; `network`: of the model joint's cue, the shipped one if None.
+
+    Raises `InputError` for unknown options.
+    """
     options.check()
     tables: dict[str, Priors] = {}
 
@@ -58,6 +63,8 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet) -> Runner:
         if truth.illumination not in tables:
             tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
         result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor)
+        if options.model == "joint":
+            return joint_estimate(truth, log_image, result, tables[truth.illumination], options, network)
         if options.model == "mbp":
             log_image = _log_separated_reflectance(truth, result, options)
         return _estimate(truth, log_image, result.height, result.light, result)
@@ -78,9 +85,37 @@ def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors,
     return solve(problem, SolverOptions(engine=options.engine, threads=options.threads), monitor=monitor)
 
 
+def joint_estimate(
+    truth: MitBerkeleyObject,
+    log_start: np.ndarray,
+    start: SirfsResult,
+    priors: Priors,
+    options: RunnerOptions,
+    network: CueNetwork | None = None,
+) -> Estimate:
+    """The step of `models.joint` from MDR's answer: `log_start` (H, W, 3) of its diffuse image, `start` of its shape and light.
+
+    `network`: of `highlight_cue`, the shipped one if None.
+    """
+    joint, valid = JointOptions(), truth.valid
+    diffuse = np.where(valid[..., None], np.exp(log_start), 0)
+    found = doubt(truth.image, diffuse, valid, joint, network)
+    if found is None:
+        return _estimate(truth, log_start, start.height, start.light, start)
+    shading = np.exp(_log_shading(normal_from_reference(normals(start.height)), start.light))
+    log_cleaner = _log(repaint(found, shading, diffuse, valid), truth)
+    problem = pose(truth, log_cleaner, priors, isc_weights(truth.illumination, 3))
+    how = SolverOptions(engine=options.engine, threads=options.threads)
+    there = solve(problem, how, known_height=start.height, known_light=start.light)
+    if not lowers_energy(start.terms.total, there.terms.total, diffuse, np.exp(log_cleaner), valid, joint):
+        return _estimate(truth, log_start, start.height, start.light, start)
+    return _estimate(truth, log_cleaner, start.height, start.light, start)
+
+
 def _log_diffuse(truth: MitBerkeleyObject, options: RunnerOptions) -> np.ndarray:
     """Log of what shape and light are recovered from (H, W, 3), 0 where it is not valid: the diffuse image, if separation comes first."""
-    diffuse = truth.image if options.model != "mdr" else separate(options.separator, truth.image, truth.valid).diffuse
+    first = options.model in ("mdr", "joint")
+    diffuse = separate(options.separator, truth.image, truth.valid).diffuse if first else truth.image
     return _log(diffuse, truth)
 
 

@@ -15,7 +15,7 @@ from .decomposition import Decomposition, Provenance, Separation
 from .errors import InputError
 from .models import Answer, Settings, Task, solve
 from .models.layers import shaded
-from .models.settings import BASELINE_MODELS, ILLUMINATIONS, LATER_MODELS, MODELS, SEPARATING_MODELS, SIRFS_MODELS
+from .models.settings import BASELINE_MODELS, ILLUMINATIONS, MODELS, SEPARATING_MODELS, SIRFS_MODELS
 from .models.task import Clock
 from .photo import Photo, mask_box
 from .progress import Monitor
@@ -25,7 +25,7 @@ from .sirfs.problem import DepthObservation
 from .sirfs.recover import Known
 from .sirfs.resampling import nearest_samples
 
-__all__ = ["BASELINE_MODELS", "ILLUMINATIONS", "LATER_MODELS", "MODELS", "SIRFS_MODELS", "Evidence", "Settings", "assemble", "decompose"]
+__all__ = ["BASELINE_MODELS", "ILLUMINATIONS", "MODELS", "SIRFS_MODELS", "Evidence", "Settings", "assemble", "decompose"]
 
 _PACKAGES = ("numpy", "scipy", "numba")
 

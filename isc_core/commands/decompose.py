@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..evidence_files import read_height, read_light
 from ..photo import Photo, read_photo
-from ..pipeline import ILLUMINATIONS, LATER_MODELS, MODELS, Evidence, Settings, decompose
+from ..pipeline import ILLUMINATIONS, MODELS, Evidence, Settings, decompose
 from ..progress import Monitor
 from ..result_folder import require_room, require_writable_result, save
 from ..separation import METHODS
@@ -38,7 +38,7 @@ def declare(commands: Commands) -> None:
         "--model",
         default=usual.model,
         metavar="NAME",
-        help=f"{', '.join(MODELS)} (default {usual.model}); later: {', '.join(LATER_MODELS)}",
+        help=f"{', '.join(MODELS)} (default {usual.model})",
     )
     parser.add_argument(
         "--separator",

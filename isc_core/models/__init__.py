@@ -1,16 +1,17 @@
 """The models: how separation, shape and light are joined to explain one photo. One model a file, and one function that knows their names.
 
-A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, and the `baselines` to compare with.
+A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with.
 """
 
 from .baseline import baseline
+from .joint import joint
 from .mbp import mbp
 from .mdr import mdr
 from .plain import sirfs
 from .settings import Settings
 from .task import Answer, Task
 
-_SOLVERS = {"mdr": mdr, "mbp": mbp, "sirfs": sirfs}
+_SOLVERS = {"mdr": mdr, "mbp": mbp, "joint": joint, "sirfs": sirfs}
 
 
 def solve(task: Task) -> Answer:

@@ -1,25 +1,25 @@
-"""Joint MDR: shape and light see only what can be believed, and say what the paint under a highlight is.
+"""Joint MDR: what shape and light explain tells a highlight from paint where colour cannot, and what paint is under it.
 
-Problem: MDR believes its separation. On grey paint, where colours tell nothing, that leaves the highlights in the diffuse image, and SIRFS
-makes pale paint and wrong shape of them.
+Problem: MDR believes its separation. On grey paint, where colours tell nothing, that leaves the highlights in the diffuse image, and in the
+reflectance as bright paint.
 
-Equation: image = D + s, D = reflectance * shading. The start is MDR's diffuse image D_0. Where `highlight_cue` expects the light to be
-e^y times the diffuse one, D_1 = D_0 e^-(y - y_0)+, y_0 what the separation by colour has taken already. Where y is large
-(`Doubt.doubtful`), too little of the paint is seen for any reflectance to be believed: SIRFS sees these pixels' outline and no more, and
+Equation: image = D + s, D = R exp(SH(normal)). The start is MDR: D_0 by colour, shape and light by SIRFS. Where `highlight_cue` expects the
+light to be e^y times the diffuse one, D_1 = D_0 e^-(y - y_0)+, y_0 what colour has taken off already. Where y - y_0 is large
+(`Doubt.doubtful`), too little of the paint is seen to be believed: it is continued from around, in the light that falls there,
 
-    log R = average of log R around them,   D = min(I, R exp(SH(normal)))
+    log R = average of log D_1 - SH(normal) over what is near and not doubtful,   D = min(D_0, R exp(SH(normal)))
 
-follows from what it has found. An object is touched only where its highlights stand out beyond doubt (`JointOptions`).
+An object is touched only where its highlights stand out (`JointOptions`).
 
-Energy: E = E_SIRFS(log D; height, light) + b sum_c mean_T log(D_c / I_c), over the pixels T that are not doubtful, at the same crop. The
-second term belongs to the change of variables from D to what was seen: a density of log D is one of I times 1 / D. The start is SIRFS on
-D_0. The step is kept if E has fallen, else the start stays, so that E never rises. There is one step.
+Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to the change of variables from D to what
+was seen: a density of log D is one of I times 1 / D. The step is kept if E falls by it, else the start stays: E never rises. There is one
+step: SIRFS on the cleaner D, doubtful pixels left out, made heights better and shading and light worse, and did not pay.
 
 Citation: inpainting of highlights that keeps to the light: P. Tan, S. Lin, L. Quan, H.-Y. Shum 2003, doi:10.1109/ICCV.2003.1238333;
 averages of what is known: H. Knutsson and C.-F. Westin 1993, doi:10.1109/CVPR.1993.341081.
 
-Limits: a broad veil without a peak stays. Paint that ends under a highlight is continued smoothly. Strong white texture (fur, print) hides
-highlights: such objects are left to the separation by colour.
+Limits: shape and light are MDR's. A broad veil without a peak stays. Paint that ends under a highlight is continued smoothly. Strong white
+texture (fur, print) hides highlights: such objects are left to the separation by colour.
 """
 
 from dataclasses import dataclass
@@ -39,17 +39,17 @@ _TAKEN = "highlights were taken off with the help of shape and light"
 _NOTHING_LEFT = "no highlights but those that colour shows: the same as mdr"
 _NOT_BETTER = "the energy did not fall: the same as mdr"
 _REACHES = (0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25)  # of the object's diagonal: how far paint is continued from
+_HALF = 0.5  # of the object doubtful: there is nothing to continue its paint from
 _SPECK = 0.005  # of the object's diagonal
 _ENOUGH = 0.1  # of a neighbourhood that is known: nearer ones decide
 
 
 @dataclass(frozen=True)
 class JointOptions:
-    """Highlights are there if the largest y of `highlight_cue` is above `seed`, or by `above_usual` above what 90 % of the object show.
-    `doubtful`: the y from which a pixel's reflectance is not believed. `change_of_variables`: b of the energy."""
+    """Highlights stand out if the largest y - y_0 is by `above_usual` above what 90 % of the object show. `doubtful`: from which y - y_0 on
+    paint is not believed. `change_of_variables`: b of the energy."""
 
-    seed: float = 0.67
-    above_usual: float = 0.52
+    above_usual: float = 0.5
     doubtful: float = 0.3
     change_of_variables: float = 5.0
 
@@ -69,74 +69,69 @@ def joint(task: Task, options: JointOptions | None = None) -> Answer:
     with task.clock.stage("separation"):
         split = separated(task.maps, method, monitor.part(0.03, 0.06))
         diffuse = split.diffuse if task.one_scale else separated(task.working, method, monitor.part(0.06, 0.08)).diffuse
+    shape = recover_shape(diffuse, task, monitor.part(0.08, 0.9))
+    with task.clock.stage("separation"):
         found = doubt(task.working.image, diffuse, task.working.mask, options)
-    shape = recover_shape(diffuse, task, monitor.part(0.08, 0.92 if found is None else 0.5))
-    taken = False
+    said = _NOTHING_LEFT
     if found is not None:
-        better = recover_shape(found.diffuse, task, monitor.part(0.5, 0.92), found.doubtful)
-        taken = _falls(diffuse, found, shape, better, task, options)
-    if taken:
-        shape, split = better, _split(split, better, task, options)
+        _, shading = shaded(shape.working_height, shape.light, task.working.mask)
+        cleaner = repaint(found, shading, diffuse, task.working.mask)
+        before, after = energy_of(diffuse, shape, task), energy_of(cleaner, shape, task)
+        taken = lowers_energy(before, after, diffuse, cleaner, task.working.mask, options)
+        said = _TAKEN if taken else _NOT_BETTER
+        split = _split(split, found, cleaner, shape, task, options) if taken else split
     lobe = fit_specular(split, shape, task, monitor.part(0.92, 0.96))
-    said = _TAKEN if taken else _NOTHING_LEFT if found is None else _NOT_BETTER
     return Answer(split, shape.height, shape.light, shape.status | lobe.status | {"joint": said}, lobe.brdf)
 
 
 def doubt(
     image: np.ndarray, diffuse: np.ndarray, mask: np.ndarray, options: JointOptions | None = None, network: CueNetwork | None = None
 ) -> Doubt | None:
-    """Where the highlights of `image` (H, W, 3) are that a separation's `diffuse` (H, W, 3) still shows; None if there are none."""
-    options = options or JointOptions()
-    excess = highlight_excess(image, mask, network)
-    if not _stands_out(excess, mask, options):
-        return None
-    inside = mask[..., None]
+    """Where the highlights of `image` (H, W, 3) are that a separation's `diffuse` (H, W, 3) still shows; None if none stand out.
+
+    `network`: of the cue, the shipped one if None.
+    """
+    options, inside = options or JointOptions(), mask[..., None]
     light = np.where(inside, image, 0).mean(axis=2)
     taken = np.log(np.maximum(light, 1e-9) / np.maximum(np.where(inside, diffuse, 0).mean(axis=2), 1e-9))
-    left = np.where(mask, np.maximum(excess - np.maximum(taken, 0), 0), 0)
+    left = np.where(mask, np.maximum(highlight_excess(image, mask, network) - np.maximum(taken, 0), 0), 0)
+    # What is a few pixels wide does not count: texture is.
+    broad = ndimage.grey_opening(left, max(3, 2 * round(_SPECK * _diagonal(mask)) + 1))[mask]
     doubtful = ndimage.binary_opening(left > options.doubtful, np.ones((2, 2))) & mask
-    if doubtful[mask].mean() > 0.5:
+    if float(broad.max()) - float(np.quantile(broad, 0.9)) <= options.above_usual or doubtful[mask].mean() > _HALF:
         return None
     return Doubt((diffuse * np.exp(-left)[..., None]).astype(diffuse.dtype), doubtful)
 
 
-def _stands_out(excess: np.ndarray, mask: np.ndarray, options: JointOptions) -> bool:
-    """Whether the expected highlights are more than the object's texture gives by itself; what is a few pixels wide does not count."""
-    side = max(3, 2 * round(_SPECK * _diagonal(mask)) + 1)
-    broad = ndimage.grey_opening(excess, side)[mask]
-    peak = float(broad.max())
-    return peak > options.seed or peak - float(np.quantile(broad, 0.9)) > options.above_usual
+def repaint(found: Doubt, shading: np.ndarray, start: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The diffuse image (H, W, 3), nowhere above `start` (H, W, 3), with the paint of doubtful pixels continued from around them.
 
-
-def repaint(found: Doubt, shading: np.ndarray, mask: np.ndarray, image: np.ndarray) -> np.ndarray:
-    """The diffuse image (H, W, 3) with the paint of doubtful pixels continued from around them; `shading` (H, W, 3) > 0 inside `mask`."""
-    known = mask & ~found.doubtful
-    if not found.doubtful.any():
-        return found.diffuse
-    log_paint = np.log(np.maximum(np.where(known[..., None], found.diffuse / np.where(mask[..., None], shading, 1), 1), 1e-9))
+    `shading` (H, W, 3): > 0 inside `mask`.
+    """
+    known, inside = mask & ~found.doubtful, mask[..., None]
+    log_paint = np.log(np.maximum(np.where(known[..., None], found.diffuse / np.where(inside, shading, 1), 1), 1e-9))
     paint = np.exp(_continued(log_paint, known, mask))
-    return np.where(found.doubtful[..., None], np.minimum(paint * shading, image), found.diffuse).astype(found.diffuse.dtype)
+    diffuse = np.where(found.doubtful[..., None], paint * shading, found.diffuse)
+    return np.where(inside, np.minimum(diffuse, start), 0).astype(start.dtype)
 
 
-def _falls(start: np.ndarray, found: Doubt, shape: Shape, better: Shape, task: Task, options: JointOptions) -> bool:
-    """Whether the energy of the step lies below that of the start."""
-    before = energy_of(start, shape, task, found.doubtful)
-    trusted = task.working.mask & ~found.doubtful
-    darker = np.log(np.maximum(found.diffuse[trusted], 1e-9) / np.maximum(start[trusted], 1e-9))
-    return bool(better.status["loss"] + options.change_of_variables * float(darker.sum(axis=1).mean(dtype=float)) < before)
+def lowers_energy(before: float, after: float, start: np.ndarray, cleaner: np.ndarray, mask: np.ndarray, options: JointOptions) -> bool:
+    """Whether E falls from `start` (H, W, 3), where the SIRFS objective is `before`, to `cleaner` (H, W, 3), where it is `after`."""
+    darker = np.log(np.maximum(cleaner[mask], 1e-9) / np.maximum(start[mask], 1e-9))
+    return after + options.change_of_variables * float(darker.sum(axis=1).mean(dtype=float)) < before
 
 
-def _split(start: Separation, shape: Shape, task: Task, options: JointOptions) -> Separation:
-    """The layers of the maps' photo under the shape that was found."""
+def _split(start: Separation, found: Doubt, cleaner: np.ndarray, shape: Shape, task: Task, options: JointOptions) -> Separation:
+    """The layers of the maps' photo; `found` and `cleaner` are those of the working one."""
     photo = task.maps
-    found = doubt(photo.image, start.diffuse, photo.mask, options)
-    if found is None:
-        return start
-    _, shading = shaded(shape.height, shape.light, photo.mask)
-    inside = photo.mask[..., None]
-    diffuse = np.where(inside, np.minimum(repaint(found, shading, photo.mask, photo.image), start.diffuse), 0).astype(np.float32)
-    image = np.where(inside, photo.image, 0).astype(np.float32)
-    specular = np.where(inside, image - diffuse - start.residual, 0).astype(np.float32)
+    if not task.one_scale:
+        of_maps = doubt(photo.image, start.diffuse, photo.mask, options)
+        if of_maps is None:
+            return start
+        _, shading = shaded(shape.height, shape.light, photo.mask)
+        found, cleaner = of_maps, repaint(of_maps, shading, start.diffuse, photo.mask)
+    diffuse = cleaner.astype(np.float32)
+    specular = np.where(photo.mask[..., None], start.specular + (start.diffuse - diffuse), 0).astype(np.float32)
     return Separation(diffuse, specular, start.residual, np.where(found.doubtful, 0, start.confidence).astype(np.float32))
 
 

@@ -6,11 +6,10 @@ from .. import baselines
 from ..errors import InputError
 from ..separation import BEST, METHODS
 
-SIRFS_MODELS = ("mdr", "mbp", "sirfs")
-SEPARATING_MODELS = ("mdr", "mbp")
+SIRFS_MODELS = ("mdr", "mbp", "joint", "sirfs")
+SEPARATING_MODELS = ("mdr", "mbp", "joint")
 BASELINE_MODELS = tuple(baselines.METHODS)
 MODELS = SIRFS_MODELS + BASELINE_MODELS
-LATER_MODELS = ("joint",)
 ILLUMINATIONS = ("natural", "laboratory")
 
 
@@ -37,8 +36,6 @@ class Settings:
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""
-        if self.model in LATER_MODELS:
-            raise InputError(f"the model {self.model} is not available yet: choose {', '.join(MODELS)}")
         for name, value, known in (
             ("model", self.model, MODELS),
             ("separator", self.separator, METHODS),

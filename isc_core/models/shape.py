@@ -26,21 +26,18 @@ class Shape:
     working_height: np.ndarray
 
 
-def recover_shape(diffuse: np.ndarray, task: Task, monitor: Monitor, doubtful: np.ndarray | None = None) -> Shape:
-    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps; `doubtful`: see `recover`.
-
-    Raises `InputError`, `Cancelled`.
-    """
-    result = _recover(diffuse, task, monitor, doubtful, task.known)
+def recover_shape(diffuse: np.ndarray, task: Task, monitor: Monitor) -> Shape:
+    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps. Raises `InputError`, `Cancelled`."""
+    result = _recover(diffuse, task, task.known, monitor)
     return Shape(height_of_maps(result.height, task), np.broadcast_to(result.light, (9, 3)).copy(), _status(result), result.height)
 
 
-def energy_of(diffuse: np.ndarray, shape: Shape, task: Task, doubtful: np.ndarray) -> float:
-    """The SIRFS objective of the working photo's `diffuse` (H, W, 3) at `shape`, over the pixels that are not `doubtful` (H, W)."""
-    return _recover(diffuse, task, Monitor(), doubtful, Known(shape.working_height, shape.light, task.known.depth)).terms.total
+def energy_of(diffuse: np.ndarray, shape: Shape, task: Task) -> float:
+    """The SIRFS objective of the working photo's `diffuse` image (H, W, 3) at `shape`."""
+    return _recover(diffuse, task, Known(shape.working_height, shape.light, task.known.depth), Monitor()).terms.total
 
 
-def _recover(diffuse: np.ndarray, task: Task, monitor: Monitor, doubtful: np.ndarray | None, known: Known) -> Recovered:
+def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor) -> Recovered:
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
@@ -51,7 +48,7 @@ def _recover(diffuse: np.ndarray, task: Task, monitor: Monitor, doubtful: np.nda
     with task.clock.stage("shape and light"):
         return recover(
             diffuse[..., :channels], working.mask, working.code_value / 2, priors, weights, options,
-            known=Known(known.height, light, known.depth), doubtful=doubtful, monitor=monitor,
+            known=Known(known.height, light, known.depth), monitor=monitor,
         )  # fmt: skip
 
 

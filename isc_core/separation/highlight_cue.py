@@ -18,6 +18,7 @@ Limits: a broad veil is hardly seen, and small y are common on matt texture: onl
 import importlib.resources
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
@@ -53,7 +54,13 @@ class CueNetwork:
 def shipped_network() -> CueNetwork:
     """The network that comes with the package."""
     resource = importlib.resources.files(__package__.rpartition(".")[0]) / "data" / "highlight_cue.npz"
-    with resource.open("rb") as file, np.load(file, allow_pickle=False) as data:
+    with importlib.resources.as_file(resource) as path:
+        return read_network(path)
+
+
+def read_network(path: Path) -> CueNetwork:
+    """A network as an archive of its fields."""
+    with np.load(path, allow_pickle=False) as data:
         mean, deviation, hidden, hidden_bias, output = (data[name] for name in ("mean", "deviation", "hidden", "hidden_bias", "output"))
         return CueNetwork(mean, deviation, hidden, hidden_bias, output, float(data["output_bias"]))
 

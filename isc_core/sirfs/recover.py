@@ -104,22 +104,18 @@ def recover(
     options: RecoverOptions | None = None,
     *,
     known: Known | None = None,
-    doubtful: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Recovered:
     """Recovers height and light.
 
     `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`: zero channels are raised to it, in
-    the logarithm only. `doubtful`: (H, W) bool, pixels of the object whose colours are not looked at; if none is left, all are.
-    Raises `Cancelled`.
+    the logarithm only. Raises `Cancelled`.
     """
     options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
     known, base = _levelled(known, mask)
     window, factor = _window(mask, options)
     inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
-    believed = mask if doubtful is None or not (mask & ~doubtful).any() else mask & ~doubtful
-    seen = window.cut(believed, False)
-    scene = _Scene(window.cut(image, 0), inside, seen, _outline(mask, window), photo, floor, priors, weights, options, known, window)
+    scene = _Scene(window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window)
     problem = scene.problem(factor)
     given = None if known.height is None else _to_solve(window.cut_on(known.height), scene.inside, factor)
     result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=monitor)
@@ -163,7 +159,6 @@ class _Scene:
 
     image: np.ndarray
     inside: np.ndarray
-    seen: np.ndarray
     outline: np.ndarray
     photo: np.ndarray
     floor: float
@@ -175,11 +170,11 @@ class _Scene:
 
     def problem(self, factor: float) -> Problem:
         """The problem at `factor` times the image's scale."""
-        image, valid, outline, photo, depth = self.image, self.seen, self.outline, self.photo, self.known.depth
+        image, valid, outline, photo, depth = self.image, self.inside, self.outline, self.photo, self.known.depth
         if depth is not None:
             depth = DepthObservation(self.window.cut(depth.height, np.nan), depth.sigma, depth.weight)
         if factor != 1:
-            image, share = resample_inside(image, self.seen, factor)
+            image, share = resample_inside(image, self.inside, factor)
             valid = share >= 0.5 * share.max()  # an object thinner than a pixel fills none by half
             outline, photo = (resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5 for m in (outline, photo))
             depth = None if depth is None else _scaled_depth(depth, factor)

@@ -228,7 +228,6 @@ DECOMPOSE = ("decompose", "PHOTO", "-o", "OUT")
 MASK = ("mask", "PHOTO", "-o", "OUT.png")
 OPTIONS = [
     (DECOMPOSE, ("--model", "guess"), "guess"),
-    (DECOMPOSE, ("--model", "joint"), "not available yet"),
     (DECOMPOSE, ("--separator", "guess"), "shen_2013"),
     (DECOMPOSE, ("--illumination", "moon"), "natural"),
     (DECOMPOSE, ("--transfer", "gamma"), "linear"),
@@ -261,7 +260,7 @@ OPTIONS = [
     (("mask", "PHOTO", "-o", "OUT.jpg"), ("--box", "5,5,44,42"), ".png"),
     (("evaluate", "NOWHERE"), ("--dataset", "guess"), "mit-berkeley"),
     (("evaluate", "NOWHERE"), ("--dataset", "mit-berkeley"), "MIT-Berkeley"),
-    (("evaluate", "NOWHERE"), ("--dataset", "mit-berkeley", "--model", "joint"), "not available yet"),
+    (("evaluate", "NOWHERE"), ("--dataset", "mit-berkeley", "--model", "guess"), "joint"),
     (("evaluate", "NOWHERE"), ("--dataset", "mit-berkeley", "--objects", ","), "--objects"),
     (("fit-priors", "NOWHERE", "-o", "OUT.npz"), (), "MIT-Berkeley"),
     (("fit-priors", "NOWHERE", "-o", "OUT.npz"), ("--objects", "a,b", "--leave-out", "c"), "not allowed"),

@@ -38,10 +38,10 @@ def photo_of(d: Decomposition) -> Photo:
     return Photo(d.image.astype(np.float32), d.mask, 1 / 4095, np.zeros(d.mask.shape, bool), source)
 
 
-def task_of(d: Decomposition, known: bool = True) -> Task:
+def task_of(d: Decomposition) -> Task:
     """With the true shape and light, so that nothing but the separation is asked for; or without them."""
     photo = photo_of(d)
-    truth = Known(d.height.astype(float), light_to_reference(d.illumination)) if known else Known()
+    truth = Known(d.height.astype(float), light_to_reference(d.illumination))
     return Task(photo, photo, Settings(illumination="laboratory"), truth)
 
 
@@ -70,14 +70,6 @@ def test_the_layers_sum_up_and_are_not_negative(glossy: tuple[Decomposition, Ans
     assert min(split.diffuse.min(), split.specular.min()) > -1e-6
     assert split.confidence.min() >= 0 and split.confidence.max() <= 1
     assert not (split.diffuse[~d.mask].any() or split.specular[~d.mask].any())
-
-
-def test_shape_and_light_are_found_without_the_highlight(glossy: tuple[Decomposition, Answer]) -> None:
-    d, _ = glossy
-    task = task_of(d, known=False)
-    found = joint(task)
-    assert found.status["joint"].startswith("highlights were taken off")
-    assert error(d, found) < 0.5 * error(d, mdr(task_of(d)))
 
 
 def test_the_same_again(glossy: tuple[Decomposition, Answer]) -> None:
@@ -137,12 +129,12 @@ def test_paint_is_continued_under_the_highlight() -> None:
     shading = np.linspace(0.5, 1, 40)[None, :, None] * np.ones((40, 40, 3))
     diffuse = np.where(mask[..., None], 0.4 * shading, 0)
     image = diffuse + 0.3 * doubtful[..., None]
-    found = repaint(Doubt(image, doubtful), shading, mask, image)
+    found = repaint(Doubt(image, doubtful), shading, image, mask)
     np.testing.assert_allclose(found, diffuse, atol=1e-6)
 
 
 def test_what_colour_has_taken_off_is_not_taken_twice() -> None:
     d = grey_ball(10)
     found = doubt(d.image, d.diffuse, d.mask)
-    assert found is not None
-    assert found.doubtful.sum() < 0.1 * doubt(d.image, d.image, d.mask).doubtful.sum()  # type: ignore[union-attr]
+    assert found is None
+    assert doubt(d.image, d.image, d.mask) is not None

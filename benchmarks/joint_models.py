@@ -1,0 +1,130 @@
+"""What each model makes of glossy photos, against SIRFS on the photo as it is and on the true diffuse image.
+
+  python -m benchmarks.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural]
+                                    [--networks FOLDER]
+
+Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them. `--networks`: a cue for each object that
+has not seen it, `OBJECT.npz` of `benchmarks.highlight_training`; without it the shipped one, which has. Writes OUT/rows.jsonl, a row a
+run, which is not run again, and OUT/tables.md: geometric means of errors relative to plain SIRFS with the interval of resampled objects,
+and which share of the gain of the true diffuse image a model reaches.
+"""
+
+import argparse
+import json
+import math
+import time
+from collections import defaultdict
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.datasets import MitBerkeleyObject, list_objects, load_object
+from isc_core.evaluate import Estimate, paired_bootstrap
+from isc_core.evaluation_runner import RunnerOptions, make_runner
+from isc_core.metrics import score
+from isc_core.progress import Monitor
+from isc_core.separation.highlight_cue import CueNetwork, read_network
+from isc_core.sirfs.prior_file import shipped_prior_set
+
+MODELS = ("plain", "mdr", "mbp", "joint", "true diffuse")
+METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light", "average")
+
+
+def photo_of(folder: Path, name: str) -> tuple[MitBerkeleyObject, MitBerkeleyObject]:
+    """An object as it is photographed and its diffuse image, with the expectations of lights that its set asks for."""
+    natural = "natural" in folder.name
+    return tuple(  # type: ignore[return-value]
+        replace(load_object(folder, name, "laboratory", kind), illumination="natural" if natural else "laboratory")
+        for kind in ("original", "diffuse")
+    )
+
+
+def run(model: str, seen: MitBerkeleyObject, diffuse: MitBerkeleyObject, network: CueNetwork | None) -> tuple[Estimate, float]:
+    """A model's answer and its seconds."""
+    truth = diffuse if model == "true diffuse" else seen
+    options = RunnerOptions("sirfs" if model in ("plain", "true diffuse") else model)
+    began = time.perf_counter()
+    answer = make_runner(options, shipped_prior_set(), network)(truth, Monitor())
+    return answer, time.perf_counter() - began
+
+
+def measure(given: argparse.Namespace) -> list[dict[str, object]]:
+    """All rows: those that are on disk, and new ones."""
+    path = given.output / "rows.jsonl"
+    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
+    done = {(row["set"], row["object"], row["model"]) for row in rows}
+    folders = [given.data, *(sorted(p for p in given.glossy.iterdir() if p.is_dir()) if given.glossy else [])]
+    for folder in folders:
+        label = "laboratory originals" if folder == given.data else folder.name
+        if given.sets and label not in given.sets:
+            continue
+        for name in given.objects or list_objects(folder, "laboratory"):
+            missing = [model for model in MODELS if (label, name, model) not in done]
+            if not missing:
+                continue
+            seen, diffuse = photo_of(folder, name)
+            network = read_network(given.networks / f"{name}.npz") if given.networks else None
+            for model in missing:
+                answer, seconds = run(model, seen, diffuse, network)
+                maps = {key: getattr(answer, key) for key in ("height", "normal", "shading", "reflectance", "light")}
+                scores = score(seen, **maps)
+                row = {"set": label, "object": name, "model": model, "seconds": seconds, **asdict(scores), "average": scores.average}
+                rows.append(row)
+                with path.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+                print(label, name, model, f"{scores.average:.5f}", flush=True)
+    return rows
+
+
+def tables(rows: list[dict[str, object]]) -> str:
+    """Markdown: for the laboratory originals and all glossy sets, a row a model."""
+    values: dict[tuple[str, str], dict[str, dict[str, float]]] = defaultdict(dict)
+    for row in rows:
+        values[str(row["set"]), str(row["object"])][str(row["model"])] = {name: float(row[name]) for name in (*METRICS, "seconds")}  # type: ignore[arg-type]
+    whole = {key: found for key, found in values.items() if all(model in found for model in MODELS)}
+    text = []
+    groups = sorted({key[0] for key in whole})
+    for title, members in [("all glossy sets", [g for g in groups if g.startswith("level")]), *((g, [g]) for g in groups)]:
+        part = {key: found for key, found in whole.items() if key[0] in members}
+        if len({name for _, name in part}) < 2:
+            continue
+        text += [f"\n## {title}: {len(part)} photos\n", "| relative to plain | " + " | ".join((*METRICS, "seconds")) + " |"]
+        text.append("|---" * (len(METRICS) + 2) + "|")
+        text += [_line(model, part) for model in MODELS[1:]]
+    return "\n".join(text) + "\n"
+
+
+def _line(model: str, part: dict[tuple[str, str], dict[str, dict[str, float]]]) -> str:
+    cells = []
+    for metric in (*METRICS, "seconds"):
+        logs: dict[str, dict[str, list[float]]] = {"plain": defaultdict(list), model: defaultdict(list), "true diffuse": defaultdict(list)}
+        for (_, name), found in part.items():
+            for who in logs:
+                logs[who][name].append(math.log(found[who][metric]))
+        mean = {who: [float(np.mean(of[name])) for name in sorted(of)] for who, of in logs.items()}
+        ratio = paired_bootstrap(mean[model], mean["plain"], 0)
+        ceiling = 1 - paired_bootstrap(mean["true diffuse"], mean["plain"], 0).ratio
+        share = f"; {(1 - ratio.ratio) / ceiling:.0%}" if ceiling > 0.05 and model != "true diffuse" and metric != "seconds" else ""
+        cells.append(f"{ratio.ratio:.3f} ({ratio.low:.3f}-{ratio.high:.3f}{share})")
+    return f"| {model} | " + " | ".join(cells) + " |"
+
+
+def main() -> None:
+    """Runs, prints and writes."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--data", type=Path, required=True, help="the MIT-Berkeley set")
+    parser.add_argument("--glossy", type=Path, help="what isc synth glossy-mit made of it")
+    parser.add_argument("--networks", type=Path, help="a cue for each object that has not seen it")
+    parser.add_argument("--objects", type=lambda text: text.split(","), default=[])
+    parser.add_argument("--sets", type=lambda text: text.split(","), default=[])
+    parser.add_argument("-o", "--output", type=Path, required=True)
+    given = parser.parse_args()
+    given.output.mkdir(parents=True, exist_ok=True)
+    text = tables(measure(given))
+    (given.output / "tables.md").write_text(text, encoding="utf-8")
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
