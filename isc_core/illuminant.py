@@ -16,12 +16,13 @@ err alike. Of the two kinds of ignorance, noise and a missing second plane, the 
 say stays white. Confidence is the share of the data's precision in its weakest direction.
 
 Only changes count that look like a highlight's flank: all channels rise, and the chromaticity moves toward the light's (the highlight's end
-of the lines that R. T. Tan, K. Nishino and K. Ikeuchi draw over inverse intensity). What does not agree has Cauchy's weight.
+of the lines that R. T. Tan, K. Nishino and K. Ikeuchi draw over inverse intensity). What does not agree has Cauchy's weight, and the
+square of the share that agrees lessens the precision: where half of the flanks are paint's, the other half is less to be believed.
 
 Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694; R. T. Tan, K. Nishino, K. Ikeuchi 2004, doi:10.1364/JOSAA.21.000321. The blocks: K.-Y.
 Liang and S. L. Zeger 1986, doi:10.1093/biomet/73.1.13.
 
-Limits: one colour of light, tinted by a third at most. Metals tint their highlights themselves. Paint that pales toward a common colour
+Limits: one colour of light, tinted by a quarter at most. Metals tint their highlights themselves. Paint that pales toward a common colour
 looks like a highlight; grey paint says nothing.
 """
 
@@ -36,9 +37,10 @@ _FINE = 0.006  # of the object's diagonal: changes are taken over twice this
 _RISE, _TURN, _TOWARD = 0.03, 0.05, 0.7  # of the intensity, over the bright pixels'; of the chromaticity; the cosine of its direction
 _LOOSE, _TOLERANCE = 0.2, 0.02  # of n . L / |n|, in the first round and in the last
 _ROUNDS, _GATES = 15, 3
+_OPEN = 2.0  # how much farther from white than usual the rounds may look, before the answer is weighed
 _BLOCKS = 8
 _FEW = 20  # changes, below which nothing is said
-_FARTHEST = 0.35  # d beyond this is no light's, but paint's
+_FARTHEST = 0.25  # d beyond this is no light's, but paint's
 # An orthonormal basis of the colours d with sum 0, (3, 2).
 _PLANE = np.array([[1, -1, 0], [1, 1, -2]]).T / np.sqrt([2.0, 6.0])
 
@@ -171,10 +173,11 @@ def _planes(changes: _Changes, flanks: np.ndarray, shift: np.ndarray, options: I
     along, offset = units @ _PLANE, units.sum(axis=1)
     blocks = np.unique(changes.block[flanks], return_inverse=True)[1]
     prior = np.eye(2) / options.usual**2
-    precision = np.zeros((2, 2))
+    precision, wanted, agreeing = np.zeros((2, 2)), shift, 0.0
     for tolerance in np.geomspace(_LOOSE, _TOLERANCE, _ROUNDS):
         off = offset + along @ shift
         weight = length / (1 + np.square(off / tolerance))
+        agreeing = weight.sum() / length.sum()
         weight /= weight.sum()
         curvature = (along * weight[:, None]).T @ along
         pulls = np.stack([np.bincount(blocks, weight * off * along[:, k]) for k in (0, 1)], axis=1)
@@ -182,5 +185,6 @@ def _planes(changes: _Changes, flanks: np.ndarray, shift: np.ndarray, options: I
         scatter = pulls.T @ pulls + options.doubt**2 * curvature + 1e-12 * np.eye(2)
         precision = curvature @ np.linalg.solve(scatter, curvature)
         wanted = shift - np.linalg.lstsq(curvature, (along * (weight * off)[:, None]).sum(axis=0), rcond=1e-6)[0]
-        shift = np.linalg.solve(precision + prior, precision @ wanted)
-    return shift, precision
+        shift = np.linalg.solve(precision + prior / _OPEN**2, precision @ wanted)
+    precision *= agreeing**2
+    return np.linalg.solve(precision + prior, precision @ wanted), precision
