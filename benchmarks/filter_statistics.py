@@ -38,6 +38,7 @@ from .specular_removal import cases
 
 _SEEN, _NONE = 0.25, 0.05  # of the light is specular
 _FOLDS = 5
+_FEW = 30  # pixels of either kind, below which a photo has no area of its own
 _TEMPERATURES = np.geomspace(0.1, 30, 51)
 _PRIOR_COUNT = 2.0  # pixels that every bin has before it is counted, per thousand
 _TESTS = ("test_objects", "test_materials", "test_lights", "test")
@@ -126,6 +127,20 @@ def area(yes: np.ndarray, no: np.ndarray) -> float:
     return float(below.mean() / 2 / len(no))
 
 
+def judged(samples: Sequence[Sample], table: FilterTable) -> str:
+    """What the table says of photos that it was not fitted to: the area over all pixels, the mean area within one photo, bits a pixel."""
+    yes, no, within = [], [], []
+    for one in samples:
+        evidence = pooled_evidence(one.intensity, one.mask, table) / table.temperature
+        yes.append(evidence[one.highlight])
+        no.append(evidence[one.without])
+        if min(len(yes[-1]), len(no[-1])) > _FEW:
+            within.append(area(yes[-1], no[-1]))
+    high, none = np.concatenate(yes), np.concatenate(no)
+    bits = 1 - (np.logaddexp(0, -high).mean() + np.logaddexp(0, none).mean()) / 2 / np.log(2)
+    return f"area {area(high, none):.3f}, within one photo {np.mean(within):.3f} (mean of {len(within)}), {bits:.3f} bits a pixel"
+
+
 def figure(folder: Path, output: Path) -> None:
     """A picture of each filter's histograms on diffuse and on specular layers (figure 3.12)."""
     output.mkdir(parents=True, exist_ok=True)
@@ -150,7 +165,9 @@ def _main_fit(given: argparse.Namespace) -> str:
             file, spread=table.spread.astype(np.float32), without=table.without.astype(np.float32),
             highlight=table.highlight.astype(np.float32), temperature=np.float32(table.temperature),
         )  # fmt: skip
-    return f"{len(samples)} scenes: temperature {table.temperature:.2f}; left out: area {hits:.3f}, {bits:.3f} bits a pixel"
+    tests = judged([sample(path, "seen") for path in scenes(given.scenes, _TESTS)], table)
+    left_out = f"area {hits:.3f}, {bits:.3f} bits a pixel"
+    return f"{len(samples)} scenes: temperature {table.temperature:.2f}\nobjects left out: {left_out}\ntest scenes: {tests}"
 
 
 @dataclass(frozen=True)

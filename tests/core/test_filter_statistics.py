@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from benchmarks.filter_statistics import Sample, calibrated, fitted
+from benchmarks.filter_statistics import Outcome, Sample, calibrated, figure, fitted, markdown, scenes
 from isc_core.errors import InputError
 from isc_core.separation import separate
 from isc_core.separation.filter_statistics import (
@@ -142,6 +142,17 @@ def test_the_separator_takes_it_as_one_more_voice():
     assert np.abs(found - separate("isc", image, DISC).specular).max() > 1e-3
     never = np.where(x < 0, 0, 0.5)
     assert separate("isc", image, DISC, changes={"filters": True}, prior=never).specular[x < 0].max() == 0
+
+
+def test_the_ablation_counts_what_got_better_and_worse(tmp_path):
+    rows = [Outcome("rendered", "a", (0.5, 0.4)), Outcome("rendered", "b", (0.5, 0.625)), Outcome("clean", "c", (0.2, 0.4))]
+    text = markdown(rows, ["without", "with"])
+    assert "| rendered | 2 | 0.500 (at most 0.500) | 0.500 (at most 0.625; 1 better, 1 worse) |" in text
+    assert "| clean | 1 | 0.200 % (at most 0.200) | 0.400 % (at most 0.400; 0 better, 1 worse) |" in text
+    with pytest.raises(InputError, match="make some with isc synth"):
+        scenes(tmp_path, ("train",))
+    with pytest.raises(InputError, match="make some with isc synth"):
+        figure(tmp_path, tmp_path / "figure")
 
 
 def test_the_shipped_table_is_whole_and_others_are_refused(tmp_path):

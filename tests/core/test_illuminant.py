@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from benchmarks.illuminant import markdown, measure, relit
 from isc_core.errors import InputError
+from isc_core.highlight_set import SeparationTruth
 from isc_core.illuminant import Illuminant, IlluminantOptions, estimate_illuminant, tinted, whitened
 
 LIGHT = np.array([1.15, 1.0, 0.85])
@@ -84,6 +86,21 @@ def test_whitened_and_back(dtype):
     np.testing.assert_array_equal(whitened(image, np.ones(3)), image)
     layers = white * dtype(0.25), white * dtype(0.75)
     np.testing.assert_allclose(sum(tinted(layer, LIGHT) for layer in layers), image, rtol=8 * np.finfo(dtype).eps)
+
+
+def test_the_benchmark_relights_exactly_and_knows_the_best_answer():
+    white = np.ones(3)
+    (image, mask), (diffuse, _) = ball(PAINTS, white, 0.5), ball(PAINTS, white, 0.0)
+    layers = [layer.astype(np.float32) for layer in (image, diffuse, image - diffuse)]
+    truth = SeparationTruth("ball", layers[0], mask, layers[1], layers[2], np.zeros_like(mask))
+    scene = relit(truth, LIGHT)
+    np.testing.assert_allclose(scene.image, ball(PAINTS, LIGHT, 0.5)[0], atol=1e-6)
+    np.testing.assert_allclose(scene.diffuse + scene.specular, scene.image, atol=1e-6)
+    found = measure("balls", scene, LIGHT, False)
+    assert found.determined and found.angle < 2 < found.of_white
+    as_white, sure, always, true_light = found.ratios
+    assert true_light < as_white and sure == always < as_white
+    assert markdown([found]).count("\n") == 3
 
 
 def test_what_does_not_fit_is_refused():
