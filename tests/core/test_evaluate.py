@@ -35,7 +35,8 @@ def write_set(root: Path) -> Path:
             light = rng.normal(size=(9, 3)) * 0.2 - np.eye(9, 3)
             shading = np.minimum(np.exp(reference_basis(normal) @ light), 1) * inside[..., None]
             images = {"diffuse": shading * reflectance, "reflectance": reflectance, "shading_color": shading, "mask": inside}
-            images["original"] = images["diffuse"] + 0.05 * inside[..., None]
+            if illumination == "laboratory":
+                images["original"] = images["diffuse"] + 0.05 * inside[..., None]
             for file, image in images.items():
                 stored = np.round(np.minimum(image, 1) * 65535).astype(np.uint16)
                 assert cv2.imwrite(str(folder / f"{file}.png"), stored[:, :, ::-1] if stored.ndim == 3 else stored)
@@ -125,6 +126,14 @@ def test_original_input_shows_the_highlights(root: Path, report: EvaluationRepor
     original = evaluate(root, illuminations=["laboratory"], input="original", model="naive", runner=naive)
     assert original.results[0].scores.reflectance != report.under("laboratory")[0].scores.reflectance
     assert "laboratory/original" in original.to_json()["results"]
+
+
+def test_natural_light_has_highlights_where_the_set_was_given_some(tmp_path: Path) -> None:
+    root = write_set(tmp_path)
+    for name in ("ball", "bowl"):
+        (root / "natural" / name / "original.png").write_bytes((root / "natural" / name / "diffuse.png").read_bytes())
+    glossy = evaluate(root, illuminations=["natural"], input="original", model="naive", runner=naive)
+    assert [result.name for result in glossy.results] == ["ball", "bowl"]
 
 
 def test_bad_names_are_found_before_the_first_run(root: Path) -> None:
