@@ -33,8 +33,8 @@ The files, their frame and crop are the set's; all pictures are linear, 16 bits 
 | `crop_idx.mat` | the evaluation crop, the set's own file |
 | `object.json` | measured shares, gain, strength of the gloss, residuals, panel, checksums |
 
-`natural/OBJECT/` holds `original.png`, `diffuse.png`, `shading_color.png` and `L.mat` of the SAME light, under the names of the set's natural half: what
-reads that half finds this object too, with that half's expectations of lights.
+`natural/OBJECT/` holds `original.png`, `diffuse.png`, `shading_color.png` and `L.mat` of the SAME light, under the names of the set's
+natural half: what reads that half finds this object too, with that half's expectations of lights.
 
 Shading is {shading}.
 The gloss is a normalised Blinn-Phong lobe of exponent {exponent:g} under a non-negative environment fitted to exp(SH(normal)){panel}

@@ -33,9 +33,9 @@ class FittedGloss:
 
 @dataclass(frozen=True)
 class GlossScores:
-    """`alpha_factor`: by which alpha is off, 1 or more; `explained`: share of the squared specular image; both where gloss was found (and the
-    material says how rough it is).
-    `determined`, `invented`: 1 or 0, whether alpha was told where there is gloss, and where there is none. None: not defined."""
+    """`alpha_factor`: by which alpha is off, 1 or more; `explained`: share of the squared specular image; both where gloss was found, the
+    first where the material says how rough it is. `determined`, `invented`: 1 or 0, whether alpha was told where there is gloss, and where
+    there is none. None: not defined."""
 
     alpha_factor: float | None = None
     explained: float | None = None
