@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from importlib import metadata
 
 import numpy as np
-from scipy import ndimage
 
 from . import __version__
 from .decomposition import Decomposition, Provenance, Separation
@@ -21,6 +20,7 @@ from .photo import Photo, mask_box
 from .progress import Monitor
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, light_to_reference
+from .sirfs.framing import continued_height
 from .sirfs.problem import DepthObservation
 from .sirfs.recover import Known
 from .sirfs.resampling import nearest_samples
@@ -115,21 +115,13 @@ def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
     height = None if evidence.height is None else nearest_samples(evidence.height, working.mask.shape, factor) * factor
     if height is not None and not np.isfinite(height[working.mask]).all():
         raise InputError("the known shape has holes inside the mask: give it as --depth, which may have holes")
-    height = None if height is None else _continued(height, working.mask)
+    height = None if height is None else continued_height(height, working.mask)
     if evidence.depth is None:
         return Known(height, light)
     seen = nearest_samples(evidence.depth, working.mask.shape, factor) * factor
     if not np.isfinite(seen[working.mask]).any():
         raise InputError("the depth map has no value inside the mask, only holes: is it a map of this photo?")
     return Known(height, light, DepthObservation(seen, evidence.depth_sigma * factor, evidence.depth_weight))
-
-
-def _continued(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The height (H, W) inside the mask, going on outside as it arrives at the rim (by point reflection): normals look one pixel out."""
-    rim = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
-    rows, columns = (np.clip(2 * r - i, 0, n - 1) for r, i, n in zip(rim, np.indices(mask.shape), mask.shape, strict=True))
-    at_rim = height[tuple(rim)]
-    return np.where(mask, height, np.where(mask[rows, columns], 2 * at_rim - height[rows, columns], at_rim))
 
 
 def _settings_json(settings: Settings) -> dict[str, object]:

@@ -23,6 +23,7 @@ from .decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from .errors import InputError
 from .exr import read_channels, write_channels
 from .gloss import gloss_of
+from .json_files import read_json
 from .mesh import MeshOptions, MeshResult, build_mesh
 from .photo import linear_to_srgb
 from .progress import Monitor
@@ -175,12 +176,7 @@ def _layers(channels: Mapping[str, np.ndarray], layers: Mapping[str, str], path:
 
 
 def _read_json(path: Path) -> dict[str, Any]:
-    try:
-        description = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:  # not JSON, or not UTF-8
-        raise InputError(f"{path} is damaged: {error}") from error
+    description = read_json(path)
     version = description.get("schema_version") if isinstance(description, dict) else None
     if not isinstance(version, int):
         raise InputError(f"{path} has no schema_version: it is not a result of isc decompose")

@@ -38,3 +38,11 @@ def continued(mask: np.ndarray, top: int, bottom: int, left: int, right: int) ->
     out[top + mask.shape[0] :, :left] = lower[0] & first[-1]
     out[top + mask.shape[0] :, left + mask.shape[1] :] = lower[-1] & last[-1]
     return out
+
+
+def continued_height(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The height (H, W) inside the mask, going on outside as it arrives at the rim (by point reflection): normals look one pixel out."""
+    rim = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
+    rows, columns = (np.clip(2 * r - i, 0, n - 1) for r, i, n in zip(rim, np.indices(mask.shape), mask.shape, strict=True))
+    at_rim = height[tuple(rim)]
+    return np.where(mask, height, np.where(mask[rows, columns], 2 * at_rim - height[rows, columns], at_rim))

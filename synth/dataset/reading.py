@@ -1,6 +1,5 @@
 """Reading a data set of rendered scenes: which scenes there are, what they are, and their truth."""
 
-import json
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
@@ -9,6 +8,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.exr import read_channels
+from isc_core.json_files import read_json
 from isc_core.result_folder import LAYERS
 
 from ..truth import GroundTruth
@@ -111,7 +111,7 @@ def read_description(folder: Path) -> dict[str, Any]:
     path = folder / "scene.json"
     if not path.is_file():
         raise InputError(f"{folder} is not a scene of isc synth (it has no scene.json)")
-    content = read_json(path)
+    content = read_object(path)
     if content.get("kind") != KIND or not isinstance(content.get("schema_version"), int):
         raise InputError(f"{path} was not written by isc synth")
     if content["schema_version"] > SCHEMA_VERSION:
@@ -119,14 +119,9 @@ def read_description(folder: Path) -> dict[str, Any]:
     return content
 
 
-def read_json(path: Path) -> dict[str, Any]:
+def read_object(path: Path) -> dict[str, Any]:
     """A file that holds one JSON object. Raises `InputError` for anything else."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:  # not JSON, or not UTF-8
-        raise InputError(f"{path} is damaged: {error}") from error
+    content = read_json(path)
     if not isinstance(content, dict):
         raise InputError(f"{path} is damaged: it holds no JSON object")
     return content

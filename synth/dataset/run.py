@@ -24,7 +24,7 @@ from ..rendering.bsdfs import load_drjit
 from ..variant import has_llvm, load_mitsuba
 from .card import card
 from .description import describe_picture
-from .reading import MANIFEST, read_description, read_json, require_intact
+from .reading import MANIFEST, read_description, read_object, require_intact
 from .scene_folder import checksum, write_scene
 from .splits import SPLITS, Choices, make_pools
 
@@ -170,7 +170,7 @@ def require_this_run(out: Path, settings: dict[str, Any], count: int) -> None:
         require_writable_file(path)
         return
     require_writable_file(path)
-    found = read_json(path)
+    found = read_object(path)
     theirs = found.get("settings")
     if found.get("kind") != KIND or not isinstance(theirs, dict) or not isinstance(found.get("count"), int):
         raise InputError(f"{path} is not the manifest of a data set of isc synth: choose another folder")

@@ -16,7 +16,7 @@ from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..dataset.description import versions
-from ..dataset.reading import read_json
+from ..dataset.reading import read_object
 from ..shapes.height_field import mesh_of_height
 from ..tracing import Tracer
 from .card import card, command, index
@@ -105,7 +105,7 @@ def _require_this_run(out: Path, settings: GlossySettings) -> None:
         if out.is_dir() and any(entry.name not in _LITTER for entry in out.iterdir()):
             raise InputError(f"{out} is not empty and not a run of isc synth glossy-mit: choose another folder")
         return
-    found, wanted = read_json(out / RUN), settings.to_json()
+    found, wanted = read_object(out / RUN), settings.to_json()
     theirs = found.get("settings")
     if found.get("kind") != KIND or not isinstance(theirs, dict):
         raise InputError(f"{out / RUN} is not of isc synth glossy-mit: choose another folder")
@@ -131,7 +131,7 @@ def _write_cards(out: Path, settings: GlossySettings, roots: tuple[str, ...]) ->
                     "command": command(settings),
                     "versions": versions(),
                     "licence": "derived from research data under its own terms; not to be redistributed",
-                    "objects": {path.parent.name: read_json(path) for path in records},
+                    "objects": {path.parent.name: read_object(path) for path in records},
                 }
                 _write_json(out / name / "scene.json", scene)
                 _write_text(out / name / "README.md", card(name, level, light, settings))

@@ -13,11 +13,11 @@ from isc_core.brdf.fitting import LobeFit, LobeFitOptions, fit_lobe
 from isc_core.brdf.roughness import alpha_from_exponent
 from isc_core.progress import Monitor
 from isc_core.sirfs.frames import normal_from_reference
+from isc_core.sirfs.framing import continued_height
 from isc_core.sirfs.stencils import normals
 
 from ..truth import GroundTruth
 from .pictures import exposure, lit
-from .sirfs_stage import continued_height
 from .stages import Inputs, Metric, Picture, Stage, StageOptions
 
 _NO_GLOSS = 0.01  # of the image's light: less specular light than this is none

@@ -9,7 +9,6 @@ Limits: shading is exp(SH(normal)), which rendered light is not; how far off tha
 from functools import cache
 
 import numpy as np
-from scipy import ndimage
 
 from isc_core.box import mask_slices
 from isc_core.errors import InputError
@@ -18,6 +17,7 @@ from isc_core.metrics import Scores, angular_error, height_error, light_error, l
 from isc_core.progress import Monitor
 from isc_core.sirfs.contour import occluding_contour
 from isc_core.sirfs.frames import light_from_reference, light_to_reference, normal_from_reference, real_sh
+from isc_core.sirfs.framing import continued_height
 from isc_core.sirfs.prior_file import shipped_prior_set
 from isc_core.sirfs.priors import Priors
 from isc_core.sirfs.problem import Problem
@@ -84,14 +84,6 @@ def sirfs_maps(answer: Estimate) -> dict[str, np.ndarray]:
     layers = {"reflectance": (answer.reflectance, "RGB"), "shading": (answer.shading, "RGB"), "normal": (answer.normal, "XYZ")}
     planes = {f"{name}.{letter}": values[..., k] for name, (values, letters) in layers.items() for k, letter in enumerate(letters)}
     return planes | {"height.Z": answer.height}
-
-
-def continued_height(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The height (H, W) inside the mask, going on outside by point reflection at the rim, since normals look one pixel out."""
-    rim = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
-    rows, columns = (np.clip(2 * r - i, 0, n - 1) for r, i, n in zip(rim, np.indices(mask.shape), mask.shape, strict=True))
-    at_rim = height[tuple(rim)]
-    return np.where(mask, height, np.where(mask[rows, columns], 2 * at_rim - height[rows, columns], at_rim))
 
 
 def _window(mask: np.ndarray) -> tuple[slice, slice]:

@@ -12,6 +12,7 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.metrics import Scores
 from isc_core.progress import Monitor
 from isc_core.sirfs.frames import real_sh
+from isc_core.sirfs.framing import continued_height
 from synth.dataset.reading import SceneFacts
 from synth.truth import GroundTruth
 from synth.validation.bootstrap import Interval, mean_interval
@@ -20,7 +21,7 @@ from synth.validation.figures import CHAIN, Figure, all_figures, scene_value
 from synth.validation.render_checks import check_identities
 from synth.validation.run import SceneResult, StageResult, measure_scene, side_by_side
 from synth.validation.separation_stage import SEPARATION, SeparationScores, score_separation
-from synth.validation.sirfs_stage import SIRFS, continued_height, run_sirfs, score_sirfs, show_sirfs, with_normals
+from synth.validation.sirfs_stage import SIRFS, run_sirfs, score_sirfs, show_sirfs, with_normals
 from synth.validation.slices import EVERYTHING, Slice, all_slices
 from synth.validation.stages import Metric, StageOptions, all_stages, find_stages, given
 from synth.validation.substitution import COMBINATIONS, METRICS, TRUTHS, ChainScores, budget, chain_value
