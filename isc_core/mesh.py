@@ -68,7 +68,9 @@ class MeshResult:
     """A mesh with its material and how it relates to the maps.
 
     `mesh`: metres, +Y up, facing +Z. `reflectance_scale`: k, base colour = k * reflectance. `metres_per_pixel`: of the maps.
-    `origin`: (column, row, height) in pixels of the world's origin. `stride`: pixels from vertex to vertex. `options`, `gloss`: as given.
+    `origin`: (column, row, height) in pixels of the world's origin. `stride`: pixels from vertex to vertex.
+    `vertex_pixel`: (V, 2) row and column of each vertex. `base_color`: (H, W, 3) linear, k * reflectance continued beyond the mask.
+    `detail`: (H, W, 3) unit vectors of the normal map in tangent space. `options`, `gloss`: as given.
     """
 
     mesh: trimesh.Trimesh
@@ -76,6 +78,9 @@ class MeshResult:
     metres_per_pixel: float
     origin: tuple[float, float, float]
     stride: int
+    vertex_pixel: np.ndarray
+    base_color: np.ndarray
+    detail: np.ndarray
     options: MeshOptions = field(default_factory=MeshOptions)
     gloss: Gloss = field(default_factory=Gloss)
 
@@ -159,7 +164,7 @@ def build_mesh(
     pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
     middle = (pixels.min(0) + pixels.max(0)) / 2
     size = options.metres_per_pixel or options.longest_side / max(np.ptp(np.argwhere(mask), axis=0) + 1)
-    detail = _detail_map(normal, mask, smooth, cells, stride)
+    detail = _detail_normals(normal, mask, smooth, cells, stride)
     color, k = base_color(reflectance, mask, options.bleed)
     visual = trimesh.visual.TextureVisuals(
         # trimesh counts v from the bottom of the texture and turns it over when it writes.
@@ -168,11 +173,12 @@ def build_mesh(
     )
     normals = smooth.reshape(-1, 3)[used].astype(np.float64)
     mesh = trimesh.Trimesh((pixels - middle) * size, faces, vertex_normals=normals, visual=visual, process=False)
-    return MeshResult(mesh, k, float(size), (float(middle[0]), float(-middle[1]), float(middle[2])), stride, options, gloss)
+    origin = (float(middle[0]), float(-middle[1]), float(middle[2]))
+    return MeshResult(mesh, k, float(size), origin, stride, np.stack([row, column], -1), color, detail, options, gloss)
 
 
 def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[np.ndarray, float]:
-    """The texture, (H, W, 3) uint8 sRGB, of k * reflectance, continued `bleed` pixels beyond the mask; and k.
+    """k * reflectance, (H, W, 3) linear, continued `bleed` pixels beyond the mask; and k.
 
     Further out it is the mean colour, which is what the smallest versions of a texture should fade to.
     """
@@ -181,8 +187,7 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
     k = _BRIGHT / bright if bright > 0 else 1.0
     distance, (rows, columns) = ndimage.distance_transform_edt(~mask, return_indices=True)
     filled = np.where((distance <= bleed)[..., None], reflectance[rows, columns], inside.mean(0))
-    coded = linear_to_srgb(np.clip(k * filled, 0, 1))
-    return np.rint(255 * coded).astype(np.uint8), k
+    return k * filled, k
 
 
 def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
@@ -268,14 +273,14 @@ def _facing(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
 
 
-def _detail_map(normal: np.ndarray, mask: np.ndarray, smooth: np.ndarray, cells: np.ndarray, stride: int) -> np.ndarray:
-    """The tangent-space normal map, (H, W, 3) uint8: each pixel's normal as seen from the interpolated vertex normal.
+def _detail_normals(normal: np.ndarray, mask: np.ndarray, smooth: np.ndarray, cells: np.ndarray, stride: int) -> np.ndarray:
+    """The normals of the tangent-space map, (H, W, 3): each pixel's normal as seen from the interpolated vertex normal.
 
     The tangent is the direction in which the texture's column grows on the surface, the bitangent that in which its row falls.
     """
     flat = np.broadcast_to(np.array([0, 0, 1], np.float32), mask.shape + (3,))
     if stride == 1:
-        return _coded(flat)
+        return flat
     shown = np.kron(cells, np.ones((stride, stride), bool))
     shown = np.pad(shown, [(0, max(0, n - m)) for n, m in zip(mask.shape, shown.shape, strict=True)])[: mask.shape[0], : mask.shape[1]]
     base = _facing(_interpolated(smooth, mask.shape, stride))
@@ -283,11 +288,15 @@ def _detail_map(normal: np.ndarray, mask: np.ndarray, smooth: np.ndarray, cells:
     tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
     bitangent = np.cross(base, tangent)
     local = np.stack([np.einsum("hwc,hwc->hw", normal, axis) for axis in (tangent, bitangent, base)], -1)
-    return _coded(np.where((shown & mask)[..., None], local, flat))
+    return np.where((shown & mask)[..., None], local, flat)
 
 
-def _coded(vectors: np.ndarray) -> np.ndarray:
-    return np.rint(np.clip(vectors * 127.5 + 127.5, 0, 255)).astype(np.uint8)
+def _color_picture(linear: np.ndarray) -> Image.Image:
+    return Image.fromarray(np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8))
+
+
+def _vector_picture(vectors: np.ndarray) -> Image.Image:
+    return Image.fromarray(np.rint(np.clip(vectors * 127.5 + 127.5, 0, 255)).astype(np.uint8))
 
 
 def _interpolated(grid: np.ndarray, shape: tuple[int, ...], stride: int) -> np.ndarray:
@@ -317,8 +326,8 @@ def _alpha_png(values: np.ndarray) -> bytes:
 def _material(color: np.ndarray, detail: np.ndarray, options: MeshOptions, gloss: Gloss) -> trimesh.visual.material.PBRMaterial:
     return trimesh.visual.material.PBRMaterial(
         name="recovered",
-        baseColorTexture=Image.fromarray(color),
-        normalTexture=Image.fromarray(detail),
+        baseColorTexture=_color_picture(color),
+        normalTexture=_vector_picture(detail),
         metallicFactor=options.metallic,
         roughnessFactor=_roughness(options, gloss),
         doubleSided=True,  # the mesh has no back: seen from behind it should not vanish

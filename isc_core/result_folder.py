@@ -1,8 +1,8 @@
 """The files of a result: what other programs read and what a person looks at first.
 
 A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`, `mesh.glb`, `preview.png`, and under `maps/`
-the main maps once more as single-layer files, for programs that cannot read multilayer ones. Where a lobe was fitted, `maps.exr` has one
-layer more, `lobe`: the specular image that the fit predicts. A separation's folder holds
+the main maps once more as single-layer files, for programs that cannot read multilayer ones; on demand `arrays.npz`, see `arrays_file`.
+Where a lobe was fitted, `maps.exr` has one layer more, `lobe`: the specular image that the fit predicts. A separation's folder holds
 `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears whole or not at all (see `atomic`).
 """
 
@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
+from .arrays_file import ARRAYS, write_arrays
 from .atomic import new_folder, require_writable
 from .brdf.fitting import LobeFit
 from .brdf_record import lobe_fit_from_json
@@ -34,12 +35,20 @@ LAYERS = {**dict.fromkeys(COLOR_MAPS, "RGB"), "normal": "XYZ", "height": "Z", "m
 LOBE = {"lobe": "RGB"}
 SINGLE = {"diffuse": "RGB", "specular": "RGB", "reflectance": "RGB", "shading": "RGB", "normal": "RGB", "height": "Y"}
 DECOMPOSITION_FILES = ("decomposition.json", "maps.exr", "mesh.glb", "preview.png", *(f"maps/{name}.exr" for name in SINGLE))
+_OURS = (*DECOMPOSITION_FILES, ARRAYS)  # what may stand there besides is written on demand
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # smaller results have not been seen
 SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
 
 
-def save(decomposition: Decomposition, folder: Path | str, *, mesh: MeshOptions | None = None, monitor: Monitor | None = None) -> None:
-    """Writes the folder of a decomposition, whole or not at all; an earlier result there is replaced.
+def save(
+    decomposition: Decomposition,
+    folder: Path | str,
+    *,
+    mesh: MeshOptions | None = None,
+    arrays: bool = False,
+    monitor: Monitor | None = None,
+) -> None:
+    """Writes the folder of a decomposition, whole or not at all; an earlier result there is replaced. `arrays`: with `arrays.npz`.
 
     Raises `InputError` if the folder is not ours or cannot be written, or the mask is too small for a mesh; `Cancelled`.
     Raises `ValueError` if a map holds NaN or infinite values.
@@ -50,7 +59,7 @@ def save(decomposition: Decomposition, folder: Path | str, *, mesh: MeshOptions 
         channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
     if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
         raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
-    with new_folder(folder, DECOMPOSITION_FILES) as partial:
+    with new_folder(folder, _OURS) as partial:
         monitor.report("writing maps", 0.0)
         write_channels(partial / "maps.exr", channels)
         (partial / "maps").mkdir()
@@ -61,6 +70,9 @@ def save(decomposition: Decomposition, folder: Path | str, *, mesh: MeshOptions 
         d = decomposition
         built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, gloss_of(d))
         (partial / "mesh.glb").write_bytes(built.glb())
+        if arrays:
+            monitor.report("writing arrays", 0.6)
+            write_arrays(d, partial / ARRAYS, built)
         monitor.report("drawing the preview", 0.7)
         contact_sheet(decomposition).save(partial / "preview.png")
         text = json.dumps(_plain(_description(decomposition, built)), indent=2, ensure_ascii=False, allow_nan=False)
@@ -108,7 +120,7 @@ def save_separation(
 
 def require_writable_result(folder: Path | str, *, separation: bool = False) -> None:
     """Tells before the work whether its result could be written to `folder`. Raises `InputError`."""
-    require_writable(folder, SEPARATION_FILES if separation else DECOMPOSITION_FILES)
+    require_writable(folder, SEPARATION_FILES if separation else _OURS)
 
 
 def require_room(folder: Path | str, pixels: int) -> None:

@@ -58,6 +58,7 @@ def declare(commands: Commands) -> None:
     )
     parser.add_argument("--full-size", action="store_true", help="bring the result back to the photo's resolution")
     parser.add_argument("--shading-only", action="store_true", help="shape from shading: the object has one colour")
+    parser.add_argument("--arrays", action="store_true", help="write arrays.npz too: everything as plain NumPy arrays, for other programs")
     _add_evidence(parser)
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
     parser.add_argument(
@@ -99,7 +100,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     evidence = _evidence(options, photo)
     require_room(options.output, _pixels(photo, settings))
     result = decompose(photo, settings, evidence=evidence, prior_set=prior_set, name=options.photo.name, monitor=monitor.part(0.0, 0.8))
-    save(result, options.output, monitor=monitor.part(0.8, 1.0))
+    save(result, options.output, arrays=options.arrays, monitor=monitor.part(0.8, 1.0))
     status = result.provenance.status
     trouble = [] if status.get("converged", True) else [f"note: {status['help']}"]
     gloss = [f"gloss: {status['gloss']}"] if status.get("gloss") else []

@@ -1,0 +1,153 @@
+"""The plain arrays of a result: the same scene as its maps and mesh, and light that gives the photo back."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from isc_core.arrays_file import ARRAYS, arrays_of
+from isc_core.brdf.fitting import fit_lobe
+from isc_core.brdf.ggx import Ggx
+from isc_core.brdf.shading import directional, radiance
+from isc_core.cli import main
+from isc_core.decomposition import COLOR_MAPS, Decomposition
+from isc_core.environment import shading_under
+from isc_core.gloss import gloss_of
+from isc_core.mesh import MeshOptions, build_mesh
+from isc_core.result_folder import load, save
+from isc_core.sirfs.frames import real_sh
+from tests.core.ball_scene import ball
+
+Arrays = dict[str, np.ndarray]
+
+
+def read(path: Path) -> Arrays:
+    with np.load(path, allow_pickle=False) as file:
+        return {name: file[name] for name in file.files}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result with arrays."""
+    path = tmp_path_factory.mktemp("arrays") / "ball"
+    save(ball(), path, arrays=True)
+    return path
+
+
+@pytest.fixture(scope="module")
+def arrays(folder: Path) -> Arrays:
+    return read(folder / ARRAYS)
+
+
+def test_the_maps_are_those_of_the_result(arrays: Arrays) -> None:
+    d = ball()
+    for name in (*COLOR_MAPS, "normal", "height", "confidence", "mask"):
+        assert np.array_equal(arrays[name], getattr(d, name)), name
+    whole = {"mask": bool, "faces": np.int32, "vertex_pixel": np.int32, "photo_size": np.int32}
+    assert {name: values.dtype for name, values in arrays.items()} == {name: whole.get(name, np.float32) for name in arrays}
+    assert arrays["photo_size"].tolist() == [120, 96] and arrays["crop_scale"] == 1
+
+
+def test_the_mesh_is_that_of_the_glb(arrays: Arrays, folder: Path) -> None:
+    (mesh,) = trimesh.load(folder / "mesh.glb", process=False).geometry.values()
+    assert np.array_equal(arrays["faces"], mesh.faces)
+    np.testing.assert_allclose(arrays["vertices"], mesh.vertices, atol=1e-7)
+    np.testing.assert_allclose(arrays["vertex_normals"], mesh.vertex_normals, atol=1e-6)
+    np.testing.assert_allclose(arrays["uv"], mesh.visual.uv, atol=1e-6)
+    record = json.loads((folder / "decomposition.json").read_text())["mesh"]
+    assert arrays["reflectance_scale"] == pytest.approx(record["reflectance_scale"])
+    assert arrays["origin"] == pytest.approx(list(record["origin"].values()))
+    np.testing.assert_allclose(arrays["mesh_illumination"], record["illumination"]["coefficients"], rtol=1e-6)
+
+
+def test_vertices_know_their_pixels(arrays: Arrays) -> None:
+    row, column = arrays["vertex_pixel"].T
+    place = np.stack([column - arrays["origin"][0], arrays["origin"][1] - row], -1) * arrays["metres_per_pixel"]
+    np.testing.assert_allclose(arrays["vertices"][:, :2], place, atol=1e-7)
+    np.testing.assert_allclose(arrays["uv"], np.stack([(column + 0.5) / 120, 1 - (row + 0.5) / 96], -1), atol=1e-6)
+    assert arrays["mask"][row, column].all()
+
+
+def test_base_color_and_its_light_give_the_diffuse_image(arrays: Arrays) -> None:
+    mask = arrays["mask"]
+    np.testing.assert_allclose(arrays["base_color"][mask], (arrays["reflectance_scale"] * arrays["reflectance"])[mask], rtol=1e-6)
+    shading = np.exp(real_sh(arrays["normal"][mask].astype(float)) @ arrays["mesh_illumination"])
+    np.testing.assert_allclose(arrays["base_color"][mask] * shading, arrays["diffuse"][mask], rtol=1e-4)
+    assert arrays["base_color"][~mask].min() > 0
+
+
+def test_the_sky_lights_the_base_color_as_the_photo_shows_it(arrays: Arrays) -> None:
+    mask = arrays["mask"]
+    shading = shading_under(arrays["sky"].astype(float), arrays["normal"][mask].astype(float))
+    wanted = arrays["shading"][mask] / arrays["reflectance_scale"]
+    assert np.sqrt(np.mean((shading / wanted - 1) ** 2)) < 0.03
+    assert arrays["sky"].min() >= 0
+
+
+def test_the_sun_explains_the_shading(arrays: Arrays) -> None:
+    mask, k = arrays["mask"], arrays["reflectance_scale"]
+    facing = np.maximum(arrays["normal"][mask] @ arrays["sun_direction"], 0)
+    shading = facing[:, None] * arrays["sun_strength"] / np.pi + arrays["sun_ambient"]
+    wanted = arrays["shading"][mask] / k
+    assert np.linalg.norm(arrays["sun_direction"]) == pytest.approx(1)
+    left = np.square(shading - wanted).sum() / np.square(wanted - wanted.mean(0)).sum()
+    assert 1 - left == pytest.approx(float(arrays["sun_explained"]), abs=0.02)
+    assert arrays["sun_explained"] > 0.9
+
+
+def test_detail_stays_where_vertices_are_few() -> None:
+    """With every second pixel a vertex, vertex normal and normal map together are the recovered normals, without rounding to codes."""
+    d = ball()
+    built = build_mesh(d.height, d.normal, d.mask, d.reflectance, MeshOptions(max_faces=3000))
+    arrays = arrays_of(d, built)
+    assert built.stride == 2
+    row, column = arrays["vertex_pixel"].T
+    base = arrays["vertex_normals"].astype(float)
+    tangent = np.stack([base[:, 2], 0 * base[:, 0], -base[:, 0]], -1)
+    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
+    local = 2 * arrays["normal_map"][row, column] - 1
+    normal = local[:, :1] * tangent + local[:, 1:2] * np.cross(base, tangent) + local[:, 2:] * base
+    changed = np.abs(local - [0, 0, 1]).max(-1) > 1e-6
+    assert changed.mean() > 0.9
+    np.testing.assert_allclose(normal[changed], d.normal[row, column][changed], atol=1e-5)
+
+
+def glossy() -> Decomposition:
+    """The ball under the gloss of one lamp, with the lobe that fits it."""
+    d = ball()
+    lamp = np.array([-0.37, 0.46, 0.807]) / np.linalg.norm([-0.37, 0.46, 0.807])
+    gloss = 0.6 * radiance(Ggx(0.2, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(lamp, 1.0))
+    specular = np.where(d.mask[..., None], gloss, 0).astype(np.float32)
+    return replace(d, image=d.diffuse + specular, specular=specular, brdf=fit_lobe(specular, d.normal, d.mask))
+
+
+def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
+    d = glossy()
+    save(d, tmp_path / "out", arrays=True)
+    found, gloss = read(tmp_path / "out" / ARRAYS), gloss_of(d)
+    assert found["roughness"] == pytest.approx(gloss.roughness) == pytest.approx(0.2**0.5, rel=0.05)
+    assert found["specular_level"] == pytest.approx(float(found["reflectance_scale"]) * gloss.specular)
+    assert np.array_equal(found["lobe"], d.brdf.predicted.astype(np.float32))
+    assert ("specular_variation" in found) == (gloss.variation is not None)
+    assert np.isnan(arrays["roughness"]) and np.isnan(arrays["specular_level"]) and not arrays["lobe"].any()
+
+
+def test_the_command_gives_the_same_bytes_as_the_option(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    save(ball(), tmp_path / "later")
+    assert not (tmp_path / "later" / ARRAYS).exists()
+    assert main(["arrays", str(tmp_path / "later")]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'later' / ARRAYS} is written\n"
+    assert (tmp_path / "later" / ARRAYS).read_bytes() == (folder / ARRAYS).read_bytes()
+    load(tmp_path / "later")
+    save(ball(), tmp_path / "later")  # a result with arrays is still one of ours, and its arrays do not outlive it
+    assert not (tmp_path / "later" / ARRAYS).exists()
+
+
+def test_a_folder_without_a_result_is_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["arrays", "--quiet", str(tmp_path)]) == 2
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1 and "not a result folder" in message
+    assert list(tmp_path.iterdir()) == []
