@@ -1,11 +1,12 @@
 # make demo   renders one glossy object, decomposes it, says where the pictures are
 # make test   linter, type checker and tests
+# make extension   Blender's add-on: one zip a platform and Python in dist/; TARGET=here builds only this machine's
 # The first call makes .venv; later ones reuse it until pyproject.toml or constraints.txt change. PYTHON=... picks an interpreter.
 
 BIN := .venv/bin
 INPUTS := pyproject.toml constraints.txt tools/setup.sh
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint extension clean
 .DEFAULT_GOAL := demo
 
 demo: .venv/.ready-demo
@@ -23,6 +24,11 @@ test: lint
 lint: .venv/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
+
+TARGET := all
+
+extension: .venv/.ready-dev
+	@$(BIN)/python -m blender_addon.packaging $(TARGET) -o dist --wheels build/wheels
 
 # A development set-up is also good for the demo; the demo alone does without the big Blender module.
 .venv/.ready-demo: $(INPUTS)

@@ -1,0 +1,72 @@
+"""One zip: the files that go in, and bytes that depend on nothing but them.
+
+Entries are sorted, dated 1980 and stored as they are: wheels are compressed already, and the rest is small beside them.
+"""
+
+import json
+import zipfile
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from string import Template
+
+from isc_core import __version__
+from isc_core.atomic import new_file
+
+from .rewrite import installed_source
+from .targets import Target
+
+ROOT = Path(__file__).resolve().parents[2]
+_ADDON, _CORE = ROOT / "blender_addon", ROOT / "isc_core"
+_MANIFEST = "blender_manifest.toml"
+_CORE_FILES = {".py", ".npz", ".typed"}
+_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+def archive_name(target: Target) -> str:
+    """The zip's file name."""
+    return f"isc_intrinsic-{__version__}-{target.name}.zip"
+
+
+def contents(target: Target, wheels: Sequence[Path]) -> dict[str, bytes | Path]:
+    """What the zip holds, by the path inside it: bytes, or the file to copy. Raises `InputError` as `installed_source` does."""
+    entries: dict[str, bytes | Path] = {"LICENSE": ROOT / "LICENSE", _MANIFEST: manifest(target, wheels).encode()}
+    for path in sorted(_ADDON.rglob("*.py")):
+        name = path.relative_to(_ADDON).as_posix()
+        if not name.startswith("packaging/"):
+            entries[name] = installed_source(path.read_text(encoding="utf-8"), name).encode()
+    core = [path for path in sorted(_CORE.rglob("*")) if path.suffix in _CORE_FILES]
+    entries |= {f"isc_core/{path.relative_to(_CORE).as_posix()}": path for path in core}
+    return entries | {f"wheels/{path.name}": path for path in wheels}
+
+
+def manifest(target: Target, wheels: Sequence[Path]) -> str:
+    """The text of blender_manifest.toml."""
+    template = Template((_ADDON / _MANIFEST).read_text(encoding="utf-8").partition("\n")[2])
+    return template.substitute(
+        version=__version__,
+        blender_min=target.blender_min,
+        blender_max=target.blender_max,
+        platforms=json.dumps([target.platform]),
+        wheels=json.dumps([f"./wheels/{path.name}" for path in wheels], indent=2),
+    )
+
+
+def write_archive(path: Path, entries: Mapping[str, bytes | Path]) -> None:
+    """Writes the zip, whole or not at all. Raises `InputError` where it cannot be written."""
+    with new_file(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
+        for name, content in sorted(entries.items()):
+            about = zipfile.ZipInfo(name, _DATE)
+            about.create_system, about.external_attr = 3, 0o100644 << 16
+            archive.writestr(about, content if isinstance(content, bytes) else content.read_bytes())
+
+
+def listing(path: Path) -> list[str]:
+    """Lines for a person: the zip's size and what makes it up, the largest first."""
+    sizes: dict[str, int] = {}
+    with zipfile.ZipFile(path) as archive:
+        for entry in archive.infolist():
+            top, _, rest = entry.filename.partition("/")
+            part = f"wheels/{rest}" if top == "wheels" else "isc_core" if top == "isc_core" else "the add-on"
+            sizes[part] = sizes.get(part, 0) + entry.file_size
+    lines = [f"{path.name}: {path.stat().st_size / 1e6:.1f} MB"]
+    return lines + [f"  {size / 1e6:7.2f} MB  {part}" for part, size in sorted(sizes.items(), key=lambda item: -item[1])]
