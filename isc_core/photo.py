@@ -188,11 +188,11 @@ def read_linear(path: str | Path, transfer: str = "auto") -> np.ndarray:
 def read_photo(path: str | Path, mask_path: str | Path | None = None, transfer: str = "auto", *, whole_frame: bool = False) -> Photo:
     """Reads a photo at full size.
 
-    Files: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM, told apart by their content. `transfer`: "srgb", "linear", or "auto" =
-    float files linear, all others sRGB. The mask is `mask_path` (inside = above half of its largest value, or its alpha channel where
-    that is not opaque); else the photo's alpha channel (>= 0.5) where that is not opaque; else, on a black border (at most 2/255 in
-    sRGB coding), the pixels that are not black: holes filled, parts smaller than 1 % of the largest dropped. Where there is none of
-    these, `whole_frame` takes all pixels.
+    Files: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM, NumPy's .npy (its integers are codes), told apart by their content.
+    `transfer`: "srgb", "linear", or "auto" = floats linear, all others sRGB. The mask is `mask_path` (inside = above half of its largest
+    value, or its alpha channel where that is not opaque); else the photo's alpha channel (>= 0.5) where that is not opaque; else, on a
+    black border (at most 2/255 in sRGB coding), the pixels that are not black: holes filled, parts smaller than 1 % of the largest
+    dropped. Where there is none of these, `whole_frame` takes all pixels.
     Raises `InputError`, one line with the remedy, for anything that cannot be used.
     """
     raster = read_raster(path)
@@ -377,7 +377,7 @@ def read_raster(path: str | Path) -> Raster:
         raise InputError(f"{path}: the file is empty")
     kind, reader = next(((kind, reader) for magic, kind, reader in _READERS if data.startswith(magic)), (None, None))
     if reader is None:
-        raise InputError(f"{path}: not an image of a known kind (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM): convert it to PNG")
+        raise InputError(f"{path}: not an image of a known kind (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, NPY): convert it to PNG")
     try:
         with _quiet():
             raster = reader(data, path)
@@ -627,6 +627,24 @@ def _in_display_window(pixels: np.ndarray, header: dict[str, Any]) -> np.ndarray
     return frame
 
 
+def _read_npy(data: bytes, path: Path) -> Raster:
+    """(H, W), (H, W, 1), (H, W, 3) or (H, W, 4), alpha last and not multiplied in. The header alone says how much is to come."""
+    stream = io.BytesIO(data)
+    version = np.lib.format.read_magic(stream)
+    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, by_columns, kind = read_header(stream)
+    if len(shape) not in (2, 3) or shape[2:] not in ((), (1,), (3,), (4,)):
+        raise InputError(f"{path}: an array of shape {shape}: a photo is (H, W, 3), or (H, W, 4) with alpha, a mask (H, W)")
+    if kind.kind not in "fbu" or kind.itemsize > 8 or (kind.kind == "u" and kind.itemsize > 2):
+        raise InputError(f"{path}: values of type {kind}: give floats of linear light, codes of 8 or 16 bits (uint8, uint16), or bool")
+    _check_size(path, shape[1], shape[0])
+    stored = np.frombuffer(data, kind, int(np.prod(shape)), stream.tell()).reshape(shape, order="F" if by_columns else "C")
+    if kind.kind == "f":
+        return _raster_of_codes(stored.astype(np.float32), 0)
+    stored = stored.astype(f"u{kind.itemsize}") * np.uint8(255 if kind.kind == "b" else 1)
+    return _raster_of_codes(stored, np.iinfo(stored.dtype).max)
+
+
 _READERS: tuple[tuple[bytes, str, Callable[[bytes, Path], Raster]], ...] = (
     (b"\x89PNG\r\n\x1a\n", "PNG", _read_png),
     (b"\xff\xd8\xff", "JPEG", _read_jpeg),
@@ -638,5 +656,6 @@ _READERS: tuple[tuple[bytes, str, Callable[[bytes, Path], Raster]], ...] = (
     (b"#?RADIANCE", "HDR", _read_hdr),
     (b"#?RGBE", "HDR", _read_hdr),
     (b"BM", "BMP", _read_bmp),
+    (b"\x93NUMPY", "NPY", _read_npy),
     *((b"P%d" % n, "PPM", _read_pnm) for n in range(1, 7)),
 )

@@ -48,7 +48,7 @@ def hints(options: argparse.Namespace, *lines: str) -> list[str]:
 
 def add_photo(parser: argparse.ArgumentParser) -> None:
     """PHOTO, --mask, --transfer."""
-    parser.add_argument("photo", metavar="PHOTO", type=Path, help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR or HDR")
+    parser.add_argument("photo", metavar="PHOTO", type=Path, help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR, HDR or NumPy .npy")
     parser.add_argument(
         "--mask",
         type=Path,
@@ -61,7 +61,10 @@ def add_photo(parser: argparse.ArgumentParser) -> None:
 def add_transfer(parser: argparse.ArgumentParser) -> None:
     """--transfer."""
     parser.add_argument(
-        "--transfer", choices=TRANSFERS, default="auto", help="how the photo is coded (auto: EXR and HDR are linear, all others sRGB)"
+        "--transfer",
+        choices=TRANSFERS,
+        default="auto",
+        help="how the photo is coded (auto: EXR, HDR and floats of .npy are linear, else sRGB)",
     )
 
 

@@ -129,6 +129,7 @@ def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
     save(d, tmp_path / "out", arrays=True)
     found, gloss = read(tmp_path / "out" / ARRAYS), gloss_of(d)
     assert found["roughness"] == pytest.approx(gloss.roughness) == pytest.approx(0.2**0.5, rel=0.05)
+    assert gloss.specular is not None and d.brdf is not None
     assert found["specular_level"] == pytest.approx(float(found["reflectance_scale"]) * gloss.specular)
     assert np.array_equal(found["lobe"], d.brdf.predicted.astype(np.float32))
     assert ("specular_variation" in found) == (gloss.variation is not None)

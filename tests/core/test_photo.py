@@ -70,6 +70,11 @@ def saved(path: Path, image: Image.Image, **options: Any) -> Path:
     return path
 
 
+def arrayed(path: Path, values: np.ndarray) -> Path:
+    np.save(path, values)
+    return path
+
+
 def opencv(path: Path, rgb: np.ndarray, *options: int) -> Path:
     assert cv2.imwrite(str(path), rgb[..., [2, 1, 0, 3][: rgb.shape[2]]] if rgb.ndim == 3 else rgb, options)
     return path
@@ -266,6 +271,61 @@ def test_radiance_hdr(tmp_path: Path) -> None:
     photo = read_photo(opencv(tmp_path / "a.hdr", light))
     assert np.abs(photo.image - light).max() < light.max() / 128
     assert photo.original.transfer == "linear" and (photo.mask == object_mask()).all()
+
+
+def test_numpy_arrays(tmp_path: Path) -> None:
+    """Floats are linear light, integers are codes, the fourth channel is alpha, not multiplied in; the order in memory does not matter."""
+    stored = codes()
+    light = srgb_to_linear(stored / 255)
+    mask = arrayed(tmp_path / "mask.npy", object_mask())
+    for kind in (np.float32, np.float64, ">f4"):
+        photo = read_photo(arrayed(tmp_path / "a.npy", light.astype(kind)), mask)
+        assert np.array_equal(photo.image, light.astype(np.float32)) and np.array_equal(photo.mask, object_mask())
+        assert (photo.original.transfer, photo.original.bit_depth) == ("linear", 32) and not photo.clipped.any()
+    png_photo = read_photo(write(tmp_path / "a.png", png(stored, 8, 2)), mask)
+    photo = read_photo(arrayed(tmp_path / "codes.npy", np.asfortranarray(stored)), mask)
+    assert np.array_equal(photo.image, png_photo.image) and (photo.original.transfer, photo.original.bit_depth) == ("srgb", 8)
+    assert read_raster(arrayed(tmp_path / "16.npy", stored.astype(np.uint16))).peak == 65535
+    alpha = np.where(object_mask(), 1.0, 0.25)
+    photo = read_photo(arrayed(tmp_path / "rgba.npy", np.dstack([light, alpha])))
+    assert np.array_equal(photo.mask, object_mask()) and np.array_equal(photo.image, light.astype(np.float32))
+
+
+def test_masks_as_numpy_arrays(tmp_path: Path) -> None:
+    photo = arrayed(tmp_path / "photo.npy", srgb_to_linear(codes() / 255))
+    for values in (object_mask(), 0.8 * object_mask(), object_mask()[..., None] * np.uint8(1)):
+        assert np.array_equal(read_photo(photo, arrayed(tmp_path / "mask.npy", values)).mask, object_mask())
+
+
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        (np.zeros((20, 20, 2)), "(20, 20, 2): a photo is"),
+        (np.zeros(20), "(20,): a photo is"),
+        (np.zeros((20, 20, 3), np.int64), "values of type int64"),
+        (np.zeros((20, 20, 3), complex), "values of type complex128"),
+        (np.zeros((20, 20), "U4"), "values of type <U4"),
+        (np.zeros((4, 20, 3)), "20 x 4 pixels"),
+        (np.zeros((20, 20, 3)), "black"),
+        (np.full((20, 20, 3), np.nan), "black"),
+    ],
+)
+def test_numpy_arrays_that_are_no_photos(tmp_path: Path, values: np.ndarray, words: str) -> None:
+    refused(arrayed(tmp_path / "a.npy", values), words)
+
+
+def test_a_numpy_file_is_believed_only_as_far_as_it_goes(tmp_path: Path) -> None:
+    def header_only(*shape: int) -> Path:
+        stream = io.BytesIO()
+        np.lib.format.write_array_header_1_0(stream, {"descr": "<f4", "fortran_order": False, "shape": shape})
+        return write(tmp_path / "a.npy", stream.getvalue() + bytes(64))
+
+    refused(header_only(14_000, 14_000, 3), "damaged")
+    refused(header_only(20_000, 20_000, 3), "200 megapixels")
+    whole = arrayed(tmp_path / "b.npy", srgb_to_linear(codes() / 255)).read_bytes()
+    refused(write(tmp_path / "c.npy", whole.replace(b"'descr'", b"'other'")), "damaged")
+    np.save(tmp_path / "d.npy", np.empty((20, 20), object))
+    refused(tmp_path / "d.npy", "values of type object")
 
 
 def test_transfer_can_be_forced(tmp_path: Path) -> None:
@@ -489,6 +549,7 @@ def every_kind(folder: Path) -> list[Path]:
         write_exr(folder / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}),
         write_exr(folder / "raw.exr", {c: light[..., i] for i, c in enumerate("RGB")}, compression=OpenEXR.NO_COMPRESSION),
         opencv(folder / "a.hdr", light),
+        arrayed(folder / "a.npy", light),
     ]
 
 
