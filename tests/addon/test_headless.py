@@ -93,7 +93,7 @@ def glossy(strength: float) -> Decomposition:
 @pytest.mark.parametrize("strength", [0.0, 0.6])
 def test_the_material_has_the_fitted_gloss(tmp_path: Path, strength: float) -> None:
     """Roughness and specular level of the shader are those of the fit; what has no highlights has no gloss."""
-    from blender_addon.scene import build
+    from blender_addon.legacy_scene import build
 
     save(glossy(strength), tmp_path / "result")
     placement = read_placement(tmp_path / "result")
@@ -113,7 +113,7 @@ def test_the_material_has_the_fitted_gloss(tmp_path: Path, strength: float) -> N
 
 @needs_bpy
 def test_a_gloss_that_was_not_fitted_is_kept_on_demand_only(tmp_path: Path) -> None:
-    from blender_addon.scene import build
+    from blender_addon.legacy_scene import build
 
     save(ball(), tmp_path / "result")
     placement = read_placement(tmp_path / "result")

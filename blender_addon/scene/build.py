@@ -1,0 +1,165 @@
+"""One result becomes an object in a scene: mesh, material, light, camera, photo; built again, the same things are updated."""
+
+import json
+from dataclasses import asdict, dataclass, replace
+from typing import Any, Literal
+
+import bpy
+import numpy as np
+
+from isc_core.errors import InputError
+
+from ..arrays import Result
+from .background import show_photo
+from .camera import ensure_camera, frame_as_photo
+from .collection import ensure_collection, ensure_scene, put, show_as_photographed
+from .images import COLOR, DATA, ensure_image
+from .material import Gloss, Maps, ensure_material
+from .mesh import fill_mesh, sheet
+from .provenance import find as find_block
+from .provenance import is_isc, label, mark, record, require_local
+from .sun import ensure_sun, remove_sun
+from .world import ensure_world
+
+__all__ = ["BuildOptions", "Built", "build", "find", "is_isc"]
+
+_USUAL_ROUGHNESS = 0.5
+
+
+@dataclass(frozen=True)
+class BuildOptions:
+    """What is built, and what of the user's may be changed.
+
+    `size_metres`: longer side of the object. `own_scene`: in a scene of its own; else in the current one, where the world, the active
+    camera, the resolution and the view transform change only with `set_world, set_camera, set_resolution, set_view_transform`.
+    `sun`: a sun lamp and even light instead of the environment. `displacement`: a flat grid that a modifier displaces, instead of the
+    height mesh. `closed_back`: a wall and a flat back, so that the mesh is closed.
+    `specular_from`: the gloss is the fitted "lobe", the photo's specular "image", or "none". `name`: the result's own if empty.
+    """
+
+    size_metres: float = 0.1
+    own_scene: bool = True
+    set_world: bool = False
+    set_camera: bool = False
+    set_resolution: bool = False
+    set_view_transform: bool = False
+    sun: bool = False
+    displacement: bool = False
+    closed_back: bool = False
+    specular_from: Literal["lobe", "image", "none"] = "lobe"
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Built:
+    """What stands in the file now. `world` is the scene's only where that was wanted."""
+
+    collection: bpy.types.Collection
+    object: bpy.types.Object
+    camera: bpy.types.Object
+    world: bpy.types.World
+    scene: bpy.types.Scene
+    material: bpy.types.Material
+
+
+def build(
+    result: Result,
+    options: BuildOptions | None = None,
+    *,
+    scene: bpy.types.Scene | None = None,
+    photo: bpy.types.Image | None = None,
+) -> Built:
+    """Builds the result, or updates what was built under its name before.
+
+    `scene`: where to, without a scene of its own; the current one if None. `photo`: shown behind the object; the masked one if None.
+    Raises `InputError`, before anything is changed, for a size that is none, things linked from another file, a mesh being edited.
+    """
+    options = options or BuildOptions()
+    key = options.name or result.name
+    _require_ready(key, options, scene or bpy.context.scene)
+    scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
+    collection = ensure_collection(key, scene)
+    material = ensure_material(key, _maps(key, result, options), _gloss(result, options))
+    thing = _object(key, collection, result, options, material)
+    camera = ensure_camera(key, collection, result, options.size_metres, thing.matrix_basis)
+    masked = ensure_image(key, "photo", result.image, COLOR, result.mask.astype(np.float32))
+    show_photo(camera, photo or masked)
+    world = ensure_world(key, ensure_image(key, "sky", result.sky, COLOR), result.sun_ambient, options.sun)
+    if options.sun:
+        ensure_sun(key, collection, result.sun_direction, result.sun_strength)
+    else:
+        remove_sun(key)
+    for block in (thing, collection):
+        record(block, result, json.dumps(asdict(options)))
+    built = Built(collection, thing, camera, world, scene, material)
+    _set_scene(built, options, result)
+    return built
+
+
+def find(thing: bpy.types.Object | None) -> Built | None:
+    """What belongs to an object, camera or sun that ISC made; None for others, or if parts of it were deleted."""
+    if thing is None or not is_isc(thing):
+        return None
+    key = thing["isc_key"]
+    parts = (
+        find_block(bpy.data.collections, key, "collection"),
+        find_block(bpy.data.objects, key, "object"),
+        find_block(bpy.data.objects, key, "camera"),
+        find_block(bpy.data.worlds, key, "world"),
+        find_block(bpy.data.scenes, key, "scene") or next(iter(thing.users_scene), None),
+        find_block(bpy.data.materials, key, "material"),
+    )
+    return None if any(part is None for part in parts) else Built(*parts)
+
+
+def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> None:
+    if not 0 < options.size_metres < 1e6:
+        raise InputError(f"a size of {options.size_metres} metres cannot be built: give one above 0")
+    if not options.own_scene and scene.library is not None:
+        raise InputError(f"the scene {scene.name} is linked from another file and cannot be changed: build in a scene of its own")
+    require_local(key)
+    thing = find_block(bpy.data.objects, key, "object")
+    if thing is not None and thing.mode != "OBJECT":
+        raise InputError(f"{thing.name} is being edited: go back to Object Mode first")
+
+
+def _object(
+    key: str, collection: bpy.types.Collection, result: Result, options: BuildOptions, material: bpy.types.Material
+) -> bpy.types.Object:
+    thing = find_block(bpy.data.objects, key, "object")
+    if thing is None:
+        thing = mark(bpy.data.objects.new(label(key), mark(bpy.data.meshes.new(label(key)), key, "mesh")), key, "object")
+    put(thing, collection)
+    fill_mesh(thing.data, sheet(result, options.size_metres))
+    if not thing.data.materials:
+        thing.data.materials.append(material)
+    return thing
+
+
+def _maps(key: str, result: Result, options: BuildOptions) -> Maps:
+    base = ensure_image(key, "base_color", result.base_color, COLOR)
+    seen = ensure_image(key, "specular", result.specular, COLOR) if options.specular_from == "image" else None
+    varies = result.specular_variation
+    variation = None if varies is None else ensure_image(key, "specular_variation", varies, DATA)
+    flat = np.abs(result.normal_map - (0.5, 0.5, 1)).max() < 1e-3
+    return Maps(base, seen, variation, None if flat else ensure_image(key, "normal_map", result.normal_map, DATA))
+
+
+def _gloss(result: Result, options: BuildOptions) -> Gloss:
+    """What the fit says; without a fitted level there is no gloss, which the photo would not show."""
+    level = result.specular_level if np.isfinite(result.specular_level) else 0.0
+    roughness = result.roughness if np.isfinite(result.roughness) else _USUAL_ROUGHNESS
+    return Gloss(level, roughness, options.specular_from)
+
+
+def _set_scene(built: Built, options: BuildOptions, result: Result) -> None:
+    wanted: Any = replace(options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True)
+    wanted = wanted if options.own_scene else options
+    if wanted.set_world:
+        built.scene.world = built.world
+    if wanted.set_camera:
+        built.scene.camera = built.camera
+    if wanted.set_resolution:
+        frame_as_photo(built.scene, result.size)
+    if wanted.set_view_transform:
+        show_as_photographed(built.scene)

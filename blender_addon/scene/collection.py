@@ -1,0 +1,38 @@
+"""The collection that holds all that ISC makes of one image, and the scene that it stands in."""
+
+import bpy
+
+from .provenance import find, label, mark
+
+
+def ensure_collection(key: str, scene: bpy.types.Scene) -> bpy.types.Collection:
+    """The collection of that image, in the scene."""
+    collection = find(bpy.data.collections, key, "collection") or mark(bpy.data.collections.new(label(key)), key, "collection")
+    if collection not in set(scene.collection.children_recursive):
+        scene.collection.children.link(collection)
+    return collection
+
+
+def ensure_scene(key: str) -> bpy.types.Scene:
+    """The image's own scene: a new one renders with Cycles, the object alone before nothing."""
+    scene = find(bpy.data.scenes, key, "scene")
+    if scene is None:
+        scene = mark(bpy.data.scenes.new(label(key)), key, "scene")
+        engines = scene.render.bl_rna.properties["engine"].enum_items.keys()
+        if "CYCLES" in engines or hasattr(scene, "cycles"):
+            scene.render.engine = "CYCLES"
+            scene.cycles.samples, scene.cycles.use_denoising = 64, False
+        scene.render.film_transparent = True
+    return scene
+
+
+def put(thing: bpy.types.Object, collection: bpy.types.Collection) -> None:
+    """Puts an object into the collection, if it is not there."""
+    if thing.name not in collection.objects or collection.objects[thing.name] != thing:
+        collection.objects.link(thing)
+
+
+def show_as_photographed(scene: bpy.types.Scene) -> None:
+    """Colours on the screen and in files as they are: no film look, no exposure."""
+    view = scene.view_settings
+    view.view_transform, view.look, view.exposure, view.gamma, view.use_curve_mapping = "Standard", "None", 0.0, 1.0, False

@@ -1,0 +1,144 @@
+"""The node group "ISC Dichromatic": a surface that is the sum of paint and gloss, as the photo was taken apart.
+
+Equation: radiance = g_d * rho' / pi * E + g_s * (what the gloss mirrors); rho' is the reflectance, recoloured in hue, saturation and
+value; E the irradiance. The gloss is a GGX lobe of the given roughness, with Fresnel's equations at the facets and f0 = 0.04 * level
+along the normal. The two are ADDED: a Diffuse BSDF beside a Principled one that has a black base, since Principled alone takes from the
+paint what its gloss mirrors, and the recovered diffuse image would come out darker than it is in the photo.
+
+"ISC Photo Highlights" shows the photo's own specular image to the camera instead: exact from where the photo was taken, and no light.
+
+A group carries its version. A file made by another version keeps its own group, this one is added beside it; materials share it.
+
+Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and Application 10 (1985),
+doi:10.1002/col.5080100409. B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206.
+
+Limits: f0 cannot exceed 0.99: level * gain above 24 changes nothing. Toward grazing light all gloss mirrors all, whatever its level.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+
+from .nodes import add_node
+
+VERSION = 1
+DICHROMATIC, HIGHLIGHTS = "ISC Dichromatic", "ISC Photo Highlights"
+
+
+@dataclass(frozen=True)
+class Socket:
+    """An input of a group: its name, kind ("Color", "Float" or "Vector"), usual value, range and tooltip."""
+
+    name: str
+    kind: str
+    default: Any
+    low: float
+    high: float
+    about: str
+    factor: bool = False
+
+
+WHITE, BLACK = (1.0, 1.0, 1.0, 1.0), (0.0, 0.0, 0.0, 1.0)
+_SPECULAR_GAIN = Socket("Specular Gain", "Float", 1.0, 0, 10, "Factor of the gloss: 0 is matt, 1 as in the photo")
+DICHROMATIC_SOCKETS = (
+    Socket("Reflectance", "Color", (0.8, 0.8, 0.8, 1.0), 0, 1, "Colour of the paint without light or gloss (linear)"),
+    Socket("Diffuse Gain", "Float", 1.0, 0, 10, "Factor of the light that the paint scatters: 0 is black, 1 as in the photo"),
+    Socket("Hue", "Float", 0.5, 0, 1, "Turns the paint's hue: 0.5 as in the photo, 0 and 1 the opposite", True),
+    Socket("Saturation", "Float", 1.0, 0, 2, "Factor of the paint's saturation: 0 is grey, 1 as in the photo"),
+    Socket("Value", "Float", 1.0, 0, 2, "Factor of the paint's brightness: 1 as in the photo"),
+    Socket("Specular Image", "Color", WHITE, 0, 1, "Where the gloss is stronger or weaker, and its colour: a factor of the level"),
+    Socket("Specular Level", "Float", 0.0, 0, 24, "Strength of the gloss: 0 is matt, 1 is plastic (4 % along the normal)"),
+    Socket("Roughness", "Float", 0.5, 0, 1, "Width of the highlights: 0 is a mirror", True),
+    _SPECULAR_GAIN,
+    Socket("Normal", "Vector", (0.0, 0.0, 0.0), -1, 1, "A normal map's normal; the mesh's own where nothing is connected"),
+)
+HIGHLIGHTS_SOCKETS = (
+    Socket("Specular Image", "Color", BLACK, 0, 1, "The photo's highlights, linear; seen by the camera, they light nothing"),
+    _SPECULAR_GAIN,
+)
+
+
+def dichromatic_group() -> bpy.types.NodeTree:
+    """The group of this version, made where the file has none; one that people edited stays as it is while its inputs are there."""
+    return _found(DICHROMATIC, DICHROMATIC_SOCKETS) or _wire_dichromatic(_new(DICHROMATIC, DICHROMATIC_SOCKETS))
+
+
+def highlights_group() -> bpy.types.NodeTree:
+    """The group that shows a specular image, as `dichromatic_group` does the other one."""
+    return _found(HIGHLIGHTS, HIGHLIGHTS_SOCKETS) or _wire_highlights(_new(HIGHLIGHTS, HIGHLIGHTS_SOCKETS))
+
+
+def _found(name: str, sockets: tuple[Socket, ...]) -> bpy.types.NodeTree | None:
+    for group in bpy.data.node_groups:
+        if group.library is None and group.get("isc_group") == name and group.get("isc_group_version") == VERSION:
+            held = {item.name for item in group.interface.items_tree if item.item_type == "SOCKET" and item.in_out == "INPUT"}
+            if held >= {socket.name for socket in sockets}:
+                return group
+    return None
+
+
+def _new(name: str, sockets: tuple[Socket, ...]) -> bpy.types.NodeTree:
+    group = bpy.data.node_groups.new(name, "ShaderNodeTree")
+    group["isc_group"], group["isc_group_version"] = name, VERSION
+    for socket in sockets:
+        item = group.interface.new_socket(socket.name, description=socket.about, in_out="INPUT", socket_type=f"NodeSocket{socket.kind}")
+        item.default_value = socket.default
+        if socket.kind == "Float":
+            item.subtype, item.min_value, item.max_value = "FACTOR" if socket.factor else "NONE", socket.low, socket.high
+        item.hide_value = socket.kind == "Vector"  # unconnected, such an input leaves the mesh's normal alone
+    group.interface.new_socket("Surface", description="Paint and gloss, added", in_out="OUTPUT", socket_type="NodeSocketShader")
+    return group
+
+
+def _wire_dichromatic(group: bpy.types.NodeTree) -> bpy.types.NodeTree:
+    given = add_node(group, "NodeGroupInput", (-700, 0)).outputs
+    paint = add_node(group, "HueSaturation", (-450, 200), label="Recolour")
+    bright = add_node(group, "VectorMath", (-250, 200), operation="SCALE", label="Diffuse Gain")
+    matt = add_node(group, "BsdfDiffuse", (50, 200), label="Paint")
+    strength = add_node(group, "Math", (-450, -150), operation="MULTIPLY", label="Specular Gain")
+    level = add_node(group, "Math", (-250, -150), operation="MULTIPLY", label="Blender's level: 0.5 is plastic")
+    gloss = add_node(group, "BsdfPrincipled", (50, 0), distribution="GGX", label="Gloss alone")
+    both = add_node(group, "AddShader", (400, 100))
+    out = add_node(group, "NodeGroupOutput", (600, 100))
+    level.inputs[1].default_value = 0.5
+    gloss.inputs["Base Color"].default_value = BLACK
+    for source, target in (
+        (given["Reflectance"], paint.inputs["Color"]),
+        (given["Hue"], paint.inputs["Hue"]),
+        (given["Saturation"], paint.inputs["Saturation"]),
+        (given["Value"], paint.inputs["Value"]),
+        (paint.outputs["Color"], bright.inputs[0]),
+        (given["Diffuse Gain"], bright.inputs["Scale"]),
+        (bright.outputs["Vector"], matt.inputs["Color"]),
+        (given["Normal"], matt.inputs["Normal"]),
+        (given["Specular Level"], strength.inputs[0]),
+        (given["Specular Gain"], strength.inputs[1]),
+        (strength.outputs["Value"], level.inputs[0]),
+        (level.outputs["Value"], gloss.inputs["Specular IOR Level"]),
+        (given["Specular Image"], gloss.inputs["Specular Tint"]),
+        (given["Roughness"], gloss.inputs["Roughness"]),
+        (given["Normal"], gloss.inputs["Normal"]),
+        (matt.outputs["BSDF"], both.inputs[0]),
+        (gloss.outputs["BSDF"], both.inputs[1]),
+        (both.outputs["Shader"], out.inputs["Surface"]),
+    ):
+        group.links.new(source, target)
+    return group
+
+
+def _wire_highlights(group: bpy.types.NodeTree) -> bpy.types.NodeTree:
+    given = add_node(group, "NodeGroupInput", (-500, 0)).outputs
+    seen = add_node(group, "LightPath", (-500, 350)).outputs["Is Camera Ray"]
+    strength = add_node(group, "Math", (-250, 100), operation="MULTIPLY", label="Seen by the camera only")
+    shine = add_node(group, "Emission", (0, 0), label="The photo's highlights")
+    out = add_node(group, "NodeGroupOutput", (250, 0))
+    for source, target in (
+        (seen, strength.inputs[0]),
+        (given["Specular Gain"], strength.inputs[1]),
+        (strength.outputs["Value"], shine.inputs["Strength"]),
+        (given["Specular Image"], shine.inputs["Color"]),
+        (shine.outputs["Emission"], out.inputs["Surface"]),
+    ):
+        group.links.new(source, target)
+    return group
