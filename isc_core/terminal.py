@@ -1,12 +1,14 @@
-"""What a person at a terminal sees and presses: the progress bar, and Ctrl-C."""
+"""What a person at a terminal sees and presses: the progress bar, results and complaints, and Ctrl-C."""
 
 import contextlib
+import os
 import shutil
 import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import TextIO
 
@@ -14,6 +16,48 @@ from .progress import Monitor
 
 _BAR = 24
 _REDRAW_SECONDS = 0.08
+
+
+def stage_name(stage: str) -> str:
+    """A stage's text without its changing part."""
+    return stage.partition(", loss")[0]
+
+
+def discard_output() -> None:
+    """Points standard output at nothing, so that what is still buffered does not fail once more when Python ends."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class TerminalSpeaker:
+    """Speaks to a person: results on standard output, all else on standard error."""
+
+    @contextmanager
+    def progress(self, quiet: bool) -> Iterator[Callable[[str, float], None]]:
+        """Where the work reports to while it lasts."""
+        with ProgressBar(sys.stderr, quiet=quiet) as bar:
+            yield bar
+
+    def done(self, output: str, lines: Sequence[str]) -> None:
+        """The work's result is written to `output`; `lines` say what a person should know."""
+        del output
+        for line in lines:
+            print(line)
+
+    def failed(self, message: str, code: int) -> None:
+        """One line says why there is no result."""
+        del code
+        print(f"isc: error: {message}", file=sys.stderr)
+
+    def rejected(self, lines: Sequence[str], code: int) -> None:
+        """The result is written, but breaks bounds, a line each."""
+        del code
+        for line in lines:
+            print(f"isc: rejected: {line}", file=sys.stderr)
+
+    def cancelled(self) -> None:
+        """The work was stopped, and left nothing."""
+        print("isc: cancelled", file=sys.stderr)
 
 
 class ProgressBar:
@@ -35,7 +79,7 @@ class ProgressBar:
         """Shows the stage; a bar never goes back."""
         if self._quiet:
             return
-        name = stage.partition(", loss")[0]
+        name = stage_name(stage)
         new, self._stage = name != self._stage, name
         self._most = max(self._most, min(fraction, 1.0))
         if self._live:

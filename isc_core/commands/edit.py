@@ -28,7 +28,7 @@ from ..progress import Monitor
 from ..report import Panel
 from ..result_folder import load
 from ..sirfs.frames import real_sh
-from .options import Commands, Parser, add_command, count, hints
+from .options import Commands, Parser, add_command, add_speech, count, hints
 
 _EXAMPLES = """  isc edit cup light-direction -o light                                where the light is, and how sure that is
   isc edit cup highlight --direction -0.5 0.6 0.6 -o glint             a new highlight
@@ -48,7 +48,7 @@ _OTHER_LIGHTS = (
     ("from the front", (0.0, 0.0, 1.0)),
 )
 _USUAL_LEVEL = 0.7
-_OF_THE_COMMAND = ("run", "act", "quiet", "output", "action", "usual")
+_OF_THE_COMMAND = ("run", "act", "quiet", "progress", "output", "action", "usual")
 _PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp")
 
 
@@ -334,7 +334,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     picture.add_argument("--mask", type=Path, metavar="MASK", help="its mask, where the result was made with one")
     picture.add_argument("--transfer", choices=TRANSFERS, help="how it is coded (default: as isc decompose read it)")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier edit is replaced")
-    parser.add_argument("--quiet", action="store_true", help="show no progress, and print nothing but what was asked for")
+    add_speech(parser)
     parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))
 
 

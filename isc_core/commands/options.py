@@ -37,8 +37,17 @@ def add_command(commands: Commands, name: str, run: Any, summary: str, descripti
         name, help=summary, description=description, epilog=f"examples:\n{examples}" if examples else None
     )
     parser.set_defaults(run=run)
-    parser.add_argument("--quiet", action="store_true", help="show no progress, and print nothing but what was asked for")
+    add_speech(parser)
     return parser
+
+
+def add_speech(parser: argparse.ArgumentParser) -> None:
+    """--quiet and --progress."""
+    parser.add_argument("--quiet", action="store_true", help="show no progress, and print nothing but what was asked for")
+    parser.add_argument(
+        "--progress", choices=("bar", "json"), default="bar",
+        help="json: for programs, a JSON object a line on stdout, cancelled by `cancel` or the end of stdin (default %(default)s)",
+    )  # fmt: skip
 
 
 def hints(options: argparse.Namespace, *lines: str) -> list[str]:

@@ -438,7 +438,7 @@ def test_a_reader_that_goes_away_is_no_error() -> None:
 def test_trouble_with_the_machine_is_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: BaseException, words: str
 ) -> None:
-    def fail(arguments: list[str]) -> int:
+    def fail(arguments: list[str], speaker: object) -> int:
         raise error
 
     monkeypatch.setattr("isc_core.cli._run", fail)
