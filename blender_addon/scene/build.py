@@ -2,7 +2,7 @@
 
 import json
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 import bpy
 import numpy as np
@@ -10,20 +10,23 @@ import numpy as np
 from isc_core.errors import InputError
 
 from ..arrays import Result
+from .back import close_back
 from .background import show_photo
 from .camera import ensure_camera, frame_as_photo
 from .collection import ensure_collection, ensure_scene, put, show_as_photographed
-from .images import COLOR, DATA, ensure_image
+from .displacement import displace, flattened, undo_displacement
+from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps
 from .material import Gloss, Maps, ensure_material
 from .mesh import fill_mesh, sheet
 from .provenance import find as find_block
 from .provenance import is_isc, label, mark, record, require_local
-from .sun import ensure_sun, remove_sun
+from .sun import relight
 from .world import ensure_world
 
 __all__ = ["BuildOptions", "Built", "build", "find", "is_isc"]
 
 _USUAL_ROUGHNESS = 0.5
+_BACK = 0.02  # of the size: how far the back lies behind the furthest point of the front
 
 
 @dataclass(frozen=True)
@@ -79,18 +82,16 @@ def build(
     _require_ready(key, options, scene or bpy.context.scene)
     scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
     collection = ensure_collection(key, scene)
-    material = ensure_material(key, _maps(key, result, options), _gloss(result, options))
+    maps = ensure_maps(key, result)
+    material = ensure_material(key, _material_maps(key, result, maps), _gloss(result, options))
     thing = _object(key, collection, result, options, material)
+    attach_maps(thing, maps)
     camera = ensure_camera(key, collection, result, options.size_metres, thing.matrix_basis)
-    masked = ensure_image(key, "photo", result.image, COLOR, result.mask.astype(np.float32))
-    show_photo(camera, photo or masked)
+    show_photo(camera, photo or ensure_image(key, "photo", result.image, COLOR, result.mask.astype(np.float32)))
     world = ensure_world(key, ensure_image(key, "sky", result.sky, COLOR), result.sun_ambient, options.sun)
-    if options.sun:
-        ensure_sun(key, collection, result.sun_direction, result.sun_strength)
-    else:
-        remove_sun(key)
     for block in (thing, collection):
         record(block, result, json.dumps(asdict(options)))
+    relight(thing, options.sun)
     built = Built(collection, thing, camera, world, scene, material)
     _set_scene(built, options, result)
     return built
@@ -117,6 +118,8 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
         raise InputError(f"a size of {options.size_metres} metres cannot be built: give one above 0")
     if not options.own_scene and scene.library is not None:
         raise InputError(f"the scene {scene.name} is linked from another file and cannot be changed: build in a scene of its own")
+    if options.displacement and options.closed_back:
+        raise InputError("a displaced grid has no back: choose displacement or a closed back")
     require_local(key)
     thing = find_block(bpy.data.objects, key, "object")
     if thing is not None and thing.mode != "OBJECT":
@@ -130,19 +133,24 @@ def _object(
     if thing is None:
         thing = mark(bpy.data.objects.new(label(key), mark(bpy.data.meshes.new(label(key)), key, "mesh")), key, "object")
     put(thing, collection)
-    fill_mesh(thing.data, sheet(result, options.size_metres))
+    geometry = sheet(result, options.size_metres)
+    if options.displacement:
+        fill_mesh(thing.data, flattened(geometry))
+        displace(key, thing, result, options.size_metres)
+    else:
+        fill_mesh(thing.data, close_back(geometry, _BACK * options.size_metres) if options.closed_back else geometry)
+        undo_displacement(key, thing)
     if not thing.data.materials:
         thing.data.materials.append(material)
     return thing
 
 
-def _maps(key: str, result: Result, options: BuildOptions) -> Maps:
+def _material_maps(key: str, result: Result, maps: dict[str, bpy.types.Image]) -> Maps:
     base = ensure_image(key, "base_color", result.base_color, COLOR)
-    seen = ensure_image(key, "specular", result.specular, COLOR) if options.specular_from == "image" else None
     varies = result.specular_variation
     variation = None if varies is None else ensure_image(key, "specular_variation", varies, DATA)
-    flat = np.abs(result.normal_map - (0.5, 0.5, 1)).max() < 1e-3
-    return Maps(base, seen, variation, None if flat else ensure_image(key, "normal_map", result.normal_map, DATA))
+    flat = np.abs(result.normal_map - (0.5, 0.5, 1)).max() < 1e-3  # a mesh of every pixel has all detail in its own normals
+    return Maps(base, maps["specular"], variation, None if flat else ensure_image(key, "normal_map", result.normal_map, DATA))
 
 
 def _gloss(result: Result, options: BuildOptions) -> Gloss:
@@ -153,8 +161,8 @@ def _gloss(result: Result, options: BuildOptions) -> Gloss:
 
 
 def _set_scene(built: Built, options: BuildOptions, result: Result) -> None:
-    wanted: Any = replace(options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True)
-    wanted = wanted if options.own_scene else options
+    everything = replace(options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True)
+    wanted = everything if options.own_scene else options
     if wanted.set_world:
         built.scene.world = built.world
     if wanted.set_camera:

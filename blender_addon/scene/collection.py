@@ -18,10 +18,8 @@ def ensure_scene(key: str) -> bpy.types.Scene:
     scene = find(bpy.data.scenes, key, "scene")
     if scene is None:
         scene = mark(bpy.data.scenes.new(label(key)), key, "scene")
-        engines = scene.render.bl_rna.properties["engine"].enum_items.keys()
-        if "CYCLES" in engines or hasattr(scene, "cycles"):
-            scene.render.engine = "CYCLES"
-            scene.cycles.samples, scene.cycles.use_denoising = 64, False
+        if hasattr(scene, "cycles"):  # an add-on, which people may have switched off
+            scene.render.engine, scene.cycles.samples = "CYCLES", 64
         scene.render.film_transparent = True
     return scene
 

@@ -20,7 +20,7 @@ from typing import Any
 
 import bpy
 
-from .nodes import add_node
+from .nodes import add_node, connect
 
 VERSION = 1
 DICHROMATIC, HIGHLIGHTS = "ISC Dichromatic", "ISC Photo Highlights"
@@ -92,53 +92,74 @@ def _new(name: str, sockets: tuple[Socket, ...]) -> bpy.types.NodeTree:
 
 
 def _wire_dichromatic(group: bpy.types.NodeTree) -> bpy.types.NodeTree:
-    given = add_node(group, "NodeGroupInput", (-700, 0)).outputs
-    paint = add_node(group, "HueSaturation", (-450, 200), label="Recolour")
-    bright = add_node(group, "VectorMath", (-250, 200), operation="SCALE", label="Diffuse Gain")
+    given = add_node(group, "NodeGroupInput", (-900, 0)).outputs
     matt = add_node(group, "BsdfDiffuse", (50, 200), label="Paint")
-    strength = add_node(group, "Math", (-450, -150), operation="MULTIPLY", label="Specular Gain")
-    level = add_node(group, "Math", (-250, -150), operation="MULTIPLY", label="Blender's level: 0.5 is plastic")
     gloss = add_node(group, "BsdfPrincipled", (50, 0), distribution="GGX", label="Gloss alone")
     both = add_node(group, "AddShader", (400, 100))
     out = add_node(group, "NodeGroupOutput", (600, 100))
-    level.inputs[1].default_value = 0.5
     gloss.inputs["Base Color"].default_value = BLACK
-    for source, target in (
-        (given["Reflectance"], paint.inputs["Color"]),
-        (given["Hue"], paint.inputs["Hue"]),
-        (given["Saturation"], paint.inputs["Saturation"]),
-        (given["Value"], paint.inputs["Value"]),
-        (paint.outputs["Color"], bright.inputs[0]),
-        (given["Diffuse Gain"], bright.inputs["Scale"]),
-        (bright.outputs["Vector"], matt.inputs["Color"]),
+    level = _product(group, given["Specular Level"], given["Specular Gain"], (-450, -150))
+    halved = _product(group, level, 0.5, (-250, -150))  # Blender's level of plastic is 0.5
+    connect(
+        group,
+        (_bright(group, given), matt.inputs["Color"]),
         (given["Normal"], matt.inputs["Normal"]),
-        (given["Specular Level"], strength.inputs[0]),
-        (given["Specular Gain"], strength.inputs[1]),
-        (strength.outputs["Value"], level.inputs[0]),
-        (level.outputs["Value"], gloss.inputs["Specular IOR Level"]),
+        (halved, gloss.inputs["Specular IOR Level"]),
         (given["Specular Image"], gloss.inputs["Specular Tint"]),
         (given["Roughness"], gloss.inputs["Roughness"]),
         (given["Normal"], gloss.inputs["Normal"]),
         (matt.outputs["BSDF"], both.inputs[0]),
         (gloss.outputs["BSDF"], both.inputs[1]),
         (both.outputs["Shader"], out.inputs["Surface"]),
-    ):
-        group.links.new(source, target)
+    )
     return group
+
+
+def _bright(group: bpy.types.NodeTree, given: Any) -> bpy.types.NodeSocket:
+    """The recoloured paint times its gain. Turning hues and back costs some bits: a paint that nobody recolours goes around that node."""
+    paint = add_node(group, "HueSaturation", (-450, 450), label="Recolour")
+    bright = add_node(group, "VectorMath", (-150, 300), operation="SCALE", label="Diffuse Gain")
+    untouched = [add_node(group, "Math", (-850, 350 + 170 * k), operation="COMPARE", label="Untouched?") for k in (0, 1)]
+    for node, usual in zip(untouched, (0.5, 1.0), strict=True):
+        node.inputs[1].default_value, node.inputs[2].default_value = usual, 1e-6
+    recoloured = add_node(group, "Math", (-550, 650), operation="SUBTRACT", label="Recoloured?")
+    recoloured.inputs[0].default_value = 1.0
+    connect(
+        group,
+        (given["Hue"], untouched[0].inputs[0]),
+        (given["Saturation"], untouched[1].inputs[0]),
+        (_product(group, untouched[0].outputs["Value"], untouched[1].outputs["Value"], (-650, 500)), recoloured.inputs[1]),
+        (recoloured.outputs["Value"], paint.inputs[3]),  # how much of it; its name changed between versions of Blender
+        (given["Hue"], paint.inputs["Hue"]),
+        (given["Saturation"], paint.inputs["Saturation"]),
+        (given["Reflectance"], paint.inputs["Color"]),
+        (paint.outputs["Color"], bright.inputs[0]),
+        (_product(group, given["Diffuse Gain"], given["Value"], (-450, 150)), bright.inputs["Scale"]),
+    )
+    return bright.outputs["Vector"]
+
+
+def _product(
+    group: bpy.types.NodeTree, first: bpy.types.NodeSocket, second: bpy.types.NodeSocket | float, place: tuple[float, float]
+) -> bpy.types.NodeSocket:
+    node = add_node(group, "Math", place, operation="MULTIPLY")
+    group.links.new(first, node.inputs[0])
+    if isinstance(second, float):
+        node.inputs[1].default_value = second
+    else:
+        group.links.new(second, node.inputs[1])
+    return node.outputs["Value"]
 
 
 def _wire_highlights(group: bpy.types.NodeTree) -> bpy.types.NodeTree:
     given = add_node(group, "NodeGroupInput", (-500, 0)).outputs
     seen = add_node(group, "LightPath", (-500, 350)).outputs["Is Camera Ray"]
-    strength = add_node(group, "Math", (-250, 100), operation="MULTIPLY", label="Seen by the camera only")
-    shine = add_node(group, "Emission", (0, 0), label="The photo's highlights")
+    shine = add_node(group, "Emission", (0, 0), label="Seen by the camera only")
     out = add_node(group, "NodeGroupOutput", (250, 0))
-    for source, target in (
-        (seen, strength.inputs[0]),
-        (given["Specular Gain"], strength.inputs[1]),
-        (strength.outputs["Value"], shine.inputs["Strength"]),
+    connect(
+        group,
+        (_product(group, seen, given["Specular Gain"], (-250, 100)), shine.inputs["Strength"]),
         (given["Specular Image"], shine.inputs["Color"]),
         (shine.outputs["Emission"], out.inputs["Surface"]),
-    ):
-        group.links.new(source, target)
+    )
     return group

@@ -7,9 +7,14 @@ they are. A packed image is an OpenEXR of 32 bit, so that nothing is lost by sav
 import bpy
 import numpy as np
 
+from ..arrays import Result
 from .provenance import find, label, mark
 
 COLOR, DATA = "Linear Rec.709", "Non-Color"
+MAPS = {
+    **dict.fromkeys(("diffuse", "specular", "residual", "reflectance", "shading", "lobe"), COLOR),
+    **dict.fromkeys(("normal", "height", "confidence", "mask"), DATA),
+}
 
 
 def ensure_image(key: str, role: str, values: np.ndarray, space: str, alpha: np.ndarray | None = None) -> bpy.types.Image:
@@ -27,6 +32,17 @@ def ensure_image(key: str, role: str, values: np.ndarray, space: str, alpha: np.
     if old is not None:
         _replace(old, image)
     return mark(image, key, role)
+
+
+def ensure_maps(key: str, result: Result) -> dict[str, bpy.types.Image]:
+    """All maps of the result as images, by name."""
+    return {name: ensure_image(key, name, getattr(result, name), space) for name, space in MAPS.items()}
+
+
+def attach_maps(thing: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None:
+    """Lets the object's properties `isc_map_...` point at the images, so that they are saved and appended with it."""
+    for name, image in maps.items():
+        thing[f"isc_map_{name}"] = image
 
 
 def _replace(old: bpy.types.Image, new: bpy.types.Image) -> None:

@@ -19,3 +19,9 @@ def add_node(tree: bpy.types.NodeTree, kind: str, place: tuple[float, float], **
     for name, value in settings.items():
         setattr(node, name, value)
     return node
+
+
+def connect(tree: bpy.types.NodeTree, *wires: tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]) -> None:
+    """Links each output to each input."""
+    for source, target in wires:
+        tree.links.new(source, target)

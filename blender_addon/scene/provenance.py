@@ -55,7 +55,7 @@ def require_local(key: str) -> None:
 
 
 def record(block: Any, result: Result, options: str) -> None:
-    """Writes what the datablock was made from: photo, settings, versions, status. `options`: of the build, as JSON."""
+    """Writes what the datablock was made from: photo, settings, versions, status, light. `options`: of the build, as JSON."""
     described = result.description
     source, settings = described.get("input", {}), described.get("settings", {})
     block["isc_version"] = str(described.get("versions", {}).get("isc", ""))
@@ -64,5 +64,8 @@ def record(block: Any, result: Result, options: str) -> None:
     block["isc_model"] = str(settings.get("model", ""))
     block["isc_separator"] = str(settings.get("separator", ""))
     block["isc_folder"] = str(result.folder)
+    for name in ("sun_direction", "sun_strength", "sun_ambient"):
+        block[f"isc_{name}"] = [float(part) for part in getattr(result, name)]
+    block["isc_sun_explained"], block["isc_sun_cone"] = result.sun_explained, result.sun_cone
     block["isc_options"] = options
     block["isc_decomposition"] = json.dumps(described, ensure_ascii=False)

@@ -8,9 +8,12 @@ import bpy
 import numpy as np
 from mathutils import Vector
 
+from isc_core.errors import InputError
+
 from .collection import put
 from .mesh import to_blender
-from .provenance import find, label, mark
+from .provenance import KEY, find, label, mark
+from .world import mix_sun
 
 
 def ensure_sun(key: str, collection: bpy.types.Collection, direction: np.ndarray, strength: np.ndarray) -> bpy.types.Object:
@@ -25,6 +28,25 @@ def ensure_sun(key: str, collection: bpy.types.Collection, direction: np.ndarray
     sun.rotation_mode = "QUATERNION"
     sun.rotation_quaternion = Vector(to_blender(direction.astype(float))).to_track_quat("Z", "Y")
     return sun
+
+
+def relight(thing: bpy.types.Object, on: bool = True) -> bpy.types.Object | None:
+    """Lights an object that ISC made by its sun and even light, or by its recovered environment again; returns the sun.
+
+    The directions are the object's properties, so that this works in any file. Raises `InputError` if it has none.
+    """
+    key, values = thing.get(KEY), [thing.get(f"isc_sun_{name}") for name in ("direction", "strength", "ambient")]
+    if not isinstance(key, str) or any(value is None for value in values):
+        raise InputError(f"{thing.name} is not an object of ISC, or its light was deleted: import the result again")
+    direction, strength, ambient = (np.array(value, float) for value in values)
+    world = find(bpy.data.worlds, key, "world")
+    if world is not None:
+        mix_sun(world, ambient, on)
+    if not on:
+        remove_sun(key)
+        return None
+    collection = find(bpy.data.collections, key, "collection") or thing.users_collection[0]
+    return ensure_sun(key, collection, direction, strength)
 
 
 def remove_sun(key: str) -> None:

@@ -12,7 +12,7 @@ from math import radians
 import bpy
 import numpy as np
 
-from .nodes import add_node, node_tree
+from .nodes import add_node, connect, node_tree
 from .provenance import find, label, mark
 
 ROTATION = 90.0  # degrees about Z
@@ -31,16 +31,25 @@ def ensure_world(key: str, sky: bpy.types.Image, ambient: np.ndarray, sun: bool)
     light = add_node(tree, "Background", (50, 0), name=BACKGROUND)
     out = add_node(tree, "OutputWorld", (250, 0))
     turn.inputs["Rotation"].default_value = (0, 0, radians(ROTATION))
-    factor, _, _, _, _, _, first, second = mix.inputs[:8]
-    factor.default_value, second.default_value = float(sun), (*map(float, ambient), 1.0)
-    for source, target in (
+    first = next(socket for socket in mix.inputs if socket.type == "RGBA")
+    connect(
+        tree,
         (place.outputs["Generated"], turn.inputs["Vector"]),
         (turn.outputs["Vector"], picture.inputs["Vector"]),
         (picture.outputs["Color"], first),
         (next(socket for socket in mix.outputs if socket.type == "RGBA"), light.inputs["Color"]),
         (light.outputs["Background"], out.inputs["Surface"]),
-    ):
-        tree.links.new(source, target)
+    )
+    mix_sun(world, ambient, sun)
     world["isc_rotation"] = ROTATION
     world["isc_rotation_about"] = "degrees about Z, by which the Mapping node brings the image's middle column toward the viewer (-Y)"
     return world
+
+
+def mix_sun(world: bpy.types.World, ambient: np.ndarray, sun: bool) -> None:
+    """Shows the even light `ambient` (3,) that a sun leaves to the rest, or the environment; nothing if people took the node away."""
+    mix = world.node_tree.nodes.get(SUN)
+    if mix is not None and mix.type == "MIX":
+        factor = next(socket for socket in mix.inputs if socket.type == "VALUE")
+        _, second = (socket for socket in mix.inputs if socket.type == "RGBA")
+        factor.default_value, second.default_value = float(sun), (*map(float, ambient), 1.0)
