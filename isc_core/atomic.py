@@ -4,15 +4,17 @@ The content is written beside its final place under a temporary name and renamed
 half of a result. What stood there before is replaced only then, and a folder only if everything in it is of the kind that we write:
 nothing of anybody else's is ever deleted.
 
-Limits: a process killed by force leaves its temporary sibling, `.NAME.xxxxxxxx.partial`, which may be deleted by hand.
+Limits: a process killed by force leaves its temporary sibling, `.NAME.xxxxxxxx.partial`, which may be deleted by hand, or by
+`remove_unfinished` in the program that killed it.
 """
 
 import contextlib
 import errno
 import os
+import re
 import secrets
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -92,6 +94,28 @@ def require_writable_file(path: Path | str) -> None:
         probe = _sibling(target, "partial")
         probe.mkdir()
         probe.rmdir()
+
+
+def unfinished(path: Path | str) -> frozenset[Path]:
+    """The temporary siblings of `path` that there are now: of processes at work, or killed by force."""
+    target = _resolved(path)
+    names = re.compile(re.escape(f".{target.name}.") + r"[0-9a-f]{8}\.(partial|old)")
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        return frozenset(entry for entry in target.parent.iterdir() if names.fullmatch(entry.name))
+    return frozenset()
+
+
+def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None:
+    """Tidies up after a process that was killed by force while it wrote `path`: removes its temporary siblings, but for those `spared`,
+    and puts back what it had moved aside."""
+    target = _resolved(path)
+    for left in sorted(unfinished(target) - spared):
+        if left.suffix == ".old" and not target.exists():
+            os.replace(left, target)
+        elif left.is_dir():
+            shutil.rmtree(left, ignore_errors=True)
+        else:
+            left.unlink(missing_ok=True)
 
 
 def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
