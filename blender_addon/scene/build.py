@@ -89,6 +89,7 @@ def build(
     camera = ensure_camera(key, collection, result, options.size_metres, thing.matrix_basis)
     show_photo(camera, photo or ensure_image(key, "photo", result.image, COLOR, result.mask.astype(np.float32)))
     world = ensure_world(key, ensure_image(key, "sky", result.sky, COLOR), result.sun_ambient, options.sun)
+    thing["isc_world"] = world  # so that the light is saved and appended with what it lights, whether or not a scene uses it
     for block in (thing, collection):
         record(block, result, json.dumps(asdict(options)))
     relight(thing, options.sun)
@@ -133,6 +134,7 @@ def _object(
     if thing is None:
         thing = mark(bpy.data.objects.new(label(key), mark(bpy.data.meshes.new(label(key)), key, "mesh")), key, "object")
     put(thing, collection)
+    thing.shape_key_clear()
     geometry = sheet(result, options.size_metres)
     if options.displacement:
         fill_mesh(thing.data, flattened(geometry))

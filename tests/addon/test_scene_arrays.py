@@ -1,0 +1,105 @@
+"""Reading a result's arrays: what is there is kept as it is, what is not sound is refused in one line."""
+
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from blender_addon.arrays import Result, read_result
+from isc_core.errors import InputError
+from tests.addon.scene_fixture import bump, write_result
+
+Arrays = dict[str, np.ndarray]
+
+
+def test_everything_of_the_file_is_in_the_result(bump_folder: Path) -> None:
+    result, d = read_result(bump_folder), bump()
+    for name in ("image", "diffuse", "specular", "reflectance", "shading", "normal", "height", "mask", "confidence"):
+        assert np.array_equal(getattr(result, name), getattr(d, name)), name
+    with np.load(bump_folder / "arrays.npz") as file:
+        assert {name for name in file.files if not hasattr(result, name)} == set()
+        assert np.array_equal(result.sky, file["sky"]) and result.reflectance_scale == float(file["reflectance_scale"])
+    assert result.size == (88, 64) and result.name == "bump" and result.description["settings"]["model"] == "mdr"
+    assert np.isnan(result.roughness) and result.specular_variation is None
+
+
+def test_a_photo_without_a_name_is_called_by_the_folder(tmp_path: Path) -> None:
+    folder = write_result(tmp_path / "my cup")
+    (folder / "decomposition.json").write_text("{}", encoding="utf-8")
+    assert read_result(folder).name == "my cup"
+
+
+def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="decomposition.json"):
+        read_result(tmp_path)
+    (tmp_path / "decomposition.json").write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="isc arrays"):
+        read_result(tmp_path)
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"input": 3}', '{"settings": []}'])
+def test_damaged_descriptions_are_refused(tmp_path: Path, bump_folder: Path, text: str) -> None:
+    folder = shutil.copytree(bump_folder, tmp_path / "copy")
+    (folder / "decomposition.json").write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match="decompose the photo again"):
+        read_result(folder)
+
+
+def without(arrays: Arrays, name: str) -> Arrays:
+    return {other: values for other, values in arrays.items() if other != name}
+
+
+def spoilt(arrays: Arrays, name: str, value: float) -> Arrays:
+    values = arrays[name].copy()
+    values.reshape(-1)[0] = value
+    return arrays | {name: values}
+
+
+DAMAGES: dict[str, Callable[[Arrays], Arrays]] = {
+    "sky is missing": lambda a: without(a, "sky"),
+    "normal has the shape": lambda a: a | {"normal": a["normal"][:-1]},
+    "diffuse is float64": lambda a: a | {"diffuse": a["diffuse"].astype(float)},
+    "base_color holds NaN": lambda a: spoilt(a, "base_color", np.nan),
+    "holds no object": lambda a: a | {"mask": np.zeros_like(a["mask"])},
+    "points at what is not there": lambda a: spoilt(a, "faces", len(a["vertices"])),
+    "the mesh points": lambda a: spoilt(a, "vertex_pixel", -1),
+}
+
+
+@pytest.mark.parametrize("message", DAMAGES)
+def test_damaged_arrays_are_refused(tmp_path: Path, bump_folder: Path, message: str) -> None:
+    folder = shutil.copytree(bump_folder, tmp_path / "copy")
+    with np.load(folder / "arrays.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    np.savez(folder / "arrays.npz", **DAMAGES[message](arrays))
+    with pytest.raises(InputError, match=message) as caught:
+        read_result(folder)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("keep", [0, 10, 5000])
+def test_half_written_arrays_are_refused(tmp_path: Path, bump_folder: Path, keep: int) -> None:
+    folder = shutil.copytree(bump_folder, tmp_path / "copy")
+    (folder / "arrays.npz").write_bytes((folder / "arrays.npz").read_bytes()[:keep])
+    with pytest.raises(InputError, match="damaged"):
+        read_result(folder)
+
+
+def test_the_variation_of_the_gloss_is_read_where_there_is_one(tmp_path: Path, bump_folder: Path) -> None:
+    folder = shutil.copytree(bump_folder, tmp_path / "copy")
+    with np.load(folder / "arrays.npz") as file:
+        arrays = {name: file[name] for name in file.files}
+    np.savez(folder / "arrays.npz", **arrays, specular_variation=arrays["confidence"])
+    result: Result = read_result(folder)
+    assert result.specular_variation is not None and np.array_equal(result.specular_variation, arrays["confidence"])
+
+
+def test_what_decomposition_says_may_be_much(tmp_path: Path, bump_folder: Path) -> None:
+    """The description is kept whole, letters of all languages too."""
+    folder = shutil.copytree(bump_folder, tmp_path / "copy")
+    said = {"input": {"name": "чашка/杯.png"}, "settings": {}, "status": {"text": "收敛"}}
+    (folder / "decomposition.json").write_text(json.dumps(said, ensure_ascii=False), encoding="utf-8")
+    assert read_result(folder).description == said
