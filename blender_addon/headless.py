@@ -1,55 +1,64 @@
-"""A result folder as a .blend file, without a window: `python -m blender_addon.headless RESULT --blend OUT.blend [--render OUT.png]`."""
+"""Photos become .blend files and renders without a window.
 
-import argparse
+    blender -b -P blender_addon/headless.py -- photo.png --mask mask.png -o out.blend --render out.png
+    python -m blender_addon.headless photo.png --mask mask.png -o out.blend --render out.png
+
+The first form works with this file in the source tree and in an installed extension; the second wants the `bpy` module. What stands behind
+`--` is read by `command_line`; exit codes are those of `isc`: 0, 2 for bad input, 130 when cancelled.
+
+Limits: in the source tree, the Python that runs this has to have the packages that `isc_core` needs.
+"""
+
+import importlib
+import importlib.util
 import sys
 from pathlib import Path
 
-from isc_core.errors import InputError
-
-from .result import read_placement
-
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command. Returns 0, or 2 after one line about what was wrong."""
-    parser = argparse.ArgumentParser(prog="python -m blender_addon.headless", description="Build a Blender scene of a result.")
-    parser.add_argument("result", type=Path, help="folder that isc decompose wrote")
-    parser.add_argument("--blend", type=Path, required=True, help="the .blend file to write")
-    parser.add_argument("--render", type=Path, help="a PNG file to render to, with Cycles")
-    parser.add_argument("--samples", type=int, default=32, help="rays per pixel (default: %(default)s)")
-    parser.add_argument("--gloss", action="store_true", help="keep the material's gloss even where it was not fitted")
-    options = parser.parse_args(arguments)
-    try:
-        run(options.result, options.blend, options.render, options.samples, options.gloss)
-    except InputError as error:
-        print(f"blender: {error}", file=sys.stderr)
-        return 2
-    return 0
+    """Runs the command, with the arguments of the process if None, and returns its exit code."""
+    command_line = importlib.import_module(f"{_package()}.command_line")
+    return int(command_line.main(_own_arguments() if arguments is None else arguments))
 
 
-def run(result: Path, blend: Path, render: Path | None = None, samples: int = 32, gloss: bool = False) -> None:
-    """Builds the scene of a result folder, saves it as `blend`, and renders it to `render`.
+def _own_arguments() -> list[str]:
+    """What Blender leaves to scripts: everything behind `--`. Without Blender around it, everything."""
+    given = sys.argv[1:]
+    if "--" in given:
+        return given[given.index("--") + 1 :]
+    return given if __package__ else []
 
-    Raises `InputError` without the bpy module, for a folder that is no result, or where a file cannot be written.
-    """
-    if samples < 1:
-        raise InputError("--samples must be 1 or more")
-    placement = read_placement(result)
-    try:
-        import bpy
-    except ImportError as error:
-        raise InputError(f"this needs Blender's Python module ({error}): install it with `pip install 'isc3d[blender]'`") from error
-    from .scene import build
 
-    scene = build(placement, samples, gloss)
-    try:
-        blend.parent.mkdir(parents=True, exist_ok=True)
-        bpy.ops.wm.save_as_mainfile(filepath=str(blend.resolve()), check_existing=False)
-        if render is not None:
-            render.parent.mkdir(parents=True, exist_ok=True)
-            scene.render.filepath = str(render.resolve())
-            bpy.ops.render.render(write_still=True)
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"cannot write the scene: {str(error).strip().splitlines()[-1]}") from error
+def _package() -> str:
+    """The name of the package that this file is a module of. Blender runs the file by itself: then the package may have to be loaded."""
+    if __package__:
+        return __package__
+    folder = Path(__file__).resolve().parent
+    if (folder / "isc_core").is_dir():
+        return _enabled(f"bl_ext.{folder.parent.name}.{folder.name}")
+    if importlib.util.find_spec("isc_core") is None:
+        _load(folder.parent / "isc_core")
+    return _load(folder)
+
+
+def _enabled(extension: str) -> str:
+    """The installed extension, enabled for this run: Blender then knows where its wheels are."""
+    if extension not in sys.modules:
+        import addon_utils  # type: ignore[import-not-found]
+
+        addon_utils.enable(extension)
+    return extension
+
+
+def _load(folder: Path) -> str:
+    """Imports the package in `folder` under the folder's name, wherever it lies: the search path stays as it is."""
+    place = importlib.util.spec_from_file_location(folder.name, folder / "__init__.py", submodule_search_locations=[str(folder)])
+    if place is None or place.loader is None:
+        raise ImportError(f"{folder} is not a package")
+    module = importlib.util.module_from_spec(place)
+    sys.modules[folder.name] = module
+    place.loader.exec_module(module)
+    return folder.name
 
 
 if __name__ == "__main__":

@@ -1,75 +1,55 @@
-"""A result folder becomes a Blender scene whose render is the photo's diffuse image. Runs the command as a user does."""
+"""Photos and results become .blend files and renders: the command, run as users run it, in processes of their own."""
 
 import importlib.util
 import json
+import signal
 import subprocess
 import sys
-from dataclasses import replace
+import time
 from pathlib import Path
-from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
 from blender_addon.headless import main
-from blender_addon.result import read_placement
-from isc_core.brdf.fitting import fit_lobe
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.shading import directional, radiance
-from isc_core.decomposition import Decomposition, Provenance
-from isc_core.result_folder import save
-from isc_core.sirfs.frames import real_sh
+from tests.addon.scene_fixture import bump, write_result
 
 ROOT = Path(__file__).resolve().parents[2]
-needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="needs the extra `blender` (Python 3.11 or 3.13)")
+pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="needs the extra `blender` (Python 3.11 or 3.13)")
+
+# Runs a script as Blender's -P does: under the name __main__, with Blender's own arguments before `--`, the script's folder not on the
+# search path, and the project not installed.
+AS_BLENDER_DOES = """
+import runpy, sys
+sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]
+script = sys.argv[1]
+sys.argv = ["blender", "-b", "-P", script, "--", *sys.argv[2:]]
+runpy.run_path(script, run_name="__main__")
+"""
+SCENES = """
+import bpy, json, sys
+bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
+about = {s.name: [s.render.engine, s.cycles.samples, s.render.resolution_x, len(s.objects)] for s in bpy.data.scenes}
+print("ABOUT", json.dumps([about, bpy.context.scene.name, [i.name for i in bpy.data.images if i.size[0] and not i.packed_file]]))
+"""
 
 
-def ball(rows: int = 72, columns: int = 96, radius: float = 26.0, centre: tuple[float, float] = (30.0, 40.0)) -> Decomposition:
-    """A ball off the middle of a wide frame, red above and blue below, lit from the upper left; height and normal are exact."""
-    row, column = np.indices((rows, columns)).astype(float)
-    x, y = (column - centre[1]) / radius, (centre[0] - row) / radius
-    mask = x * x + y * y < 0.96
-    z = np.sqrt(np.maximum(1 - x * x - y * y, 0.04))
-    normal = np.where(mask[..., None], np.dstack([x, y, z]), np.array([0.0, 0, 1]))
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    light = np.zeros((9, 3))
-    light[0], light[1], light[3] = [-2.2, -2.6, -3.0], 0.5, -0.4
-    paint = np.where((y > 0)[..., None], [0.45, 0.10, 0.08], [0.08, 0.14, 0.40])
-    shading = np.exp(real_sh(normal) @ light) * mask[..., None]
-    image = (paint * shading).astype(np.float32)
-    none = np.zeros_like(image)
-    reflectance = (paint * mask[..., None]).astype(np.float32)
-    height = (radius * z * mask).astype(np.float32)
-    maps = (image, image, none, none, reflectance, shading.astype(np.float32), normal.astype(np.float32), height)
-    confidence = mask.astype(np.float32)
-    about = {"sha256": "0" * 64, "size": [columns, rows], "scale": 1.0, "crop_box": [0, 0, columns, rows]}
-    return Decomposition(*maps, mask, confidence, light, Provenance(input=about, status={"converged": True}))
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "blender_addon.headless", *map(str, arguments)]
 
 
-@needs_bpy
-def test_the_scene_renders_as_the_photo_shows_it(tmp_path: Path) -> None:
-    known = ball()
-    save(known, tmp_path / "result")
-    blend, picture = tmp_path / "scene" / "out.blend", tmp_path / "scene" / "out.png"
-    done = blender(tmp_path / "result", "--blend", blend, "--render", picture, "--samples", 64)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert blend.stat().st_size > 10_000
-    got, alpha = linear_picture(picture)
-    assert alpha.shape == known.mask.shape
-    overlap = ((alpha > 0.5) & known.mask).sum() / ((alpha > 0.5) | known.mask).sum()
-    assert overlap > 0.95, "the camera does not frame the object as the photo does"
-    inner = cv2.erode(known.mask.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
-    rows = np.indices(known.mask.shape)[0]
-    for half in (inner & (rows < 28), inner & (rows > 32)):  # apart, so that the paint's contrast does not hide the shading's
-        np.testing.assert_allclose(got[half].mean(0), known.diffuse[half].mean(0), rtol=0.03)
-        strongest = known.diffuse[half].mean(0).argmax()
-        assert np.corrcoef(got[half][:, strongest], known.diffuse[half][:, strongest])[0, 1] > 0.98
+def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
+    given = {"cwd": ROOT, "capture_output": True, "text": True, "check": False, "timeout": 300} | options
+    return subprocess.run(command(*arguments), **given)  # type: ignore[call-overload]
 
 
-def blender(*arguments: object) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "blender_addon.headless", *map(str, arguments)]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=300)
+def scenes_of(blend: Path) -> tuple[dict[str, list[object]], str, list[str]]:
+    """The file's scenes, the one it opens with, and images that it does not hold."""
+    done = subprocess.run([sys.executable, "-c", SCENES, str(blend)], capture_output=True, text=True, check=True, timeout=100)
+    line = next(line for line in done.stdout.splitlines() if line.startswith("ABOUT "))
+    scenes, active, loose = json.loads(line.removeprefix("ABOUT "))
+    return scenes, active, loose
 
 
 def linear_picture(path: Path) -> tuple[np.ndarray, np.ndarray]:
@@ -79,83 +59,101 @@ def linear_picture(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4), pixels[..., 3]
 
 
-def glossy(strength: float) -> Decomposition:
-    """The ball under the gloss of a lamp, alpha .2, with the lobe that fits."""
-    d = ball()
-    lamp = np.array([-0.37, 0.46, 0.807])
-    lamp /= np.linalg.norm(lamp)
-    gloss = strength * radiance(Ggx(0.2, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(lamp, 1.0))
-    specular = np.where(d.mask[..., None], gloss, 0).astype(np.float32)
-    return replace(d, image=d.diffuse + specular, specular=specular, brdf=fit_lobe(specular, d.normal, d.mask))
+def photo(folder: Path, name: str = "bump.png") -> Path:
+    """A small photo with an alpha channel."""
+    d = bump(48, 64, (20.0, 28.0))
+    coded = np.where(d.image <= 0.0031308, 12.92 * d.image, 1.055 * np.maximum(d.image, 1e-6) ** (1 / 2.4) - 0.055)
+    pixels = np.dstack([coded[..., ::-1], d.mask])
+    folder.mkdir(parents=True, exist_ok=True)
+    cv2.imwrite(str(folder / name), np.rint(65535 * np.clip(pixels, 0, 1)).astype(np.uint16))
+    return folder / name
 
 
-@needs_bpy
-@pytest.mark.parametrize("strength", [0.0, 0.6])
-def test_the_material_has_the_fitted_gloss(tmp_path: Path, strength: float) -> None:
-    """Roughness and specular level of the shader are those of the fit; what has no highlights has no gloss."""
-    from blender_addon.legacy_scene import build
-
-    save(glossy(strength), tmp_path / "result")
-    placement = read_placement(tmp_path / "result")
-    assert placement.gloss_is_fitted == (strength > 0)
-    scene = build(placement)
-    shader = principled(scene)
-    record = json.loads((tmp_path / "result" / "decomposition.json").read_text())
-    level = shader.inputs["Specular IOR Level"].default_value * shader.inputs["Specular Tint"].default_value[0]
-    assert level == pytest.approx(0.5 * record["mesh"]["specular"]["value"], rel=1e-5)
-    if strength > 0:
-        assert shader.inputs["Roughness"].default_value == pytest.approx(record["brdf"]["blender_roughness"], rel=1e-5)
-        assert record["brdf"]["blender_roughness"] == pytest.approx(0.2**0.5, rel=0.05)
-        assert record["mesh"]["specular"]["source"] == "fitted"
-    else:
-        assert level == 0
+def test_a_result_becomes_a_file_and_a_render_that_looks_like_it(tmp_path: Path) -> None:
+    write_result(tmp_path / "result")
+    blend, picture = tmp_path / "scene" / "out.blend", tmp_path / "scene" / "out.png"
+    done = run(tmp_path / "result", "-o", blend, "--render", picture, "--samples", 32, "--specular", "none")
+    assert done.returncode == 0, done.stdout + done.stderr
+    scenes, active, loose = scenes_of(blend)
+    assert scenes == {"result": ["CYCLES", 32, 88, 2]}, "the object's own scene, and no other"
+    assert (active, loose) == ("result", [])
+    known = bump()
+    got, alpha = linear_picture(picture)
+    assert alpha.shape == known.mask.shape
+    overlap = ((alpha > 0.5) & known.mask).sum() / ((alpha > 0.5) | known.mask).sum()
+    assert overlap > 0.95, "the camera does not frame the object as the photo does"
+    inner = cv2.erode(known.mask.astype(np.uint8), np.ones((7, 7), np.uint8)) > 0
+    np.testing.assert_allclose(got[inner].mean(0), known.diffuse[inner].mean(0), rtol=0.05)
+    assert sorted(path.name for path in (tmp_path / "scene").iterdir()) == ["out.blend", "out.png"]
 
 
-@needs_bpy
-def test_a_gloss_that_was_not_fitted_is_kept_on_demand_only(tmp_path: Path) -> None:
-    from blender_addon.legacy_scene import build
-
-    save(ball(), tmp_path / "result")
-    placement = read_placement(tmp_path / "result")
-    levels = [principled(build(placement, gloss=keep)).inputs["Specular IOR Level"].default_value for keep in (False, True)]
-    assert levels == [0, 0.5]
-
-
-def principled(scene: Any) -> Any:
-    """The shader of the scene's only mesh."""
-    (mesh,) = (thing for thing in scene.objects if thing.type == "MESH")
-    return next(node for node in mesh.material_slots[0].material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+def test_a_folder_goes_into_one_file_with_a_scene_each_or_into_files_of_its_own(tmp_path: Path) -> None:
+    for name in ("cup", "jug"):
+        write_result(tmp_path / "all" / name)
+    done = run(tmp_path / "all", "-o", tmp_path / "all.blend", "--render", tmp_path / "renders", "--samples", 1)
+    assert done.returncode == 0, done.stderr
+    assert set(scenes_of(tmp_path / "all.blend")[0]) == {"cup", "jug"}
+    assert sorted(path.name for path in (tmp_path / "renders").iterdir()) == ["cup.png", "jug.png"]
+    done = run(tmp_path / "all", "-o", tmp_path / "files")
+    assert done.returncode == 0, done.stderr
+    assert [set(scenes_of(tmp_path / "files" / f"{name}.blend")[0]) for name in ("cup", "jug")] == [{"cup"}, {"jug"}]
 
 
-@needs_bpy
-def test_a_damaged_mesh_is_refused_in_one_line(tmp_path: Path) -> None:
-    save(ball(), tmp_path / "result")
-    (tmp_path / "result" / "mesh.glb").write_bytes(b"glTF no more")
-    done = blender(tmp_path / "result", "--blend", tmp_path / "out.blend")
-    assert done.returncode == 2
-    assert "Traceback" not in done.stderr
-    assert not (tmp_path / "out.blend").exists()
+def test_a_photo_is_taken_apart_when_blender_runs_the_file_from_the_source_tree(tmp_path: Path) -> None:
+    blend, kept = tmp_path / "out.blend", tmp_path / "kept"
+    script = ROOT / "blender_addon" / "headless.py"
+    arguments = [photo(tmp_path), "-o", blend, "--results", kept, "--max-size", 32, "--threads", 1]
+    call = [sys.executable, "-P", "-c", AS_BLENDER_DOES, str(script), *map(str, arguments)]
+    done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert set(scenes_of(blend)[0]) == {"bump"}
+    about = json.loads((kept / "bump" / "decomposition.json").read_text())
+    assert about["input"]["name"] == "bump.png"
+    assert (kept / "bump" / "arrays.npz").is_file()
 
 
-def test_a_folder_that_is_no_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([str(tmp_path), "--blend", str(tmp_path / "out.blend")]) == 2
-    message = capsys.readouterr().err
-    assert message.count("\n") == 1
-    assert "decomposition.json" in message
-
-
-@pytest.mark.parametrize("text", ["", "[]", "{}", '{"mesh": {}}', '{"mesh": 3}', '{"mesh": {"illumination": {"coefficients": [[1]]}}}'])
-def test_damaged_descriptions_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str) -> None:
-    (tmp_path / "mesh.glb").write_bytes(b"")
-    (tmp_path / "decomposition.json").write_text(text)
-    assert main([str(tmp_path), "--blend", str(tmp_path / "out.blend")]) == 2
-    assert capsys.readouterr().err.count("\n") == 1
-
-
-def test_without_bpy_the_message_names_the_extra(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["none.png", "-o", "x.blend"], "none.png: there is no such photo or folder"),
+        (["RESULT"], "say what to write"),
+        (["RESULT", "-o", "x.blend", "--samples", "0"], "--samples must be 1 or more"),
+        (["RESULT", "-o", "x.blend", "--size", "nan"], "--size must be above 0"),
+        (["RESULT", "-o", "RESULT/arrays.npz/x.blend"], "a part of the path is a file"),
+        (["RESULT", "--render", "x.png", "--nonsense"], "unrecognized arguments: --nonsense"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_one_line_before_any_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], says: str
 ) -> None:
-    save(ball(), tmp_path / "result")
-    monkeypatch.setitem(sys.modules, "bpy", None)
-    assert main([str(tmp_path / "result"), "--blend", str(tmp_path / "out.blend")]) == 2
-    assert "isc3d[blender]" in capsys.readouterr().err
+    result = write_result(tmp_path / "RESULT")
+    monkeypatch.chdir(tmp_path)
+    assert main([argument.replace("RESULT", str(result)) for argument in arguments]) == 2
+    said = capsys.readouterr().err
+    assert says in said
+    assert said.count("\n") == 1, said
+    assert [path.name for path in tmp_path.iterdir()] == ["RESULT"]
+
+
+def test_one_that_fails_does_not_hold_up_the_others(tmp_path: Path) -> None:
+    for name in ("cup", "jug"):
+        write_result(tmp_path / "all" / name)
+    (tmp_path / "all" / "cup" / "arrays.npz").write_bytes(b"nothing")
+    done = run(tmp_path / "all", "-o", tmp_path / "out", "--quiet")
+    assert done.returncode == 2
+    assert "cup" in done.stderr
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["jug.blend"]
+
+
+def test_ctrl_c_ends_the_worker_and_leaves_nothing(tmp_path: Path) -> None:
+    call = command(photo(tmp_path), "-o", tmp_path / "out.blend")
+    with subprocess.Popen(call, cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        assert process.stderr is not None
+        first = process.stderr.readline()  # the worker is at work
+        time.sleep(0.2)
+        process.send_signal(signal.SIGINT)
+        rest = process.stderr.read()
+        assert process.wait(60) == 130, first + rest
+    assert rest.splitlines()[-1] == "blender: cancelled"
+    assert [path.name for path in tmp_path.iterdir()] == ["bump.png"]

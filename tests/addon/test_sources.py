@@ -1,0 +1,76 @@
+"""What a command line names: photos, results, masks, and the files that come of them."""
+
+from pathlib import Path
+
+import pytest
+
+from blender_addon.sources import Source, find_sources, output_files
+from isc_core.errors import InputError
+
+
+def touch(path: Path) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"")
+    return path
+
+
+def result(folder: Path) -> Path:
+    touch(folder / "decomposition.json")
+    touch(folder / "preview.png")
+    return folder
+
+
+def test_a_folder_gives_its_photos_and_results_in_order_and_takes_masks_beside_them(tmp_path: Path) -> None:
+    for name in ("b.png", "b_mask.png", "a.JPG", "notes.txt", ".hidden.png"):
+        touch(tmp_path / name)
+    result(tmp_path / "c")
+    touch(tmp_path / "empty" / "x.png")  # folders in folders are not searched
+    assert find_sources([tmp_path], None) == [
+        Source(tmp_path / "a.JPG", "a"),
+        Source(tmp_path / "b.png", "b", mask=tmp_path / "b_mask.png"),
+        Source(tmp_path / "c", "c", is_result=True),
+    ]
+
+
+def test_a_result_is_known_by_its_description(tmp_path: Path) -> None:
+    assert find_sources([result(tmp_path / "cup")], None) == [Source(tmp_path / "cup", "cup", is_result=True)]
+
+
+def test_masks_come_from_a_file_or_a_folder(tmp_path: Path) -> None:
+    a, b = touch(tmp_path / "a.png"), touch(tmp_path / "b.jpg")
+    one = touch(tmp_path / "white.png")
+    assert find_sources([a], one)[0].mask == one
+    assert find_sources([a, result(tmp_path / "r")], one)[1].mask is None
+    masks = [touch(tmp_path / "masks" / "a.png"), touch(tmp_path / "masks" / "b_mask.png")]
+    assert [source.mask for source in find_sources([a, b], tmp_path / "masks")] == masks
+    masks[1].unlink()
+    with pytest.raises(InputError, match=r"holds no mask for b.jpg: name it b.png"):
+        find_sources([a, b], tmp_path / "masks")
+    with pytest.raises(InputError, match="is one file, but there are 2 photos: give a folder of masks"):
+        find_sources([a, b], one)
+    with pytest.raises(InputError, match="there is no such mask"):
+        find_sources([a], tmp_path / "none.png")
+
+
+def test_names_differ_even_where_capitals_do_not_count(tmp_path: Path) -> None:
+    paths = [touch(tmp_path / "x" / "Cup.png"), touch(tmp_path / "y" / "cup.jpg"), touch(tmp_path / "cup.tif")]
+    assert [source.name for source in find_sources(paths, None)] == ["Cup", "cup-2", "cup-3"]
+
+
+def test_what_is_not_there_or_holds_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"none.png: there is no such photo or folder"):
+        find_sources([tmp_path / "none.png"], None)
+    with pytest.raises(InputError, match="holds no photo .* and no result"):
+        find_sources([tmp_path], None)
+
+
+def test_where_the_files_go() -> None:
+    one, two = [Source(Path("a.png"), "a")], [Source(Path("a.png"), "a"), Source(Path("b.png"), "b")]
+    blend = (".blend",)
+    assert output_files(two, None, blend, "-o", together=True) == [None, None]
+    assert output_files(one, Path("o.blend"), blend, "-o", together=True) == [Path("o.blend")]
+    assert output_files(two, Path("o.blend"), blend, "-o", together=True) == [Path("o.blend")] * 2
+    assert output_files(two, Path("o"), blend, "-o", together=True) == [Path("o/a.blend"), Path("o/b.blend")]
+    assert output_files(one, Path("o.EXR"), (".png", ".exr"), "--render", together=False) == [Path("o.EXR")]
+    with pytest.raises(InputError, match="--render o.png is one file, but there are 2 objects: give a folder"):
+        output_files(two, Path("o.png"), (".png", ".exr"), "--render", together=False)
