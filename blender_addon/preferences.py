@@ -1,6 +1,8 @@
 """What holds for all files: how many threads, where compiled kernels and results are kept."""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 
+import importlib.util
+import sys
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +12,8 @@ import bpy
 from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
+
+from .worker import WorkerEnvironment
 
 ADDON = __package__ or ""
 
@@ -72,6 +76,22 @@ def _base(chosen: str) -> Path:
         return Path(bpy.utils.extension_path_user(ADDON))
     except ValueError:  # not installed as an extension
         return Path(tempfile.gettempdir()) / "isc_intrinsic"
+
+
+def worker_environment(chosen: Choices) -> WorkerEnvironment:
+    """Blender's own Python, where the worker finds `isc_core` and the packages it needs, and where it keeps compiled kernels.
+
+    Raises `InputError` if `isc_core` is not there.
+    """
+    inside = Path(__file__).resolve().parent
+    place = importlib.util.find_spec("isc_core") if not (inside / "isc_core").is_dir() else None
+    if place is not None and place.submodule_search_locations:
+        inside = Path(place.submodule_search_locations[0]).resolve().parent
+    if not (inside / "isc_core" / "__main__.py").is_file():
+        raise InputError("the worker is missing (isc_core is not in the extension): install the extension again")
+    extensions = Path(bpy.utils.user_resource("EXTENSIONS")).resolve()
+    wheels = (Path(path) for path in sys.path if path and Path(path).resolve().is_relative_to(extensions))
+    return WorkerEnvironment(python=Path(sys.executable), search=(inside, *wheels), cache=chosen.cache)
 
 
 def new_folder(choice: Path | None, name: str) -> Path:

@@ -1,0 +1,25 @@
+"""What the panels' buttons do; `CLASSES` is what Blender has to know of."""
+
+from .decompose import ISC_OT_decompose, ISC_OT_redo
+from .edit import ISC_OT_dichromatic, ISC_OT_recolour, ISC_OT_relight
+from .export import ISC_OT_export
+from .mask import ISC_OT_cut_mask, ISC_OT_draw_box, ISC_OT_new_mask, ISC_OT_take_mask
+from .modal import ISC_OT_cancel
+from .result import ISC_OT_build_result, ISC_OT_complete_result, ISC_OT_import_result
+
+CLASSES = (
+    ISC_OT_decompose,
+    ISC_OT_redo,
+    ISC_OT_cancel,
+    ISC_OT_cut_mask,
+    ISC_OT_take_mask,
+    ISC_OT_new_mask,
+    ISC_OT_draw_box,
+    ISC_OT_build_result,
+    ISC_OT_import_result,
+    ISC_OT_complete_result,
+    ISC_OT_recolour,
+    ISC_OT_dichromatic,
+    ISC_OT_relight,
+    ISC_OT_export,
+)
