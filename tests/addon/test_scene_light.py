@@ -94,7 +94,7 @@ def test_an_object_is_relit_from_what_it_knows(blender: Any, result: Result) -> 
     from blender_addon.scene.world import SUN
 
     built = build(sunlit(result))
-    sun = relight(built.object)
+    sun: Any = relight(built.object)
     assert sun.data.type == "SUN" and sun.data.energy == pytest.approx(2) and sun.name in built.collection.objects
     assert tuple(sun.data.color) == pytest.approx((1, 0.5, 0.25))
     toward = sun.rotation_quaternion.to_matrix().col[2]
