@@ -32,6 +32,7 @@ Box = tuple[int, int, int, int]
 
 _PATIENCE_SECONDS = 2.0  # from the wish to cancel to the kill
 _TIDYING_SECONDS = 5.0  # how long Blender's own end waits for the traces of a killed worker to be removed
+_NICENESS = 5  # the window comes first where both want the processor
 _REPORT_BYTES = 8000
 _KEPT = (
     "PATH", "HOME", "USER", "LOGNAME", "LANG", "LC_ALL", "LC_CTYPE", "TMPDIR", "TEMP", "TMP",
@@ -121,6 +122,7 @@ class Worker:
                 **_apart(),
             )
             stack.pop_all()
+        _lower_priority(self._process)
         threading.Thread(target=self._follow, name="isc-worker", daemon=True).start()
 
     def poll(self) -> Update:
@@ -241,10 +243,16 @@ def _full(path: Path) -> str:
 
 
 def _apart() -> dict[str, Any]:
-    """A process group of its own, and no console window."""
+    """A process group of its own, no console window, and on Windows already the lower priority."""
     if sys.platform == "win32":
-        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP}
+        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
     return {"start_new_session": True}
+
+
+def _lower_priority(process: "subprocess.Popen[str]") -> None:
+    if sys.platform != "win32":
+        with contextlib.suppress(OSError):  # it has ended already, and `poll` will say why
+            os.setpriority(os.PRIO_PROCESS, process.pid, os.getpriority(os.PRIO_PROCESS, 0) + _NICENESS)
 
 
 def _kill_group(process: "subprocess.Popen[str]") -> None:

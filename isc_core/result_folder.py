@@ -37,6 +37,7 @@ SINGLE = {"diffuse": "RGB", "specular": "RGB", "reflectance": "RGB", "shading": 
 DECOMPOSITION_FILES = ("decomposition.json", "maps.exr", "mesh.glb", "preview.png", *(f"maps/{name}.exr" for name in SINGLE))
 _OURS = (*DECOMPOSITION_FILES, ARRAYS)  # what may stand there besides is written on demand
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # smaller results have not been seen
+_ARRAY_BYTES_A_PIXEL = 129  # its maps are not compressed
 SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
 
 
@@ -123,10 +124,10 @@ def require_writable_result(folder: Path | str, *, separation: bool = False) -> 
     require_writable(folder, SEPARATION_FILES if separation else _OURS)
 
 
-def require_room(folder: Path | str, pixels: int) -> None:
+def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:
     """Raises `InputError` where the disk surely has no room for the result of an object of `pixels` pixels: known before the work."""
     place = next(parent for parent in (Path(folder).resolve() / "maps").parents if parent.exists())
-    least = _LEAST_BYTES + _LEAST_BYTES_A_PIXEL * pixels
+    least = _LEAST_BYTES + (_LEAST_BYTES_A_PIXEL + _ARRAY_BYTES_A_PIXEL * arrays) * pixels
     if (free := shutil.disk_usage(place).free) < least:
         raise InputError(
             f"cannot write {folder}: no space is left on the disk ({free / 1e6:.1f} MB, at least {least / 1e6:.1f} are needed); "

@@ -98,7 +98,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     prior_set = None if options.priors is None else load_prior_set(options.priors)
     photo = read_photo(options.photo, options.mask, options.transfer)
     evidence = _evidence(options, photo)
-    require_room(options.output, _pixels(photo, settings))
+    require_room(options.output, _pixels(photo, settings), arrays=options.arrays)
     result = decompose(photo, settings, evidence=evidence, prior_set=prior_set, name=options.photo.name, monitor=monitor.part(0.0, 0.8))
     save(result, options.output, arrays=options.arrays, monitor=monitor.part(0.8, 1.0))
     status = result.provenance.status

@@ -253,6 +253,7 @@ def test_a_stubborn_worker_is_killed_with_all_its_children(tmp_path: Path, stand
     worker = start(job(tmp_path / "a.png", tmp_path / "new" / "out"), stand_in(child + STUBBORN))
     at_stage(worker, "asleep")
     assert (tmp_path / "new" / ".out.0a1b2c3d.partial" / "maps.exr").is_file()
+    assert os.getpriority(os.PRIO_PROCESS, process_of(worker).pid) == min(os.getpriority(os.PRIO_PROCESS, 0) + 5, 19)
     getattr(worker, how)()
     assert worker.poll().state == "running", "nobody has waited"
     final = ended(worker, 20)

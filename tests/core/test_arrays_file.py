@@ -3,6 +3,8 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,13 +17,18 @@ from isc_core.brdf.shading import directional, radiance
 from isc_core.cli import main
 from isc_core.decomposition import COLOR_MAPS, Decomposition
 from isc_core.environment import shading_under
+from isc_core.errors import InputError
 from isc_core.gloss import gloss_of
-from isc_core.mesh import MeshOptions, build_mesh
-from isc_core.result_folder import load, save
+from isc_core.mesh import MeshOptions, MeshResult, build_mesh
+from isc_core.result_folder import load, require_room, save
 from isc_core.sirfs.frames import real_sh
 from tests.core.ball_scene import ball
 
 Arrays = dict[str, np.ndarray]
+
+
+def built(d: Decomposition, **options: Any) -> MeshResult:
+    return build_mesh(d.height, d.normal, d.mask, d.reflectance, MeshOptions(**options))
 
 
 def read(path: Path) -> Arrays:
@@ -101,9 +108,9 @@ def test_the_sun_explains_the_shading(arrays: Arrays) -> None:
 def test_detail_stays_where_vertices_are_few() -> None:
     """With every second pixel a vertex, vertex normal and normal map together are the recovered normals, without rounding to codes."""
     d = ball()
-    built = build_mesh(d.height, d.normal, d.mask, d.reflectance, MeshOptions(max_faces=3000))
-    arrays = arrays_of(d, built)
-    assert built.stride == 2
+    mesh = built(d, max_faces=3000)
+    arrays = arrays_of(d, mesh)
+    assert mesh.stride == 2
     row, column = arrays["vertex_pixel"].T
     base = arrays["vertex_normals"].astype(float)
     tangent = np.stack([base[:, 2], 0 * base[:, 0], -base[:, 0]], -1)
@@ -145,6 +152,16 @@ def test_the_command_gives_the_same_bytes_as_the_option(folder: Path, tmp_path: 
     load(tmp_path / "later")
     save(ball(), tmp_path / "later")  # a result with arrays is still one of ours, and its arrays do not outlive it
     assert not (tmp_path / "later" / ARRAYS).exists()
+
+
+def test_a_disk_without_room_for_arrays_is_known_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=50_000_000))
+    require_room(tmp_path / "out", 1_000_000)
+    with pytest.raises(InputError, match="no space is left"):
+        require_room(tmp_path / "out", 1_000_000, arrays=True)
+    monkeypatch.undo()
+    maps = [values.nbytes for values in arrays_of(ball(), built(ball())).values() if values.shape[:2] == (96, 120)]
+    assert sum(maps) == 129 * 96 * 120
 
 
 def test_a_folder_without_a_result_is_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
