@@ -37,7 +37,10 @@ class BuildOptions:
     camera, the resolution and the view transform change only with `set_world, set_camera, set_resolution, set_view_transform`.
     `sun`: a sun lamp and even light instead of the environment. `displacement`: a flat grid that a modifier displaces, instead of the
     height mesh. `closed_back`: a wall and a flat back, so that the mesh is closed.
-    `specular_from`: the gloss is the fitted "lobe", the photo's specular "image", or "none". `name`: the result's own if empty.
+    `specular_from`: the gloss is the fitted "lobe", the photo's specular "image", or "none".
+    `own_shadows`: whether the object casts shadows and lights itself (Cycles). The recovered shading holds those of the photo already, so
+    that without them it looks as photographed. None: a new object does, unless it has a scene of its own; an old one as it is.
+    `name`: the result's own if empty.
     """
 
     size_metres: float = 0.1
@@ -50,6 +53,7 @@ class BuildOptions:
     displacement: bool = False
     closed_back: bool = False
     specular_from: Literal["lobe", "image", "none"] = "lobe"
+    own_shadows: bool | None = None
     name: str = ""
 
 
@@ -130,9 +134,12 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
 def _object(
     key: str, collection: bpy.types.Collection, result: Result, options: BuildOptions, material: bpy.types.Material
 ) -> bpy.types.Object:
-    thing = find_block(bpy.data.objects, key, "object")
+    thing, shadows = find_block(bpy.data.objects, key, "object"), options.own_shadows
     if thing is None:
         thing = mark(bpy.data.objects.new(label(key), mark(bpy.data.meshes.new(label(key)), key, "mesh")), key, "object")
+        shadows = not options.own_scene if shadows is None else shadows
+    if shadows is not None:
+        thing.visible_shadow = thing.visible_diffuse = shadows
     put(thing, collection)
     thing.shape_key_clear()
     geometry = sheet(result, options.size_metres)

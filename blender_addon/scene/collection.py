@@ -20,6 +20,7 @@ def ensure_scene(key: str) -> bpy.types.Scene:
         scene = mark(bpy.data.scenes.new(label(key)), key, "scene")
         if hasattr(scene, "cycles"):  # an add-on, which people may have switched off
             scene.render.engine, scene.cycles.samples = "CYCLES", 64
+            scene.cycles.filter_width = 0.5  # the photo's camera has smoothed the texture: Blender's usual filter would once more
         scene.render.film_transparent = True
     return scene
 
