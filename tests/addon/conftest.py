@@ -1,7 +1,6 @@
 """What the tests of the add-on share: an empty Blender, and results to build."""
 
 import importlib.util
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -9,15 +8,14 @@ import pytest
 
 
 @pytest.fixture
-def blender() -> Iterator[Any]:
+def blender() -> Any:
     """The bpy module with an empty file; skipped where it is not installed."""
     if importlib.util.find_spec("bpy") is None:
         pytest.skip("needs the extra `blender` (Python 3.11 or 3.13)")
     import bpy
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    yield bpy
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return bpy
 
 
 @pytest.fixture(scope="session")

@@ -300,3 +300,21 @@ def test_a_mesh_with_shape_keys_is_filled_anew(blender: Any, result: Result) -> 
     built.object.shape_key_add(name="bent")
     build(replace(result, faces=result.faces[:100]))
     assert built.object.data.shape_keys is None and len(built.object.data.polygons) == 100
+
+
+def test_things_that_happen_to_have_its_names_are_left_alone(blender: Any, result: Result) -> None:
+    cube = blender.data.objects.new("bump", blender.data.meshes.new("bump"))
+    clay, group = blender.data.materials.new("bump"), blender.data.node_groups.new("ISC Dichromatic", "ShaderNodeTree")
+    built = build(result)
+    assert built.object != cube and built.material != clay and not cube.data.vertices and not group.nodes
+    assert next(node for node in built.material.node_tree.nodes if node.type == "GROUP").node_tree != group
+
+
+def test_an_object_shadows_itself_where_it_stands_among_others(blender: Any, result: Result) -> None:
+    """The recovered shading holds the photo's shadows; in a user's scene people expect an object to cast one."""
+    assert not build(result, name="alone").object.visible_shadow
+    thing = build(result, name="among others", own_scene=False).object
+    assert thing.visible_shadow
+    thing.visible_shadow = False
+    assert not build(result, name="among others", own_scene=False).object.visible_shadow, "what people set stays"
+    assert build(result, name="alone", own_shadows=True).object.visible_shadow

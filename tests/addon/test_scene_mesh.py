@@ -119,8 +119,11 @@ def test_the_displaced_grid_is_the_height_mesh(blender: Any, tmp_path: Path, fac
     exact = got(build(result).object.data.vertices, "co", 3)
     built = build(result, displacement=True)
     assert np.ptp(got(built.object.data.vertices, "co", 3)[:, 1]) == 0
-    displaced = got(evaluated(built).vertices, "co", 3)
+    lifted = evaluated(built)
+    displaced = got(lifted.vertices, "co", 3)
     np.testing.assert_allclose(displaced, exact, atol=1e-6 * 0.1)
+    flat = np.repeat(got(lifted.polygons, "normal", 3), 3, axis=0)
+    assert np.abs(got(lifted.corner_normals, "vector", 3) - flat).max() > 0.02, "the faces are not smooth"
     build(result)
     assert not built.object.modifiers and len(blender.data.textures) == 0
 
