@@ -30,7 +30,7 @@ from scipy import ndimage
 from ..decomposition import Separation
 from ..separation.highlight_cue import CueNetwork, highlight_excess
 from ..separation.smoothing import masked_gaussian
-from .layers import separated, shaded
+from .layers import separated_first, shaded
 from .lobe import fit_specular
 from .shape import Shape, energy_of, recover_shape
 from .task import Answer, Task
@@ -64,11 +64,8 @@ class Doubt:
 
 def joint(task: Task, options: JointOptions | None = None) -> Answer:
     """MDR, and where highlights are left the step beyond it, if that lowers the energy. Raises `InputError`, `Cancelled`."""
-    options, monitor, method = options or JointOptions(), task.monitor, task.settings.separator
-    monitor.report(f"separating ({method})", 0.03)
-    with task.clock.stage("separation"):
-        split = separated(task.maps, method, monitor.part(0.03, 0.06))
-        diffuse = split.diffuse if task.one_scale else separated(task.working, method, monitor.part(0.06, 0.08)).diffuse
+    options, monitor = options or JointOptions(), task.monitor
+    split, diffuse = separated_first(task)
     shape = recover_shape(diffuse, task, monitor.part(0.08, 0.9))
     with task.clock.stage("separation"):
         found = doubt(task.working.image, diffuse, task.working.mask, options)

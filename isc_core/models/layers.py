@@ -16,6 +16,18 @@ def separated(photo: Photo, method: str, monitor: Monitor | None = None) -> Sepa
     return separate(method, photo.image, photo.mask, photo.clipped, monitor=monitor)
 
 
+def separated_first(task: Task) -> tuple[Separation, np.ndarray]:
+    """The layers of the maps' photo by the separator of the settings, and the diffuse image (H, W, 3) of the working one.
+
+    Raises `InputError`, `Cancelled`.
+    """
+    method, monitor = task.settings.separator, task.monitor
+    monitor.report(f"separating ({method})", 0.03)
+    with task.clock.stage("separation"):
+        split = separated(task.maps, method, monitor.part(0.03, 0.06)) if task.split is None else task.split
+        return split, split.diffuse if task.one_scale else separated(task.working, method, monitor.part(0.06, 0.08)).diffuse
+
+
 def unseparated(task: Task) -> tuple[Separation, np.ndarray]:
     """All light taken as diffuse: the layers of the maps' photo, and the diffuse image (H, W, 3) of the working one."""
     task.monitor.report("preparing", 0.03)

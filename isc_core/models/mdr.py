@@ -8,7 +8,7 @@ S. A. Shafer 1985, doi:10.1002/col.5080100409.
 Limits: what the separation leaves or takes too much of, SIRFS believes.
 """
 
-from .layers import separated
+from .layers import separated_first
 from .lobe import fit_specular
 from .shape import recover_shape
 from .task import Answer, Task
@@ -16,11 +16,7 @@ from .task import Answer, Task
 
 def mdr(task: Task) -> Answer:
     """Separation, then shape and light of the diffuse image, then the lobe of the specular one. Raises `InputError`, `Cancelled`."""
-    method, monitor = task.settings.separator, task.monitor
-    monitor.report(f"separating ({method})", 0.03)
-    with task.clock.stage("separation"):
-        split = separated(task.maps, method, monitor.part(0.03, 0.07))
-        diffuse = split.diffuse if task.one_scale else separated(task.working, method, monitor.part(0.07, 0.1)).diffuse
-    shape = recover_shape(diffuse, task, monitor.part(0.1, 0.92))
-    lobe = fit_specular(split, shape, task, monitor.part(0.92, 0.96))
+    split, diffuse = separated_first(task)
+    shape = recover_shape(diffuse, task, task.monitor.part(0.08, 0.92))
+    lobe = fit_specular(split, shape, task, task.monitor.part(0.92, 0.96))
     return Answer(split, shape.height, shape.light, shape.status | lobe.status, lobe.brdf)

@@ -36,7 +36,8 @@ class Task:
     """One photo to be explained.
 
     `working`: the photo at the scale at which shape and light are looked for; `maps`: at the scale of the result's maps, the same object
-    where the two scales are one. `known`: at the working scale. `prior_set`: the shipped one if None.
+    where the two scales are one. `known`: at the working scale. `prior_set`: the shipped one if None. `split`: the layers of `maps` by the
+    separator of the settings, where they have been found before; else None.
     """
 
     working: Photo
@@ -46,6 +47,7 @@ class Task:
     prior_set: PriorSet | None = None
     monitor: Monitor = field(default_factory=Monitor)
     clock: Clock = field(default_factory=Clock)
+    split: Separation | None = None
 
     @property
     def one_scale(self) -> bool:
