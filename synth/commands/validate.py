@@ -7,12 +7,14 @@ from pathlib import Path
 from isc_core.atomic import require_writable_file
 from isc_core.commands.options import Commands, add_command, count, hints, names
 from isc_core.errors import InputError, Rejected
+from isc_core.models.settings import SEPARATING_MODELS
 from isc_core.pipeline import ILLUMINATIONS
 from isc_core.progress import Monitor
 from isc_core.separation import BEST, METHODS
 
 _EXAMPLES = """  isc synth --count 60 --size 128 -o scenes
   isc validate scenes -o validation                     then open validation/report.html
+  isc validate scenes -o models --stages separation --models mdr,mbp,joint
   isc validate scenes -o shen --separator shen_2013 --bounds none
   isc validate scenes -o validation --update-bounds bounds.json"""
 _NO_BOUNDS = "none"
@@ -23,8 +25,9 @@ def declare(commands: Commands) -> None:
     parser = add_command(
         commands, "validate", run, "errors of every stage on rendered scenes, their causes, and whether they are accepted",
         "Runs the stages over a dataset of isc synth: tables of errors with confidence intervals, an error budget by swapping in the truth "
-        "for one stage at a time, slices by gloss, light, albedo and size, and pictures. Writes a folder with report.html, report.json and "
-        "summary.md. Exits with 1 where a bound is broken; the maps that show why are then in its folder evidence.", _EXAMPLES,
+        "for one stage at a time, slices by gloss, light, albedo, material and size, pictures, and models side by side. Writes a folder "
+        "with report.html, report.json and summary.md. Exits with 1 where a bound is broken; the maps that show why are then in its "
+        "folder evidence.", _EXAMPLES,
     )  # fmt: skip
     parser.add_argument("dataset", metavar="DATASET", type=Path, help="a folder that isc synth wrote")
     parser.add_argument(
@@ -34,6 +37,8 @@ def declare(commands: Commands) -> None:
     parser.add_argument("--scenes", type=count, default=0, metavar="N", help="run N scenes, drawn by --seed (default: all)")
     stages = "separation, sirfs, gloss (default: all, and the chain with its error budget)"
     parser.add_argument("--stages", type=names, metavar="a,b", help=stages)
+    models = f"compare these with plain SIRFS and with SIRFS on the true diffuse layer: {', '.join(SEPARATING_MODELS)} (default: none)"
+    parser.add_argument("--models", type=names, metavar="a,b", help=models)
     parser.add_argument("--separator", choices=METHODS, default=BEST, metavar="NAME", help="how to separate (default %(default)s)")
     parser.add_argument("--illumination", choices=ILLUMINATIONS, default=ILLUMINATIONS[0], help="which lights SIRFS expects")
     parser.add_argument("--seed", type=count, default=0, metavar="S", help="of everything drawn at random (default 0)")
@@ -47,12 +52,15 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work; what can be wrong is found before it begins. Raises `Rejected` where a bound is broken, with the report written."""
     from ..validation.bounds import SHIPPED, bounds_from, read_bounds, write_bounds
     from ..validation.folder import require_writable_report, write_report
+    from ..validation.models_stage import models_stage
     from ..validation.run import RunOptions
     from ..validation.stages import StageOptions, find_stages
     from ..validation.validate import validate
 
-    settings = StageOptions(options.separator, options.illumination)
-    wanted = RunOptions(options.split, options.scenes, find_stages(options.stages), settings, options.seed, options.threads)
+    models = tuple(dict.fromkeys(options.models or ()))
+    settings = StageOptions(options.separator, options.illumination, models=models)
+    stages = find_stages(options.stages) + ((models_stage(models),) if models else ())
+    wanted = RunOptions(options.split, options.scenes, stages, settings, options.seed, options.threads)
     bounds_file = SHIPPED if options.bounds is None else Path(options.bounds)
     bounds = () if options.bounds == _NO_BOUNDS or (options.bounds is None and not SHIPPED.is_file()) else read_bounds(bounds_file)
     require_writable_report(options.output)
@@ -75,6 +83,7 @@ def _command(options: argparse.Namespace) -> str:
     for name, default in (("split", None), ("scenes", 0), ("separator", BEST), ("illumination", ILLUMINATIONS[0]), ("bounds", None)):
         if (value := getattr(options, name)) != default:
             words += [f"--{name}", str(value)]
-    if options.stages:
-        words += ["--stages", ",".join(options.stages)]
+    for name in ("stages", "models"):
+        if getattr(options, name):
+            words += [f"--{name}", ",".join(getattr(options, name))]
     return shlex.join([*words, "--seed", str(options.seed)])

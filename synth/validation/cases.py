@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -13,12 +14,12 @@ from ..dataset.reading import read_truth
 from ..truth import GroundTruth
 from .bounds import Verdict
 from .figures import CHAIN, Figure, scene_value
-from .markdown import number
 from .run import RunOptions, SceneResult, side_by_side
 from .separation_stage import SEPARATION
 from .sirfs_stage import SIRFS
-from .stages import Metric, Picture, find_stages, given
+from .stages import Metric, Picture, Stage, given
 from .substitution import METRICS
+from .words import number
 
 _RANKS = ("best", "median", "worst")
 
@@ -63,7 +64,7 @@ def make_cases(scenes: Sequence[SceneResult], options: RunOptions, monitor: Moni
 
 
 def _stage_pictures(name: str, truth: GroundTruth, options: RunOptions, monitor: Monitor) -> tuple[Picture, ...]:
-    (stage,) = find_stages((name,))
+    stage = next(stage for stage in options.stages if stage.name == name)
     return stage.shown(truth, stage.run(given(truth, stage.needs), options.settings, monitor))
 
 
@@ -95,7 +96,8 @@ def write_evidence(folder: Path, scene: SceneResult, stage: str, options: RunOpt
     write_channels(folder / "truth.exr", _truth_maps(truth))
     names = ["truth.exr"]
     diffuse = None
-    for found in find_stages(None if stage == CHAIN else (stage,)):
+    stages: tuple[Stage[Any, Any], ...] = (SEPARATION, SIRFS)
+    for found in stages if stage == CHAIN else (own for own in options.stages if own.name == stage):
         inputs = given(truth, () if stage == CHAIN else found.needs, diffuse)
         answer = found.run(inputs, options.settings, monitor)
         diffuse = getattr(answer, "diffuse", diffuse)

@@ -32,11 +32,12 @@ def metrics_of(stages: Sequence[Stage[Any, Any]], scenes: Sequence[SceneResult])
 
 
 def scene_value(scene: SceneResult, stage: str, metric: str) -> float | None:
-    """One scene's value; None where it was not run, or is not defined there."""
+    """One scene's value; None where it was not run, or is not defined there. "joint.average": a field of a field of the scores."""
     if stage == CHAIN:
         return None if scene.chain is None else chain_value(scene.chain.under(()), metric)
-    scores = scene.scores(stage)
-    value = None if scores is None else getattr(scores, metric)
+    value = scene.scores(stage)
+    for field in metric.split("."):
+        value = None if value is None else getattr(value, field)
     return None if value is None else float(value)
 
 

@@ -9,12 +9,14 @@ from html import escape
 from .bootstrap import Interval
 from .cases import Case
 from .figures import CHAIN, Figure
-from .markdown import CHAIN_TITLE, TRUTH_TITLES, findings, percent, verdict_line, with_interval
+from .markdown import CHAIN_TITLE, TRUTH_TITLES, findings, verdict_line
+from .model_tables import EXPLANATION, model_tables
+from .models_stage import NAME as MODELS
 from .outcome import Outcome, versions
 from .pictures import png_data
 from .slices import EVERYTHING
-from .stages import all_stages
 from .substitution import Budget
+from .words import percent, with_interval
 
 _COLORS = {"diffuse": "#e08a3c", "shape": "#5b9bd5", "light": "#e3c94b", "rest": "#8d8f94"}
 _LABELS = 290  # where the bars' names end, pixels
@@ -118,7 +120,9 @@ def _bar(x: Callable[[float], float], y: float, height: float, name: str, color:
 
 def _stage_part(stage: str, outcome: Outcome, cases: Sequence[Case]) -> str:
     figures = [f for f in outcome.figures if f.stage == stage]
-    title = CHAIN_TITLE if stage == CHAIN else next(found.title for found in all_stages() if found.name == stage)
+    title = CHAIN_TITLE if stage == CHAIN else next(found.title for found in outcome.options.stages if found.name == stage)
+    if stage == MODELS:
+        return f"<h2>{escape(title)}</h2>" + _model_part(outcome) + _cases(stage, cases)
     whole = [f for f in figures if f.group.kind == EVERYTHING]
     rows = [[f.metric.title, with_interval(f.interval), f.metric.unit, _mean(f), str(f.interval.scenes)] for f in whole]
     parts = [f"<h2>{escape(title)}</h2>", _table(["figure", "mean [95 % interval]", "unit", "mean over scenes", "scenes"], rows)]
@@ -130,7 +134,19 @@ def _stage_part(stage: str, outcome: Outcome, cases: Sequence[Case]) -> str:
             members = next(iter(own.values())).group.members
             body.append([value, str(len(members)), *(with_interval(own[name].interval) if name in own else "" for name in names)])
         parts.append(f"<details><summary>by {escape(kind)}</summary>{_table([kind, 'scenes', *names], body)}</details>")
-    return "".join(parts) + "".join(_case(case) for case in cases if case.stage == stage)
+    return "".join(parts) + _cases(stage, cases)
+
+
+def _model_part(outcome: Outcome) -> str:
+    parts = [f"<p>{escape(EXPLANATION)}</p>"]
+    for table in model_tables(outcome):
+        text = _table(table.heading, table.rows, words=table.heading.index("model") + 1)
+        parts.append(text if table.kind == EVERYTHING else f"<details><summary>by {escape(table.kind)}</summary>{text}</details>")
+    return "".join(parts)
+
+
+def _cases(stage: str, cases: Sequence[Case]) -> str:
+    return "".join(_case(case) for case in cases if case.stage == stage)
 
 
 def _mean(figure: Figure) -> str:

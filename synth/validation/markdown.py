@@ -4,32 +4,18 @@ from collections.abc import Sequence
 
 from .bootstrap import Interval
 from .figures import CHAIN, Figure
+from .model_tables import EXPLANATION, model_findings, model_tables
+from .models_stage import NAME as MODELS
+from .models_stage import TITLE as MODELS_TITLE
 from .outcome import Outcome
 from .slices import EVERYTHING
 from .substitution import Budget
+from .words import percent, with_interval
 
 TRUTH_TITLES = {"diffuse": "separation", "shape": "shape", "light": "light"}
 _TRUTHS = {"diffuse": "diffuse image", "shape": "shape", "light": "light"}
+MODEL_SLICES = (EVERYTHING, "material", "gloss", "albedo", "light")  # of models, in the summary; the report has all
 CHAIN_TITLE = "The whole chain, from the photo"
-
-
-def number(value: float) -> str:
-    """Three digits that matter."""
-    return f"{value:.3g}"
-
-
-def with_interval(interval: Interval) -> str:
-    """A value and its interval: "0.031 [0.024, 0.040]"."""
-    if interval.low is None or interval.high is None:
-        return number(interval.value)
-    return f"{number(interval.value)} [{number(interval.low)}, {number(interval.high)}]"
-
-
-def percent(interval: Interval) -> str:
-    """A share and its interval in per cent: "42 % [30, 55]"."""
-    if interval.low is None or interval.high is None:
-        return f"{round(100 * interval.value)} %"
-    return f"{round(100 * interval.value)} % [{round(100 * interval.low)}, {round(100 * interval.high)}]"
 
 
 def verdict_line(outcome: Outcome) -> str:
@@ -49,7 +35,9 @@ def findings(outcome: Outcome) -> tuple[str, ...]:
         found += _limits(outcome.budgets[0])
     for stage, figures in _by_stage(outcome.figures).items():
         first = next((f for f in figures if f.group.kind == EVERYTHING), None)
-        if first is not None and stage != CHAIN:
+        if stage == MODELS:
+            found += model_findings(outcome)
+        elif first is not None and stage != CHAIN:
             found.append(f"{stage} by itself: {first.metric.title} {with_interval(first.interval)} over {first.interval.scenes} scenes.")
         if worst := _worst_slice(figures):
             best, last = worst
@@ -70,6 +58,9 @@ def summary(outcome: Outcome) -> str:
     if outcome.budgets:
         lines += ["", "## Error budget", "", *budget_table(outcome.budgets)]
     for stage, figures in _by_stage(outcome.figures).items():
+        if stage == MODELS:
+            lines += _model_part(outcome)
+            continue
         rows = [
             [f.metric.title, with_interval(f.interval), f.metric.unit, str(f.interval.scenes)] for f in figures if f.group.kind == "all"
         ]
@@ -86,6 +77,14 @@ def budget_table(budgets: Sequence[Budget]) -> list[str]:
         cells = [shares.get(truth, "") for truth in ("diffuse", "shape", "light")]
         rows.append([found.metric.title, with_interval(found.error), *cells, percent(found.rest)])
     return _table(heading, rows)
+
+
+def _model_part(outcome: Outcome) -> list[str]:
+    lines = ["", f"## {MODELS_TITLE}", "", EXPLANATION]
+    tables = {table.kind: table for table in model_tables(outcome)}
+    for kind in (kind for kind in MODEL_SLICES if kind in tables):
+        lines += ["", *([] if kind == EVERYTHING else [f"By {kind}:", ""]), *_table(tables[kind].heading, tables[kind].rows)]
+    return lines
 
 
 def _limits(found: Budget) -> list[str]:

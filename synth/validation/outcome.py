@@ -10,6 +10,8 @@ import isc_core
 
 from .bounds import Verdict
 from .figures import Figure
+from .gains import Gain
+from .models_stage import Variants
 from .render_checks import RenderCheck
 from .run import RunOptions, SceneResult
 from .stages import Metric
@@ -22,7 +24,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "mitsuba")
 @dataclass(frozen=True)
 class Outcome:
     """`dataset`: as the user named it; `command`: how to run it again. `figures`, `budgets` (none without the chain), `checks` of renders,
-    `verdicts` on bounds. `notes`: what a reader should know."""
+    `verdicts` on bounds. `notes`: what a reader should know. `gains`: of models, none without the stage "models"."""
 
     dataset: str
     command: str
@@ -33,6 +35,7 @@ class Outcome:
     checks: tuple[RenderCheck, ...]
     verdicts: tuple[Verdict, ...]
     notes: tuple[str, ...] = ()
+    gains: tuple[Gain, ...] = ()
 
     @property
     def measured(self) -> tuple[SceneResult, ...]:
@@ -78,11 +81,13 @@ def to_json(outcome: Outcome, evidence: Sequence[str]) -> dict[str, Any]:
             "stages": [stage.name for stage in options.stages],
             "separator": options.settings.separator,
             "illumination": options.settings.illumination,
+            "models": list(options.settings.models),
         },
         "notes": list(outcome.notes),
         "failures": list(outcome.failures),
         "evidence": list(evidence),
         "figures": [_figure(figure) for figure in outcome.figures],
+        "gains": [_gain(gain) for gain in outcome.gains],
         "budget": [_budget(found) for found in outcome.budgets],
         "checks": [_check(check) for check in outcome.checks],
         "bounds": [asdict(verdict) for verdict in outcome.verdicts],
@@ -93,6 +98,11 @@ def to_json(outcome: Outcome, evidence: Sequence[str]) -> dict[str, Any]:
 def _figure(figure: Figure) -> dict[str, Any]:
     group = {"kind": figure.group.kind, "value": figure.group.value}
     return {"stage": figure.stage, "metric": _metric(figure.metric), "slice": group, "interval": asdict(figure.interval)}
+
+
+def _gain(gain: Gain) -> dict[str, Any]:
+    group = {"kind": gain.group.kind, "value": gain.group.value}
+    return {"model": gain.model, "error": gain.error, "slice": group, "share": asdict(gain.share)}
 
 
 def _metric(metric: Metric) -> dict[str, Any]:
@@ -125,5 +135,7 @@ def _chain(scene: SceneResult) -> dict[str, Any]:
 
 
 def _scores(scores: Any) -> dict[str, Any]:
+    if isinstance(scores, Variants):
+        return {name: _scores(own) for name, own in scores.items()}
     average = getattr(scores, "average", None)
     return asdict(scores) | ({} if average is None else {"average": average})

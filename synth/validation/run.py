@@ -6,7 +6,7 @@ Scenes run side by side, a thread each: compiled kernels release the interpreter
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -100,7 +100,8 @@ def measure_scene(
     try:
         for stage in stages:
             start = time.perf_counter()
-            answers[stage.name] = stage.run(given(truth, stage.needs), settings, monitor)
+            inputs = replace(given(truth, stage.needs), split=answers.get(SEPARATION.name))
+            answers[stage.name] = stage.run(inputs, settings, monitor)
             seconds = time.perf_counter() - start
             results.append(StageResult(stage.name, stage.score(truth, answers[stage.name]), seconds))
         chain = None

@@ -1,7 +1,7 @@
 """The stages that are validated, and what all of them have in common.
 
 A stage is one step from photo to scene: it sees what the stages before it found, or the truth of that where it is measured by itself.
-Adding one: a file with its `run`, `score` and `shown`, and an entry in `STAGES`.
+Adding one: a file with its `run`, `score` and `shown`, and an entry in `all_stages`.
 """
 
 from collections.abc import Callable, Mapping
@@ -10,7 +10,9 @@ from typing import Any, Generic, Literal, TypeVar
 
 import numpy as np
 
+from isc_core.decomposition import Separation
 from isc_core.errors import InputError
+from isc_core.models.settings import SEPARATING_MODELS
 from isc_core.pipeline import ILLUMINATIONS
 from isc_core.progress import Monitor
 from isc_core.separation import BEST, METHODS
@@ -26,14 +28,18 @@ BLACK = 0.5 / 65535
 @dataclass(frozen=True)
 class StageOptions:
     """`separator`: one of `isc_core.separation.METHODS`. `illumination`: "natural" or "laboratory", which lights SIRFS expects.
-    `threads`: of one solver, 0 for all cores. Raises `InputError` for unknown names."""
+    `threads`: of one solver, 0 for all cores. `models`: which of `SEPARATING_MODELS` the stage "models" compares with plain SIRFS.
+    Raises `InputError` for unknown names."""
 
     separator: str = BEST
     illumination: str = "natural"
     threads: int = 1
+    models: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for name, value, known in (("separator", self.separator, METHODS), ("illumination", self.illumination, ILLUMINATIONS)):
+        given = [("separator", self.separator, METHODS), ("illumination", self.illumination, ILLUMINATIONS)]
+        given += [("model", model, SEPARATING_MODELS) for model in self.models]
+        for name, value, known in given:
             if value not in known:
                 raise InputError(f'unknown {name} "{value}": choose {", ".join(known)}')
 
@@ -43,7 +49,8 @@ class Inputs:
     """What a stage sees.
 
     `image`: (H, W, 3) linear, the photo; `mask`, `clipped`: (H, W) bool. `diffuse`: (H, W, 3), the diffuse layer as it is believed to be,
-    None before it is known. `height` (H, W) pixels and `light` (9, 3) in our convention: given as exact, or None.
+    None before it is known. `height` (H, W) pixels and `light` (9, 3) in our convention: given as exact, or None. `split`: the layers that
+    the stage "separation" found, None where it was not run.
     """
 
     image: np.ndarray
@@ -52,6 +59,7 @@ class Inputs:
     diffuse: np.ndarray | None = None
     height: np.ndarray | None = None
     light: np.ndarray | None = None
+    split: Separation | None = None
 
 
 @dataclass(frozen=True)
@@ -111,7 +119,7 @@ class Stage(Generic[Answer, Marks]):
 
 
 def all_stages() -> tuple[Stage[Any, Any], ...]:
-    """Every stage that there is, in the order of the chain."""
+    """Every stage that is run if nothing else is said, in the order of the chain."""
     from .lobe_stage import GLOSS
     from .separation_stage import SEPARATION
     from .sirfs_stage import SIRFS

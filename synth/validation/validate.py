@@ -8,6 +8,7 @@ from isc_core.progress import Monitor
 
 from .bounds import Bound, judge
 from .figures import all_figures
+from .gains import all_gains
 from .outcome import Outcome, all_budgets
 from .render_checks import check_dataset
 from .run import RunOptions, choose_scenes, run_scenes
@@ -27,4 +28,5 @@ def validate(root: Path, options: RunOptions, bounds: Sequence[Bound], renders: 
         raise InputError(f"no scene of {root} could be run: {scenes[0].refused}")
     figures = all_figures(options.stages, measured, options.seed)
     budgets = all_budgets(measured, options.seed)
-    return Outcome(str(root), command, options, scenes, figures, budgets, checks, judge(bounds, figures), notes)
+    gains = all_gains(measured, options.seed)
+    return Outcome(str(root), command, options, scenes, figures, budgets, checks, judge(bounds, figures), notes, gains)
