@@ -41,6 +41,7 @@ class _Main(_Panel):
         settings, going = context.scene.isc, active() is not None
         photo = self.layout.column()
         photo.enabled = not going
+        photo.label(text="Photo")
         photo.template_ID(settings, "image", new="image.new", open="image.open")
         column = self.columns()
         column.enabled = not going

@@ -78,9 +78,10 @@ def request_from_settings(scene: Any) -> Request:
 
 
 def build_options(settings: Any, name: str) -> BuildOptions:
-    """What the panel says is to be built, under that name."""
-    chosen = {part.name: getattr(settings, part.name) for part in fields(BuildOptions) if part.name != "name"}
-    return BuildOptions(**chosen, name=name)
+    """What the panel says is to be built, under that name; the rest, which Blender's own panels show, stays as it is."""
+    offered = settings.bl_rna.properties.keys()
+    chosen = {part.name: getattr(settings, part.name) for part in fields(BuildOptions) if part.name in offered}
+    return BuildOptions(**{**chosen, "name": name})
 
 
 def pictures_of(request: Request) -> tuple[Picture, Picture | None, tuple[int, int] | None]:
@@ -139,6 +140,8 @@ def remembered(thing: Any, scene: Any, max_size: int) -> Request:
 
 
 def _known(kind: type, stored: dict[str, Any]) -> Any:
-    """A dataclass of those values that it has fields for."""
+    """A dataclass of those values that it has fields for. Raises `TypeError` if they have no names."""
+    if not isinstance(stored, dict):
+        raise TypeError(f"{stored!r} has no names")
     names = {part.name for part in fields(kind)}
     return kind(**{name: value for name, value in stored.items() if name in names})

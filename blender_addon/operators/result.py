@@ -133,10 +133,14 @@ def _copy_settings(source: Any, target: Any) -> None:
 
 
 def _show(context: Any, built: Built) -> None:
-    """Makes the object the active one, where the user looks."""
+    """Makes the object the active one, where the user looks; its own scene is looked at through the photo's camera."""
     if context.window is not None and context.window.scene != built.scene:
         context.window.scene = built.scene
+        for area in context.window.screen.areas:
+            if area.type == "VIEW_3D":
+                area.spaces.active.region_3d.view_perspective = "CAMERA"
     layer = built.scene.view_layers[0] if context.window is None else context.window.view_layer
+    layer.update()  # it does not know yet what was linked just now
     if built.object.name not in layer.objects:
         return
     for other in list(layer.objects.selected):

@@ -1,0 +1,368 @@
+"""The operators as people press them: one real run from photo to object, and what is said where something is wrong."""
+
+import importlib.util
+import json
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
+
+import blender_addon  # noqa: E402 (after the skip)
+from blender_addon import operators, preferences, presets, properties  # noqa: E402
+from blender_addon.messages import in_words, notes_of  # noqa: E402
+from blender_addon.operators import request as requests  # noqa: E402
+from blender_addon.operators.decompose import run_of  # noqa: E402
+from blender_addon.operators.mask import box_of  # noqa: E402
+from blender_addon.operators.request import request_from_settings  # noqa: E402
+from blender_addon.operators.run import Run, begin, end_active  # noqa: E402
+from blender_addon.panels import wrapped  # noqa: E402
+from blender_addon.scene.build import BuildOptions, find  # noqa: E402
+from blender_addon.worker import Update  # noqa: E402
+from isc_core.errors import InputError  # noqa: E402
+from isc_core.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
+from isc_core.separation import METHODS  # noqa: E402
+from tests.addon.scene_fixture import bump, write_result  # noqa: E402
+
+
+@pytest.fixture
+def addon(blender: Any) -> Iterator[Any]:
+    """Blender with the add-on registered; no run is left behind."""
+    blender_addon.register()
+    yield blender
+    end_active()
+    blender_addon.unregister()
+
+
+def picture(name: str, values: np.ndarray, **options: Any) -> Any:
+    """An image of Blender's from (H, W, 3) values, row 0 at the top."""
+    image = bpy.data.images.new(name, values.shape[1], values.shape[0], **options)
+    opaque = np.concatenate([values, np.ones_like(values[..., :1])], axis=2).astype(np.float32)
+    image.pixels.foreach_set(opaque[::-1].ravel())
+    return image
+
+
+def photo(name: str = "cup.png") -> Any:
+    """The bump as a float photo on black."""
+    return picture(name, bump().image, float_buffer=True)
+
+
+def mask_image(name: str = "cup mask", size: tuple[int, int] = (64, 88)) -> Any:
+    white = bump().mask if size == (64, 88) else np.ones(size, bool)
+    return picture(name, np.repeat(white[..., None], 3, 2).astype(np.float32))
+
+
+def say(operator: Any, **options: Any) -> str:
+    """What an operator complains about."""
+    with pytest.raises(RuntimeError) as caught:
+        operator(**options)
+    return str(caught.value).strip().removeprefix("Error: ")
+
+
+def census(blender: Any) -> dict[str, list[str]]:
+    kinds = ("objects", "meshes", "materials", "images", "worlds", "scenes", "collections", "node_groups", "cameras", "texts")
+    return {kind: sorted(block.name for block in getattr(blender.data, kind)) for kind in kinds}
+
+
+# --- from photo to object ---------------------------------------------------------------------------------------------------------------
+
+
+def test_a_photo_becomes_an_object_and_is_made_again_larger(addon: Any) -> None:
+    """One real run, of a painted photo with a name that is no file name."""
+    addon.data.scenes[0].name = "Mine"
+    settings = addon.context.scene.isc
+    settings.image, settings.separator, settings.max_size, settings.samples = photo("Täss/chen 杯.png"), "shen_2013", 36, 3
+    before = addon.context.scene.world, addon.context.scene.camera
+    assert addon.ops.isc.decompose() == {"FINISHED"}
+    shown = addon.context.window_manager.isc
+    assert shown.state == "done" and shown.message == "Täss_chen 杯: built in the scene Täss_chen 杯"
+    built = find(addon.context.object)
+    assert built is not None and built.scene == addon.context.scene and built.object.select_get()
+    assert built.scene.cycles.samples == 3 and built.scene.isc.image == settings.image
+    mine = addon.data.scenes["Mine"]
+    assert (mine.world, mine.camera) == before and not mine.objects, "the user's scene is as before"
+    folder = Path(built.object["isc_folder"])
+    assert (folder / "mesh.glb").is_file() and not (folder / "arrays.npz").exists()
+    assert sorted(path.name for path in folder.parent.iterdir()) == ["result"], "what was handed over has served"
+    assert json.loads((folder / "decomposition.json").read_text())["settings"]["max_size"] == 36
+    vertices = len(built.object.data.vertices)
+    addon.ops.isc.recolour(hue=0.1)
+    assert addon.ops.isc.redo(max_size=48) == {"FINISHED"}
+    again = find(addon.context.object)
+    assert again is not None and again.object == built.object and len(again.object.data.vertices) > 1.4 * vertices
+    assert requests.request_from_json(again.object["isc_request"]).method.max_size == 48
+    assert len(addon.data.meshes) == 1 and again.material.node_tree.nodes["ISC Dichromatic"].inputs["Hue"].default_value == pytest.approx(
+        0.1
+    )
+
+
+def test_a_box_is_cut_out_as_the_mask(addon: Any) -> None:
+    d = bump()
+    settings = addon.context.scene.isc
+    settings.image = picture("cup.png", np.where(d.mask[..., None], 3 * d.image + 0.2, [0.02, 0.25, 0.03]), float_buffer=True)
+    settings.box = (8, 1, 60, 54)
+    for _ in range(2):  # the second replaces the first
+        assert addon.ops.isc.cut_mask() == {"FINISHED"}
+    assert settings.mask_source == "IMAGE" and settings.mask.name == "cup.png mask" and settings.mask.packed_file is not None
+    assert [image.name for image in addon.data.images] == ["cup.png", "cup.png mask"]
+    found = np.empty(len(settings.mask.pixels), np.float32)
+    settings.mask.pixels.foreach_get(found)
+    inside = found.reshape(64, 88, 4)[::-1, :, 0] > 0.5
+    assert (inside & d.mask).sum() / (inside | d.mask).sum() > 0.9
+    run = run_of(addon.context, request_from_settings(addon.context.scene))
+    run.cancel()
+
+
+def test_two_runs_at_once_are_refused(addon: Any, tmp_path: Path) -> None:
+    addon.context.scene.isc.image = photo()
+    before = census(addon)
+    (tmp_path / "run").mkdir()
+    begin(Run("Decompose jug", (Update() for _ in "many"), lambda *_: "", tmp_path / "run"))  # type: ignore[arg-type]
+    assert not addon.ops.isc.decompose.poll()
+    with pytest.raises(InputError, match="Decompose jug is going on: wait for it, or cancel it first"):
+        run_of(addon.context, request_from_settings(addon.context.scene))
+    assert census(addon) == before
+
+
+# --- what is asked for ------------------------------------------------------------------------------------------------------------------
+
+
+def test_the_panel_knows_what_the_command_knows() -> None:
+    assert {item[0] for item in properties.MODELS} == set(MODELS)
+    assert {item[0] for item in properties.SEPARATORS} == set(METHODS)
+    assert {item[0] for item in properties.ILLUMINATIONS} == set(ILLUMINATIONS)
+
+
+def test_every_property_and_operator_explains_itself(addon: Any) -> None:
+    kinds: list[Any] = [*properties.CLASSES, preferences.ISC_AP_preferences, *operators.CLASSES]
+    for kind in kinds:
+        known = kind.bl_rna
+        assert not issubclass(kind, addon.types.Operator) or kind.bl_description, kind
+        for name in getattr(kind, "__annotations__", {}):
+            if name in known.properties:
+                assert len(known.properties[name].description) > 8, f"{kind.__name__}.{name}"
+            for item in getattr(known.properties.get(name), "enum_items", ()):
+                assert item.description, f"{kind.__name__}.{name}: {item.identifier}"
+
+
+def test_presets_are_what_they_set(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    assert settings.preset == "STANDARD", "the usual values are a preset"
+    for name, preset in presets.PRESETS.items():
+        settings.preset = name
+        assert (settings.preset, settings.max_size, settings.model, settings.samples) == (
+            name,
+            preset.max_size,
+            preset.model,
+            preset.samples,
+        )
+        assert preset.model in MODELS
+    settings.samples += 1
+    assert settings.preset == "CUSTOM"
+    settings.preset = "CUSTOM"
+    assert settings.samples == presets.PRESETS["FULL"].samples + 1
+
+
+def test_choices_survive_the_file(addon: Any, tmp_path: Path) -> None:
+    settings = addon.context.scene.isc
+    settings.image, settings.mask, settings.mask_source = photo(), mask_image(), "IMAGE"
+    settings.model, settings.size_metres = "mbp", 0.4
+    asked = request_from_settings(addon.context.scene)
+    addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    addon.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
+    assert request_from_settings(addon.context.scene) == asked
+    assert asked.build.size_metres == pytest.approx(0.4) and asked.method.model == "mbp"
+
+
+def test_a_request_is_kept_as_text() -> None:
+    asked = requests.Request("a", "b", True, requests.Method(max_size=7), BuildOptions(name="杯"), "Scene")
+    assert requests.request_from_json(asked.to_json()) == asked
+    later = json.loads(asked.to_json()) | {"of_a_later_version": 1}
+    assert requests.request_from_json(json.dumps(later)) == asked
+    for broken in ("", "null", "[]", "{}", '{"method": 3, "build": {}}'):
+        with pytest.raises(InputError, match="not known how this object was made"):
+            requests.request_from_json(broken)
+
+
+def test_objects_of_two_photos_are_told_apart(addon: Any, tmp_path: Path) -> None:
+    first, second = photo("cup.png"), photo("cup.jpg")
+    assert requests.key_of(first) == requests.key_of(second) == "cup"
+    thing = addon.data.objects.new("cup", None)
+    thing["isc_key"] = "cup"
+    requests.remember(thing, requests.Request(image="cup.png"))
+    assert (requests.key_of(first), requests.key_of(second)) == ("cup", "cup.jpg")
+
+
+def test_kept_results_go_to_the_cache_folder(addon: Any, tmp_path: Path) -> None:
+    folder = preferences.new_folder(tmp_path / "results", "a/b: 杯 ..")
+    assert folder.parent == tmp_path / "results" and folder.name.startswith("isc_a_b__杯____")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="choose another folder in the add-on's preferences"):
+        preferences.new_folder(tmp_path / "file" / "x", "cup")
+
+
+# --- what is wrong ----------------------------------------------------------------------------------------------------------------------
+
+
+def masked(settings: Any, mask: Any) -> None:
+    settings.image, settings.mask_source = photo(), "IMAGE"
+    settings.mask = mask or settings.image
+
+
+def without_mask(settings: Any) -> None:
+    settings.image, settings.mask_source = photo(), "IMAGE"
+
+
+def set_image(settings: Any, values: np.ndarray) -> None:
+    settings.image = picture("wall", values)
+
+
+@pytest.mark.parametrize(
+    ("prepare", "complaint"),
+    [
+        (lambda s: None, "there is no photo: open a file"),
+        (lambda s: set_image(s, np.ones((1, 1, 3))), "is 1 x 1 pixels: choose a larger one"),
+        (without_mask, "there is no mask image: choose one"),
+        (lambda s: masked(s, bpy.data.images.new("m", 88, 64)), "the mask m is empty: paint the object white on black"),
+        (
+            lambda s: masked(s, mask_image(size=(20, 30))),
+            "the mask is 30 x 20 pixels, the photo 88 x 64: choose another mask, or tick Scale Mask",
+        ),
+        (lambda s: masked(s, None), "is the photo itself"),
+        (lambda s: set_image(s, np.zeros((32, 32, 3))), "wall: every pixel is black"),
+        (lambda s: set_image(s, 0.3 + np.indices((32, 32, 3)).sum(0) / 200), "choose a mask image, or cut one out of a box"),
+    ],
+)
+def test_what_is_wrong_is_said_and_nothing_changes(addon: Any, prepare: Any, complaint: str) -> None:
+    prepare(addon.context.scene.isc)
+    before, folders = census(addon), list(Path(addon.app.tempdir).iterdir())
+    assert complaint in say(addon.ops.isc.decompose)
+    after = census(addon)
+    after["texts"].clear()  # a report of the worker may be there
+    assert after == before and list(Path(addon.app.tempdir).iterdir()) == folders
+
+
+def test_a_mask_of_another_size_is_taken_where_that_is_wanted(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    settings.image, settings.mask_source, settings.mask = photo(), "IMAGE", mask_image(size=(32, 44))
+    settings.scale_mask = True
+    run = run_of(addon.context, request_from_settings(addon.context.scene))
+    folder = run.folder
+    while not (folder / "mask.npy").exists():
+        assert run.step().state == "running", run.status.message
+    while run.status.stage != "starting the worker":
+        run.step()
+    assert np.load(folder / "mask.npy").shape == (64, 88)
+    run.cancel()
+
+
+def test_a_missing_worker_is_said(addon: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
+    addon.context.scene.isc.image = photo()
+    assert "the worker is missing" in say(addon.ops.isc.decompose)
+
+
+def test_a_box_that_is_none_is_refused(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    settings.image = photo()
+    assert "the box is less than 8 pixels wide or high" in say(addon.ops.isc.cut_mask)
+    settings.box = (0, 0, 88, 64)
+    assert "covers the whole image" in say(addon.ops.isc.cut_mask)
+    assert settings.mask is None and len(addon.data.images) == 1
+
+
+def test_a_new_mask_has_the_photos_size(addon: Any) -> None:
+    settings = addon.context.scene.isc
+    assert "choose a photo first" in say(addon.ops.isc.new_mask)
+    settings.image = photo()
+    assert addon.ops.isc.new_mask() == {"FINISHED"}
+    assert tuple(settings.mask.size) == (88, 64) and settings.mask_source == "IMAGE"
+
+
+# --- results --------------------------------------------------------------------------------------------------------------------------
+
+
+def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path) -> None:
+    scene = addon.context.scene
+    scene.isc.own_scene = False
+    world, camera = scene.world, scene.camera
+    assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
+    built = find(addon.context.object)
+    assert built is not None and built.scene == scene and (scene.world, scene.camera) == (world, camera) and len(addon.data.scenes) == 1
+    assert (bump_folder / "arrays.npz").is_file(), "a folder of the user's own stays as it is"
+
+
+def test_a_folder_without_arrays_is_given_them(addon: Any, tmp_path: Path) -> None:
+    from isc_core.result_folder import save
+
+    save(bump(), tmp_path / "cup")
+    assert addon.ops.isc.import_result(directory=str(tmp_path / "cup")) == {"FINISHED"}
+    assert find(addon.context.object) is not None and (tmp_path / "cup" / "arrays.npz").is_file()
+
+
+def test_what_is_no_result_is_refused(addon: Any, tmp_path: Path, bump_folder: Path) -> None:
+    before = census(addon)
+    assert "is no result: give the folder that isc decompose wrote" in say(addon.ops.isc.import_result, directory=str(tmp_path))
+    shutil.copytree(bump_folder, tmp_path / "broken")
+    (tmp_path / "broken" / "arrays.npz").write_bytes(b"nothing")
+    assert "is damaged" in say(addon.ops.isc.import_result, directory=str(tmp_path / "broken"))
+    assert census(addon) == before
+
+
+def test_the_same_object_is_updated(addon: Any, bump_folder: Path) -> None:
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    once = census(addon)
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    assert census(addon) == once
+
+
+def test_what_is_built_comes_with_the_object_into_another_file(addon: Any, tmp_path: Path) -> None:
+    addon.context.scene.isc.image = photo()
+    request = request_from_settings(addon.context.scene)
+    addon.ops.isc.build_result(directory=str(write_result(tmp_path / "cup")), request=request.to_json())
+    addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    addon.ops.wm.append(directory=str(tmp_path / "a.blend" / "Object"), filename="cup")
+    thing = addon.data.objects["cup"]
+    again = requests.remembered(thing, addon.context.scene, 99)
+    assert again.image == "cup.png" and again.method.max_size == 99
+    addon.data.images.remove(addon.data.images["cup.png"])
+    with pytest.raises(InputError, match="the photo that cup was made of is not in this file"):
+        requests.remembered(thing, addon.context.scene, 99)
+
+
+# --- words ------------------------------------------------------------------------------------------------------------------------------
+
+
+def test_messages_speak_of_images_and_fields() -> None:
+    assert in_words("/t/a.npy: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size", {"/t/a.npy": "cup"}) == (
+        "cup: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size, or tick Scale Mask"
+    )
+    assert in_words("--max-size 9 leaves the object thin", {}) == "Size 9 leaves the object thin"
+
+
+def test_notes_leave_out_what_helps_at_a_terminal() -> None:
+    assert notes_of("note: not converged\ngloss: none\nlook at x/preview.png") == "note: not converged; gloss: none"
+
+
+def test_lines_fit() -> None:
+    assert wrapped("one two three", 7) == ["one two", "three"]
+    assert wrapped("unbreakable", 3) == ["unbreakable"] and wrapped("", 5) == [""]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "box"),
+    [
+        ((0.25, 0.75), (0.75, 0.25), (25, 50, 50, 100)),
+        ((0.75, 0.25), (0.25, 0.75), (25, 50, 50, 100)),
+        ((-1.0, 2.0), (0.5, 0.5), (0, 0, 50, 100)),
+        ((0.5, 0.5), (0.55, 0.55), None),
+        ((1.5, 1.5), (2.0, 2.0), None),
+    ],
+)
+def test_a_drawn_box_counts_from_above(first: tuple[float, float], second: tuple[float, float], box: Any) -> None:
+    assert box_of(first, second, (100, 200)) == box

@@ -1,0 +1,372 @@
+"""A run in steps: what it tells, how it ends, and that nothing of it is left where it did not end well."""
+
+import shutil
+import sys
+import time
+from collections.abc import Callable, Generator, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
+
+import blender_addon  # noqa: E402 (after the skip)
+from blender_addon.operators import tasks  # noqa: E402
+from blender_addon.operators.modal import WorkerOperator, advance  # noqa: E402
+from blender_addon.operators.request import Method  # noqa: E402
+from blender_addon.operators.run import Run, WorkFailed, active, begin, end_active, follow, remove  # noqa: E402
+from blender_addon.operators.tasks import cut_out, decompose  # noqa: E402
+from blender_addon.photo_files import Picture  # noqa: E402
+from blender_addon.worker import Update, Worker, WorkerEnvironment, start  # noqa: E402
+from isc_core.errors import InputError  # noqa: E402
+
+# A package in place of `isc_core` that takes its time, or dies.
+SLOW = """
+import json, sys, time
+print(json.dumps({"event": "progress", "stage": "solving", "fraction": 0.25}), flush=True)
+while True: time.sleep(0.05)
+"""
+CRASH = "import os, sys\nprint('half way through', file=sys.stderr, flush=True)\nos.abort()\n"
+
+
+@pytest.fixture
+def addon(blender: Any) -> Iterator[Any]:
+    """Blender with the add-on registered; no run is left behind."""
+    blender_addon.register()
+    yield blender
+    end_active()
+    blender_addon.unregister()
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A run's own folder with something in it."""
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "photo.npy").write_text("x")
+    return tmp_path / "run"
+
+
+def stand_in(tmp_path: Path, code: str) -> WorkerEnvironment:
+    package = tmp_path / "stand_in" / "isc_core"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text("")
+    (package / "__main__.py").write_text(code)
+    return WorkerEnvironment(Path(sys.executable), (package.parent,), tmp_path / "cache")
+
+
+def script(steps: int, result: Path, closed: list[str] | None = None) -> Generator[Update, None, Path]:
+    try:
+        for number in range(steps):
+            yield Update("at work", number / steps)
+    finally:
+        if closed is not None:
+            closed.append("closed")
+    return result
+
+
+def failing(error: Exception) -> Generator[Update, None, Path]:
+    yield Update("at work")
+    raise error
+
+
+def take(_context: Any, result: Path) -> str:
+    return f"took {result.name}"
+
+
+def until(true: Callable[[], object], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, "it did not happen in time"
+        time.sleep(0.02)
+
+
+def test_a_run_ends_with_its_result_taken_in(folder: Path) -> None:
+    run = Run("Decompose cup", script(2, folder), take, folder)
+    assert [run.step().state for _ in range(4)] == ["running", "running", "ready", "ready"]
+    assert not run.ended
+    assert (run.take_in(None).state, run.status.message, run.ended) == ("done", "took run", True)
+    assert folder.is_dir(), "what is kept is for others to decide"
+
+
+def test_stage_and_fraction_are_passed_on(folder: Path) -> None:
+    run = Run("Decompose cup", script(4, folder), take, folder)
+    run.step()
+    run.step()
+    assert (run.status.stage, run.status.fraction) == ("at work", 0.25)
+
+
+@pytest.mark.parametrize(("error", "report"), [(InputError("no room"), ""), (WorkFailed("no room", "the log"), "the log")])
+def test_a_failure_is_told_and_leaves_nothing(folder: Path, error: Exception, report: str) -> None:
+    run = Run("Decompose cup", failing(error), take, folder)
+    run.step()
+    assert run.step().state == "failed"
+    assert (run.status.message, run.status.report) == ("no room", report)
+    assert not folder.exists()
+
+
+def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
+    def refuse(_context: Any, _result: Path) -> str:
+        raise InputError("linked")
+
+    run = Run("Decompose cup", script(0, folder), refuse, folder)
+    run.step()
+    assert (run.take_in(None).state, run.status.message, folder.exists()) == ("failed", "linked", False)
+
+
+def test_cancelling_closes_the_script_and_removes_the_folder(folder: Path) -> None:
+    closed: list[str] = []
+    run = Run("Decompose cup", script(5, folder, closed), take, folder)
+    run.step()
+    run.cancel()
+    assert (run.status.state, run.status.message, closed) == ("cancelled", "Decompose cup: cancelled", ["closed"])
+    assert run.step().state == "cancelled" and run.take_in(None).state == "cancelled"
+    assert not folder.exists()
+
+
+def test_cancelling_after_the_end_changes_nothing(folder: Path) -> None:
+    run = Run("Decompose cup", script(0, folder), take, folder)
+    run.step()
+    run.take_in(None)
+    assert run.cancel().state == "done" and folder.is_dir()
+
+
+def test_calls_are_measured_and_the_import_apart(folder: Path) -> None:
+    def slow_script() -> Generator[Update, None, Path]:
+        yield Update("quick")
+        time.sleep(0.03)
+        yield Update("slow")
+        return folder
+
+    def slow_import(_context: Any, _result: Path) -> str:
+        time.sleep(0.2)
+        return ""
+
+    run = Run("Decompose cup", slow_script(), slow_import, folder)
+    run.step()
+    assert run.longest_call_ms < 30
+    while run.step().state == "running":
+        pass
+    run.take_in(None)
+    assert 30 <= run.longest_call_ms < 200 <= run.import_ms
+
+
+def test_two_runs_at_once_are_refused(tmp_path: Path, folder: Path) -> None:
+    first = begin(Run("Decompose cup", script(5, folder), take, folder))
+    (tmp_path / "second").mkdir()
+    try:
+        with pytest.raises(InputError, match="Decompose cup is going on: wait for it, or cancel it first"):
+            begin(Run("Decompose jug", script(5, folder), take, tmp_path / "second"))
+        assert active() is first and not (tmp_path / "second").exists()
+    finally:
+        end_active()
+    assert active() is None and first.status.state == "cancelled"
+
+
+def test_a_folder_that_is_still_written_to_goes_in_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "run").mkdir()
+    whole, calls = shutil.rmtree, []
+
+    def busy(path: Path, ignore_errors: bool = False) -> None:
+        calls.append(path)
+        if len(calls) > 2:
+            whole(path, ignore_errors=ignore_errors)
+
+    monkeypatch.setattr(shutil, "rmtree", busy)
+    remove(tmp_path / "run")
+    assert (tmp_path / "run").exists(), "the first try was too early"
+    until(lambda: not (tmp_path / "run").exists())
+
+
+# --- workers ----------------------------------------------------------------------------------------------------------------------------
+
+
+def photo_file(tmp_path: Path) -> Picture:
+    (tmp_path / "cup.png").write_text("never read")
+    return Picture("cup", path=tmp_path / "cup.png")
+
+
+def test_cancelling_kills_the_worker_and_removes_what_it_wrote(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    environment, workers = stand_in(tmp_path, SLOW), []
+
+    def started(*given: Any) -> Worker:
+        workers.append(start(*given))
+        return workers[0]
+
+    monkeypatch.setattr(tasks, "start", started)
+    run = Run("Decompose cup", decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment), take, folder)
+    until(lambda: run.step().stage == "solving")
+    assert workers[0].poll().state == "running"
+    run.cancel()
+    until(lambda: workers[0].poll().state == "cancelled")
+    assert workers[0]._process.poll() is not None
+    until(lambda: not folder.exists())
+    assert (tmp_path / "cup.png").is_file(), "the user's own file stays"
+
+
+def test_a_crash_is_reported_with_the_logs_tail(tmp_path: Path, folder: Path) -> None:
+    script = cut_out(photo_file(tmp_path), (0, 0, 9, 9), folder, stand_in(tmp_path, CRASH))
+    run = Run("Cut Out", script, take, folder)
+    until(lambda: run.step().state != "running")
+    assert run.status.state == "failed" and "killed (SIGABRT)" in run.status.message
+    assert "half way through" in run.status.report
+    assert not folder.exists()
+
+
+def test_a_worker_that_cannot_be_started_is_said(tmp_path: Path, folder: Path) -> None:
+    environment = WorkerEnvironment(tmp_path / "no_python", (), tmp_path / "cache")
+    run = Run("Cut Out", cut_out(photo_file(tmp_path), (0, 0, 9, 9), folder, environment), take, folder)
+    until(lambda: run.step().state != "running")
+    assert run.status.state == "failed" and "cannot be started" in run.status.message
+
+
+def test_messages_name_images_not_files(tmp_path: Path, folder: Path) -> None:
+    code = """
+import json, sys
+print(json.dumps({"event": "failed", "message": f"{sys.argv[2]}: make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` "
+                  "and give it with --mask", "code": 2}), flush=True)
+sys.exit(2)
+"""
+    script = decompose(photo_file(tmp_path), None, None, Method(), folder, 0, stand_in(tmp_path, code))
+    run = Run("Decompose cup", script, take, folder)
+    until(lambda: run.step().state != "running")
+    assert run.status.message == "cup: choose a mask image, or cut one out of a box"
+
+
+def test_following_ends_the_worker_when_it_is_closed() -> None:
+    class Fake:
+        killed = 0
+
+        def poll(self) -> Update:
+            return Update("at work", 0.5)
+
+        def kill(self) -> None:
+            self.killed += 1
+
+    worker = Fake()
+    following = follow(worker)
+    next(following)
+    following.close()
+    assert worker.killed == 1
+
+
+# --- in the window ----------------------------------------------------------------------------------------------------------------------
+
+
+class Plain(WorkerOperator):
+    """The operators' mixin without Blender's class, which cannot be made outside of Blender's own call."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        self.said: list[tuple[set[str], str]] = []
+
+    def report(self, kind: set[str], text: str) -> None:
+        self.said.append((kind, text))
+
+
+def event(kind: str, value: str = "NOTHING") -> Any:
+    return SimpleNamespace(type=kind, value=value)
+
+
+def test_the_timer_polls_and_all_else_passes_through(addon: Any, folder: Path) -> None:
+    run = begin(Run("Decompose cup", script(2, folder), take, folder))
+    plain, shown = Plain(run), addon.context.window_manager.isc
+    assert plain.modal(addon.context, event("MOUSEMOVE")) == {"PASS_THROUGH"} and run.status.stage == "starting"
+    assert plain.modal(addon.context, event("TIMER")) == {"PASS_THROUGH"}
+    assert (shown.title, shown.state, shown.stage) == ("Decompose cup", "running", "at work")
+    states = [plain.modal(addon.context, event("TIMER")) for _ in range(2)]
+    assert states == [{"PASS_THROUGH"}, {"FINISHED"}]
+    assert (shown.state, shown.message, plain.said) == ("done", "took run", [({"INFO"}, "took run")])
+    assert shown.longest_call_ms > 0 and shown.import_ms > 0
+
+
+def test_escape_cancels_at_once(addon: Any, folder: Path) -> None:
+    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    plain = Plain(run)
+    plain.modal(addon.context, event("TIMER"))
+    assert plain.modal(addon.context, event("ESC", "RELEASE")) == {"PASS_THROUGH"} and not run.ended
+    assert plain.modal(addon.context, event("ESC", "PRESS")) == {"CANCELLED"}
+    assert addon.context.window_manager.isc.state == "cancelled" and not folder.exists()
+
+
+def test_the_button_cancels(addon: Any, folder: Path) -> None:
+    assert not addon.ops.isc.cancel.poll()
+    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    run.step()
+    assert addon.ops.isc.cancel() == {"FINISHED"} and run.status.state == "cancelled"
+    assert Plain(run).modal(addon.context, event("TIMER")) == {"CANCELLED"}
+
+
+def test_a_report_is_kept_as_text(addon: Any, folder: Path) -> None:
+    for log in ("an older log", "the log's tail"):
+        run = begin(Run("Decompose cup", failing(WorkFailed("it died", log)), take, folder))
+        plain = Plain(run)
+        plain.modal(addon.context, event("TIMER"))
+        assert plain.modal(addon.context, event("TIMER")) == {"CANCELLED"}
+    assert plain.said == [({"ERROR"}, "it died (see the text ISC Report)")]
+    assert [text.name for text in addon.data.texts] == ["ISC Report"]
+    assert addon.data.texts[0].as_string().splitlines() == ["Decompose cup", "it died", "", "the log's tail"]
+
+
+def test_nothing_is_built_while_something_is_edited(addon: Any, folder: Path) -> None:
+    """Undo in Edit Mode knows that mode alone: what is built then would not be one step."""
+    mesh = addon.data.objects.new("cube", addon.data.meshes.new("cube"))
+    addon.context.scene.collection.objects.link(mesh)
+    addon.context.view_layer.objects.active = mesh
+    addon.ops.object.mode_set(mode="EDIT")
+    run = begin(Run("Decompose cup", script(0, folder), take, folder))
+    assert not advance(addon.context, run) and not advance(addon.context, run)
+    assert addon.context.window_manager.isc.stage == "leave Edit Mode to see the result"
+    addon.ops.object.mode_set(mode="OBJECT")
+    assert advance(addon.context, run) and run.status.state == "done"
+
+
+def test_loading_another_file_ends_the_run(addon: Any, folder: Path) -> None:
+    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    run.step()
+    addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert run.status.state == "cancelled" and not folder.exists()
+
+
+def test_unregistering_ends_the_run(blender: Any, folder: Path) -> None:
+    blender_addon.register()
+    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    run.step()
+    blender_addon.unregister()
+    assert run.status.state == "cancelled" and not folder.exists()
+    assert not hasattr(blender.types.Scene, "isc") and not hasattr(blender.ops.isc.decompose, "nothing")
+
+
+def test_closing_blender_ends_the_worker(tmp_path: Path) -> None:
+    """A Blender of its own that is left while a run goes on: neither process nor folder outlives it."""
+    import subprocess
+
+    environment = stand_in(
+        tmp_path, SLOW.replace("while True", f"open({str(tmp_path / 'pid')!r}, 'w').write(str(__import__('os').getpid()))\nwhile True")
+    )
+    code = f"""
+import sys, time
+from pathlib import Path
+import bpy, blender_addon
+blender_addon.register()
+from blender_addon.operators.run import Run, begin
+from blender_addon.operators.request import Method
+from blender_addon.operators.tasks import decompose
+from blender_addon.photo_files import Picture
+from blender_addon.worker import WorkerEnvironment
+environment = WorkerEnvironment(Path(sys.executable), (Path({str(environment.search[0])!r}),), Path({str(tmp_path / "cache")!r}))
+folder = Path({str(tmp_path / "run")!r})
+folder.mkdir()
+picture = Picture("cup", path=Path({str(tmp_path / "cup.png")!r}))
+run = begin(Run("Decompose cup", decompose(picture, None, None, Method(), folder, 0, environment), lambda *_: "", folder))
+end = time.monotonic() + 30
+while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exists():
+    assert time.monotonic() < end
+    time.sleep(0.02)
+"""
+    root = Path(__file__).resolve().parents[2]
+    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert not (tmp_path / "run").exists()
+    until(lambda: not Path(f"/proc/{(tmp_path / 'pid').read_text()}").exists())
