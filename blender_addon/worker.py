@@ -106,7 +106,7 @@ class Worker:
         self._spared = unfinished(output)
         self._made = [parent for parent in output.parents if not parent.exists()]
         self._update = Update("starting")
-        self._killed = False
+        self._stopped = False
         self._ended = threading.Event()
         with contextlib.ExitStack() as stack:
             self._log: IO[bytes] = stack.enter_context(tempfile.TemporaryFile())
@@ -132,6 +132,7 @@ class Worker:
     def cancel(self) -> None:
         """Asks the worker to stop; it is killed if it has not done so after two seconds. Without effect once it has ended."""
         if not self._ended.is_set():
+            self._stopped = True
             with contextlib.suppress(OSError, ValueError):  # it has just ended
                 assert self._process.stdin is not None
                 self._process.stdin.close()
@@ -140,7 +141,7 @@ class Worker:
     def kill(self) -> None:
         """Ends the worker now. Without effect once it has ended."""
         if not self._ended.is_set():
-            self._killed = True
+            self._stopped = True
             self._see_to_the_end(0.0)
 
     def _see_to_the_end(self, patience: float) -> None:
@@ -149,7 +150,6 @@ class Worker:
 
     def _end(self, patience: float) -> None:
         if not self._ended.wait(patience):
-            self._killed = True
             _kill_group(self._process)
             self._ended.wait(_TIDYING_SECONDS)
 
@@ -177,7 +177,7 @@ class Worker:
                 return Update("done", 1.0, "done", "\n".join(last.get("lines", ())), report)
             case "failed":
                 return Update("failed", fraction, "failed", str(last.get("message", "")), report)
-        if last.get("event") == "cancelled" or self._killed:
+        if last.get("event") == "cancelled" or self._stopped:
             return Update("cancelled", fraction, "cancelled", "cancelled", report)
         return Update("failed", fraction, "failed", _how_it_died(code, report), report)
 

@@ -22,16 +22,13 @@ _Speaker = TerminalSpeaker | JsonSpeaker
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs `isc` with `arguments`, those of the process if None, and returns its exit code; never raises for a user's mistake."""
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if "--progress=json" in words or ("--progress", "json") in pairwise(words):  # complaints about the other options are told so, too
-        with JsonSpeaker(sys.stdout) as speaker:
-            return _spoken(words, speaker)
-    return _spoken(words, TerminalSpeaker())
-
-
-def _spoken(words: list[str], speaker: _Speaker) -> int:
-    """Runs the command, tells how it ended, and returns its exit code."""
+    # Looked for here, so that complaints about the other options are told to a program, too.
+    for_program = "--progress=json" in words or ("--progress", "json") in pairwise(words)
+    speaker: _Speaker = JsonSpeaker(sys.stdout) if for_program else TerminalSpeaker()
     try:
-        speaker.done(*_run(words, speaker))
+        with speaker:
+            output, lines = _run(words, speaker)
+        speaker.done(output, lines)
         sys.stdout.flush()
         return SUCCESS
     except InputError as error:

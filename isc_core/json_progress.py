@@ -32,12 +32,13 @@ _CANCELLED = 130
 
 
 class JsonSpeaker:
-    """Reports to a program, and lets it cancel. Use as a context manager, in the process's main thread."""
+    """Reports to a program. As a context manager, in the process's main thread, it lets the program cancel: `KeyboardInterrupt`."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
         self._stage, self._most, self._told = "", 0.0, float("-inf")
         self._ended = threading.Event()
+        self._turn = threading.Lock()
         self._before: object = None
 
     @contextmanager
@@ -48,19 +49,19 @@ class JsonSpeaker:
 
     def done(self, output: str, lines: Sequence[str]) -> None:
         """The work's result is written to `output`."""
-        self._last("done", output=output, lines=list(lines))
+        self._say("done", output=output, lines=list(lines))
 
     def failed(self, message: str, code: int) -> None:
         """One line says why there is no result."""
-        self._last("failed", message=message, code=code)
+        self._say("failed", message=message, code=code)
 
     def rejected(self, lines: Sequence[str], code: int) -> None:
         """The result is written, but breaks bounds, a line each."""
-        self._last("failed", message="; ".join(lines), code=code)
+        self._say("failed", message="; ".join(lines), code=code)
 
     def cancelled(self) -> None:
         """The work was stopped, and left nothing."""
-        self._last("cancelled")
+        self._say("cancelled")
 
     def _step(self, stage: str, fraction: float) -> None:
         name, now = stage_name(stage), time.monotonic()
@@ -68,10 +69,6 @@ class JsonSpeaker:
         if name != self._stage or now - self._told > _REPEAT_SECONDS:
             self._stage, self._told = name, now
             self._say("progress", stage=name, fraction=round(self._most, 4))
-
-    def _last(self, event: str, **content: object) -> None:
-        self._ended.set()
-        self._say(event, **content)
 
     def _say(self, event: str, **content: object) -> None:
         try:
@@ -90,16 +87,18 @@ class JsonSpeaker:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
-        self._ended.set()
+        with self._turn:  # from here on nothing is interrupted, so that the last word is heard
+            self._ended.set()
         if self._before is not None:
             signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def _watch(self, descriptor: int) -> None:
         _await_cancel(descriptor)
         for patience in _PATIENCE_SECONDS:
-            if self._ended.is_set():
-                return
-            _thread.interrupt_main()
+            with self._turn:
+                if self._ended.is_set():
+                    return
+                _thread.interrupt_main()
             self._ended.wait(patience)
         if not self._ended.is_set():
             os._exit(_CANCELLED)

@@ -38,6 +38,12 @@ class TerminalSpeaker:
         with ProgressBar(sys.stderr, quiet=quiet) as bar:
             yield bar
 
+    def __enter__(self) -> "TerminalSpeaker":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        pass
+
     def done(self, output: str, lines: Sequence[str]) -> None:
         """The work's result is written to `output`; `lines` say what a person should know."""
         del output

@@ -124,6 +124,13 @@ def test_a_cancelled_solve_leaves_nothing(tmp_path: Path, stop: Callable[[Proces
     assert [entry.name for entry in tmp_path.iterdir()] == ["ball.png"]
 
 
+def test_a_start_can_be_cancelled(tmp_path: Path) -> None:
+    """The answer to the very first line, while libraries are loaded."""
+    process = started("separate", tmp_path / "photo.png", "-o", tmp_path / "out")
+    code, events, errors = followed(process, at("starting", cancel))
+    assert (code, events[-1], errors) == (130, {"event": "cancelled"}, "")
+
+
 @pytest.mark.parametrize("ignored", [False, True])
 def test_work_that_does_not_listen_is_interrupted(tmp_path: Path, ignored: bool) -> None:
     """Also where the program's own parent has told it to ignore Ctrl-C."""
