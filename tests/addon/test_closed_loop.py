@@ -1,0 +1,82 @@
+"""The closed loop on an exact result: its white, matt and whole renders are its maps, in its own light and in another one."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks import closed_loop
+from benchmarks.closed_loop_cases import Relit
+from blender_addon.arrays import Result, read_result
+from isc_core.environment import directions, shading_under
+from isc_core.metrics import psnr
+
+SAMPLES = 16
+
+
+@pytest.fixture
+def result(bump_folder: Path, blender: Any) -> Result:
+    return read_result(bump_folder)
+
+
+def test_what_stands_in_blender_is_what_was_recovered(result: Result, tmp_path: Path) -> None:
+    renders = closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES)
+    row = closed_loop.loop_row("bump", renders)
+    assert row.shading < 0.08
+    assert row.inner <= row.shading
+    assert row.diffuse > 30
+    assert row.diffuse > row.diffuse_usual, "Blender's usual filter smooths what the photo's camera has smoothed already"
+    assert row.image > 30
+    assert row.image > row.matt + 3, "the photo has a highlight, the matt object has none"
+    assert closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES).kept.keys() == renders.kept.keys()
+    assert closed_loop.loop_table([row]).count("\n") == 3
+
+
+@pytest.mark.parametrize("light", ["sun", "sky"])
+def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(result: Result, light: str) -> None:
+    """A shallow dome has no shadows under light from the front: matt radiance is albedo * irradiance / pi."""
+    from benchmarks.closed_loop_renders import Look, picture
+
+    toward, irradiance, height = np.array([0.48, -0.36, 0.8]), np.array([2.0, 1.5, 1.0]), directions(16)[..., :1]
+    sky = np.full((16, 32, 3), 0.1) if light == "sun" else (1 + 0.8 * height) * np.array([0.2, 0.5, 0.8])
+    sun = irradiance if light == "sun" else np.zeros(3)
+    normal = result.normal[result.mask].astype(float)
+    truth = np.zeros_like(result.diffuse)
+    shading = shading_under(sky, normal) + sun / np.pi * np.maximum(normal @ toward, 0)[:, None]
+    truth[result.mask] = result.reflectance[result.mask] * shading
+    got, _ = picture(result, Look(own_shadows=False, relit=Relit(light, sky, toward, sun, truth, truth)), SAMPLES)
+    assert psnr(truth, got / result.reflectance_scale, result.mask, peak=closed_loop.white(truth, result.mask)) > 30
+    assert closed_loop.gain(truth, got, result.mask) == pytest.approx(1 / result.reflectance_scale, rel=0.02)
+
+
+def test_materials_that_shine_by_themselves_are_found(result: Result) -> None:
+    from benchmarks.closed_loop_renders import shining
+    from blender_addon.scene import BuildOptions, build
+
+    assert shining(build(result, BuildOptions(specular_from="image")).material)
+    for gloss in ("lobe", "none"):
+        assert not shining(build(result, BuildOptions(specular_from=gloss)).material)  # type: ignore[arg-type]
+
+
+def test_an_object_shadows_itself_only_where_others_stand_around_it(result: Result) -> None:
+    from blender_addon.scene import BuildOptions, build
+
+    def shadows(**options: Any) -> tuple[bool, bool]:
+        thing = build(result, BuildOptions(**options)).object
+        return thing.visible_shadow, thing.visible_diffuse
+
+    assert shadows(name="alone") == (False, False)
+    assert shadows(name="alone", own_shadows=True) == (True, True)
+    assert shadows(name="alone") == (True, True), "built again, it stays as it was set"
+    assert shadows(name="among others", own_scene=False) == (True, True)
+    assert shadows(name="among others", own_scene=False, own_shadows=False) == (False, False)
+
+
+def test_only_the_scale_of_a_relit_picture_is_free() -> None:
+    rng = np.random.default_rng(0)
+    truth, mask = rng.uniform(0, 1, (8, 9, 3)), np.ones((8, 9), bool)
+    seen = truth + rng.normal(0, 0.05, truth.shape)
+    assert closed_loop.scaled_psnr(truth, seen, mask) == pytest.approx(closed_loop.scaled_psnr(truth, 7 * seen, mask))
+    assert closed_loop.scaled_psnr(truth, seen * [1, 0.5, 0.5], mask) < closed_loop.scaled_psnr(truth, seen, mask) - 3
+    assert closed_loop.relative_rms(1.1 * truth, truth, mask) == pytest.approx(0.1)
