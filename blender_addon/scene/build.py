@@ -103,19 +103,21 @@ def build(
 
 
 def find(thing: bpy.types.Object | None) -> Built | None:
-    """What belongs to an object, camera or sun that ISC made; None for others, or if parts of it were deleted."""
+    """What belongs to an object, camera or sun that ISC made; None for others, and where object or material are gone.
+
+    Camera, world, scene and collection are None where they were deleted, or not appended with the object.
+    """
     if thing is None or not is_isc(thing):
         return None
     key = thing["isc_key"]
-    parts = (
-        find_block(bpy.data.collections, key, "collection"),
-        find_block(bpy.data.objects, key, "object"),
-        find_block(bpy.data.objects, key, "camera"),
-        find_block(bpy.data.worlds, key, "world"),
-        find_block(bpy.data.scenes, key, "scene") or next(iter(thing.users_scene), None),
-        find_block(bpy.data.materials, key, "material"),
-    )
-    return None if any(part is None for part in parts) else Built(*parts)
+    made = find_block(bpy.data.objects, key, "object")
+    material = find_block(bpy.data.materials, key, "material")
+    if made is None or material is None:
+        return None
+    collection = find_block(bpy.data.collections, key, "collection") or next(iter(made.users_collection), None)
+    scene = find_block(bpy.data.scenes, key, "scene") or next(iter(made.users_scene), None)
+    camera, world = find_block(bpy.data.objects, key, "camera"), find_block(bpy.data.worlds, key, "world")
+    return Built(collection, made, camera, world, scene, material)
 
 
 def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> None:

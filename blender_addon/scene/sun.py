@@ -39,13 +39,11 @@ def relight(thing: bpy.types.Object, on: bool = True) -> bpy.types.Object | None
     if not isinstance(key, str) or any(value is None for value in values):
         raise InputError(f"{thing.name} is not an object of ISC, or its light was deleted: import the result again")
     direction, strength, ambient = (np.array(value, float) for value in values)
-    world = find(bpy.data.worlds, key, "world")
-    if world is not None:
-        mix_sun(world, ambient, on)
+    mix_sun(find(bpy.data.worlds, key, "world"), ambient, on)
     if not on:
         remove_sun(key)
         return None
-    collection = find(bpy.data.collections, key, "collection") or thing.users_collection[0]
+    collection = find(bpy.data.collections, key, "collection") or next(iter(thing.users_collection), bpy.context.scene.collection)
     return ensure_sun(key, collection, direction, strength)
 
 

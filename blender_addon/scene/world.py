@@ -46,9 +46,9 @@ def ensure_world(key: str, sky: bpy.types.Image, ambient: np.ndarray, sun: bool)
     return world
 
 
-def mix_sun(world: bpy.types.World, ambient: np.ndarray, sun: bool) -> None:
-    """Shows the even light `ambient` (3,) that a sun leaves to the rest, or the environment; nothing if people took the node away."""
-    mix = world.node_tree.nodes.get(SUN)
+def mix_sun(world: bpy.types.World | None, ambient: np.ndarray, sun: bool) -> None:
+    """Shows the even light `ambient` (3,) that a sun leaves to the rest, or the environment; nothing where world or node are gone."""
+    mix = world.node_tree.nodes.get(SUN) if world else None
     if mix is not None and mix.type == "MIX":
         factor = next(socket for socket in mix.inputs if socket.type == "VALUE")
         _, second = (socket for socket in mix.inputs if socket.type == "RGBA")

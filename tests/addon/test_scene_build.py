@@ -212,6 +212,8 @@ def test_everything_survives_saving_and_loading(blender: Any, result: Result, tm
 
 @pytest.mark.parametrize("kind", ["objects", "collections", "scenes"])
 def test_everything_survives_appending(blender: Any, result: Result, tmp_path: Path, kind: str) -> None:
+    from blender_addon.scene import find
+
     name = {"objects": "object", "collections": "collection", "scenes": "scene"}[kind]
     wanted = getattr(build(result), name).name
     save(blender, tmp_path / "saved.blend")
@@ -221,6 +223,9 @@ def test_everything_survives_appending(blender: Any, result: Result, tmp_path: P
     thing = next(thing for thing in blender.data.objects if thing.type == "MESH")
     check_loaded(blender, thing, result)
     assert bool(blender.data.cameras) == (kind != "objects") and thing["isc_world"] in set(blender.data.worlds)
+    found = find(thing)
+    assert found is not None and found.object == thing and found.world == thing["isc_world"]
+    assert (found.camera is None) == (kind == "objects")
     assert build(result).object == thing, "what was appended is updated, too"
 
 
