@@ -22,7 +22,9 @@ from isc_core.models.settings import SEPARATING_MODELS
 from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.separation import separate
+from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.recover import RecoverOptions
+from isc_core.sirfs.solver import SolverOptions
 from synth.truth import GroundTruth
 from synth.validation import separation_stage
 from synth.validation.bootstrap import Interval
@@ -44,8 +46,9 @@ EVERY = StageOptions(models=("mbp", "joint", "mdr"))
 
 @pytest.fixture(autouse=True)
 def small_solves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SIRFS solved at 24 pixels instead of 256: what is tested here does not depend on it."""
+    """SIRFS solved at 24 pixels instead of 256, and not to the end: what is tested here does not depend on it."""
     monkeypatch.setattr(shape, "RecoverOptions", partial(RecoverOptions, solve_size=24, margin=6))
+    monkeypatch.setattr(shape, "SolverOptions", partial(SolverOptions, lbfgs=LbfgsOptions(evaluations=25)))
 
 
 @pytest.fixture(scope="module")
