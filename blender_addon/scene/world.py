@@ -41,6 +41,8 @@ def ensure_world(key: str, sky: bpy.types.Image, ambient: np.ndarray, sun: bool)
         (light.outputs["Background"], out.inputs["Surface"]),
     )
     mix_sun(world, ambient, sun)
+    if hasattr(world, "cycles"):  # its own choice is 1024 columns, which take longer to tabulate than a small render
+        world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", 4 * sky.size[0]
     world["isc_rotation"] = ROTATION
     world["isc_rotation_about"] = "degrees about Z, by which the Mapping node brings the image's middle column toward the viewer (-Y)"
     return world
