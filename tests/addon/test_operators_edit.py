@@ -1,0 +1,208 @@
+"""Editing what was built: paint, gains, light, files; and what is said where it cannot be edited."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
+
+from mathutils import Vector  # noqa: E402 (after the skip)
+
+import blender_addon  # noqa: E402
+from blender_addon.arrays import read_result  # noqa: E402
+from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # noqa: E402
+from blender_addon.scene.build import Built, find  # noqa: E402
+from blender_addon.scene.material import dichromatic_node  # noqa: E402
+from tests.addon.scene_render import render  # noqa: E402
+
+
+@pytest.fixture
+def addon(blender: Any) -> Iterator[Any]:
+    """Blender with the add-on registered."""
+    blender_addon.register()
+    yield blender
+    blender_addon.unregister()
+
+
+@pytest.fixture
+def built(addon: Any, bump_folder: Path) -> Built:
+    """The bump in its own scene, active."""
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    found = find(addon.context.object)
+    assert found is not None
+    return found
+
+
+def sockets(built: Built) -> dict[str, float]:
+    node = dichromatic_node(built.material)
+    assert node is not None
+    names = ("Hue", "Saturation", "Value", "Diffuse Gain", "Specular Gain", "Roughness")
+    return {name: node.inputs[name].default_value for name in names}
+
+
+def say(operator: Any, **options: Any) -> str:
+    """What an operator complains about."""
+    with pytest.raises(RuntimeError) as caught:
+        operator(**options)
+    return str(caught.value).strip().removeprefix("Error: ")
+
+
+def sun_of(built: Built) -> Any:
+    return next((thing for thing in built.collection.objects if thing.type == "LIGHT"), None)
+
+
+def test_recolouring_sets_the_paint_and_nothing_else(addon: Any, built: Built, bump_folder: Path, tmp_path: Path) -> None:
+    before = sockets(built)
+    assert addon.ops.isc.recolour(hue=0.5, saturation=0.0, value=0.5) == {"FINISHED"}
+    assert sockets(built) == {**before, "Saturation": 0.0, "Value": 0.5}
+    result = read_result(bump_folder)
+    paint = render(built.scene, tmp_path)["Diffuse Color"]
+    inside = result.mask & (result.confidence > 0.8)
+    np.testing.assert_allclose(paint[inside], 0.5 * result.base_color[inside].max(-1, keepdims=True).repeat(3, -1), rtol=0.02)
+
+
+def test_gains_reach_paint_and_gloss_wherever_it_comes_from(addon: Any, bump_folder: Path) -> None:
+    addon.context.scene.isc.specular_from = "image"
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    material = find(addon.context.object).material  # type: ignore[union-attr]
+    assert addon.ops.isc.dichromatic(diffuse_gain=0.25, specular_gain=0.5) == {"FINISHED"}
+    groups = [node for node in material.node_tree.nodes if node.type == "GROUP"]
+    gains = [node.inputs["Specular Gain"].default_value for node in groups if "Specular Gain" in node.inputs]
+    node = dichromatic_node(material)
+    assert gains == [0.5, 0.5] and node is not None and node.inputs["Diffuse Gain"].default_value == 0.25
+
+
+def test_an_edit_begins_with_what_is_set(addon: Any, built: Built) -> None:
+    """From a panel: the redo panel shows the object's values, not the usual ones. Without a window, Blender never asks for that."""
+    addon.ops.isc.recolour(hue=0.2, saturation=0.7, value=1.5)
+    addon.ops.isc.dichromatic(diffuse_gain=0.3, specular_gain=0.4)
+    for kind, wanted in (
+        (ISC_OT_recolour, {"hue": 0.2, "saturation": 0.7, "value": 1.5}),
+        (ISC_OT_dichromatic, {"diffuse_gain": 0.3, "specular_gain": 0.4}),
+    ):
+        operator = SimpleNamespace(execute=lambda context: {"FINISHED"})
+        assert kind.invoke(operator, addon.context, None) == {"FINISHED"}
+        assert {name: getattr(operator, name) for name in wanted} == pytest.approx(wanted)
+
+
+def test_the_sun_stands_where_the_light_was(addon: Any, built: Built, bump_folder: Path) -> None:
+    result = read_result(bump_folder)
+    assert sun_of(built) is None
+    assert addon.ops.isc.relight(light="OPTIMAL") == {"FINISHED"}
+    sun = sun_of(built)
+    x, y, z = result.sun_direction
+    toward = sun.rotation_quaternion.to_matrix() @ Vector((0, 0, 1))
+    np.testing.assert_allclose(toward, (x, -z, y), atol=1e-5)
+    np.testing.assert_allclose(sun.data.energy * np.array(sun.data.color), result.sun_strength, rtol=1e-5)
+
+
+def test_the_sun_goes_where_it_is_told(addon: Any, built: Built) -> None:
+    """Right, away from the viewer, up: Blender's own axes, as the camera looks along +Y."""
+    addon.ops.isc.relight(light="OPTIMAL")
+    energy = sun_of(built).data.energy
+    assert addon.ops.isc.relight(light="CHOSEN", direction=(0, -3, 0), strength=2) == {"FINISHED"}
+    sun = sun_of(built)
+    toward = sun.rotation_quaternion.to_matrix() @ Vector((0, 0, 1))
+    np.testing.assert_allclose(toward, (0, -1, 0), atol=1e-6)
+    assert sun.data.energy == pytest.approx(2 * energy)
+    assert "no length" in say(addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0))
+
+
+def test_the_recovered_light_comes_back(addon: Any, built: Built, tmp_path: Path) -> None:
+    before = render(built.scene, tmp_path, samples=4)["Combined"]
+    addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0), ambient=0)
+    lit = render(built.scene, tmp_path, samples=4)["Combined"][..., :3]
+    middle = 38  # of the bump
+    assert lit[:, middle + 1 :].mean() > 0.003 and not lit[:, :middle].any(), "light from the right alone"
+    addon.ops.isc.relight(light="RECOVERED")
+    np.testing.assert_array_equal(render(built.scene, tmp_path, samples=4)["Combined"], before)
+    assert sun_of(built) is None
+
+
+def test_even_light_is_a_factor(addon: Any, built: Built, tmp_path: Path) -> None:
+    addon.ops.isc.relight(light="OPTIMAL", strength=0, ambient=0)
+    assert render(built.scene, tmp_path, samples=4)["Combined"][..., :3].max() < 1e-6
+    addon.ops.isc.relight(light="OPTIMAL", strength=0, ambient=1)
+    assert render(built.scene, tmp_path, samples=4)["Combined"][..., :3].max() > 0.01
+
+
+def test_other_objects_are_not_edited(addon: Any, built: Built) -> None:
+    other = addon.data.objects.new("cube", addon.data.meshes.new("cube"))
+    addon.context.scene.collection.objects.link(other)
+    addon.context.view_layer.objects.active = other
+    for name in ("recolour", "dichromatic", "relight", "redo", "export"):
+        assert not getattr(addon.ops.isc, name).poll(), name
+
+
+def test_nodes_that_were_taken_away_are_missed(addon: Any, built: Built) -> None:
+    built.material.node_tree.nodes.clear()
+    assert "has no node group ISC Dichromatic any more" in say(addon.ops.isc.recolour, hue=0.1)
+
+
+def test_an_object_of_unknown_origin_is_not_made_again(addon: Any, built: Built) -> None:
+    assert "is not in this file: open it, and press Decompose" in say(addon.ops.isc.redo, max_size=64)
+    del built.object["isc_request"]
+    assert "not known how this object was made" in say(addon.ops.isc.redo, max_size=64)
+
+
+# --- files ------------------------------------------------------------------------------------------------------------------------------
+
+
+def test_the_results_own_files_are_copied(addon: Any, tmp_path: Path) -> None:
+    from isc_core.arrays_file import write_arrays
+    from isc_core.mesh import build_mesh
+    from isc_core.result_folder import load, save
+    from tests.addon.scene_fixture import bump
+
+    d = bump()
+    save(d, tmp_path / "result")
+    write_arrays(d, tmp_path / "result" / "arrays.npz", build_mesh(d.height, d.normal, d.mask, d.reflectance, None))
+    addon.ops.isc.import_result(directory=str(tmp_path / "result"))
+    assert addon.ops.isc.export(directory=str(tmp_path / "out")) == {"FINISHED"}
+    copy = tmp_path / "out" / "bump"
+    assert sorted(path.name for path in copy.iterdir()) == ["decomposition.json", "maps.exr", "mesh.glb", "preview.png"]
+    np.testing.assert_array_equal(load(copy).height, d.height)
+    assert (copy / "mesh.glb").read_bytes() == (tmp_path / "result" / "mesh.glb").read_bytes()
+
+
+def test_without_them_the_scene_is_written(addon: Any, built: Built, bump_folder: Path, tmp_path: Path) -> None:
+    import trimesh
+
+    from isc_core.exr import read_channels
+
+    addon.ops.isc.relight(light="OPTIMAL")
+    material = built.object.data.materials[0]
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    result = read_result(bump_folder)
+    channels = read_channels(tmp_path / "bump" / "reflectance.exr")
+    np.testing.assert_array_equal(np.stack([channels[letter] for letter in "RGB"], -1), result.reflectance)
+    mesh = trimesh.load(tmp_path / "bump" / "mesh.glb", force="mesh")
+    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), np.ptp(places(built), axis=0)[[0, 2, 1]], rtol=1e-4)
+    assert mesh.visual.material.baseColorTexture is not None, "the paint goes with it"
+    assert built.object.data.materials[0] == material and "plain" not in addon.data.materials
+
+
+def places(built: Built) -> np.ndarray:
+    """(V, 3) of the object's mesh."""
+    values = np.empty(3 * len(built.object.data.vertices), np.float32)
+    built.object.data.vertices.foreach_get("co", values)
+    return values.reshape(-1, 3)
+
+
+def test_a_place_that_cannot_be_written_is_said(addon: Any, built: Built, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    assert "choose another folder" in say(addon.ops.isc.export, directory=str(tmp_path / "file"))
+    assert "and a folder to write to" in say(addon.ops.isc.export, directory="")
+
+
+def test_linked_objects_are_left_alone(addon: Any, built: Built, tmp_path: Path) -> None:
+    addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
+    addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    addon.ops.wm.link(directory=str(tmp_path / "a.blend" / "Collection"), filename="bump", instance_collections=False)
+    thing = next(thing for thing in addon.data.objects if thing.type == "MESH")
+    addon.context.view_layer.objects.active = thing
+    assert thing.library is not None and not addon.ops.isc.recolour.poll()
