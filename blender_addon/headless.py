@@ -12,7 +12,11 @@ Limits: in the source tree, the Python that runs this has to have the packages t
 import importlib
 import importlib.util
 import sys
+import traceback
 from pathlib import Path
+from typing import NoReturn
+
+FAULT = 1  # of this program, not of what it was given
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -61,5 +65,16 @@ def _load(folder: Path) -> str:
     return folder.name
 
 
+def _run() -> NoReturn:
+    """Ends the process with the command's exit code; Blender by itself ends with 0 after a script that raised."""
+    code = FAULT
+    try:
+        code = main()
+    finally:
+        if code == FAULT:
+            traceback.print_exc()
+        sys.exit(code)
+
+
 if __name__ == "__main__":
-    sys.exit(main())
+    _run()

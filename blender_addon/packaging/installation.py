@@ -84,6 +84,7 @@ def paint_photo() -> Any:
     pixels[..., 3] = square < 1
     image = bpy.data.images.new("photo", SIDE, SIDE, alpha=True)
     image.pixels.foreach_set(pixels[::-1].ravel())
+    image.pack()
     return image
 
 
@@ -107,9 +108,9 @@ def begin_run() -> Any:
 def tick(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:
     """Polls as the timer does, until the run has ended or `until` of it is done; the stages that were shown."""
     stages, end = [], time.monotonic() + seconds
-    while time.monotonic() < end and not part("operators.modal").advance(bpy.context, run) and run.update.fraction < until:
-        if run.update.stage not in stages:
-            stages.append(run.update.stage)
+    while time.monotonic() < end and not part("operators.modal").advance(bpy.context, run) and run.status.fraction < until:
+        if run.status.stage not in stages:
+            stages.append(run.status.stage)
         time.sleep(0.05)
     return stages
 
@@ -119,7 +120,7 @@ def run_to_the_end() -> dict[str, Any]:
     began = time.perf_counter()
     run = begin_run()
     stages = tick(run)
-    check(run.update.state == "done", f"the run ends well: {run.update}")
+    check(run.status.state == "done", f"the run ends well: {run.status}")
     seconds = round(time.perf_counter() - began, 1)
     return {"seconds": seconds, "longest call ms": round(run.longest_call_ms, 1), "import ms": round(run.import_ms), "stages": stages}
 
@@ -139,12 +140,12 @@ def cancel_in_the_middle() -> dict[str, Any]:
     before = len(bpy.data.objects)
     run = begin_run()
     tick(run, until=0.02)
-    check(run.update.state == "running", f"the run is at work: {run.update}")
-    at = run.update.stage
+    check(run.status.state == "running", f"the run is at work: {run.status}")
+    at = run.status.stage
     began = time.perf_counter()
     run.cancel()
     took = time.perf_counter() - began
-    check(run.update.state == "cancelled" and len(bpy.data.objects) == before, "cancelled, and the scene as before")
+    check(run.status.state == "cancelled" and len(bpy.data.objects) == before, "cancelled, and the scene as before")
     gone = _within(5, lambda: not run.folder.exists() and not children())
     check(gone, f"a cancelled run leaves nothing: {children()} {run.folder}")
     return {"at": at, "call ms": round(1e3 * took, 1)}
@@ -157,9 +158,9 @@ def kill_the_worker() -> str:
     for child in children():
         os.kill(child, signal.SIGKILL)
     tick(run, seconds=30)
-    check(run.update.state == "failed" and run.update.message != "", f"a killed worker is reported: {run.update}")
+    check(run.status.state == "failed" and run.status.message != "", f"a killed worker is reported: {run.status}")
     bpy.data.scenes[0].isc.max_size = 64
-    return str(run.update.message)
+    return str(run.status.message)
 
 
 def children() -> list[int]:
@@ -202,7 +203,7 @@ def append(blend: Path) -> None:
     (thing,) = [thing for thing in target.collections[0].objects if thing.type == "MESH"]
     images = [node.image for node in thing.data.materials[0].node_tree.nodes if node.type == "TEX_IMAGE"]
     check(bool(images) and all(image.packed_file and image.size[0] for image in images), "the material came with its images")
-    check("isc_request" in thing and "isc_settings" in thing, "how it was made came along")
+    check("isc_request" in thing and "isc_decomposition" in thing, "how it was made came along")
 
 
 def uninstall() -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from blender_addon.headless import main
+from isc_core.terminal import Interrupts
 from tests.addon.scene_fixture import bump, write_result
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -157,3 +158,24 @@ def test_ctrl_c_ends_the_worker_and_leaves_nothing(tmp_path: Path) -> None:
         assert process.wait(60) == 130, first + rest
     assert rest.splitlines()[-1] == "blender: cancelled"
     assert [path.name for path in tmp_path.iterdir()] == ["bump.png"]
+
+
+def test_a_host_that_had_set_signals_itself_is_no_trouble() -> None:
+    """Blender sets its own in C, which Python knows nothing of and cannot set again."""
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with Interrupts() as interrupts:
+            interrupts._before = dict.fromkeys(before)
+        assert {signal.getsignal(number) for number in before} == {signal.SIG_DFL}
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def test_a_fault_is_not_taken_for_success(tmp_path: Path) -> None:
+    """Blender itself ends with 0 after a script that raised."""
+    code = "import runpy, sys, blender_addon.command_line as c; c.main = None; sys.argv = ['headless']; "
+    code += "runpy.run_module('blender_addon.headless', run_name='__main__')"
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
+    assert done.returncode == 1
+    assert "TypeError" in done.stderr
