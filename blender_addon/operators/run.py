@@ -5,10 +5,12 @@ happens into a `Status`. Nothing here knows windows or operators, so it runs wit
 when it is closed itself, which is all that cancelling takes; the run's own folder then goes, the result with it.
 """
 
+import contextlib
 import shutil
+import sys
 import threading
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -17,8 +19,17 @@ from isc_core.errors import InputError
 
 from ..worker import Update, Worker
 
-Script = Generator[Update, None, Path]
-"""Yields how far the work is, and returns the folder or file it made; raises `InputError` or `WorkFailed`."""
+
+@dataclass(frozen=True)
+class Made:
+    """What a script has made: a folder or a file, and what the worker had to say of it, one line or nothing."""
+
+    path: Path
+    notes: str = ""
+
+
+Script = Generator[Update, None, Made]
+"""Yields how far the work is, and returns what it made; raises `InputError` or `WorkFailed`."""
 
 State = Literal["running", "ready", "done", "failed", "cancelled"]
 _REMOVE_SECONDS = 5.0
@@ -60,7 +71,7 @@ class Run:
         self.import_ms = 0.0
         self._script = script
         self._finish = finish
-        self._result: Path | None = None
+        self._made: Made | None = None
 
     @property
     def ended(self) -> bool:
@@ -81,13 +92,12 @@ class Run:
 
     def take_in(self, context: Any) -> Status:
         """Puts the result of a run that is ready into the scene: the one call that may take longer."""
-        if self.status.state != "ready" or self._result is None:
+        if self.status.state != "ready" or self._made is None:
             return self.status
         began = time.perf_counter()
-        try:
-            self._end("done", self._finish(context, self._result))
-        except InputError as error:
-            self._end("failed", str(error))
+        with self._ended_by_errors():
+            said = self._finish(context, self._made.path)
+            self._end("done", f"{said}; {self._made.notes}" if self._made.notes else said)
         self.import_ms = 1e3 * (time.perf_counter() - began)
         return self.status
 
@@ -98,16 +108,30 @@ class Run:
         return self.status
 
     def _advance(self) -> None:
+        with self._ended_by_errors():
+            try:
+                said = next(self._script)
+                self.status = Status("running", said.stage, said.fraction)
+            except StopIteration as stop:
+                self._made = stop.value
+                self.status = Status("ready", "building the scene", 1.0)
+
+    @contextlib.contextmanager
+    def _ended_by_errors(self) -> Iterator[None]:
+        """Ends the run with what went wrong; errors that nobody foresaw go on to Blender's console, but the run must not stay."""
+        foreseen = False
         try:
-            said = next(self._script)
-            self.status = Status("running", said.stage, said.fraction)
-        except StopIteration as stop:
-            self._result = stop.value
-            self.status = Status("ready", "building the scene", 1.0)
+            yield
+            foreseen = True
         except InputError as error:
+            foreseen = True
             self._end("failed", str(error))
         except WorkFailed as failure:
+            foreseen = True
             self._end("failed", str(failure), failure.report)
+        finally:
+            if not foreseen:
+                self._end("failed", f"an error of the extension, see the console: {sys.exception()}")
 
     def _end(self, state: State, message: str, report: str = "") -> None:
         self._script.close()

@@ -4,11 +4,11 @@ from collections.abc import Callable, Generator, Mapping
 from pathlib import Path
 
 from ..arrays import ARRAYS
-from ..messages import in_words
+from ..messages import in_words, notes_of
 from ..photo_files import Picture, hand_over, hand_over_mask
 from ..worker import Job, Update, Worker, WorkerEnvironment, box_mask, start, start_arrays
 from .request import Method
-from .run import Script, WorkFailed, during, follow
+from .run import Made, Script, WorkFailed, during, follow
 
 _HANDING_OVER = "handing the photo over"
 RESULT = "result"
@@ -40,12 +40,12 @@ def decompose(
         transfer=photo.transfer,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
-    yield from _worked(lambda: start(job, environment), names)
+    done = yield from _worked(lambda: start(job, environment), names)
     for handed in (photo_path, mask_path):
         # What was handed over has served; a file of the user's own is not in the run's folder.
         if handed is not None and handed.parent == folder:
             handed.unlink(missing_ok=True)
-    return folder / RESULT
+    return Made(folder / RESULT, notes_of(done.message))
 
 
 def cut_out(photo: Picture, box: tuple[int, int, int, int], folder: Path, environment: WorkerEnvironment) -> Script:
@@ -53,14 +53,14 @@ def cut_out(photo: Picture, box: tuple[int, int, int, int], folder: Path, enviro
     path = yield from during(_HANDING_OVER, hand_over(photo, folder / "photo"))
     mask = folder / "mask.png"
     yield from _worked(lambda: box_mask(path, box, mask, environment, photo.transfer), {str(path): photo.name})
-    return mask
+    return Made(mask)
 
 
 def complete(result: Path, environment: WorkerEnvironment) -> Script:
     """Adds the arrays that Blender reads to a result folder that was made without them; returns it."""
     if not (result / ARRAYS).is_file():
         yield from _worked(lambda: start_arrays(result, environment), {})
-    return result
+    return Made(result)
 
 
 def _worked(begin: Callable[[], Worker], names: Mapping[str, str]) -> Generator[Update, None, Update]:

@@ -16,7 +16,7 @@ import blender_addon  # noqa: E402 (after the skip)
 from blender_addon.operators import tasks  # noqa: E402
 from blender_addon.operators.modal import WorkerOperator, advance  # noqa: E402
 from blender_addon.operators.request import Method  # noqa: E402
-from blender_addon.operators.run import Run, WorkFailed, active, begin, end_active, follow, remove  # noqa: E402
+from blender_addon.operators.run import Made, Run, WorkFailed, active, begin, end_active, follow, remove  # noqa: E402
 from blender_addon.operators.tasks import cut_out, decompose  # noqa: E402
 from blender_addon.photo_files import Picture  # noqa: E402
 from blender_addon.worker import Update, Worker, WorkerEnvironment, start  # noqa: E402
@@ -56,17 +56,17 @@ def stand_in(tmp_path: Path, code: str) -> WorkerEnvironment:
     return WorkerEnvironment(Path(sys.executable), (package.parent,), tmp_path / "cache")
 
 
-def script(steps: int, result: Path, closed: list[str] | None = None) -> Generator[Update, None, Path]:
+def script(steps: int, result: Path, closed: list[str] | None = None) -> Generator[Update, None, Made]:
     try:
         for number in range(steps):
             yield Update("at work", number / steps)
     finally:
         if closed is not None:
             closed.append("closed")
-    return result
+    return Made(result)
 
 
-def failing(error: Exception) -> Generator[Update, None, Path]:
+def failing(error: Exception) -> Generator[Update, None, Made]:
     yield Update("at work")
     raise error
 
@@ -115,6 +115,31 @@ def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
     assert (run.take_in(None).state, run.status.message, folder.exists()) == ("failed", "linked", False)
 
 
+def test_what_the_worker_says_of_the_result_is_passed_on(folder: Path) -> None:
+    def talkative() -> Generator[Update, None, Made]:
+        yield Update("at work")
+        return Made(folder, "note: it did not converge")
+
+    run = Run("Decompose cup", talkative(), take, folder)
+    run.step()
+    run.step()
+    assert run.take_in(None).message == "took run; note: it did not converge"
+
+
+@pytest.mark.parametrize("where", ["script", "finish"])
+def test_an_unforeseen_error_does_not_block_the_next_run(folder: Path, where: str) -> None:
+    def broken(_context: Any, _result: Path) -> str:
+        raise ZeroDivisionError("an error of ours")
+
+    steps = failing(ZeroDivisionError("an error of ours")) if where == "script" else script(1, folder)
+    run = begin(Run("Decompose cup", steps, broken, folder))
+    run.step()
+    with pytest.raises(ZeroDivisionError):
+        run.step() and run.take_in(None)
+    assert active() is None and run.status.state == "failed" and "an error of ours" in run.status.message
+    assert not folder.exists()
+
+
 def test_cancelling_closes_the_script_and_removes_the_folder(folder: Path) -> None:
     closed: list[str] = []
     run = Run("Decompose cup", script(5, folder, closed), take, folder)
@@ -133,11 +158,11 @@ def test_cancelling_after_the_end_changes_nothing(folder: Path) -> None:
 
 
 def test_calls_are_measured_and_the_import_apart(folder: Path) -> None:
-    def slow_script() -> Generator[Update, None, Path]:
+    def slow_script() -> Generator[Update, None, Made]:
         yield Update("quick")
         time.sleep(0.03)
         yield Update("slow")
-        return folder
+        return Made(folder)
 
     def slow_import(_context: Any, _result: Path) -> str:
         time.sleep(0.2)
@@ -350,7 +375,7 @@ import sys, time
 from pathlib import Path
 import bpy, blender_addon
 blender_addon.register()
-from blender_addon.operators.run import Run, begin
+from blender_addon.operators.run import Made, Run, begin
 from blender_addon.operators.request import Method
 from blender_addon.operators.tasks import decompose
 from blender_addon.photo_files import Picture
