@@ -7,7 +7,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import operators, panels, preferences, properties
-from .operators.run import end_active
+from .operators.modal import show
+from .operators.run import active, end_active
 
 _CLASSES = (preferences.ISC_AP_preferences, *properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
 
@@ -35,4 +36,7 @@ def unregister() -> None:
 @persistent
 def _end_before_loading(*_: Any) -> None:
     """The run belongs to the file that it was begun in."""
-    end_active()
+    run = active()
+    if run is not None:
+        run.cancel()
+        show(bpy.context, run)

@@ -352,6 +352,7 @@ def test_loading_another_file_ends_the_run(addon: Any, folder: Path) -> None:
     run.step()
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert run.status.state == "cancelled" and not folder.exists()
+    assert addon.context.window_manager.isc.state in {"", "cancelled"}
 
 
 def test_unregistering_ends_the_run(blender: Any, folder: Path) -> None:
