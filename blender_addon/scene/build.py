@@ -15,7 +15,7 @@ from .background import show_photo
 from .camera import ensure_camera, frame_as_photo
 from .collection import ensure_collection, ensure_scene, put, show_as_photographed
 from .displacement import displace, flattened, undo_displacement
-from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps
+from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps, require_spaces
 from .material import Gloss, Maps, ensure_material
 from .mesh import fill_mesh, sheet
 from .provenance import find as find_block
@@ -79,7 +79,8 @@ def build(
     """Builds the result, or updates what was built under its name before.
 
     `scene`: where to, without a scene of its own; the current one if None. `photo`: shown behind the object; the masked one if None.
-    Raises `InputError`, before anything is changed, for a size that is none, things linked from another file, a mesh being edited.
+    Raises `InputError`, before anything is changed, for a size that is none, things linked from another file, a mesh being
+    edited, a colour configuration without the spaces that maps need.
     """
     options = options or BuildOptions()
     key = options.name or result.name
@@ -127,6 +128,7 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
         raise InputError(f"the scene {scene.name} is linked from another file and cannot be changed: build in a scene of its own")
     if options.displacement and options.closed_back:
         raise InputError("a displaced grid has no back: choose displacement or a closed back")
+    require_spaces(COLOR, DATA)
     require_local(key)
     thing = find_block(bpy.data.objects, key, "object")
     if thing is not None and thing.mode != "OBJECT":

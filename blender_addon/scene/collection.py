@@ -1,5 +1,7 @@
 """The collection that holds all that ISC makes of one image, and the scene that it stands in."""
 
+from contextlib import suppress
+
 import bpy
 
 from .provenance import find, label, mark
@@ -32,6 +34,8 @@ def put(thing: bpy.types.Object, collection: bpy.types.Collection) -> None:
 
 
 def show_as_photographed(scene: bpy.types.Scene) -> None:
-    """Colours on the screen and in files as they are: no film look, no exposure."""
+    """Colours on the screen and in files as they are: no film look, no exposure. Views that are not Blender's own stay."""
     view = scene.view_settings
-    view.view_transform, view.look, view.exposure, view.gamma, view.use_curve_mapping = "Standard", "None", 0.0, 1.0, False
+    view.exposure, view.gamma, view.use_curve_mapping = 0.0, 1.0, False
+    with suppress(TypeError):  # in somebody's colour configuration they may not exist
+        view.view_transform, view.look = "Standard", "None"

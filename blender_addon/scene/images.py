@@ -7,6 +7,8 @@ they are. A packed image is an OpenEXR of 32 bit, so that nothing is lost by sav
 import bpy
 import numpy as np
 
+from isc_core.errors import InputError
+
 from ..arrays import Result
 from .provenance import find, label, mark
 
@@ -15,6 +17,13 @@ MAPS = {
     **dict.fromkeys(("diffuse", "specular", "residual", "reflectance", "shading", "lobe"), COLOR),
     **dict.fromkeys(("normal", "height", "confidence", "mask"), DATA),
 }
+
+
+def require_spaces(*names: str) -> None:
+    """Raises `InputError` where Blender runs with somebody's colour configuration that lacks one of the colour spaces."""
+    known = bpy.types.ColorManagedInputColorspaceSettings.bl_rna.properties["name"].enum_items.keys()
+    if missing := [name for name in names if name not in known]:
+        raise InputError(f"the colour configuration has no space {missing[0]!r}: start Blender with its own (without the variable OCIO)")
 
 
 def ensure_image(key: str, role: str, values: np.ndarray, space: str, alpha: np.ndarray | None = None) -> bpy.types.Image:

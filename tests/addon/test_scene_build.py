@@ -1,5 +1,6 @@
 """Building is repeatable, keeps its hands off what is not its own, survives files, and refuses in one line."""
 
+import importlib
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -276,6 +277,14 @@ def test_a_displaced_grid_with_a_back_is_refused(blender: Any, result: Result) -
     with pytest.raises(InputError, match="choose"):
         build(result, displacement=True, closed_back=True)
     assert not blender.data.objects
+
+
+def test_a_colour_configuration_without_our_spaces_is_refused(blender: Any, result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(importlib.import_module("blender_addon.scene.build"), "DATA", "Cinema Data")
+    before = census(blender)
+    with pytest.raises(InputError, match="no space 'Cinema Data'"):
+        build(result)
+    assert census(blender) == before
 
 
 def test_an_object_that_is_being_edited_is_refused(blender: Any, result: Result) -> None:
