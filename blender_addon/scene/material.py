@@ -44,6 +44,8 @@ def ensure_material(key: str, maps: Maps, gloss: Gloss) -> bpy.types.Material:
     tree.nodes.clear()
     group = add_node(tree, "Group", (0, 200), name=DICHROMATIC, width=220, node_tree=dichromatic_group())
     output = add_node(tree, "OutputMaterial", (600, 200))
+    if hasattr(material, "cycles"):
+        material.cycles.emission_sampling = "NONE"  # the photo's highlights light nothing: rays toward them would only add noise
     _texture(tree, maps.base_color, group.inputs["Reflectance"], (-500, 400))
     surface = group.outputs["Surface"]
     if gloss.source == "image" and maps.specular is not None:
