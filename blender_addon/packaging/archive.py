@@ -45,7 +45,8 @@ def manifest(target: Target, wheels: Sequence[Path]) -> str:
     return template.substitute(
         version=__version__,
         blender_min=target.blender_min,
-        blender_max=target.blender_max,
+        # Left out where there is no end: Blender 5.2 stumbles over an empty one.
+        blender_max=f'blender_version_max = "{target.blender_max}"' if target.blender_max else "",
         platforms=json.dumps([target.platform]),
         wheels=json.dumps([f"./wheels/{path.name}" for path in wheels], indent=2),
     )

@@ -115,6 +115,7 @@ def test_the_manifest_says_what_the_zip_is_for() -> None:
     assert about["wheels"] == ["./wheels/scipy-1-cp311-cp311-manylinux_2_28_x86_64.whl"]
     assert list(about["permissions"]) == ["files"]
     assert about["license"] == ["SPDX:GPL-3.0-or-later"]
+    assert "blender_version_max" not in tomllib.loads(manifest(TARGETS[-1], []))
 
 
 def test_the_same_files_make_the_same_bytes(tmp_path: Path) -> None:
