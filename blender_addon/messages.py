@@ -10,6 +10,7 @@ _INSTEAD = (
     ("make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` and give it with --mask", "choose a mask image, or cut one out of a box"),
     ("give a mask of the photo's size", "give a mask of the photo's size, or tick Scale Mask"),
     ("--max-size ", "Size "),
+    ("--illumination ", "Light "),
     ("--transfer ", "colour space "),
     ("--threads ", "Threads "),
     ("--separator ", "Separator "),

@@ -1,6 +1,7 @@
 """What workers are asked to do, as scripts for `run.Run`: decompose a photo, cut a mask out of a box, complete a result's arrays."""
 
 from collections.abc import Callable, Generator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from ..arrays import ARRAYS
@@ -65,8 +66,30 @@ def complete(result: Path, environment: WorkerEnvironment) -> Script:
 
 def _worked(begin: Callable[[], Worker], names: Mapping[str, str]) -> Generator[Update, None, Update]:
     """Starts a worker and follows it to its end; what it says is said in the window's words. `names`: of images, by path."""
-    yield Update("starting the worker")
+    worker = yield from _begun(begin)
     try:
-        return (yield from follow(begin()))
+        return (yield from follow(worker))
     except WorkFailed as failure:
         raise WorkFailed(in_words(str(failure), names), failure.report) from failure
+
+
+def _begun(begin: Callable[[], Worker]) -> Generator[Update, None, Worker]:
+    """Starts a worker in a thread: on a busy machine a new process of a large program takes longer than a window may wait."""
+    pool = ThreadPoolExecutor(1)
+    starting = pool.submit(begin)
+    pool.shutdown(wait=False)
+    followed = False
+    try:
+        yield Update("starting the worker")
+        while not starting.done():
+            yield Update("starting the worker")
+        followed = True
+        return starting.result()
+    finally:
+        if not followed:  # cancelled meanwhile
+            starting.add_done_callback(_end_unfollowed)
+
+
+def _end_unfollowed(started: Future[Worker]) -> None:
+    if started.exception() is None:
+        started.result().kill()

@@ -230,6 +230,23 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(tmp_path: Path, f
     assert (tmp_path / "cup.png").is_file(), "the user's own file stays"
 
 
+def test_a_worker_that_is_just_being_started_is_ended_too(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    environment, workers = stand_in(tmp_path, SLOW), []
+
+    def slow_start(*given: Any) -> Worker:
+        time.sleep(0.3)
+        workers.append(start(*given))
+        return workers[0]
+
+    monkeypatch.setattr(tasks, "start", slow_start)
+    run = Run("Decompose cup", decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment), take, folder)
+    until(lambda: run.step().stage == "starting the worker")
+    run.cancel()
+    assert not workers
+    until(lambda: workers and workers[0].poll().state == "cancelled")
+    assert workers[0]._process.poll() is not None
+
+
 def test_a_crash_is_reported_with_the_logs_tail(tmp_path: Path, folder: Path) -> None:
     script = cut_out(photo_file(tmp_path), (0, 0, 9, 9), folder, stand_in(tmp_path, CRASH))
     run = Run("Cut Out", script, take, folder)
