@@ -24,7 +24,7 @@ from isc_core.evaluate import Estimate, paired_bootstrap
 from isc_core.evaluation_runner import RunnerOptions, make_runner
 from isc_core.metrics import score
 from isc_core.progress import Monitor
-from isc_core.separation.highlight_cue import CueNetwork, read_network
+from isc_core.separation.layer_network import LayerNetwork, read_network
 from isc_core.sirfs.prior_file import shipped_prior_set
 
 MODELS = ("plain", "mdr", "mbp", "joint", "true diffuse")
@@ -40,7 +40,7 @@ def photo_of(folder: Path, name: str) -> tuple[MitBerkeleyObject, MitBerkeleyObj
     )
 
 
-def run(model: str, seen: MitBerkeleyObject, diffuse: MitBerkeleyObject, network: CueNetwork | None) -> tuple[Estimate, float]:
+def run(model: str, seen: MitBerkeleyObject, diffuse: MitBerkeleyObject, network: LayerNetwork | None) -> tuple[Estimate, float]:
     """A model's answer and its seconds."""
     truth = diffuse if model == "true diffuse" else seen
     options = RunnerOptions("sirfs" if model in ("plain", "true diffuse") else model)

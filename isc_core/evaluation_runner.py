@@ -16,7 +16,7 @@ from .models.mbp import split_reflectance
 from .pipeline import BASELINE_MODELS, Settings
 from .progress import Monitor
 from .separation import BEST, separate
-from .separation.highlight_cue import CueNetwork
+from .separation.layer_network import LayerNetwork
 from .sirfs.contour import occluding_contour
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
@@ -46,8 +46,8 @@ class RunnerOptions:
         Settings(model=self.model, separator=self.separator, engine=self.engine, threads=self.threads).check()
 
 
-def make_runner(options: RunnerOptions, prior_set: PriorSet, network: CueNetwork | None = None) -> Runner:
-    """What `evaluate` runs on each object; `network`: of the model joint's cue, the shipped one if None.
+def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwork | None = None) -> Runner:
+    """What `evaluate` runs on each object; `network`: of the model joint's layers, the shipped one if None.
 
     Raises `InputError` for unknown options.
     """
@@ -62,9 +62,9 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet, network: CueNetwork
         announce_compilation(options.engine, monitor)
         if truth.illumination not in tables:
             tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
-        result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor)
         if options.model == "joint":
-            return joint_estimate(truth, log_image, result, tables[truth.illumination], options, network)
+            return joint_estimate(truth, tables[truth.illumination], options, monitor, network)
+        result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor)
         if options.model == "mbp":
             log_image = _log_separated_reflectance(truth, result, options)
         return _estimate(truth, log_image, result.height, result.light, result)
@@ -86,36 +86,30 @@ def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors,
 
 
 def joint_estimate(
-    truth: MitBerkeleyObject,
-    log_start: np.ndarray,
-    start: SirfsResult,
-    priors: Priors,
-    options: RunnerOptions,
-    network: CueNetwork | None = None,
+    truth: MitBerkeleyObject, priors: Priors, options: RunnerOptions, monitor: Monitor, network: LayerNetwork | None = None
 ) -> Estimate:
-    """The step of `models.joint` from MDR's answer: `log_start` (H, W, 3) of its diffuse image, `start` of its shape and light.
-
-    `network`: of `highlight_cue`, the shipped one if None.
-    """
+    """`models.joint` on one object; `network`: of its layers, the shipped one if None."""
     joint, valid = JointOptions(), truth.valid
-    diffuse = np.where(valid[..., None], np.exp(log_start), 0)
-    found = doubt(truth.image, diffuse, valid, joint, network)
+    by_colour = separate(options.separator, truth.image, valid).diffuse
+    found = doubt(truth.image, by_colour, valid, joint, network)
+    start = by_colour if found is None else found.diffuse
+    log_start = _log(start, truth)
+    there = solve_sirfs(truth, log_start, priors, options, monitor)
     if found is None:
-        return _estimate(truth, log_start, start.height, start.light, start)
-    shading = np.exp(_log_shading(normal_from_reference(normals(start.height)), start.light))
-    log_cleaner = _log(repaint(found, shading, diffuse, valid), truth)
-    problem = pose(truth, log_cleaner, priors, isc_weights(truth.illumination, 3))
+        return _estimate(truth, log_start, there.height, there.light, there)
+    shading = np.exp(_log_shading(normal_from_reference(normals(there.height)), there.light))
+    cleaner = repaint(found, shading, np.where(valid[..., None], start, 0), valid)
+    log_cleaner = _log(cleaner, truth)
     how = SolverOptions(engine=options.engine, threads=options.threads)
-    there = solve(problem, how, known_height=start.height, known_light=start.light)
-    if not lowers_energy(start.terms.total, there.terms.total, diffuse, np.exp(log_cleaner), valid, joint):
-        return _estimate(truth, log_start, start.height, start.light, start)
-    return _estimate(truth, log_cleaner, start.height, start.light, start)
+    problem = pose(truth, log_cleaner, priors, isc_weights(truth.illumination, 3))
+    after = solve(problem, how, known_height=there.height, known_light=there.light).terms.total
+    falls = lowers_energy(there.terms.total, after, np.exp(log_start), np.exp(log_cleaner), valid, joint)
+    return _estimate(truth, log_cleaner if falls else log_start, there.height, there.light, there)
 
 
 def _log_diffuse(truth: MitBerkeleyObject, options: RunnerOptions) -> np.ndarray:
     """Log of what shape and light are recovered from (H, W, 3), 0 where it is not valid: the diffuse image, if separation comes first."""
-    first = options.model in ("mdr", "joint")
-    diffuse = separate(options.separator, truth.image, truth.valid).diffuse if first else truth.image
+    diffuse = separate(options.separator, truth.image, truth.valid).diffuse if options.model == "mdr" else truth.image
     return _log(diffuse, truth)
 
 

@@ -346,6 +346,18 @@ def _overlaps(count: int, factor: float) -> Any:
     return sparse.csr_matrix((weights, (np.concatenate([first, second]), np.concatenate([old, old]))), shape=(new, count))
 
 
+def averaged(image: np.ndarray, mask: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """`image` (H, W, 3) and `mask` (H, W) bool, `factor` times as large, 0 < factor <= 1: means of the mask's light over the new pixels,
+    and the pixels of which the mask covers half, or any, where that leaves none. Returns (h, w, 3) float32, (h, w) bool, and the factor."""
+    if factor >= 1:
+        return np.where(mask[..., None], image, 0).astype(np.float32), mask, 1.0
+    area = _AreaFilter.of(mask.shape, factor)
+    cover = area(mask)
+    inside = cover >= 0.5 * area.full
+    inside = inside if inside.any() else cover > 0
+    return np.where(inside[..., None], _resize_apart(image, mask, inside, area), 0), inside, factor
+
+
 def _resize_apart(image: np.ndarray, mask: np.ndarray, new_mask: np.ndarray, area: _AreaFilter) -> np.ndarray:
     """Means of `image` over the new pixels: of the object's pixels alone inside `new_mask`, of the others alone outside."""
     result = np.empty((*new_mask.shape, image.shape[2]), np.float32)

@@ -23,7 +23,7 @@ FORBIDDEN = {
     "isc_core": {"isc_core", "synth", "blender_addon", "benchmarks"} | RENDERERS | BLENDER,
     "synth": {"blender_addon", "benchmarks"} | BLENDER,
     "blender_addon": {"synth", "benchmarks"} | RENDERERS,
-    "benchmarks": BLENDER,
+    "benchmarks": set(),  # the closed loop measures what Blender renders
 }
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "marshal", "shelve"}
 LONGEST_FUNCTION = 80

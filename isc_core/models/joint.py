@@ -1,43 +1,44 @@
 """Joint MDR: what shape and light explain tells a highlight from paint where colour cannot, and what paint is under it.
 
-Problem: MDR believes its separation. On grey paint, where colours tell nothing, that leaves the highlights in the diffuse image, and in the
-reflectance as bright paint.
+Problem: MDR believes a separation by colour. On grey paint, where colours tell nothing, that leaves the highlights in the diffuse image:
+shape and light are bent to explain them, and the reflectance shows them as bright paint.
 
-Equation: image = D + s, D = R exp(SH(normal)). The start is MDR: D_0 by colour, shape and light by SIRFS. Where `highlight_cue` expects the
-light to be e^y times the diffuse one, D_1 = D_0 e^-(y - y_0)+, y_0 what colour has taken off already. Where y - y_0 is large
-(`Doubt.doubtful`), too little of the paint is seen to be believed: it is continued from around, in the light that falls there,
+Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what the layer network has learned of the
+form of highlights (`separation.layer_network`): it expects y = log(I / D) with an error b, and D_1 = min(D_0, I e^-max(y - b / 2, 0)).
+SIRFS on D_1 gives shape and light. They give a better separation: where the network took much of what colour had left (`Doubt.doubtful`),
+too little of the paint is seen to be believed; it is continued from around, in the light that falls there,
 
-    log R = average of log D_1 - SH(normal) over what is near and not doubtful,   D = min(D_0, R exp(SH(normal)))
+    log R = average of log D_1 - SH(normal) over what is near and not doubtful,   D = min(D_1, R exp(SH(normal)))
 
-An object is touched only where its highlights stand out (`JointOptions`).
+An object is touched only where highlights stand out that colour has left (`JointOptions`): else the answer is MDR's.
 
 Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to the change of variables from D to what
-was seen: a density of log D is one of I times 1 / D. The step is kept if E falls by it, else the start stays: E never rises. There is one
-step: SIRFS on the cleaner D, doubtful pixels left out, made heights better and shading and light worse, and did not pay.
+was seen: a density of log D is one of I times 1 / D. The step from D_1 to D is kept if E falls by it, else D_1 stays: E never rises. There
+is one step: SIRFS again on D bends the shape by what the continued paint gets wrong, and did not pay (docs/methods/joint.md).
 
 Citation: inpainting of highlights that keeps to the light: P. Tan, S. Lin, L. Quan, H.-Y. Shum 2003, doi:10.1109/ICCV.2003.1238333;
 averages of what is known: H. Knutsson and C.-F. Westin 1993, doi:10.1109/CVPR.1993.341081.
 
-Limits: shape and light are MDR's. A broad veil without a peak stays. Paint that ends under a highlight is continued smoothly. Strong white
-texture (fur, print) hides highlights: such objects are left to the separation by colour.
+Limits: those of the network. A broad veil without a peak stays. Paint that ends under a highlight is continued smoothly.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy import ndimage
 
 from ..decomposition import Separation
-from ..separation.highlight_cue import CueNetwork, highlight_excess
+from ..separation.layer_network import LayerNetwork, shipped_network
+from ..separation.network import NetworkOptions, log_ratio
 from ..separation.smoothing import masked_gaussian
 from .layers import separated_first, shaded
 from .lobe import fit_specular
 from .shape import Shape, energy_of, recover_shape
 from .task import Answer, Task
 
-_TAKEN = "highlights were taken off with the help of shape and light"
+_TAKEN = "highlights that colour does not show were taken off, and the paint under them continued with the help of shape and light"
+_NOT_CONTINUED = "highlights that colour does not show were taken off; continuing the paint under them did not lower the energy"
 _NOTHING_LEFT = "no highlights but those that colour shows: the same as mdr"
-_NOT_BETTER = "the energy did not fall: the same as mdr"
 _REACHES = (0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25)  # of the object's diagonal: how far paint is continued from
 _HALF = 0.5  # of the object doubtful: there is nothing to continue its paint from
 _SPECK = 0.005  # of the object's diagonal
@@ -46,58 +47,63 @@ _ENOUGH = 0.1  # of a neighbourhood that is known: nearer ones decide
 
 @dataclass(frozen=True)
 class JointOptions:
-    """Highlights stand out if the largest y - y_0 is by `above_usual` above what 90 % of the object show. `doubtful`: from which y - y_0 on
-    paint is not believed. `change_of_variables`: b of the energy."""
+    """`above_usual`: highlights stand out if the largest y that colour has left is by so much above what 90 % of the object show.
+    `doubtful`: from which y on paint is not believed. `change_of_variables`: b of the energy. `network`: how it is asked."""
 
-    above_usual: float = 0.5
-    doubtful: float = 0.3
+    above_usual: float = 0.3
+    doubtful: float = 0.15
     change_of_variables: float = 5.0
+    network: NetworkOptions = field(default_factory=lambda: NetworkOptions(doubt=0.5))
 
 
 @dataclass(frozen=True)
 class Doubt:
-    """`diffuse` (H, W, 3): D_1. `doubtful` (H, W) bool: where not even that is to be believed; never all of the mask."""
+    """`diffuse` (H, W, 3): D_1. `doubtful` (H, W) bool: where not even that is to be believed; never more than half of the mask."""
 
     diffuse: np.ndarray
     doubtful: np.ndarray
 
 
 def joint(task: Task, options: JointOptions | None = None) -> Answer:
-    """MDR, and where highlights are left the step beyond it, if that lowers the energy. Raises `InputError`, `Cancelled`."""
+    """MDR on what colour and form tell of the layers; the step beyond it, if the energy falls. Raises `InputError`, `Cancelled`."""
     options, monitor = options or JointOptions(), task.monitor
     split, diffuse = separated_first(task)
-    shape = recover_shape(diffuse, task, monitor.part(0.08, 0.9))
     with task.clock.stage("separation"):
         found = doubt(task.working.image, diffuse, task.working.mask, options)
+    start = diffuse if found is None else found.diffuse
+    shape = recover_shape(start, task, monitor.part(0.08, 0.9))
     said = _NOTHING_LEFT
     if found is not None:
         _, shading = shaded(shape.working_height, shape.light, task.working.mask)
-        cleaner = repaint(found, shading, diffuse, task.working.mask)
-        before, after = energy_of(diffuse, shape, task), energy_of(cleaner, shape, task)
-        taken = lowers_energy(before, after, diffuse, cleaner, task.working.mask, options)
-        said = _TAKEN if taken else _NOT_BETTER
-        split = _split(split, found, cleaner, shape, task, options) if taken else split
+        cleaner = repaint(found, shading, start, task.working.mask)
+        before, after = energy_of(start, shape, task), energy_of(cleaner, shape, task)
+        falls = lowers_energy(before, after, start, cleaner, task.working.mask, options)
+        said = _TAKEN if falls else _NOT_CONTINUED
+        split = _split(split, found, cleaner if falls else start, shape, task, options, falls)
     lobe = fit_specular(split, shape, task, monitor.part(0.92, 0.96))
     return Answer(split, shape.height, shape.light, shape.status | lobe.status | {"joint": said}, lobe.brdf)
 
 
 def doubt(
-    image: np.ndarray, diffuse: np.ndarray, mask: np.ndarray, options: JointOptions | None = None, network: CueNetwork | None = None
+    image: np.ndarray, diffuse: np.ndarray, mask: np.ndarray, options: JointOptions | None = None, network: LayerNetwork | None = None
 ) -> Doubt | None:
     """Where the highlights of `image` (H, W, 3) are that a separation's `diffuse` (H, W, 3) still shows; None if none stand out.
 
-    `network`: of the cue, the shipped one if None.
+    `network`: the shipped one if None.
     """
     options, inside = options or JointOptions(), mask[..., None]
-    light = np.where(inside, image, 0).mean(axis=2)
-    taken = np.log(np.maximum(light, 1e-9) / np.maximum(np.where(inside, diffuse, 0).mean(axis=2), 1e-9))
-    left = np.where(mask, np.maximum(highlight_excess(image, mask, network) - np.maximum(taken, 0), 0), 0)
+    expected, _ = log_ratio(image, mask, network or shipped_network(), options.network)
+    taken = np.log(np.maximum(np.where(inside, image, 1), 1e-9) / np.maximum(np.where(inside, diffuse, 1), 1e-9))
+    left = np.where(inside, np.maximum(expected - np.maximum(taken, 0), 0), 0)
+    level = left.mean(axis=2)
     # What is a few pixels wide does not count: texture is.
-    broad = ndimage.grey_opening(left, max(3, 2 * round(_SPECK * _diagonal(mask)) + 1))[mask]
-    doubtful = ndimage.binary_opening(left > options.doubtful, np.ones((2, 2))) & mask
-    if float(broad.max()) - float(np.quantile(broad, 0.9)) <= options.above_usual or doubtful[mask].mean() > _HALF:
+    broad = ndimage.grey_opening(level, max(3, 2 * round(_SPECK * _diagonal(mask)) + 1))[mask]
+    if float(broad.max()) - float(np.quantile(broad, 0.9)) <= options.above_usual:
         return None
-    return Doubt((diffuse * np.exp(-left)[..., None]).astype(diffuse.dtype), doubtful)
+    doubtful = ndimage.binary_opening(level > options.doubtful, np.ones((2, 2))) & mask
+    if doubtful[mask].mean() > _HALF:
+        doubtful = np.zeros_like(mask)
+    return Doubt((diffuse * np.exp(-left)).astype(diffuse.dtype), doubtful)
 
 
 def repaint(found: Doubt, shading: np.ndarray, start: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -118,15 +124,19 @@ def lowers_energy(before: float, after: float, start: np.ndarray, cleaner: np.nd
     return after + options.change_of_variables * float(darker.sum(axis=1).mean(dtype=float)) < before
 
 
-def _split(start: Separation, found: Doubt, cleaner: np.ndarray, shape: Shape, task: Task, options: JointOptions) -> Separation:
-    """The layers of the maps' photo; `found` and `cleaner` are those of the working one."""
+def _split(
+    start: Separation, found: Doubt, cleaner: np.ndarray, shape: Shape, task: Task, options: JointOptions, falls: bool
+) -> Separation:
+    """The layers of the maps' photo; `found` and `cleaner` are those of the working one. `falls`: whether paint is to be continued."""
     photo = task.maps
     if not task.one_scale:
         of_maps = doubt(photo.image, start.diffuse, photo.mask, options)
         if of_maps is None:
             return start
         _, shading = shaded(shape.height, shape.light, photo.mask)
-        found, cleaner = of_maps, repaint(of_maps, shading, start.diffuse, photo.mask)
+        found, cleaner = of_maps, of_maps.diffuse
+        if falls:
+            cleaner = repaint(of_maps, shading, of_maps.diffuse, photo.mask)
     diffuse = cleaner.astype(np.float32)
     specular = np.where(photo.mask[..., None], start.specular + (start.diffuse - diffuse), 0).astype(np.float32)
     return Separation(diffuse, specular, start.residual, np.where(found.doubtful, 0, start.confidence).astype(np.float32))

@@ -31,6 +31,7 @@ METHODS = (
     "akashi_2016",
     "chaotic_segmentation",
     "sparse_coding",
+    "network",
     "isc",
 )
 BEST = "isc"

@@ -3,7 +3,7 @@
 Each model is run as `isc decompose` runs it (`isc_core.models.solve`), and scored as the stage "sirfs" is. Errors count relative to plain
 SIRFS on the same scene, so that a mean over scenes is a paired comparison; the true diffuse layer shows what perfect separation would gain.
 
-Two models share their shape and light with another by definition: MBP has those of plain SIRFS, joint those of MDR. They are found once.
+MBP has the shape and light of plain SIRFS by definition: they are found once.
 
 Limits: SIRFS is solved with the object 256 pixels long, as for a photo, not at the picture's own size as in the stage "sirfs" and the
 chain: figures of the two do not compare. Black channels, in the shadows of lamps in the dark, are raised to half a code, for all alike.
@@ -35,7 +35,7 @@ TITLE = "Models beside plain SIRFS"
 PLAIN, TRUE_DIFFUSE = "plain", "true_diffuse"
 TITLES = {PLAIN: "plain SIRFS", TRUE_DIFFUSE: "SIRFS on the true diffuse layer"} | {name: name for name in SEPARATING_MODELS}
 ERRORS = SIRFS.metrics
-_STARTS = {"mbp": PLAIN, "joint": "mdr"}  # whose shape and light a model has
+_STARTS = {"mbp": PLAIN}  # whose shape and light a model has
 _SMALLEST = 1e-30
 
 Item = TypeVar("Item")

@@ -1,0 +1,125 @@
+"""The network that tells the diffuse layer of a photo from experience: what rendered glossy objects look like with and without gloss.
+
+Problem: a highlight on grey paint has the paint's own colour; what gives it away is its form, how it lies on the shape, and what the paint
+is around it. No local cue is proof; a network that has seen many objects weighs them all, near and far.
+
+Equation: y_c(x) = log(I_c / D_c) >= 0 and log b(x), the scale of y's error, from log(I / mean I + .03) and the mask. An encoder of five
+levels, each of two 3 x 3 convolutions with max(0, .), halved by averages of 2 x 2; a decoder that goes back up with the encoder's layers
+beside it. Pixels go in and come out in blocks of 2 x 2 (space to depth), and y = log(1 + exp(o - 2)). The answers for the photo and its
+mirror image are averaged.
+
+Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016,
+doi:10.1109/CVPR.2016.207. Weights, training scenes and loss are our own: `python -m benchmarks.layer_network_training`.
+
+Limits: it knows lamps, panels and skies on opaque objects of one piece. What no colour and no form tells (a veil over everything) stays.
+"""
+
+import importlib.resources
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+
+STRIDE = 32  # pixels: sides of what the network sees are multiples
+_DARK = 0.03  # of the mean light: below, logarithms are of noise
+_MARGIN = 2.0  # of the output: without evidence it says "hardly anything"
+_BLOCK = 2
+_CHANNELS = 4  # y of three colours, log b
+
+
+@dataclass(frozen=True)
+class LayerNetwork:
+    """`weights`: of each convolution (9, inputs, outputs) float32, rows of the 3 x 3 first; `biases` (outputs,). In the order of the data:
+    two for each level down, two for each level up from the coarsest, the output."""
+
+    weights: tuple[np.ndarray, ...]
+    biases: tuple[np.ndarray, ...]
+
+    def __post_init__(self) -> None:
+        count = len(self.weights)
+        fits = all(w.ndim == 3 and w.shape[0] == 9 and b.shape == w.shape[2:] for w, b in zip(self.weights, self.biases, strict=True))
+        if count < 7 or count % 4 != 3 or not fits or self.weights[-1].shape[2] != _CHANNELS * _BLOCK**2:
+            raise InputError("these are not the weights of a layer network")
+
+    def __call__(self, image: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """y (H, W, 3) >= 0 and log b (H, W), float32, of `image` (H, W, 3) linear >= 0 and `mask` (H, W) bool; H, W multiples of 32."""
+        mirrored = self._run(image[:, ::-1], mask[:, ::-1])[:, ::-1]
+        raw = 0.5 * (self._run(image, mask) + mirrored)
+        return raw[..., :3], raw[..., 3]
+
+    def _run(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        layer = _to_blocks(_inputs(image, mask))
+        depth = (len(self.weights) - 1) // 4 + 1
+        steps = iter(zip(self.weights, self.biases, strict=True))
+        kept = []
+        for level in range(depth):
+            layer = _twice(layer if level == 0 else _halved(layer), steps)
+            kept.append(layer)
+        for skipped in kept[-2::-1]:
+            layer = _twice(np.concatenate([skipped, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps)
+        raw = _from_blocks(_convolved(layer, *next(steps)))
+        raw[..., :3] = np.logaddexp(0, raw[..., :3] - np.float32(_MARGIN))
+        return raw
+
+
+@cache
+def shipped_network() -> LayerNetwork:
+    """The network that comes with the package."""
+    resource = importlib.resources.files(__package__.rpartition(".")[0]) / "data" / "layer_network.npz"
+    with importlib.resources.as_file(resource) as path:
+        return read_network(path)
+
+
+def read_network(path: Path) -> LayerNetwork:
+    """An archive of float16 or float32 arrays `weight00`, `bias00`, ... Raises `InputError` for a file that is none."""
+    try:
+        with np.load(path, allow_pickle=False) as data:
+            count = sum(name.startswith("weight") for name in data.files)
+            weights, biases = ([data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count)] for kind in ("weight", "bias"))
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"{path} holds no layer network: {error}") from error
+    return LayerNetwork(tuple(weights), tuple(biases))
+
+
+def _inputs(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """(H, W, 4) float32: log light over the object's mean, 0 outside, and the mask."""
+    light = np.where(mask[..., None], image, 0).astype(np.float32)
+    mean = max(float(light.sum(dtype=float)) / (3 * max(int(mask.sum()), 1)), 1e-9)
+    log_light = np.log(light / np.float32(mean) + np.float32(_DARK)) * mask[..., None]
+    return np.concatenate([log_light, mask[..., None].astype(np.float32)], axis=2)
+
+
+def _to_blocks(layer: np.ndarray) -> np.ndarray:
+    """(H, W, C) as (H / 2, W / 2, 4 C), channels first in each block's order."""
+    rows, columns, channels = layer.shape
+    blocks = layer.reshape(rows // 2, 2, columns // 2, 2, channels)
+    return np.ascontiguousarray(blocks.transpose(0, 2, 4, 1, 3)).reshape(rows // 2, columns // 2, 4 * channels)
+
+
+def _from_blocks(layer: np.ndarray) -> np.ndarray:
+    """The inverse of `_to_blocks`."""
+    rows, columns, channels = layer.shape
+    blocks = layer.reshape(rows, columns, channels // 4, 2, 2)
+    return np.ascontiguousarray(blocks.transpose(0, 3, 1, 4, 2)).reshape(2 * rows, 2 * columns, channels // 4)
+
+
+def _halved(layer: np.ndarray) -> np.ndarray:
+    rows, columns, channels = layer.shape
+    return layer.reshape(rows // 2, 2, columns // 2, 2, channels).mean(axis=(1, 3))
+
+
+def _twice(layer: np.ndarray, steps: "object") -> np.ndarray:
+    for _ in range(2):
+        layer = np.maximum(_convolved(layer, *next(steps)), 0)  # type: ignore[call-overload]
+    return layer
+
+
+def _convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """3 x 3, zeros around: one matrix product of all neighbourhoods."""
+    rows, columns, channels = layer.shape
+    padded = np.pad(layer, ((1, 1), (1, 1), (0, 0)))
+    near = np.stack([padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=2)
+    return (near.reshape(-1, 9 * channels) @ weight.reshape(-1, weight.shape[2]) + bias).reshape(rows, columns, -1)
