@@ -16,7 +16,7 @@ from .scene.material import dichromatic_node
 _PLACES = ("VIEW_3D", "IMAGE_EDITOR")
 _PAINT = ("Hue", "Saturation", "Value")
 _STATE_ICONS = {"done": "CHECKMARK", "failed": "ERROR", "cancelled": "CANCEL"}
-_LINE = 42  # letters of a message that fit into a sidebar of usual width
+_LINE = 34  # letters of a message that fit into a sidebar of usual width
 
 
 class _Panel:

@@ -24,6 +24,7 @@ MODELS = (
 )
 SEPARATORS = (
     ("isc", "ISC", "This project's own: the best on most photos"),
+    ("network", "Network", "Learned from rendered glossy objects: also tells highlights from white paint, where colours alone cannot"),
     ("sparse_coding", "Sparse Coding", "Highlights as what a dictionary of diffuse patches cannot say"),
     ("chaotic_segmentation", "Chaotic Segmentation", "Highlights by thresholds that chaotic search finds, filled in from around"),
     ("shen_2013", "Shen 2013", "Real-time: chromaticity ranges by pixel clustering"),

@@ -282,7 +282,6 @@ def test_a_byte_image_in_an_unknown_space_is_refused() -> None:
 def test_an_image_that_is_removed_meanwhile_is_missed(tmp_path: Path) -> None:
     image = generated()
     steps = hand_over(examine(image), tmp_path / "photo")
-    next(steps)
     bpy.data.images.remove(image)
     with pytest.raises(InputError, match="was removed or resized meanwhile"):
         last(steps)
