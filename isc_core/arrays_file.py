@@ -20,7 +20,7 @@ mathematics to use them. `arrays.npz` (uncompressed, no pickles) holds what such
     sun_explained, sun_cone ()       share of the shading in [0, 1], and the direction's standard error in degrees
     lobe (H, W, 3)                   the specular image that the fitted lobe predicts; 0 where none was fitted
     roughness ()                     Blender's and glTF's, NaN if unknown
-    specular_level ()                for `base_color`, 1 is plastic (f0 = .04), NaN if unknown
+    specular_level ()                for `base_color`, 1 is plastic (f0 = .04), NaN if unknown; at most what the photo has room for
     specular_variation (H, W)        factor of that level, where it varies; else absent
     photo_size (2,) int32            width and height of the original photo    crop_scale ()    map pixels to one of its pixels
 
@@ -41,6 +41,7 @@ from .editing.light_direction import explain_shading
 from .environment import environment_from_shading
 from .gloss import gloss_of
 from .mesh import MeshResult, build_mesh
+from .sheen import most_level
 
 ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
@@ -58,7 +59,8 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     """The file's arrays by name, see the module. `built`: the mesh of `d`."""
-    values = _maps(d) | _mesh(built) | _light(d, built) | _gloss(d, built)
+    light = _light(d, built)
+    values = _maps(d) | _mesh(built) | light | _gloss(d, built, light["sky"])
     size, scale = d.provenance.input.get("size", d.mask.shape[::-1]), d.provenance.input.get("scale", 1.0)
     values |= {"photo_size": np.array(size), "crop_scale": np.array(scale)}
     return {name: _typed(name, array) for name, array in values.items()}
@@ -103,11 +105,13 @@ def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     }
 
 
-def _gloss(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
-    gloss = built.gloss
+def _gloss(d: Decomposition, built: MeshResult, sky: np.ndarray) -> dict[str, np.ndarray]:
+    gloss, level = built.gloss, np.nan if built.gloss.specular is None else built.specular
+    if level > 0 and gloss.roughness is not None:
+        level = min(level, most_level(d, gloss.roughness, sky))
     values = {
         "lobe": np.zeros(d.image.shape) if d.brdf is None else d.brdf.predicted,
         "roughness": np.array(np.nan if gloss.roughness is None else gloss.roughness),
-        "specular_level": np.array(np.nan if gloss.specular is None else built.specular),
+        "specular_level": np.array(level),
     }
     return values if gloss.variation is None else values | {"specular_variation": gloss.variation}

@@ -35,23 +35,26 @@ _TOO_BRIGHT = 2.0  # of the photo's white: kept energy never asks for more at a 
 
 @dataclass(frozen=True)
 class Lobe:
-    """A lobe of strength 1: Blinn-Phong's `exponent` in [1, 1e5], or the `alpha` in [.01, 1] of GGX facets, which then counts.
+    """A lobe of strength 1: Blinn-Phong's `exponent` in [1, 1e5], or the `alpha` in [.01, 1] of GGX facets, which then counts, and their
+    `f0`, 1 for mirrors.
 
     Raises `InputError` outside these ranges.
     """
 
     exponent: float = USUAL_EXPONENT
     alpha: float | None = None
+    f0: float = 1.0
 
     def __post_init__(self) -> None:
         check_range("exponent", self.exponent, 1, 1e5)
         if self.alpha is not None:
             check_range("alpha", self.alpha, 0.01, 1)
+            check_range("f0", self.f0, 0, 1)
 
     @property
     def model(self) -> Model:
         """The reflectance model, without a strength of its own."""
-        return BlinnPhong(1.0, self.exponent) if self.alpha is None else Ggx(self.alpha, 1.0)
+        return BlinnPhong(1.0, self.exponent) if self.alpha is None else Ggx(self.alpha, self.f0)
 
     @property
     def nearest_exponent(self) -> float:

@@ -1,0 +1,35 @@
+"""How glossy an object can be at most, given what its photo shows of the sky.
+
+Problem: a fitted lobe's level is uncertain (see `gloss`), yet a renderer takes it at its word: under the recovered sky it mirrors that sky
+all over the object, as a sheen that the photo need not have.
+
+Equation: sheen(x) = level s(n(x)), s what the lobe of plastic mirrors of the sky toward the viewer. The photo is at least as bright, so
+that level <= min over c of I_c(x) / s_c(n(x)) at every pixel x. The 5th percentile is taken: normals and outlines are uncertain.
+
+Citation: B. Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206 (the lobe, see `brdf.ggx`).
+
+Limits: a bound, no estimate: pale paint has room for nearly any gloss. Toward grazing angles a sheen falls less than its level does.
+"""
+
+import numpy as np
+
+from .brdf.fitting.response import F0
+from .brdf.roughness import alpha_from_blender
+from .decomposition import Decomposition
+from .editing.lobes import Lobe, lobe_in
+from .environment import resampled
+
+_ROWS = 16  # of the sky: a lobe of a smooth one is smooth
+_SHARE = 5.0  # percentile
+_NARROWEST = 0.05  # alpha: what is narrower mirrors a smooth sky alike
+
+
+def most_level(d: Decomposition, roughness: float, sky: np.ndarray) -> float:
+    """The largest specular level, 1 being plastic, whose sheen the photo has room for; infinite under a black sky.
+
+    `roughness`: Blender's, in [0, 1]. `sky`: (rows, 2 rows, 3) radiance as the object is lit by it, rows >= 16.
+    """
+    lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
+    sheen = lobe_in(lobe, d.normal[d.mask].astype(float), resampled(sky, _ROWS))
+    room = np.divide(d.image[d.mask], sheen, out=np.full(sheen.shape, np.inf), where=sheen > 1e-9)
+    return float(np.percentile(room.min(-1), _SHARE, method="lower"))  # infinite values cannot be interpolated
