@@ -48,8 +48,8 @@ def environment(version: str, folder: Path = Path("build/environments")) -> Path
     return python
 
 
-def try_out(archive: Path, python: Path) -> subprocess.CompletedProcess[str]:
-    """Runs `installation` with a new user folder; what it printed. Raises `InputError` if there is no such zip."""
+def try_out(archive: Path, python: Path, result: Path | None = None) -> subprocess.CompletedProcess[str]:
+    """Runs `installation` with a new user folder; what it printed. `result`: see there. Raises `InputError` if there is no such zip."""
     if not archive.is_file():
         raise InputError(f"{archive}: there is no such zip; build it with `make extension`")
     with tempfile.TemporaryDirectory(prefix="isc-extension-") as folder:
@@ -58,7 +58,7 @@ def try_out(archive: Path, python: Path) -> subprocess.CompletedProcess[str]:
         work.mkdir()
         clean = {name: value for name, value in os.environ.items() if not name.startswith(("PYTHON", "NUMBA", "BLENDER"))}
         variables = clean | {"BLENDER_USER_RESOURCES": str(user), "HOME": str(work)}
-        command = [str(python), "-P", str(SCRIPT), str(archive.resolve()), str(work)]
+        command = [str(python), "-P", str(SCRIPT), str(archive.resolve()), str(work), *([] if result is None else [str(result)])]
         return subprocess.run(command, cwd=work, env=variables, capture_output=True, text=True, check=False, timeout=_SECONDS)
 
 
