@@ -77,7 +77,7 @@ def _parser() -> argparse.ArgumentParser:
 
 def _add_recovery(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
-    add("--model", default="mdr", metavar="NAME", help="as isc decompose knows them (default %(default)s)")
+    add("--model", default="joint", metavar="NAME", help="as isc decompose knows them (default %(default)s)")
     add("--separator", default="isc", metavar="NAME", help="what removes highlights (default %(default)s)")
     add("--illumination", default="natural", choices=("natural", "laboratory"), help="which lights to expect (default %(default)s)")
     add("--transfer", default="auto", choices=("auto", "srgb", "linear"), help="how the photos are coded (default %(default)s)")

@@ -16,9 +16,9 @@ class Preset:
 
 
 PRESETS = {
-    "DRAFT": Preset("Draft", "A first look within seconds: a small, coarse shape", 128, "mdr", 16),
-    "STANDARD": Preset("Standard", "A good balance for most objects", 256, "mdr", 64),
-    "FULL": Preset("Full", "The finest shape and textures, and colours judged once more with shape and light: minutes", 512, "joint", 256),
+    "DRAFT": Preset("Draft", "A first look within seconds: a small, coarse shape", 128, "joint", 16),
+    "STANDARD": Preset("Standard", "A good balance for most objects", 256, "joint", 64),
+    "FULL": Preset("Full", "The finest textures: a minute or more", 512, "joint", 256),
 }
 CUSTOM = "CUSTOM"
 

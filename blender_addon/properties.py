@@ -13,8 +13,8 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, In
 from .presets import CUSTOM, PRESETS, preset_of
 
 MODELS = (
-    ("mdr", "MDR", "Highlights are removed first, then shape, light and paint are recovered from the diffuse image"),
-    ("joint", "Joint", "As MDR, and where highlights on grey paint stand out, what shape and light say of them"),
+    ("joint", "Joint", "Highlights go by colour and form; shape, light and paint are recovered, and the paint beneath continued"),
+    ("mdr", "MDR", "Highlights are removed by colour, then shape, light and paint are recovered from the diffuse image"),
     ("mbp", "MBP", "Shape, light and paint are recovered from the photo, then highlights are removed from the paint"),
     ("sirfs", "SIRFS", "The photo is taken as free of highlights"),
     ("naive", "Naive", "Baseline: a flat shape under even light"),
@@ -104,7 +104,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         set=_set_preset,
         options={"SKIP_SAVE"},
     )
-    model: EnumProperty(name="Model", description="How highlights, shape, light and paint are told apart", items=MODELS, default="mdr")
+    model: EnumProperty(name="Model", description="How highlights, shape, light and paint are told apart", items=MODELS, default="joint")
     separator: EnumProperty(name="Separator", description="What removes the highlights", items=SEPARATORS, default="isc")
     illumination: EnumProperty(name="Light", description="Which lights to expect", items=ILLUMINATIONS, default="natural")
     max_size: IntProperty(

@@ -20,7 +20,7 @@ _IMAGE, _MASK, _REQUEST = "isc_source_image", "isc_source_mask", "isc_request"
 class Method:
     """How the photo is taken apart; the names are those of `isc decompose`. `samples`: rays a pixel in the scene that is built."""
 
-    model: str = "mdr"
+    model: str = "joint"
     separator: str = "isc"
     illumination: str = "natural"
     max_size: int = 256

@@ -14,7 +14,7 @@ from .options import Commands, add_command, add_engine, names
 
 _EXAMPLES = """  isc evaluate DATA --dataset mit-berkeley --json scores.json
   isc evaluate DATA --dataset mit-berkeley --objects apple,cup1 --illumination natural
-  isc evaluate DATA --dataset mit-berkeley --input original --model mdr
+  isc evaluate DATA --dataset mit-berkeley --input original --model joint
 
 The package's own priors were fitted on the training objects of this set. For a fair figure leave the object out:
   isc fit-priors DATA --leave-out apple -o priors.npz
@@ -34,8 +34,8 @@ def declare(commands: Commands) -> None:
         "--input", choices=INPUTS, default="diffuse", help="images without highlights, or as photographed (default %(default)s)"
     )
     parser.add_argument("--illumination", choices=(*ILLUMINATIONS, "both"), help="default: both, or laboratory for --input original")
-    parser.add_argument("--model", metavar="NAME", help="as for isc decompose (default: sirfs, or mdr for --input original)")
-    parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of mdr and mbp (default %(default)s)")
+    parser.add_argument("--model", metavar="NAME", help="as for isc decompose (default: sirfs, or joint for --input original)")
+    parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of joint, mdr, mbp (default %(default)s)")
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
     add_engine(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
@@ -46,7 +46,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.json is not None:
         require_writable_file(options.json)
     original = options.input == "original"
-    model = options.model or ("mdr" if original else "sirfs")
+    model = options.model or ("joint" if original else "sirfs")
     runner_options = RunnerOptions(model, options.separator, options.engine, options.threads)
     runner_options.check()
     prior_set = shipped_prior_set() if options.priors is None else load_prior_set(options.priors)

@@ -24,7 +24,7 @@ class Settings:
     `shading_only`: shape-from-shading mode, an object of one colour.
     """
 
-    model: str = "mdr"
+    model: str = "joint"
     separator: str = BEST
     illumination: str = "natural"
     max_size: int = 512

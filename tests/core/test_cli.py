@@ -87,7 +87,7 @@ def test_decompose_writes_a_whole_result(result: Path) -> None:
     found = load(result / "result")
     assert found.identity_errors().broken() == ()
     assert found.mask.shape == ball_codes().shape[:2]
-    assert found.provenance.settings["model"] == "mdr" and found.provenance.settings["separator"] == BEST
+    assert found.provenance.settings["model"] == "joint" and found.provenance.settings["separator"] == BEST
     assert found.provenance.input["name"] == "ball.png"
     assert {"maps.exr", "decomposition.json", "mesh.glb", "preview.png"} <= {entry.name for entry in (result / "result").iterdir()}
     assert sorted(entry.name for entry in result.iterdir()) == ["ball.png", "result"]
@@ -277,7 +277,9 @@ def test_a_photo_that_is_left_alone_is_said_to_be(tmp_path: Path, capsys: pytest
 
 def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
     photo = grey_ball(tmp_path)
-    assert isc("decompose", photo, "--quiet", "-o", tmp_path / "out") == 0
+    assert isc("decompose", photo, "--quiet", "-o", tmp_path / "joint") == 0
+    assert load(tmp_path / "joint").identity_errors().broken() == ()
+    assert isc("decompose", photo, "--model", "mdr", "--quiet", "-o", tmp_path / "out") == 0  # by colour alone, and there is none
     found = load(tmp_path / "out")
     assert found.identity_errors().broken() == ()
     unclipped = found.mask & ~read_photo(photo).clipped
