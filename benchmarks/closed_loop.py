@@ -37,7 +37,7 @@ from .closed_loop_renders import Look, picture
 
 USUAL_FILTER = 1.5  # Blender's, pixels
 _RING = 2  # pixels of the outline that "inner" leaves out
-_SHEET_WIDTH = 1100
+_SHEET_WIDTH, _SHEET_ROWS = 1000, 3
 
 
 @dataclass(frozen=True)
@@ -277,8 +277,10 @@ def _write(given: argparse.Namespace, loops: list[LoopRow], relits: list[RelitRo
     (given.output / "rows.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     about = f"Cycles, {given.samples} samples, {given.size} px"
     for what, shown in panels.items():
-        if shown:
-            save_sheet(given.output / f"closed_loop_{what}.png", _TITLES[what], about, shown, 6 if what == "relit" else 7)
+        columns = 6 if what == "relit" else 7
+        for page, first in enumerate(range(0, len(shown), _SHEET_ROWS * columns), start=1):
+            path = given.output / f"closed_loop_{what}_{page}.png"
+            save_sheet(path, _TITLES[what], about, shown[first : first + _SHEET_ROWS * columns], columns)
 
 
 _TITLES = {

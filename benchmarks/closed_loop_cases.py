@@ -35,7 +35,7 @@ PHOTOS = ("Banana", "Basketball", "Cup", "Helmet", "Shrek")
 RENDERED = ("gourd", "vase", "blob")
 NEW_LIGHTS = ("sun", "sky")
 _MEMBERS = {"vase": ("lathe", "print", "area"), "blob": ("blobby", "patches", "sh")}  # shape, paint and light, see `synth.recipe`
-_LEVEL, _FILL = 0.9, 0.88  # the gourd's brightest value; share of the picture's side that the object fills
+_LEVEL, _FILL = 0.9, 0.91  # the gourd's brightest value; share of the picture's side that no object exceeds, so that none is scaled
 _SKY_ROWS = 32
 _PARTS = ("sky", "sun_direction", "sun_irradiance", "image", "diffuse")
 
