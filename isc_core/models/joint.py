@@ -50,7 +50,7 @@ class JointOptions:
     """`above_usual`: highlights stand out if the largest y that colour has left is by so much above what 90 % of the object show.
     `doubtful`: from which y on paint is not believed. `change_of_variables`: b of the energy. `network`: how it is asked."""
 
-    above_usual: float = 0.5
+    above_usual: float = 0.3
     doubtful: float = 0.15
     change_of_variables: float = 5.0
     network: NetworkOptions = field(default_factory=lambda: NetworkOptions(doubt=0.5))
