@@ -140,7 +140,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     closed_back: BoolProperty(name="Closed Back", description="Close the object with a flat back", default=False)
     specular_from: EnumProperty(
-        name="Highlights", description="Where the material's highlights come from", items=SPECULAR_SOURCES, default="lobe"
+        name="Highlights", description="Where the material's highlights come from", items=SPECULAR_SOURCES, default="image"
     )
 
 

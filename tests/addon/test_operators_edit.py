@@ -30,7 +30,8 @@ def addon(blender: Any) -> Iterator[Any]:
 
 @pytest.fixture
 def built(addon: Any, bump_folder: Path) -> Built:
-    """The bump in its own scene, active."""
+    """The bump in its own scene, active; its gloss follows the light."""
+    addon.context.scene.isc.specular_from = "lobe"
     addon.ops.isc.import_result(directory=str(bump_folder))
     found = find(addon.context.object)
     assert found is not None
