@@ -28,8 +28,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..decomposition import Separation
-from ..separation.layer_network import LayerNetwork, shipped_network
-from ..separation.network import NetworkOptions, log_ratio
+from ..separation.layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
 from ..separation.smoothing import masked_gaussian
 from .layers import separated_first, shaded
 from .lobe import fit_specular

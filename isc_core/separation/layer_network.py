@@ -21,13 +21,25 @@ from pathlib import Path
 
 import numpy as np
 
+from ..box import mask_slices
 from ..errors import InputError
+from ..photo import averaged
+from .smoothing import masked_gaussian
 
 STRIDE = 32  # pixels: sides of what the network sees are multiples
 _DARK = 0.03  # of the mean light: below, logarithms are of noise
 _MARGIN = 2.0  # of the output: without evidence it says "hardly anything"
 _BLOCK = 2
 _CHANNELS = 4  # y of three colours, log b
+_FRAME = 8  # pixels around the object: what lies beyond the picture's frame is background as well
+
+
+@dataclass(frozen=True)
+class NetworkOptions:
+    """`long_side`: of the object, in pixels, as the network sees it, >= 32. `doubt` >= 0: how many scales of error y has to exceed."""
+
+    long_side: int = 176
+    doubt: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -63,6 +75,20 @@ class LayerNetwork:
         raw = _from_blocks(_convolved(layer, *next(steps)))
         raw[..., :3] = np.logaddexp(0, raw[..., :3] - np.float32(_MARGIN))
         return raw
+
+
+def log_ratio(image: np.ndarray, mask: np.ndarray, network: LayerNetwork, options: NetworkOptions) -> tuple[np.ndarray, np.ndarray]:
+    """y (H, W, 3) >= 0 and b (H, W) > 0, float32, 0 outside `mask` (H, W) bool, of `image` (H, W, 3)."""
+    box = mask_slices(mask)
+    small, inside, factor = averaged(image[box], mask[box], min(1.0, options.long_side / max(mask[box].shape)))
+    framed, place = _framed(small, inside)
+    raw, log_error = network(*framed)
+    error = np.exp(log_error)
+    excess = np.maximum(raw - options.doubt * error[..., None], 0)
+    found = np.concatenate([excess, error[..., None]], axis=2)[place]
+    whole = np.zeros((*mask.shape, 4), np.float32)
+    whole[box] = np.where(mask[box][..., None], _carried(found, inside, mask[box].shape, factor), 0)
+    return whole[..., :3], whole[..., 3]
 
 
 @cache
@@ -123,3 +149,27 @@ def _convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.nd
     padded = np.pad(layer, ((1, 1), (1, 1), (0, 0)))
     near = np.stack([padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=2)
     return (near.reshape(-1, 9 * channels) @ weight.reshape(-1, weight.shape[2]) + bias).reshape(rows, columns, -1)
+
+
+def _framed(image: np.ndarray, mask: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], tuple[slice, slice]]:
+    """Image and mask in the middle of a picture whose sides the network can halve, and where they are in it."""
+    sides = [-(-(n + 2 * _FRAME) // STRIDE) * STRIDE for n in mask.shape]
+    place = tuple(slice((side - n) // 2, (side - n) // 2 + n) for side, n in zip(sides, mask.shape, strict=True))
+    framed, inside = np.zeros((*sides, 3), np.float32), np.zeros(sides, bool)
+    mean = max(float(image[mask].mean(dtype=float)), 1e-30)
+    framed[place], inside[place] = np.where(mask[..., None], image / mean, 0), mask
+    return (framed, inside), place  # type: ignore[return-value]
+
+
+def _carried(found: np.ndarray, known: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
+    """Maps (h, w, C), `known` (h, w) bool, at the pixels of a picture of `shape`: linear between pixels' centres."""
+    if factor == 1:
+        return found
+    filled = np.where(known[..., None], found, masked_gaussian(found, known, 1.0))
+    for axis, size in enumerate(shape):
+        at = np.clip((np.arange(size) + 0.5) * factor - 0.5, 0, filled.shape[axis] - 1)
+        first = np.minimum(at.astype(np.int64), max(filled.shape[axis] - 2, 0))
+        beyond = (at - first).astype(np.float32).reshape([-1 if k == axis else 1 for k in range(3)])
+        after = np.minimum(first + 1, filled.shape[axis] - 1)
+        filled = (1 - beyond) * np.take(filled, first, axis) + beyond * np.take(filled, after, axis)
+    return filled

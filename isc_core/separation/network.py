@@ -11,30 +11,18 @@ Citation: see `layer_network`.
 Limits: those of the network; an object of few pixels is seen as it is. Clipped pixels: see `clipped`.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from ..box import mask_slices
 from ..decomposition import Separation
 from ..errors import InputError
-from ..photo import averaged
 from ..progress import Monitor
 from .checks import check_arrays
-from .layer_network import STRIDE, LayerNetwork, shipped_network
+from .layer_network import STRIDE, LayerNetwork, NetworkOptions, log_ratio, shipped_network
 from .layers import diffuse_layers
-from .smoothing import masked_gaussian
 
-_MARGIN = 8  # pixels around the object: what lies beyond the picture's frame is background as well
 _UNIT = 0.1  # of the mean light: an error of this size halves the confidence
-
-
-@dataclass(frozen=True)
-class NetworkOptions:
-    """`long_side`: of the object, in pixels, as the network sees it, >= 32. `doubt` >= 0: how many scales of error y has to exceed."""
-
-    long_side: int = 176
-    doubt: float = 0.0
 
 
 VARIANTS: dict[str, NetworkOptions] = {"improved": NetworkOptions()}
@@ -65,41 +53,3 @@ def separate(
     trust = 1 / (1 + error * split.diffuse.mean(axis=2) / unit)
     known = mask if clipped is None else mask & ~clipped
     return replace(split, confidence=np.where(known, trust, 0).astype(np.float32))
-
-
-def log_ratio(image: np.ndarray, mask: np.ndarray, network: LayerNetwork, options: NetworkOptions) -> tuple[np.ndarray, np.ndarray]:
-    """y (H, W, 3) >= 0 and b (H, W) > 0, float32, 0 outside `mask` (H, W) bool, of `image` (H, W, 3)."""
-    box = mask_slices(mask)
-    small, inside, factor = averaged(image[box], mask[box], min(1.0, options.long_side / max(mask[box].shape)))
-    framed, place = _framed(small, inside)
-    raw, log_error = network(*framed)
-    error = np.exp(log_error)
-    excess = np.maximum(raw - options.doubt * error[..., None], 0)
-    found = np.concatenate([excess, error[..., None]], axis=2)[place]
-    whole = np.zeros((*mask.shape, 4), np.float32)
-    whole[box] = np.where(mask[box][..., None], _carried(found, inside, mask[box].shape, factor), 0)
-    return whole[..., :3], whole[..., 3]
-
-
-def _framed(image: np.ndarray, mask: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], tuple[slice, slice]]:
-    """Image and mask in the middle of a picture whose sides the network can halve, and where they are in it."""
-    sides = [-(-(n + 2 * _MARGIN) // STRIDE) * STRIDE for n in mask.shape]
-    place = tuple(slice((side - n) // 2, (side - n) // 2 + n) for side, n in zip(sides, mask.shape, strict=True))
-    framed, inside = np.zeros((*sides, 3), np.float32), np.zeros(sides, bool)
-    mean = max(float(image[mask].mean(dtype=float)), 1e-30)
-    framed[place], inside[place] = np.where(mask[..., None], image / mean, 0), mask
-    return (framed, inside), place  # type: ignore[return-value]
-
-
-def _carried(found: np.ndarray, known: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
-    """Maps (h, w, C), `known` (h, w) bool, at the pixels of a picture of `shape`: linear between pixels' centres."""
-    if factor == 1:
-        return found
-    filled = np.where(known[..., None], found, masked_gaussian(found, known, 1.0))
-    for axis, size in enumerate(shape):
-        at = np.clip((np.arange(size) + 0.5) * factor - 0.5, 0, filled.shape[axis] - 1)
-        first = np.minimum(at.astype(np.int64), max(filled.shape[axis] - 2, 0))
-        beyond = (at - first).astype(np.float32).reshape([-1 if k == axis else 1 for k in range(3)])
-        after = np.minimum(first + 1, filled.shape[axis] - 1)
-        filled = (1 - beyond) * np.take(filled, first, axis) + beyond * np.take(filled, after, axis)
-    return filled

@@ -6,8 +6,16 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.separation import separate
-from isc_core.separation.layer_network import LayerNetwork, _convolved, _from_blocks, _to_blocks, read_network, shipped_network
-from isc_core.separation.network import NetworkOptions, log_ratio
+from isc_core.separation.layer_network import (
+    LayerNetwork,
+    NetworkOptions,
+    _convolved,
+    _from_blocks,
+    _to_blocks,
+    log_ratio,
+    read_network,
+    shipped_network,
+)
 
 
 def small_network(rng):

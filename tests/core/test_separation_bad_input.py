@@ -12,7 +12,7 @@ from isc_core.progress import Monitor
 from isc_core.separation import METHODS, variants
 
 # Those that do not judge by colour, and so have an answer for grey photos; the others refuse.
-WITHOUT_COLOUR = {("none", "improved"), ("chaotic_segmentation", "paper"), ("isc", "improved")}
+WITHOUT_COLOUR = {("none", "improved"), ("chaotic_segmentation", "paper"), ("network", "improved"), ("isc", "improved")}
 EVERY = [(method, variant) for method in METHODS for variant in variants(method)]
 OURS = [(method, variant) for method, variant in EVERY if variant != "sihr"]
 
