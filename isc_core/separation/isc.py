@@ -39,6 +39,7 @@ from ..progress import Monitor
 from .channels import largest, smallest
 from .checks import check_arrays
 from .edge_aware import Paths
+from .enlarging import enlarged
 from .evidence import colour_evidence
 from .filter_statistics import highlight_prior
 from .highlight_cues import Steps, far_from_borders, noise_level, paint_mixing, ramp, roughness, steps_of
@@ -389,23 +390,11 @@ def _carried_over(full: _Photo, paints: _Paints, judged: _Judged, factor: int) -
     mask = full.mask
     hue_share = _spread(paints.places(full, factor).read(paints.share), mask)
     gain_by_hue, gain_by_place, share = (
-        _enlarged(layer, mask.shape, factor) for layer in (judged.gain_by_hue, judged.gain_by_place, judged.share)
+        enlarged(layer, mask.shape, factor) for layer in (judged.gain_by_hue, judged.gain_by_place, judged.share)
     )
     by_hue = _specular(full.low, full.chroma, hue_share)
     by_place = _specular(full.low, full.chroma, share)
     return _Judged(by_hue, gain_by_hue, by_place, gain_by_place, share)
-
-
-def _enlarged(layer: np.ndarray, shape: tuple[int, ...], factor: int) -> np.ndarray:
-    """A map of blocks at the pixels (H, W), linear between the blocks' centres."""
-    for axis, size in enumerate(shape):
-        at = np.clip((np.arange(size) + 0.5) / factor - 0.5, 0, layer.shape[axis] - 1)
-        first = np.minimum(at.astype(np.int64), max(layer.shape[axis] - 2, 0))
-        beyond = (at - first).astype(np.float32)
-        beyond = beyond[:, None] if axis == 0 else beyond
-        after = np.minimum(first + 1, layer.shape[axis] - 1)
-        layer = (1 - beyond) * np.take(layer, first, axis) + beyond * np.take(layer, after, axis)
-    return layer
 
 
 def _at_odds(gain: np.ndarray, prior: np.ndarray | None) -> np.ndarray:

@@ -15,6 +15,7 @@ Limits: it knows lamps, panels and skies on opaque objects of one piece. What no
 """
 
 import importlib.resources
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -24,6 +25,7 @@ import numpy as np
 from ..box import mask_slices
 from ..errors import InputError
 from ..photo import averaged
+from .enlarging import enlarged
 from .smoothing import masked_gaussian
 
 STRIDE = 32  # pixels: sides of what the network sees are multiples
@@ -137,9 +139,9 @@ def _halved(layer: np.ndarray) -> np.ndarray:
     return layer.reshape(rows // 2, 2, columns // 2, 2, channels).mean(axis=(1, 3))
 
 
-def _twice(layer: np.ndarray, steps: "object") -> np.ndarray:
+def _twice(layer: np.ndarray, steps: Iterator[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     for _ in range(2):
-        layer = np.maximum(_convolved(layer, *next(steps)), 0)  # type: ignore[call-overload]
+        layer = np.maximum(_convolved(layer, *next(steps)), 0)
     return layer
 
 
@@ -165,11 +167,4 @@ def _carried(found: np.ndarray, known: np.ndarray, shape: tuple[int, ...], facto
     """Maps (h, w, C), `known` (h, w) bool, at the pixels of a picture of `shape`: linear between pixels' centres."""
     if factor == 1:
         return found
-    filled = np.where(known[..., None], found, masked_gaussian(found, known, 1.0))
-    for axis, size in enumerate(shape):
-        at = np.clip((np.arange(size) + 0.5) * factor - 0.5, 0, filled.shape[axis] - 1)
-        first = np.minimum(at.astype(np.int64), max(filled.shape[axis] - 2, 0))
-        beyond = (at - first).astype(np.float32).reshape([-1 if k == axis else 1 for k in range(3)])
-        after = np.minimum(first + 1, filled.shape[axis] - 1)
-        filled = (1 - beyond) * np.take(filled, first, axis) + beyond * np.take(filled, after, axis)
-    return filled
+    return enlarged(np.where(known[..., None], found, masked_gaussian(found, known, 1.0)), shape, 1 / factor)

@@ -1,6 +1,7 @@
 """What the tests of the add-on share: an empty Blender, and results to build."""
 
 import importlib.util
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,18 @@ def blender() -> Any:
 
     bpy.ops.wm.read_factory_settings(use_empty=True)
     return bpy
+
+
+@pytest.fixture
+def addon(blender: Any) -> Iterator[Any]:
+    """Blender with the add-on registered; no run is left behind."""
+    import blender_addon
+    from blender_addon.operators.run import end_active
+
+    blender_addon.register()
+    yield blender
+    end_active()
+    blender_addon.unregister()
 
 
 @pytest.fixture(scope="session")

@@ -3,7 +3,6 @@
 import importlib.util
 import json
 import shutil
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -12,14 +11,13 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-import blender_addon  # noqa: E402 (after the skip)
 from blender_addon import operators, preferences, presets, properties  # noqa: E402
 from blender_addon.messages import in_words, notes_of  # noqa: E402
 from blender_addon.operators import request as requests  # noqa: E402
 from blender_addon.operators.decompose import run_of  # noqa: E402
 from blender_addon.operators.mask import box_of  # noqa: E402
 from blender_addon.operators.request import request_from_settings  # noqa: E402
-from blender_addon.operators.run import Run, begin, end_active  # noqa: E402
+from blender_addon.operators.run import Run, begin  # noqa: E402
 from blender_addon.panels import wrapped  # noqa: E402
 from blender_addon.scene.build import BuildOptions, find  # noqa: E402
 from blender_addon.worker import Update  # noqa: E402
@@ -27,15 +25,6 @@ from isc_core.errors import InputError  # noqa: E402
 from isc_core.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.separation import METHODS  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
-
-
-@pytest.fixture
-def addon(blender: Any) -> Iterator[Any]:
-    """Blender with the add-on registered; no run is left behind."""
-    blender_addon.register()
-    yield blender
-    end_active()
-    blender_addon.unregister()
 
 
 def picture(name: str, values: np.ndarray, **options: Any) -> Any:

@@ -1,6 +1,5 @@
 """Editing what was built: paint, gains, light, files; and what is said where it cannot be edited."""
 
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -12,20 +11,11 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from mathutils import Vector  # noqa: E402 (after the skip)
 
-import blender_addon  # noqa: E402
 from blender_addon.arrays import read_result  # noqa: E402
 from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # noqa: E402
 from blender_addon.scene.build import Built, find  # noqa: E402
 from blender_addon.scene.material import dichromatic_node  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
-
-
-@pytest.fixture
-def addon(blender: Any) -> Iterator[Any]:
-    """Blender with the add-on registered."""
-    blender_addon.register()
-    yield blender
-    blender_addon.unregister()
 
 
 @pytest.fixture

@@ -3,7 +3,7 @@
 import shutil
 import sys
 import time
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -29,15 +29,6 @@ print(json.dumps({"event": "progress", "stage": "solving", "fraction": 0.25}), f
 while True: time.sleep(0.05)
 """
 CRASH = "import os, sys\nprint('half way through', file=sys.stderr, flush=True)\nos.abort()\n"
-
-
-@pytest.fixture
-def addon(blender: Any) -> Iterator[Any]:
-    """Blender with the add-on registered; no run is left behind."""
-    blender_addon.register()
-    yield blender
-    end_active()
-    blender_addon.unregister()
 
 
 @pytest.fixture
