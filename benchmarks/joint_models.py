@@ -1,10 +1,10 @@
 """What each model makes of glossy photos, against SIRFS on the photo as it is and on the true diffuse image.
 
   python -m benchmarks.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural]
-                                    [--networks FOLDER]
+                                    [--networks FOLDER] [--models plain,joint]
 
-Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them. `--networks`: a cue for each object that
-has not seen it, `OBJECT.npz` of `benchmarks.highlight_training`; without it the shipped one, which has. Writes OUT/rows.jsonl, a row a
+Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them. `--networks`: a network for each object that
+has not seen it, `OBJECT.npz` of `benchmarks.layer_network_training`; without it the shipped one, which has. Writes OUT/rows.jsonl, a row a
 run, which is not run again, and OUT/tables.md: geometric means of errors relative to plain SIRFS with the interval of resampled objects,
 and which share of the gain of the true diffuse image a model reaches.
 """
@@ -60,7 +60,7 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
         if given.sets and label not in given.sets:
             continue
         for name in given.objects or list_objects(folder, "laboratory"):
-            missing = [model for model in MODELS if (label, name, model) not in done]
+            missing = [model for model in given.models if (label, name, model) not in done]
             if not missing:
                 continue
             seen, diffuse = photo_of(folder, name)
@@ -115,9 +115,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--data", type=Path, required=True, help="the MIT-Berkeley set")
     parser.add_argument("--glossy", type=Path, help="what isc synth glossy-mit made of it")
-    parser.add_argument("--networks", type=Path, help="a cue for each object that has not seen it")
+    parser.add_argument("--networks", type=Path, help="a network for each object that has not seen it")
     parser.add_argument("--objects", type=lambda text: text.split(","), default=[])
     parser.add_argument("--sets", type=lambda text: text.split(","), default=[])
+    parser.add_argument("--models", type=lambda text: text.split(","), default=MODELS)
     parser.add_argument("-o", "--output", type=Path, required=True)
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
