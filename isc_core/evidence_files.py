@@ -8,6 +8,7 @@ import numpy as np
 
 from .errors import InputError
 from .exr import read_channels
+from .limits import USUAL, Limits
 from .photo import read_raster
 from .result_folder import load
 from .sirfs.resampling import nearest_samples
@@ -18,7 +19,7 @@ _NUMPY = b"\x93NUMPY"
 _CHANNELS = ("height.Z", "Z", "Y", "height.Y")
 
 
-def read_height(path: str | Path, shape: tuple[int, ...], scale: float | None = None) -> np.ndarray:
+def read_height(path: str | Path, shape: tuple[int, ...], scale: float | None = None, limits: Limits = USUAL) -> np.ndarray:
     """A height map (H, W) float64 in photo pixels toward the viewer, NaN where there is none.
 
     `shape`: the photo's (H, W). `path`: an EXR with a channel Y or Z or height.Z, a NumPy array, an integer PNG or TIFF (0 is a hole),
@@ -26,7 +27,7 @@ def read_height(path: str | Path, shape: tuple[int, ...], scale: float | None = 
     Raises `InputError` for a file that is missing, damaged, of another size, or all holes.
     """
     path = Path(path)
-    height, unit = (_of_result(path, shape), 1.0) if path.is_dir() else _of_file(path)
+    height, unit = (_of_result(path, shape), 1.0) if path.is_dir() else _of_file(path, limits)
     if height.shape != shape:
         raise InputError(f"{path}: the height map is {_size(height.shape)} pixels, the photo {_size(shape)}: give one of the photo's size")
     height = np.where(np.isfinite(height), height, np.nan) * (unit if scale is None else scale)
@@ -60,7 +61,7 @@ def read_light(path: str | Path) -> np.ndarray:
     return light
 
 
-def _of_file(path: Path) -> tuple[np.ndarray, float]:
+def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
     """The map as stored and its usual unit in photo pixels."""
     try:
         with path.open("rb") as file:
@@ -71,7 +72,7 @@ def _of_file(path: Path) -> tuple[np.ndarray, float]:
         return _of_exr(path), 1.0
     if start.startswith(_NUMPY):
         return _of_numpy(path), 1.0
-    raster = read_raster(path)
+    raster = read_raster(path, limits)
     if raster.values.shape[2] != 1 or raster.bit_depth < 16:
         raise InputError(f"{path}: a height map has one channel of 16 bits or more: save it as a grey 16-bit PNG, a TIFF, an EXR or .npy")
     values = raster.values[..., 0].astype(np.float64)

@@ -17,6 +17,7 @@ import cv2
 import numpy as np
 
 from .errors import InputError
+from .limits import USUAL, Limits
 from .photo import MIN_SIDE, check_mask, linear_to_srgb, read_linear, tidy_mask
 
 SOLVED_PIXELS = 1_000_000
@@ -91,13 +92,13 @@ def write_mask(path: str | Path, mask: np.ndarray) -> None:
         raise InputError(f"{path}: cannot be written ({error.strerror}): choose another place") from error
 
 
-def cut_out(photo_path: str | Path, box: Box, out_path: str | Path, transfer: str = "auto") -> np.ndarray:
+def cut_out(photo_path: str | Path, box: Box, out_path: str | Path, transfer: str = "auto", limits: Limits = USUAL) -> np.ndarray:
     """Reads a photo, finds the object within the box (x, y, width, height; of the upright photo), writes the mask and returns it.
 
-    `transfer` as for `photo.read_photo`; the mask as `grabcut` gives it.
+    `transfer` and `limits` as for `photo.read_photo`; the mask as `grabcut` gives it.
     Raises `InputError` where the photo cannot be read, the box does not fit, nothing is found or the mask cannot be written.
     """
-    image = read_linear(photo_path, transfer)
+    image = read_linear(photo_path, transfer, limits)
     white = float(np.percentile(image, 99.9)) or float(image.max())
     if white == 0:
         raise InputError(f"{photo_path}: the image is black: there is nothing to cut out; use another photo")

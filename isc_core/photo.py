@@ -35,9 +35,9 @@ from scipy import sparse
 
 from .box import mask_slices
 from .errors import InputError
+from .limits import USUAL, Limits
 
 TRANSFERS = ("auto", "srgb", "linear")
-MAX_PIXELS = 200_000_000
 MAX_ASPECT = 100
 MIN_SIDE = 8
 MIN_MASK_PIXELS = 64
@@ -172,12 +172,12 @@ def _as_rgb(values: np.ndarray) -> np.ndarray:
     return np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values
 
 
-def read_linear(path: str | Path, transfer: str = "auto") -> np.ndarray:
+def read_linear(path: str | Path, transfer: str = "auto", limits: Limits = USUAL) -> np.ndarray:
     """The whole image without a mask: (H, W, 3) float32, linear Rec.709; what is not finite or negative in a float file becomes 0.
 
     Raises `InputError` as `read_photo` does.
     """
-    raster = read_raster(path)
+    raster = read_raster(path, limits)
     linear = _as_rgb(_to_linear(raster, _transfer_used(transfer, raster)))
     return np.where(np.isfinite(linear) & (linear > 0), linear, np.float32(0))
 
@@ -185,7 +185,9 @@ def read_linear(path: str | Path, transfer: str = "auto") -> np.ndarray:
 # --- the photo --------------------------------------------------------------------------------------------------------------------------
 
 
-def read_photo(path: str | Path, mask_path: str | Path | None = None, transfer: str = "auto", *, whole_frame: bool = False) -> Photo:
+def read_photo(
+    path: str | Path, mask_path: str | Path | None = None, transfer: str = "auto", *, whole_frame: bool = False, limits: Limits = USUAL
+) -> Photo:
     """Reads a photo at full size.
 
     Files: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM, NumPy's .npy (its integers are codes), told apart by their content.
@@ -193,13 +195,13 @@ def read_photo(path: str | Path, mask_path: str | Path | None = None, transfer: 
     value, or its alpha channel where that is not opaque); else the photo's alpha channel (>= 0.5) where that is not opaque; else, on a
     black border (at most 2/255 in sRGB coding), the pixels that are not black: holes filled, parts smaller than 1 % of the largest
     dropped. Where there is none of these, `whole_frame` takes all pixels.
-    Raises `InputError`, one line with the remedy, for anything that cannot be used.
+    Raises `InputError`, one line with the remedy, for anything that cannot be used; what is beyond `limits` is told from the file's header.
     """
-    raster = read_raster(path)
+    raster = read_raster(path, limits)
     used = _transfer_used(transfer, raster)
     _refuse_constant(raster.values, f"{path}: every pixel")
     linear = _to_linear(raster, used)
-    mask, mask_from = _find_mask(path, raster, linear, mask_path, whole_frame)
+    mask, mask_from = _find_mask(path, raster, linear, mask_path, whole_frame, limits)
     check_mask(mask, f"{path if mask_path is None else mask_path}: the mask")
     _refuse_constant(raster.values[mask], f"{path}: every pixel inside the mask")
     height, width = mask.shape
@@ -278,10 +280,10 @@ def tidy_mask(mask: np.ndarray) -> np.ndarray:
 
 
 def _find_mask(
-    path: str | Path, raster: Raster, linear: np.ndarray, mask_path: str | Path | None, whole_frame: bool
+    path: str | Path, raster: Raster, linear: np.ndarray, mask_path: str | Path | None, whole_frame: bool, limits: Limits
 ) -> tuple[np.ndarray, str]:
     if mask_path is not None:
-        return _mask_of_file(mask_path, raster), "file"
+        return _mask_of_file(mask_path, raster, limits), "file"
     if raster.alpha is not None and (raster.alpha < 1).any():
         return raster.alpha >= 0.5, "alpha"
     light = _finite(_brightest(linear))
@@ -302,8 +304,8 @@ def _find_mask(
     return tidy_mask(lit), "black border"
 
 
-def _mask_of_file(mask_path: str | Path, photo: Raster) -> np.ndarray:
-    raster = read_raster(mask_path)
+def _mask_of_file(mask_path: str | Path, photo: Raster, limits: Limits) -> np.ndarray:
+    raster = read_raster(mask_path, limits)
     if raster.values.shape[:2] != photo.values.shape[:2]:
         (h, w), (mask_h, mask_w) = photo.values.shape[:2], raster.values.shape[:2]
         raise InputError(f"{mask_path}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: give a mask of the photo's size")
@@ -372,7 +374,7 @@ def _resize_apart(image: np.ndarray, mask: np.ndarray, new_mask: np.ndarray, are
 # --- files ------------------------------------------------------------------------------------------------------------------------------
 
 
-def read_raster(path: str | Path) -> Raster:
+def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
     """The values that an image file stores, upright. Raises `InputError` where it is missing, damaged, too large or of no known kind."""
     path = Path(path)
     if path.is_dir():
@@ -392,7 +394,7 @@ def read_raster(path: str | Path) -> Raster:
         raise InputError(f"{path}: not an image of a known kind (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, NPY): convert it to PNG")
     try:
         with _quiet():
-            raster = reader(data, path)
+            raster = reader(data, path, limits)
     except InputError:
         raise
     except _DECODING_ERRORS as error:
@@ -442,10 +444,9 @@ def _quiet() -> Iterator[None]:
         yield
 
 
-def _check_size(path: Path, width: int, height: int) -> None:
+def _check_size(path: Path, limits: Limits, width: int, height: int) -> None:
     """Refuses, from the header alone, what would not fit or cannot be an object's photo."""
-    if width * height > MAX_PIXELS:
-        raise InputError(f"{path}: {width} x {height} pixels; at most {MAX_PIXELS // 1_000_000} megapixels are read: make it smaller first")
+    limits.check_pixels(path, width, height)
     if min(width, height) < MIN_SIDE:
         raise InputError(f"{path}: {width} x {height} pixels; at least {MIN_SIDE} are needed both ways: use a larger photo")
     if max(width, height) > MAX_ASPECT * min(width, height):
@@ -483,9 +484,9 @@ def _orientation(image: Image.Image) -> int:
         return 1  # metadata that cannot be read says nothing about rotation; the pixels are still good
 
 
-def _raster_of_pillow(image: Image.Image, path: Path, oriented: bool = False) -> Raster:
+def _raster_of_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool = False) -> Raster:
     """`oriented`: the decoder turns the image itself. Stricter than OpenCV: a file cut short raises OSError."""
-    _check_size(path, *image.size)
+    _check_size(path, limits, *image.size)
     if image.mode in ("CMYK", "LAB", "HSV"):
         raise InputError(f"{path}: its colours are {image.mode}, made for printing or editing: convert it to RGB, for example as a PNG")
     orientation = 1 if oriented else _orientation(image)
@@ -507,15 +508,15 @@ def _decode_opencv(data: bytes) -> np.ndarray:
     return pixels[..., [2, 1, 0, 3][: pixels.shape[2]]]
 
 
-def _read_png(data: bytes, path: Path) -> Raster:
+def _read_png(data: bytes, path: Path, limits: Limits) -> Raster:
     """16 bits go through OpenCV, for Pillow would cut RGB to 8; each chunk's checksum is verified first, which decoders skip."""
     width, height, bits = struct.unpack(">IIB", data[16:25])
-    _check_size(path, width, height)
+    _check_size(path, limits, width, height)
     plain = _plain_png(data)
     image = PngImagePlugin.PngImageFile(io.BytesIO(plain))
     if bits == 16:
         return _raster_of_codes(_decode_opencv(plain), 65535, _orientation(image))
-    return _raster_of_pillow(image, path)
+    return _raster_of_pillow(image, path, limits)
 
 
 def _plain_png(data: bytes) -> bytes:
@@ -534,21 +535,21 @@ def _plain_png(data: bytes) -> bytes:
         at += 12 + length
 
 
-def _read_jpeg(data: bytes, path: Path) -> Raster:
-    return _raster_of_pillow(JpegImagePlugin.JpegImageFile(io.BytesIO(data)), path)
+def _read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
+    return _raster_of_pillow(JpegImagePlugin.JpegImageFile(io.BytesIO(data)), path, limits)
 
 
-def _read_bmp(data: bytes, path: Path) -> Raster:
-    return _raster_of_pillow(BmpImagePlugin.BmpImageFile(io.BytesIO(data)), path)
+def _read_bmp(data: bytes, path: Path, limits: Limits) -> Raster:
+    return _raster_of_pillow(BmpImagePlugin.BmpImageFile(io.BytesIO(data)), path, limits)
 
 
-def _read_pnm(data: bytes, path: Path) -> Raster:
+def _read_pnm(data: bytes, path: Path, limits: Limits) -> Raster:
     gap = rb"(?:\s|#[^\n]*\n)+"
     header = re.match(rb"P([56])" + gap + rb"(\d+)" + gap + rb"(\d+)" + gap + rb"(\d+)\s", data)
     if header is None or int(header[4]) < 256:
-        return _raster_of_pillow(PpmImagePlugin.PpmImageFile(io.BytesIO(data)), path)
+        return _raster_of_pillow(PpmImagePlugin.PpmImageFile(io.BytesIO(data)), path, limits)
     width, height, peak = int(header[2]), int(header[3]), int(header[4])
-    _check_size(path, width, height)
+    _check_size(path, limits, width, height)
     channels = 3 if header[1] == b"6" else 1
     codes = np.frombuffer(data, ">u2", width * height * channels, header.end()).astype(np.uint16)
     if peak > 65535 or codes.max() > peak:
@@ -560,18 +561,18 @@ def _read_pnm(data: bytes, path: Path) -> Raster:
 _TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (339, 1), (338, 0))
 
 
-def _read_tiff(data: bytes, path: Path) -> Raster:
+def _read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
     """8 bits go through Pillow, 16 bits and floats through OpenCV; both apply the rotation flag themselves."""
     stream = io.BytesIO(data)
     tags = TiffImagePlugin.ImageFileDirectory_v2(stream.read(16 if data[2:3] == b"+" or data[3:4] == b"+" else 8))
     stream.seek(tags.next)
     tags.load(stream)
-    _check_size(path, int(tags[256]), int(tags[257]))
+    _check_size(path, limits, int(tags[256]), int(tags[257]))
     bits, samples, photometric, stores, extra = (int(np.ravel(tags.get(tag, n))[0]) for tag, n in _TIFF_TAGS)
     if photometric == 5:
         raise InputError(f"{path}: its colours are CMYK, made for printing: convert it to RGB, for example as a PNG")
     if bits <= 8:
-        return _raster_of_pillow(TiffImagePlugin.TiffImageFile(io.BytesIO(data)), path, oriented=True)
+        return _raster_of_pillow(TiffImagePlugin.TiffImageFile(io.BytesIO(data)), path, limits, oriented=True)
     pixels = _decode_opencv(data)
     fits = (pixels.dtype == np.uint16 and stores == 1 and bits == 16) or pixels.dtype.kind == "f"
     if not fits or photometric not in (1, 2, 32844, 32845) or samples != (pixels.shape[2] if pixels.ndim == 3 else 1):
@@ -581,20 +582,20 @@ def _read_tiff(data: bytes, path: Path) -> Raster:
     return _raster_of_codes(pixels, 65535, premultiplied=extra == 1)
 
 
-def _read_hdr(data: bytes, path: Path) -> Raster:
+def _read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
     size = re.search(rb"\n-Y (\d+) \+X (\d+)\n", data)
     if size is None:
         raise ValueError("no upright resolution line")
-    _check_size(path, int(size[2]), int(size[1]))
+    _check_size(path, limits, int(size[2]), int(size[1]))
     return _raster_of_codes(_decode_opencv(data), 0)
 
 
-def _read_exr(data: bytes, path: Path) -> Raster:
+def _read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     """The RGB or Y channels, and A, which EXR colours are premultiplied by; the frame is the display window, black without data."""
     for part in OpenEXR.File(str(path), header_only=True).parts:
         for window in ("dataWindow", "displayWindow"):
             low, high = part.header[window]
-            _check_size(path, *(int(n) for n in high - low + 1))
+            _check_size(path, limits, *(int(n) for n in high - low + 1))
     parts = OpenEXR.File(str(path), separate_channels=True).parts
     if not parts:
         raise ValueError("the pixels cannot be read")
@@ -639,7 +640,7 @@ def _in_display_window(pixels: np.ndarray, header: dict[str, Any]) -> np.ndarray
     return frame
 
 
-def _read_npy(data: bytes, path: Path) -> Raster:
+def _read_npy(data: bytes, path: Path, limits: Limits) -> Raster:
     """(H, W), (H, W, 1), (H, W, 3) or (H, W, 4), alpha last and not multiplied in. The header alone says how much is to come."""
     stream = io.BytesIO(data)
     version = np.lib.format.read_magic(stream)
@@ -649,7 +650,7 @@ def _read_npy(data: bytes, path: Path) -> Raster:
         raise InputError(f"{path}: an array of shape {shape}: a photo is (H, W, 3), or (H, W, 4) with alpha, a mask (H, W)")
     if kind.kind not in "fbu" or kind.itemsize > 8 or (kind.kind == "u" and kind.itemsize > 2):
         raise InputError(f"{path}: values of type {kind}: give floats of linear light, codes of 8 or 16 bits (uint8, uint16), or bool")
-    _check_size(path, shape[1], shape[0])
+    _check_size(path, limits, shape[1], shape[0])
     stored = np.frombuffer(data, kind, int(np.prod(shape)), stream.tell()).reshape(shape, order="F" if by_columns else "C")
     if kind.kind == "f":
         return _raster_of_codes(stored.astype(np.float32), 0)
@@ -657,7 +658,7 @@ def _read_npy(data: bytes, path: Path) -> Raster:
     return _raster_of_codes(stored, np.iinfo(stored.dtype).max)
 
 
-_READERS: tuple[tuple[bytes, str, Callable[[bytes, Path], Raster]], ...] = (
+_READERS: tuple[tuple[bytes, str, Callable[[bytes, Path, Limits], Raster]], ...] = (
     (b"\x89PNG\r\n\x1a\n", "PNG", _read_png),
     (b"\xff\xd8\xff", "JPEG", _read_jpeg),
     (b"II*\0", "TIFF", _read_tiff),

@@ -11,7 +11,7 @@ from ..progress import Monitor
 from ..result_folder import require_room, require_writable_result, save
 from ..separation import METHODS
 from ..sirfs.prior_file import load_prior_set
-from .options import Commands, add_command, add_engine, add_photo, count, hints, number, positive
+from .options import Commands, add_command, add_engine, add_photo, count, hints, limits_of, number, positive
 
 _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
@@ -96,7 +96,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     settings.check()
     require_writable_result(options.output)
     prior_set = None if options.priors is None else load_prior_set(options.priors)
-    photo = read_photo(options.photo, options.mask, options.transfer)
+    photo = read_photo(options.photo, options.mask, options.transfer, limits=limits_of(options))
     evidence = _evidence(options, photo)
     require_room(options.output, _pixels(photo, settings), arrays=options.arrays)
     result = decompose(photo, settings, evidence=evidence, prior_set=prior_set, name=options.photo.name, monitor=monitor.part(0.0, 0.8))
@@ -108,11 +108,11 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:
-    size, scale = photo.mask.shape, options.height_scale
+    size, scale, limits = photo.mask.shape, options.height_scale, limits_of(options)
     return Evidence(
-        height=None if options.shape is None else read_height(options.shape, size, scale),
+        height=None if options.shape is None else read_height(options.shape, size, scale, limits),
         light=None if options.light is None else read_light(options.light),
-        depth=None if options.depth is None else read_height(options.depth, size, scale),
+        depth=None if options.depth is None else read_height(options.depth, size, scale, limits),
         depth_sigma=options.depth_sigma,
         depth_weight=options.depth_weight,
     )

@@ -23,12 +23,13 @@ from ..editing.relight import HIGHLIGHTS, NewLight, Relighting, relight
 from ..editing.spheres import render_sphere, sphere_normals
 from ..errors import InputError
 from ..evidence_files import read_light
+from ..limits import Limits
 from ..photo import TRANSFERS, linear_to_srgb, read_linear, read_photo, read_raster, srgb_to_linear
 from ..progress import Monitor
 from ..report import Panel
 from ..result_folder import load
 from ..sirfs.frames import real_sh
-from .options import Commands, Parser, add_command, add_speech, count, hints
+from .options import Commands, Parser, add_command, add_limits, add_speech, count, hints, limits_of
 
 _EXAMPLES = """  isc edit cup light-direction -o light                                where the light is, and how sure that is
   isc edit cup highlight --direction -0.5 0.6 0.6 -o glint             a new highlight
@@ -48,7 +49,7 @@ _OTHER_LIGHTS = (
     ("from the front", (0.0, 0.0, 1.0)),
 )
 _USUAL_LEVEL = 0.7
-_OF_THE_COMMAND = ("run", "act", "quiet", "progress", "output", "action", "usual")
+_OF_THE_COMMAND = ("run", "act", "quiet", "progress", "output", "action", "usual", "max_pixels")
 _PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp")
 
 
@@ -164,7 +165,7 @@ def _recolour(d: Decomposition, options: argparse.Namespace) -> _Done:
     if options.cluster is not None:
         region = clusters.weight(options.cluster)
     elif options.region is not None:
-        region = _read_region(options.region, d)
+        region = _read_region(options.region, d, limits_of(options))
     measured = {"clusters": [{"color": _plain(c), "share": float(s)} for c, s in zip(clusters.colors, clusters.shares, strict=True)]}
     return _Done(recolour(d, paint, region), measured, (), clusters)
 
@@ -207,7 +208,7 @@ def _new_light(d: Decomposition, options: argparse.Namespace, rotation: np.ndarr
     if options.light is not None and options.light.suffix.lower() in _PICTURES:
         if turned:
             raise InputError("an environment picture is not turned here: turn the picture itself, or give a direction")
-        return NewLight(sky=read_linear(options.light)), False
+        return NewLight(sky=read_linear(options.light, limits=limits_of(options))), False
     return NewLight(
         coefficients=turned_light(d.illumination if options.light is None else _read_coefficients(options.light), rotation)
     ), True
@@ -233,9 +234,9 @@ def _lobe(options: argparse.Namespace) -> Lobe | None:
     return Lobe(USUAL_EXPONENT if options.exponent is None else options.exponent, options.alpha)
 
 
-def _read_region(path: Path, d: Decomposition) -> np.ndarray:
+def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
     """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's."""
-    region = np.clip(read_linear(path, "linear").mean(axis=2), 0, 1)
+    region = np.clip(read_linear(path, "linear", limits).mean(axis=2), 0, 1)
     if region.shape == d.mask.shape:
         return region
     scale, size = d.provenance.input.get("scale"), d.provenance.input.get("size")
@@ -250,10 +251,11 @@ def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     transfer = options.transfer or str(given.get("transfer", "auto"))
     if given.get("mask_from") == "file" and options.mask is None:
         raise InputError("the result was made with a mask of its own: give the same one with --mask")
-    photo = read_photo(options.photo, options.mask, transfer)
+    limits = limits_of(options)
+    photo = read_photo(options.photo, options.mask, transfer, limits=limits)
     if given.get("sha256") != photo.original.sha256 and not options.quiet:
         print("isc: note: the photo's file is not the one that was decomposed; the edit is brought into it all the same", file=sys.stderr)
-    return Original(photo, read_raster(options.photo), options.photo)
+    return Original(photo, read_raster(options.photo, limits), options.photo)
 
 
 # --- words ------------------------------------------------------------------------------------------------------------------------------
@@ -333,6 +335,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     picture.add_argument("--photo", type=Path, metavar="PHOTO", help="the photo that RESULT was made of: the edit is brought back into it")
     picture.add_argument("--mask", type=Path, metavar="MASK", help="its mask, where the result was made with one")
     picture.add_argument("--transfer", choices=TRANSFERS, help="how it is coded (default: as isc decompose read it)")
+    add_limits(parser)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier edit is replaced")
     add_speech(parser)
     parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))

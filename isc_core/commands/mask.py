@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ..mask import Box, cut_out
 from ..progress import Monitor
-from .options import Commands, add_command, add_transfer, hints
+from .options import Commands, add_command, add_limits, add_transfer, hints, limits_of
 
 _EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
 
@@ -25,13 +25,14 @@ def declare(commands: Commands) -> None:
         help="left, top, width and height in pixels, some background around the object included",
     )
     add_transfer(parser)
+    add_limits(parser)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MASK", help="the PNG file to write")
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work."""
     del monitor  # one step of a second or two
-    found = cut_out(options.photo, options.box, options.output, options.transfer)
+    found = cut_out(options.photo, options.box, options.output, options.transfer, limits_of(options))
     return hints(options, f"{options.output}: {int(found.sum())} pixels; look at it before you use it")
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ..errors import InputError
+from ..limits import USUAL, Limits
 from ..photo import TRANSFERS
 
 Commands = Any  # what `add_subparsers` returns has no public name
@@ -65,6 +66,7 @@ def add_photo(parser: argparse.ArgumentParser) -> None:
         help="image of the photo's size, the object white on black (default: the photo's alpha channel, else what is not black)",
     )
     add_transfer(parser)
+    add_limits(parser)
 
 
 def add_transfer(parser: argparse.ArgumentParser) -> None:
@@ -75,6 +77,19 @@ def add_transfer(parser: argparse.ArgumentParser) -> None:
         default="auto",
         help="how the photo is coded (auto: EXR, HDR and floats of .npy are linear, else sRGB)",
     )
+
+
+def add_limits(parser: argparse.ArgumentParser) -> None:
+    """--max-pixels."""
+    parser.add_argument(
+        "--max-pixels", type=whole, default=USUAL.max_pixels, metavar="N",
+        help="refuse images of more pixels (width x height), before they are unpacked (default %(default)s)",
+    )  # fmt: skip
+
+
+def limits_of(options: argparse.Namespace) -> Limits:
+    """What the files that a command reads may ask for."""
+    return Limits(max_pixels=options.max_pixels)
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
@@ -93,6 +108,14 @@ def count(text: str) -> int:
         value = -1
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+    return value
+
+
+def whole(text: str) -> int:
+    """A whole number from 1 on."""
+    value = count(text)
+    if value == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
     return value
 
 

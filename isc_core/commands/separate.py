@@ -9,13 +9,14 @@ import numpy as np
 
 from ..decomposition import Separation
 from ..errors import InputError
+from ..limits import Limits
 from ..photo import Photo, read_linear, read_photo
 from ..progress import Monitor
 from ..result_folder import require_writable_result, save_separation
 from ..separation import BEST, IMPROVED, METHODS, separate
 from ..separation.checks import has_colour
 from ..separation.option_text import parse_changes
-from .options import Commands, add_command, add_photo, hints
+from .options import Commands, add_command, add_photo, hints, limits_of
 
 _EXAMPLES = """  isc separate cup.png -o cup-layers
   isc separate highlights.bmp --transfer linear --method shen_2013 --variant paper -o layers
@@ -60,8 +61,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.prior is not None and options.method != BEST:
         raise InputError(f"--prior is for the method {BEST} alone")
     require_writable_result(options.output, separation=True)
-    photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True)
-    prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape)
+    photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True, limits=limits_of(options))
+    prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape, limits_of(options))
     monitor.report(f"separating ({options.method})", 0.1)
     layers = separate(
         options.method, photo.image, photo.mask, photo.clipped,
@@ -86,9 +87,9 @@ def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Ite
         yield "the photo has no colour, which tells highlights from paint, so it was left as it is; a colour photo would help"
 
 
-def _read_prior(path: Path, size: tuple[int, ...]) -> np.ndarray:
+def _read_prior(path: Path, size: tuple[int, ...], limits: Limits) -> np.ndarray:
     """The stored values of an image, as probabilities (H, W) in [0, 1]. Raises `InputError` unless it has the photo's size (H, W)."""
-    prior: np.ndarray = np.clip(read_linear(path, "linear").mean(axis=2), 0, 1)
+    prior: np.ndarray = np.clip(read_linear(path, "linear", limits).mean(axis=2), 0, 1)
     if prior.shape != size:
         raise InputError(f"{path}: the prior must have the photo's size {size}, not {prior.shape}")
     return prior

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from isc_core.errors import InputError
+from isc_core.limits import Limits
 from isc_core.photo import (
-    MAX_PIXELS,
     Photo,
     PhotoSource,
     linear_to_srgb,
@@ -320,8 +320,8 @@ def test_a_numpy_file_is_believed_only_as_far_as_it_goes(tmp_path: Path) -> None
         np.lib.format.write_array_header_1_0(stream, {"descr": "<f4", "fortran_order": False, "shape": shape})
         return write(tmp_path / "a.npy", stream.getvalue() + bytes(64))
 
-    refused(header_only(14_000, 14_000, 3), "damaged")
-    refused(header_only(20_000, 20_000, 3), "200 megapixels")
+    refused(header_only(9_000, 9_000, 3), "damaged")
+    refused(header_only(20_000, 20_000, 3), "100 megapixels")
     whole = arrayed(tmp_path / "b.npy", srgb_to_linear(codes() / 255)).read_bytes()
     refused(write(tmp_path / "c.npy", whole.replace(b"'descr'", b"'other'")), "damaged")
     np.save(tmp_path / "d.npy", np.empty((20, 20), object))
@@ -598,21 +598,21 @@ def test_sizes_are_refused_from_the_header(tmp_path: Path) -> None:
         ihdr = chunk(b"IHDR", struct.pack(">IIBBBBB", w, h, 8, 2, 0, 0, 0))
         return write(tmp_path / "a.png", b"\x89PNG\r\n\x1a\n" + ihdr + chunk(b"IDAT", zlib.compress(b"0")) + chunk(b"IEND", b""))
 
-    refused(header_only(20_000, 20_000), "20000 x 20000", "200 megapixels")
-    refused(header_only(14_000, 14_000), "damaged")  # 196 megapixels pass the limit
+    refused(header_only(20_000, 20_000), "20000 x 20000", "100 megapixels")
+    refused(header_only(9_000, 9_000), "damaged")  # 81 megapixels pass the limit
     refused(header_only(1, 500), "1 x 500", "at least 8")
     refused(header_only(60_000, 10), "60000 x 10", "crop")
-    refused(write(tmp_path / "a.ppm", b"P6 30000 30000 255\n"), "200 megapixels")
-    refused(write(tmp_path / "b.ppm", b"P6 30000 30000 65535\n"), "200 megapixels")
-    refused(write(tmp_path / "a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 30000 +X 30000\n"), "200 megapixels")
+    refused(write(tmp_path / "a.ppm", b"P6 30000 30000 255\n"), "100 megapixels")
+    refused(write(tmp_path / "b.ppm", b"P6 30000 30000 65535\n"), "100 megapixels")
+    refused(write(tmp_path / "a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 30000 +X 30000\n"), "100 megapixels")
     buffer = io.BytesIO()
     Image.fromarray(codes()).save(buffer, "bmp")
     data = bytearray(buffer.getvalue())
     data[18:26] = struct.pack("<ii", 30_000, 30_000)
-    refused(write(tmp_path / "a.bmp", bytes(data)), "200 megapixels")
+    refused(write(tmp_path / "a.bmp", bytes(data)), "100 megapixels")
     window = (np.array([0, 0], np.int32), np.array([3, 99], np.int32))
     refused(write_exr(tmp_path / "a.exr", {"Y": np.ones((100, 4), np.float32)}, dataWindow=window), "4 x 100")
-    assert MAX_PIXELS == 200_000_000
+    assert Limits().max_pixels == 100_000_000
 
 
 @pytest.mark.parametrize(("bad", "word"), [(np.nan, "NaN"), (np.inf, "infinite"), (-np.inf, "infinite"), (-0.5, "negative")])

@@ -1,0 +1,38 @@
+"""How much a file may ask for, known before any of its content is unpacked.
+
+Problem: a hundred bytes can claim a picture of a million pixels a side, and a small archive can unpack to more than a machine holds. What a
+file claims stands in its header: width and height, the shape and kind of an array, the unpacked size of an archive's member. Readers hold
+these against `Limits` first, and decode afterwards.
+
+Limits: they bound what a file unpacks to. What a command then needs for its own work is a multiple of it; see docs/operations.md.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from .errors import InputError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is read of one file at most.
+
+    `max_pixels`: width x height of a picture. `max_bytes`: of values in memory, once unpacked, for pictures and arrays alike.
+    """
+
+    max_pixels: int = 100_000_000
+    max_bytes: int = 1 << 31
+
+    def check_pixels(self, path: Path | str, width: int, height: int) -> None:
+        """Raises `InputError` for a picture of more pixels."""
+        if width * height > self.max_pixels:
+            most = f"{self.max_pixels / 1e6:g} megapixels"
+            raise InputError(f"{path}: {width} x {height} pixels; at most {most} are read: make it smaller, or raise --max-pixels")
+
+    def check_bytes(self, path: Path | str, count: int) -> None:
+        """Raises `InputError` for a file whose values take more bytes of memory than `max_bytes`."""
+        if count > self.max_bytes:
+            raise InputError(f"{path}: unpacks to {count / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are read: store less in it")
+
+
+USUAL = Limits()
