@@ -11,7 +11,7 @@ import numpy as np
 from . import baselines
 from .datasets import MitBerkeleyObject
 from .evaluate import Estimate, Runner
-from .models.joint import JointOptions, doubt, lowers_energy, repaint
+from .models.joint import Explain, JointOptions, doubt, stepped
 from .models.mbp import split_reflectance
 from .pipeline import BASELINE_MODELS, Settings
 from .progress import Monitor
@@ -91,20 +91,19 @@ def joint_estimate(
     """`models.joint` on one object; `network`: of its layers, the shipped one if None."""
     joint, valid = JointOptions(), truth.valid
     by_colour = separate(options.separator, truth.image, valid).diffuse
-    found = doubt(truth.image, by_colour, valid, joint, network)
-    start = by_colour if found is None else found.diffuse
-    log_start = _log(start, truth)
-    there = solve_sirfs(truth, log_start, priors, options, monitor)
-    if found is None:
-        return _estimate(truth, log_start, there.height, there.light, there)
-    shading = np.exp(_log_shading(normal_from_reference(normals(there.height)), there.light))
-    cleaner = repaint(found, shading, np.where(valid[..., None], start, 0), valid)
-    log_cleaner = _log(cleaner, truth)
     how = SolverOptions(engine=options.engine, threads=options.threads)
-    problem = pose(truth, log_cleaner, priors, isc_weights(truth.illumination, 3))
-    after = solve(problem, how, known_height=there.height, known_light=there.light).terms.total
-    falls = lowers_energy(there.terms.total, after, np.exp(log_start), np.exp(log_cleaner), valid, joint)
-    return _estimate(truth, log_cleaner if falls else log_start, there.height, there.light, there)
+
+    def energy(diffuse: np.ndarray, there: SirfsResult) -> float:
+        problem = pose(truth, _log(diffuse, truth), priors, isc_weights(truth.illumination, 3))
+        return solve(problem, how, known_height=there.height, known_light=there.light).terms.total
+
+    explain = Explain(
+        solve=lambda diffuse: solve_sirfs(truth, _log(diffuse, truth), priors, options, monitor),
+        shading=lambda there: np.exp(_log_shading(normal_from_reference(normals(there.height)), there.light)),
+        energy=energy,
+    )
+    step = stepped(doubt(truth.image, by_colour, valid, joint, network), by_colour, valid, explain, joint)
+    return _estimate(truth, _log(step.diffuse, truth), step.shape.height, step.shape.light, step.shape)
 
 
 def _log_diffuse(truth: MitBerkeleyObject, options: RunnerOptions) -> np.ndarray:

@@ -22,7 +22,9 @@ averages of what is known: H. Knutsson and C.-F. Westin 1993, doi:10.1109/CVPR.1
 Limits: those of the network. A broad veil without a peak stays. Paint that ends under a highlight is continued smoothly.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Generic, TypeVar
 
 import numpy as np
 from scipy import ndimage
@@ -42,6 +44,7 @@ _REACHES = (0.004, 0.008, 0.016, 0.03, 0.06, 0.12, 0.25)  # of the object's diag
 _HALF = 0.5  # of the object doubtful: there is nothing to continue its paint from
 _SPECK = 0.005  # of the object's diagonal
 _ENOUGH = 0.1  # of a neighbourhood that is known: nearer ones decide
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True)
@@ -63,24 +66,58 @@ class Doubt:
     doubtful: np.ndarray
 
 
+@dataclass(frozen=True)
+class Explain(Generic[Found]):
+    """How shape and light are found and asked: `solve` gives them for a diffuse image (H, W, 3); `shading` (H, W, 3) is what they give,
+    above 0 inside the mask; `energy` is the SIRFS objective of a diffuse image at them. All of one photo's pixels."""
+
+    solve: Callable[[np.ndarray], Found]
+    shading: Callable[[Found], np.ndarray]
+    energy: Callable[[np.ndarray, Found], float]
+
+
+@dataclass(frozen=True)
+class Step(Generic[Found]):
+    """`shape`: what `Explain.solve` gave. `diffuse` (H, W, 3): what is left in the end. `taken`: whether paint was continued."""
+
+    shape: Found
+    diffuse: np.ndarray
+    taken: bool
+
+
 def joint(task: Task, options: JointOptions | None = None) -> Answer:
     """MDR on what colour and form tell of the layers; the step beyond it, if the energy falls. Raises `InputError`, `Cancelled`."""
-    options, monitor = options or JointOptions(), task.monitor
+    options, monitor, working = options or JointOptions(), task.monitor, task.working
     split, diffuse = separated_first(task)
     with task.clock.stage("separation"):
-        found = doubt(task.working.image, diffuse, task.working.mask, options)
-    start = diffuse if found is None else found.diffuse
-    shape = recover_shape(start, task, monitor.part(0.08, 0.9))
+        found = doubt(working.image, diffuse, working.mask, options)
+    explain = Explain(
+        solve=lambda image: recover_shape(image, task, monitor.part(0.08, 0.9)),
+        shading=lambda shape: shaded(shape.working_height, shape.light, working.mask)[1],
+        energy=lambda image, shape: energy_of(image, shape, task),
+    )
+    step = stepped(found, diffuse, working.mask, explain, options)
     said = _NOTHING_LEFT
     if found is not None:
-        _, shading = shaded(shape.working_height, shape.light, task.working.mask)
-        cleaner = repaint(found, shading, start, task.working.mask)
-        before, after = energy_of(start, shape, task), energy_of(cleaner, shape, task)
-        falls = lowers_energy(before, after, start, cleaner, task.working.mask, options)
-        said = _TAKEN if falls else _NOT_CONTINUED
-        split = _split(split, found, cleaner if falls else start, shape, task, options, falls)
-    lobe = fit_specular(split, shape, task, monitor.part(0.92, 0.96))
-    return Answer(split, shape.height, shape.light, shape.status | lobe.status | {"joint": said}, lobe.brdf)
+        said = _TAKEN if step.taken else _NOT_CONTINUED
+        split = _split(split, found, step, task, options)
+    lobe = fit_specular(split, step.shape, task, monitor.part(0.92, 0.96))
+    return Answer(split, step.shape.height, step.shape.light, step.shape.status | lobe.status | {"joint": said}, lobe.brdf)
+
+
+def stepped(found: Doubt | None, by_colour: np.ndarray, mask: np.ndarray, explain: Explain[Found], options: JointOptions) -> Step[Found]:
+    """Shape and light of D_1, then the step to D where E falls by it.
+
+    `found`: what `doubt` says of the separation's diffuse image `by_colour` (H, W, 3), which stays where that is None.
+    """
+    if found is None:
+        return Step(explain.solve(by_colour), by_colour, False)
+    start = found.diffuse
+    shape = explain.solve(start)
+    cleaner = repaint(found, explain.shading(shape), start, mask)
+    before, after = explain.energy(start, shape), explain.energy(cleaner, shape)
+    taken = lowers_energy(before, after, start, cleaner, mask, options)
+    return Step(shape, cleaner if taken else start, taken)
 
 
 def doubt(
@@ -123,20 +160,18 @@ def lowers_energy(before: float, after: float, start: np.ndarray, cleaner: np.nd
     return after + options.change_of_variables * float(darker.sum(axis=1).mean(dtype=float)) < before
 
 
-def _split(
-    start: Separation, found: Doubt, cleaner: np.ndarray, shape: Shape, task: Task, options: JointOptions, falls: bool
-) -> Separation:
-    """The layers of the maps' photo; `found` and `cleaner` are those of the working one. `falls`: whether paint is to be continued."""
-    photo = task.maps
+def _split(start: Separation, found: Doubt, step: Step[Shape], task: Task, options: JointOptions) -> Separation:
+    """The layers of the maps' photo, whose separation is `start`; `found` and `step` are those of the working one."""
+    photo, diffuse, shape = task.maps, step.diffuse, step.shape
     if not task.one_scale:
         of_maps = doubt(photo.image, start.diffuse, photo.mask, options)
         if of_maps is None:
             return start
-        _, shading = shaded(shape.height, shape.light, photo.mask)
-        found, cleaner = of_maps, of_maps.diffuse
-        if falls:
-            cleaner = repaint(of_maps, shading, of_maps.diffuse, photo.mask)
-    diffuse = cleaner.astype(np.float32)
+        found, diffuse = of_maps, of_maps.diffuse
+        if step.taken:
+            _, shading = shaded(shape.height, shape.light, photo.mask)
+            diffuse = repaint(of_maps, shading, of_maps.diffuse, photo.mask)
+    diffuse = diffuse.astype(np.float32)
     specular = np.where(photo.mask[..., None], start.specular + (start.diffuse - diffuse), 0).astype(np.float32)
     return Separation(diffuse, specular, start.residual, np.where(found.doubtful, 0, start.confidence).astype(np.float32))
 
