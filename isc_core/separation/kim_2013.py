@@ -37,6 +37,7 @@ from ..progress import Monitor
 from .channels import smallest
 from .checks import check_arrays, require_colour
 from .layers import bright_layers
+from .specular_free import dark_channel
 
 
 @dataclass(frozen=True)
@@ -142,7 +143,7 @@ def _check_options(options: Kim2013Options) -> None:
 
 def _scene(image: np.ndarray, mask: np.ndarray, base: float, options: Kim2013Options) -> _Scene:
     low = smallest(image)
-    dark = ndimage.minimum_filter(np.where(mask, low, np.inf), options.patch, mode="nearest")
+    dark = dark_channel(low, mask, options.patch)
     first = np.where(mask, np.maximum(dark - options.base * base, 0), 0)
     cells = _cells(image, mask, options)
     grid = tuple(int(size) for size in np.ceil(cells.max(axis=1)) + 3)

@@ -105,6 +105,25 @@ class _Dictionary:
         return table[below % len(table)] * (1 - share) + table[(below + 1) % len(table)] * share
 
 
+@dataclass(frozen=True)
+class Stages:
+    """What the grouped code sees on its way, (H, W) each, 0 outside the mask. `hue`, in turns, and `alpha`: what highlights leave as it is;
+    `brightness`: t, the part along the highlight atom. `beta`: what each pixel by itself has too much of it for its paint's atom.
+    `group`: the number of the group that switches the highlight atom on, -1 for none. `code`: beta times what is kept of its group."""
+
+    hue: np.ndarray
+    alpha: np.ndarray
+    brightness: np.ndarray
+    beta: np.ndarray
+    group: np.ndarray
+    code: np.ndarray
+
+    @property
+    def specular(self) -> np.ndarray:
+        """The specular light (H, W), the same in all channels, in the image's unit."""
+        return self.code / _WHITE
+
+
 def separate(
     image: np.ndarray,
     mask: np.ndarray,
@@ -133,7 +152,7 @@ def separate(
     dictionary = _learn(free, telling, options)
     monitor.report("sparse codes", 0.4)
     if options.grouped:
-        return white_layers(image, mask, _grouped_code(free, dictionary, options) / _WHITE, clipped)
+        return white_layers(image, mask, _grouped(free, dictionary, options).specular, clipped)
     return diffuse_layers(image, mask, _diffuse_of_pixels(image, free, dictionary, options), clipped)
 
 
@@ -142,9 +161,14 @@ def grouped_specular(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -
 
     `image` (H, W, 3), zero outside `mask` (H, W) bool; `telling` (H, W) bool, some of the mask: the pixels that shape the atoms.
     """
+    return stages(image, mask, telling).specular
+
+
+def stages(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> Stages:
+    """What the improved variant makes of an image on its way to `grouped_specular`; the same arguments."""
     options = VARIANTS["improved"]
     free = _specular_free(image, mask, options.blur)
-    return _grouped_code(free, _learn(free, telling, options), options) / _WHITE
+    return _grouped(free, _learn(free, telling, options), options)
 
 
 def _check_options(options: SparseCodingOptions) -> None:
@@ -201,22 +225,22 @@ def _atoms(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
     return colour / np.linalg.norm(colour, axis=-1, keepdims=True)
 
 
-def _grouped_code(free: _Free, dictionary: _Dictionary, options: SparseCodingOptions) -> np.ndarray:
-    """beta (H, W), the highlight atom's code, of pixels that switch it on in groups."""
+def _grouped(free: _Free, dictionary: _Dictionary, options: SparseCodingOptions) -> Stages:
+    """The highlight atom's code of pixels that switch it on in groups."""
     log_ratio = dictionary.at(dictionary.log_ratio, free.hue)
     diffuse = np.exp(log_ratio) * free.alpha
     beta = np.where(free.mask, np.maximum(free.brightness - diffuse, 0), 0)
     brightest = float(np.quantile(free.brightness[free.mask], 0.99))
     floor = options.noise * brightest
     active = beta > options.sparsity * free.brightness + floor / 2
-    code = np.zeros(beta.shape)
+    code, group = np.zeros(beta.shape), np.full(beta.shape, -1)
+    answer = Stages(free.hue, free.alpha, free.brightness, beta, group, code)
     if not active.any():
-        return code
+        return answer
     angle = 2 * np.pi * free.hue
     colour = np.stack([np.cos(angle), np.sin(angle), free.alpha, np.exp(log_ratio), beta], axis=2)
     watched = options.specular_free != "sf2", options.specular_free != "sf1"
     names, number = np.unique(_groups(colour, active, watched, options.edge, floor)[active], return_inverse=True)
-    group = np.full(beta.shape, -1)
     group[active] = number
     evidence = _evidence(colour, group, free.mask, watched, options.edge, floor, len(names))
     excess = np.log(free.brightness[active] / np.maximum(diffuse[active], _TINY))
@@ -226,7 +250,7 @@ def _grouped_code(free: _Free, dictionary: _Dictionary, options: SparseCodingOpt
         excess=excess,
     )
     code[active] = _keep(number, beta[active], paint, evidence, brightest)[number] * beta[active]
-    return code
+    return answer
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,7 @@ from .checks import check_arrays, require_colour
 from .colour_groups import colour_cells, group_quantile, two_band_shares
 from .evidence import colour_evidence
 from .layers import white_layers
+from .specular_free import fixed_chromaticity
 
 
 @dataclass(frozen=True)
@@ -176,8 +177,7 @@ def _prepared(image: np.ndarray, used: np.ndarray, options: Tan2005Options) -> _
     total, high = image[..., 0] + image[..., 1] + image[..., 2], largest(image)
     over = np.where(total > 0, total, 1)
     peak = np.where(total > 0, high / over, 1 / 3)
-    white = (high - _FREE * total) / (1 - 3 * _FREE)
-    free = sum(np.maximum(image[..., c] - white, 0) for c in range(3))
+    free = fixed_chromaticity(image, _FREE)
     limit = np.ones_like(total)
     if options.by_colour:
         red, green = two_band_shares(image, used, options.window)
@@ -187,7 +187,18 @@ def _prepared(image: np.ndarray, used: np.ndarray, options: Tan2005Options) -> _
         red, green = image[..., 0] / over, image[..., 1] / over
     neighbour = np.ones_like(used) if options.whole_frame else used
     label = np.where(used, _DIFFUSE, _DARK).astype(np.int8)
-    return _Pixels(image.copy(), total, peak, red, green, np.asarray(free), limit, neighbour, label, np.zeros(used.shape, np.bool_))
+    return _Pixels(
+        image.copy(),
+        total,
+        peak,
+        red,
+        green,
+        free[..., 0] + free[..., 1] + free[..., 2],
+        limit,
+        neighbour,
+        label,
+        np.zeros(used.shape, np.bool_),
+    )
 
 
 def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options) -> None:
