@@ -10,7 +10,6 @@ from isc_core.separation.specular_free import (
     modified,
     two_band,
 )
-
 from tests.core.separation_scenes import glossy_disc
 
 
