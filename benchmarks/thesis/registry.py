@@ -1,0 +1,40 @@
+"""All items, in the order of the thesis' lists."""
+
+import difflib
+import importlib
+from functools import cache
+
+from isc_core.errors import InputError
+
+from .item import Item
+
+_MODULES = (
+    "introduction_items", "background_items", "framework_items", "filter_items", "application_items", "catalogue_items",
+    "thresholding_items", "segmentation_items", "removal_items", "sparse_coding_items", "characteristics_items", "sheets_items",
+)  # fmt: skip
+_INSTALL = "install what is missing with `pip install 'isc3d[thesis]'`"
+
+
+@cache
+def items() -> tuple[Item, ...]:
+    """Every item. Raises `InputError` where a library that draws or renders is not installed."""
+    try:
+        modules = [importlib.import_module(f".{name}", __package__) for name in _MODULES]
+    except ModuleNotFoundError as error:
+        if (error.name or "").startswith("benchmarks"):
+            raise
+        raise InputError(f"isc thesis cannot start here ({error}): {_INSTALL}") from error
+    found: list[Item] = sorted((item for module in modules for item in module.ITEMS), key=lambda item: item.order)
+    names = [item.name for item in found]
+    if twice := {name for name in names if names.count(name) > 1}:
+        raise ValueError(f"listed twice: {', '.join(sorted(twice))}")
+    return tuple(found)
+
+
+def find(kind: str, number: str) -> Item:
+    """One item. Raises `InputError` that names the nearest numbers where there is none."""
+    known = {item.number: item for item in items() if item.kind == kind}
+    if number not in known:
+        near = difflib.get_close_matches(number, known, 3, 0.0)
+        raise InputError(f"there is no {kind} {number!r}: the nearest are {', '.join(near)} (`isc thesis list` shows all)")
+    return known[number]

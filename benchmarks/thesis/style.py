@@ -1,0 +1,123 @@
+"""How every figure looks: one size of letters, colours that colour-blind people tell apart, images in sRGB.
+
+matplotlib's objects are used directly, without its global state, so that nothing has to be closed or reset.
+
+Citation: M. Okabe, K. Ito, "Color universal design" (2008) (the eight colours); the maps viridis and cividis: J. R. Nuñez,
+C. R. Anderton, R. S. Renslow (2018), doi:10.1371/journal.pone.0199239.
+
+Limits: values above 1 are shown as 1.
+"""
+
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from isc_core.photo import linear_to_srgb
+
+OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
+WIDTH = 7.0  # inches
+DPI = 150
+LETTERS = 8.0  # points
+_BRIGHT = 0.9  # what all but the brightest hundredth of an image is shown below
+_LABEL = 1.05  # inches left of a sheet, for the names of its rows
+_LINE = 0.16  # inches that a line of letters takes
+
+
+def figure(
+    rows: int, columns: int, *, width: float = WIDTH, height: float | None = None, sharex: bool = False, sharey: bool = False
+) -> tuple[Figure, np.ndarray]:
+    """A figure and its axes (rows, columns). `width`, `height`: inches; without a height, rows get three quarters of a column's width."""
+    tall = height if height is not None else max(2.2, 0.75 * width * rows / columns)
+    with matplotlib.rc_context({"font.size": LETTERS, "axes.titlesize": LETTERS, "axes.linewidth": 0.6}):
+        made = Figure(figsize=(width, tall), dpi=DPI, layout="constrained")
+        axes = made.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
+    for each in axes.flat:
+        each.set_prop_cycle(color=OKABE_ITO)
+        each.tick_params(labelsize=LETTERS - 1, width=0.6)
+        for side in ("top", "right"):
+            each.spines[side].set_visible(False)
+    return made, axes
+
+
+def legend(axes: Axes, where: str = "best", columns: int = 1) -> None:
+    """The legend of what was drawn with a label."""
+    axes.legend(fontsize=LETTERS - 1, frameon=False, loc=where, ncols=columns)
+
+
+def show(axes: Axes, image_linear: np.ndarray, title: str = "", mask: np.ndarray | None = None) -> None:
+    """Draws an image (H, W, 3), or (H, W) as grey, of linear light in sRGB, white outside `mask` (H, W), without ticks."""
+    image = np.asarray(image_linear, float)
+    image = np.repeat(image[..., None], 3, -1) if image.ndim == 2 else image
+    coded = linear_to_srgb(np.clip(np.nan_to_num(image), 0, 1))
+    axes.imshow(coded if mask is None else np.where(mask[..., None], coded, 1.0), interpolation="antialiased")
+    _bare(axes, title)
+
+
+def show_map(
+    axes: Axes, values: np.ndarray, title: str = "", mask: np.ndarray | None = None, *, limits: tuple[float, float] | None = None,
+    colours: str = "viridis", label: str = "",
+) -> None:  # fmt: skip
+    """Draws a map of numbers (H, W) in the colours of "viridis" or "cividis", white outside `mask`; a `label` adds a bar of colours."""
+    shown = np.ma.masked_invalid(values if mask is None else np.where(mask, values, np.nan))
+    low, high = limits if limits is not None else (None, None)
+    picture = axes.imshow(shown, cmap=colours, vmin=low, vmax=high, interpolation="nearest")
+    _bare(axes, title)
+    if label:
+        bar = axes.figure.colorbar(picture, ax=axes, shrink=0.8)
+        bar.set_label(label, fontsize=LETTERS - 1)
+        bar.ax.tick_params(labelsize=LETTERS - 1)
+
+
+def normal_colours(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """Unit normals (H, W, 3) as an image of linear light that `show` draws in the usual colours, (n + 1) / 2; white outside the mask."""
+    coded = np.where(mask[..., None], (np.asarray(normal, float) + 1) / 2, 1.0)
+    return np.where(coded <= 0.04045, coded / 12.92, ((np.maximum(coded, 0) + 0.055) / 1.055) ** 2.4)
+
+
+def exposure(image_linear: np.ndarray, mask: np.ndarray | None = None) -> float:
+    """The gain with which an image is shown: all but its brightest hundredth stays below .9."""
+    inside = image_linear[mask] if mask is not None else image_linear.reshape(-1, *image_linear.shape[2:])
+    peak = float(np.quantile(inside.max(-1) if inside.ndim > 1 else inside, 0.99)) if inside.size else 0.0
+    return _BRIGHT / peak if peak > 0 else 1.0
+
+
+def sheet(
+    columns: Sequence[str],
+    rows: Sequence[tuple[str, Sequence[np.ndarray | None]]],
+    *,
+    width: float = WIDTH,
+    expose: bool | Sequence[bool] = True,
+) -> Figure:
+    """A labelled contact sheet of linear images, (H, W, 3) or (H, W) each; None leaves a cell empty.
+
+    `expose`: whether the images of a row are brightened together, by what its first image needs; one answer for each column, or for all.
+    """
+    exposed = [expose] * len(columns) if isinstance(expose, bool) else list(expose)
+    cell = (width - _LABEL) / len(columns)
+    heights = [max([image.shape[0] / image.shape[1] for image in images if image is not None] or [1.0]) * cell for _, images in rows]
+    made, axes = figure(len(rows), len(columns), width=width, height=sum(heights) + _LINE * (2 + len(rows)))
+    made.get_layout_engine().set(w_pad=0.01, h_pad=0.01, wspace=0.01, hspace=0.01)
+    grid = axes[0, 0].get_gridspec()
+    grid.set_height_ratios(heights)
+    for line, (name, images) in enumerate(rows):
+        first = next((image for image, brighten in zip(images, exposed, strict=True) if image is not None and brighten), None)
+        gain = 1.0 if first is None else exposure(first)
+        for column, image in enumerate(images):
+            place = axes[line, column]
+            if image is not None:
+                show(place, image * gain if exposed[column] else image)
+            _bare(place, columns[column] if line == 0 else "")
+        axes[line, 0].set_ylabel(name, rotation=0, ha="right", va="center", labelpad=4)
+    return made
+
+
+def _bare(axes: Axes, title: str) -> None:
+    axes.set_xticks([])
+    axes.set_yticks([])
+    for side in axes.spines.values():
+        side.set_visible(False)
+    if title:
+        axes.set_title(title, fontsize=LETTERS)

@@ -1,0 +1,213 @@
+"""What an item leaves behind: NAME.md, NAME.csv, NAME.png, and a record for programs, each whole or not at all.
+
+The record, `records/NAME.json`, is written last: an item is complete when it is there and says the same fingerprint. The index `README.md`
+is made of the records.
+"""
+
+import csv
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from isc_core import __version__
+from isc_core.atomic import new_file
+from isc_core.errors import InputError
+from isc_core.json_files import read_json
+
+from .claims import ABSTRACT
+from .context import Context
+from .item import Cell, Item, Made, Table, Verdict
+
+RECORDS = "records"
+_SCHEMA = 1
+_INTRODUCTION = (
+    "Every table and figure in the lists of the thesis (S. Akbar, *3D Intrinsic Scene Characteristics Extraction Framework for a Single",
+    "Image*, 2016), made again on open data by `isc thesis all`; one of them by `isc thesis table 4.5` or `isc thesis figure 4.50`.",
+    "",
+    "The thesis measures on MIT-Berkeley-UTeM, a set with rendered highlights that is not public. `isc synth glossy-mit` is its stand-in:",
+    "objects of MIT-Berkeley, or the project's own where no copy is given, under a gloss of known strength. Figures are therefore not those",
+    "of the thesis; what can be compared is which method is better, and by how much.",
+    "",
+)
+
+
+@dataclass(frozen=True)
+class Record:
+    """What is known of a written item. `fingerprint`: of the run (see `Context.fingerprint`). `files`: names beside the index, the
+    Markdown file first. `seconds`: that it took. `machine`: in words. `verdicts`: its claims."""
+
+    name: str
+    fingerprint: str
+    command: str
+    seed: int
+    version: str
+    machine: str
+    seconds: float
+    files: tuple[str, ...]
+    verdicts: tuple[Verdict, ...]
+
+
+def write_item(item: Item, made: Made, context: Context, seconds: float) -> Record:
+    """Writes the files of an item and its record; files that an earlier run left beside them are removed.
+
+    Raises `InputError` where the folder cannot be written.
+    """
+    folder, name = context.output, item.name
+    pictures = [_numbered(name, number, "png") for number in range(len(made.figures))]
+    lists = [_numbered(name, number, "csv") for number in range(len(made.tables))]
+    before = read_record(folder, name)
+    _forget(folder, name)
+    for file, figure in zip(pictures, made.figures, strict=True):
+        with new_file(folder / file) as partial:
+            figure.savefig(partial, format="png", metadata={"Software": None})
+    for file, table in zip(lists, made.tables, strict=True):
+        with new_file(folder / file) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
+            csv.writer(stream, lineterminator="\n").writerows([table.header, *table.rows])
+    record = Record(
+        name, context.fingerprint, command_of(item, context), context.seed, __version__, machine(), round(seconds, 1),
+        (f"{name}.md", *lists, *pictures), made.verdicts,
+    )  # fmt: skip
+    with new_file(folder / f"{name}.md") as partial:
+        partial.write_text(page(item, made, record, pictures, lists), encoding="utf-8")
+    for file in set(before.files if before is not None else ()) - set(record.files):
+        (folder / file).unlink(missing_ok=True)
+    with new_file(_record_path(folder, name)) as partial:
+        partial.write_text(json.dumps({"schema_version": _SCHEMA, **asdict(record)}, indent=1) + "\n", encoding="utf-8")
+    return record
+
+
+def read_record(folder: Path, name: str) -> Record | None:
+    """The record of an item, None where there is none that can be used."""
+    path = _record_path(folder, name)
+    if not path.is_file():
+        return None
+    try:
+        content: dict[str, Any] = read_json(path)
+        if content.pop("schema_version") != _SCHEMA:
+            return None
+        verdicts = tuple(Verdict(**verdict) for verdict in content.pop("verdicts"))
+        return Record(**{**content, "files": tuple(content["files"])}, verdicts=verdicts)
+    except (InputError, KeyError, TypeError, ValueError, AttributeError):
+        return None
+
+
+def is_complete(folder: Path, name: str, fingerprint: str) -> bool:
+    """Whether all files of the item are there, made by a run with this fingerprint."""
+    record = read_record(folder, name)
+    return record is not None and record.fingerprint == fingerprint and all((folder / file).is_file() for file in record.files)
+
+
+def page(item: Item, made: Made, record: Record, pictures: Sequence[str], lists: Sequence[str]) -> str:
+    """The item's Markdown."""
+    title = f"{item.kind.capitalize()} {item.number}: {item.title}"
+    parts = [f"# {title}", *(verdict_lines(verdict) for verdict in made.verdicts)]
+    if not made.verdicts:
+        parts.append("The thesis' abstract gives no claim for this.")
+    parts += [f"![{title}]({picture})" for picture in pictures]
+    parts += [part for table in made.tables for part in ((table.caption, markdown(table)) if table.caption else (markdown(table),))]
+    if made.text:
+        parts.append(made.text.strip())
+    files = ", ".join(f"[{file}]({file})" for file in lists)
+    parts.append(
+        f"Made by `{record.command}` (seed {record.seed}, ISC {record.version}, {record.machine}, {record.seconds:g} s)."
+        + (f" Numbers: {files}." if lists else "")
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def markdown(table: Table) -> str:
+    """A table in Markdown, numbers with four digits."""
+    lines = ["| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
+    return "\n".join([*lines, *("| " + " | ".join(_shown(cell) for cell in row) + " |" for row in table.rows)])
+
+
+def verdict_lines(verdict: Verdict) -> str:
+    """A claim, what was measured, and whether it holds."""
+    why = f" {verdict.why}" if verdict.why else ""
+    return f"**The thesis:** {verdict.claim} **Here:** {verdict.here} **Holds: {verdict.holds}.**{why}"
+
+
+def write_index(folder: Path, items: Sequence[Item]) -> None:
+    """Writes README.md: what there is, the verdict of every claim of the abstract, and every item."""
+    records = {item.name: record for item in items if (record := read_record(folder, item.name)) is not None}
+    with new_file(folder / "README.md") as partial:
+        partial.write_text(index(items, records), encoding="utf-8")
+
+
+def index(items: Sequence[Item], records: dict[str, Record]) -> str:
+    """The index's Markdown."""
+    made = sum(item.name in records for item in items)
+    lines = [
+        "# The thesis' tables and figures", "",
+        *_INTRODUCTION, f"{made} of {len(items)} are here.", "",
+        "## What the abstract claims", "", "| claim | here | holds | where |", "|---|---|---|---|",
+    ]  # fmt: skip
+    for claim in ABSTRACT:
+        said = [(name, verdict) for name, record in records.items() for verdict in record.verdicts if verdict.claim == claim]
+        lines += [f"| {claim} | {v.here} | {v.holds} | [{_spoken(name)}]({name}.md) |" for name, v in said] or [
+            f"| {claim} | | not measured | |"
+        ]
+    for kind in ("table", "figure"):
+        lines += ["", f"## {kind.capitalize()}s", "", "| | what | verdicts |", "|---|---|---|"]
+        lines += [_index_row(item, records.get(item.name)) for item in items if item.kind == kind]
+    return "\n".join(lines) + "\n"
+
+
+def command_of(item: Item, context: Context) -> str:
+    """What makes the item again; folders stand there by name only."""
+    words = ["isc thesis", item.kind, item.number, *(["--data ROOT"] if context.data is not None else [])]
+    words += ["--quick"] if context.quick else []
+    return " ".join([*words, *([f"--seed {context.seed}"] if context.seed else [])])
+
+
+def machine() -> str:
+    """The processor, its cores and Python, in words."""
+    return f"{_processor()}, {os.cpu_count()} cores, Python {platform.python_version()}"
+
+
+def _processor() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        return next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        pass
+    try:
+        done = subprocess.run(["sysctl", "-n", "machdep.cpu.brand_string"], capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return platform.machine()
+
+
+def _index_row(item: Item, record: Record | None) -> str:
+    title = f"[{item.number}]({item.name}.md)" if record is not None else item.number
+    state = f"not regenerable: {item.reason}" if item.make is None else "not made yet"
+    said = "; ".join(f"{verdict.holds}: {verdict.claim}" for verdict in record.verdicts) if record is not None else state
+    return f"| {title} | {item.title} | {said} |"
+
+
+def _spoken(name: str) -> str:
+    return name.replace("-", " ")
+
+
+def _shown(cell: Cell) -> str:
+    if isinstance(cell, float):
+        return f"{cell:.4g}"
+    return str(cell).replace("|", "\\|")
+
+
+def _numbered(name: str, number: int, suffix: str) -> str:
+    return f"{name}{f'-{number + 1}' if number else ''}.{suffix}"
+
+
+def _record_path(folder: Path, name: str) -> Path:
+    return folder / RECORDS / f"{name}.json"
+
+
+def _forget(folder: Path, name: str) -> None:
+    """An item that is being written is not complete."""
+    _record_path(folder, name).unlink(missing_ok=True)
