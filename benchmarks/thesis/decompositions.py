@@ -1,0 +1,39 @@
+"""Real runs of the models on subjects, kept as result folders below the output, so that items share them and a run resumes.
+
+Limits: photos without a known coding count as linear floats; where nothing exceeds 1, values of 1 are taken for clipped.
+"""
+
+import numpy as np
+
+from isc_core.decomposition import Decomposition
+from isc_core.photo import FLOAT_STEP, Photo, PhotoSource
+from isc_core.pipeline import Settings, decompose
+from isc_core.result_folder import load, save
+
+from .context import WORK, Context
+from .subjects import Subject
+
+SIZE, QUICK_SIZE = 256, 72  # pixels of an object's longer side
+
+
+def photo_of(subject: Subject) -> Photo:
+    """The subject as a photo that a model takes."""
+    bright = subject.image[subject.mask]
+    height, width = subject.mask.shape
+    clipped = subject.mask & (subject.image.max(axis=2) >= 1) & (float(bright.max()) <= 1)
+    source = PhotoSource("", (width, height), 32, "linear", "file")
+    return Photo(subject.image.astype(np.float32), subject.mask, FLOAT_STEP * float(np.quantile(bright, 0.999)), clipped, source)
+
+
+def decomposed(context: Context, subject: Subject, model: str = "mdr") -> Decomposition:
+    """What a model of `pipeline.MODELS` makes of the subject. Raises `InputError`, `Cancelled`."""
+    folder = context.output / WORK / "decompositions" / f"{subject.kind}-{subject.name}-{model}-{context.fingerprint}"
+    record = folder / "decomposition.json"
+    if record.is_file() and record.stat().st_mtime >= context.fresh_since:
+        return load(folder)
+    lit = "natural" if subject.truth is None else subject.truth.illumination
+    settings = Settings(model=model, illumination=lit, max_size=QUICK_SIZE if context.quick else SIZE, seed=context.seed, threads=2)
+    found = decompose(photo_of(subject), settings, name=subject.name, monitor=context.monitor)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    save(found, folder)
+    return load(folder)

@@ -1,0 +1,183 @@
+"""Figures of the introduction: shape from shading by the two classical methods, and images with their characteristics.
+
+The sphere and the vase are closed forms, lit by one distant light as both methods assume: brightness = max(0, n . l). The vase is
+z = sqrt(f(y)^2 - x^2) with f(y) = .15 - .1 y (6 y + 1)^2 (y - 1)^2 (3 y - 2), the one on which such methods are usually compared. Of the
+third object the true height is known, and its paint and light are what they are. Both methods are the models of `isc_core.baselines`, which
+also estimate the light.
+
+Citation: P.-S. Tsai and M. Shah (1994), doi:10.1016/0262-8856(94)90002-7; K. Ikeuchi and B. K. P. Horn (1981),
+doi:10.1016/0004-3702(81)90023-0; the vase: R. Zhang, P.-S. Tsai, J. E. Cryer and M. Shah, "Shape from shading: a survey" (1999),
+doi:10.1109/34.784284.
+
+Limits: which methods and objects the thesis shows in 1.2 and 1.3 is not known to us.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from isc_core import baselines
+from isc_core.editing.lights import toward
+from isc_core.metrics import angular_error, height_error, truth_normal
+
+from .context import Context, JsonRow
+from .decompositions import decomposed
+from .item import Item, Made, Table
+from .panels import Panel, characteristics, panels
+from .subjects import Subject
+
+LIGHT = toward(-0.4, 0.5, 1.0)
+_ALBEDO, _DARKEST = 0.8, 1e-3
+_NAMES = {"sfs-tsai-shah": "Tsai & Shah 1994", "sfs-ikeuchi-horn": "Ikeuchi & Horn 1981", "naive": "flat (doing nothing)"}
+
+
+@dataclass(frozen=True)
+class Shaded:
+    """An object whose shape is known. `image`: (H, W, 3) linear; `mask`: (H, W) bool; `height`: (H, W) pixels, NaN where unknown."""
+
+    name: str
+    image: np.ndarray
+    mask: np.ndarray
+    height: np.ndarray
+
+
+def sphere(size: int) -> Shaded:
+    """A ball that fills 90 % of a picture of `size` pixels a side, under `LIGHT`."""
+    radius = 0.45 * size
+    axis = (np.arange(size) + 0.5 - size / 2) / radius
+    x, y = np.meshgrid(axis, -axis)
+    square = 1 - x * x - y * y
+    mask = square > 0
+    z = np.sqrt(np.maximum(square, 0))
+    return _lit("sphere", np.stack([x, y, z], -1), mask, radius * z)
+
+
+def vase(size: int) -> Shaded:
+    """The vase of the survey, as high as a picture of `size` pixels a side, under `LIGHT`."""
+    x, y = np.meshgrid((np.arange(size) + 0.5) / size - 0.5, 1 - (np.arange(size) + 0.5) / size)
+    f = 0.15 - 0.1 * y * (6 * y + 1) ** 2 * (y - 1) ** 2 * (3 * y - 2)
+    slope = np.gradient(f[:, 0], y[:, 0])[:, None]
+    square = f * f - x * x
+    mask = (square > 0) & (y > 0.02) & (y < 0.98)
+    z = np.sqrt(np.maximum(square, 0))
+    # The gradient of x^2 + z^2 - f(y)^2, which needs no division where the vase turns away.
+    normal = np.stack([x, -f * slope, z], -1)
+    return _lit("vase", normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12), mask, size * z)
+
+
+def _lit(name: str, normal: np.ndarray, mask: np.ndarray, height: np.ndarray) -> Shaded:
+    shade = np.where(mask, np.maximum(normal @ LIGHT, 0), 0)
+    return Shaded(name, _ALBEDO * np.repeat(shade[..., None], 3, axis=2), mask, np.where(mask, height, np.nan))
+
+
+def shaded_objects(context: Context) -> tuple[Shaded, ...]:
+    """The sphere, the vase, and the first object of the matt ones whose height is known."""
+    size = 64 if context.quick else 160
+    found: list[Shaded] = [sphere(size), vase(size)]
+    for subject in context.subjects("matt"):
+        if subject.truth is not None:
+            height = np.where(subject.mask, subject.truth.height, np.nan)
+            return (*found, Shaded(subject.name, subject.image, subject.mask, height))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class Recovered:
+    """A method's answer. `height`: (H, W) pixels. `angle`: (H, W) degrees between true and found normals, NaN where unknown.
+    `height_share`: mean error of the height after the best offset, of the true height's range."""
+
+    height: np.ndarray
+    angle: np.ndarray
+    height_share: float
+
+    @property
+    def mean_angle(self) -> float:
+        """Degrees."""
+        return float(np.nanmean(self.angle))
+
+
+def recover(shaded: Shaded, method: str) -> Recovered:
+    """What a method of `baselines.METHODS` makes of the image. Raises `InputError` for an unknown one."""
+    log_image = np.log(np.maximum(np.where(shaded.mask[..., None], shaded.image, 1), _DARKEST * float(shaded.image.max())))
+    height = baselines.estimate(method, log_image, shaded.mask).height
+    true, found = truth_normal(shaded.height), truth_normal(height)
+    known = shaded.mask & np.isfinite(true[..., 2])
+    angle = np.full(shaded.mask.shape, np.nan)
+    angle[known] = [np.degrees(angular_error(one, other)) for one, other in zip(true[known], found[known], strict=True)]
+    share = height_error(shaded.height, height) / max(float(np.ptp(shaded.height[np.isfinite(shaded.height)])), 1e-9)
+    return Recovered(height, angle, share)
+
+
+def _errors(context: Context) -> list[JsonRow]:
+    def compute() -> list[JsonRow]:
+        rows: list[JsonRow] = []
+        for shaded in shaded_objects(context):
+            for method in _NAMES:
+                found = recover(shaded, method)
+                rows.append({"object": shaded.name, "method": method, "height": found.height_share, "angle": found.mean_angle})
+        return rows
+
+    return context.rows("shape from shading", compute)
+
+
+def _shape_from_shading(method: str, context: Context) -> Made:
+    shown = []
+    for shaded in shaded_objects(context):
+        found = recover(shaded, method)
+        low = np.nanmedian(shaded.height) - np.nanmedian(found.height[shaded.mask])
+        ends = float(np.nanmin(shaded.height)), float(np.nanmax(shaded.height))
+        shown += [
+            Panel(f"{shaded.name}: image", shaded.image, shaded.mask),
+            Panel("true height (pixels)", shaded.height, shaded.mask, ends),
+            Panel("found", found.height + low, shaded.mask, ends),
+            Panel("error of the normals (degrees)", found.angle, shaded.mask, (0, 60)),
+        ]
+    rows = _errors(context)
+    cells = [(str(r["object"]), _NAMES[str(r["method"])], float(r["height"] or 0), float(r["angle"] or 0)) for r in rows]
+    header = ("object", "method", "height error / range", "normal error (degrees)")
+    table = Table(header, tuple(cells), "Mean errors inside the mask; heights after the best offset. The light is estimated, too.")
+    own = [float(r["angle"] or 0) for r in rows if r["method"] == method]
+    flat = [float(r["angle"] or 0) for r in rows if r["method"] == "naive"]
+    better = sum(a < b for a, b in zip(own, flat, strict=True))
+    angles = ", ".join(f"{angle:.0f}" for angle in own)
+    here = f"{_NAMES[method]}: normals off by {angles} degrees; better than a flat shape on {better} of {len(own)}."
+    text = f"{here} Heights are in one scale of colours for each object. The last object's brightness is paint as well as shape."
+    return Made((table,), (panels(shown, 4),), text)
+
+
+def _characteristics(kind: str, context: Context) -> Made:
+    subject: Subject = context.subjects(kind)[0]
+    d = decomposed(context, subject)
+    errors = d.identity_errors()
+    table = Table(
+        ("identity", "largest error"),
+        (
+            ("image = diffuse + specular + residual", errors.image),
+            ("diffuse = reflectance * shading", errors.shading_product),
+            ("shading = exp(SH(normal))", errors.sh),
+            ("length of the normals = 1", errors.normal_length),
+        ),
+        f"{subject.name}: how exactly the characteristics make up the photo; of the image's largest value, relative for the shading.",
+    )
+    share = float(d.specular[d.mask].sum() / d.image[d.mask].sum())
+    state = "all identities hold" if not errors.broken() else f"broken: {'; '.join(errors.broken())}"
+    text = (
+        f"{subject.name}, the first subject of its kind, in a real run of `isc decompose --model mdr`: {100 * share:.1f} % of its "
+        f"light was found to be specular; {state}."
+    )
+    return Made((table,), (panels(characteristics(d), 4),), text)
+
+
+def _item(number: str, title: str, make: Callable[[Context], Made]) -> Item:
+    return Item("figure", number, title, make)
+
+
+ITEMS: tuple[Item, ...] = (
+    Item("figure", "1.1", "Illustration of the introduction", None, "an illustration: nothing is computed or measured in it"),
+    _item("1.2", "Shape from shading: Tsai & Shah against the truth", partial(_shape_from_shading, "sfs-tsai-shah")),
+    _item("1.3", "Shape from shading: Ikeuchi & Horn against the truth", partial(_shape_from_shading, "sfs-ikeuchi-horn")),
+    _item("1.4", "An image with significant specularity and its characteristics", partial(_characteristics, "specular")),
+    _item("1.5", "A synthetic image and its characteristics", partial(_characteristics, "synthetic")),
+)
