@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from isc_core import atomic
 from isc_core.atomic import new_file, new_folder, require_writable
 from isc_core.errors import Cancelled, InputError
 
@@ -143,13 +144,15 @@ def test_a_failure_of_the_last_step_brings_the_earlier_result_back(tmp_path: Pat
     make(tmp_path / "out", "old")
     real, calls = os.replace, []
 
-    def second_fails(source: Path, target: Path) -> None:
+    def third_fails(source: Path, target: Path) -> None:
+        """After the attempt to replace in one step and the moving aside."""
         calls.append(source)
-        if len(calls) == 2:
+        if len(calls) == 3:
             raise OSError(errno.EIO, "broken")
         real(source, target)
 
-    monkeypatch.setattr(os, "replace", second_fails)
+    monkeypatch.setattr(atomic, "_exchanged", lambda one, other: False)
+    monkeypatch.setattr(os, "replace", third_fails)
     with pytest.raises(InputError, match="broken"):
         make(tmp_path / "out", "new")
     assert everything(tmp_path) == ["out", "out/maps", "out/maps/one.bin", "out/mark.json"]

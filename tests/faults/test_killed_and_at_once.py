@@ -1,0 +1,221 @@
+"""Writing by several processes at once, and after some were killed: one whole result, and nothing left behind."""
+
+import ctypes
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from isc_core import atomic
+from isc_core.atomic import new_file, new_folder, unfinished
+from isc_core.errors import InputError
+
+ROOT = Path(__file__).resolve().parents[2]
+OURS = ("mark.json", "data.bin")
+KILLED = """
+import os, signal, sys
+from isc_core import atomic
+from isc_core.atomic import new_file, new_folder
+{before}
+with {kind}(sys.argv[1]{ours}) as partial:
+    (partial / "mark.json" if partial.is_dir() else partial).write_text("half")
+    {inside}
+"""
+KILL = "os.kill(os.getpid(), signal.SIGKILL)"
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="needs locks of files and signals")
+
+
+def make(folder: Path, content: str) -> None:
+    with new_folder(folder, OURS) as partial:
+        (partial / "mark.json").write_text(content)
+        (partial / "data.bin").write_text(content)
+
+
+def killed(target: Path, *, kind: str = "new_folder", before: str = "", inside: str = KILL) -> None:
+    """A process that is killed by force while it writes `target`."""
+    script = KILLED.format(kind=kind, before=before, inside=inside, ours=f", {OURS!r}" if kind == "new_folder" else "")
+    done = subprocess.run([sys.executable, "-c", script, str(target)], cwd=ROOT, check=False, timeout=60)
+    assert done.returncode == -signal.SIGKILL
+
+
+@posix
+def test_what_a_killed_process_left_is_removed_by_the_next(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    make(target, "old")
+    killed(target)
+    assert len(unfinished(target)) == 1 and (target / "mark.json").read_text() == "old"
+    make(target, "new")
+    assert (target / "mark.json").read_text() == "new"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@posix
+def test_the_same_for_a_file(tmp_path: Path) -> None:
+    target = tmp_path / "table.json"
+    killed(target, kind="new_file")
+    assert len(unfinished(target)) == 1 and not target.exists()
+    with new_file(target) as partial:
+        partial.write_text("new")
+    assert target.read_text() == "new"
+    assert [path.name for path in tmp_path.iterdir()] == ["table.json"]
+
+
+@posix
+def test_a_process_killed_between_two_renames_loses_nothing(tmp_path: Path) -> None:
+    """Where the system cannot exchange two names in one step."""
+    target = tmp_path / "out"
+    make(target, "old")
+    before = f"""
+atomic._exchanged = lambda one, other: False
+real = os.replace
+def replace(source, target):
+    real(source, target)
+    if str(target).endswith(".old"):
+        {KILL}
+os.replace = replace
+"""
+    killed(target, before=before, inside="(partial / 'data.bin').write_text('half')")
+    assert not target.exists() and {path.suffix for path in unfinished(target)} == {".old", ".partial"}
+    with pytest.raises(ZeroDivisionError), new_folder(target, OURS):
+        raise ZeroDivisionError  # whatever becomes of the next one that writes there, the old one is back
+    assert (target / "mark.json").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@posix
+def test_leftovers_inside_a_result_do_not_keep_it_from_being_replaced(tmp_path: Path) -> None:
+    """`isc arrays` writes one file into a result; killed, it leaves a temporary one there."""
+    target = tmp_path / "out"
+    make(target, "old")
+    killed(target / "data.bin", kind="new_file")
+    assert len(unfinished(target / "data.bin")) == 1
+    make(target, "new")
+    assert sorted(path.name for path in target.iterdir()) == ["data.bin", "mark.json"]
+
+
+def test_the_one_at_work_is_left_alone(tmp_path: Path) -> None:
+    target = tmp_path / "out"
+    with new_folder(target, OURS) as first:
+        (first / "mark.json").write_text("first")
+        make(target, "second")
+        assert first.is_dir() and (target / "mark.json").read_text() == "second"
+    assert (target / "mark.json").read_text() == "first", "the last one to end stands there"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def hammered(target: Path, write: Callable[[str], None], read: Callable[[], set[str]], times: int) -> list[str]:
+    """Several threads write `target` at once, and one reads it; what readers saw that was not whole, and what was refused."""
+    trouble: list[str] = []
+    done = threading.Event()
+
+    def writer(name: str) -> None:
+        for number in range(times):
+            try:
+                write(f"{name}{number}")
+            except InputError as error:
+                trouble.append(str(error))
+
+    def reader() -> None:
+        while not done.is_set():
+            try:
+                seen = read()
+            except FileNotFoundError:
+                continue  # a folder may be replaced between two looks into it
+            if len(seen) != 1:
+                trouble.append(f"half: {seen}")
+
+    with ThreadPoolExecutor(5) as pool:
+        reading = pool.submit(reader)
+        for future in [pool.submit(writer, name) for name in "abcd"]:
+            future.result()
+        done.set()
+        reading.result()
+    return trouble
+
+
+def test_many_writers_of_one_folder_all_succeed(tmp_path: Path) -> None:
+    target = tmp_path / "deep" / "out"
+
+    def read() -> set[str]:
+        descriptor = os.open(target, os.O_RDONLY)  # one folder, whatever bears the name meanwhile
+        try:
+            names = [os.open(name, os.O_RDONLY, dir_fd=descriptor) for name in OURS]
+        finally:
+            os.close(descriptor)
+        texts = set()
+        for name in names:
+            with open(name) as file:
+                texts.add(file.read())
+        return texts
+
+    if os.open not in os.supports_dir_fd or not hasattr(ctypes.CDLL(None), "renameat2"):
+        pytest.skip("needs folders that can be held open and exchanged")
+    assert hammered(target, lambda text: make(target, text), read, 12) == []
+    assert [path.name for path in target.parent.iterdir()] == ["out"]
+
+
+def test_many_writers_of_one_file_all_succeed(tmp_path: Path) -> None:
+    target = tmp_path / "deep" / "table.json"
+
+    def write(text: str) -> None:
+        with new_file(target) as partial:
+            partial.write_text(50 * f"{text} ")
+
+    assert hammered(target, write, lambda: set(target.read_text().split()), 12) == []
+    assert [path.name for path in target.parent.iterdir()] == ["table.json"]
+
+
+def test_two_steps_replace_as_well(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(atomic, "_exchanged", lambda one, other: False)
+    make(tmp_path / "out", "old")
+    make(tmp_path / "out", "new")
+    assert (tmp_path / "out" / "mark.json").read_text() == "new"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+def test_a_disk_without_locks_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(atomic, "fcntl", None)
+    (tmp_path / atomic._sibling(tmp_path / "out", 0, "partial").name).mkdir()
+    make(tmp_path / "out", "old")
+    make(tmp_path / "out", "new")
+    assert (tmp_path / "out" / "mark.json").read_text() == "new"
+    assert len(unfinished(tmp_path / "out")) == 1, "whose that is cannot be told"
+
+
+@pytest.mark.parametrize("length", [200, 240, 255])
+def test_a_name_may_be_as_long_as_the_disk_allows(tmp_path: Path, length: int) -> None:
+    name = "n" * length
+    make(tmp_path / name, "new")
+    with new_file(tmp_path / name / name) as partial:
+        partial.write_text("long")
+    assert (tmp_path / name / name).read_text() == "long"
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_a_device_is_never_replaced() -> None:
+    if not Path("/dev/null").exists():
+        pytest.skip("there are no devices here")
+    with pytest.raises(InputError, match="not a regular file"), new_file("/dev/null"):
+        pass
+    assert Path("/dev/null").is_char_device()
+
+
+def test_what_reaches_the_disk_only_at_the_end_may_fail_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Network disks and quotas say at the end only that there was no room."""
+
+    def full(descriptor: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    make(tmp_path / "out", "old")
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(InputError, match="no space is left"):
+        make(tmp_path / "out", "new")
+    assert (tmp_path / "out" / "mark.json").read_text() == "old"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
