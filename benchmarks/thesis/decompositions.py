@@ -13,8 +13,6 @@ from isc_core.result_folder import load, save
 from .context import WORK, Context
 from .subjects import Subject
 
-SIZE, QUICK_SIZE = 256, 72  # pixels of an object's longer side
-
 
 def photo_of(subject: Subject) -> Photo:
     """The subject as a photo that a model takes."""
@@ -26,13 +24,13 @@ def photo_of(subject: Subject) -> Photo:
 
 
 def decomposed(context: Context, subject: Subject, model: str = "mdr") -> Decomposition:
-    """What a model of `pipeline.MODELS` makes of the subject. Raises `InputError`, `Cancelled`."""
+    """What a model of `pipeline.MODELS` makes of the subject, pixel by pixel. Raises `InputError`, `Cancelled`."""
     folder = context.output / WORK / "decompositions" / f"{subject.kind}-{subject.name}-{model}-{context.fingerprint}"
     record = folder / "decomposition.json"
     if record.is_file() and record.stat().st_mtime >= context.fresh_since:
         return load(folder)
     lit = "natural" if subject.truth is None else subject.truth.illumination
-    settings = Settings(model=model, illumination=lit, max_size=QUICK_SIZE if context.quick else SIZE, seed=context.seed, threads=2)
+    settings = Settings(model=model, illumination=lit, max_size=0, seed=context.seed, threads=2)
     found = decompose(photo_of(subject), settings, name=subject.name, monitor=context.monitor)
     folder.parent.mkdir(parents=True, exist_ok=True)
     save(found, folder)
