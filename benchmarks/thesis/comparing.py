@@ -43,7 +43,8 @@ def gain(claim: str, claimed: float, found: Ratio | None, what: str) -> Verdict:
     the interval holds no difference but not the claim. Where it holds both, nobody can tell."""
     if found is None:
         return Verdict(claim, "-", "cannot be told", "fewer than two subjects with an error")
-    here = f"{what} {100 * (1 - found.ratio):.1f} % lower ({100 * (1 - found.high):.1f} to {100 * (1 - found.low):.1f} %)"
+    change = f"{100 * abs(1 - found.ratio):.1f} % {'lower' if found.ratio <= 1 else 'higher'}"
+    here = f"{what} {change}: {in_words(found)} of what it is compared with"
     if found.high >= 1 and found.low <= 1 - claimed:
         return Verdict(claim, here, "cannot be told", "too few subjects: the interval holds the claim, and no difference as well")
     if found.high >= 1:

@@ -45,7 +45,7 @@ def verdict(runs: Runs, layer: Layer, seed: int) -> Verdict:
     ours = means(runs[_BOTH], layer[0])
     rivals = [means(runs[way.label], layer[0]) for way in RIVALS[:2]]
     both = {name: (rivals[0][name] * rivals[1][name]) ** 0.5 for name in rivals[0] if name in rivals[1]}
-    judged = gain(claim, share, ratio(ours, both, seed), "than CS and the iterative method, both improved:")
+    judged = gain(claim, share, ratio(ours, both, seed), "MSE, against CS and the iterative method, both improved,")
     published = [in_words(ratio(ours, means(runs[way.label], layer[0]), seed)) for way in RIVALS[2:]]
     why = f"{judged.why}; " if judged.why else ""
     return Verdict(
