@@ -228,7 +228,7 @@ def _error(true: np.ndarray, found: np.ndarray) -> float:
 def _specular_free(context: Context) -> Made:
     subjects = with_layers((*context.subjects("specular"), *context.subjects("synthetic")))
     kinds = (PHOTO, *KINDS, DARK)
-    cells = [(one.name, *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects]
+    cells: list[tuple[str | int | float, ...]] = [(one.name, *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects]
     table = Table(
         ("subject", *(kind.name for kind in kinds)), tuple(cells), "Share of the highlights' light that is left in each image (%)."
     )
