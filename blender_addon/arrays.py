@@ -6,15 +6,15 @@ mask, colours are linear Rec.709, vectors stand in the camera's frame (x right, 
 Limits: a file of another version, or a damaged one, is refused; nothing is repaired.
 """
 
-import json
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
 
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.json_files import read_json
+from isc_core.numpy_files import read_arrays
 
 ARRAYS, DESCRIPTION = "arrays.npz", "decomposition.json"
 
@@ -118,24 +118,12 @@ def read_result(folder: Path | str) -> Result:
     description = _read_description(folder / DESCRIPTION)
     if not (folder / ARRAYS).is_file():
         raise InputError(f"{folder} has no {ARRAYS}: run `isc arrays` on it, or decompose with --arrays")
-    try:
-        with np.load(folder / ARRAYS, allow_pickle=False) as file:
-            held = {name: file[name] for name in file.files}
-    except OSError as error:
-        raise InputError(f"cannot read {folder / ARRAYS}: {error.strerror or error}") from error
-    except (ValueError, KeyError, EOFError, BadZipFile) as error:
-        raise InputError(f"{folder / ARRAYS} is damaged ({error}): decompose the photo again") from error
-    values = _checked(held, folder / ARRAYS)
+    values = _checked(read_arrays(folder / ARRAYS), folder / ARRAYS)
     return Result(**values, description=description, folder=folder)
 
 
 def _read_description(path: Path) -> dict[str, Any]:
-    try:
-        description = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read {path} ({error.strerror}): give the folder that isc decompose wrote") from error
-    except ValueError as error:
-        raise InputError(f"{path} is damaged ({error}): decompose the photo again") from error
+    description = read_json(path, "decompose the photo again")
     parts = [description.get(name, {}) for name in ("input", "settings", "status")] if isinstance(description, dict) else [None]
     if not all(isinstance(part, dict) for part in parts):
         raise InputError(f"{path} is not the description of a result: decompose the photo again")

@@ -8,16 +8,14 @@ from shading", doi:10.1109/TPAMI.2014.2377712.
 In natural light `image = shading * reflectance` exactly (it is rendered); in the laboratory only to a few per cent.
 """
 
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
-import scipy.io
-from scipy.io.matlab import MatReadError
 
 from .errors import InputError
+from .mat_files import read_matrix
+from .photo import read_raster
 
 ILLUMINATIONS = ("natural", "laboratory")
 INPUTS = ("diffuse", "original")
@@ -114,20 +112,10 @@ def _folder(root: Path, illumination: str) -> Path:
     raise InputError(f"{root} has no folder {' or '.join(_FOLDERS[illumination])}: give the folder that contains the MIT-Berkeley set")
 
 
-def _bytes(path: Path) -> bytes:
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot read {path} ({error.strerror}): is the data set complete?") from error
-
-
 def _pixels(path: Path) -> np.ndarray:
-    """A PNG's stored values, (h, w) or (h, w, 3) in RGB order."""
-    data = _bytes(path)
-    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED) if data else None
-    if pixels is None:
-        raise InputError(f"{path} is not a readable image: fetch the data set again")
-    return pixels if pixels.ndim == 2 else pixels[:, :, 2::-1]
+    """An image's stored values, (h, w) or (h, w, 3) in RGB order."""
+    values = read_raster(path).values
+    return values[..., 0] if values.shape[2] == 1 else values
 
 
 def _colour(path: Path) -> np.ndarray:
@@ -138,20 +126,8 @@ def _colour(path: Path) -> np.ndarray:
 
 
 def _matrix(path: Path, *keys: str) -> np.ndarray:
-    """A float64 array of a MAT file (version 5 to 7): the variable `keys[0]`, then its fields."""
-    if not path.is_file():
-        raise InputError(f"cannot read {path} (no such file): is the data set complete?")
-    try:
-        value = scipy.io.loadmat(path, variable_names=keys[:1], simplify_cells=True)[keys[0]]
-        for key in keys[1:]:
-            value = value[key]
-        return np.array(value, dtype=np.float64)
-    except NotImplementedError as error:
-        raise InputError(f"{path} is a MATLAB 7.3 file: save it with '-v7' and try again") from error
-    except (KeyError, IndexError) as error:
-        raise InputError(f"{path} lacks '{'.'.join(keys)}': is it the file of the data set?") from error
-    except (OSError, EOFError, ValueError, TypeError, MatReadError, zlib.error) as error:
-        raise InputError(f"{path} is not a readable MATLAB file: fetch the data set again") from error
+    """A float64 array of a MAT file: the variable `keys[0]`, then its fields; sides of length 1 are dropped."""
+    return np.squeeze(read_matrix(path, *keys)).astype(np.float64)
 
 
 def _shading(folder: Path, illumination: str, crop: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
@@ -164,7 +140,8 @@ def _shading(folder: Path, illumination: str, crop: tuple[np.ndarray, np.ndarray
 
 def _crop(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """The rows and columns of the evaluation crop, from 1-based lists to 0-based ones."""
-    rows, columns = (np.atleast_1d(_matrix(path, key)).ravel().astype(np.int64) - 1 for key in ("crop_idx1", "crop_idx2"))
+    with np.errstate(invalid="ignore"):  # what is no number lies outside of any picture
+        rows, columns = (np.atleast_1d(_matrix(path, key)).ravel().astype(np.int64) - 1 for key in ("crop_idx1", "crop_idx2"))
     return rows, columns
 
 
@@ -173,6 +150,6 @@ def _cut(full: np.ndarray, crop: tuple[np.ndarray, np.ndarray], channels: int, p
     if full.shape[2:] != ((channels,) if channels > 1 else ()) or full.ndim < 2:
         raise InputError(f"{path}: shape {full.shape} where {channels} channel(s) were expected: is it the file of the data set?")
     for indices, size in zip(crop, full.shape[:2], strict=True):
-        if indices.size == 0 or indices.min() < 0 or indices.max() >= size:
+        if not 0 < indices.size <= size or indices.min() < 0 or indices.max() >= size:
             raise InputError(f"{path}: its {full.shape[1]} x {full.shape[0]} pixels do not hold the crop: is it a file of the data set?")
     return np.ascontiguousarray(full[np.ix_(*crop)])

@@ -1,6 +1,5 @@
 """Reading what is known of a scene beforehand: height maps and lights, from the files that people and programs have them in."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,9 @@ import numpy as np
 
 from .errors import InputError
 from .exr import read_channels
+from .json_files import read_json
 from .limits import USUAL, Limits
+from .numpy_files import read_array
 from .photo import read_raster
 from .result_folder import load
 from .sirfs.resampling import nearest_samples
@@ -44,17 +45,12 @@ def read_light(path: str | Path) -> np.ndarray:
     """
     path = Path(path)
     path = path / "decomposition.json" if path.is_dir() else path
-    try:
-        found: Any = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"cannot read the light {path}: {error.strerror}") from error
-    except (ValueError, RecursionError) as error:  # not JSON, or not UTF-8
-        raise InputError(f"{path} is not a JSON file: a light is a decomposition.json or 9 lists of 3 numbers") from error
+    found: Any = read_json(path, "a light is a decomposition.json or 9 lists of 3 numbers")
     for key in ("illumination", "coefficients"):
         found = found[key] if isinstance(found, dict) and key in found else found
     try:
         light = np.array(found, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         light = np.zeros(0)
     if light.shape != (9, 3) or not np.isfinite(light).all():
         raise InputError(f"{path} holds no light: 9 lists of 3 numbers are needed, red, green and blue of each spherical harmonic")
@@ -69,9 +65,9 @@ def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
     except OSError as error:
         raise InputError(f"cannot read the height map {path}: {error.strerror}") from error
     if start.startswith(_EXR):
-        return _of_exr(path), 1.0
+        return _of_exr(path, limits), 1.0
     if start.startswith(_NUMPY):
-        return _of_numpy(path), 1.0
+        return _of_numpy(path, limits), 1.0
     raster = read_raster(path, limits)
     if raster.values.shape[2] != 1 or raster.bit_depth < 16:
         raise InputError(f"{path}: a height map has one channel of 16 bits or more: save it as a grey 16-bit PNG, a TIFF, an EXR or .npy")
@@ -79,8 +75,8 @@ def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
     return (values, 1.0) if raster.peak is None else (np.where(values > 0, values, np.nan), CODE)
 
 
-def _of_exr(path: Path) -> np.ndarray:
-    channels = read_channels(path)
+def _of_exr(path: Path, limits: Limits) -> np.ndarray:
+    channels = read_channels(path, limits)
     name = next((name for name in _CHANNELS if name in channels), next(iter(channels)) if len(channels) == 1 else None)
     if name is None:
         raise InputError(f"{path}: has no channel Y, Z or height.Z but {', '.join(list(channels)[:8])}: save the height as one of these")
@@ -89,11 +85,8 @@ def _of_exr(path: Path) -> np.ndarray:
     return height if inside is None or name != "height.Z" else np.where(inside > 0.5, height, np.nan)
 
 
-def _of_numpy(path: Path) -> np.ndarray:
-    try:
-        values = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"{path} is damaged or holds objects: save a plain array of numbers with numpy.save") from error
+def _of_numpy(path: Path, limits: Limits) -> np.ndarray:
+    values = read_array(path, limits)
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise InputError(f"{path} holds {values.dtype} of shape {values.shape}: a height map is one array (H, W) of numbers")
     return values.astype(np.float64)

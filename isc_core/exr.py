@@ -5,6 +5,7 @@ Channels keep their full names (`diffuse.R`, `height.Z`); compression is lossles
 
 import errno
 import shutil
+import struct
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -12,8 +13,9 @@ import numpy as np
 import OpenEXR
 
 from .errors import InputError
-
-_FULL = 1 << 20  # a disk with less free space than this, in bytes, is called full
+from .exr_header import check_exr
+from .limits import USUAL, Limits
+from .memory_files import named
 
 
 def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
@@ -21,20 +23,25 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
     # The writer stores garbage from strided arrays without a word: every channel is made contiguous here.
     pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    try:
-        with OpenEXR.File(header, pixels) as file:
-            file.write(str(path))
-    except RuntimeError as error:
-        full = shutil.disk_usage(path.parent).free < _FULL
-        raise OSError(errno.ENOSPC if full else errno.EIO, str(error)) from error
+    with named() as place:
+        try:
+            with OpenEXR.File(header, pixels) as file:
+                file.write(str(place))
+        except RuntimeError as error:
+            raise OSError(errno.EIO, str(error)) from error
+        shutil.copyfile(place, path)
 
 
-def read_channels(path: Path) -> dict[str, np.ndarray]:
+def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
     """All channels of a file's first part: name -> (H, W) float32. Raises `InputError` if it is no readable OpenEXR file."""
     if not path.is_file():
         raise InputError(f"{path} does not exist")
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as file:
+        data = path.read_bytes()
+        check_exr(data, path, limits)
+        with named(data) as place, OpenEXR.File(str(place), separate_channels=True) as file:
             return {name: np.asarray(channel.pixels, np.float32) for name, channel in file.channels().items()}
-    except (RuntimeError, ValueError) as error:
+    except InputError:
+        raise
+    except (RuntimeError, ValueError, TypeError, KeyError, OSError, OverflowError, MemoryError, struct.error) as error:
         raise InputError(f"{path} is not a readable OpenEXR file (damaged or cut short)") from error

@@ -6,12 +6,21 @@ from typing import Any
 
 from .errors import InputError
 
+MOST_BYTES = 1 << 28
 
-def read_json(path: Path) -> Any:
-    """What the file holds; the caller looks at whether that is what it expects. Raises `InputError` where it is not readable JSON."""
+
+def read_json(path: Path, remedy: str = "write it again") -> Any:
+    """What the file holds; the caller looks at whether that is what it expects.
+
+    Raises `InputError`, its line ended by `remedy`, where it is not readable JSON or larger than 256 MB.
+    """
     try:
+        if (size := path.stat().st_size) > MOST_BYTES:
+            raise InputError(f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB of JSON are read: is it the right file?")
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror}") from error
-    except ValueError as error:  # not JSON, or not UTF-8
-        raise InputError(f"{path} is damaged: {error}") from error
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested without end
+        raise InputError(f"{path} is damaged or no JSON ({str(error)[:200]}): {remedy}") from error

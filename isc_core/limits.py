@@ -17,11 +17,13 @@ from .errors import InputError
 class Limits:
     """What is read of one file at most.
 
-    `max_pixels`: width x height of a picture. `max_bytes`: of values in memory, once unpacked, for pictures and arrays alike.
+    `max_pixels`: width x height of a picture. A file may unpack to `max_bytes` bytes of values, or to `max_ratio` times its own size,
+    whichever is more: large files hold what they hold, small ones that unpack to much are bombs.
     """
 
     max_pixels: int = 100_000_000
-    max_bytes: int = 1 << 31
+    max_bytes: int = 1 << 30
+    max_ratio: int = 20
 
     def check_pixels(self, path: Path | str, width: int, height: int) -> None:
         """Raises `InputError` for a picture of more pixels."""
@@ -29,10 +31,11 @@ class Limits:
             most = f"{self.max_pixels / 1e6:g} megapixels"
             raise InputError(f"{path}: {width} x {height} pixels; at most {most} are read: make it smaller, or raise --max-pixels")
 
-    def check_bytes(self, path: Path | str, count: int) -> None:
-        """Raises `InputError` for a file whose values take more bytes of memory than `max_bytes`."""
-        if count > self.max_bytes:
-            raise InputError(f"{path}: unpacks to {count / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are read: store less in it")
+    def check_unpacked(self, path: Path | str, unpacked: int, stored: int) -> None:
+        """Raises `InputError` for a file of `stored` bytes whose values would take more than it may, `unpacked` bytes."""
+        most = max(self.max_bytes, self.max_ratio * stored)
+        if unpacked > most:
+            raise InputError(f"{path}: unpacks to {unpacked / 1e9:.1f} GB, at most {most / 1e9:.1f} are read: store less in it")
 
 
 USUAL = Limits()

@@ -17,6 +17,7 @@ import errno
 import functools
 import hashlib
 import io
+import math
 import os
 import re
 import struct
@@ -35,7 +36,10 @@ from scipy import sparse
 
 from .box import mask_slices
 from .errors import InputError
+from .exr_header import check_exr, size_of
 from .limits import USUAL, Limits
+from .memory_files import named
+from .numpy_files import array_header
 
 TRANSFERS = ("auto", "srgb", "linear")
 MAX_ASPECT = 100
@@ -45,7 +49,10 @@ BLACK = 2.0 / 255.0
 FLOAT_STEP = 2.0**-14
 
 _ORIENTATION_TAG = 0x0112
-_DECODING_ERRORS = (OSError, SyntaxError, ValueError, IndexError, KeyError, RuntimeError, EOFError, struct.error, zlib.error, cv2.error)
+_DECODING_ERRORS = (
+    OSError, SyntaxError, ValueError, TypeError, IndexError, KeyError, RuntimeError, EOFError, OverflowError, MemoryError,
+    struct.error, zlib.error, cv2.error, Image.DecompressionBombError,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -592,11 +599,11 @@ def _read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
 
 def _read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     """The RGB or Y channels, and A, which EXR colours are premultiplied by; the frame is the display window, black without data."""
-    for part in OpenEXR.File(str(path), header_only=True).parts:
-        for window in ("dataWindow", "displayWindow"):
-            low, high = part.header[window]
-            _check_size(path, limits, *(int(n) for n in high - low + 1))
-    parts = OpenEXR.File(str(path), separate_channels=True).parts
+    for claimed in check_exr(data, path, limits):
+        for window in (claimed.data, claimed.display):
+            _check_size(path, limits, *size_of(window))
+    with named(data) as place:
+        parts = OpenEXR.File(str(place), separate_channels=True).parts
     if not parts:
         raise ValueError("the pixels cannot be read")
     layer = "{0}.{1}" if len(parts) > 1 else "{1}"
@@ -642,16 +649,13 @@ def _in_display_window(pixels: np.ndarray, header: dict[str, Any]) -> np.ndarray
 
 def _read_npy(data: bytes, path: Path, limits: Limits) -> Raster:
     """(H, W), (H, W, 1), (H, W, 3) or (H, W, 4), alpha last and not multiplied in. The header alone says how much is to come."""
-    stream = io.BytesIO(data)
-    version = np.lib.format.read_magic(stream)
-    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape, by_columns, kind = read_header(stream)
+    shape, by_columns, kind, start = array_header(data)
     if len(shape) not in (2, 3) or shape[2:] not in ((), (1,), (3,), (4,)):
         raise InputError(f"{path}: an array of shape {shape}: a photo is (H, W, 3), or (H, W, 4) with alpha, a mask (H, W)")
     if kind.kind not in "fbu" or kind.itemsize > 8 or (kind.kind == "u" and kind.itemsize > 2):
         raise InputError(f"{path}: values of type {kind}: give floats of linear light, codes of 8 or 16 bits (uint8, uint16), or bool")
     _check_size(path, limits, shape[1], shape[0])
-    stored = np.frombuffer(data, kind, int(np.prod(shape)), stream.tell()).reshape(shape, order="F" if by_columns else "C")
+    stored = np.frombuffer(data, kind, math.prod(shape), start).reshape(shape, order="F" if by_columns else "C")
     if kind.kind == "f":
         return _raster_of_codes(stored.astype(np.float32), 0)
     stored = stored.astype(f"u{kind.itemsize}") * np.uint8(255 if kind.kind == "b" else 1)

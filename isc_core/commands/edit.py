@@ -24,6 +24,7 @@ from ..editing.spheres import render_sphere, sphere_normals
 from ..errors import InputError
 from ..evidence_files import read_light
 from ..limits import Limits
+from ..numpy_files import read_array
 from ..photo import TRANSFERS, linear_to_srgb, read_linear, read_photo, read_raster, srgb_to_linear
 from ..progress import Monitor
 from ..report import Panel
@@ -217,10 +218,7 @@ def _new_light(d: Decomposition, options: argparse.Namespace, rotation: np.ndarr
 def _read_coefficients(path: Path) -> np.ndarray:
     if path.suffix.lower() != ".npy":
         return read_light(path)
-    try:
-        light = np.load(path, allow_pickle=False)
-    except (OSError, ValueError, EOFError) as error:
-        raise InputError(f"cannot read the light {path}: it is missing, damaged or no plain array") from error
+    light = read_array(path)
     if light.shape != (9, 3) or light.dtype.kind not in "fiu" or not np.isfinite(light).all():
         raise InputError(f"{path} holds no light: an array of 9 x 3 numbers is needed")
     return light.astype(float)

@@ -26,13 +26,13 @@ import importlib.resources
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import IO
 
 import numpy as np
 from scipy import ndimage
 
 from ..box import mask_slices
 from ..errors import InputError
+from ..numpy_files import parse_arrays
 from .smoothing import masked_gaussian
 
 WIDTHS = (0.006, 0.015, 0.04)  # of the object's diagonal
@@ -84,24 +84,23 @@ def bin_edges() -> np.ndarray:
 def shipped_table() -> FilterTable:
     """The table that comes with the package."""
     resource = importlib.resources.files(__package__.rpartition(".")[0]) / "data" / "filter_statistics.npz"
-    with resource.open("rb") as file:
-        return _read(file, "the shipped table")
+    return _read(resource.read_bytes(), "the shipped table")
 
 
 def read_table(path: str | Path) -> FilterTable:
     """A table that `benchmarks.filter_statistics fit` wrote. Raises `InputError` for a file that is none."""
     try:
-        with Path(path).open("rb") as file:
-            return _read(file, str(path))
+        data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    return _read(data, str(path))
 
 
-def _read(file: IO[bytes], name: str) -> FilterTable:
+def _read(data: bytes, name: str) -> FilterTable:
     try:
-        with np.load(file, allow_pickle=False) as data:
-            spread, without, highlight, temperature = (np.asarray(data[key], float) for key in _ARRAYS)
-    except (ValueError, KeyError, EOFError) as error:
+        arrays = parse_arrays(data, name)
+        spread, without, highlight, temperature = (np.asarray(arrays[key], float) for key in _ARRAYS)
+    except (ValueError, KeyError) as error:
         raise InputError(f"{name} is no table of filter statistics: fit one with benchmarks.filter_statistics") from error
     shape = (len(FILTERS), BINS)
     fit = spread.shape == shape[:1] and without.shape == shape and highlight.shape == shape and temperature.shape == ()

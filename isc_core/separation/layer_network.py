@@ -24,6 +24,7 @@ import numpy as np
 
 from ..box import mask_slices
 from ..errors import InputError
+from ..numpy_files import read_arrays
 from ..photo import averaged
 from .enlarging import enlarged
 from .smoothing import masked_gaussian
@@ -104,10 +105,10 @@ def shipped_network() -> LayerNetwork:
 def read_network(path: Path) -> LayerNetwork:
     """An archive of float16 or float32 arrays `weight00`, `bias00`, ... Raises `InputError` for a file that is none."""
     try:
-        with np.load(path, allow_pickle=False) as data:
-            count = sum(name.startswith("weight") for name in data.files)
-            weights, biases = ([data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count)] for kind in ("weight", "bias"))
-    except (OSError, ValueError, KeyError) as error:
+        data = read_arrays(path)
+        count = sum(name.startswith("weight") for name in data)
+        weights, biases = ([data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count)] for kind in ("weight", "bias"))
+    except (ValueError, KeyError) as error:
         raise InputError(f"{path} holds no layer network: {error}") from error
     return LayerNetwork(tuple(weights), tuple(biases))
 

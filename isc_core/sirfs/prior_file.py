@@ -5,7 +5,6 @@ import importlib.resources
 import io
 import json
 import zipfile
-import zlib
 from pathlib import Path
 from typing import IO
 
@@ -13,6 +12,7 @@ import numpy as np
 
 from ..atomic import new_file
 from ..errors import InputError
+from ..numpy_files import parse_arrays
 from .fitting.absolute_table import CoarseTable
 from .fitting.color_mixture import ColorScaleMixture
 from .fitting.lights import Contrast, GaussianLight
@@ -89,12 +89,9 @@ def _write_archive(file: IO[bytes], arrays: dict[str, np.ndarray]) -> None:
 
 def _parse(data: bytes, source: str) -> PriorSet:
     problem = InputError(f"{source} is damaged or not a file of priors: give a file that 'isc fit-priors' wrote")
-    if not data.startswith(b"PK"):
-        raise problem
     try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-    except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+        arrays = parse_arrays(data, source)
+    except InputError as error:
         raise problem from error
     return _Reader(arrays, source).prior_set()
 
@@ -184,5 +181,5 @@ class _Reader:
         try:
             record = json.loads(str(self.array("record")))
             return FitRecord(tuple(record["objects"]), Contrast(**record["natural_contrast"]), dict(record["options"]))
-        except (ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise self.wrong("its record of the fit is damaged") from error

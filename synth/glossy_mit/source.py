@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import scipy.io
 
 from isc_core.datasets import ILLUMINATIONS, load_object
 from isc_core.errors import InputError
+from isc_core.mat_files import read_matrix
 from isc_core.metrics import truth_normal
 from isc_core.photo import read_raster
 from isc_core.sirfs.frames import light_from_reference
@@ -53,8 +53,7 @@ def load_source(root: Path, name: str) -> Source:
     truths = {illumination: load_object(root, name, illumination) for illumination in ILLUMINATIONS}
     truth = truths["laboratory"]
     folder = next(path for path in (root / "laboratory" / name, root / "MIT-Berkeley-Laboratory" / name) if path.is_dir())
-    crop = scipy.io.loadmat(folder / "crop_idx.mat")
-    rows, columns = (crop[key].ravel().astype(int) - 1 for key in ("crop_idx1", "crop_idx2"))
+    rows, columns = (read_matrix(folder / "crop_idx.mat", key).ravel().astype(int) - 1 for key in ("crop_idx1", "crop_idx2"))
     normal = truth_normal(truth.height)
     frame = read_raster(folder / "mask.png").values.shape
     mask = truth.mask & np.isfinite(normal).all(-1) & (truth.reflectance > 0).all(-1)

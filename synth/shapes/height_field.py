@@ -11,16 +11,15 @@ the MIT-Berkeley objects, `Z.mat`).
 Limits: one side only, open at the rim and behind. Steps between neighbouring pixels become steep walls, not gaps.
 """
 
-import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import scipy.io
-from scipy.io.matlab import MatReadError
 
 from isc_core.errors import InputError
 from isc_core.exr import read_channels
+from isc_core.mat_files import read_matrix
+from isc_core.numpy_files import ARCHIVE, read_array
 from synth.camera import LARGEST, SMALLEST, Camera
 from synth.meshes import Mesh
 
@@ -166,24 +165,14 @@ def _coordinates(where: np.ndarray, known: np.ndarray, half: float) -> np.ndarra
 
 
 def _read_mat(path: Path) -> np.ndarray:
-    try:
-        return np.asarray(scipy.io.loadmat(path, variable_names=["depth"])["depth"])
-    except NotImplementedError as error:
-        raise InputError(f"{path} is a MATLAB 7.3 file: save it with '-v7' and try again") from error
-    except KeyError as error:
-        raise InputError(f"{path} has no variable 'depth': give the Z.mat of an object") from error
-    except (OSError, EOFError, ValueError, TypeError, IndexError, MatReadError, zlib.error) as error:
-        raise InputError(f"{path} is not a readable MATLAB file: save it again") from error
+    return read_matrix(path, "depth")
 
 
 def _read_npy(path: Path) -> np.ndarray:
-    try:
-        stored = np.load(path, mmap_mode="r", allow_pickle=False)
-    except (OSError, EOFError, ValueError) as error:
-        raise InputError(f"{path} is not a readable array of numbers: save it with numpy.save") from error
-    if not isinstance(stored, np.ndarray):
-        raise InputError(f"{path} holds several arrays: save the height map alone with numpy.save")
-    return stored
+    with path.open("rb") as file:
+        if file.read(2) == ARCHIVE:
+            raise InputError(f"{path} holds several arrays: save the height map alone with numpy.save")
+    return read_array(path)
 
 
 def _read_exr(path: Path) -> np.ndarray:

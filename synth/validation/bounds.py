@@ -14,6 +14,7 @@ from pathlib import Path
 
 from isc_core.atomic import new_file
 from isc_core.errors import InputError
+from isc_core.json_files import read_json
 
 from .bootstrap import Interval
 from .figures import Figure
@@ -58,12 +59,9 @@ class Verdict:
 
 def read_bounds(path: Path) -> tuple[Bound, ...]:
     """Reads a file of `write_bounds`. Raises `InputError` for anything else."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"{path} does not exist: --update-bounds writes a file of bounds") from error
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"{path} is not a readable file of bounds: {error}") from error
+    if not path.exists():
+        raise InputError(f"{path} does not exist: --update-bounds writes a file of bounds")
+    content = read_json(path, "--update-bounds writes a file of bounds")
     entries = content.get("bounds") if isinstance(content, dict) and content.get("schema_version") == SCHEMA_VERSION else None
     if not isinstance(entries, list):
         raise InputError(f"{path} is not a file of bounds of version {SCHEMA_VERSION}: --update-bounds writes one")

@@ -109,7 +109,7 @@ MISTAKES = {
     "recolour --cluster 1 --region {}/region.png": "give one of them",
     "recolour --region {}/sky.png": "photo's size",
     "recolour --match-brightness": "brightness",
-    "relight --light {}/nothing.json": "cannot read the light",
+    "relight --light {}/nothing.json": "cannot read",
     "relight --light {}/region.png": "twice as wide as high",
     "relight --light {}/light.npy --direction 0 0 1": "give one of them",
     "relight --light {}/sky.png --yaw 3": "not turned",
