@@ -10,6 +10,7 @@ Limits: what is kept in the folder is found by its name: it belongs to one versi
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -43,17 +44,33 @@ from .subjects import QUICK_SIZE, Subject
 
 _SAMPLES, _QUICK_SAMPLES = 128, 32
 _LEVEL = 25.0  # per cent of the light that is specular
-# Name, family of shapes, its member, family of paints, exponent and strength of the gloss.
-_SCENES = (
-    ("vase", "lathe", 3, "patches", 90.0, 0.10),
-    ("pebble", "displaced", 1, "noise", 40.0, 0.09),
-    ("soap", "superquadric", 2, "uniform", 150.0, 0.08),
-    ("amoeba", "blobby", 0, "print", 60.0, 0.10),
-)
-_GLOSSY = (("jar", "lathe", 6, "patches"), ("stone", "displaced", 3, "uniform"), ("cushion", "superquadric", 5, "print"))
-_SYNTH_SEEDS = (1, 4)
+_SYNTH_SEEDS = (2, 21)
 _ARRAYS = ("image", "valid", "mask", "height", "shading", "reflectance", "light")
 
+
+@dataclass(frozen=True)
+class _Thing:
+    """An object of ours: a member of a family of shapes, painted from a family of albedos. `exponent`, `strength`: of its gloss."""
+
+    name: str
+    shape: str
+    member: int
+    paint: str
+    exponent: float = 100.0
+    strength: float = 0.1
+
+    def part(self, seed: int) -> Part:
+        """The shape's member; another seed takes another one."""
+        return Part(self.shape, self.member + seed)
+
+
+_SCENES = (
+    _Thing("fruit", "lathe", 8, "patches", 80.0),
+    _Thing("pebble", "displaced", 7, "uniform", 60.0),
+    _Thing("soap", "superquadric", 11, "noise", 80.0),
+    _Thing("tin", "lathe", 7, "print", 120.0),
+)
+_GLOSSY = (_Thing("bowl", "lathe", 6, "patches"), _Thing("stone", "displaced", 3, "uniform"), _Thing("seal", "blobby", 11, "patches"))
 
 Layers = tuple[MitBerkeleyObject, np.ndarray]  # the truth, and the diffuse layer (H, W, 3)
 
@@ -80,21 +97,20 @@ def _plans(family: str, root: Path | None, objects: Sequence[str], size: int, se
     """Names, and what makes them."""
     if family == "scene":
         gourd = ("gourd", partial(_of_scene, demo_scene, size, seed))
-        return [gourd, *((name, partial(_of_scene, partial(_scene, recipe, seed), size, seed)) for name, *recipe in _SCENES)]
+        return [gourd, *((thing.name, partial(_of_scene, partial(_scene, thing, seed), size, seed)) for thing in _SCENES)]
     if family == "synth":
         return [(f"scene{number}", partial(_of_synth, number + seed, size)) for number in _SYNTH_SEEDS]
     if root is not None:
         return [(name, partial(_of_glossy, partial(load_source, root, name), seed)) for name in objects]
-    return [(name, partial(_of_glossy, partial(_own_source, name, recipe, size, seed), seed)) for name, *recipe in _GLOSSY]
+    return [(thing.name, partial(_of_glossy, partial(_own_source, thing, size, seed), seed)) for thing in _GLOSSY]
 
 
-def _scene(recipe: Sequence[str | int | float], seed: int, size: int) -> Scene:
+def _scene(thing: _Thing, seed: int, size: int) -> Scene:
     """A glossy object under softboxes."""
-    family, number, paint, exponent, strength = recipe
-    shape = Part(str(family), int(number) + seed)
-    albedo = make_albedo(str(paint), shape.generator("albedo"))
-    mesh = make_shape(str(family), shape.generator("shape"))
-    material = Material(albedo, "blinn_phong", float(exponent), float(strength))
+    shape = thing.part(seed)
+    albedo = make_albedo(thing.paint, shape.generator("albedo"))
+    mesh = make_shape(thing.shape, shape.generator("shape"))
+    material = Material(albedo, "blinn_phong", thing.exponent, thing.strength)
     return Scene(mesh, material, make_lights("area", shape.generator("light")), camera_around(mesh, size, 0.92))
 
 
@@ -102,7 +118,7 @@ def _of_scene(make: Callable[[int], Scene], size: int, seed: int, monitor: Monit
     scene = make(size)
     samples = _QUICK_SAMPLES if size <= QUICK_SIZE else _SAMPLES
     truth = render_truth(scene, RenderOptions(samples=samples, seed=seed), monitor)
-    return _layers(exposed(scene, truth, 0.95, 0.995, "image")[1], "scene")
+    return _layers(exposed(scene, truth, 0.98, 0.9995, "image")[1], "scene")
 
 
 def _of_synth(number: int, size: int, monitor: Monitor) -> Layers:
@@ -125,12 +141,11 @@ def _layers(truth: GroundTruth, name: str) -> Layers:
     )
 
 
-def _own_source(name: str, recipe: Sequence[str | int], size: int, seed: int) -> Source:
+def _own_source(thing: _Thing, size: int, seed: int) -> Source:
     """An object of ours as the glossy set's arithmetic takes one of MIT-Berkeley: shape, paint and a light of its own."""
-    family, number, paint = recipe
-    shape = Part(str(family), int(number) + seed)
-    mesh = make_shape(str(family), shape.generator("shape"))
-    material = Material(make_albedo(str(paint), shape.generator("albedo")), "lambert")
+    shape = thing.part(seed)
+    mesh = make_shape(thing.shape, shape.generator("shape"))
+    material = Material(make_albedo(thing.paint, shape.generator("albedo")), "lambert")
     lights = make_lights("sh", shape.generator("light"))
     scene = Scene(mesh, material, lights, camera_around(mesh, size, 0.92))
     truth = render_truth(scene, RenderOptions(samples=2, seed=seed))

@@ -24,6 +24,7 @@ LETTERS = 8.0  # points
 _BRIGHT = 0.9  # what all but the brightest hundredth of an image is shown below
 _LABEL = 1.05  # inches left of a sheet, for the names of its rows
 _LINE = 0.16  # inches that a line of letters takes
+_GAP = 0.03  # inches between the rows of a sheet
 
 
 def figure(
@@ -98,8 +99,8 @@ def sheet(
     exposed = [expose] * len(columns) if isinstance(expose, bool) else list(expose)
     cell = (width - _LABEL) / len(columns)
     heights = [max([image.shape[0] / image.shape[1] for image in images if image is not None] or [1.0]) * cell for _, images in rows]
-    made, axes = figure(len(rows), len(columns), width=width, height=sum(heights) + _LINE * (2 + len(rows)))
-    made.get_layout_engine().set(w_pad=0.01, h_pad=0.01, wspace=0.01, hspace=0.01)
+    made, axes = figure(len(rows), len(columns), width=width, height=sum(heights) + _LINE * 1.5 + _GAP * len(rows))
+    made.set_layout_engine("constrained", w_pad=_GAP / 2, h_pad=_GAP / 2, wspace=0.0, hspace=0.0)
     grid = axes[0, 0].get_gridspec()
     grid.set_height_ratios(heights)
     for line, (name, images) in enumerate(rows):
@@ -109,6 +110,8 @@ def sheet(
             place = axes[line, column]
             if image is not None:
                 show(place, image * gain if exposed[column] else image)
+            else:
+                place.set_aspect(heights[line] / cell)
             _bare(place, columns[column] if line == 0 else "")
         axes[line, 0].set_ylabel(name, rotation=0, ha="right", va="center", labelpad=4)
     return made

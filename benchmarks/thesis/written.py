@@ -30,8 +30,8 @@ _INTRODUCTION = (
     "Image*, 2016), made again on open data by `isc thesis all`; one of them by `isc thesis table 4.5` or `isc thesis figure 4.50`.",
     "",
     "The thesis measures on MIT-Berkeley-UTeM, a set with rendered highlights that is not public. `isc synth glossy-mit` is its stand-in:",
-    "objects of MIT-Berkeley, or the project's own where no copy is given, under a gloss of known strength. Figures are therefore not those",
-    "of the thesis; what can be compared is which method is better, and by how much.",
+    "objects of MIT-Berkeley, or the project's own where no copy is given, under a gloss of known strength. Figures are not those of the",
+    "thesis, therefore; what can be compared is which method is better, and by how much.",
     "",
 )
 
