@@ -157,7 +157,7 @@ def _own_source(thing: _Thing, size: int, seed: int) -> Source:
     rows, columns = (np.arange(side) for side in mask.shape)
     known = np.where(mask, height, np.nan)
     return Source(
-        name, mask.shape, rows, columns, mask, known, truth.reflectance[mask].astype(float), normal[mask], {"natural": light}, b""
+        thing.name, mask.shape, rows, columns, mask, known, truth.reflectance[mask].astype(float), normal[mask], {"natural": light}, b""
     )
 
 
