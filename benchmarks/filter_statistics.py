@@ -66,8 +66,12 @@ def scenes(folder: Path, splits: Sequence[str]) -> list[Path]:
 
 
 def sample(folder: Path, of: str) -> Sample:
-    """Outputs of the photo (`of` "seen") or of its layers ("layers") in the pixels whose kind is clear."""
-    truth = load_rendered(folder)
+    """Outputs of a rendered photo (`of` "seen") or of its layers ("layers") in the pixels whose kind is clear."""
+    return sample_of(load_rendered(folder), of)
+
+
+def sample_of(truth: SeparationTruth, of: str) -> Sample:
+    """The same of any photo whose layers are known."""
     image, specular = truth.image.mean(axis=2), truth.specular.mean(axis=2)
     share = specular / np.maximum(image, 1e-9)
     highlight, without = truth.mask & (share >= _SEEN), truth.mask & (share <= _NONE)
@@ -77,7 +81,7 @@ def sample(folder: Path, of: str) -> Sample:
     else:
         kinds = (filter_outputs(image, truth.mask),) * 2
         chosen = (highlight[truth.mask], without[truth.mask])
-    return Sample(folder.name.split("_")[0], image, truth.mask, highlight, without, kinds[0][chosen[0]], kinds[1][chosen[1]])
+    return Sample(truth.name.split("_")[0], image, truth.mask, highlight, without, kinds[0][chosen[0]], kinds[1][chosen[1]])
 
 
 def fitted(samples: Sequence[Sample], temperature: float = 1.0) -> FilterTable:

@@ -26,13 +26,15 @@ _BALL = 160  # pixels
 @dataclass(frozen=True)
 class Panel:
     """One picture. `values`: (H, W, 3) an image of linear light, or (H, W) numbers; `mask` (H, W) bool or None;
-    `limits`: the ends of the numbers' colours; `gain`: of an image, None for one of its own."""
+    `limits`: the ends of the numbers' colours; `gain`: of an image, None for one of its own; `bar`: whether the
+    numbers have a bar of colours."""
 
     title: str
     values: np.ndarray
     mask: np.ndarray | None = None
     limits: tuple[float, float] | None = None
     gain: float | None = None
+    bar: bool = True
 
 
 def panels(shown: Sequence[Panel], columns: int, *, width: float = WIDTH) -> Figure:
@@ -45,7 +47,7 @@ def panels(shown: Sequence[Panel], columns: int, *, width: float = WIDTH) -> Fig
     for row in range(rows):
         part = slice(columns * row, columns * (row + 1))
         pictures = max(panel.values.shape[0] / panel.values.shape[1] for panel in cut[part]) * cell
-        bars = 2.2 if any(panel.values.ndim == 2 for panel in cut[part]) else 0.4
+        bars = 2.2 if any(panel.values.ndim == 2 and panel.bar for panel in cut[part]) else 0.4
         heights.append(pictures + _LINE * (1 + bars + max(title.count("\n") for title in titles[part])))
     made, axes = figure(rows, columns, width=width, height=sum(heights))
     axes[0, 0].get_gridspec().set_height_ratios(heights)
@@ -63,10 +65,12 @@ def _draw(place: Axes, panel: Panel, title: str) -> None:
         show(place, panel.values * gain, title, panel.mask)
         return
     show_map(place, panel.values, title, panel.mask, limits=panel.limits)
+    if not panel.bar:
+        return
     # Below the picture, where it takes none of the width that the pictures beside it have.
     bar = place.figure.colorbar(place.images[-1], cax=place.inset_axes((0.1, -0.1, 0.8, 0.04)), orientation="horizontal")
     bar.ax.tick_params(labelsize=LETTERS - 1, width=0.6, length=2, pad=1)
-    bar.ax.locator_params(nbins=4)
+    bar.ax.locator_params(nbins=3)
     bar.outline.set_linewidth(0.6)
 
 
@@ -74,7 +78,7 @@ def _cut(panel: Panel) -> Panel:
     if panel.mask is None:
         return panel
     box = mask_slices(panel.mask)
-    return Panel(panel.title, panel.values[box], panel.mask[box], panel.limits, panel.gain)
+    return Panel(panel.title, panel.values[box], panel.mask[box], panel.limits, panel.gain, panel.bar)
 
 
 def normals_panel(title: str, normal: np.ndarray, mask: np.ndarray) -> Panel:
