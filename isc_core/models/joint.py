@@ -4,9 +4,10 @@ Problem: MDR believes a separation by colour. On grey paint, where colours tell 
 shape and light are bent to explain them, and the reflectance shows them as bright paint.
 
 Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what the layer network has learned of the
-form of highlights (`separation.layer_network`): it expects y = log(I / D) with an error b, and D_1 = min(D_0, I e^-max(y - b / 2, 0)).
-SIRFS on D_1 gives shape and light. They give a better separation: where the network took much of what colour had left (`Doubt.doubtful`),
-too little of the paint is seen to be believed; it is continued from around, in the light that falls there,
+form of highlights (`separation.layer_network`): it expects y = log(I / D) with an error b, and D_1 = min(D_0, I e^-max(y - b / 2, 0)), the
+light between D_0 and D_1 held to be nearly white (`separation.light_tint`). SIRFS on D_1 gives shape and light. They give a better
+separation: where the network took much of what colour had left (`Doubt.doubtful`), too little of the paint is seen to be believed; it is
+continued from around, in the light that falls there,
 
     log R = average of log D_1 - SH(normal) over what is near and not doubtful,   D = min(D_1, R exp(SH(normal)))
 
@@ -31,6 +32,7 @@ from scipy import ndimage
 
 from ..decomposition import Separation
 from ..separation.layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
+from ..separation.light_tint import held_to_light
 from ..separation.smoothing import masked_gaussian
 from .layers import separated_first, shaded
 from .lobe import fit_specular
@@ -139,7 +141,8 @@ def doubt(
     doubtful = ndimage.binary_opening(level > options.doubtful, np.ones((2, 2))) & mask
     if doubtful[mask].mean() > _HALF:
         doubtful = np.zeros_like(mask)
-    return Doubt((diffuse * np.exp(-left)).astype(diffuse.dtype), doubtful)
+    cleaner = held_to_light(diffuse, diffuse * np.exp(-left), options.network.tint)
+    return Doubt(cleaner.astype(diffuse.dtype), doubtful)
 
 
 def repaint(found: Doubt, shading: np.ndarray, start: np.ndarray, mask: np.ndarray) -> np.ndarray:

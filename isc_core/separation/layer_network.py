@@ -6,7 +6,7 @@ is around it. No local cue is proof; a network that has seen many objects weighs
 Equation: y_c(x) = log(I_c / D_c) >= 0 and log b(x), the scale of y's error, from log(I / mean I + .03) and the mask. An encoder of five
 levels, each of two 3 x 3 convolutions with max(0, .), halved by averages of 2 x 2; a decoder that goes back up with the encoder's layers
 beside it. Pixels go in and come out in blocks of 2 x 2 (space to depth), and y = log(1 + exp(o - 2)). The answers for the photo and its
-mirror image are averaged.
+mirror image are averaged. How coloured the light may be that is taken off so: see `light_tint`.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016,
 doi:10.1109/CVPR.2016.207. Weights, training scenes and loss are our own: `python -m benchmarks.layer_network_training`.
@@ -39,10 +39,14 @@ _FRAME = 8  # pixels around the object: what lies beyond the picture's frame is 
 
 @dataclass(frozen=True)
 class NetworkOptions:
-    """`long_side`: of the object, in pixels, as the network sees it, >= 32. `doubt` >= 0: how many scales of error y has to exceed."""
+    """`long_side`: of the object, in pixels, as the network sees it, >= 32. `doubt` >= 0: how many scales of error y has to exceed.
+    `tint` >= 1: how coloured the light may be that is taken off, see `light_tint`. `mirrored`: whether the answer is the mean of those for
+    the photo and its mirror image, in twice the time."""
 
     long_side: int = 176
     doubt: float = 0.0
+    tint: float = 1.5
+    mirrored: bool = True
 
 
 @dataclass(frozen=True)
@@ -59,10 +63,14 @@ class LayerNetwork:
         if count < 7 or count % 4 != 3 or not fits or self.weights[-1].shape[2] != _CHANNELS * _BLOCK**2:
             raise InputError("these are not the weights of a layer network")
 
-    def __call__(self, image: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """y (H, W, 3) >= 0 and log b (H, W), float32, of `image` (H, W, 3) linear >= 0 and `mask` (H, W) bool; H, W multiples of 32."""
-        mirrored = self._run(image[:, ::-1], mask[:, ::-1])[:, ::-1]
-        raw = 0.5 * (self._run(image, mask) + mirrored)
+    def __call__(self, image: np.ndarray, mask: np.ndarray, mirrored: bool = True) -> tuple[np.ndarray, np.ndarray]:
+        """y (H, W, 3) >= 0 and log b (H, W), float32, of `image` (H, W, 3) linear >= 0 and `mask` (H, W) bool; H, W multiples of 32.
+
+        `mirrored`: see `NetworkOptions`.
+        """
+        raw = self._run(image, mask)
+        if mirrored:
+            raw = 0.5 * (raw + self._run(image[:, ::-1], mask[:, ::-1])[:, ::-1])
         return raw[..., :3], raw[..., 3]
 
     def _run(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -85,7 +93,7 @@ def log_ratio(image: np.ndarray, mask: np.ndarray, network: LayerNetwork, option
     box = mask_slices(mask)
     small, inside, factor = averaged(image[box], mask[box], min(1.0, options.long_side / max(mask[box].shape)))
     framed, place = _framed(small, inside)
-    raw, log_error = network(*framed)
+    raw, log_error = network(*framed, options.mirrored)
     error = np.exp(log_error)
     excess = np.maximum(raw - options.doubt * error[..., None], 0)
     found = np.concatenate([excess, error[..., None]], axis=2)[place]

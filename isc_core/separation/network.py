@@ -4,7 +4,8 @@ Problem: the network sees an object at the size it was fitted to; photos are lar
 
 Equation: the photo, averaged so that the object is `long_side` pixels long, gives y = log(I / D) and the scale b of its error; y is carried
 to the photo's pixels linearly, and D = I exp(-y). What is below the network's own error says nothing: y is taken as max(y - d b, 0) of
-d = `doubt`. Confidence is 1 / (1 + e / u): e = D b, the error to be expected, u a tenth of the mean light.
+d = `doubt`. What is taken off so is held to the colours of light, see `light_tint`. Confidence is 1 / (1 + e / u): e = D b, the error to be
+expected, u a tenth of the mean light.
 
 Citation: see `layer_network`.
 
@@ -21,6 +22,7 @@ from ..progress import Monitor
 from .checks import check_arrays
 from .layer_network import STRIDE, LayerNetwork, NetworkOptions, log_ratio, shipped_network
 from .layers import diffuse_layers
+from .light_tint import held_to_light
 
 _UNIT = 0.1  # of the mean light: an error of this size halves the confidence
 
@@ -42,12 +44,13 @@ def separate(
     Raises `InputError` for unfit options and arrays, `Cancelled`.
     """
     options, monitor = options or NetworkOptions(), monitor or Monitor()
-    if options.long_side < STRIDE or options.doubt < 0:
-        raise InputError(f"the network needs a long side of {STRIDE} pixels or more, and a doubt of 0 or more")
+    if options.long_side < STRIDE or options.doubt < 0 or not options.tint >= 1:
+        raise InputError(f"the network needs a long side of {STRIDE} pixels or more, a doubt of 0 or more, and a tint of 1 or more")
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
     excess, error = log_ratio(image, mask, network or shipped_network(), options)
-    diffuse = np.where(mask[..., None], image, 0) * np.exp(-excess)
+    seen = np.where(mask[..., None], image, 0)
+    diffuse = held_to_light(seen, seen * np.exp(-excess), options.tint)
     split = diffuse_layers(image, mask, diffuse, clipped)
     unit = max(_UNIT * float(image[mask].mean(dtype=float)), 1e-30)
     trust = 1 / (1 + error * split.diffuse.mean(axis=2) / unit)

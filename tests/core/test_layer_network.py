@@ -16,6 +16,7 @@ from isc_core.separation.layer_network import (
     read_network,
     shipped_network,
 )
+from isc_core.separation.light_tint import held_to_light
 
 
 def small_network(rng):
@@ -100,12 +101,47 @@ def test_confidence_sorts_pixels_by_their_error():
     assert error[order[:fifth]].sum() > 2 * error[order[-fifth:]].sum()
 
 
+@pytest.mark.parametrize("tint", [1.0, 1.5])
+def test_what_is_taken_off_is_not_more_coloured_than_light(tint):
+    rng = np.random.default_rng(4)
+    seen = rng.uniform(0.01, 1, (40, 50, 3)).astype(np.float32)
+    diffuse = held_to_light(seen, seen * rng.uniform(0.05, 1, seen.shape).astype(np.float32), tint)
+    light = seen - diffuse
+    assert (diffuse >= 0).all() and light.min() > -1e-6
+    assert (light.max(-1) <= tint * light.min(-1) + 1e-6).all()
+
+
+def test_light_that_is_white_stays_and_green_light_on_green_paint_goes_back():
+    paint = np.array([0.3, 0.5, 0.05], np.float32) * np.ones((4, 5, 1), np.float32)
+    assert np.allclose(held_to_light(paint + 0.2, paint, 1.5), paint, atol=1e-6)
+    assert np.allclose(held_to_light(paint, paint, 1.5), paint)
+    green = np.array([0.1, 0.18, 0.01], np.float32)
+    kept = held_to_light(paint + green, paint, 1.0)
+    level = (paint + green - kept)[0, 0]
+    costs = [np.square((level[0] + d - green) / paint[0, 0]).sum() for d in (-0.001, 0, 0.001)]
+    assert np.ptp(level) < 1e-6 and costs[1] == min(costs), "the white light whose diffuse layer differs least in its logarithm"
+
+
+def test_the_mirror_image_is_asked_only_where_that_is_wanted():
+    rng = np.random.default_rng(5)
+    network, image, mask = small_network(rng), rng.uniform(0.01, 1, (32, 32, 3)).astype(np.float32), np.ones((32, 32), bool)
+    one, _ = network(image, mask, mirrored=False)
+    other, _ = network(image[:, ::-1], mask, mirrored=False)
+    assert np.allclose(network(image, mask)[0], 0.5 * (one + other[:, ::-1]), atol=1e-6)
+    assert not np.allclose(one, other[:, ::-1], atol=1e-3)
+    alone, _ = log_ratio(image, mask, network, NetworkOptions(mirrored=False))
+    assert not np.allclose(alone, log_ratio(image, mask, network, NetworkOptions())[0], atol=1e-3)
+
+
 def test_options_and_files_that_mean_nothing_are_refused(tmp_path):
     image, _, mask = ball(40)
     with pytest.raises(InputError, match="long side"):
         separate("network", image, mask, changes={"long_side": 8})
     with pytest.raises(InputError, match="doubt"):
         separate("network", image, mask, changes={"doubt": -1.0})
+    for wrong in (0.9, float("nan")):
+        with pytest.raises(InputError, match="tint"):
+            separate("network", image, mask, changes={"tint": wrong})
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
     with pytest.raises(InputError, match=r"bad\.npz holds no layer network"):
