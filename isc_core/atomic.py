@@ -20,7 +20,7 @@ import os
 import platform
 import re
 import shutil
-from collections.abc import Iterator, Sequence, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -84,10 +84,14 @@ def new_file(path: Path | str) -> Iterator[Path]:
         _flush_names(target.parent)
 
 
-def require_writable(folder: Path | str, ours: Sequence[str]) -> None:
-    """Tries now whether `new_folder` could begin, before hours of work are spent. Leaves no trace. Raises `InputError`."""
+def require_writable(folder: Path | str, ours: Sequence[str], inputs: Iterable[Path | None] = ()) -> None:
+    """Tries now whether `new_folder` could begin, before hours of work are spent. Leaves no trace. Raises `InputError`, also where one of
+    the `inputs` of the work lies in the folder that would be replaced."""
     target = _resolved(folder)
     require_replaceable(target, ours)
+    for given in inputs:
+        if given is not None and target in (resolved := _resolved(given)).parents and resolved.exists():
+            raise InputError(f"{given} lies in {folder}, which would be replaced: choose another folder")
     _try_beside(target)
 
 

@@ -9,13 +9,13 @@ Limits: colours alone decide, so an object of the background's colour is cut bad
 solved at one megapixel and the border is interpolated.
 """
 
-import contextlib
 import os
 from pathlib import Path
 
 import cv2
 import numpy as np
 
+from .atomic import new_file, require_writable_file
 from .errors import InputError
 from .limits import USUAL, Limits
 from .photo import MIN_SIDE, check_mask, linear_to_srgb, read_linear, tidy_mask
@@ -76,28 +76,28 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
 
 def write_mask(path: str | Path, mask: np.ndarray) -> None:
     """Writes an (H, W) bool mask as an 8-bit grey PNG, 255 inside; whole or not at all. Raises `InputError` where it cannot."""
-    path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise InputError(f"{path}: a mask is written as PNG: give a name that ends in .png")
+    _require_png(path)
     data = cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes()
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        try:
-            unfinished.write_bytes(data)
-            unfinished.replace(path)
-        finally:
-            with contextlib.suppress(OSError):
-                unfinished.unlink()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror}): choose another place") from error
+    with new_file(path) as partial:
+        partial.write_bytes(data)
+
+
+def _require_png(path: str | Path) -> None:
+    if Path(path).suffix.lower() != ".png":
+        raise InputError(f"{path}: a mask is written as PNG: give a name that ends in .png")
 
 
 def cut_out(photo_path: str | Path, box: Box, out_path: str | Path, transfer: str = "auto", limits: Limits = USUAL) -> np.ndarray:
     """Reads a photo, finds the object within the box (x, y, width, height; of the upright photo), writes the mask and returns it.
 
     `transfer` and `limits` as for `photo.read_photo`; the mask as `grabcut` gives it.
-    Raises `InputError` where the photo cannot be read, the box does not fit, nothing is found or the mask cannot be written.
+    Raises `InputError` where the photo cannot be read, the box does not fit, nothing is found or the mask cannot be written or would
+    take the photo's place.
     """
+    _require_png(out_path)
+    if os.path.exists(out_path) and os.path.exists(photo_path) and os.path.samefile(photo_path, out_path):
+        raise InputError(f"{out_path} is the photo itself: name another file for its mask")
+    require_writable_file(out_path)
     image = read_linear(photo_path, transfer, limits)
     white = float(np.percentile(image, 99.9)) or float(image.max())
     if white == 0:

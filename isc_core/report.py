@@ -10,18 +10,22 @@ The height is drawn as a relief under a lamp at the upper left, with contour lin
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
+from .atomic import new_file
 from .brdf.fitting import LobeFit
 from .decomposition import Decomposition, Separation
+from .errors import InputError
+from .names import readable
 from .photo import linear_to_srgb, srgb_to_linear
 from .sirfs.frames import real_sh
 
 _PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
 _PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
+_SMALL = 480  # pixels: long side of a sheet's thumbnail
 _MARGIN = 0.06  # room around the object, of the panel's side
 _TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (1.0, 0.42, 0.04), (0.06, 0.3, 1.0), (0.06, 0.06, 0.06)  # linear
 _FULL_ERROR = 0.1  # of the photo's white: errors from here on have the full colour
@@ -60,6 +64,18 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
     panels.append(_relief(d, frame))
     panels.append(Panel(ball_light * ball, coverage, "Light", "on a white ball"))
     return _sheet(*_title(d), panels, columns=4)
+
+
+def thumbnail(sheet: Path, target: Path) -> None:
+    """Writes a small JPEG of a sheet's picture, for pages that show many. Raises `InputError` where it cannot be read or written."""
+    try:
+        with Image.open(sheet) as picture:
+            small = picture.convert("RGB")
+    except OSError as error:
+        raise InputError(f"{sheet}: cannot be read ({error})") from error
+    small.thumbnail((_SMALL, _SMALL), reducing_gap=2.0)
+    with new_file(target) as partial:
+        small.save(partial, "JPEG", quality=85)
 
 
 def separation_sheet(separation: Separation, image: np.ndarray, mask: np.ndarray, title: str = "") -> Image.Image:
@@ -286,7 +302,7 @@ def _write(
     right: bool = False,
 ) -> float:
     """Writes a line on the base line `place`, cut to `room` pixels; returns where it ends."""
-    font = ImageFont.load_default(size)
+    font, text = ImageFont.load_default(size), readable(text)
     if font.getlength(text) > room:
         while text and font.getlength(text + "…") > room:
             text = text[:-1]

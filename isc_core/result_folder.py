@@ -9,7 +9,7 @@ Where a lobe was fitted, `maps.exr` has one layer more, `lobe`: the specular ima
 import json
 import math
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from .exr import read_channels, write_channels
 from .gloss import gloss_of
 from .json_files import read_json
 from .mesh import MeshOptions, MeshResult, build_mesh
+from .names import readable
 from .photo import linear_to_srgb
 from .progress import Monitor
 from .report import contact_sheet, separation_sheet
@@ -119,9 +120,9 @@ def save_separation(
         separation_sheet(separation, image, inside, title).save(partial / "preview.png")
 
 
-def require_writable_result(folder: Path | str, *, separation: bool = False) -> None:
-    """Tells before the work whether its result could be written to `folder`. Raises `InputError`."""
-    require_writable(folder, SEPARATION_FILES if separation else _OURS)
+def require_writable_result(folder: Path | str, *, separation: bool = False, inputs: Iterable[Path | None] = ()) -> None:
+    """Tells before the work whether its result could be written to `folder` without loss of its `inputs`. Raises `InputError`."""
+    require_writable(folder, SEPARATION_FILES if separation else _OURS, inputs)
 
 
 def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:
@@ -155,15 +156,15 @@ def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """The value in the types of JSON: arrays as lists, paths as text, numbers that are not finite as null."""
+    """The value in the types of JSON: arrays as lists, paths as text that can be coded, numbers that are not finite as null."""
     if isinstance(value, Mapping):
         return {str(key): _plain(part) for key, part in value.items()}
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, list | tuple):
         return [_plain(part) for part in value]
-    if isinstance(value, Path):
-        return str(value)
+    if isinstance(value, str | Path):
+        return readable(str(value))
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 

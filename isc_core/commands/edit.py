@@ -24,6 +24,7 @@ from ..editing.spheres import render_sphere, sphere_normals
 from ..errors import InputError
 from ..evidence_files import read_light
 from ..limits import Limits
+from ..names import readable
 from ..numpy_files import read_array
 from ..photo import TRANSFERS, linear_to_srgb, read_linear, read_photo, read_raster, srgb_to_linear
 from ..progress import Monitor
@@ -86,7 +87,7 @@ def declare(commands: Commands) -> None:
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work; what can be wrong is found before anything is written."""
-    require_writable_edit(options.output)
+    require_writable_edit(options.output, (options.photo, options.mask))
     if options.photo is None and (options.mask is not None or options.transfer is not None):
         raise InputError("--mask and --transfer say how --photo is read: give it too")
     monitor.report("reading", 0.0)
@@ -253,7 +254,10 @@ def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     photo = read_photo(options.photo, options.mask, transfer, limits=limits)
     if given.get("sha256") != photo.original.sha256 and not options.quiet:
         print("isc: note: the photo's file is not the one that was decomposed; the edit is brought into it all the same", file=sys.stderr)
-    return Original(photo, read_raster(options.photo, limits), options.photo)
+    raster = read_raster(options.photo, limits)
+    if raster.sha256 != photo.original.sha256:
+        raise InputError(f"{options.photo} changed while it was read: run the command again")
+    return Original(photo, raster, options.photo)
 
 
 # --- words ------------------------------------------------------------------------------------------------------------------------------
@@ -322,7 +326,7 @@ def _said(options: argparse.Namespace) -> str:
 def _plain(value: object) -> object:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    return str(value) if isinstance(value, Path) else value
+    return readable(str(value)) if isinstance(value, Path) else value
 
 
 # --- options ----------------------------------------------------------------------------------------------------------------------------

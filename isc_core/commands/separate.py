@@ -60,7 +60,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
         raise InputError(f"--prior is for the method {BEST} alone")
-    require_writable_result(options.output, separation=True)
+    require_writable_result(options.output, separation=True, inputs=(options.photo, options.mask, options.prior))
     photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True, limits=limits_of(options))
     prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape, limits_of(options))
     monitor.report(f"separating ({options.method})", 0.1)

@@ -9,7 +9,7 @@ R, G, B; else to the rounding of the product with alpha.
 """
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -57,9 +57,9 @@ class Record:
     measured: Mapping[str, Any] = field(default_factory=dict)
 
 
-def require_writable_edit(folder: Path | str) -> None:
-    """Tells before the work whether an edit could be written to `folder`. Raises `InputError`."""
-    require_writable(folder, FILES)
+def require_writable_edit(folder: Path | str, inputs: Iterable[Path | None] = ()) -> None:
+    """Tells before the work whether an edit could be written to `folder` without loss of its `inputs`. Raises `InputError`."""
+    require_writable(folder, FILES, inputs)
 
 
 def save_edit(

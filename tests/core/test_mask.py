@@ -93,11 +93,12 @@ def test_a_mask_that_cannot_be_written(tmp_path: Path) -> None:
     _, truth = scene()
     with pytest.raises(InputError, match="ends in .png"):
         write_mask(tmp_path / "mask.jpg", truth)
-    with pytest.raises(InputError, match="cannot be written"):
-        write_mask(tmp_path / "missing" / "mask.png", truth)
     (tmp_path / "folder.png").mkdir()
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="name a file"):
         write_mask(tmp_path / "folder.png", truth)
+    (tmp_path / "folder.png" / "file").write_bytes(b"")
+    with pytest.raises(InputError, match="not a folder"):
+        write_mask(tmp_path / "folder.png" / "file" / "mask.png", truth)
     assert [p.name for p in tmp_path.iterdir()] == ["folder.png"]
 
 
