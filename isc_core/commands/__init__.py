@@ -13,7 +13,7 @@ from typing import NoReturn
 from .. import __version__
 from ..errors import InputError
 from ..progress import Monitor
-from . import arrays, decompose, edit, evaluate, fit_priors, mask, separate
+from . import arrays, batch, decompose, edit, evaluate, fit_priors, mask, separate
 from .options import Commands, Parser
 
 _GROUP = "isc.commands"
@@ -35,7 +35,7 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"isc {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for command in (decompose, separate, edit, arrays, mask, evaluate, fit_priors):
+    for command in (decompose, batch, separate, edit, arrays, mask, evaluate, fit_priors):
         command.declare(commands)
     for entry in entry_points(group=_GROUP):
         _declare_other(entry, commands)

@@ -6,12 +6,11 @@ from pathlib import Path
 
 from ..evidence_files import read_height, read_light
 from ..photo import Photo, read_photo
-from ..pipeline import ILLUMINATIONS, MODELS, Evidence, Settings, decompose
+from ..pipeline import Evidence, Settings, decompose
 from ..progress import Monitor
 from ..result_folder import require_room, require_writable_result, save
-from ..separation import METHODS
 from ..sirfs.prior_file import load_prior_set
-from .options import Commands, add_command, add_engine, add_photo, count, hints, limits_of, number, positive
+from .options import Commands, add_command, add_engine, add_photo, add_settings, hints, limits_of, number, positive
 
 _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
@@ -29,41 +28,12 @@ def declare(commands: Commands) -> None:
         "Takes a photo of one glossy object apart: diffuse and specular light, shape, illumination, shading, reflectance. Writes a folder "
         "with preview.png (look at this first), maps.exr, mesh.glb and decomposition.json.", _EXAMPLES,
     )  # fmt: skip
-    usual = Settings()
     add_photo(parser)
     parser.add_argument(
         "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier result is replaced"
     )
-    parser.add_argument(
-        "--model",
-        default=usual.model,
-        metavar="NAME",
-        help=f"{', '.join(MODELS)} (default {usual.model})",
-    )
-    parser.add_argument(
-        "--separator",
-        default=usual.separator,
-        metavar="NAME",
-        help=f"what removes highlights: {', '.join(METHODS)} (default {usual.separator})",
-    )
-    parser.add_argument(
-        "--illumination", choices=ILLUMINATIONS, default=usual.illumination, help="which lights to expect (default %(default)s)"
-    )
-    parser.add_argument(
-        "--max-size",
-        type=count,
-        default=usual.max_size,
-        metavar="N",
-        help="long side of the object, in pixels, in the maps (default %(default)s; 0: the photo's)",
-    )
-    parser.add_argument("--full-size", action="store_true", help="bring the result back to the photo's resolution")
-    parser.add_argument("--shading-only", action="store_true", help="shape from shading: the object has one colour")
-    parser.add_argument("--arrays", action="store_true", help="write arrays.npz too: everything as plain NumPy arrays, for other programs")
+    add_settings(parser)
     _add_evidence(parser)
-    parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
-    parser.add_argument(
-        "--seed", type=count, default=usual.seed, metavar="N", help="of random numbers, written into the result (default %(default)s)"
-    )
     add_engine(parser)
 
 

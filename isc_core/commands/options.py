@@ -8,7 +8,9 @@ from typing import Any, NoReturn
 
 from ..errors import InputError
 from ..limits import USUAL, Limits
+from ..models.settings import ILLUMINATIONS, MODELS, Settings
 from ..photo import TRANSFERS
+from ..separation import METHODS
 
 Commands = Any  # what `add_subparsers` returns has no public name
 
@@ -92,12 +94,46 @@ def limits_of(options: argparse.Namespace) -> Limits:
     return Limits(max_pixels=options.max_pixels)
 
 
-def add_engine(parser: argparse.ArgumentParser) -> None:
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """What the command's `Settings` are read from but for --engine and --threads; --priors and --arrays."""
+    usual = Settings()
+    parser.add_argument(
+        "--model",
+        default=usual.model,
+        metavar="NAME",
+        help=f"{', '.join(MODELS)} (default {usual.model})",
+    )
+    parser.add_argument(
+        "--separator",
+        default=usual.separator,
+        metavar="NAME",
+        help=f"what removes highlights: {', '.join(METHODS)} (default {usual.separator})",
+    )
+    parser.add_argument(
+        "--illumination", choices=ILLUMINATIONS, default=usual.illumination, help="which lights to expect (default %(default)s)"
+    )
+    parser.add_argument(
+        "--max-size",
+        type=count,
+        default=usual.max_size,
+        metavar="N",
+        help="long side of the object, in pixels, in the maps (default %(default)s; 0: the photo's)",
+    )
+    parser.add_argument("--full-size", action="store_true", help="bring the result back to the photo's resolution")
+    parser.add_argument("--shading-only", action="store_true", help="shape from shading: the object has one colour")
+    parser.add_argument("--arrays", action="store_true", help="write arrays.npz too: everything as plain NumPy arrays, for other programs")
+    parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
+    parser.add_argument(
+        "--seed", type=count, default=usual.seed, metavar="N", help="of random numbers, written into the result (default %(default)s)"
+    )
+
+
+def add_engine(parser: argparse.ArgumentParser, threads: str = "how many threads to use (0: one for each core)") -> None:
     """--engine and --threads."""
     parser.add_argument(
         "--engine", choices=("auto", "numba", "numpy"), default="auto", help="compiled kernels, or plain NumPy (auto: compiled if possible)"
     )
-    parser.add_argument("--threads", type=count, default=0, metavar="N", help="how many threads to use (0: one for each core)")
+    parser.add_argument("--threads", type=count, default=0, metavar="N", help=threads)
 
 
 def count(text: str) -> int:

@@ -1,0 +1,184 @@
+"""Dask's scheduler and workers: started here, or found at an address; and the stream of jobs through them.
+
+Citation: M. Rocklin, "Dask: Parallel Computation with Blocked algorithms and Task Scheduling" (2015), doi:10.25080/Majora-7b98e3ed-013.
+
+A window of jobs is at the scheduler at any time, a few for each worker, so that a stream of any length needs the same memory. Workers
+that die are replaced and their images tried again; which image kills them is found out by `attempts`, not by the scheduler's own count,
+which also blames the images that waited beside it.
+
+Limits: one image at a time in a worker process, so workers of a cluster should have one thread each (`dask worker --nthreads 1`). Workers
+of this machine listen on 127.0.0.1 only, but to whoever works on this machine.
+"""
+
+import logging
+import os
+import queue
+import re
+import signal
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from ..errors import InputError
+from .item import FAILED, Job, Outcome
+from .work import process
+
+_DEAL_SECONDS = 0.2  # between two looks at whether to stop
+_AHEAD = 3  # jobs at the scheduler for each image that is worked on
+_SUSPICION = 100  # of the scheduler, before it gives a job up: `attempts` does before
+_CLUSTER_PATIENCE = 60.0
+
+Client = Any  # Dask is optional
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who works. `workers`: processes, 0 for as many as cores allow; `threads`: of each image, 0 shares the cores among the workers.
+
+    `memory`: of each worker as Dask reads it ("4GB", "auto", "0" for no limit). `scheduler`: the address of a cluster; then the others
+    do not count. `processes`: false works in threads of this process, for tests and for stores that only this process sees.
+    """
+
+    workers: int = 0
+    threads: int = 0
+    memory: str = "auto"
+    scheduler: str = ""
+    processes: bool = True
+
+    def sized(self) -> "Crew":
+        """With numbers in place of zeros."""
+        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        workers = self.workers or max(1, cores // max(self.threads, 1))
+        return Crew(workers, self.threads or max(1, cores // workers), self.memory, self.scheduler, self.processes)
+
+
+def require_dask() -> None:
+    """Raises `InputError` where Dask is not installed."""
+    try:
+        import dask.distributed  # noqa: F401
+    except ImportError as error:
+        raise InputError(f"isc batch needs Dask ({error}): install it with `pip install 'isc3d[batch]'`") from error
+
+
+@contextmanager
+def connected(crew: Crew) -> Iterator[Client]:
+    """A client of the cluster at `crew.scheduler`, or of one that lives as long as the block. Raises `InputError`."""
+    import dask
+    from dask.distributed import Client as DaskClient
+
+    with ExitStack() as stack:
+        if crew.scheduler:
+            try:
+                client = stack.enter_context(DaskClient(crew.scheduler, timeout=10, set_as_default=False))
+                client.wait_for_workers(1, timeout=_CLUSTER_PATIENCE)
+            except TimeoutError as error:
+                raise InputError(f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_PATIENCE:.0f} s: start some") from error
+            except (OSError, ValueError) as error:
+                raise InputError(f"--scheduler {crew.scheduler}: cannot be reached: {error}") from error
+        else:
+            stack.enter_context(dask.config.set(_configuration()))
+            cluster = stack.enter_context(_local_cluster(crew))
+            client = stack.enter_context(DaskClient(cluster, set_as_default=False))
+        yield client
+
+
+def _configuration() -> dict[str, object]:
+    """A worker that is full of memory is ended, never paused: paused workers would wait for ever."""
+    memory = "distributed.worker.memory"
+    return {
+        "distributed.scheduler.allowed-failures": _SUSPICION,
+        "distributed.scheduler.worker-saturation": 1.0,
+        f"{memory}.target": False, f"{memory}.spill": False, f"{memory}.pause": False, f"{memory}.terminate": 0.95,
+    }  # fmt: skip
+
+
+def _local_cluster(crew: Crew) -> Any:
+    from dask.distributed import LocalCluster
+
+    how: dict[str, Any] = {"processes": crew.processes}
+    if crew.processes:
+        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+        how["env"] = dict.fromkeys(names, str(crew.threads))
+    try:
+        with _without_interrupts():
+            return LocalCluster(
+                n_workers=crew.workers, threads_per_worker=1, memory_limit=crew.memory, dashboard_address="127.0.0.1:8787",
+                silence_logs=logging.CRITICAL, **how,
+            )  # fmt: skip
+    except ValueError as error:
+        raise InputError(f"--memory {crew.memory}: {error}") from error
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Ctrl-C reaches every process of a terminal. Those started here, and by threads that begin here, leave it to this one."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def dashboard(client: Client) -> str:
+    """Where Dask shows what it does; "" for nowhere."""
+    return str(client.dashboard_link or "")
+
+
+def worked(
+    client: Client, jobs: Iterator[Job], tick: Callable[[], None], task: Callable[[Job], Outcome] = process
+) -> Iterator[tuple[Job, Outcome]]:
+    """Every job with its outcome, in the order in which they end. `tick` is called several times a second; what it raises ends the work.
+
+    Raises `InputError` when the scheduler is lost.
+    """
+    ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    waiting: dict[str, tuple[Job, Any]] = {}
+    window, more = _window(client), True
+    while more or waiting:
+        tick()
+        while more and len(waiting) < window:
+            if (job := next(jobs, None)) is None:
+                more = False
+                break
+            key = f"isc-{job.plan.run}-{job.number}"
+            future = client.submit(task, job, key=key, pure=False, retries=0)
+            waiting[key] = job, future
+            future.add_done_callback(ended.put)
+        for future in _some(ended):
+            job, _ = waiting.pop(future.key)
+            outcome = _outcome(client, future)
+            future.release()
+            yield job, outcome
+        if client.status != "running":
+            raise InputError("the scheduler is lost: give the same command again; what is finished stays")
+        window = max(window, _window(client)) if len(waiting) < window else window
+
+
+def _window(client: Client) -> int:
+    return _AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+
+
+def _some(ended: "queue.SimpleQueue[Any]") -> Iterator[Any]:
+    """What has ended; waits a moment where nothing has."""
+    try:
+        yield ended.get(timeout=_DEAL_SECONDS)
+        while True:
+            yield ended.get_nowait()
+    except queue.Empty:
+        return
+
+
+def _outcome(client: Client, future: Any) -> Outcome:
+    from dask.distributed import KilledWorker
+
+    if future.status == "finished":
+        outcome: Outcome = future.result()
+        return outcome
+    if future.status != "error":
+        raise InputError("the scheduler is lost: give the same command again; what is finished stays")
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return Outcome(FAILED, "workers were lost while they worked on it: it may need more memory than they have")
+    text = re.sub(r"\s+", " ", str(error))
+    return Outcome(FAILED, f"a fault of this program, please report it: {type(error).__name__}: {text}")

@@ -1,0 +1,89 @@
+"""Bringing an input to this machine: a path is taken as it is, a URL is copied to a temporary file through fsspec.
+
+Limits: a file of more bytes than `Limits.max_bytes` is refused, an object of a store while it is copied, as soon as it is longer. What a
+store asks for (keys, regions) is given as its fsspec implementation wants it, in the environment of the workers.
+"""
+
+import hashlib
+import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from ..errors import InputError
+from ..limits import Limits
+
+_BLOCK = 1 << 20
+
+
+def is_url(location: str) -> bool:
+    """Whether a place is one for fsspec, such as s3://bucket/cup.png; all else is a path."""
+    return "://" in location
+
+
+def fsspec_module() -> ModuleType:
+    """fsspec. Raises `InputError` where it is not installed."""
+    try:
+        import fsspec
+    except ImportError as error:
+        raise InputError(f"URLs need fsspec ({error}): install it with `pip install 'isc3d[batch]'`") from error
+    return fsspec  # type: ignore[no-any-return]
+
+
+def file_system(url: str) -> tuple[Any, str]:
+    """fsspec's file system of a URL, and the path in it. Raises `InputError` where there is none."""
+    fsspec = fsspec_module()
+    try:
+        return fsspec.core.url_to_fs(url)  # type: ignore[no-any-return]
+    except (ImportError, ValueError) as error:
+        raise InputError(f"{url} cannot be reached: {error}") from error
+
+
+@contextmanager
+def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
+    """The file as one of this machine, while the block lasts; copies go below `folder`. Raises `InputError`."""
+    if not is_url(location):
+        yield _checked(Path(location), limits)
+        return
+    system, path = file_system(location)
+    folder.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder) as place:
+        copy = Path(place) / "file"
+        try:
+            with system.open(path, "rb") as source, copy.open("wb") as target:
+                length = 0
+                while block := source.read(_BLOCK):
+                    length += len(block)
+                    _check_length(location, length, limits)
+                    target.write(block)
+        except OSError as error:
+            raise InputError(f"{location}: cannot be read: {error.strerror or error or 'there is no such object'}") from error
+        yield copy
+
+
+def _checked(path: Path, limits: Limits) -> Path:
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: there is no such file") from error
+    if not stat.S_ISREG(status.st_mode):
+        raise InputError(f"{path} is not a regular file: give an image file")
+    _check_length(str(path), status.st_size, limits)
+    return path
+
+
+def _check_length(location: str, length: int, limits: Limits) -> None:
+    if length > limits.max_bytes:
+        raise InputError(f"{location}: more than {limits.max_bytes / 1e9:.1f} GB: too large for a photo")
+
+
+def sha256(path: Path) -> str:
+    """Of the file's content, in hexadecimal. Raises `InputError` where it cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from error

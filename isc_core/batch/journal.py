@@ -1,0 +1,78 @@
+"""What came out, image by image, while a run lasts: a file that grows, and the same in the inputs' order once it ends.
+
+Every line is written at once: a run that is killed leaves what it knew. Of each image 8 bytes are kept in memory, where its line begins.
+"""
+
+import json
+from array import array
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack
+from dataclasses import asdict, dataclass
+from types import TracebackType
+
+from .item import FAILED, Outcome
+from .run_folder import RunFolder
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One image's line. `number`: its place in the inputs; `name`: of its result, "" for none; `image`, `mask`: as they were given."""
+
+    number: int
+    name: str
+    image: str
+    mask: str
+    outcome: Outcome
+
+    def row(self) -> dict[str, object]:
+        """JSON-ready."""
+        return {"number": self.number, "name": self.name, "image": self.image, "mask": self.mask, **asdict(self.outcome)}
+
+    @staticmethod
+    def of(row: dict[str, object]) -> "Entry":
+        """The inverse of `row`."""
+        outcome = Outcome(str(row["status"]), str(row["reason"]), float(str(row["seconds"])), float(str(row["peak_mb"])))
+        return Entry(int(str(row["number"])), str(row["name"]), str(row["image"]), str(row["mask"]), outcome)
+
+
+class Journal:
+    """Takes entries of `count` images as they come, and gives them back in the inputs' order. Use as a context manager."""
+
+    def __init__(self, folder: RunFolder, count: int) -> None:
+        self.counts: Counter[str] = Counter()
+        self.total = count
+        self._places = array("q", [-1]) * count
+        self._files = ExitStack()
+        self._all = self._files.enter_context(folder.journal.open("w+b"))
+        self._failures = self._files.enter_context(folder.failures.open("wb"))
+
+    def add(self, entry: Entry) -> None:
+        """Writes an image's line; that of a failure also into `failures.jsonl`."""
+        self._places[entry.number] = self._all.tell()
+        self._all.write(_line(entry.row()))
+        self._all.flush()
+        self.counts[entry.outcome.status] += 1
+        if entry.outcome.status == FAILED:
+            row = {"image": entry.image, "mask": entry.mask, "name": entry.name, "reason": entry.outcome.reason}
+            self._failures.write(_line(row))
+            self._failures.flush()
+
+    def entries(self) -> Iterator[Entry]:
+        """All that were added, in the inputs' order."""
+        for place in self._places:
+            if place >= 0:
+                self._all.seek(place)
+                yield Entry.of(json.loads(self._all.readline()))
+        self._all.seek(0, 2)
+
+    def __enter__(self) -> "Journal":
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+        self._files.close()
+
+
+def _line(row: Mapping[str, object]) -> bytes:
+    """Pure ASCII, so that names of files which are not UTF-8 survive."""
+    return json.dumps(row).encode("ascii") + b"\n"

@@ -1,0 +1,159 @@
+"""Lists of images: CSV with a header, or JSON lines; read as a stream, a line at a time.
+
+    image,mask,name,max_size                {"image": "cup.png", "mask": "cup_mask.png", "name": "cup", "options": {"max_size": 256}}
+    cup.png,cup_mask.png,cup,256            {"image": "s3://photos/jug.png", "transfer": "linear"}
+
+`image` alone is needed. Options are columns or keys of their own, or stand together under `options`. Relative paths are relative to the
+manifest's folder. A mistake in any line is found in the first pass, before work begins; a file that lacks is a failure of that image alone.
+"""
+
+import csv
+import json
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TextIO
+
+from ..errors import InputError
+from .fetch import file_system, is_url
+from .item import OPTIONS, Item, Options, Recipe, parse_options
+from .names import check_given
+
+SUFFIXES = (".csv", ".jsonl", ".ndjson")
+_LONGEST_LINE = 1 << 20  # letters
+_OWN = ("image", "mask", "name", "options")
+
+
+class Manifest:
+    """The items of a manifest, any number of times. `recipe`: what the lines' options change, to tell whether they can."""
+
+    def __init__(self, location: str, recipe: Recipe) -> None:
+        self._location, self._recipe = location, recipe
+        head, slash, _ = location.rpartition("/")
+        self._base = head + slash
+        self._known: dict[str, Options] = {}
+        self._first = ""
+
+    def __iter__(self) -> Iterator[Item]:
+        with _opened(self._location) as (file, state):
+            self._require_unchanged(state)
+            rows = _csv_rows(file, self._location) if self._location.lower().endswith(".csv") else _json_rows(file, self._location)
+            for line, row in rows:
+                yield self._item(row, line)
+
+    def _require_unchanged(self, state: str) -> None:
+        if self._first and self._first != state:
+            raise InputError(f"{self._location} changed while it was read: run again when it is complete")
+        self._first = state
+
+    def _item(self, row: dict[str, Any], line: int) -> Item:
+        texts = [row.get(key) for key in ("image", "mask", "name")]
+        image, mask, name = ("" if text is None else text for text in texts)
+        if not (isinstance(image, str) and isinstance(mask, str) and isinstance(name, str)):
+            raise InputError(f"{self._at(line)}: image, mask and name must be text")
+        if not image:
+            raise InputError(f"{self._at(line)} names no image")
+        if name:
+            check_given(name, self._at(line))
+        options = self._options(row, line) if len(row) > len(texts) or not row.keys() <= {"image", "mask", "name"} else ()
+        return Item(self._joined(image), self._joined(mask) if mask else "", name, options, self._joined(image))
+
+    def _at(self, line: int) -> str:
+        return f"{self._location}, line {line}"
+
+    def _joined(self, location: str) -> str:
+        return location if is_url(location) or location.startswith("/") else self._base + location
+
+    def _options(self, row: dict[str, Any], line: int) -> Options:
+        """The line's options, checked; lines mostly share a few sets of them."""
+        given = {key: value for key, value in row.items() if key not in _OWN and value not in ("", None)}
+        together = row.get("options") or {}
+        if not given and not together:
+            return ()
+        key = repr((sorted(given.items()), together))
+        if key not in self._known:
+            options = parse_options({**given, **_mapping(together, self._at(line))}, self._at(line))
+            try:
+                self._recipe.changed(options)
+            except InputError as error:
+                raise InputError(f"{self._at(line)}: {error}") from error
+            if len(self._known) > 1000:
+                self._known.clear()
+            self._known[key] = options
+        return self._known[key]
+
+
+def _mapping(options: object, where: str) -> dict[str, object]:
+    """The column `options` holds an object as JSON text, the key of that name the object itself."""
+    if isinstance(options, str):
+        try:
+            options = json.loads(options)
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{where}: options is not JSON: {error}") from error
+    if not isinstance(options, dict):
+        raise InputError(f'{where}: options must be an object such as {{"max_size": 256}}')
+    return options
+
+
+@contextmanager
+def _opened(location: str) -> Iterator[tuple[TextIO, str]]:
+    """The manifest's text, and what tells whether it is still the same. Names of files may hold bytes that are not UTF-8."""
+    how: dict[str, Any] = {"encoding": "utf-8-sig", "errors": "surrogateescape", "newline": ""}
+    try:
+        if is_url(location):
+            system, path = file_system(location)
+            with system.open(path, "r", **how) as file:
+                yield file, str(system.ukey(path))
+        else:
+            status = Path(location).stat()
+            with Path(location).open(**how) as file:
+                yield file, f"{status.st_size} {status.st_mtime_ns}"
+    except OSError as error:
+        raise InputError(f"{location}: cannot be read: {error.strerror or error}") from error
+
+
+def _lines(file: TextIO, location: str) -> Iterator[str]:
+    number = 0
+    while line := file.readline(_LONGEST_LINE):
+        number += 1
+        if len(line) == _LONGEST_LINE:
+            raise InputError(f"{location}, line {number} is longer than {_LONGEST_LINE} letters: is this a manifest?")
+        yield line
+
+
+def _json_rows(file: TextIO, location: str) -> Iterator[tuple[int, dict[str, Any]]]:
+    for number, line in enumerate(_lines(file, location), 1):
+        if line.isspace():
+            continue
+        try:
+            row = json.loads(line)
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{location}, line {number} is not JSON: {error}") from error
+        if not isinstance(row, dict):
+            raise InputError(f'{location}, line {number} is not an object: write {{"image": "cup.png"}}')
+        yield number, row
+
+
+def _csv_rows(file: TextIO, location: str) -> Iterator[tuple[int, dict[str, Any]]]:
+    reader = csv.reader(_lines(file, location), strict=True)
+    try:
+        header = [name.strip() for name in next(reader, [])]
+        _check_header(header, location)
+        for cells in reader:
+            if not cells:
+                continue
+            if len(cells) != len(header):
+                raise InputError(f"{location}, line {reader.line_num} has {len(cells)} cells, the header {len(header)}")
+            yield reader.line_num, dict(zip(header, cells, strict=True))
+    except csv.Error as error:
+        raise InputError(f"{location}, line {reader.line_num} is not CSV: {error}") from error
+
+
+def _check_header(header: Iterable[str], location: str) -> None:
+    names = list(header)
+    if "image" not in names:
+        raise InputError(f"{location}: its first line has no column `image`: begin with image,mask,name or a part of it")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise InputError(f"{location}: the column {twice[0]!r} stands there twice")
+    if strange := [name for name in names if name not in _OWN and name.replace("-", "_") not in OPTIONS]:
+        raise InputError(f"{location}: unknown column {strange[0]!r}: choose {', '.join((*_OWN, *OPTIONS))}")

@@ -1,0 +1,104 @@
+"""Names of results, from names of files that may be anything.
+
+Problem: a result is a folder in the output, named after its image. Images of different folders share names, and a name in a manifest may
+hold "..", separators, control characters or a device's name. Names must be safe on every file system, unlike each other even where capitals
+do not count, and the same whatever the order of the inputs, so that a run that goes on finds what the run before has made.
+
+Way: a name that several images want gets, for each of them, a hash of image, mask and options behind it. Two passes over the inputs tell:
+the first keeps 16 bytes an image, hashes of names and of images, sorted by NumPy, and finds those that stand there more than once.
+
+Limits: hashes have 64 bits; of a million images two different ones share one with a probability of 3e-8, and the later is left out.
+"""
+
+import hashlib
+import re
+import unicodedata
+from array import array
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..errors import InputError
+from .item import Item
+
+_LONGEST = 120  # bytes; temporary siblings add some, and file systems allow 255
+_SAFE = re.compile(r"[0-9A-Za-z_][0-9A-Za-z_.-]{0,99}(?<!\.)")
+_UNSAFE_RUN = re.compile(r"[^\w.-]+")
+_HASHED = re.compile(r"-[0-9a-f]{12}")
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
+# What the run itself writes into the output folder.
+OWN_FILES = ("failures.jsonl", "summary.html", "summary.csv", "summary.jsonl", "summary-pages", "thumbnails")
+
+
+def safe_name(text: str) -> str:
+    """`text` as the name of a folder: letters, digits, ".", "-", "_" stay, runs of all else become "_"; never empty, hidden or reserved."""
+    name = text
+    if not _SAFE.fullmatch(name):
+        name = _UNSAFE_RUN.sub("_", unicodedata.normalize("NFC", text)).strip(".-") or "image"
+        while len(name.encode("utf-8")) > _LONGEST:
+            name = name[:-1]
+        name = name.rstrip(".-") or "image"
+    if name.casefold() in OWN_FILES or _DEVICES.fullmatch(name):
+        name = f"_{name}"
+    return name
+
+
+def check_given(name: str, where: str) -> str:
+    """A name that a manifest gives, if it can be one. Raises `InputError`, opened by `where`, for paths and what means something else."""
+    if "/" in name or "\\" in name or any(ord(letter) < 32 for letter in name) or name.strip(". ") == "":
+        raise InputError(f"{where}: {name!r} cannot name a result: give a name without /, \\ and control characters, no path")
+    if name.casefold() in OWN_FILES or _DEVICES.fullmatch(name):
+        raise InputError(f"{where}: the name {name!r} is reserved: choose another")
+    return name
+
+
+def wanted_name(item: Item) -> str:
+    """The name that an item's result has where no other wants it."""
+    if item.name:
+        return safe_name(item.name)
+    file = item.image.rstrip("/").rpartition("/")[2]
+    return safe_name(file.rpartition(".")[0] or file)
+
+
+class Names:
+    """Gives every item of a stream that was seen before as a whole its name."""
+
+    def __init__(self, items: Iterable[Item]) -> None:
+        names, identities = array("Q"), array("Q")
+        for item in items:
+            names.append(_hash(wanted_name(item).casefold()))
+            identities.append(_hash(_identity(item)))
+        self.count = len(names)
+        self._shared = _repeated(names)
+        self._repeated = _repeated(identities)
+        self._given: set[int] = set()
+
+    def name(self, item: Item) -> str | None:
+        """The item's name; None where the same item had one before in this pass."""
+        identity = _identity(item)
+        if (number := _hash(identity)) in self._repeated:
+            if number in self._given:
+                return None
+            self._given.add(number)
+        name = wanted_name(item)
+        if _hash(name.casefold()) in self._shared or _HASHED.fullmatch(name[-13:]):
+            return f"{name}-{_digest(identity).hex()[:12]}"
+        return name
+
+
+def _identity(item: Item) -> str:
+    return "\0".join((item.label or item.image, item.mask, item.name, repr(item.options)))
+
+
+def _digest(text: str) -> bytes:
+    return hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=8).digest()
+
+
+def _hash(text: str) -> int:
+    return int.from_bytes(_digest(text), "little")
+
+
+def _repeated(hashes: "array[int]") -> frozenset[int]:
+    """The numbers that stand there more than once."""
+    values = np.sort(np.frombuffer(hashes, np.uint64)) if len(hashes) else np.zeros(0, np.uint64)
+    return frozenset(np.unique(values[1:][values[1:] == values[:-1]]).tolist())

@@ -1,0 +1,149 @@
+"""One run of a batch, from its inputs to its summary."""
+
+import os
+import secrets
+import time
+from collections import Counter, deque
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from .. import __version__
+from ..errors import Cancelled, InputError
+from ..limits import USUAL, Limits
+from ..progress import Monitor
+from ..sirfs.prior_file import load_prior_set
+from .engine import Crew, connected, dashboard, require_dask, worked
+from .fetch import is_url, sha256
+from .item import SKIPPED, Item, Job, Outcome, Plan, Recipe
+from .journal import Entry, Journal
+from .names import Names
+from .run_folder import RunFolder
+from .sources import Inputs
+from .summary import write_summary
+from .work import process
+
+_RECENT = 200  # images whose rate tells how long the rest will take
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What is asked for.
+
+    `inputs`: photos, folders, patterns, manifests; `masks`: a folder of masks, None looks beside the photos. `output`: the folder to write.
+    `timeout`: seconds an image may take, 0 for no end. `arrays`: write `arrays.npz` too. `priors`: a file of `isc fit-priors`.
+    """
+
+    inputs: Sequence[str]
+    output: Path
+    masks: str | None = None
+    recipe: Recipe = field(default_factory=Recipe)
+    crew: Crew = field(default_factory=Crew)
+    limits: Limits = USUAL
+    timeout: float = 0.0
+    arrays: bool = False
+    priors: Path | None = None
+
+
+def run_batch(
+    batch: Batch,
+    monitor: Monitor | None = None,
+    announce: Callable[[str], None] = lambda line: None,
+    task: Callable[[Job], Outcome] = process,
+) -> Counter[str]:
+    """Makes the result of every image that is not there yet, and returns how many are done, skipped and failed.
+
+    `announce` is told, once, what a person should know at the beginning. `task`: what a worker does. What is complete stays, however this
+    ends. Raises `InputError` for what is wrong with the run as a whole, before work begins; `Cancelled`.
+    """
+    monitor = monitor or Monitor()
+    require_dask()
+    crew = batch.crew.sized()
+    recipe = replace(batch.recipe, settings=replace(batch.recipe.settings, threads=crew.threads))
+    recipe.settings.check()
+    plan = _plan(batch)
+    folder = RunFolder(plan.output)
+    with folder.held(plan.run):
+        monitor.report("looking at the inputs", 0.0)
+        inputs = Inputs(batch.inputs, batch.masks, recipe)
+        names = Names(_watched(inputs, monitor))
+        if names.count == 0:
+            raise InputError(f"{', '.join(batch.inputs)}: names no image")
+        with Journal(folder, names.count) as journal:
+            try:
+                monitor.report("starting workers", 0.0)
+                with connected(crew) as client:
+                    announce(f"{names.count} images; Dask's dashboard: {dashboard(client)}")
+                    pace = _Pace(journal, monitor)
+                    for job, outcome in worked(client, _jobs(inputs, names, recipe, plan, journal), pace.tick, task):
+                        journal.add(Entry(job.number, job.name, job.image, job.mask, outcome))
+                        pace.count(outcome)
+            finally:
+                write_summary(folder, journal)
+        return journal.counts
+
+
+def _plan(batch: Batch) -> Plan:
+    if batch.priors is not None:
+        load_prior_set(batch.priors)
+    return Plan(
+        output=Path(os.path.abspath(batch.output.expanduser())),
+        run=secrets.token_hex(8),
+        version=__version__,
+        limits=batch.limits,
+        timeout=batch.timeout,
+        arrays=batch.arrays,
+        priors="" if batch.priors is None else os.path.abspath(batch.priors),
+        priors_sha256="" if batch.priors is None else sha256(batch.priors),
+    )
+
+
+def _watched(inputs: Inputs, monitor: Monitor) -> Iterator[Item]:
+    """The inputs, of which the first pass of a long list can be cancelled."""
+    for number, item in enumerate(inputs):
+        if number % 10_000 == 0 and monitor.cancelled():
+            raise Cancelled("looking at the inputs")
+        yield item
+
+
+def _jobs(inputs: Inputs, names: Names, recipe: Recipe, plan: Plan, journal: Journal) -> Iterator[Job]:
+    """The tasks, as a stream; an item that stands there again needs none."""
+    for number, item in enumerate(inputs):
+        name = names.name(item)
+        image, mask = _absolute(item.image), _absolute(item.mask)
+        if name is None:
+            journal.add(Entry(number, "", image, mask, Outcome(SKIPPED, "stands in the inputs more than once")))
+            continue
+        yield Job(number, name, image, mask, recipe.changed(item.options) if item.options else recipe, plan)
+
+
+def _absolute(location: str) -> str:
+    return location if not location or is_url(location) else os.path.abspath(location)
+
+
+class _Pace:
+    """Tells the monitor how far the run is, how fast it goes and how long the rest will take."""
+
+    def __init__(self, journal: Journal, monitor: Monitor) -> None:
+        self._journal, self._monitor = journal, monitor
+        self._recent: deque[float] = deque([time.monotonic()], maxlen=_RECENT)
+
+    def count(self, outcome: Outcome) -> None:
+        """An image has ended; those that were there already say nothing about how long one takes."""
+        if outcome.status != SKIPPED:
+            self._recent.append(time.monotonic())
+
+    def tick(self) -> None:
+        """Reports. Raises `Cancelled`."""
+        counts, total = self._journal.counts, self._journal.total
+        reached = sum(counts.values())
+        self._monitor.report(f"images, done {counts['done']}, {self._told(total - reached)}", reached / total)
+
+    def _told(self, left: int) -> str:
+        counts = self._journal.counts
+        told = f"failed {counts['failed']}, skipped {counts['skipped']}, {left} left"
+        rate = (len(self._recent) - 1) / max(time.monotonic() - self._recent[0], 1e-6)
+        if rate == 0:
+            return told
+        minutes, seconds = divmod(round(left / rate), 60)
+        return f"{told}, {rate:.2g}/s, {minutes // 60}:{minutes % 60:02d}:{seconds:02d} to go"

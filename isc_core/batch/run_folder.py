@@ -1,0 +1,101 @@
+"""The output folder of a batch: its lock, its own files, and what killed runs left in it.
+
+    OUT/NAME/                a result each, whole or not there
+    OUT/thumbnails/NAME.jpg
+    OUT/failures.jsonl       grows while a run lasts
+    OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    once it ends
+    OUT/.isc-batch/          lock, the run's name, the journal, records of attempts, fetched files
+
+The lock is the kernel's (`flock`): it ends with its process, however that ends, so that no stale file keeps anybody out.
+"""
+
+import contextlib
+import fcntl
+import os
+import re
+import shutil
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from ..atomic import remove_unfinished
+from ..errors import InputError
+from .names import OWN_FILES
+
+_LEFT = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old)")
+
+
+class RunFolder:
+    """The paths of an output folder, and what is done to it as a whole."""
+
+    def __init__(self, output: Path) -> None:
+        self.output = output
+        own = output / ".isc-batch"
+        self.own, self.attempts, self.fetched = own, own / "attempts", own / "fetched"
+        self.lock, self.run, self.journal = own / "lock", own / "run", own / "journal.jsonl"
+        self.failures = output / "failures.jsonl"
+        self.thumbnails, self.pages = output / "thumbnails", output / "summary-pages"
+
+    def thumbnail(self, name: str) -> Path:
+        """Of the result of this name."""
+        return self.thumbnails / f"{name}.jpg"
+
+    @contextmanager
+    def held(self, run: str) -> Iterator[None]:
+        """Holds the folder for this process; makes it, and removes what killed runs left, at the beginning and at the end.
+
+        Raises `InputError` where another process holds it, or it is not ours to write to.
+        """
+        self._make()
+        with self.lock.open("a+") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except OSError as error:
+                lock.seek(0)
+                raise InputError(f"{self.output} is being written by another run ({lock.read().strip()}): wait for its end") from error
+            lock.truncate(0)
+            lock.write(f"process {os.getpid()} on {socket.gethostname()}\n")
+            lock.flush()
+            self._tidy()
+            self.run.write_text(run)
+            try:
+                yield
+            finally:
+                self.run.unlink(missing_ok=True)
+                self._tidy()
+                lock.truncate(0)
+
+    def runs(self, run: str) -> bool:
+        """Whether this run holds the folder now, as seen from this machine."""
+        try:
+            return self.run.read_text() == run
+        except OSError:
+            return False
+
+    def require_run(self, run: str) -> None:
+        """Raises `InputError` where this machine does not see the folder of this run."""
+        if not self.runs(run):
+            raise InputError(f"{self.output} is not the run's folder on {socket.gethostname()}: give one that all workers share")
+
+    def _make(self) -> None:
+        if self.output.exists() and not self.output.is_dir():
+            raise InputError(f"{self.output} is a file: name a folder")
+        if not self.own.is_dir() and (foreign := [name for name in OWN_FILES if (self.output / name).exists()]):
+            raise InputError(f"{self.output} holds {foreign[0]}, which no batch has written: choose another folder")
+        try:
+            for folder in (self.attempts, self.thumbnails):
+                folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot write {self.output}: {error.strerror}; choose another place") from error
+
+    def _tidy(self) -> None:
+        """Removes temporary siblings of results and what was fetched. Nobody else writes here: the lock is held, the workers are gone."""
+        for folder in (self.output, self.thumbnails, self.pages):
+            with contextlib.suppress(FileNotFoundError):
+                for name in {left[1] for entry in os.scandir(folder) if (left := _LEFT.fullmatch(entry.name))}:
+                    remove_unfinished(folder / name)
+        shutil.rmtree(self.fetched, ignore_errors=True)
+        with contextlib.suppress(FileNotFoundError):
+            for entry in os.scandir(self.attempts):
+                Path(entry.path).unlink(missing_ok=True)

@@ -1,0 +1,113 @@
+"""What INPUTS name: photos, folders, patterns and manifests, here or in an object store; as one stream of items.
+
+A file `cup_mask.*` beside `cup.jpg` is its mask; in a folder of masks it is `cup.*` or `cup_mask.*`. Folders are not searched deeper: a
+pattern with ** is. Files come in the order of their names.
+"""
+
+import glob
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
+from pathlib import Path
+
+from ..errors import InputError
+from .fetch import file_system, is_url
+from .item import Item, Recipe
+from .manifest import SUFFIXES, Manifest
+
+PHOTOS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".ppm", ".pgm", ".exr", ".hdr", ".npy")
+_MASK = "_mask"
+
+
+class Inputs:
+    """The items of all inputs, any number of times; folders and patterns are listed once, manifests are streamed each time.
+
+    `masks`: a folder of masks, None looks beside the photos. Raises `InputError` for an input that is not there or holds no photo.
+    """
+
+    def __init__(self, inputs: Sequence[str], masks: str | None, recipe: Recipe) -> None:
+        self._masks = None if masks is None else masks.rstrip("/") or masks
+        if self._masks is not None and not _files(self._masks):
+            raise InputError(f"--masks {masks}: there is no such folder, or it is empty")
+        self._parts: list[Iterable[Item]] = [self._part(text, recipe) for text in inputs]
+
+    def __iter__(self) -> Iterator[Item]:
+        for part in self._parts:
+            yield from part
+
+    def _part(self, text: str, recipe: Recipe) -> Iterable[Item]:
+        if text.lower().endswith(SUFFIXES):
+            return Manifest(text, recipe)
+        found = _listed(text)
+        if not found:
+            raise InputError(f"{text}: there is no such photo, folder or manifest, or it holds no photo ({' '.join(PHOTOS)})")
+        return [Item(location, self._mask_of(location), label=location) for location in found]
+
+    def _mask_of(self, location: str) -> str:
+        """The mask that belongs to a photo, "" for none. Raises `InputError` where a folder of masks has none."""
+        folder, _, name = location.rpartition("/")
+        stem = name.rpartition(".")[0]
+        stems = _by_stem(folder if self._masks is None else self._masks)
+        wanted = (f"{stem}{_MASK}",) if self._masks is None else (stem, f"{stem}{_MASK}")
+        for candidate in wanted:
+            if candidate in stems:
+                return f"{folder if self._masks is None else self._masks}/{stems[candidate]}"
+        if self._masks is not None:
+            raise InputError(f"--masks {self._masks} holds no mask for {name}: name it {stem}.png")
+        return ""
+
+
+def _is_photo(name: str) -> bool:
+    stem, dot, suffix = name.rpartition(".")
+    return f"{dot}{suffix}".lower() in PHOTOS and not stem.endswith(_MASK) and not name.startswith(".")
+
+
+def _listed(text: str) -> list[str]:
+    """The photos that an input names, sorted."""
+    if is_url(text):
+        return _listed_remote(text)
+    if Path(text).is_dir():
+        folder = text.rstrip("/") or text
+        return [f"{folder}/{name}" for name in _files(folder) if _is_photo(name)]
+    if Path(text).exists():
+        return [text if "/" in text else f"./{text}"]
+    return sorted(f"./{path}" if "/" not in path else path for path in glob.iglob(text, recursive=True) if _is_photo(Path(path).name))
+
+
+def _listed_remote(url: str) -> list[str]:
+    system, path = file_system(url)
+    try:
+        if glob.has_magic(path):
+            return sorted(system.unstrip_protocol(found) for found in system.glob(path) if _is_photo(found.rpartition("/")[2]))
+        if system.isdir(path):
+            folder = url.rstrip("/")
+            return [f"{folder}/{name}" for name in _files(folder) if _is_photo(name)]
+        return [url] if system.exists(path) else []
+    except OSError as error:
+        raise InputError(f"{url} cannot be listed: {error.strerror or error}") from error
+
+
+def _files(folder: str) -> list[str]:
+    """Names of the files in a folder, sorted; none where there is no such folder."""
+    if is_url(folder):
+        system, path = file_system(folder)
+        try:
+            return sorted(entry["name"].rpartition("/")[2] for entry in system.ls(path, detail=True) if entry["type"] == "file")
+        except FileNotFoundError:
+            return []
+    try:
+        with os.scandir(folder or ".") as entries:
+            return sorted(entry.name for entry in entries if entry.is_file())
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+
+
+@lru_cache(maxsize=64)
+def _by_stem(folder: str) -> dict[str, str]:
+    """The photos and masks of a folder by their names without suffix; of several the first."""
+    found: dict[str, str] = {}
+    for name in _files(folder):
+        stem, dot, suffix = name.rpartition(".")
+        if f"{dot}{suffix}".lower() in PHOTOS:
+            found.setdefault(stem, name)
+    return found

@@ -1,0 +1,150 @@
+"""The task of one image: what a worker does.
+
+A worker does one image at a time, however many threads it has: the watchdog and the peak of memory are the process's.
+"""
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path, PurePath
+
+from .. import __version__
+from ..errors import Cancelled, InputError
+from ..photo import read_photo
+from ..pipeline import decompose
+from ..progress import Monitor
+from ..report import thumbnail
+from ..result_folder import require_room, save
+from ..sirfs.fitting.prior_set import PriorSet
+from ..sirfs.prior_file import load_prior_set
+from .attempts import attempt
+from .fetch import is_url, local_copy, sha256
+from .fingerprint import fingerprint, is_finished
+from .item import DONE, FAILED, SKIPPED, Job, Outcome
+from .run_folder import RunFolder
+
+_LOOK_SECONDS = 2.0
+_one_at_a_time = threading.Lock()
+
+Work = Callable[[Job, Monitor], str]
+
+
+def process(job: Job, work: "Work | None" = None) -> Outcome:
+    """Makes the job's result unless it is there. What is wrong with the image is an outcome; a fault of the program raises.
+
+    `work`: what to do, `decompose_into` if None; returns the status.
+    """
+    with _one_at_a_time:
+        start = time.perf_counter()
+        _reset_peak()
+        status, reason = _attempted(job, work or decompose_into)
+        return Outcome(status, reason, round(time.perf_counter() - start, 4), _peak_mb())
+
+
+def _attempted(job: Job, work: Work) -> tuple[str, str]:
+    plan = job.plan
+    try:
+        if plan.version != __version__:
+            raise InputError(f"this worker has ISC {__version__}, the run {plan.version}: install the same version everywhere")
+        folder = RunFolder(plan.output)
+        folder.require_run(plan.run)
+        with attempt(folder.attempts / job.name, plan.run, plan.timeout) as monitor:
+            return work(job, _while_wanted(monitor, folder, plan.run)), ""
+    except Cancelled as stopped:
+        return FAILED, f"took longer than --timeout {plan.timeout:g} s, in the stage: {stopped}"
+    except InputError as error:
+        return FAILED, str(error)
+    except MemoryError:
+        return FAILED, "there is not enough memory for it: give a smaller image, a smaller --max-size or fewer workers"
+    except OSError as error:
+        return FAILED, f"{error.filename or job.image}: {error.strerror or error}"
+
+
+def _while_wanted(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
+    """Also says stop once the run is no more; on a cluster nobody else tells those who work for it."""
+    looked, wanted = time.monotonic(), True
+
+    def cancelled() -> bool:
+        nonlocal looked, wanted
+        if (now := time.monotonic()) - looked > _LOOK_SECONDS:
+            looked, wanted = now, folder.runs(run)
+        return not wanted or monitor.cancelled()
+
+    return Monitor(cancelled=cancelled)
+
+
+def decompose_into(job: Job, monitor: Monitor) -> str:
+    """Decomposes the image into its folder, as `isc decompose` does. Returns whether it is done or was there already."""
+    plan, fetched = job.plan, RunFolder(job.plan.output).fetched
+    with contextlib.ExitStack() as stack:
+        photo = stack.enter_context(local_copy(job.image, plan.limits, fetched))
+        mask = stack.enter_context(local_copy(job.mask, plan.limits, fetched)) if job.mask else None
+        sums = sha256(photo), "" if mask is None else sha256(mask)
+        wanted = fingerprint(job, *sums)
+        if is_finished(job.folder, wanted, plan.arrays):
+            _draw_thumbnail(job, anew=False)
+            return SKIPPED
+        monitor.report("reading", 0.0)
+        try:
+            _decompose(job, photo, mask, sums, wanted, monitor)
+        except InputError as error:
+            # The temporary copy's name says nothing to anybody.
+            raise InputError(_renamed(str(error), ((photo, job.image), (mask, job.mask)))) from error
+    _draw_thumbnail(job, anew=True)
+    return DONE
+
+
+def _decompose(job: Job, path: Path, mask: Path | None, sums: tuple[str, str], wanted: str, monitor: Monitor) -> None:
+    plan, recipe = job.plan, job.recipe
+    photo = read_photo(path, mask, recipe.transfer, limits=plan.limits)
+    if photo.original.sha256 != sums[0] or (mask is not None and sha256(mask) != sums[1]):
+        raise InputError(f"{job.image} changed while it was read: run again when it is complete")
+    require_room(job.folder, 0, arrays=plan.arrays)
+    priors = _priors(plan.priors, plan.priors_sha256) if plan.priors else None
+    name = PurePath(job.image).name
+    result = decompose(photo, recipe.settings, prior_set=priors, name=name, monitor=monitor.part(0.0, 0.8))
+    source = {**result.provenance.input, "mask_sha256": sums[1] or None, "fingerprint": wanted}
+    result = replace(result, provenance=replace(result.provenance, input=source))
+    save(result, job.folder, arrays=plan.arrays, monitor=monitor.part(0.8, 1.0))
+
+
+def _renamed(message: str, copies: tuple[tuple[Path | None, str], ...]) -> str:
+    for copy, location in copies:
+        if copy is not None and is_url(location):
+            message = message.replace(str(copy), location)
+    return message
+
+
+@lru_cache(maxsize=2)
+def _priors(path: str, expected: str) -> PriorSet:
+    if sha256(Path(path)) != expected:
+        raise InputError(f"{path} is not the file that the run began with: all workers have to see the same priors")
+    return load_prior_set(Path(path))
+
+
+def _draw_thumbnail(job: Job, *, anew: bool) -> None:
+    """Beside the results: theirs are folders of known content."""
+    target = RunFolder(job.plan.output).thumbnail(job.name)
+    if anew or not target.is_file():
+        thumbnail(job.folder / "preview.png", target)
+
+
+# --- the peak of memory ---------------------------------------------------------------------------------------------------------------
+
+
+def _reset_peak() -> None:
+    """Linux forgets a process's highest use of memory when asked to; elsewhere nothing happens."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/clear_refs").write_text("5")
+
+
+def _peak_mb() -> float:
+    """The highest use of memory since then, in MB; 0 where the system does not tell."""
+    with contextlib.suppress(OSError):
+        for line in Path("/proc/self/status").read_text().splitlines():
+            if line.startswith("VmHWM:"):
+                return round(int(line.split()[1]) / 1024, 1)
+    return 0.0

@@ -1,0 +1,109 @@
+"""Names of results are safe, unlike each other, and the same whatever the order."""
+
+import os
+import random
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from isc_core.batch.item import Item
+from isc_core.batch.names import OWN_FILES, Names, check_given, safe_name, wanted_name
+from isc_core.errors import InputError
+
+ANY_NAME = st.text(st.characters(codec=None), max_size=300) | st.binary(max_size=300).map(os.fsdecode)
+HOSTILE = [
+    "",
+    ".",
+    "..",
+    "...",
+    "../x",
+    "/etc/passwd",
+    "a/../../b",
+    "a\\b",
+    "\0",
+    "a\0b",
+    "con",
+    "NUL.txt",
+    "-rf",
+    ".hidden",
+    "Summary.html",
+]
+
+
+def is_safe(name: str) -> bool:
+    """Whether it can be a folder's name on any system, and none of those that the run itself uses."""
+    return (
+        0 < len(name.encode("utf-8")) <= 130
+        and not set(name) & set('/\\\0<>:"|?*\n\r ')
+        and not name.startswith((".", "-"))
+        and not name.endswith((".", " "))
+        and name.casefold() not in OWN_FILES
+        and name.partition(".")[0].casefold() not in ("con", "nul", "aux", "prn", "com1")
+    )
+
+
+@given(ANY_NAME)
+def test_any_text_becomes_a_safe_name(text: str) -> None:
+    name = safe_name(text)
+    assert is_safe(name)
+    assert safe_name(name) == name
+
+
+@pytest.mark.parametrize("text", [*HOSTILE, *OWN_FILES])
+def test_hostile_names_become_safe(text: str) -> None:
+    assert is_safe(safe_name(text))
+
+
+def test_usual_names_stay() -> None:
+    for name in ("cup", "IMG_0001", "tasse-blau.2", "чашка", "杯子"):
+        assert safe_name(name) == name
+
+
+@pytest.mark.parametrize("name", ["..", ".", "/abs", "a/b", "a\\b", "x\0y", "x\ny", "nul", "COM1.png", "thumbnails", "Failures.jsonl", " "])
+def test_a_manifest_cannot_give_names_that_lead_elsewhere(name: str) -> None:
+    with pytest.raises(InputError, match="^here: "):
+        check_given(name, "here")
+
+
+def test_names_that_several_want_tell_their_images_apart_in_any_order() -> None:
+    items = [Item(f"{folder}/front.png") for folder in "abcdefgh"] + [Item("a/Front.jpg"), Item("a/back.png"), Item("x", name="BACK")]
+    names = Names(items)
+    given_names = {item: names.name(item) for item in items}
+    assert len({str(name).casefold() for name in given_names.values()}) == len(items) == names.count
+    assert all(
+        name is not None and is_safe(name) and name.casefold().startswith(wanted_name(item).casefold()[:4])
+        for item, name in given_names.items()
+    )
+    shuffled = items[:]
+    random.Random(1).shuffle(shuffled)
+    again = Names(shuffled)
+    assert {item: again.name(item) for item in shuffled} == given_names
+
+
+def test_a_name_that_nobody_else_wants_is_the_files() -> None:
+    item = Item("photos/cup.png")
+    assert Names([item, Item("photos/jug.png")]).name(item) == "cup"
+
+
+def test_a_file_cannot_take_the_name_that_a_hash_gives() -> None:
+    pair = [Item("a/cup.png"), Item("b/cup.png")]
+    taken = str(Names(pair).name(pair[0]))
+    three = [*pair, Item(f"c/{taken}.png")]
+    names = Names(three)
+    assert len({names.name(item) for item in three}) == 3
+
+
+def test_the_same_item_has_one_result() -> None:
+    item, other = Item("a/cup.png"), Item("a/cup.png", options=(("max_size", 64),))
+    names = Names([item, other, item])
+    first, second = names.name(item), names.name(other)
+    assert None not in (first, second) and first != second
+    assert names.name(item) is None
+
+
+def test_names_lead_into_the_output(tmp_path: Path) -> None:
+    for text in HOSTILE:
+        folder = (tmp_path / safe_name(text)).resolve()
+        assert folder.parent == tmp_path.resolve()
