@@ -19,6 +19,7 @@ from .atomic import new_file
 from .brdf.fitting import LobeFit
 from .decomposition import Decomposition, Separation
 from .errors import InputError
+from .names import readable
 from .photo import linear_to_srgb, srgb_to_linear
 from .sirfs.frames import real_sh
 
@@ -301,7 +302,7 @@ def _write(
     right: bool = False,
 ) -> float:
     """Writes a line on the base line `place`, cut to `room` pixels; returns where it ends."""
-    font = ImageFont.load_default(size)
+    font, text = ImageFont.load_default(size), readable(text)
     if font.getlength(text) > room:
         while text and font.getlength(text + "…") > room:
             text = text[:-1]

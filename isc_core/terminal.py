@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import TextIO
 
+from .names import readable
 from .progress import Monitor
 
 _BAR = 24
@@ -27,6 +28,12 @@ def discard_output() -> None:
     """Points standard output at nothing, so that what is still buffered does not fail once more when Python ends."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _printable(text: str, stream: TextIO) -> str:
+    """`text`, which may have several lines, in characters that `stream` can write."""
+    coding = getattr(stream, "encoding", None) or "utf-8"
+    return "\n".join(map(readable, text.split("\n"))).encode(coding, "backslashreplace").decode(coding)
 
 
 class TerminalSpeaker:
@@ -48,7 +55,7 @@ class TerminalSpeaker:
         """The work's result is written to `output`; `lines` say what a person should know."""
         del output
         for line in lines:
-            print(line)
+            print(_printable(line, sys.stdout))
 
     def failed(self, message: str, code: int) -> None:
         """One line says why there is no result."""

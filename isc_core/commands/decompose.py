@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work; what can be wrong is found before it begins."""
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
-    require_writable_result(options.output)
+    require_writable_result(options.output, inputs=(options.photo, options.mask))
     prior_set = None if options.priors is None else load_prior_set(options.priors)
     photo = read_photo(options.photo, options.mask, options.transfer, limits=limits_of(options))
     evidence = _evidence(options, photo)
