@@ -20,7 +20,7 @@ from . import claims
 from .comparing import gain, in_words, ratio
 from .context import Context
 from .estimates import AFTER, BEFORE, BOUND, METRICS, SIRFS, Framework, Row, known, measured
-from .item import Item, Made, Table, Verdict
+from .item import Cell, Item, Made, Table, Verdict
 
 KINDS = {"specular": "photos with significant specularity", "synthetic": "synthetic images"}
 _NAMES = {
@@ -66,7 +66,7 @@ def relative_errors(rows: Sequence[Row], words: str, seed: int) -> Table:
 
 
 def _absolute(rows: Sequence[Row]) -> Table:
-    lines = [(row.subject, row.framework, *(row.errors[name] for name in METRICS)) for row in rows]
+    lines: list[tuple[Cell, ...]] = [(row.subject, row.framework, *(row.errors[name] for name in METRICS)) for row in rows]
     return Table(("subject", "framework", *(_NAMES[name] for name in METRICS)), tuple(lines), "Errors by subject")
 
 

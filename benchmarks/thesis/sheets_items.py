@@ -1,5 +1,196 @@
-"""Items of the thesis that are not here yet."""
+"""Figures 4.10 to 4.48: what every method makes of single images, as sheets to look at.
 
-from .item import Item
+4.10-4.15 segmentation and inpainting, 4.16-4.24 published separations, 4.25-4.28 Sparse Coding with SF1, SF2 and both, 4.29-4.31 the
+thesis' methods beside the iterative one and ours, 4.32-4.34 SIRFS before and 4.35-4.40 after a separation, 4.41-4.48 photos of real
+objects.
 
-ITEMS: tuple[Item, ...] = ()
+Limits: what the thesis shows under each number of this range is not known: the order within it is ours. Where there are fewer subjects
+than numbers, the next ones show the first subjects in other settings, or by other models, so that no two figures are the same.
+"""
+
+import functools
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from isc_core.errors import InputError
+from isc_core.image_metrics import highlight_region
+from isc_core.metrics import mse, score, truth_normal
+from isc_core.sirfs.frames import light_from_reference
+
+from .context import Context
+from .decompositions import decomposed
+from .estimates import AFTER, BEFORE, BOUND, SIRFS, Framework, estimated, known
+from .item import Item, Made
+from .panels import characteristics, panels
+from .pictures import ball, beside, directions, fitted, lit, marked, relief, signed
+from .removal_items import METHODS
+from .segmentation_items import WAYS as SEGMENTATIONS
+from .separations import SEGMENTATION, Way, highlights, layers, split
+from .sparse_coding_items import METHOD as SPARSE_CODING
+from .sparse_coding_items import OURS as SPECULAR_FREE
+from .style import exposure, sheet
+from .subjects import Subject
+
+Rows = list[tuple[str, Sequence[np.ndarray | None]]]
+_OPTIMISERS = SEGMENTATIONS[:3]
+_PAINTED = (*_OPTIMISERS, Way("CS, improved", SEGMENTATION))
+_PUBLISHED = tuple(Way(label, method, "paper") for label, method in METHODS.items())
+_IMPROVED = tuple(Way(f"{label}, improved", method) for label, method in METHODS.items())
+_THESIS = (Way("iterative", "tan_2005"), Way("CS", SEGMENTATION), Way("SC", SPARSE_CODING), Way("ISC", "isc"))
+_THESIS_PUBLISHED = tuple(Way(f"{way.label}, as published", way.method, "paper") for way in _THESIS[:3])
+_FREE_OTHERS = (Way("SC, as published", SPARSE_CODING, "paper"), *SPECULAR_FREE[2:])
+_LATER = (SIRFS, *(one for one in BEFORE if one.label in ("SC-SIRFS", "MDR-SIRFS")), BOUND)
+_FIRST = (SIRFS, *(one for one in BEFORE if one.label != "SC-SIRFS"))
+_MODELS = {"mdr": "MDR", "mbp": "MBP", "joint": "joint", "sirfs": "SIRFS alone"}
+_PREFERRED = ("Cup", "Helmet", "Basketball", "Goldfish", "Hydrant", "Bag", "Guitar", "Clock")
+
+
+def turn(index: int, subjects: Sequence[Subject], rounds: int) -> tuple[Subject, int]:
+    """The subject of the `index`-th figure of a family, and in which of its rounds. Raises `InputError` where there are too few."""
+    if not subjects or index >= rounds * len(subjects):
+        raise InputError(f"{len(subjects)} images of this kind are too few for so many figures: give more with --data")
+    return subjects[index % len(subjects)], index // len(subjects)
+
+
+def separation_rows(subject: Subject, ways: Sequence[Way], seed: int) -> Rows:
+    """The truth and the photo, then each way's layers and its error."""
+    diffuse, specular = layers(subject)
+    mask, gain = subject.mask, exposure(subject.image, subject.mask)
+    rows: Rows = [("truth", [lit(diffuse, mask, gain), lit(specular, mask, gain), lit(subject.image, mask, gain)])]
+    nothing = mse(diffuse, subject.image, mask)
+    for way in ways:
+        try:
+            found = split(subject, way, seed)
+        except InputError:
+            rows.append((f"{way.label}\nrefuses", [None, None, None]))
+            continue
+        error = mse(diffuse, found.diffuse, mask)
+        words = f"MSE × {_short(error / nothing)}" if nothing > 0 else f"RMS {error**0.5:.2g}"
+        error_picture = signed(found.diffuse - diffuse, mask, gain)
+        rows.append((f"{_wrapped(way.label)}\n{words}", [lit(found.diffuse, mask, gain), lit(found.specular, mask, gain), error_picture]))
+    return rows
+
+
+def characteristics_rows(context: Context, subject: Subject, frameworks: Sequence[Framework]) -> Rows:
+    """The truth and each framework's height, normals, shading, reflectance and light."""
+    truth = subject.truth
+    assert truth is not None
+    seen, mask = truth.valid & np.isfinite(truth.height), truth.mask
+    heights = truth.height - np.nanmedian(truth.height[mask])
+    limits = float(np.nanmin(heights[mask])), float(np.nanmax(heights[mask]))
+    gains = {name: exposure(getattr(truth, name), seen) for name in ("shading", "reflectance")}
+    lamp, covered = ball(light_from_reference(truth.light))
+    bright = exposure(lamp, covered)
+
+    def row(label: str, height: np.ndarray, normal: np.ndarray, shading: np.ndarray, paint: np.ndarray, light: np.ndarray) -> None:
+        colours = [(fitted(shading, truth.shading, seen), "shading"), (fitted(paint, truth.reflectance, seen), "reflectance")]
+        rows.append((label, [
+            relief(height, mask, limits), directions(normal, mask), *(lit(values, seen, gains[name], mask) for values, name in colours),
+            beside(lit(fitted(light, lamp, covered), covered, bright), mask),
+        ]))  # fmt: skip
+
+    rows: Rows = []
+    row("truth", heights, truth_normal(truth.height), truth.shading, truth.reflectance, lamp)
+    for framework in frameworks:
+        answer = estimated(context, subject, framework).answer
+        if answer is None:
+            rows.append((f"{framework.label}\nrefuses", [None] * 5))
+            continue
+        found = score(
+            truth, height=answer.height, normal=answer.normal, shading=answer.shading, reflectance=answer.reflectance, light=answer.light
+        )
+        offset = np.median((answer.height - heights)[np.isfinite(heights)])
+        label = f"{_wrapped(framework.label)}\nerror {found.average:.3f}"
+        row(label, answer.height - offset, answer.normal, answer.shading, answer.reflectance, ball(answer.light)[0])
+    return rows
+
+
+def _masks(kind: str, context: Context) -> Made:
+    rows: Rows = []
+    differing = []
+    for subject in context.subjects(kind):
+        gain = exposure(subject.image, subject.mask)
+        found = [highlights(subject, way, context.seed) for way in _OPTIMISERS]
+        differing.append(f"{subject.name} {max(int((found[2] ^ other).sum()) for other in found[:2])}")
+        _, specular = layers(subject)
+        true = highlight_region(specular, subject.mask)
+        pictures = [marked(subject.image, subject.mask, pixels, gain) for pixels in (*found, true)]
+        rows.append((subject.name, [lit(subject.image, subject.mask, gain), *pictures]))
+    columns = ("photo", *(way.label.partition(",")[0] for way in _OPTIMISERS), "true highlights")
+    text = (
+        "Pixels above the highest of three thresholds of the smallest channel, orange, and beside them where the true specular layer has a "
+        f"tenth of its strongest light. Pixels that CS marks and another search does not, or the other way round: {', '.join(differing)}."
+    )
+    return Made(figures=(sheet(columns, rows, expose=False),), text=text)
+
+
+def _layers(kind: str, rounds: Sequence[Sequence[Way]], index: int, context: Context) -> Made:
+    subject, which = turn(index, context.subjects(kind), len(rounds))
+    rows = separation_rows(subject, rounds[which], context.seed)
+    text = (
+        f"{subject.name}. Under each name: the diffuse layer's mean square error over that of doing nothing, or, where no highlight is, "
+        "its RMS error. Errors: orange is light left over, blue is paint taken for light, in full colour from a tenth of the photo's white "
+        "on."
+    )
+    return Made(figures=(sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),), text=text)
+
+
+def _characteristics(rounds: Sequence[Sequence[Framework]], index: int, context: Context) -> Made:
+    subject, which = turn(index, known(context, ("specular", "synthetic")), len(rounds))
+    rows = characteristics_rows(context, subject, rounds[which])
+    text = (
+        f"{subject.name} ({subject.kind}). Under each name the geometric mean of the six errors. Height in the true one's range, shading, "
+        "reflectance and light in the scale nearest to the truth; the light on a white ball."
+    )
+    return Made(figures=(sheet(("height", "normals", "shading", "reflectance", "light"), rows, expose=False),), text=text)
+
+
+def _photo(index: int, context: Context) -> Made:
+    found = context.photos()
+    order = {name: place for place, name in enumerate(_PREFERRED)}
+    subjects = sorted(found, key=lambda subject: order.get(subject.name, len(order)))
+    subject, which = turn(index, subjects, len(_MODELS))
+    model = list(_MODELS)[which]
+    text = (
+        f"{subject.name}, by {_MODELS[model]}; its truth is not known. Photo, diffuse and specular share an exposure, the rest has its own."
+    )
+    return Made(figures=(panels(characteristics(decomposed(context, subject, model)), 4),), text=text)
+
+
+def _short(value: float) -> str:
+    return f"{value:.2g}" if value < 100 else f"{value:.0f}"
+
+
+def _wrapped(label: str) -> str:
+    """A label of a row in lines that fit beside the sheet."""
+    return label.replace(", ", ",\n").replace(" with ", "\nwith ").replace(" on the true ", "\non the true\n")
+
+
+_KINDS = {"specular": "significant specularity", "synthetic": "a synthetic image", "matt": "an image without specularity"}
+_Plan = tuple[str, Callable[[Context], Made]]
+
+
+def _family(words: str, kind: str, rounds: Sequence[Sequence[Way]], count: int) -> list[_Plan]:
+    return [(f"{words}: {_KINDS[kind]} ({index + 1})", functools.partial(_layers, kind, rounds, index)) for index in range(count)]
+
+
+def _plans() -> list[_Plan]:
+    plans: list[_Plan] = [
+        (f"Highlights found by PSO, ClonalG and CS: {words}", functools.partial(_masks, kind)) for kind, words in _KINDS.items()
+    ]
+    for kind in _KINDS:
+        plans += _family("Highlights painted over after PSO, ClonalG and CS", kind, (_PAINTED,), 1)
+    for kind, count in (("specular", 4), ("synthetic", 3), ("matt", 2)):
+        plans += _family("Layers by MZK06, YCK06, YWA10 and SC09", kind, (_PUBLISHED, _IMPROVED), count)
+    for kind, count in (("specular", 2), ("synthetic", 1), ("matt", 1)):
+        plans += _family("Layers by Sparse Coding with SF1, SF2 and both", kind, (SPECULAR_FREE, _FREE_OTHERS), count)
+    for kind, count in (("specular", 2), ("synthetic", 1)):
+        plans += _family("Layers by the iterative method, CS, SC and ISC", kind, (_THESIS, _THESIS_PUBLISHED), count)
+    after, before = ((SIRFS, *AFTER), (SIRFS, AFTER[-1], BOUND)), (_FIRST, _LATER)
+    plans += [(f"Characteristics by SIRFS before a separation ({i + 1})", functools.partial(_characteristics, after, i)) for i in range(3)]
+    plans += [(f"Characteristics by SIRFS after a separation ({i + 1})", functools.partial(_characteristics, before, i)) for i in range(6)]
+    return plans + [(f"Characteristics of a real object's photo ({i + 1})", functools.partial(_photo, i)) for i in range(8)]
+
+
+ITEMS: tuple[Item, ...] = tuple(Item("figure", f"4.{10 + place}", title, make) for place, (title, make) in enumerate(_plans()))
