@@ -1,0 +1,260 @@
+"""The thesis' tables of separations and frameworks, on small painted balls whose layers, shape and light are known exactly."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from benchmarks.thesis import (
+    characteristics_items,
+    estimates,
+    layer_tables,
+    removal_items,
+    segmentation_items,
+    separations,
+    sheets_items,
+    sparse_coding_items,
+)
+from benchmarks.thesis.comparing import gain, rank_sum, ratio
+from benchmarks.thesis.context import Context
+from benchmarks.thesis.estimates import AFTER, BOUND, SIRFS
+from benchmarks.thesis.layer_tables import DIFFUSE, SPECULAR
+from benchmarks.thesis.pictures import ball, beside, fitted, lit, signed
+from benchmarks.thesis.separations import NOTHING, Way
+from benchmarks.thesis.subjects import Subject
+from isc_core.datasets import MitBerkeleyObject
+from isc_core.decomposition import Separation
+from isc_core.errors import InputError
+from isc_core.evaluate import Ratio
+from isc_core.metrics import score, truth_normal
+from isc_core.sirfs.frames import light_from_reference, light_to_reference, real_sh
+
+SIZE = 36
+PAINTS = ((0.8, 0.25, 0.1), (0.15, 0.45, 0.7))
+
+
+def painted_ball(name: str, kind: str, paint: tuple[float, float, float], gloss: float) -> Subject:
+    """A ball under one smooth light; a highlight above its middle."""
+    axis = (np.arange(SIZE) - (SIZE - 1) / 2) / (0.45 * SIZE)
+    distance = np.hypot(axis, axis[:, None])
+    mask = distance < 0.97
+    height = np.where(mask, np.sqrt(np.maximum(1 - distance**2, 0)) * 0.45 * SIZE, np.nan)
+    normal = truth_normal(height)
+    light = np.zeros((9, 3))
+    light[0], light[1], light[2] = -2.5, 0.5, 0.8
+    shading = np.where(np.isfinite(normal), np.exp(real_sh(np.nan_to_num(normal)) @ light), 0.5)
+    diffuse = np.where(mask[..., None], np.array(paint) * shading, 0).astype(np.float32)
+    lobe = gloss * np.exp(-((axis[:, None] + 0.35) ** 2 + axis**2) / 0.02)[..., None] * np.ones(3)
+    specular = np.where(mask[..., None], lobe, 0).astype(np.float32)
+    image = diffuse + specular
+    reflectance = np.where(mask[..., None], np.array(paint), 0.0)
+    truth = MitBerkeleyObject(
+        name, "laboratory", image.astype(float), mask & (image > 0).all(-1), mask, height, shading, reflectance, light_to_reference(light)
+    )
+    return Subject(name, kind, image, mask, diffuse, specular, truth)
+
+
+@dataclass(frozen=True)
+class Balls(Context):
+    """A run on two balls of each kind."""
+
+    def subjects(self, kind: str) -> tuple[Subject, ...]:
+        """Red and blue."""
+        return tuple(painted_ball(f"ball {number}", kind, paint, 0 if kind == "matt" else 0.4) for number, paint in enumerate(PAINTS))
+
+    def photos(self) -> tuple[Subject, ...]:
+        """The glossy ones, nothing known."""
+        return tuple(replace(s, kind="photo", diffuse=None, specular=None, truth=None) for s in self.subjects("specular"))
+
+
+@pytest.fixture(scope="module")
+def context(tmp_path_factory: pytest.TempPathFactory) -> Context:
+    return Balls(tmp_path_factory.mktemp("thesis"), quick=True)
+
+
+def perfect(subject: Subject) -> Separation:
+    diffuse, specular = separations.layers(subject)
+    return Separation(diffuse, specular, np.zeros_like(diffuse), np.ones(subject.mask.shape, np.float32))
+
+
+@pytest.mark.parametrize("kind", ["specular", "matt"])
+def test_the_truth_scores_perfectly(context: Context, kind: str) -> None:
+    subject = context.subjects(kind)[0]
+    found = separations.scored(subject, perfect(subject))
+    assert found["mse"] == found["specular_mse"] == 0
+    assert found["ssim"] == pytest.approx(1)
+    assert found["lmse"] == pytest.approx(0, abs=1e-9)
+    assert found["specular_lmse"] is None if kind == "matt" else found["specular_lmse"] == pytest.approx(0, abs=1e-9)
+    assert layer_tables.decibels(0) == np.inf
+
+
+def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Context) -> None:
+    for items in (segmentation_items, removal_items, sparse_coding_items):
+        for item in items.ITEMS:
+            assert item.make is not None
+            made = item.make(context)
+            assert all(NOTHING.label in [cell for row in table.rows for cell in row[:2]] for table in made.tables), item.number
+    runs = layer_tables.run_all(context, "specular", ())
+    assert layer_tables.relative(runs, NOTHING.label, "specular", DIFFUSE, 0) == "1"
+    for layer in (DIFFUSE, SPECULAR):
+        error = layer_tables.means(runs[NOTHING.label], layer[0])
+        true = {s.name: float(np.mean(separations.layers(s)[1][s.mask].astype(float) ** 2)) for s in context.subjects("specular")}
+        assert error == pytest.approx(true, rel=1e-4)  # leaving the highlight costs exactly the highlight, in both layers
+    matt = layer_tables.run_all(context, "matt", ())
+    assert layer_tables.relative(matt, NOTHING.label, "matt", DIFFUSE, 0) == "0.00"
+
+
+def test_every_search_marks_the_pixels_of_the_exact_one(context: Context) -> None:
+    subject = context.subjects("specular")[0]
+    exact = next(way for way in segmentation_items.WAYS if way.label == "exact search, as published")
+    marked = separations.highlights(subject, exact, 0)
+    assert 0 < marked.sum() < subject.mask.sum() / 2
+    for way in segmentation_items.WAYS[:3]:
+        assert (separations.highlights(subject, way, 3) == marked).all(), way.label
+
+
+def test_runs_are_repeated_with_other_seeds_and_taken_up_again(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    subject = context.subjects("specular")[0]
+    way = next(way for way in segmentation_items.WAYS if way.label == "CS, as published")
+    first = separations.measured(context, subject, way, 3)
+    assert [run.run for run in first] == [0, 1, 2]
+    assert all(run.search is not None and run.seconds is not None and run.search < run.seconds for run in first)
+    assert way.options(1) == {"optimiser": "chaotic_clonal", "seed": 1}
+    monkeypatch.setattr(separations, "split", lambda *_: pytest.fail("computed again"))
+    assert separations.measured(context, subject, way, 3) == first
+
+
+def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -> None:
+    subject = context.subjects("specular")[0]
+    grey = replace(subject, name="grey", image=np.repeat(subject.image.mean(2, keepdims=True), 3, 2))
+    way = Way("CS, improved", separations.SEGMENTATION)
+    found = separations.measured(context, grey, way)
+    assert found[0].refused and found[0].mse is None
+    table = layer_tables.by_subject(
+        {NOTHING.label: {"grey": separations.measured(context, grey, NOTHING)}, way.label: {"grey": found}}, "specular", DIFFUSE
+    )
+    assert table.rows[1][2] == "refused"
+
+
+@pytest.mark.parametrize(
+    ("found", "holds"),
+    [
+        (Ratio(0.80, 0.7, 0.9), "yes"),
+        (Ratio(0.95, 0.93, 0.97), "partly"),
+        (Ratio(0.99, 0.95, 1.03), "no"),
+        (Ratio(1.2, 1.1, 1.3), "no"),
+        (Ratio(0.8, 0.6, 1.1), "cannot be told"),
+        (None, "cannot be told"),
+    ],
+)
+def test_a_claim_of_ten_per_cent_holds_only_where_the_interval_says_so(found: Ratio | None, holds: str) -> None:
+    assert gain("ten per cent less", 0.1, found, "error").holds == holds
+
+
+def test_comparisons_pair_subjects_and_know_when_they_cannot_tell() -> None:
+    found = ratio({"a": 1.0, "b": 2.0, "c": 5.0}, {"a": 2.0, "b": 4.0, "d": 1.0}, 0)
+    assert found is not None
+    assert found == pytest.approx((0.5, 0.5, 0.5))  # the two subjects that both have, not c and d
+    assert ratio({"a": 1.0, "b": 0.0}, {"a": 1.0, "b": 1.0}, 0) is None
+    assert rank_sum([1, 2], [1, 2]) is None
+    assert rank_sum([2, 2, 2], [2, 2, 2]) == 1
+    low, high = [1.0, 1.1, 1.2, 1.3, 1.4], [2.0, 2.1, 2.2, 2.3, 2.4]
+    chance = rank_sum(low, high)
+    assert chance is not None and chance < 0.01
+
+
+@pytest.fixture(scope="module")
+def rows(context: Context) -> list[estimates.Row]:
+    subjects = [estimates.known(context, (kind,))[0] for kind in ("specular", "matt")]
+    return estimates.measured(context, subjects, (SIRFS, AFTER[-1], BOUND))
+
+
+def test_sirfs_is_what_all_are_relative_to(rows: list[estimates.Row]) -> None:
+    table = characteristics_items.relative_errors(rows, "balls", 0)
+    assert table.rows[0] == ("SIRFS", *["1"] * len(estimates.METRICS))
+    of = {(row.subject.split()[0], row.framework): row for row in rows}
+    plain, bound = of["matt", "SIRFS"], of["matt", BOUND.label]
+    assert bound.errors == pytest.approx(plain.errors, rel=1e-4)  # without a highlight the photo is the diffuse image
+    assert all(row.seconds > 0 and row.evaluations > 0 for row in rows)
+
+
+def test_a_separation_afterwards_changes_reflectance_alone(rows: list[estimates.Row]) -> None:
+    glossy = {row.framework: row.errors for row in rows if row.subject.startswith("specular")}
+    for name in ("height", "normal", "light", "shading"):
+        assert glossy["SIRFS-MBP"][name] == pytest.approx(glossy["SIRFS"][name], rel=1e-3)
+    assert glossy["SIRFS-MBP"]["reflectance"] < 0.8 * glossy["SIRFS"]["reflectance"]
+
+
+def test_an_estimate_is_kept_with_its_maps(context: Context, rows: list[estimates.Row], monkeypatch: pytest.MonkeyPatch) -> None:
+    del rows
+    monkeypatch.setattr(estimates, "make_runner", lambda *_: pytest.fail("computed again"))
+    subject = estimates.known(context, ("specular",))[0]
+    answer = estimates.estimated(context, subject, SIRFS).answer
+    assert answer is not None and answer.height.shape == subject.mask.shape
+
+
+def test_the_true_maps_score_perfectly_and_fill_the_first_row_of_a_sheet(context: Context) -> None:
+    truth = context.subjects("specular")[0].truth
+    assert truth is not None
+    light = light_from_reference(truth.light)
+    normal = np.nan_to_num(truth_normal(truth.height))
+    found = score(
+        truth, height=np.nan_to_num(truth.height), normal=normal, shading=truth.shading, reflectance=truth.reflectance, light=light
+    )
+    assert found.height == pytest.approx(0) and found.reflectance == pytest.approx(0) and found.light == pytest.approx(0)
+    assert found.normal == pytest.approx(0, abs=1e-6)
+
+
+def test_figures_are_numbered_without_a_gap_and_none_is_drawn_twice() -> None:
+    assert [item.number for item in sheets_items.ITEMS] == [f"4.{number}" for number in range(10, 49)]
+    assert len({item.title for item in sheets_items.ITEMS}) == 39
+    subjects = [painted_ball(name, "specular", PAINTS[0], 0.4) for name in "ab"]
+    shown = [sheets_items.turn(index, subjects, 2) for index in range(4)]
+    assert [(subject.name, which) for subject, which in shown] == [("a", 0), ("b", 0), ("a", 1), ("b", 1)]
+    for few in ([], subjects):
+        with pytest.raises(InputError, match="too few"):
+            sheets_items.turn(4, few, 2)
+
+
+def test_sheets_have_a_row_for_the_truth_and_for_each_method(context: Context) -> None:
+    made = {item.number: item.make for item in sheets_items.ITEMS}
+    pictures = []
+    for number in ("4.16", "4.18"):  # the first subject as published, and, as there are only two, improved
+        make = made[number]
+        assert make is not None
+        (figure,) = make(context).figures
+        assert len(figure.axes) == 5 * 3
+        pictures.append(np.concatenate([axes.images[0].get_array().ravel() for axes in figure.axes if axes.images]))
+    assert pictures[0].shape != pictures[1].shape or (pictures[0] != pictures[1]).any()
+
+
+def test_errors_are_orange_where_light_was_left_and_blue_where_too_much_was_taken() -> None:
+    mask = np.ones((3, 5), bool)
+    pictures = {sign: signed(np.full((3, 5, 3), 0.2 * sign), mask, 1.0) for sign in (-1, 0, 1)}
+    assert (pictures[1][..., 0] > pictures[1][..., 2]).all()
+    assert (pictures[-1][..., 0] < pictures[-1][..., 2]).all()
+    assert np.ptp(pictures[0]) == 0
+
+
+def test_pictures_are_cut_to_the_object_and_compared_at_one_scale() -> None:
+    mask = np.zeros((20, 30), bool)
+    mask[5:10, 4:24] = True
+    truth = np.random.default_rng(0).random((20, 30, 3))
+    assert lit(truth, mask).shape == (5, 20, 3)
+    assert fitted(0.3 * truth, truth, mask) == pytest.approx(truth)
+    picture, covered = ball(np.zeros((9, 3)))
+    assert picture[covered] == pytest.approx(1)
+    wide = beside(picture, mask)
+    assert wide.shape[1] == 4 * wide.shape[0]
+
+
+def test_every_number_of_the_tables_is_there_once() -> None:
+    def numbers() -> Iterator[str]:
+        for module in (segmentation_items, removal_items, sparse_coding_items, characteristics_items):
+            yield from (item.number for item in module.ITEMS)
+
+    assert list(itertools.chain(numbers())) == [f"4.{number}" for number in range(5, 23)]
