@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import re
 import shutil
 import signal
 import sys
@@ -17,11 +18,12 @@ from .progress import Monitor
 
 _BAR = 24
 _REDRAW_SECONDS = 0.08
+_TIME_LEFT = re.compile(r", [0-9.]+ (s|min|h) left$")
 
 
 def stage_name(stage: str) -> str:
-    """A stage's text without its changing part."""
-    return stage.partition(", loss")[0].partition(", done")[0]
+    """A stage's text without its changing part: what comes after "loss", and how much time is left."""
+    return _TIME_LEFT.sub("", stage.partition(", loss")[0]).partition(", done")[0]
 
 
 def discard_output() -> None:

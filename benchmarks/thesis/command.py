@@ -1,6 +1,7 @@
 """`isc thesis`: the thesis' tables and figures, made again."""
 
 import argparse
+import importlib.util
 import time
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from .item import Item
 
 _DEFAULT = Path("docs") / "thesis"
+_LIBRARIES = ("matplotlib", "skimage")
 _EXAMPLES = """  isc thesis list
   isc thesis table 4.5 --quick -o results
   isc thesis figure 4.50 -o results
@@ -61,7 +63,8 @@ def _nothing(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def run_list(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """A line for each item: number, title, state, claims."""
+    """A line for each item: number, title, state, claims. Raises `InputError` where a library is missing."""
+    _require_libraries()
     from .registry import items
     from .run import states
 
@@ -70,7 +73,8 @@ def run_list(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Makes one item."""
+    """Makes one item. Raises `InputError` for an unknown number and what cannot be made; `Cancelled`."""
+    _require_libraries()
     from .registry import find
 
     item = find(options.kind, options.number)
@@ -80,10 +84,17 @@ def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Makes all items that can be made."""
+    """Makes all items that can be made. Raises `InputError` for data and folders that cannot be used; `Cancelled`."""
+    _require_libraries()
     from .registry import items
 
     return _made(options, [item for item in items() if item.make is not None], monitor)
+
+
+def _require_libraries() -> None:
+    """What draws and what brings the nine images; Mitsuba is asked for where something has to be rendered."""
+    if missing := [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]:
+        raise InputError(f"isc thesis needs {' and '.join(missing)}: install them with `pip install 'isc3d[thesis]'`")
 
 
 def _made(options: argparse.Namespace, wanted: "Sequence[Item]", monitor: Monitor) -> list[str]:

@@ -10,20 +10,15 @@ from .item import Item
 
 _MODULES = (
     "introduction_items", "background_items", "framework_items", "filter_items", "application_items", "catalogue_items",
-    "thresholding_items", "segmentation_items", "removal_items", "sparse_coding_items", "characteristics_items", "sheets_items",
+    "thresholding_items", "thresholding_figures",
+    "segmentation_items", "removal_items", "sparse_coding_items", "characteristics_items", "sheets_items",
 )  # fmt: skip
-_INSTALL = "install what is missing with `pip install 'isc3d[thesis]'`"
 
 
 @cache
 def items() -> tuple[Item, ...]:
-    """Every item. Raises `InputError` where a library that draws or renders is not installed."""
-    try:
-        modules = [importlib.import_module(f".{name}", __package__) for name in _MODULES]
-    except ModuleNotFoundError as error:
-        if (error.name or "").startswith("benchmarks"):
-            raise
-        raise InputError(f"isc thesis cannot start here ({error}): {_INSTALL}") from error
+    """Every item. matplotlib and scikit-image have to be installed."""
+    modules = [importlib.import_module(f".{name}", __package__) for name in _MODULES]
     found: list[Item] = sorted((item for module in modules for item in module.ITEMS), key=lambda item: item.order)
     names = [item.name for item in found]
     if twice := {name for name in names if names.count(name) > 1}:

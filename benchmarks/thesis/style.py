@@ -43,6 +43,12 @@ def figure(
     return made, axes
 
 
+def finish(made: Figure) -> None:
+    """Gives all titles the size of the other letters, whichever way they were set."""
+    for axes in made.axes:
+        axes.title.set_fontsize(LETTERS)
+
+
 def legend(axes: Axes, where: str = "best", columns: int = 1) -> None:
     """The legend of what was drawn with a label."""
     axes.legend(fontsize=LETTERS - 1, frameon=False, loc=where, ncols=columns)

@@ -22,6 +22,7 @@ from isc_core.json_files import read_json
 from .claims import ABSTRACT
 from .context import Context
 from .item import Cell, Item, Made, Table, Verdict
+from .style import finish
 
 RECORDS = "records"
 _SCHEMA = 1
@@ -64,6 +65,7 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     _forget(folder, name)
     for file, figure in zip(pictures, made.figures, strict=True):
         with new_file(folder / file) as partial:
+            finish(figure)
             figure.savefig(partial, format="png", metadata={"Software": None})
     for file, table in zip(lists, made.tables, strict=True):
         with new_file(folder / file) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
