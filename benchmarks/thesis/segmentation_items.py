@@ -20,7 +20,7 @@ from .layer_tables import DIFFUSE, KINDS, Runs, by_subject, means, run_all, spee
 from .separations import NOTHING, SEGMENTATION, Way
 
 OPTIMISERS = {"PSO": "particle_swarm", "ClonalG": "clonal_selection", "CS": "chaotic_clonal", "exact search": "exact"}
-RUNS, QUICK_RUNS = 10, 2
+RUNS, QUICK_RUNS = 5, 2
 _SETTINGS = {"paper": "as published", "improved": "improved"}
 WAYS = tuple(
     Way(f"{label}, {words}", SEGMENTATION, variant, (("optimiser", optimiser),))
