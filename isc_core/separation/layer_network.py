@@ -34,6 +34,7 @@ _DARK = 0.03  # of the mean light: below, logarithms are of noise
 _MARGIN = 2.0  # of the output: without evidence it says "hardly anything"
 _BLOCK = 2
 _CHANNELS = 4  # y of three colours, log b
+_BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits add up to less than 2^53
 _FRAME = 8  # pixels around the object: what lies beyond the picture's frame is background as well
 
 
@@ -155,11 +156,24 @@ def _twice(layer: np.ndarray, steps: Iterator[tuple[np.ndarray, np.ndarray]]) ->
 
 
 def _convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """3 x 3, zeros around: one matrix product of all neighbourhoods."""
+    """3 x 3, zeros around: one matrix product of all neighbourhoods.
+
+    Both factors are rounded to whole multiples of a power of two, so small that doubles hold every sum of their products exactly: the
+    order of summing, which libraries choose by the number of threads, does not change a bit.
+    """
     rows, columns, channels = layer.shape
-    padded = np.pad(layer, ((1, 1), (1, 1), (0, 0)))
+    (seen, of_layer), (kernel, of_kernel) = _in_steps(layer), _in_steps(weight)
+    padded = np.pad(seen, ((1, 1), (1, 1), (0, 0)))
     near = np.stack([padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=2)
-    return (near.reshape(-1, 9 * channels) @ weight.reshape(-1, weight.shape[2]) + bias).reshape(rows, columns, -1)
+    sums = near.reshape(-1, 9 * channels) @ kernel.reshape(-1, weight.shape[2])
+    return (sums * (of_layer * of_kernel) + bias).astype(np.float32).reshape(rows, columns, -1)
+
+
+def _in_steps(values: np.ndarray) -> tuple[np.ndarray, float]:
+    """`values` in float64 as whole numbers of steps, at most 2^20 of them; and the step, a power of two."""
+    most = float(np.abs(values).max())
+    step = 2.0 ** (np.ceil(np.log2(most)) - _BITS) if most > 0 else 1.0
+    return np.rint(values.astype(np.float64) / step), step
 
 
 def _framed(image: np.ndarray, mask: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], tuple[slice, slice]]:
