@@ -39,9 +39,8 @@ import numpy as np
 from .decomposition import COLOR_MAPS, Decomposition
 from .editing.light_direction import explain_shading
 from .environment import environment_from_shading
-from .gloss import gloss_of
 from .mesh import MeshResult, build_mesh
-from .sheen import most_level
+from .sheen import shown_gloss
 
 ARRAYS = "arrays.npz"
 _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
@@ -52,15 +51,14 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
 
     Raises `InputError` if the mask is too small for a mesh; `OSError` when the file cannot be written.
     """
-    arrays = arrays_of(d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, gloss_of(d)))
+    arrays = arrays_of(d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, shown_gloss(d)))
     with path.open("wb") as file:  # given a name, NumPy would add a suffix to it
         np.savez(file, **arrays)
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     """The file's arrays by name, see the module. `built`: the mesh of `d`."""
-    light = _light(d, built)
-    values = _maps(d) | _mesh(built) | light | _gloss(d, built, light["sky"])
+    values = _maps(d) | _mesh(built) | _light(d, built) | _gloss(d, built)
     size, scale = d.provenance.input.get("size", d.mask.shape[::-1]), d.provenance.input.get("scale", 1.0)
     values |= {"photo_size": np.array(size), "crop_scale": np.array(scale)}
     return {name: _typed(name, array) for name, array in values.items()}
@@ -105,13 +103,11 @@ def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
     }
 
 
-def _gloss(d: Decomposition, built: MeshResult, sky: np.ndarray) -> dict[str, np.ndarray]:
-    gloss, level = built.gloss, np.nan if built.gloss.specular is None else built.specular
-    if level > 0 and gloss.roughness is not None:
-        level = min(level, most_level(d, gloss.roughness, sky))
+def _gloss(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+    gloss = built.gloss
     values = {
         "lobe": np.zeros(d.image.shape) if d.brdf is None else d.brdf.predicted,
         "roughness": np.array(np.nan if gloss.roughness is None else gloss.roughness),
-        "specular_level": np.array(level),
+        "specular_level": np.array(np.nan if gloss.specular is None else built.specular),
     }
     return values if gloss.variation is None else values | {"specular_variation": gloss.variation}

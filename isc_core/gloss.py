@@ -30,6 +30,7 @@ from .brdf.fitting.response import F0
 from .decomposition import Decomposition
 
 FITTED, BOUND, NONE_FOUND, NOT_FITTED = "fitted", "upper bound", "no highlights found", "not fitted"
+LOWERED = "fitted, lowered to what the photo has room for"
 _BRIGHTEST_SHADING = 97.0  # percentile
 _LEAST_LAMP = 1 / 3  # of it: a weaker lamp cannot be told from none
 _MOST = 1 / F0  # a level that mirrors all light
@@ -41,7 +42,7 @@ _EVEN = 0.01  # of the specular light's squares: what one level leaves less of i
 @dataclass(frozen=True)
 class Gloss:
     """`roughness` of glTF and Blender in [0, 1], `specular` >= 0 the level for a base colour equal to the reflectance, 1 is plastic; None
-    where it is not known. `source`: of each, in words: `FITTED`, `BOUND`, `NONE_FOUND` or `NOT_FITTED`.
+    where it is not known. `source`: of each, in words: `FITTED`, `LOWERED`, `BOUND`, `NONE_FOUND`, `NOT_FITTED`.
     `variation`: (H, W) >= 0, a factor of `specular`; None where one level explains the photo as well.
     """
 

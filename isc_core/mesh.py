@@ -18,8 +18,8 @@ Base colour: k * reflectance, with k such that the 99.5th percentile of the refl
 belongs to it is the recovered one divided by k, that is log shading - log k. Beyond the mask the texture repeats the nearest colour
 inside, so that filtering draws no dark fringe.
 
-Gloss: roughness and specular level are the fitted lobe's, the level times k, as the base colour is. A level up to 1, and its variation
-over the object in a texture's alpha, are KHR_materials_specular's factor; what lies above 1 is its colour.
+Gloss: roughness and specular level are those given (see `sheen.shown_gloss`), the level times k, as the base colour is. A level up to 1,
+and its variation over the object in a texture's alpha, are KHR_materials_specular's factor; what lies above 1 is its colour.
 
 Reference: Khronos Group (2021), glTF 2.0 specification, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 

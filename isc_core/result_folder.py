@@ -23,13 +23,13 @@ from .brdf_record import lobe_fit_from_json
 from .decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from .errors import InputError
 from .exr import read_channels, write_channels
-from .gloss import gloss_of
 from .json_files import read_json
 from .mesh import MeshOptions, MeshResult, build_mesh
 from .names import readable
 from .photo import linear_to_srgb
 from .progress import Monitor
 from .report import contact_sheet, separation_sheet
+from .sheen import shown_gloss
 
 SCHEMA_VERSION = 1
 LAYERS = {**dict.fromkeys(COLOR_MAPS, "RGB"), "normal": "XYZ", "height": "Z", "mask": "A", "confidence": "Y"}
@@ -70,7 +70,7 @@ def save(
             write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
         monitor.report("building the mesh", 0.4)
         d = decomposition
-        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, gloss_of(d))
+        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, shown_gloss(d))
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)

@@ -1,7 +1,7 @@
 """How glossy an object can be at most, given what its photo shows of the sky.
 
 Problem: a fitted lobe's level is uncertain (see `gloss`), yet a renderer takes it at its word: under the recovered sky it mirrors that sky
-all over the object, as a sheen that the photo need not have.
+all over the object, as a sheen that the photo need not have. `shown_gloss` is the gloss that every file of a result carries.
 
 Equation: sheen(x) = level s(n(x)), s what the lobe of plastic mirrors of the sky toward the viewer. The photo is at least as bright, so
 that level <= min over c of I_c(x) / s_c(n(x)) at every pixel x. The 5th percentile is taken: normals and outlines are uncertain.
@@ -11,17 +11,29 @@ Citation: B. Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206 (the lobe, see 
 Limits: a bound, no estimate: pale paint has room for nearly any gloss. Toward grazing angles a sheen falls less than its level does.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from .brdf.fitting.response import F0
 from .brdf.roughness import alpha_from_blender
 from .decomposition import Decomposition
 from .editing.lobes import Lobe, lobe_in
-from .environment import resampled
+from .environment import environment_from_shading, resampled
+from .gloss import LOWERED, Gloss, gloss_of
 
 _ROWS = 16  # of the sky: a lobe of a smooth one is smooth
 _SHARE = 5.0  # percentile
 _NARROWEST = 0.05  # alpha: what is narrower mirrors a smooth sky alike
+
+
+def shown_gloss(d: Decomposition) -> Gloss:
+    """The fitted gloss, its level lowered to what the photo has room for under the recovered light."""
+    gloss = gloss_of(d)
+    if not gloss.specular or gloss.roughness is None:
+        return gloss
+    most = most_level(d, gloss.roughness, environment_from_shading(d.illumination, _ROWS))
+    return gloss if gloss.specular <= most else replace(gloss, specular=most, specular_source=LOWERED)
 
 
 def most_level(d: Decomposition, roughness: float, sky: np.ndarray) -> float:

@@ -1,14 +1,18 @@
 """A gloss that mirrors more of the sky than the photo shows is not believed."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from isc_core.arrays_file import arrays_of
-from isc_core.gloss import Gloss, gloss_of
-from isc_core.mesh import build_mesh
-from isc_core.sheen import most_level
+from isc_core.arrays_file import ARRAYS
+from isc_core.decomposition import Decomposition
+from isc_core.environment import environment_from_shading
+from isc_core.gloss import FITTED, LOWERED, gloss_of
+from isc_core.result_folder import save
+from isc_core.sheen import most_level, shown_gloss
 from tests.core.test_arrays_file import glossy
 
 
@@ -26,9 +30,31 @@ def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> 
     d = glossy()
     gloss = gloss_of(d)
     assert gloss.specular is not None and gloss.roughness is not None
-    for factor, kept in ((1.0, True), (100.0, False)):
-        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, None, Gloss(gloss.roughness, factor * gloss.specular))
-        arrays = arrays_of(d, built)
-        room = most_level(d, gloss.roughness, arrays["sky"])
-        assert (built.specular < room) == kept
-        assert float(arrays["specular_level"]) == pytest.approx(min(built.specular, room), rel=1e-5)
+    assert shown_gloss(d) == gloss
+    room = most_level(d, gloss.roughness, environment_from_shading(d.illumination, 16))
+    shown = shown_gloss(stronger(d, 100.0))
+    assert gloss.specular < room < 100 * gloss.specular
+    assert shown.specular == pytest.approx(room)
+    assert (shown.specular_source, shown.roughness) == (LOWERED, gloss.roughness)
+
+
+@pytest.mark.parametrize("factor", [1.0, 100.0])
+def test_every_file_of_a_result_has_the_same_level(tmp_path: Path, factor: float) -> None:
+    d = stronger(glossy(), factor)
+    save(d, tmp_path / "out", arrays=True)
+    with np.load(tmp_path / "out" / ARRAYS) as arrays:
+        level = float(arrays["specular_level"])
+    described = json.loads((tmp_path / "out" / "decomposition.json").read_text(encoding="utf-8"))["mesh"]["specular"]
+    chunk = (tmp_path / "out" / "mesh.glb").read_bytes()
+    size = int.from_bytes(chunk[12:16], "little")
+    extension = json.loads(chunk[20 : 20 + size])["materials"][0]["extensions"]["KHR_materials_specular"]
+    written = extension["specularFactor"] * max(extension.get("specularColorFactor", [1]))
+    assert described["source"] == (FITTED if factor == 1 else LOWERED)
+    assert level == pytest.approx(described["value"], rel=1e-6) == pytest.approx(written, rel=1e-6)
+
+
+def stronger(d: Decomposition, factor: float) -> Decomposition:
+    """The fitted lobe with a level that the photo does not bear out."""
+    assert d.brdf is not None
+    lights = tuple(replace(light, strength_light=factor * light.strength_light) for light in d.brdf.lights)
+    return replace(d, brdf=replace(d.brdf, lights=lights))
