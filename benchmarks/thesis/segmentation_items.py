@@ -15,7 +15,7 @@ from collections.abc import Callable
 from .claims import CHAOS_HELPS
 from .comparing import in_words, ratio
 from .context import Context
-from .item import Item, Made, Verdict
+from .item import Item, Made, Table, Verdict
 from .layer_tables import DIFFUSE, KINDS, Runs, by_subject, means, run_all, speed, summary
 from .separations import NOTHING, SEGMENTATION, Way
 
@@ -33,7 +33,17 @@ _CHAOS, _RIVALS = "CS, as published", ("PSO, as published", "ClonalG, as publish
 def _accuracy(kind: str, context: Context) -> Made:
     runs = _runs(kind, context)
     tables = summary(runs, kind, DIFFUSE, context.seed, _chaos_of, "CS"), by_subject(runs, kind, DIFFUSE, _chaos_of, "CS")
-    return Made(tables, text=_ACCURACY, verdicts=(verdict(runs, "mse", "MSE", _SAME, context.seed),))
+    return Made((tables[0], hits(runs), tables[1]), text=_ACCURACY, verdicts=(verdict(runs, "mse", "MSE", _SAME, context.seed),))
+
+
+def hits(runs: Runs) -> Table:
+    """How often each search marked the very pixels that the exact one marks."""
+    lines = []
+    for label, of_subjects in runs.items():
+        ends = [run.exact for found in of_subjects.values() for run in found if run.exact is not None]
+        if ends:
+            lines.append((label, len(ends), f"{100 * sum(ends) / len(ends):.0f} %"))
+    return Table(("method", "runs", "as the exact search"), tuple(lines), "Runs that marked the pixels which the exact search marks")
 
 
 def _speed(kind: str, context: Context) -> Made:
@@ -68,9 +78,8 @@ _SAME = "where the searches find the same thresholds, the layers differ by the r
 _DEAR = "all searches spend the same budget of evaluations, and a chaotic number costs no less than a pseudo-random one"
 _ACCURACY = (
     "The searches differ in how they come to the thresholds, not in what the thresholds are for: where they find the same ones, the "
-    "accuracy is the same, and what is left between them are the random numbers of the patches that fill the highlights. As published "
-    "the method has no way to say that there is no highlight, so that it repaints bright paint too; `doing nothing` shows how much harm "
-    "that is. The rank-sum tests compare runs with different seeds on one subject; the intervals resample subjects."
+    "accuracy is the same, and the second table says how often. As published the method has no way to say that there is no highlight, so "
+    "that it repaints bright paint too; `doing nothing` shows how much harm that is. The rank-sum tests compare runs with different seeds on one subject; the intervals resample subjects."
 )
 _SPEED = (
     "Search: finding the thresholds, 20,000 evaluations at most, and marking the pixels above them. Whole: the search, matching and "

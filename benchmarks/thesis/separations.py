@@ -57,8 +57,8 @@ class Scores:
     """One run of a way on one subject; None: not defined, or not measured.
 
     `mse`, `lmse`, `ssim` of the diffuse layer; `specular_*` of the specular one. `removed`: RMS of what was taken off over the photo's
-    RMS. `seconds` of the whole; `search`: of finding the highlights' mask by thresholds; `megapixels` inside the mask; `refused`: why
-    there is no answer.
+    RMS. `seconds` of the whole; `search`: of finding the highlights' mask by thresholds; `exact`: whether those are the pixels that the
+    exact search marks; `megapixels` inside the mask; `refused`: why there is no answer.
     """
 
     subject: str
@@ -74,6 +74,7 @@ class Scores:
     removed: float | None = None
     seconds: float | None = None
     search: float | None = None
+    exact: bool | None = None
     refused: str = ""
 
 
@@ -140,13 +141,14 @@ def _run(context: Context, subject: Subject, way: Way, run: int) -> Scores:
         seconds = time.perf_counter() - start
     except InputError as error:
         return replace(known, refused=str(error))
-    search = _search_seconds(subject, way, context.seed + run)
-    return replace(known, **scored(subject, found), seconds=round(seconds, 5), search=search)
+    searched = _searched(subject, way, context.seed + run) if way.method == SEGMENTATION else {}
+    return replace(known, **scored(subject, found), **searched, seconds=round(seconds, 5))
 
 
-def _search_seconds(subject: Subject, way: Way, seed: int) -> float | None:
-    if way.method != SEGMENTATION:
-        return None
+def _searched(subject: Subject, way: Way, seed: int) -> dict[str, Any]:
+    """How long the search for thresholds takes, and whether it ends where the exact one does."""
     start = time.perf_counter()
-    highlights(subject, way, seed)
-    return round(time.perf_counter() - start, 5)
+    marked = highlights(subject, way, seed)
+    seconds = time.perf_counter() - start
+    best = highlights(subject, replace(way, changes=(*way.changes, ("optimiser", "exact"))), seed)
+    return {"search": round(seconds, 5), "exact": bool((marked == best).all())}
