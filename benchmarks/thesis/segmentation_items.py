@@ -79,7 +79,8 @@ _DEAR = "all searches spend the same budget of evaluations, and a chaotic number
 _ACCURACY = (
     "The searches differ in how they come to the thresholds, not in what the thresholds are for: where they find the same ones, the "
     "accuracy is the same, and the second table says how often. As published the method has no way to say that there is no highlight, so "
-    "that it repaints bright paint too; `doing nothing` shows how much harm that is. The rank-sum tests compare runs with different seeds on one subject; the intervals resample subjects."
+    "that it repaints bright paint too; `doing nothing` shows how much harm that is. The rank-sum tests compare runs with different seeds "
+    "on one subject; the intervals resample subjects."
 )
 _SPEED = (
     "Search: finding the thresholds, 20,000 evaluations at most, and marking the pixels above them. Whole: the search, matching and "
