@@ -147,6 +147,7 @@ def _request(source: Source, options: argparse.Namespace) -> Request:
         sun=options.sun,
         displacement=options.displacement,
         closed_back=options.closed_back,
+        own_shadows=True if options.own_shadows else None,
         specular_from=options.specular,
         name=source.name,
     )

@@ -91,6 +91,7 @@ def _add_scene(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
     add("--size", type=float, default=0.1, metavar="M", help="long side of the object in metres (default %(default)s)")
     add("--specular", default="image", choices=("lobe", "image", "none"), help="where highlights come from (default %(default)s)")
+    add("--own-shadows", action="store_true", help="let the object cast shadows on itself, beside those that the recovered light holds")
     add("--sun", action="store_true", help="add a sun from the strongest direction of the light")
     add("--displacement", action="store_true", help="displace a flat grid instead of building the mesh")
     add("--closed-back", action="store_true", help="close the mesh behind")

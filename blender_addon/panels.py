@@ -95,7 +95,7 @@ class _Build(_Panel):
         settings, column = context.scene.isc, self.columns()
         column.prop(settings, "size_metres")
         column.prop(settings, "specular_from")
-        for name in ("sun", "displacement", "closed_back"):
+        for name in ("shadows", "sun", "displacement", "closed_back"):
             column.prop(settings, name)
         column.separator()
         column.prop(settings, "own_scene")

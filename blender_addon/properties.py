@@ -50,6 +50,11 @@ SPECULAR_SOURCES = (
     ("image", "Image", "The separated highlights, fixed to the surface as in the photo"),
     ("none", "None", "A matte object"),
 )
+SHADOWS = (
+    ("usual", "Usual", "On in a scene with others, off in a scene of its own; an object that is updated keeps what it has"),
+    ("on", "On", "The object casts shadows, on itself too, and its parts light each other; the recovered light holds the photo's already"),
+    ("off", "Off", "The object casts no shadows, and looks as photographed"),
+)
 _PRESET_NAMES = (*PRESETS, CUSTOM)
 
 
@@ -139,6 +144,9 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
         name="Displacement", description="A flat grid, raised by a Displace modifier from the height map, instead of a mesh", default=False
     )
     closed_back: BoolProperty(name="Closed Back", description="Close the object with a flat back", default=False)
+    shadows: EnumProperty(
+        name="Own Shadows", description="Whether the object casts shadows and lights itself in Cycles", items=SHADOWS, default="usual"
+    )
     specular_from: EnumProperty(
         name="Highlights", description="Where the material's highlights come from", items=SPECULAR_SOURCES, default="image"
     )

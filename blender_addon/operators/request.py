@@ -10,7 +10,7 @@ import bpy
 from isc_core.errors import InputError
 
 from ..photo_files import Picture, examine
-from ..scene.build import BuildOptions
+from ..scene.build import SHADOWS, BuildOptions
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".hdr", ".tga", ".webp")
 _IMAGE, _MASK, _REQUEST = "isc_source_image", "isc_source_mask", "isc_request"
@@ -81,7 +81,7 @@ def build_options(settings: Any, name: str) -> BuildOptions:
     """What the panel says is to be built, under that name; the rest, which Blender's own panels show, stays as it is."""
     offered = settings.bl_rna.properties.keys()
     chosen = {part.name: getattr(settings, part.name) for part in fields(BuildOptions) if part.name in offered}
-    return BuildOptions(**{**chosen, "name": name})
+    return BuildOptions(**{**chosen, "own_shadows": SHADOWS[settings.shadows], "name": name})
 
 
 def pictures_of(request: Request) -> tuple[Picture, Picture | None, tuple[int, int] | None]:

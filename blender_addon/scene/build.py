@@ -23,8 +23,9 @@ from .provenance import is_isc, label, mark, record, require_local
 from .sun import relight
 from .world import ensure_world
 
-__all__ = ["BuildOptions", "Built", "build", "find", "is_isc"]
+__all__ = ["SHADOWS", "BuildOptions", "Built", "build", "find", "is_isc"]
 
+SHADOWS: dict[str, bool | None] = {"usual": None, "on": True, "off": False}  # what the user's choice means for `own_shadows`
 _USUAL_ROUGHNESS = 0.5
 _BACK = 0.02  # of the size: how far the back lies behind the furthest point of the front
 

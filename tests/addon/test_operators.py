@@ -285,6 +285,17 @@ def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path
     assert (bump_folder / "arrays.npz").is_file(), "a folder of the user's own stays as it is"
 
 
+@pytest.mark.parametrize(
+    ("chosen", "own", "cast"), [("usual", True, False), ("usual", False, True), ("on", True, True), ("off", False, False)]
+)
+def test_shadows_are_as_chosen(addon: Any, bump_folder: Path, chosen: str, own: bool, cast: bool) -> None:
+    settings = addon.context.scene.isc
+    settings.shadows, settings.own_scene = chosen, own
+    assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
+    made = next(thing for thing in addon.data.objects if thing.type == "MESH" and find(thing))
+    assert (made.visible_shadow, made.visible_diffuse) == (cast, cast)
+
+
 def test_a_folder_without_arrays_is_given_them(addon: Any, tmp_path: Path) -> None:
     from isc_core.result_folder import save
 
