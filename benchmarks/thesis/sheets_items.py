@@ -10,10 +10,13 @@ than numbers, the next ones show the first subjects in other settings, or by oth
 
 import functools
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from isc_core.datasets import MitBerkeleyObject
 from isc_core.errors import InputError
+from isc_core.evaluate import Estimate
 from isc_core.image_metrics import highlight_region
 from isc_core.metrics import mse, score, truth_normal
 from isc_core.sirfs.frames import light_from_reference
@@ -35,10 +38,11 @@ from .subjects import Subject
 Rows = list[tuple[str, Sequence[np.ndarray | None]]]
 _OPTIMISERS = SEGMENTATIONS[:3]
 _PAINTED = (*_OPTIMISERS, Way("CS, improved", SEGMENTATION))
-_PUBLISHED = tuple(Way(label, method, "paper") for label, method in METHODS.items())
+_PUBLISHED = tuple(Way(f"{label}, as published", method, "paper") for label, method in METHODS.items())
 _IMPROVED = tuple(Way(f"{label}, improved", method) for label, method in METHODS.items())
-_THESIS = (Way("iterative", "tan_2005"), Way("CS", SEGMENTATION), Way("SC", SPARSE_CODING), Way("ISC", "isc"))
-_THESIS_PUBLISHED = tuple(Way(f"{way.label}, as published", way.method, "paper") for way in _THESIS[:3])
+_OWN = {"iterative": "tan_2005", "CS": SEGMENTATION, "SC": SPARSE_CODING}
+_THESIS = (*(Way(f"{label}, improved", method) for label, method in _OWN.items()), Way("ISC", "isc"))
+_THESIS_PUBLISHED = tuple(Way(f"{label}, as published", method, "paper") for label, method in _OWN.items())
 _FREE_OTHERS = (Way("SC, as published", SPARSE_CODING, "paper"), *SPECULAR_FREE[2:])
 _LATER = (SIRFS, *(one for one in BEFORE if one.label in ("SC-SIRFS", "MDR-SIRFS")), BOUND)
 _FIRST = (SIRFS, *(one for one in BEFORE if one.label != "SC-SIRFS"))
@@ -76,34 +80,45 @@ def characteristics_rows(context: Context, subject: Subject, frameworks: Sequenc
     """The truth and each framework's height, normals, shading, reflectance and light."""
     truth = subject.truth
     assert truth is not None
-    seen, mask = truth.valid & np.isfinite(truth.height), truth.mask
-    heights = truth.height - np.nanmedian(truth.height[mask])
-    limits = float(np.nanmin(heights[mask])), float(np.nanmax(heights[mask]))
-    gains = {name: exposure(getattr(truth, name), seen) for name in ("shading", "reflectance")}
-    lamp, covered = ball(light_from_reference(truth.light))
-    bright = exposure(lamp, covered)
-
-    def row(label: str, height: np.ndarray, normal: np.ndarray, shading: np.ndarray, paint: np.ndarray, light: np.ndarray) -> None:
-        colours = [(fitted(shading, truth.shading, seen), "shading"), (fitted(paint, truth.reflectance, seen), "reflectance")]
-        rows.append((label, [
-            relief(height, mask, limits), directions(normal, mask), *(lit(values, seen, gains[name], mask) for values, name in colours),
-            beside(lit(fitted(light, lamp, covered), covered, bright), mask),
-        ]))  # fmt: skip
-
-    rows: Rows = []
-    row("truth", heights, truth_normal(truth.height), truth.shading, truth.reflectance, lamp)
+    shown: list[tuple[str, Estimate | None]] = [("truth", _known(truth))]
     for framework in frameworks:
         answer = estimated(context, subject, framework).answer
-        if answer is None:
-            rows.append((f"{framework.label}\nrefuses", [None] * 5))
-            continue
-        found = score(
-            truth, height=answer.height, normal=answer.normal, shading=answer.shading, reflectance=answer.reflectance, light=answer.light
-        )
-        offset = np.median((answer.height - heights)[np.isfinite(heights)])
-        label = f"{_wrapped(framework.label)}\nerror {found.average:.3f}"
-        row(label, answer.height - offset, answer.normal, answer.shading, answer.reflectance, ball(answer.light)[0])
-    return rows
+        words = "refuses" if answer is None else f"error {_error(truth, answer):.3f}"
+        shown.append((f"{_wrapped(framework.label)}\n{words}", None if answer is None else _levelled(answer, truth)))
+    known_heights = np.isfinite(truth.height)
+    heights = np.concatenate([answer.height[known_heights] for _, answer in shown if answer is not None])
+    limits = float(heights.min()), float(heights.max())
+    return [(label, [None] * 5 if answer is None else _maps(answer, truth, limits)) for label, answer in shown]
+
+
+def _maps(answer: Estimate, truth: MitBerkeleyObject, limits: tuple[float, float]) -> list[np.ndarray]:
+    """One row of a sheet: an answer's maps, those of free scale in the truth's scale and exposure."""
+    seen, mask = truth.valid & np.isfinite(truth.height), truth.mask
+    colours = [
+        lit(fitted(getattr(answer, name), true, seen), seen, exposure(true, seen), mask)
+        for name, true in (("shading", truth.shading), ("reflectance", truth.reflectance))
+    ]
+    (true_lamp, covered), (lamp, _) = ball(light_from_reference(truth.light)), ball(answer.light)
+    light = lit(fitted(lamp, true_lamp, covered), covered, exposure(true_lamp, covered))
+    height = np.where(np.isfinite(truth.height), answer.height, np.nan)
+    return [relief(height, mask, limits), directions(answer.normal, mask), *colours, beside(light, mask)]
+
+
+def _known(truth: MitBerkeleyObject) -> Estimate:
+    """The truth as if it were an answer."""
+    light = light_from_reference(truth.light)
+    answer = Estimate(truth.height, truth_normal(truth.height), truth.shading, truth.reflectance, light)
+    return _levelled(answer, truth)
+
+
+def _levelled(answer: Estimate, truth: MitBerkeleyObject) -> Estimate:
+    """The answer with its median height at 0: the offset is not known."""
+    return replace(answer, height=answer.height - np.median(answer.height[np.isfinite(truth.height)]))
+
+
+def _error(truth: MitBerkeleyObject, answer: Estimate) -> float:
+    maps = {name: getattr(answer, name) for name in ("height", "normal", "shading", "reflectance", "light")}
+    return score(truth, **maps).average
 
 
 def _masks(kind: str, context: Context) -> Made:
@@ -140,7 +155,7 @@ def _characteristics(rounds: Sequence[Sequence[Framework]], index: int, context:
     subject, which = turn(index, known(context, ("specular", "synthetic")), len(rounds))
     rows = characteristics_rows(context, subject, rounds[which])
     text = (
-        f"{subject.name} ({subject.kind}). Under each name the geometric mean of the six errors. Height in the true one's range, shading, "
+        f"{subject.name} ({subject.kind}). Under each name the geometric mean of the six errors. Heights of all in one range, shading, "
         "reflectance and light in the scale nearest to the truth; the light on a white ball."
     )
     return Made(figures=(sheet(("height", "normals", "shading", "reflectance", "light"), rows, expose=False),), text=text)
