@@ -23,13 +23,14 @@ def photo_of(subject: Subject) -> Photo:
     return Photo(subject.image.astype(np.float32), subject.mask, FLOAT_STEP * float(np.quantile(bright, 0.999)), clipped, source)
 
 
-def decomposed(context: Context, subject: Subject, model: str = "mdr") -> Decomposition:
-    """What a model of `pipeline.MODELS` makes of the subject, pixel by pixel. Raises `InputError`, `Cancelled`."""
-    folder = context.output / WORK / "decompositions" / f"{subject.kind}-{subject.name}-{model}-{context.fingerprint}"
+def decomposed(context: Context, subject: Subject, model: str = "mdr", illumination: str | None = None) -> Decomposition:
+    """What a model of `pipeline.MODELS` makes of the subject, pixel by pixel. `illumination`: which lights to expect; None for those of
+    the subject's truth, or natural ones. Raises `InputError`, `Cancelled`."""
+    lit = illumination or ("natural" if subject.truth is None else subject.truth.illumination)
+    folder = context.output / WORK / "decompositions" / f"{subject.kind}-{subject.name}-{model}-{lit}-{context.fingerprint}"
     record = folder / "decomposition.json"
     if record.is_file() and record.stat().st_mtime >= context.fresh_since:
         return load(folder)
-    lit = "natural" if subject.truth is None else subject.truth.illumination
     settings = Settings(model=model, illumination=lit, max_size=0, seed=context.seed, threads=2)
     found = decompose(photo_of(subject), settings, name=subject.name, monitor=context.monitor)
     folder.parent.mkdir(parents=True, exist_ok=True)

@@ -108,10 +108,10 @@ def _search(context: Context) -> Made:
     published = VARIANTS["paper"]
     levels, thresholds = _thresholds(image, mask, published, context.seed)
     objective = OtsuObjective.of(levels[mask])
+    rows: list[tuple[str, str, float, int | str]] = []
     best = exact(objective, published.levels)
     made, axes = figure(1, 3, height=2.7)
     _histogram(axes[0, 0], levels[mask], thresholds)
-    rows = []
     place = axes[0, 1]
     budget = 2_000 if context.quick else published.evaluations
     for name, colour in zip(("chaotic_clonal", "clonal_selection", "particle_swarm"), OKABE_ITO, strict=False):

@@ -1,0 +1,235 @@
+"""The thesis' figures of background, framework and applications, and its tables of documentation: what has to hold in them."""
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("mitsuba")
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from benchmarks.thesis import (
+    application_items,
+    background_items,
+    catalogue_items,
+    filter_items,
+    framework_items,
+    introduction_items,
+)
+from benchmarks.thesis.context import Context
+from benchmarks.thesis.item import Item, Made
+from benchmarks.thesis.specular_free_images import KINDS, PHOTO, highlight_left
+from benchmarks.thesis.subjects import Subject
+from isc_core.brdf.phong import Phong
+from isc_core.datasets import MitBerkeleyObject
+from isc_core.decomposition import Decomposition
+from isc_core.editing.lights import toward
+from isc_core.separation.filter_statistics import BINS, FILTERS
+from isc_core.sirfs.frames import light_to_reference
+from tests.core.ball_scene import ball
+from tests.core.separation_scenes import glossy_disc
+
+MODULES = (introduction_items, background_items, framework_items, filter_items, application_items, catalogue_items)
+ITEMS = {item.name: item for module in MODULES for item in module.ITEMS}
+
+
+def known_ball(name: str = "ball") -> Subject:
+    """The chequered ball, all of it known."""
+    d = ball((64, 64), 28.0, (31.5, 31.5))
+    height = np.where(d.mask, d.height, np.nan)
+    truth = MitBerkeleyObject(
+        name, "natural", d.image.astype(float), d.mask, d.mask, height, d.shading.astype(float), d.reflectance.astype(float),
+        light_to_reference(d.illumination),
+    )  # fmt: skip
+    return Subject(name, "synthetic", d.image, d.mask, d.diffuse, d.specular, truth)
+
+
+@dataclass(frozen=True)
+class Known(Context):
+    """A run on the ball alone."""
+
+    def subjects(self, kind: str) -> tuple[Subject, ...]:
+        """The ball, whatever the kind; without its highlight as a matt one."""
+        one = known_ball()
+        assert one.diffuse is not None
+        matt = replace(one, image=one.diffuse, specular=np.zeros_like(one.diffuse))
+        return (matt,) if kind == "matt" else (one, known_ball("other"))
+
+    def photos(self) -> tuple[Subject, ...]:
+        """The ball, of which nothing is known."""
+        return (replace(known_ball(), diffuse=None, specular=None, truth=None),)
+
+
+@pytest.fixture
+def context(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Context:
+    """A quick run in which the models answer with the ball's truth: what they find has tests of its own."""
+    answer = ball((64, 64), 28.0, (31.5, 31.5))
+
+    def decomposed(*given: object, **also: object) -> Decomposition:
+        del given, also
+        return answer
+
+    for module in (introduction_items, background_items, framework_items, application_items, catalogue_items):
+        monkeypatch.setattr(module, "decomposed", decomposed)
+    monkeypatch.setattr(application_items, "DIRECTIONS", application_items.DIRECTIONS[:1])
+    return Known(tmp_path, quick=True)
+
+
+def made(name: str, context: Context) -> Made:
+    item: Item = ITEMS[name]
+    assert item.make is not None
+    return item.make(context)
+
+
+def column(answer: Made, header: str, table: int = 0) -> dict[str, object]:
+    """A column of a table by the first one."""
+    place = answer.tables[table].header.index(header)
+    return {str(row[0]): row[place] for row in answer.tables[table].rows}
+
+
+def labels(figure: Figure) -> Iterator[tuple[float, float, float, float]]:
+    """Boxes (left, bottom, right, top) of all titles, in pixels."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    for axes in figure.axes:
+        if axes.get_title():
+            yield axes.title.get_window_extent(canvas.get_renderer()).extents
+
+
+@pytest.mark.parametrize("name", [name for name in ITEMS if name.startswith("figure") and ITEMS[name].make is not None])
+def test_figures_are_made_with_their_titles_apart_and_in_the_picture(name: str, context: Context) -> None:
+    answer = made(name, context)
+    assert answer.figures
+    assert answer.text
+    for figure in answer.figures:
+        assert figure.get_figwidth() == 7.0
+        boxes = list(labels(figure))
+        right, top = figure.bbox.extents[2:]
+        assert all(box[0] >= -2 and box[1] >= -2 and box[2] <= right + 2 and box[3] <= top + 2 for box in boxes)
+        for one, other in itertools.combinations(boxes, 2):
+            overlap = min(one[2], other[2]) - max(one[0], other[0]), min(one[3], other[3]) - max(one[1], other[1])
+            assert min(overlap) < 1
+
+
+def test_what_cannot_be_made_again_says_why() -> None:
+    for name in ("figure-1.1", "figure-3.1"):
+        assert ITEMS[name].make is None
+        assert len(ITEMS[name].reason) > 20
+
+
+def test_reflectance_models_obey_what_the_table_says_of_them() -> None:
+    found = {name: catalogue_items.measure(model).obeyed for name, model in catalogue_items.MODELS}
+    assert all(positive for positive, _, _ in found.values())
+    reciprocal = {name for name, (_, obeyed, _) in found.items() if obeyed}
+    assert set(found) - reciprocal == {name for name in found if "plain" in name}
+    keeps = {name: kept for name, (_, _, kept) in found.items()}
+    assert keeps["Lambert, albedo 1"]
+    assert keeps["GGX, alpha .1, f0 1"]
+    assert keeps["Blinn-Phong, conserving, exponent 50"]
+    assert not keeps["Blinn-Phong, normalised, exponent 50"]
+    assert not keeps["Phong, plain, exponent 1"]
+
+
+def test_characteristics_are_those_of_a_saved_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert catalogue_items.check_characteristics(ball(), tmp_path / "all") == ()
+    monkeypatch.setattr(catalogue_items, "CHARACTERISTICS", catalogue_items.CHARACTERISTICS[1:])
+    missing = catalogue_items.check_characteristics(ball(), tmp_path / "fewer")
+    assert any("image" in said for said in missing), "a field that nobody lists is noticed"
+
+
+def test_tables_of_documentation_are_made(context: Context) -> None:
+    assert "NOT" not in made("table-2.3", context).text
+    left = column(made("table-2.2", context), "highlight left (%), mean")
+    assert set(left) == {kind.name for kind in KINDS}
+    assert len(made("table-2.1", context).tables[0].rows) == len(catalogue_items.MODELS)
+
+
+def test_white_highlights_are_not_left_in_the_exact_images() -> None:
+    image, diffuse, mask = glossy_disc()
+    subject = Subject("disc", "specular", image, mask, diffuse, image - diffuse)
+    assert highlight_left(PHOTO, subject) == pytest.approx(1, abs=0.05)
+    for kind in KINDS[:3]:
+        assert highlight_left(kind, subject) < 1e-9
+
+
+def test_a_lobe_is_largest_where_light_is_mirrored_to() -> None:
+    views = np.linspace(-89, 89, 179)
+    for incident in (0, 30, 60):
+        curve = background_items.lobe(Phong(exponent=50.0), incident, views) / np.cos(np.deg2rad(views))
+        assert views[np.argmax(curve)] == incident
+    sharp, _ = background_items.phong_sphere(48, 100.0)
+    soft, mask = background_items.phong_sphere(48, 5.0)
+    assert np.allclose(soft["sum"][mask], (soft["ambient"] + soft["diffuse"] + soft["specular"])[mask])
+    assert sharp["specular"][mask].sum() < soft["specular"][mask].sum() / 5
+
+
+def test_smooth_light_is_modelled_better_by_harmonics_than_by_one_lamp() -> None:
+    true, models, _ = background_items.shading_models(known_ball())
+    inside = true.any(axis=2)
+    smooth, lamp, constant = (float(np.square((model - true)[inside]).mean()) for model in models.values())
+    assert smooth < 0.1 * lamp
+    assert lamp < 0.5 * constant
+
+
+def test_closed_forms_look_as_their_shape_and_light_say() -> None:
+    for shaded in (introduction_items.sphere(64), introduction_items.vase(64)):
+        inside = np.isfinite(shaded.height)
+        assert np.array_equal(inside, shaded.mask)
+        normal = introduction_items.truth_normal(shaded.height)
+        known = np.isfinite(normal[..., 2]) & (normal[..., 2] > 0.5)
+        expected = introduction_items._ALBEDO * np.maximum(normal @ introduction_items.LIGHT, 0)
+        assert np.abs(expected - shaded.image[..., 0])[known].mean() < 0.02
+    ball_, method = introduction_items.sphere(64), "sfs-ikeuchi-horn"
+    assert introduction_items.recover(ball_, method).mean_angle < 0.4 * introduction_items.recover(ball_, "naive").mean_angle
+
+
+def test_chance_is_told_from_difference() -> None:
+    random = np.random.default_rng(2)
+    alike = random.dirichlet(np.ones(BINS), (8, 2, len(FILTERS)))
+    apart = alike.copy()
+    apart[:, 0, :, : BINS // 2] *= 9
+    apart /= apart.sum(axis=-1, keepdims=True)
+    assert (filter_items.chance(apart, 0) == pytest.approx(2 / 2**8)) and (filter_items.chance(alike, 0) > 0.02).mean() > 0.7
+    assert ((filter_items.distances(apart) > filter_items.distances(alike)) & (filter_items.distances(apart) < 1)).all()
+    many = np.concatenate([apart, apart])
+    assert (filter_items.chance(many, 0) <= 4 / 4096).all(), "beyond twelve subjects exchanges are drawn at random"
+    assert np.allclose(filter_items.holm(np.array([0.01, 0.5, 0.02])), [0.03, 0.5, 0.04])
+
+
+def test_the_light_of_a_ball_is_found_to_a_degree() -> None:
+    for direction in (toward(-0.6, 0.6, 1.0), toward(0.9, -0.4, 0.8)):
+        found = application_items.found_lights(application_items.lit_ball(direction, 56))
+        assert len(found) == 3
+        for name, light in found.items():
+            assert application_items.degrees_between(light, direction) < 1, name
+
+
+def test_edits_do_what_was_asked_for_and_nothing_else(context: Context) -> None:
+    answer = made("figure-4.50", context)
+    diffuse, specular = (column(answer, f"of the {layer} layer (%)") for layer in ("diffuse", "specular"))
+    assert diffuse["nothing asked for"] == specular["nothing asked for"] == 0
+    for name in diffuse:
+        if name != "nothing asked for":
+            layers = {"diffuse": diffuse[name], "specular": specular[name]}
+            asked = name.split()[0]
+            assert layers.pop(asked) > 1, name
+            assert set(layers.values()) == {0}, name
+    assert diffuse["diffuse removed"] == pytest.approx(100)
+    recoloured = made("figure-4.51", context)
+    assert set(column(recoloured, "change outside (%)").values()) == {0.0}
+    assert set(column(recoloured, "of the highlights (%)").values()) == {0.0}
+    assert min(column(recoloured, "change inside (%)").values()) > 1
+    assert max(column(recoloured, "change of luminance (%)").values()) < 5
+
+
+def test_no_search_beats_the_exact_one(context: Context) -> None:
+    reached = column(made("figure-3.4", context), "objective / optimum")
+    assert reached.pop("exact") == 1.0
+    assert len(reached) == 3
+    assert all(0.9 < float(str(value)) <= 1 + 1e-12 for value in reached.values())
