@@ -78,7 +78,7 @@ def sparsification(error: np.ndarray, confidence: np.ndarray) -> Sparsification:
     sums = np.bincount(group, weights=np.asarray(error, float))
     total = sums.sum()
     dropped = np.concatenate([[0.0], np.cumsum(count) / len(group)])
-    gone = np.cumsum(sums) / total if total > 0 else dropped[1:]
+    gone = np.minimum(np.cumsum(sums) / total, 1) if total > 0 else dropped[1:]
     return Sparsification(dropped, np.concatenate([[1.0], 1 - gone]))
 
 
