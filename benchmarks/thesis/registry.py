@@ -1,6 +1,5 @@
 """All items, in the order of the thesis' lists."""
 
-import difflib
 import importlib
 from functools import cache
 
@@ -30,6 +29,17 @@ def find(kind: str, number: str) -> Item:
     """One item. Raises `InputError` that names the nearest numbers where there is none."""
     known = {item.number: item for item in items() if item.kind == kind}
     if number not in known:
-        near = difflib.get_close_matches(number, known, 3, 0.0)
+        near = sorted(known, key=lambda other: _distance(number, other))[:3]
         raise InputError(f"there is no {kind} {number!r}: the nearest are {', '.join(near)} (`isc thesis list` shows all)")
     return known[number]
+
+
+def _distance(asked: str, known: str) -> tuple[float, float]:
+    """How far apart two numbers like "4.5" are: by chapter, then by what follows; words are infinitely far."""
+    try:
+        chapter, _, place = asked.partition(".")
+        wanted = float(chapter), float(place or 0)
+    except ValueError:
+        wanted = float("inf"), float("inf")
+    own = [float(part) for part in known.split(".")]
+    return abs(wanted[0] - own[0]), abs(wanted[1] - own[1])

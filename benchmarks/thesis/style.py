@@ -24,6 +24,7 @@ LETTERS = 8.0  # points
 _BRIGHT = 0.9  # what all but the brightest hundredth of an image is shown below
 _LABEL = 1.05  # inches left of a sheet, for the names of its rows
 _LINE = 0.16  # inches that a line of letters takes
+_LETTER = 0.062  # inches that a small letter takes, on the average
 _GAP = 0.03  # inches between the rows of a sheet
 
 
@@ -47,6 +48,25 @@ def finish(made: Figure) -> None:
     """Gives all titles the size of the other letters, whichever way they were set."""
     for axes in made.axes:
         axes.title.set_fontsize(LETTERS)
+
+
+def tabulated(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Figure:
+    """A picture of a table, for where Markdown is not shown: columns as wide as their longest cell, every second row shaded."""
+    lengths = [max(len(cell) for cell in column) + 2 for column in zip(header, *rows, strict=True)]
+    width, height = max(4.0, _LETTER * sum(lengths)), _LINE * 1.15 * (len(rows) + 1) + (_LINE * 1.6 if caption else 0.05)
+    made = Figure(figsize=(width, height), dpi=DPI)
+    axes = made.add_axes((0, 0, 1, (height - (_LINE * 1.5 if caption else 0)) / height))
+    axes.set(xlim=(0, sum(lengths)), ylim=(len(rows) + 1, 0))
+    axes.axis("off")
+    for line, cells in enumerate([list(header), *rows]):
+        if line % 2 == 0 and line:
+            axes.axhspan(line, line + 1, color="0.94")
+        for place, cell in zip(np.cumsum([1, *lengths[:-1]]), cells, strict=True):
+            axes.text(place, line + 0.5, cell, fontsize=LETTERS - 1, va="center", weight="normal" if line else "bold", parse_math=False)
+    axes.axhline(1, color="0", linewidth=0.6)
+    if caption:
+        made.text(0.01, 1 - _LINE * 0.75 / height, caption, fontsize=LETTERS, va="center", parse_math=False)
+    return made
 
 
 def legend(axes: Axes, where: str = "best", columns: int = 1) -> None:

@@ -114,7 +114,9 @@ class Library:
         """A folder of photos in or beside the data."""
         if self.data is None:
             return None
-        return next((f for f in (self.data / name, self.data.parent / name, self.data / "data" / name) if f.is_dir()), None)
+        # A folder beside the data counts where the data is the set itself.
+        outer = (self.data.parent / name,) if self._root == self.data else ()
+        return next((folder for folder in (self.data / name, self.data / "data" / name, *outer) if folder.is_dir()), None)
 
     def _specular(self, monitor: Monitor) -> Iterator[Subject]:
         names = [name for name in SIGNIFICANT if name in self._objects]

@@ -21,8 +21,8 @@ from isc_core.json_files import read_json
 
 from .claims import ABSTRACT
 from .context import Context
-from .item import Cell, Item, Made, Table, Verdict
-from .style import finish
+from .item import Item, Made, Table, Verdict
+from .style import finish, tabulated
 
 RECORDS = "records"
 _SCHEMA = 1
@@ -59,11 +59,12 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     Raises `InputError` where the folder cannot be written.
     """
     folder, name = context.output, item.name
-    pictures = [_numbered(name, number, "png") for number in range(len(made.figures))]
+    drawings = made.figures or tuple(tabulated(table.header, _cells(table), table.caption) for table in made.tables[:1])
+    pictures = [_numbered(name, number, "png") for number in range(len(drawings))]
     lists = [_numbered(name, number, "csv") for number in range(len(made.tables))]
     before = read_record(folder, name)
     _forget(folder, name)
-    for file, figure in zip(pictures, made.figures, strict=True):
+    for file, figure in zip(pictures, drawings, strict=True):
         with new_file(folder / file) as partial:
             finish(figure)
             figure.savefig(partial, format="png", metadata={"Software": None})
@@ -110,14 +111,14 @@ def page(item: Item, made: Made, record: Record, pictures: Sequence[str], lists:
     parts = [f"# {title}", *(verdict_lines(verdict) for verdict in made.verdicts)]
     if not made.verdicts:
         parts.append("The thesis' abstract gives no claim for this.")
-    parts += [f"![{title}]({picture})" for picture in pictures]
+    parts += [f"![{title}]({picture})" for picture in pictures if made.figures]
     parts += [part for table in made.tables for part in ((table.caption, markdown(table)) if table.caption else (markdown(table),))]
     if made.text:
         parts.append(made.text.strip())
-    files = ", ".join(f"[{file}]({file})" for file in lists)
+    files = ", ".join(f"[{file}]({file})" for file in (*lists, *(pictures if not made.figures else ())))
     parts.append(
         f"Made by `{record.command}` (seed {record.seed}, ISC {record.version}, {record.machine}, {record.seconds:g} s)."
-        + (f" Numbers: {files}." if lists else "")
+        + (f" Files: {files}." if files else "")
     )
     return "\n\n".join(parts) + "\n"
 
@@ -125,13 +126,13 @@ def page(item: Item, made: Made, record: Record, pictures: Sequence[str], lists:
 def markdown(table: Table) -> str:
     """A table in Markdown, numbers with four digits."""
     lines = ["| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
-    return "\n".join([*lines, *("| " + " | ".join(_shown(cell) for cell in row) + " |" for row in table.rows)])
+    return "\n".join([*lines, *("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in _cells(table))])
 
 
 def verdict_lines(verdict: Verdict) -> str:
     """A claim, what was measured, and whether it holds."""
-    why = f" {verdict.why}" if verdict.why else ""
-    return f"**The thesis:** {verdict.claim} **Here:** {verdict.here} **Holds: {verdict.holds}.**{why}"
+    why = f" {_sentence(verdict.why)}" if verdict.why else ""
+    return f"**The thesis:** {_sentence(verdict.claim)} **Here:** {_sentence(verdict.here)} **Holds: {verdict.holds}.**{why}"
 
 
 def write_index(folder: Path, items: Sequence[Item]) -> None:
@@ -192,14 +193,18 @@ def _index_row(item: Item, record: Record | None) -> str:
     return f"| {title} | {item.title} | {said} |"
 
 
+def _sentence(text: str) -> str:
+    """With a capital letter and a full stop."""
+    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}"
+
+
 def _spoken(name: str) -> str:
     return name.replace("-", " ")
 
 
-def _shown(cell: Cell) -> str:
-    if isinstance(cell, float):
-        return f"{cell:.4g}"
-    return str(cell).replace("|", "\\|")
+def _cells(table: Table) -> list[list[str]]:
+    """The rows as they are shown, numbers with four digits."""
+    return [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in table.rows]
 
 
 def _numbered(name: str, number: int, suffix: str) -> str:

@@ -1,0 +1,104 @@
+"""The thesis' tables of thresholds: exact rows against all candidates, statistics against their definitions, items as they are made."""
+
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("matplotlib")
+
+from benchmarks.thesis.claims import CHAOS_FINDS_OPTIMUM, CHAOS_HELPS
+from benchmarks.thesis.context import Context
+from benchmarks.thesis.item import Made
+from benchmarks.thesis.registry import find
+from benchmarks.thesis.thresholding_items import exhaustive
+from benchmarks.thesis.thresholding_runs import all_runs, holm, iterations, objective, rank_sum, runs, share_interval
+from benchmarks.thresholding import COUNTS, IMAGES
+from isc_core.thresholding import OtsuObjective, exact
+
+
+@pytest.fixture(scope="module")
+def context(tmp_path_factory: pytest.TempPathFactory) -> Context:
+    return Context(tmp_path_factory.mktemp("thesis"), quick=True)
+
+
+def made(context: Context, kind: str, number: str) -> Made:
+    item = find(kind, number)
+    assert item.make is not None
+    return item.make(context)
+
+
+def test_all_candidates_agree_with_dynamic_programming() -> None:
+    """On few levels against a plain loop, on a real image against the program for it."""
+    rng = np.random.default_rng(3)
+    few = OtsuObjective(np.concatenate([rng.integers(1, 50, 12), np.zeros(244)]))
+    loop = max(float(few(np.array([sets]))[0]) for sets in combinations(range(12), 3))
+    assert exhaustive(few)[1] == pytest.approx(loop, rel=1e-12)
+    for name in ("camera", "clock"):
+        where, value = exhaustive(objective(name))
+        assert value == pytest.approx(exact(objective(name), 3).value, rel=1e-12)
+        assert objective(name)(np.array([where]))[0] == pytest.approx(value, rel=1e-12)
+
+
+def test_the_exact_table_has_every_image_and_its_known_optimum(context: Context) -> None:
+    table, check = made(context, "table", "4.1").tables
+    known = {(row[0], row[1]): float(row[3]) for row in table.rows}
+    assert known["camera", 4] == pytest.approx(5313.813, abs=1e-3)
+    assert "46 100 145 182" in {row[2] for row in table.rows}
+    assert set(known) == {(name, count) for name in IMAGES[:3] for count in COUNTS}
+    assert all(0 < float(row[4]) < 100 for row in table.rows) and {row[3] for row in check.rows} == {"yes"}
+    # More classes never lie closer together.
+    assert all(known[name, 3] < known[name, 4] < known[name, 5] for name in IMAGES[:3])
+
+
+def test_runs_are_kept_differ_by_seed_and_never_beat_the_optimum(context: Context) -> None:
+    found = all_runs(context, ("PSO", "CS"))
+    for (_, image, count), each in found.items():
+        best = exact(objective(image), count).value
+        assert (each.values <= best * (1 + 1e-12)).all() and each.thresholds.shape == (len(each.values), count)
+        assert each.values == pytest.approx(objective(image)(each.thresholds), rel=1e-12)
+        assert np.array_equal(np.isfinite(each.needed), each.values >= best * (1 - 1e-12))
+    again = runs(Context(context.output, quick=True), "PSO", "camera", 5)
+    assert np.array_equal(again.milliseconds, found["PSO", "camera", 5].milliseconds), "they were measured anew"
+    assert len(set(found["PSO", "camera", 5].values.tolist())) > 1, "every run started alike"
+
+
+def test_tables_of_runs_fit_the_runs(context: Context) -> None:
+    objectives, thresholds, times = (made(context, "table", number) for number in ("4.2", "4.3", "4.4"))
+    assert [verdict.claim for verdict in objectives.verdicts] == [CHAOS_FINDS_OPTIMUM, CHAOS_HELPS]
+    chaotic = all_runs(context, ("CS",))
+    hits = sum(each.hits for each in chaotic.values())
+    assert f"{hits} of {sum(len(each.values) for each in chaotic.values())} runs" in objectives.verdicts[0].here
+    cells = {(row[0], row[1]): row for row in objectives.tables[1].rows}
+    assert cells["moon", 4][7] == f"{chaotic['CS', 'moon', 4].values.mean():.3f}"
+    assert all(len(table.rows) == 9 for table in (*thresholds.tables, *times.tables))
+    assert all(0 <= float(row[-1]) <= 1 for row in times.tables[0].rows)
+
+
+@pytest.mark.parametrize("number", ["3.5", "3.6", "3.7", "3.8", "4.1"])
+def test_figures_are_drawn(context: Context, number: str) -> None:
+    answer = made(context, "figure", number)
+    assert len(answer.figures) == 1 and answer.tables[0].rows and answer.text
+
+
+def test_uniform_numbers_and_one_orbit_are_told_apart(context: Context) -> None:
+    one, many, pseudo = ([float(cell) for cell in row[1:]] for row in made(context, "figure", "3.8").tables[0].rows)
+    assert many[2] == pseudo[2] == 0 < one[2]
+    assert many[0] < 100 and pseudo[0] < 100
+
+
+def test_statistics_are_what_they_are_called() -> None:
+    assert np.allclose(share_interval(50, 50), (0.92866, 1), atol=1e-4)
+    assert np.allclose(share_interval(5, 10), (0.23659, 0.76341), atol=1e-4)
+    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+    assert rank_sum(np.array([1.0, 1.0]), np.array([1.0, 1.0])) == (0.5, 1.0)
+    share, p = rank_sum(np.array([np.inf] * 20), np.arange(20.0))
+    assert share == 1.0 and p < 1e-6
+    assert iterations("PSO", np.array([40, 41, 80, 120])).tolist() == [0, 1, 1, 2]
+    assert iterations("CS", np.array([50, 51, 305, 306])).tolist() == [0, 1, 1, 2]
+
+
+def test_another_seed_is_another_run(context: Context, tmp_path: Path) -> None:
+    one, other = (runs(Context(tmp_path, quick=True, seed=seed), "PSO", "camera", 5) for seed in (0, 100))
+    assert not np.array_equal(one.thresholds, other.thresholds)
