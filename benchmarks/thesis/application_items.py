@@ -30,7 +30,7 @@ from isc_core.separation import separate
 from synth.truth import fit_light
 
 from .context import Context, JsonRow
-from .decompositions import decomposed
+from .decompositions import decomposed, photo_of
 from .item import Item, Made, Table
 from .panels import Panel, panels
 from .style import exposure
@@ -99,7 +99,7 @@ def _spheres(context: Context) -> Made:
         off = {name: degrees_between(way, direction) for name, way in found.items()}
         errors.append(off)
         rows.append((_word(direction), *(off.get(name, "") for name in _WAYS)))
-        shown += _ball_panels(ball, found, off, size)
+        shown += _ball_panels(ball, found, off, size, context.quick)
     means = [[off[name] for off in errors if name in off] for name in _WAYS]
     rows.append(("mean", *(float(np.mean(values)) for values in means)))
     header = ("light (x, y, z)", *_WAYS)
@@ -110,7 +110,7 @@ def _spheres(context: Context) -> Made:
     )
     if context.quick:
         text += " In a quick run the model sees the first ball only."
-    return Made((table,), (panels(shown, 4),), text)
+    return Made((table,), (panels(shown, 4 if context.quick else 5),), text)
 
 
 def _found_rows(context: Context, ball: Decomposition, number: int) -> list[JsonRow]:
@@ -121,13 +121,14 @@ def _found_rows(context: Context, ball: Decomposition, number: int) -> list[Json
     return [{"way": name, **dict(zip("xyz", map(float, direction), strict=True))} for name, direction in found.items()]
 
 
-def _ball_panels(ball: Decomposition, found: dict[str, np.ndarray], off: dict[str, float], size: int) -> list[Panel]:
+def _ball_panels(ball: Decomposition, found: dict[str, np.ndarray], off: dict[str, float], size: int, quick: bool) -> list[Panel]:
     gain = exposure(ball.image, ball.mask)
     parted = separated(ball)
     shown = [Panel("image", ball.image, ball.mask, gain=gain), Panel("specular, by isc", parted.specular, ball.mask, gain=gain)]
-    for title, name in (("the highlight's light", _WAYS[2]), ("the shading's light", _WAYS[0])):
+    ways = (("lit as the highlight tells", _WAYS[2]), ("as the shading tells", _WAYS[0]), ("as MDR tells", _WAYS[3]))
+    for title, name in ways if _WAYS[3] in found and not quick else ways[:2]:
         lit, coverage = render_sphere(DirectionalLight(found[name], ambient=np.full(3, _AMBIENT)), size, EXPONENT, _GLOSS)
-        shown.append(Panel(f"{title}: {off[name]:.2f}° off", lit, coverage > 0.5, gain=0.8))
+        shown.append(Panel(f"{title}: {off[name]:.2g}° off", lit, coverage > 0.5, gain=0.8))
     return shown
 
 
@@ -136,18 +137,15 @@ def _word(direction: np.ndarray) -> str:
 
 
 def _photographed(context: Context) -> tuple[Subject, Decomposition]:
-    """The photo with the most light that is found to be specular of the first few: editing highlights needs some."""
-    best: tuple[Subject, Decomposition] | None = None
-    for subject in context.photos()[: 2 if context.quick else 4]:
-        d = decomposed(context, subject)
-        if best is None or _specular_share(d) > _specular_share(best[1]):
-            best = subject, d
-    assert best is not None
-    return best
+    """The masked photo with the most light that `isc` takes for specular: editing highlights needs some, and SIRFS an outline."""
 
+    def share(subject: Subject) -> float:
+        split = separate("isc", subject.image, subject.mask, photo_of(subject).clipped)
+        return float(split.specular[subject.mask].sum(dtype=float) / subject.image[subject.mask].sum(dtype=float))
 
-def _specular_share(d: Decomposition) -> float:
-    return float(d.specular[d.mask].sum(dtype=float) / d.image[d.mask].sum(dtype=float))
+    photos = context.photos()
+    chosen = max([one for one in photos if not one.mask.all()] or photos, key=share)
+    return chosen, decomposed(context, chosen)
 
 
 EDITS: tuple[tuple[str, DichromaticEdit], ...] = (
@@ -155,7 +153,7 @@ EDITS: tuple[tuple[str, DichromaticEdit], ...] = (
     ("specular gamma 2", DichromaticEdit(specular=LayerEdit(gamma=2.0))),
     ("specular gamma ½", DichromaticEdit(specular=LayerEdit(gamma=0.5))),
     ("diffuse gamma 1.6", DichromaticEdit(diffuse=LayerEdit(gamma=1.6))),
-    ("diffuse sharpened by 2", DichromaticEdit(diffuse=LayerEdit(sharpen=2.0))),
+    ("diffuse sharpened", DichromaticEdit(diffuse=LayerEdit(sharpen=1.0))),
     ("specular removed", DichromaticEdit(specular=LayerEdit(gain=0.0))),
     ("diffuse removed", DichromaticEdit(diffuse=LayerEdit(gain=0.0))),
 )
@@ -213,7 +211,7 @@ def _recolouring(context: Context) -> Made:
     asked += [(f"blue in cluster {number}", Paint(target=target), clusters.weight(number)) for number in numbers]
     shown = [Panel("photo", d.image, d.mask, gain=gain), Panel("clusters of paint", _cluster_picture(clusters), d.mask)]
     shown.append(Panel("painted mask", painted_region(d), d.mask, (0, 1)))
-    rows = []
+    rows: list[tuple[str | float, ...]] = []
     for name, paint, region in asked:
         after = recolour(d, paint, region)
         shown.append(Panel(name, after.image, d.mask, gain=gain))

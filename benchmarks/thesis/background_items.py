@@ -35,7 +35,7 @@ from .context import Context
 from .decompositions import decomposed
 from .item import Item, Made, Table
 from .panels import Panel, normals_panel, panels
-from .specular_free_images import DARK, KINDS, PHOTO, highlight_left, with_layers
+from .specular_free_images import DARK, KINDS, PHOTO, highlight_left, titled, with_layers
 from .style import LETTERS, OKABE_ITO, exposure, figure, sheet
 from .subjects import Subject
 
@@ -178,7 +178,7 @@ def _shading(context: Context) -> Made:
         shown += [normals_panel(f"{subject.name}: true normals", normal, inside), Panel("true shading", true, inside, gain=gain)]
         for name, model in models.items():
             left = float(np.sqrt(np.square((model - true)[inside]).mean())) / size
-            cells.append((f"{subject.name} ({kind})", name, 100 * left))
+            cells.append((titled(subject), name, 100 * left))
             if name != "constant":
                 error = np.abs(model - true).mean(axis=2) / size
                 shown += [Panel(name, model, inside, gain=gain), Panel("its error, of the RMS", error, inside, (0, 0.5))]
@@ -228,7 +228,7 @@ def _error(true: np.ndarray, found: np.ndarray) -> float:
 def _specular_free(context: Context) -> Made:
     subjects = with_layers((*context.subjects("specular"), *context.subjects("synthetic")))
     kinds = (PHOTO, *KINDS, DARK)
-    cells: list[tuple[str | int | float, ...]] = [(one.name, *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects]
+    cells: list[tuple[str | int | float, ...]] = [(titled(one), *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects]
     table = Table(
         ("subject", *(kind.name for kind in kinds)), tuple(cells), "Share of the highlights' light that is left in each image (%)."
     )
@@ -245,7 +245,7 @@ def _specular_free(context: Context) -> Made:
     text = (
         f"{chosen.name}: each image made of the photo (above) and of its diffuse layer (below), in one exposure per column. Where both "
         "rows look alike, highlights do not reach the image. The dark channel is the opposite: mostly highlight, and what is left of pale "
-        "paint. What is left in the exact ones (SF1, SF2) is the highlights' tint: they assume white light."
+        "paint. What is left in the exact ones (SF1, SF2) is that highlights are not quite white."
     )
     return Made((table,), (panels(shown, len(kinds)),), text)
 

@@ -36,7 +36,7 @@ from isc_core.result_folder import LAYERS, save
 from .context import Context
 from .decompositions import decomposed
 from .item import Item, Made, Table
-from .specular_free_images import KINDS, highlight_left, with_layers
+from .specular_free_images import KINDS, highlight_left, titled, with_layers
 
 _PAIRS = 4000
 _RECIPROCAL, _KEPT = 1e-9, 1e-3  # what counts as equal, and how much more than all light the integrals' own error may give
@@ -122,7 +122,7 @@ def _specular_free(context: Context) -> Made:
     header = ("image", "formula", "citation", "function", "used by", "highlight left (%), mean", "largest")
     text = (
         "min and max are over the channels of a pixel, Σ their sum. What is left of the highlights is measured on "
-        f"{', '.join(subject.name for subject in subjects)}, without what lies evenly on the whole object. Two methods have "
+        f"{', '.join(map(titled, subjects))}, without what lies evenly on the whole object. Two methods have "
         "invariants that are no images: `mallick_2006` the hue and chroma in a plane across white, `isc` the chroma max I − min I."
     )
     return Made((Table(header, tuple(rows)),), text=text)

@@ -25,7 +25,7 @@ from isc_core.separation.filter_statistics import BINS, FILTERS, KINDS, WIDTHS, 
 
 from .context import Context
 from .item import Item, Made, Table
-from .specular_free_images import with_layers
+from .specular_free_images import titled, with_layers
 from .style import LETTERS, OKABE_ITO, figure, legend
 from .subjects import Subject
 
@@ -39,7 +39,7 @@ def samples_of(subjects: list[Subject]) -> list[Sample]:
     for one in subjects:
         assert one.diffuse is not None
         assert one.specular is not None
-        truth = SeparationTruth(one.name, one.image, one.mask, one.diffuse, one.specular, np.zeros_like(one.mask))
+        truth = SeparationTruth(titled(one), one.image, one.mask, one.diffuse, one.specular, np.zeros_like(one.mask))
         sample = sample_of(truth, "layers")
         if min(len(sample.of_highlight), len(sample.of_without)) >= _LEAST:
             found.append(sample)

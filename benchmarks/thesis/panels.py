@@ -13,14 +13,12 @@ from matplotlib.figure import Figure
 
 from isc_core.box import mask_slices
 from isc_core.decomposition import Decomposition
-from isc_core.editing.spheres import sphere_normals
-from isc_core.sirfs.frames import real_sh
 
+from .pictures import ball
 from .style import LETTERS, WIDTH, exposure, figure, normal_colours, show, show_map
 
 _LINE = 0.16  # inches of a line of letters
 _LETTERS_AN_INCH = 15  # that fit above a panel
-_BALL = 160  # pixels
 
 
 @dataclass(frozen=True)
@@ -88,8 +86,7 @@ def normals_panel(title: str, normal: np.ndarray, mask: np.ndarray) -> Panel:
 
 def light_panel(title: str, illumination: np.ndarray) -> Panel:
     """A white ball under the light of coefficients (9, 3)."""
-    normal, coverage = sphere_normals(_BALL)
-    return Panel(title, np.exp(real_sh(normal) @ illumination), coverage > 0.5)
+    return Panel(title, *ball(illumination))
 
 
 def characteristics(d: Decomposition) -> list[Panel]:

@@ -82,3 +82,8 @@ def highlight_left(kind: SpecularFree, subject: Subject) -> float:
 def with_layers(subjects: Sequence[Subject]) -> list[Subject]:
     """Those whose diffuse layer is known and differs from the image."""
     return [one for one in subjects if one.diffuse is not None and np.abs(one.image - one.diffuse)[one.mask].sum() > 0]
+
+
+def titled(subject: Subject) -> str:
+    """Its name and kind: kinds share objects."""
+    return f"{subject.name} ({subject.kind})"

@@ -30,6 +30,7 @@ from isc_core.brdf.phong import Phong
 from isc_core.datasets import MitBerkeleyObject
 from isc_core.decomposition import Decomposition
 from isc_core.editing.lights import toward
+from isc_core.metrics import truth_normal
 from isc_core.separation.filter_statistics import BINS, FILTERS
 from isc_core.sirfs.frames import light_to_reference
 from tests.core.ball_scene import ball
@@ -87,10 +88,10 @@ def made(name: str, context: Context) -> Made:
     return item.make(context)
 
 
-def column(answer: Made, header: str, table: int = 0) -> dict[str, object]:
-    """A column of a table by the first one."""
-    place = answer.tables[table].header.index(header)
-    return {str(row[0]): row[place] for row in answer.tables[table].rows}
+def column(answer: Made, header: str) -> dict[str, float]:
+    """A column of the first table by that of names."""
+    place = answer.tables[0].header.index(header)
+    return {str(row[0]): float(row[place]) for row in answer.tables[0].rows}
 
 
 def labels(figure: Figure) -> Iterator[tuple[float, float, float, float]]:
@@ -181,7 +182,7 @@ def test_closed_forms_look_as_their_shape_and_light_say() -> None:
     for shaded in (introduction_items.sphere(64), introduction_items.vase(64)):
         inside = np.isfinite(shaded.height)
         assert np.array_equal(inside, shaded.mask)
-        normal = introduction_items.truth_normal(shaded.height)
+        normal = truth_normal(shaded.height)
         known = np.isfinite(normal[..., 2]) & (normal[..., 2] > 0.5)
         expected = introduction_items._ALBEDO * np.maximum(normal @ introduction_items.LIGHT, 0)
         assert np.abs(expected - shaded.image[..., 0])[known].mean() < 0.02
@@ -232,4 +233,4 @@ def test_no_search_beats_the_exact_one(context: Context) -> None:
     reached = column(made("figure-3.4", context), "objective / optimum")
     assert reached.pop("exact") == 1.0
     assert len(reached) == 3
-    assert all(0.9 < float(str(value)) <= 1 + 1e-12 for value in reached.values())
+    assert all(0.9 < value <= 1 + 1e-12 for value in reached.values())
