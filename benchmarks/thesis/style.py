@@ -19,7 +19,7 @@ from isc_core.photo import linear_to_srgb
 
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
 WIDTH = 7.0  # inches
-DPI = 150
+DPI = 110  # about as wide as pages are shown; all pictures together stay small
 LETTERS = 8.0  # points
 _BRIGHT = 0.9  # what all but the brightest hundredth of an image is shown below
 _LABEL = 1.05  # inches left of a sheet, for the names of its rows

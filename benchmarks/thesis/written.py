@@ -67,7 +67,7 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     for file, figure in zip(pictures, drawings, strict=True):
         with new_file(folder / file) as partial:
             finish(figure)
-            figure.savefig(partial, format="png", metadata={"Software": None})
+            figure.savefig(partial, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
     for file, table in zip(lists, made.tables, strict=True):
         with new_file(folder / file) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream, lineterminator="\n").writerows([table.header, *table.rows])
