@@ -41,7 +41,7 @@ def _errors(frameworks: Sequence[Framework], text: str, judged: bool) -> Callabl
         tables = [relative_errors(_of_kind(rows, kind), words, context.seed) for kind, words in KINDS.items()]
         tables = [relative_errors(rows, "all of them", context.seed), *(table for table in tables if table.rows)]
         verdicts = _verdicts(rows, context.seed) if judged else ()
-        return Made((*tables, _absolute(rows)), text=text, verdicts=verdicts)
+        return Made((*tables, absolute(rows)), text=text, verdicts=verdicts)
 
     return make
 
@@ -65,7 +65,8 @@ def relative_errors(rows: Sequence[Row], words: str, seed: int) -> Table:
     return Table(header, tuple(lines), f"Errors relative to SIRFS, geometric means (95 %): {words}, {count} subjects")
 
 
-def _absolute(rows: Sequence[Row]) -> Table:
+def absolute(rows: Sequence[Row]) -> Table:
+    """Each run's errors as they are."""
     lines: list[tuple[Cell, ...]] = [(row.subject, row.framework, *(row.errors[name] for name in METRICS)) for row in rows]
     return Table(("subject", "framework", *(_NAMES[name] for name in METRICS)), tuple(lines), "Errors by subject")
 
@@ -118,7 +119,7 @@ def _of_kind(rows: Sequence[Row], kind: str) -> list[Row]:
 
 _AFTER_TEXT = (
     "Below 1 is better than SIRFS on the photo as it is. Height, normals and light of SIRFS-X are those of SIRFS, since X sees its result: "
-    "only reflectance can change, and with it the last two columns. The abstract claims nothing of these frameworks."
+    "only reflectance can change, and with it the last two columns."
 )
 _BEFORE_TEXT = (
     "Below 1 is better than SIRFS on the photo as it is. MZK06 and YCK06 in their improved settings, SC with both specular-free images; "

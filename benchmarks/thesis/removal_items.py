@@ -50,10 +50,10 @@ def _quickest(label: str) -> str | None:
 
 
 _ACCURACY = (
-    "The abstract claims nothing of these four. Below 1 in the first column a method helps, above it does harm: as published, most "
+    "Below 1 in the first column a method helps, above it does harm: as published, most "
     "take pale paint for light. The improved settings mostly know when to leave a photo alone, which is caution more than skill."
 )
-_SPEED = "The abstract claims nothing of these four. All kinds of images together; one warm run each, seconds as the machine was."
+_SPEED = "All kinds of images together; one warm run each, seconds as the machine was."
 
 ITEMS: tuple[Item, ...] = (
     Item("table", "4.11", "MZK06, YCK06, YWA10 and SC09: accuracy", _accuracy),

@@ -18,13 +18,14 @@ from isc_core.datasets import MitBerkeleyObject
 from isc_core.errors import InputError
 from isc_core.evaluate import Estimate
 from isc_core.image_metrics import highlight_region
-from isc_core.metrics import mse, score, truth_normal
+from isc_core.metrics import mse, truth_normal
 from isc_core.sirfs.frames import light_from_reference
 
+from .characteristics_items import absolute
 from .context import Context
 from .decompositions import decomposed
-from .estimates import AFTER, BEFORE, BOUND, SIRFS, Framework, estimated, known
-from .item import Item, Made
+from .estimates import AFTER, BEFORE, BOUND, SIRFS, Framework, estimated, known, measured
+from .item import Cell, Item, Made, Table
 from .panels import characteristics, panels
 from .pictures import ball, beside, directions, fitted, lit, marked, relief, signed
 from .removal_items import METHODS
@@ -57,33 +58,37 @@ def turn(index: int, subjects: Sequence[Subject], rounds: int) -> tuple[Subject,
     return subjects[index % len(subjects)], index // len(subjects)
 
 
-def separation_rows(subject: Subject, ways: Sequence[Way], seed: int) -> Rows:
-    """The truth and the photo, then each way's layers and its error."""
+def separation_rows(subject: Subject, ways: Sequence[Way], seed: int) -> tuple[Rows, Table]:
+    """The truth and the photo, then each way's layers and its error; and the errors as numbers."""
     diffuse, specular = layers(subject)
     mask, gain = subject.mask, exposure(subject.image, subject.mask)
     rows: Rows = [("truth", [lit(diffuse, mask, gain), lit(specular, mask, gain), lit(subject.image, mask, gain)])]
-    nothing = mse(diffuse, subject.image, mask)
+    nothing, lines = mse(diffuse, subject.image, mask), []
     for way in ways:
         try:
             found = split(subject, way, seed)
         except InputError:
-            rows.append((f"{way.label}\nrefuses", [None, None, None]))
+            rows.append((f"{_wrapped(way.label)}\nrefuses", [None, None, None]))
+            lines.append((way.label, "refuses", "-", "-"))
             continue
         error = mse(diffuse, found.diffuse, mask)
         words = f"MSE × {_short(error / nothing)}" if nothing > 0 else f"RMS {error**0.5:.2g}"
-        error_picture = signed(found.diffuse - diffuse, mask, gain)
-        rows.append((f"{_wrapped(way.label)}\n{words}", [lit(found.diffuse, mask, gain), lit(found.specular, mask, gain), error_picture]))
-    return rows
+        wrong = signed(found.diffuse - diffuse, mask, gain)
+        rows.append((f"{_wrapped(way.label)}\n{words}", [lit(found.diffuse, mask, gain), lit(found.specular, mask, gain), wrong]))
+        lines.append((way.label, f"{error:.3g}", _short(error / nothing) if nothing > 0 else "-", _share(found.specular, subject)))
+    header = ("method", "MSE of the diffuse layer", "over doing nothing", "light taken off, %")
+    return rows, Table(header, tuple(lines), f"{subject.name}: {_share(specular, subject)} % of the light is specular")
 
 
 def characteristics_rows(context: Context, subject: Subject, frameworks: Sequence[Framework]) -> Rows:
     """The truth and each framework's height, normals, shading, reflectance and light."""
     truth = subject.truth
     assert truth is not None
+    errors = {row.framework: row.errors["average"] for row in measured(context, [subject], frameworks)}
     shown: list[tuple[str, Estimate | None]] = [("truth", _known(truth))]
     for framework in frameworks:
         answer = estimated(context, subject, framework).answer
-        words = "refuses" if answer is None else f"error {_error(truth, answer):.3f}"
+        words = "refuses" if answer is None else f"error {errors[framework.label]:.3f}"
         shown.append((f"{_wrapped(framework.label)}\n{words}", None if answer is None else _levelled(answer, truth)))
     known_heights = np.isfinite(truth.height)
     heights = np.concatenate([answer.height[known_heights] for _, answer in shown if answer is not None])
@@ -116,39 +121,36 @@ def _levelled(answer: Estimate, truth: MitBerkeleyObject) -> Estimate:
     return replace(answer, height=answer.height - np.median(answer.height[np.isfinite(truth.height)]))
 
 
-def _error(truth: MitBerkeleyObject, answer: Estimate) -> float:
-    maps = {name: getattr(answer, name) for name in ("height", "normal", "shading", "reflectance", "light")}
-    return score(truth, **maps).average
-
-
 def _masks(kind: str, context: Context) -> Made:
     rows: Rows = []
-    differing = []
+    lines: list[tuple[Cell, ...]] = []
+    names = [way.label.partition(",")[0] for way in _OPTIMISERS]
     for subject in context.subjects(kind):
         gain = exposure(subject.image, subject.mask)
+        true = highlight_region(layers(subject)[1], subject.mask)
         found = [highlights(subject, way, context.seed) for way in _OPTIMISERS]
-        differing.append(f"{subject.name} {max(int((found[2] ^ other).sum()) for other in found[:2])}")
-        _, specular = layers(subject)
-        true = highlight_region(specular, subject.mask)
         pictures = [marked(subject.image, subject.mask, pixels, gain) for pixels in (*found, true)]
         rows.append((subject.name, [lit(subject.image, subject.mask, gain), *pictures]))
-    columns = ("photo", *(way.label.partition(",")[0] for way in _OPTIMISERS), "true highlights")
+        for name, pixels in zip(names, found, strict=True):
+            both = int((pixels & true).sum())
+            lines.append((subject.name, name, int(pixels.sum()), _percent(both, int(pixels.sum())), _percent(both, int(true.sum()))))
+    table = Table(("image", "search", "pixels marked", "of them highlights, %", "of the highlights, %"), tuple(lines))
     text = (
         "Pixels above the highest of three thresholds of the smallest channel, orange, and beside them where the true specular layer has a "
-        f"tenth of its strongest light. Pixels that CS marks and another search does not, or the other way round: {', '.join(differing)}."
+        "tenth of its strongest light."
     )
-    return Made(figures=(sheet(columns, rows, expose=False),), text=text)
+    return Made((table,), (sheet(("photo", *names, "true highlights"), rows, expose=False),), text)
 
 
 def _layers(kind: str, rounds: Sequence[Sequence[Way]], index: int, context: Context) -> Made:
     subject, which = turn(index, context.subjects(kind), len(rounds))
-    rows = separation_rows(subject, rounds[which], context.seed)
+    rows, table = separation_rows(subject, rounds[which], context.seed)
     text = (
         f"{subject.name}. Under each name: the diffuse layer's mean square error over that of doing nothing, or, where no highlight is, "
         "its RMS error. Errors: orange is light left over, blue is paint taken for light, in full colour from a tenth of the photo's white "
         "on."
     )
-    return Made(figures=(sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),), text=text)
+    return Made((table,), (sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),), text)
 
 
 def _characteristics(rounds: Sequence[Sequence[Framework]], index: int, context: Context) -> Made:
@@ -158,19 +160,33 @@ def _characteristics(rounds: Sequence[Sequence[Framework]], index: int, context:
         f"{subject.name} ({subject.kind}). Under each name the geometric mean of the six errors. Heights of all in one range, shading, "
         "reflectance and light in the scale nearest to the truth; the light on a white ball."
     )
-    return Made(figures=(sheet(("height", "normals", "shading", "reflectance", "light"), rows, expose=False),), text=text)
+    drawn = sheet(("height", "normals", "shading", "reflectance", "light"), rows, expose=False)
+    return Made((absolute(measured(context, [subject], rounds[which])),), (drawn,), text)
 
 
 def _photo(index: int, context: Context) -> Made:
-    found = context.photos()
     order = {name: place for place, name in enumerate(_PREFERRED)}
-    subjects = sorted(found, key=lambda subject: order.get(subject.name, len(order)))
+    subjects = sorted(context.photos(), key=lambda subject: order.get(subject.name, len(order)))
     subject, which = turn(index, subjects, len(_MODELS))
     model = list(_MODELS)[which]
     text = (
         f"{subject.name}, by {_MODELS[model]}; its truth is not known. Photo, diffuse and specular share an exposure, the rest has its own."
     )
-    return Made(figures=(panels(characteristics(decomposed(context, subject, model)), 4),), text=text)
+    found = decomposed(context, subject, model)
+    heights = found.height[found.mask]
+    lines = (("light taken off, %", _share(found.specular, subject)), ("range of heights, pixels", f"{np.ptp(heights):.0f}"))
+    return Made((Table(("what", "here"), lines),), (panels(characteristics(found), 4),), text)
+
+
+def _share(specular: np.ndarray, subject: Subject) -> str:
+    """How much of the subject's light a layer holds, per cent; a model may work at another size."""
+    layer = specular.astype(float).sum() / specular.shape[0] / specular.shape[1]
+    photo = np.where(subject.mask[..., None], subject.image, 0).astype(float).mean(axis=(0, 1)).sum()
+    return f"{100 * layer / max(photo, 1e-30):.2f}"
+
+
+def _percent(part: int, whole: int) -> str:
+    return f"{100 * part / whole:.0f}" if whole else "-"
 
 
 def _short(value: float) -> str:
