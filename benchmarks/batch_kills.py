@@ -1,9 +1,9 @@
 """Does a batch that is killed lose or spoil anything? Kills at random moments, a check after each, the same command again until it is done.
 
-  python -m benchmarks.batch_kills -o FOLDER [--kills 100] [--images 24]
+  python -m benchmarks.batch_kills -o FOLDER [--kills 100] [--images 10]
 
-Four kinds, in turn: a worker process, while its run goes on; the run, whose workers are left to themselves; the run and its workers at
-once; the scheduler of a cluster that stands by itself. After each kill every folder of the output is compared with a reference that a
+Four kinds, in turn: worker processes, several while a run goes on; the run, whose workers are left to themselves; the run and its workers
+at once; the scheduler of a cluster that stands by itself. After each kill every folder of the output is compared with a reference that a
 plain loop has written: all files byte by byte, of decomposition.json all but the seconds and the two entries that only a batch writes. The
 campaign stops at the first that is wrong or incomplete. Every other time the next run begins while orphans of the last may still be at
 work. A run that comes to its end has to have made everything, with exit code 0; then the output begins anew.
@@ -36,7 +36,8 @@ from isc_core.result_folder import save
 
 from .batch_images import made_photos
 
-KINDS = ("worker", "run", "worker", "run and workers", "worker", "scheduler")
+KINDS = ("worker", "run", "run and workers", "run", "scheduler")
+_WORKERS_A_RUN = 4
 _SIZE = 36
 _SETTINGS = Settings(model="retinex", threads=1)
 _LONGEST = 1200.0  # seconds of a run before it counts as hung
@@ -75,7 +76,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--images", type=int, default=24)
+    parser.add_argument("--images", type=int, default=10)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--reference", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -87,10 +88,8 @@ def main() -> None:
     subprocess.run(again, check=True, env={**os.environ, **_ONE_THREAD})
     log = place.root / "kills.jsonl"
     rows = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
-    tries = len(rows)
     while (kills := sum(row["struck"] for row in rows)) < options.kills:
-        tries += 1
-        row = one_kill(place, KINDS[kills % len(KINDS)], random.Random(f"{options.seed} {tries}"))
+        row = one_run(place, KINDS[len(rows) % len(KINDS)], random.Random(f"{options.seed} {len(rows)}"))
         rows.append(row)
         with log.open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
@@ -107,40 +106,40 @@ def make_reference(place: Place, count: int) -> None:
             save(decompose(read_photo(photo), _SETTINGS, name=photo.name), place.reference / photo.stem)
 
 
-# --- one kill -------------------------------------------------------------------------------------------------------------------------
+# --- kills ----------------------------------------------------------------------------------------------------------------------------
 
 
-def one_kill(place: Place, kind: str, rng: random.Random) -> dict[str, object]:
-    """Starts or goes on, kills at a random moment, checks. A run that ends before its kill is checked as a whole, and counts as none."""
-    begun = {path.name for path in results(place.output)}
+def one_run(place: Place, kind: str, rng: random.Random) -> dict[str, object]:
+    """Starts or goes on, kills at random moments, checks after each. A run that ends before its kill is checked as a whole."""
+    begun, start, struck, complete = len(results(place.output)), time.monotonic(), 0, []
     with running(place, kind == "scheduler") as (run, scheduler):
-        start = time.monotonic()
-        moment = when_to_strike(place, run, rng, len(begun))
-        family = [run, *run.children(recursive=True)] if run.is_running() else [run]
-        struck = moment is not None and strike(kind, family, scheduler, rng)
-        complete = check(place)
-        if struck and kind in ("run", "run and workers") and rng.random() < 0.5:
-            psutil.wait_procs(family, timeout=60)  # else the next run meets those who are left
-        elif not struck or kind in ("worker", "scheduler"):
-            ended_well(place, run, lost=kind == "scheduler" and struck)
+        for _ in range(_WORKERS_A_RUN if kind == "worker" else 1):
+            if not struck_now(place, run, rng):
+                break
+            family = [run, *run.children(recursive=True)]
+            struck += strike(kind, family, scheduler, rng)
+            complete.append(check(place))
+        if struck and kind in ("run", "run and workers"):
+            if rng.random() < 0.5:
+                psutil.wait_procs(family, timeout=60)  # else the next run meets those who are left
+        else:
+            ended_well(place, run, lost=kind == "scheduler" and struck > 0)
         check(place)
-        seconds = round(time.monotonic() - start, 1)
-    return {"kind": kind, "struck": struck, "found": len(begun), "complete": complete, "seconds": seconds}
+    seconds = round(time.monotonic() - start, 1)
+    return {"kind": kind, "struck": struck, "found": begun, "complete": complete, "seconds": seconds}
 
 
-def when_to_strike(place: Place, run: psutil.Process, rng: random.Random, found: int) -> float | None:
-    """Waits until so many more results are there as chance says, and a little longer; None where the run ends before.
+def struck_now(place: Place, run: psutil.Process, rng: random.Random) -> bool:
+    """Waits until so many more results are there as chance says, and a little longer; false where the run ends before.
 
     Some kills come during the start, some during the end.
     """
-    more = rng.choice([0, rng.randrange(0, 8), rng.randrange(0, 24)])
-    start = time.monotonic()
-    while alive(run) and len(results(place.output)) < found + more:
-        if len(results(place.output)) == len(results(place.reference)):
-            break
+    goal = len(results(place.output)) + rng.choice([0, 1, 2, rng.randrange(0, 8)])
+    most = len(results(place.reference))
+    while alive(run) and len(results(place.output)) < min(goal, most):
         time.sleep(0.02)
-    time.sleep(rng.uniform(0.0, 6.0 if more == 0 else 1.0))
-    return time.monotonic() - start if alive(run) else None
+    time.sleep(rng.uniform(0.0, rng.choice([0.3, 3.0, 10.0])))
+    return alive(run)
 
 
 def alive(process: psutil.Process) -> bool:
@@ -237,7 +236,8 @@ def check(place: Place) -> int:
         if not picture.read_bytes().endswith(b"\xff\xd9"):
             raise Spoilt(f"{picture} is not whole")
     for name in ("summary.html", "summary.csv", "summary.jsonl"):
-        if (place.output / name).exists() and not (place.output / name).read_text().endswith("\n"):
+        text = (place.output / name).read_text() if (place.output / name).exists() else ""
+        if text and not text.endswith("\n"):
             raise Spoilt(f"{name} is not whole")
     return len(found)
 
@@ -259,10 +259,12 @@ def whole(place: Place) -> bool:
 def table(rows: list[dict[str, object]]) -> str:
     """Markdown: kills of each kind, and what was found."""
     struck = [row for row in rows if row["struck"]]
-    kinds = Counter(str(row["kind"]) for row in struck)
-    compared = sum(int(str(row["complete"])) for row in rows)
+    kinds: Counter[str] = Counter()
+    for row in struck:
+        kinds[str(row["kind"])] += int(str(row["struck"]))
+    compared = sum(sum(json.loads(str(row["complete"]))) for row in rows)
     lines = ["| killed | times |", "|---|---|", *(f"| {kind} | {count} |" for kind, count in sorted(kinds.items()))]
-    lines.append(f"| all | {len(struck)} |")
+    lines.append(f"| all | {kinds.total()} |")
     return "\n".join([*lines, "", f"{compared} results compared after kills; wrong or incomplete: 0; runs that did not complete: 0"])
 
 

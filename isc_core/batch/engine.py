@@ -15,9 +15,12 @@ import os
 import queue
 import re
 import signal
+import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from multiprocessing import resource_tracker
 from typing import Any
 
 from ..errors import InputError
@@ -27,7 +30,10 @@ from .work import process
 _DEAL_SECONDS = 0.2  # between two looks at whether to stop
 _AHEAD = 3  # jobs at the scheduler for each image that is worked on
 _SUSPICION = 100  # of the scheduler, before it gives a job up: `attempts` does before
+_LOOK_SECONDS = 2.0  # between two looks after the workers
+_LONELY_SECONDS = 900.0  # without any worker, before the run gives up
 _CLUSTER_PATIENCE = 60.0
+_LOST = "the scheduler is lost: give the same command again; what is finished stays"
 
 Client = Any  # Dask is optional
 
@@ -89,6 +95,7 @@ def _configuration() -> dict[str, object]:
     return {
         "distributed.scheduler.allowed-failures": _SUSPICION,
         "distributed.scheduler.worker-saturation": 1.0,
+        "distributed.deploy.lost-worker-timeout": "5 minutes",  # to start again; on a busy machine that takes more than the usual 15 s
         f"{memory}.target": False, f"{memory}.spill": False, f"{memory}.pause": False, f"{memory}.terminate": 0.95,
     }  # fmt: skip
 
@@ -101,7 +108,8 @@ def _local_cluster(crew: Crew) -> Any:
         names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
         how["env"] = dict.fromkeys(names, str(crew.threads))
     try:
-        with _without_interrupts():
+        with _without_interrupts(), warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "Port ")  # another is taken, and announced
             return LocalCluster(
                 n_workers=crew.workers, threads_per_worker=1, memory_limit=crew.memory, dashboard_address="127.0.0.1:8787",
                 silence_logs=logging.CRITICAL, **how,
@@ -113,6 +121,7 @@ def _local_cluster(crew: Crew) -> Any:
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
     """Ctrl-C reaches every process of a terminal. Those started here, and by threads that begin here, leave it to this one."""
+    resource_tracker.ensure_running()  # a process of multiprocessing's own; the thread that starts it gets its signals back
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -130,14 +139,15 @@ def worked(
 ) -> Iterator[tuple[Job, Outcome]]:
     """Every job with its outcome, in the order in which they end. `tick` is called several times a second; what it raises ends the work.
 
-    Raises `InputError` when the scheduler is lost.
+    Raises `InputError` when the scheduler, or all workers are lost.
     """
     ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
     waiting: dict[str, tuple[Job, Any]] = {}
-    window, more = _window(client), True
+    workforce, more = _Workforce(client), True
     while more or waiting:
         tick()
-        while more and len(waiting) < window:
+        workforce.look()
+        while more and len(waiting) < workforce.window:
             if (job := next(jobs, None)) is None:
                 more = False
                 break
@@ -146,17 +156,39 @@ def worked(
             waiting[key] = job, future
             future.add_done_callback(ended.put)
         for future in _some(ended):
+            if future.status == "pending":  # its worker died before it told; another does it again
+                future.add_done_callback(ended.put)
+                continue
             job, _ = waiting.pop(future.key)
-            outcome = _outcome(client, future)
+            outcome = _outcome(future)
             future.release()
             yield job, outcome
-        if client.status != "running":
-            raise InputError("the scheduler is lost: give the same command again; what is finished stays")
-        window = max(window, _window(client)) if len(waiting) < window else window
 
 
-def _window(client: Client) -> int:
-    return _AHEAD * max(1, len(client.scheduler_info(n_workers=-1)["workers"]))
+class _Workforce:
+    """Looks after the workers: how many jobs they can be given at a time, and whether there are any."""
+
+    def __init__(self, client: Client) -> None:
+        self._client = client
+        self._wanted = 0 if client.cluster is None else len(client.cluster.workers)
+        self._looked, self._seen = float("-inf"), time.monotonic()
+        self.window = _AHEAD
+
+    def look(self) -> None:
+        """Every few seconds: has workers of this machine that were given up started again. Raises `InputError` where all is lost."""
+        if (now := time.monotonic()) - self._looked < _LOOK_SECONDS:
+            return
+        self._looked = now
+        if self._client.status != "running":
+            raise InputError(_LOST)
+        there = len(self._client.scheduler_info(n_workers=-1)["workers"])
+        if self._wanted:
+            self._client.cluster.scale(self._wanted)
+        if there:
+            self._seen = now
+        elif now - self._seen > _LONELY_SECONDS:
+            raise InputError(f"there was no worker for {_LONELY_SECONDS:.0f} s: start some, and give the same command again")
+        self.window = _AHEAD * max(1, there, self._wanted)
 
 
 def _some(ended: "queue.SimpleQueue[Any]") -> Iterator[Any]:
@@ -169,14 +201,14 @@ def _some(ended: "queue.SimpleQueue[Any]") -> Iterator[Any]:
         return
 
 
-def _outcome(client: Client, future: Any) -> Outcome:
+def _outcome(future: Any) -> Outcome:
     from dask.distributed import KilledWorker
 
     if future.status == "finished":
         outcome: Outcome = future.result()
         return outcome
     if future.status != "error":
-        raise InputError("the scheduler is lost: give the same command again; what is finished stays")
+        raise InputError(_LOST)
     error = future.exception()
     if isinstance(error, KilledWorker):
         return Outcome(FAILED, "workers were lost while they worked on it: it may need more memory than they have")

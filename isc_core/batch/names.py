@@ -69,8 +69,12 @@ class Names:
             names.append(_hash(wanted_name(item).casefold()))
             identities.append(_hash(_identity(item)))
         self.count = len(names)
-        self._shared = _repeated(names)
-        self._repeated = _repeated(identities)
+        name, identity = (np.frombuffer(hashes, np.uint64) if self.count else np.zeros(0, np.uint64) for hashes in (names, identities))
+        self._repeated = _repeated(np.sort(identity))
+        order = np.lexsort((identity, name))
+        name, identity = name[order], identity[order]
+        new = np.append(True, (name[1:] != name[:-1]) | (identity[1:] != identity[:-1]))[: self.count]
+        self._shared = _repeated(name[new])
         self._given: set[int] = set()
 
     def name(self, item: Item) -> str | None:
@@ -98,7 +102,6 @@ def _hash(text: str) -> int:
     return int.from_bytes(_digest(text), "little")
 
 
-def _repeated(hashes: "array[int]") -> frozenset[int]:
-    """The numbers that stand there more than once."""
-    values = np.sort(np.frombuffer(hashes, np.uint64)) if len(hashes) else np.zeros(0, np.uint64)
+def _repeated(values: np.ndarray) -> frozenset[int]:
+    """The numbers that stand more than once in a sorted array."""
     return frozenset(np.unique(values[1:][values[1:] == values[:-1]]).tolist())

@@ -26,6 +26,7 @@ class Inputs:
     """
 
     def __init__(self, inputs: Sequence[str], masks: str | None, recipe: Recipe) -> None:
+        self._stems = lru_cache(maxsize=64)(_by_stem)
         self._masks = None if masks is None else masks.rstrip("/") or masks
         if self._masks is not None and not _files(self._masks):
             raise InputError(f"--masks {masks}: there is no such folder, or it is empty")
@@ -47,7 +48,7 @@ class Inputs:
         """The mask that belongs to a photo, "" for none. Raises `InputError` where a folder of masks has none."""
         folder, _, name = location.rpartition("/")
         stem = name.rpartition(".")[0]
-        stems = _by_stem(folder if self._masks is None else self._masks)
+        stems = self._stems(folder if self._masks is None else self._masks)
         wanted = (f"{stem}{_MASK}",) if self._masks is None else (stem, f"{stem}{_MASK}")
         for candidate in wanted:
             if candidate in stems:
@@ -102,7 +103,6 @@ def _files(folder: str) -> list[str]:
         return []
 
 
-@lru_cache(maxsize=64)
 def _by_stem(folder: str) -> dict[str, str]:
     """The photos and masks of a folder by their names without suffix; of several the first."""
     found: dict[str, str] = {}

@@ -1,14 +1,16 @@
 """What the tests of batches share: a few tiny photos, and runs without processes of their own."""
 
 import json
+import shutil
+from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from isc_core.batch.engine import Crew
-from isc_core.batch.item import Recipe
-from isc_core.batch.run import Batch
+from isc_core.batch.item import DONE, FAILED, Recipe
+from isc_core.batch.run import Batch, run_batch
 from isc_core.models.settings import Settings
 from tests.core.command_line import ball_codes, write_image
 
@@ -16,16 +18,30 @@ QUICK = Recipe(Settings(model="retinex", engine="numpy"))
 HERE = Crew(workers=1, threads=1, memory="0", processes=False)  # threads of this process: a second less, and its memory:// is theirs
 
 
-@pytest.fixture
-def photos(tmp_path: Path) -> Path:
-    """A folder of three balls and a file that is no photo."""
-    folder = tmp_path / "photos"
+@pytest.fixture(scope="session")
+def first_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder `photos` of three balls and a file that is no photo, and what a run has made of them in `out`."""
+    place = tmp_path_factory.mktemp("batch")
+    folder = place / "photos"
     folder.mkdir()
     codes = ball_codes(12.0).astype(float)
     for name, gain in (("one", 1.0), ("two", 0.8), ("three", 0.6)):
         write_image(folder / f"{name}.png", (gain * codes).astype("uint16"))
-    (folder / "bad.png").write_bytes(b"\x89PNG\r\n\x1a\n and nothing more")
-    return folder
+    (folder / "bad.png").write_bytes((folder / "one.png").read_bytes()[:200])
+    assert run_batch(batch(folder, output=place / "out")) == Counter({DONE: 3, FAILED: 1})
+    return place
+
+
+@pytest.fixture
+def photos(first_run: Path, tmp_path: Path) -> Path:
+    """The photos, to be changed at will."""
+    return Path(shutil.copytree(first_run / "photos", tmp_path / "photos"))
+
+
+@pytest.fixture
+def made(first_run: Path, tmp_path: Path) -> Path:
+    """The output of the first run, to be changed at will."""
+    return Path(shutil.copytree(first_run / "out", tmp_path / "out"))
 
 
 def batch(*inputs: object, output: Path, **changes: object) -> Batch:

@@ -24,7 +24,7 @@ def obey(job: Job, monitor: Monitor) -> str:
         raise ZeroDivisionError("a fault\nof two lines")
     if name == "full":
         raise MemoryError
-    job.folder.mkdir(parents=True)
+    job.folder.mkdir(parents=True, exist_ok=True)  # done before, by a worker that was lost before it could tell
     (job.folder / "made").write_text(job.image)
     return DONE
 

@@ -1,0 +1,65 @@
+"""Workers that are processes: they die, hang and are cancelled; and the command itself."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+from isc_core.batch.attempts import MOST_LOST
+from isc_core.batch.engine import Crew
+from isc_core.batch.item import DONE, FAILED
+from isc_core.batch.run import run_batch
+from tests.batch.conftest import batch, rows
+from tests.batch.tasks import obedient
+from tests.core.command_line import isc_command, run_isc
+
+
+def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(tmp_path: Path) -> None:
+    for name in ("good1", "good2", "hang", "kill", "kill_once"):
+        (tmp_path / f"{name}.png").touch()
+    plan = replace(batch(tmp_path / "*.png", output=tmp_path / "out", timeout=4.0), crew=Crew(workers=2, threads=1, memory="0"))
+    assert run_batch(plan, task=obedient) == Counter({DONE: 3, FAILED: 2})
+    reasons = {str(row["name"]): str(row["reason"]) for row in rows(tmp_path / "out" / "failures.jsonl")}
+    assert reasons["hang"] == "took longer than --timeout 4 s and did not react (in obey): its worker was ended"
+    assert reasons["kill"].startswith(f"{MOST_LOST} workers were lost while they worked on it")
+    assert (tmp_path / "out" / "kill_once" / "made").exists()
+
+
+def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
+    words = ["batch", photos, "-o", tmp_path / "out", "--model", "retinex", "--workers", "1", "--memory", "0"]
+    run = subprocess.Popen(isc_command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True)
+    while run.poll() is None and not (tmp_path / "out" / "one").exists():
+        time.sleep(0.05)
+    os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to all of them
+    told = run.communicate(timeout=60)[1]
+    assert run.returncode in (130, 1), told  # 1: it was faster
+    assert "dashboard: http://127.0.0.1:" in told
+    assert "Traceback" not in told
+    done = run_isc(*words, "--progress", "json")
+    events = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.returncode == 1
+    assert events[-1] == {"event": "failed", "message": events[-1]["message"], "code": 1}
+    assert "1 of 4 images failed" in events[-1]["message"]
+    assert all((tmp_path / "out" / name / "mesh.glb").is_file() for name in ("one", "two", "three"))
+
+
+def test_what_is_wrong_with_the_run_is_one_line(photos: Path, tmp_path: Path) -> None:
+    """Found before any worker starts."""
+    without = "import sys; sys.modules['dask'] = None"
+    for words, before, told in (
+        ((photos,), without, "pip install 'isc3d[batch]'"),
+        ((tmp_path / "none.csv",), "", "none.csv: cannot be read"),
+        ((photos, "--model", "nosuch"), "", 'unknown model "nosuch"'),
+        ((photos, "--timeout", "-1"), "", "is not above 0"),
+    ):
+        done = run_isc("batch", *words, "-o", tmp_path / "out", before=before)
+        assert done.returncode == 2, done.stderr
+        assert told in done.stderr
+        lines = [line for line in done.stderr.splitlines() if line != "isc: looking at the inputs"]
+        assert len(lines) == 1, done.stderr
+    assert sys.executable
