@@ -126,12 +126,12 @@ def _shape_from_shading(method: str, context: Context) -> Made:
     shown = []
     for shaded in shaded_objects(context):
         found = recover(shaded, method)
-        low = np.nanmedian(shaded.height) - np.nanmedian(found.height[shaded.mask])
-        ends = float(np.nanmin(shaded.height)), float(np.nanmax(shaded.height))
+        true = shaded.height - np.nanmin(shaded.height)
+        ends = 0.0, float(np.nanmax(true))
         shown += [
             Panel(f"{shaded.name}: image", shaded.image, shaded.mask),
-            Panel("true height (pixels)", shaded.height, shaded.mask, ends),
-            Panel("found", found.height + low, shaded.mask, ends),
+            Panel("true height (pixels)", true, shaded.mask, ends),
+            Panel("found", found.height + np.nanmedian((true - found.height)[shaded.mask]), shaded.mask, ends),
             Panel("error of the normals (degrees)", found.angle, shaded.mask, (0, 60)),
         ]
     rows = _errors(context)
