@@ -44,7 +44,7 @@ def gain(claim: str, claimed: float, found: Ratio | None, what: str) -> Verdict:
     if found is None:
         return Verdict(claim, "-", "cannot be told", "fewer than two subjects with an error")
     change = f"{100 * abs(1 - found.ratio):.1f} % {'lower' if found.ratio <= 1 else 'higher'}"
-    here = f"{what} {change}: {in_words(found)} of what it is compared with"
+    here = f"{what} {change}: ratio {in_words(found)}"
     if found.high >= 1 and found.low <= 1 - claimed:
         return Verdict(claim, here, "cannot be told", "too few subjects: the interval holds the claim, and no difference as well")
     if found.high >= 1:

@@ -83,8 +83,8 @@ _ACCURACY = (
     "on one subject; the intervals resample subjects."
 )
 _SPEED = (
-    "Search: finding the thresholds, 20,000 evaluations at most, and marking the pixels above them. Whole: the search, matching and "
-    "filling. Seconds are worth no more than the quiet of the machine they were taken on."
+    "Search: finding the thresholds, 20,000 evaluations at most, and marking the pixels above them, in processor time. Whole: the search, "
+    "matching and filling. Seconds are worth no more than the quiet of the machine they were taken on."
 )
 _PARTS: tuple[tuple[str, Callable[[str, Context], Made]], ...] = (("accuracy", _accuracy), ("speed", _speed))
 
