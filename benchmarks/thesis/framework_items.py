@@ -37,13 +37,14 @@ _LEVELS = 255
 
 
 def _subject(context: Context) -> Subject:
-    """The one with the most specular light of those with significant specularity: of it the stages have most to show."""
+    """The one with the most specular light of those with significant specularity and an outline: of it the stages have most to show."""
 
     def share(subject: Subject) -> float:
         specular = np.zeros(1) if subject.specular is None else subject.specular[subject.mask]
         return float(specular.sum(dtype=float) / subject.image[subject.mask].sum(dtype=float))
 
-    return max(context.subjects("specular"), key=share)
+    subjects = context.subjects("specular")
+    return max([one for one in subjects if not one.mask.all()] or subjects, key=share)
 
 
 def _framework(context: Context) -> Made:
@@ -110,7 +111,7 @@ def _search(context: Context) -> Made:
     objective = OtsuObjective.of(levels[mask])
     rows: list[tuple[str, str, float, int | str]] = []
     best = exact(objective, published.levels)
-    made, axes = figure(1, 3, height=2.7)
+    made, axes = figure(1, 3, height=3.0)
     _histogram(axes[0, 0], levels[mask], thresholds)
     place = axes[0, 1]
     budget = 2_000 if context.quick else published.evaluations
@@ -124,7 +125,7 @@ def _search(context: Context) -> Made:
     rows.append(("exact", " ".join(map(str, best.thresholds)), 1.0, ""))
     place.set(xscale="log", yscale="log", xlabel="evaluations", ylabel="share below the optimum, + 1e-7", xlim=(30, None))
     place.set_title("the search", fontsize=LETTERS)
-    legend(place, "lower left")
+    made.legend(*place.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=LETTERS - 1, frameon=False)
     box = np.where(mask, np.digitize(levels, thresholds, right=True), np.nan)
     show_map(axes[0, 2], box, "classes of the thresholds found")
     header = ("search", "thresholds", "objective / optimum", "evaluations until then")
