@@ -16,6 +16,7 @@ from .errors import InputError
 from .exr_header import check_exr
 from .limits import USUAL, Limits
 from .memory_files import named
+from .quiet import quiet
 
 
 def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
@@ -39,7 +40,7 @@ def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
     try:
         data = path.read_bytes()
         check_exr(data, path, limits)
-        with named(data) as place, OpenEXR.File(str(place), separate_channels=True) as file:
+        with quiet(), named(data) as place, OpenEXR.File(str(place), separate_channels=True) as file:
             return {name: np.asarray(channel.pixels, np.float32) for name, channel in file.channels().items()}
     except InputError:
         raise

@@ -23,10 +23,9 @@ from .limits import USUAL, Limits
 ARRAY, ARCHIVE = b"\x93NUMPY", b"PK"
 KINDS = "fiub"
 _ENCRYPTED = 0x1
-_DAMAGED = (
-    ValueError, TypeError, KeyError, IndexError, AttributeError, OSError, EOFError, OverflowError, RecursionError, MemoryError,
-    SyntaxError, NotImplementedError, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
-)  # fmt: skip
+# What the literal in a header can make the parser raise: a nested or broken one, a kind that is none.
+_PARSING = (TypeError, KeyError, IndexError, AttributeError, SyntaxError, OverflowError, RecursionError, MemoryError, tokenize.TokenError)
+_UNPACKING = (ValueError, KeyError, OSError, EOFError, OverflowError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error)
 
 
 def read_array(path: Path, limits: Limits = USUAL) -> np.ndarray:
@@ -46,7 +45,7 @@ def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USU
     """
     try:
         shape, by_columns, kind, start = array_header(data)
-    except _DAMAGED as error:
+    except ValueError as error:
         raise InputError(f"{name} is not a readable array (it is damaged): save it again with numpy.save") from error
     if kind.kind not in kinds or kind.hasobject or kind.subdtype is not None or not 0 < kind.itemsize <= len(data):
         what = "objects" if kind.hasobject else str(kind)[:40]
@@ -75,7 +74,7 @@ def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np
             unpacked = {member.filename.removesuffix(".npy"): archive.read(member) for member in members}
     except InputError:
         raise
-    except (*_DAMAGED, RuntimeError) as error:
+    except _UNPACKING as error:
         raise InputError(f"{name} is damaged or no archive of NumPy arrays: write it again") from error
     return {key: parse_array(content, f"{name} ({key})"[:400], KINDS + "U", limits).copy() for key, content in unpacked.items()}
 
@@ -83,18 +82,19 @@ def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np
 def array_header(data: bytes) -> tuple[tuple[int, ...], bool, np.dtype, int]:
     """Of the bytes of a `.npy` file: the shape, whether columns come first, the kind of value, and where the values begin.
 
-    Raises `ValueError`, or another error of a parser, where they do not begin with such a header.
+    Raises `ValueError` where they do not begin with such a header.
     """
     stream = io.BytesIO(data)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of headers that an old version wrote
-        version = np.lib.format.read_magic(stream)
-        if version == (1, 0):
-            shape, by_columns, kind = np.lib.format.read_array_header_1_0(stream)
-        elif version == (2, 0):
-            shape, by_columns, kind = np.lib.format.read_array_header_2_0(stream)
-        else:
-            raise ValueError("a header of an unknown version")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of headers that an old version wrote
+            version = np.lib.format.read_magic(stream)
+            if version not in ((1, 0), (2, 0)):
+                raise ValueError("a header of an unknown version")
+            read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+            shape, by_columns, kind = read(stream)
+    except _PARSING as error:
+        raise ValueError("no header of an array") from error
     return shape, by_columns, kind, stream.tell()
 
 

@@ -12,18 +12,15 @@ Limits: colour profiles and chromaticities in the file are not applied, the prim
 several pages the first is read.
 """
 
-import contextlib
 import errno
 import functools
 import hashlib
 import io
 import math
-import os
 import re
 import struct
-import warnings
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -40,6 +37,7 @@ from .exr_header import check_exr, size_of
 from .limits import USUAL, Limits
 from .memory_files import named
 from .numpy_files import array_header
+from .quiet import quiet
 
 TRANSFERS = ("auto", "srgb", "linear")
 MAX_ASPECT = 100
@@ -249,7 +247,8 @@ def _finite(values: np.ndarray) -> np.ndarray:
 
 def _code_value(raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndarray) -> float:
     if raster.peak is None:
-        return FLOAT_STEP * float(np.percentile(_brightest(linear)[mask], 99.9))
+        light = _brightest(linear)[mask]
+        return FLOAT_STEP * float(np.percentile(light, 99.9) or light.max())
     step = 1.0 / raster.peak
     return float(srgb_to_linear(step)) if transfer == "srgb" else step
 
@@ -400,7 +399,7 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
     if reader is None:
         raise InputError(f"{path}: not an image of a known kind (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, NPY): convert it to PNG")
     try:
-        with _quiet():
+        with quiet():
             raster = reader(data, path, limits)
     except InputError:
         raise
@@ -434,21 +433,6 @@ def write_png(path: Path, raster: Raster) -> None:
     if not done:
         raise OSError(errno.EIO, "the PNG could not be coded")
     path.write_bytes(data.tobytes())
-
-
-@contextlib.contextmanager
-def _quiet() -> Iterator[None]:
-    """Keeps what decoders print away from the terminal: the C libraries write to file descriptor 2 behind Python's back."""
-    with warnings.catch_warnings(), contextlib.redirect_stdout(io.StringIO()), contextlib.ExitStack() as stack:
-        warnings.simplefilter("ignore")
-        with contextlib.suppress(OSError):  # without a descriptor 2 (a program with windows only) there is nothing to silence
-            saved = os.dup(2)
-            stack.callback(os.close, saved)
-            stack.callback(os.dup2, saved, 2)
-            null = os.open(os.devnull, os.O_WRONLY)
-            stack.callback(os.close, null)
-            os.dup2(null, 2)
-        yield
 
 
 def _check_size(path: Path, limits: Limits, width: int, height: int) -> None:

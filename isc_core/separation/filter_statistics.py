@@ -99,12 +99,13 @@ def read_table(path: str | Path) -> FilterTable:
 def _read(data: bytes, name: str) -> FilterTable:
     try:
         arrays = parse_arrays(data, name)
-        spread, without, highlight, temperature = (np.asarray(arrays[key], float) for key in _ARRAYS)
+        with np.errstate(invalid="ignore"):  # what is no number is refused below
+            spread, without, highlight, temperature = (np.asarray(arrays[key], float) for key in _ARRAYS)
     except (ValueError, KeyError) as error:
         raise InputError(f"{name} is no table of filter statistics: fit one with benchmarks.filter_statistics") from error
     shape = (len(FILTERS), BINS)
     fit = spread.shape == shape[:1] and without.shape == shape and highlight.shape == shape and temperature.shape == ()
-    if not fit or min(values.min() for values in (spread, without, highlight, temperature)) <= 0:
+    if not fit or not all((np.isfinite(values) & (values > 0)).all() for values in (spread, without, highlight, temperature)):
         raise InputError(f"{name} holds other filters than this version has: fit it anew with benchmarks.filter_statistics")
     return FilterTable(spread, without, highlight, float(temperature))
 

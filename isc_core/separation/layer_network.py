@@ -117,6 +117,8 @@ def read_network(path: Path) -> LayerNetwork:
         data = read_arrays(path)
         count = sum(name.startswith("weight") for name in data)
         weights, biases = ([data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count)] for kind in ("weight", "bias"))
+        if not all(np.isfinite(values).all() for values in (*weights, *biases)):
+            raise ValueError("some of its numbers are not finite")
     except (ValueError, KeyError) as error:
         raise InputError(f"{path} holds no layer network: {error}") from error
     return LayerNetwork(tuple(weights), tuple(biases))

@@ -12,6 +12,8 @@ glTF. Only files in the mesh's own folder, or below it, are opened.
 """
 
 import io
+import json
+import math
 import struct
 import zlib
 from dataclasses import dataclass, replace
@@ -25,7 +27,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from isc_core.errors import InputError
+from isc_core.limits import USUAL
 from isc_core.photo import srgb_to_linear
+from isc_core.quiet import quiet
 from synth.materials import texture_at
 from synth.meshes import Mesh
 
@@ -34,13 +38,18 @@ from .texture_coordinates import from_the_front
 KINDS = ("glb", "gltf", "obj", "off", "ply", "stl")
 CREASE = 40.0  # degrees between the normals of neighbouring faces; above it their edge is sharp
 MOST_FACES = 3_000_000
-_MOST_BYTES = 1 << 30
+_MOST_BYTES = 1 << 29
+_MOST_NUMBERS = 4 * MOST_FACES  # entries of all tables of a glTF file
+_PICTURES = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")  # of textures; others may run programs
+_DEEPEST, _FARTHEST = 10_000, 1e6  # of the width; of texture coordinates
 _UNREADABLE = "model.gltf"  # what trimesh asks for where a glTF file is not JSON
 _NO_COLOUR = (102, 102, 102)  # what trimesh gives a material that names none
-_PAINTED = 768  # pixels a side of a painted texture
-_ERRORS = (OSError, ValueError, LookupError, TypeError, AttributeError, ArithmeticError, NotImplementedError, EOFError, AssertionError,
-           RecursionError, MemoryError, struct.error, zlib.error,
-           Image.DecompressionBombError)  # fmt: skip
+PAINTED = 768  # pixels a side of a painted texture
+# A loader trips over whatever a damaged file makes it believe, over variables that it never set, too.
+_ERRORS = (
+    OSError, ValueError, LookupError, TypeError, AttributeError, NameError, ArithmeticError, NotImplementedError, EOFError, AssertionError,
+    SyntaxError, ImportError, RecursionError, MemoryError, struct.error, zlib.error, Image.DecompressionBombError,
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -96,9 +105,11 @@ def read_mesh(path: str | Path) -> Mesh:
     return read_mesh_file(path).mesh
 
 
-def read_mesh_file(path: str | Path) -> MeshFile:
-    """A closed mesh and its base colour. Raises `InputError` for a file that is absent, unreadable, empty, huge, or refers to a file that
-    is missing or outside its folder, and for a mesh that is open, turned inconsistently, without volume, or has places that are not finite.
+def read_mesh_file(path: str | Path, painted: int = PAINTED) -> MeshFile:
+    """A closed mesh and its base colour; `painted`: pixels a side of a texture that has to be made for it.
+
+    Raises `InputError` for a file that is absent, unreadable, empty, huge, or refers to a file that is missing or outside its folder, and
+    for a mesh that is open, turned inconsistently, without volume, or has places that are not finite.
     """
     path = Path(path)
     parts = _read_parts(path)
@@ -112,7 +123,7 @@ def read_mesh_file(path: str | Path) -> MeshFile:
         uv, albedo = np.clip(lone.uv, 0, 1), lone.texture
     else:
         uv = from_the_front(vertices)
-        albedo = _painted(parts, vertices, uv)
+        albedo = _painted(parts, vertices, uv, painted)
         faces = np.unique(place, return_index=True)[1][place[faces]]  # what lies in one place has one coordinate now
     # One vertex of the mesh for each vertex of the file in each smooth group around it.
     groups = len(normals)
@@ -131,11 +142,16 @@ def _read_parts(path: Path) -> list[_Part]:
     if not path.is_file():
         raise InputError(f"{path}: there is no such file")
     if path.stat().st_size > _MOST_BYTES:
-        raise InputError(f"{path}: larger than {_MOST_BYTES >> 30} GiB: simplify the mesh first")
-    beside = _Beside(path)
+        raise InputError(f"{path}: larger than {_MOST_BYTES >> 20} MiB: simplify the mesh first")
+    beside, data = _Beside(path), path.read_bytes()
     try:
-        loaded = trimesh.load(io.BytesIO(path.read_bytes()), file_type=kind, resolver=beside, force="scene", process=False)
-        parts = [part for name in loaded.graph.nodes_geometry for part in [_part(loaded, name, kind)] if part is not None]
+        if kind in ("glb", "gltf"):
+            _check_claims(path, data)
+        with quiet():
+            loaded = trimesh.load(io.BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
+            parts = [part for name in loaded.graph.nodes_geometry for part in [_part(loaded, name, kind)] if part is not None]
+    except InputError:
+        raise
     except _ERRORS as error:
         _check_references(path, beside)
         raise InputError(f"{path} is not a readable {kind.upper()} file: export the mesh again") from error
@@ -150,9 +166,19 @@ def _read_parts(path: Path) -> list[_Part]:
     return parts
 
 
+def _check_claims(path: Path, data: bytes) -> None:
+    """What a glTF file says it holds, before memory is asked for it: numbers that no buffer holds count as zeros."""
+    text = data[20 : 20 + int.from_bytes(data[12:16], "little")] if data.startswith(b"glTF") else data
+    tree = json.loads(text.decode("utf-8", "replace"))
+    counts = [accessor["count"] for accessor in tree.get("accessors", [])]
+    if any(type(count) is not int or count < 0 for count in counts) or sum(counts) > _MOST_NUMBERS:
+        raise InputError(f"{path} claims more than {_MOST_NUMBERS} entries, or a strange number of them: simplify or export it again")
+
+
 def _is_image(data: bytes) -> bool:
     try:
-        with Image.open(io.BytesIO(data)) as image:
+        with quiet(), Image.open(io.BytesIO(data), formats=_PICTURES) as image:
+            USUAL.check_pixels("a texture", *image.size)
             image.load()
     except _ERRORS:
         return False
@@ -194,6 +220,10 @@ def _texture(material: Any) -> np.ndarray | None:
         factor = getattr(material, "diffuse", None)
         if factor is None or (np.asarray(factor)[:3] == _NO_COLOUR).all():
             return None
+    if image is not None:
+        if image.format not in _PICTURES:
+            raise ValueError("a texture of a kind that is not read")
+        USUAL.check_pixels("a texture", *image.size)
     numbers = np.ones(3) if factor is None else np.asarray(factor)[:3]
     scale = numbers / (255 if numbers.dtype.kind in "iu" else 1)
     if image is None:
@@ -221,7 +251,11 @@ def _sound(path: Path, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndar
     if not np.isfinite(used).all():
         raise InputError(f"{path} has vertices that are not finite numbers: remove them")
     low, high = used.min(0), used.max(0)
-    if (high - low)[:2].max() <= 0 or not np.isfinite((high - low) ** 2).all():
+    with np.errstate(over="ignore"):
+        sized = (high - low)[:2].max() > 0 and np.isfinite((high - low) ** 2).all()
+    if sized and (high - low)[2] > _DEEPEST * (high - low)[:2].max():
+        raise InputError(f"{path}: the mesh is over {_DEEPEST} times deeper than wide: scale its z as its x and y")
+    if not sized:
         raise InputError(f"{path}: the mesh has no size: all of its vertices lie in one place or one line toward the viewer")
     vertices = (np.nan_to_num(vertices) - (low + high) / 2) * (2 / (high - low)[:2].max())
     place = _places(vertices)
@@ -293,38 +327,39 @@ def _within(uv: np.ndarray) -> bool:
     return bool(np.isfinite(uv).all() and (uv >= -1e-3).all() and (uv <= 1.001).all())
 
 
-def _painted(parts: list[_Part], vertices: np.ndarray, front: np.ndarray) -> np.ndarray | None:
+def _painted(parts: list[_Part], vertices: np.ndarray, front: np.ndarray, side: int) -> np.ndarray | None:
     """The colours of all parts on one texture, at the coordinates `front` of the vertices; where several lie, the one before the others."""
     if all(part.texture is None and part.colours is None for part in parts):
         return None
     if len(parts) == 1 and parts[0].texture is not None and parts[0].texture.shape[:2] == (1, 1):
         return parts[0].texture
-    texture, depth = np.zeros((_PAINTED**2, 3)), np.full(_PAINTED**2, -np.inf)
+    texture, depth = np.zeros((side**2, 3)), np.full(side**2, -np.inf)
     start = 0
     for part in parts:
         own = slice(start, start + len(part.vertices))
         _paint(part, vertices[own, 2], front[own], texture, depth)
         start += len(part.vertices)
     # What no face covers takes the colour of the nearest that one does.
-    empty = np.isinf(depth).reshape(_PAINTED, _PAINTED)
+    empty = np.isinf(depth).reshape(side, side)
     row, column = distance_transform_edt(empty, return_distances=False, return_indices=True)
-    return texture.reshape(_PAINTED, _PAINTED, 3)[row, column]
+    return texture.reshape(side, side, 3)[row, column]
 
 
 def _paint(part: _Part, z: np.ndarray, front: np.ndarray, texture: np.ndarray, depth: np.ndarray) -> None:
     """Puts one part's colours into a texture (h w, 3) where it is before what is there, by points spread over its faces."""
+    side = math.isqrt(len(depth))
     x, y = (part.vertices[part.faces, i] for i in range(2))
     toward = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) > (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     shown = part.faces[toward]  # of a closed mesh the others are behind these
-    place = front[shown] * _PAINTED
+    place = front[shown] * side
     longest = np.linalg.norm(place - np.roll(place, 1, 1), axis=-1).max(1, initial=0)
     steps = np.ceil(1.25 ** np.ceil(np.log(np.maximum(1.2 * longest, 1)) / np.log(1.25))).astype(int)
     for step in np.unique(steps):
         i, j = np.nonzero(np.add.outer(np.arange(step + 1), np.arange(step + 1)) <= step)
         weights = np.stack([i, j, step - i - j], -1) / step
         for faces in np.array_split(shown[steps == step], max(1, (steps == step).sum() * len(weights) // 2_000_000)):
-            cell = np.clip(np.floor(weights @ front[faces] * _PAINTED).astype(int), 0, _PAINTED - 1)
-            index, near = (cell[..., 1] * _PAINTED + cell[..., 0]).ravel(), (weights @ z[faces][..., None]).ravel()
+            cell = np.clip(np.floor(weights @ front[faces] * side).astype(int), 0, side - 1)
+            index, near = (cell[..., 1] * side + cell[..., 0]).ravel(), (weights @ z[faces][..., None]).ravel()
             order = np.argsort(near)  # the nearest last: it is the one that stays
             order = order[near[order] >= depth[index[order]]]
             colours = _colours_of(part, faces, weights).reshape(-1, 3)
@@ -339,5 +374,6 @@ def _colours_of(part: _Part, faces: np.ndarray, weights: np.ndarray) -> np.ndarr
         return np.full((len(faces), len(weights), 3), 0.5)
     if part.uv is None:
         return np.broadcast_to(part.texture[0, 0], (len(faces), len(weights), 3))
-    uv = (weights @ np.nan_to_num(part.uv)[faces]).reshape(-1, 2)
+    near = np.where(np.abs(part.uv) < _FARTHEST, part.uv, 0)  # what is no number, too
+    uv = (weights @ near[faces]).reshape(-1, 2)
     return texture_at(part.texture, np.stack([uv[:, 0], np.mod(uv[:, 1], 1)], -1)).reshape(len(faces), len(weights), 3)

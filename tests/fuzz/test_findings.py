@@ -1,0 +1,261 @@
+"""What fuzzing found, and what files can claim: each kept as a small file that has to be refused in one quiet line."""
+
+import io
+import json
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.fuzzing.data_files import deflated, matlab
+from benchmarks.fuzzing.mesh_files import glb
+from benchmarks.fuzzing.pictures import array, ball, coded, codes, exr
+from isc_core.datasets import load_natural_lights
+from isc_core.errors import InputError
+from isc_core.evidence_files import read_light
+from isc_core.exr import read_channels
+from isc_core.json_files import read_json
+from isc_core.limits import Limits
+from isc_core.mat_files import read_matrix
+from isc_core.numpy_files import read_array, read_arrays
+from isc_core.photo import read_linear, read_photo
+from isc_core.separation.filter_statistics import read_table, shipped_table
+from isc_core.separation.layer_network import read_network
+from synth.dataset.reading import read_facts
+from synth.shapes.mesh_file import read_mesh_file
+
+
+@pytest.fixture
+def refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Callable[..., None]:
+    """Gives a reader a file; it has to raise `InputError` with `words`, and to print nothing."""
+
+    def check(read: Callable[[Path], object], name: str, data: bytes, words: str, **beside: bytes) -> None:
+        for other, content in beside.items():
+            (tmp_path / other.replace("_", ".")).write_bytes(content)
+        (tmp_path / name).write_bytes(data)
+        with pytest.raises(InputError, match=words) as caught:
+            read(tmp_path / name)
+        assert str(caught.value).isprintable()
+        assert capfd.readouterr() == ("", "")
+
+    return check
+
+
+def archive(kind: int = zipfile.ZIP_DEFLATED, **members: bytes) -> bytes:
+    stream = io.BytesIO()
+    with zipfile.ZipFile(stream, "w", kind) as written:
+        for name, content in members.items():
+            written.writestr(f"{name}.npy", content)
+    return stream.getvalue()
+
+
+def header(text: str, version: int = 1) -> bytes:
+    """The start of a `.npy` file with any text in its header."""
+    coded_text = text.encode("latin-1")
+    return b"\x93NUMPY" + bytes([version, 0]) + struct.pack("<H" if version == 1 else "<I", len(coded_text)) + coded_text
+
+
+# --- pictures ---------------------------------------------------------------------------------------------------------------------------
+
+PLANES = {name: ball()[..., k].astype(np.float32) for k, name in enumerate("RGB")}
+
+
+@pytest.mark.parametrize("read", [read_channels, read_photo])
+def test_damaged_pixels_of_an_exr_are_refused_quietly(refused: Callable[..., None], read: Callable[[Path], object]) -> None:
+    data = bytearray(exr(PLANES))
+    data[-300:-200] = bytes(100)
+    refused(read, "a.exr", bytes(data), "readable|damaged")
+
+
+def with_window(left: int, top: int, right: int, bottom: int) -> bytes:
+    data = exr(PLANES)
+    at = data.index(b"dataWindow\0box2i\0") + 21
+    return data[:at] + struct.pack("<4i", left, top, right, bottom) + data[at + 16 :]
+
+
+@pytest.mark.parametrize(
+    ("window", "words"),
+    [
+        ((0, 0, 2**31 - 1, 2**31 - 1), "megapixels"),
+        ((-(2**31), -(2**31), 2**31 - 1, 2**31 - 1), "megapixels"),
+        ((0, 0, 9_999, 9_999), "readable|damaged"),
+        ((5, 5, 4, 4), "readable|damaged"),
+    ],
+)
+def test_windows_of_an_exr_are_believed_only_as_far_as_it_goes(
+    refused: Callable[..., None], window: tuple[int, int, int, int], words: str
+) -> None:
+    for read in (read_channels, read_photo):
+        refused(read, "a.exr", with_window(*window), words)
+
+
+def test_deep_exr_and_strange_channels_are_refused(refused: Callable[..., None]) -> None:
+    data = exr(PLANES)
+    refused(read_channels, "a.exr", data[:5] + bytes([data[5] | 8]) + data[6:], "deep")
+    at = data.index(b"channels\0chlist\0") + 20
+    sampling = at + 2 + 8
+    refused(read_channels, "a.exr", data[:sampling] + struct.pack("<ii", 0, 0) + data[sampling + 8 :], "coarsely")
+    refused(read_channels, "a.exr", data[: at + 2] + struct.pack("<i", 7) + data[at + 6 :], "readable")
+
+
+def test_the_limit_of_pixels_is_held_before_decoding(refused: Callable[..., None], tmp_path: Path) -> None:
+    few = Limits(max_pixels=400)
+    for suffix, pixels in (
+        (".png", codes(16)),
+        (".png", codes()),
+        (".jpg", codes()),
+        (".tiff", codes(16)),
+        (".hdr", ball().astype(np.float32)),
+    ):
+        refused(
+            lambda path: read_photo(path, whole_frame=True, limits=few), f"a{suffix}", coded(suffix, pixels), "20 x 24 pixels.*--max-pixels"
+        )
+    for name, data in (("a.exr", exr(PLANES)), ("a.npy", array(codes()))):
+        refused(lambda path: read_linear(path, limits=few), name, data, "20 x 24 pixels.*--max-pixels")
+    (tmp_path / "photo.png").write_bytes(coded(".png", codes()))
+    assert read_photo(tmp_path / "photo.png", limits=Limits(max_pixels=480)).mask.any()
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------------------------
+
+HEADERS = {
+    "unfinished": "{'descr': '<f4', 'fortran_order': False, 'shape': (",
+    "nested": "(" * 5000,
+    "kind that is none": "{'descr': '<q9', 'fortran_order': False, 'shape': (2,)}",
+    "objects": "{'descr': '|O', 'fortran_order': False, 'shape': (2,)}",
+    "records": "{'descr': [('a', '<f4')], 'fortran_order': False, 'shape': (2,)}",
+    "negative": "{'descr': '<f4', 'fortran_order': False, 'shape': (-2, -2)}",
+    "huge": "{'descr': '<f4', 'fortran_order': False, 'shape': (999999999, 999999999)}",
+    "no size": "{'descr': '|V0', 'fortran_order': False, 'shape': (999999999,)}",
+}
+
+
+@pytest.mark.parametrize("case", HEADERS)
+@pytest.mark.parametrize("version", [1, 2])
+def test_headers_of_arrays_are_not_believed(refused: Callable[..., None], case: str, version: int) -> None:
+    data = header(HEADERS[case], version) + bytes(64)
+    refused(read_array, "a.npy", data, "not a readable array")
+    refused(read_photo, "a.npy", data, "damaged|values of type|an array of shape|objects|pixels")
+    refused(read_arrays, "a.npz", archive(a=data), "not a readable array")
+
+
+def test_archives_that_unpack_to_much_are_refused(refused: Callable[..., None]) -> None:
+    few = Limits(max_bytes=1 << 20)
+    bomb = archive(a=array(np.zeros(1 << 20)))
+    assert len(bomb) < 1 << 14
+    refused(lambda path: read_arrays(path, few), "a.npz", bomb, "unpacks to")
+    refused(read_arrays, "a.npz", archive(zipfile.ZIP_LZMA, a=array(np.zeros(9))), "no archive")
+    refused(
+        lambda path: read_matrix(path, "depth", limits=few),
+        "a.mat",
+        deflated(matlab({"depth": np.zeros((400, 900))}, packed=False)),
+        "unpacks",
+    )
+
+
+def test_a_matrix_may_not_claim_more_than_it_holds(refused: Callable[..., None]) -> None:
+    data = bytearray(matlab({"depth": np.zeros((3, 3))}, packed=False))
+    shape = data.index(struct.pack("<ii", 3, 3))
+    data[shape : shape + 8] = struct.pack("<ii", 2**31 - 1, 2**31 - 1)
+    for wrapped in (bytes(data), deflated(bytes(data))):
+        refused(lambda path: read_matrix(path, "depth"), "a.mat", wrapped, "not a readable MATLAB file")
+    deep: object = np.zeros(2)
+    for _ in range(30):
+        deep = {"depth": deep}
+    refused(lambda path: read_matrix(path, "depth", "depth"), "a.mat", matlab({"depth": deep}, packed=True), "readable|lacks")
+    refused(lambda path: read_matrix(path, "depth"), "a.mat", matlab({"depth": "text"}, packed=True), "not a readable MATLAB file")
+
+
+def test_matrices_are_read_as_they_were_written(tmp_path: Path) -> None:
+    values = {"depth": np.arange(6.0).reshape(2, 3), "s": {"a": np.arange(4, dtype=np.int16).reshape(2, 2), "b": "x", "c": {"d": 7.5}}}
+    for packed in (False, True):
+        (tmp_path / "a.mat").write_bytes(matlab(values, packed=packed))
+        np.testing.assert_array_equal(read_matrix(tmp_path / "a.mat", "depth"), values["depth"])
+        np.testing.assert_array_equal(read_matrix(tmp_path / "a.mat", "s", "a"), [[0, 1], [2, 3]])
+        assert read_matrix(tmp_path / "a.mat", "s", "c", "d").item() == 7.5
+    (tmp_path / "natural_lights.mat").write_bytes(matlab({"Ls": np.ones((9, 3, 2))}, packed=True))
+    assert load_natural_lights(tmp_path).shape == (9, 3, 2)
+
+
+def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(refused: Callable[..., None]) -> None:
+    table = shipped_table()
+    members = {"spread": table.spread, "without": table.without, "highlight": table.highlight, "temperature": np.array(table.temperature)}
+    broken = np.array(table.spread, np.float64)
+    broken[0] = np.nan
+    refused(read_table, "a.npz", archive(**{key: array(np.asarray(v)) for key, v in (members | {"spread": broken}).items()}), "a.npz")
+    weights = {"weight00": np.full((3, 3), np.nan, np.float32), "bias00": np.zeros(3, np.float32)}
+    refused(read_network, "a.npz", archive(**{key: array(value) for key, value in weights.items()}), "not finite")
+
+
+# --- descriptions -----------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("text", ["[" * 100_000, "{" * 100_000, '{"a":' * 100_000, "\ufeff{", "1" * 10_000, "", "\0"])
+def test_json_that_is_none_is_refused(refused: Callable[..., None], text: str) -> None:
+    refused(read_json, "a.json", text.encode(), "a.json")
+    refused(read_light, "a.json", text.encode(), "a.json")
+    refused(lambda path: read_facts(path.parent), "scene.json", text.encode(), "scene.json")
+
+
+def test_numbers_too_large_for_floats_are_refused(refused: Callable[..., None]) -> None:
+    refused(read_light, "a.json", json.dumps([[10**400] * 3] * 9).encode(), "holds no light")
+
+
+@pytest.mark.parametrize("name", ["line\nend", "\x1b[2J", "\u202egnp.exe", "\udce9"])
+def test_what_files_say_cannot_steer_the_terminal(name: str) -> None:
+    assert str(InputError(f"channel {name}: not known")).isprintable()
+    assert str(InputError("Größe 5 °: “x”")) == "Größe 5 °: “x”"
+
+
+# --- meshes -----------------------------------------------------------------------------------------------------------------------------
+
+CUBE = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 {z}\nv 1 0 1\nv 1 1 1\nv 0 1 1
+f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n"""
+PLY = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nend_header\n"
+
+
+def test_meshes_that_trip_the_loader_are_refused(refused: Callable[..., None]) -> None:
+    refused(read_mesh_file, "a.ply", PLY, "a.ply")
+    refused(read_mesh_file, "a.ply", PLY.replace(b"face 1", b"face 1\nproperty list uchar"), "a.ply")
+    refused(read_mesh_file, "a.obj", CUBE.format(z="1e160").encode(), "a.obj")
+    refused(read_mesh_file, "a.obj", CUBE.format(z="1e30").encode(), "deeper than wide")
+    refused(read_mesh_file, "a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex a b c\nendloop\nendfacet\nendsolid\n", "a.stl")
+    accessor = {"componentType": 5126, "count": 1, "type": "VEC3"}
+    strange = {"asset": {"version": "2.0"}, "accessors": [accessor | {"bufferView": 5}], "bufferViews": [], "meshes": []}
+    refused(read_mesh_file, "a.glb", glb(json.dumps(strange).encode(), b""), "a.glb")
+    for count in (2**31, -1, "many", 1e999):
+        claims = {"asset": {"version": "2.0"}, "accessors": [accessor | {"count": count}]}
+        refused(read_mesh_file, "a.glb", glb(json.dumps(claims).encode(), b""), "claims more than|readable")
+
+
+TEXTURED = b"mtllib a.mtl\nusemtl a\n" + CUBE.format(z=1).replace("f ", "vt 0.1 0.2\nf ", 1).encode()
+
+
+def test_textures_are_pictures_of_a_bearable_size(refused: Callable[..., None]) -> None:
+    material = b"newmtl a\nmap_Kd a.png\n"
+    size = struct.pack(">II", 60_000, 60_000)
+    picture = coded(".png", codes())
+    start = picture[:16] + size + picture[24:29]
+    bomb = start + struct.pack(">I", zlib.crc32(start[12:])) + picture[33:]
+    program = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 9 9\n%%EndComments\n(x) print quit\n"
+    for data in (bomb, program, picture[:70] + bytes(9) + picture[79:]):
+        refused(read_mesh_file, "a.obj", TEXTURED, "a.obj|a.png", a_mtl=material, a_png=data)
+    for outside in (b"../secret.png", b"/etc/hostname", b"..\\secret.png"):
+        refused(read_mesh_file, "a.obj", TEXTURED, "not in its folder", a_mtl=b"newmtl a\nmap_Kd " + outside + b"\n")
+
+
+@pytest.mark.parametrize("uv", ["nan nan", "1e300 -1e300", "inf 0"])
+def test_texture_coordinates_without_end_are_quiet(tmp_path: Path, capfd: pytest.CaptureFixture[str], uv: str) -> None:
+    text = CUBE.format(z=1)
+    faces = "\n".join("f " + " ".join(f"{k}/1" for k in line[2:].split()) for line in text.splitlines() if line.startswith("f"))
+    vertices = "\n".join(line for line in text.splitlines() if line.startswith("v"))
+    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\nusemtl a\n{vertices}\nvt {uv}\n{faces}\n", encoding="utf-8")
+    (tmp_path / "a.mtl").write_bytes(b"newmtl a\nmap_Kd a.png\n")
+    (tmp_path / "a.png").write_bytes(coded(".png", codes()))
+    found = read_mesh_file(tmp_path / "a.obj", painted=16)
+    assert found.albedo is not None and np.isfinite(found.albedo).all()
+    assert capfd.readouterr() == ("", "")
