@@ -199,7 +199,7 @@ def running(place: Place, cluster: bool) -> Iterator[tuple[psutil.Process, psuti
     dask = [str(Path(sys.executable).parent / "dask")]
     there = ["--scheduler-file", str(contact)]
     scheduler = _started([*dask, "scheduler", *there, "--host", "127.0.0.1", "--port", "0", "--dashboard-address", ":0"], place)
-    workers = _started([*dask, "worker", *there, "--nthreads", "1", "--nworkers", "2", "--death-timeout", "10"], place)
+    workers = _started([*dask, "worker", *there, "--nthreads", "1", "--nworkers", "2", "--death-timeout", "300"], place)
     try:
         while not contact.exists() or not (text := contact.read_text()):
             time.sleep(0.1)
