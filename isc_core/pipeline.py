@@ -61,6 +61,8 @@ def decompose(
     settings, evidence, monitor = settings or Settings(), evidence or Evidence(), monitor or Monitor()
     settings.check()
     _check_used(settings, evidence, prior_set)
+    if not photo.image[photo.mask].any():
+        raise InputError("the photo is black inside the mask: there is nothing to recover; use another photo")
     clock = Clock()
     with clock.stage("prepare"):
         working = photo.resized_to_object(settings.max_size)

@@ -44,7 +44,8 @@ class Picture:
     def photo(self) -> Photo:
         """As if read from a file of floats."""
         light, inside = self.light(), self.inside()
-        step = FLOAT_STEP * float(np.percentile(light.max(axis=2)[inside], 99.9))
+        bright = light.max(axis=2)[inside]
+        step = FLOAT_STEP * float(np.percentile(bright, 99.9) or bright.max())
         return Photo(light, inside, step, self.clipped(), PhotoSource("", (self.columns, self.rows), 32, "linear", "file"))
 
 

@@ -45,7 +45,9 @@ def run_chunk(law: Law, chunk: int, examples: int) -> Outcome:
     try:
         holds()
     except Exception as error:  # noqa: BLE001 (whatever a law finds is what is looked for)
-        failure = f"{smallest[0]}: {type(error).__name__}: {' '.join(str(error).split())}"[:600]
+        several = error.exceptions if isinstance(error, ExceptionGroup) else (error,)
+        said = "; ".join(f"{type(one).__name__}: {' '.join(str(one).split())}"[:300] for one in several)
+        failure = f"{smallest[0]}: {said}"
     return Outcome(law.name, chunk, tried["cases"], notes.refused, round(time.monotonic() - start, 2), failure, notes.measured)
 
 
