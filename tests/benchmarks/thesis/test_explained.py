@@ -205,7 +205,7 @@ def test_chance_is_told_from_difference() -> None:
 
 def test_the_light_of_a_ball_is_found_to_a_degree() -> None:
     for direction in (toward(-0.6, 0.6, 1.0), toward(0.9, -0.4, 0.8)):
-        found = application_items.found_lights(application_items.lit_ball(direction, 56))
+        found = application_items.found_lights(application_items.lit_ball(direction, 40))
         assert len(found) == 3
         for name, light in found.items():
             assert application_items.degrees_between(light, direction) < 1, name
