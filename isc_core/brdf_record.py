@@ -1,12 +1,12 @@
 """A lobe fit as it stands in `decomposition.json`, read back: what `LobeFit.to_json` wrote."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from .brdf.fitting import Interval, LobeFit, LobeLight
+from .json_files import numbers
 
 
 def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> LobeFit:
@@ -46,16 +46,17 @@ def _interval(record: Any, shape: tuple[int, ...]) -> Interval | None:
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> np.ndarray:
-    array = np.array(values, np.float64)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise ValueError(f"{values} instead of numbers of shape {shape}")
+    array = numbers(values, shape)
+    if array is None:
+        raise ValueError(f"{str(values)[:80]} instead of numbers of shape {shape}")
     return array
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{value} instead of a number")
-    return float(value)
+    number = None if isinstance(value, bool) or not isinstance(value, int | float) else numbers(value, ())
+    if number is None:
+        raise ValueError(f"{str(value)[:80]} instead of a number")
+    return float(number)
 
 
 def _truth(value: Any) -> bool:

@@ -7,7 +7,7 @@ import numpy as np
 
 from .errors import InputError
 from .exr import read_channels
-from .json_files import read_json
+from .json_files import numbers, read_json
 from .limits import USUAL, Limits
 from .numpy_files import read_array
 from .photo import read_raster
@@ -48,11 +48,8 @@ def read_light(path: str | Path) -> np.ndarray:
     found: Any = read_json(path, "a light is a decomposition.json or 9 lists of 3 numbers")
     for key in ("illumination", "coefficients"):
         found = found[key] if isinstance(found, dict) and key in found else found
-    try:
-        light = np.array(found, np.float64)
-    except (TypeError, ValueError, OverflowError):
-        light = np.zeros(0)
-    if light.shape != (9, 3) or not np.isfinite(light).all():
+    light = numbers(found, (9, 3))
+    if light is None:
         raise InputError(f"{path} holds no light: 9 lists of 3 numbers are needed, red, green and blue of each spherical harmonic")
     return light
 

@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from .errors import InputError
 
 MOST_BYTES = 1 << 28
@@ -24,3 +26,14 @@ def read_json(path: Path, remedy: str = "write it again") -> Any:
         raise
     except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested without end
         raise InputError(f"{path} is damaged or no JSON ({str(error)[:200]}): {remedy}") from error
+
+
+def numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
+    """A part of what a file holds as an array, float64, if it is finite numbers of that shape; else None."""
+    try:
+        found = np.array(value)
+        array = found.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):  # JSON has whole numbers of any length
+        return None
+    # Texts would be read as numbers: "iuf" are numbers, "O" are whole ones that are too long for these.
+    return array if found.dtype.kind in "iufO" and array.shape == shape and np.isfinite(array).all() else None

@@ -31,6 +31,11 @@ class Limits:
             most = f"{self.max_pixels / 1e6:g} megapixels"
             raise InputError(f"{path}: {width} x {height} pixels; at most {most} are read: make it smaller, or raise --max-pixels")
 
+    def check_stored(self, path: Path | str, stored: int) -> None:
+        """Raises `InputError` for a picture's file of more than `max_bytes` bytes, which is held in memory whole."""
+        if stored > self.max_bytes:
+            raise InputError(f"{path} has {stored / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are read: make it smaller first")
+
     def check_unpacked(self, path: Path | str, unpacked: int, stored: int) -> None:
         """Raises `InputError` for a file of `stored` bytes whose values would take more than it may, `unpacked` bytes."""
         most = max(self.max_bytes, self.max_ratio * stored)

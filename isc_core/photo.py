@@ -390,6 +390,7 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
     if not path.is_file():
         raise InputError(f"{path} is not a regular file: give an image file")
     try:
+        limits.check_stored(path, path.stat().st_size)
         data = path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error

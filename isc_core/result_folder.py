@@ -23,7 +23,7 @@ from .brdf_record import lobe_fit_from_json
 from .decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from .errors import InputError
 from .exr import read_channels, write_channels
-from .json_files import read_json
+from .json_files import numbers, read_json
 from .mesh import MeshOptions, MeshResult, build_mesh
 from .names import readable
 from .photo import linear_to_srgb
@@ -37,6 +37,7 @@ LOBE = {"lobe": "RGB"}
 SINGLE = {"diffuse": "RGB", "specular": "RGB", "reflectance": "RGB", "shading": "RGB", "normal": "RGB", "height": "Y"}
 DECOMPOSITION_FILES = ("decomposition.json", "maps.exr", "mesh.glb", "preview.png", *(f"maps/{name}.exr" for name in SINGLE))
 _OURS = (*DECOMPOSITION_FILES, ARRAYS)  # what may stand there besides is written on demand
+_LONGEST_SIDE = 1 << 31  # of a photo, pixels
 _LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # smaller results have not been seen
 _ARRAY_BYTES_A_PIXEL = 129  # its maps are not compressed
 SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
@@ -200,11 +201,9 @@ def _read_json(path: Path) -> dict[str, Any]:
 
 
 def _coefficients(description: Mapping[str, Any], folder: Path) -> np.ndarray:
-    try:
-        light = np.array(description["illumination"]["coefficients"], np.float64)
-    except (KeyError, TypeError, ValueError):
-        light = np.zeros(0)
-    if light.shape != (9, 3) or not np.isfinite(light).all():
+    given = description.get("illumination")
+    light = numbers(given.get("coefficients"), (9, 3)) if isinstance(given, dict) else None
+    if light is None:
         raise InputError(f"{folder / 'decomposition.json'} has no illumination of 9 x 3 numbers: it is damaged")
     return light
 
@@ -225,4 +224,17 @@ def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:
     for name, kind in types.items():
         if not isinstance(description.get(name), kind):
             raise InputError(f"{folder / 'decomposition.json'} has no usable {name}: it is damaged")
+    if wrong := _wrong_input(description["input"]):
+        raise InputError(f"{folder / 'decomposition.json'} has no usable input.{wrong}: it is damaged")
     return Provenance(**{name: description[name] for name in types})
+
+
+def _wrong_input(given: Mapping[str, Any]) -> str:
+    """The first entry of what is said of the photo that later work could stumble over; "" if there is none. Any may lack."""
+    scale, size = numbers(given.get("scale", 1.0), ()), given.get("size", [1, 1])
+    if scale is None or not 0 < scale <= 1:
+        return "scale"
+    if not isinstance(size, list) or len(size) != 2 or any(type(side) is not int or not 0 < side < _LONGEST_SIDE for side in size):
+        return "size"
+    words = (name for name in ("name", "sha256", "transfer", "mask_from") if not isinstance(given.get(name, ""), str))
+    return next(words, "" if type(given.get("bit_depth", 8)) is int else "bit_depth")

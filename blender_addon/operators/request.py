@@ -53,7 +53,7 @@ def request_from_json(text: str) -> Request:
         stored = json.loads(text)
         parts = {"method": _known(Method, stored["method"]), "build": _known(BuildOptions, stored["build"])}
         return _known(Request, {**stored, **parts})
-    except (ValueError, KeyError, TypeError) as error:
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError("it is not known how this object was made: decompose its photo again") from error
 
 

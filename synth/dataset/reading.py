@@ -8,7 +8,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 from isc_core.exr import read_channels
-from isc_core.json_files import read_json
+from isc_core.json_files import numbers, read_json
 from isc_core.result_folder import LAYERS
 
 from ..truth import GroundTruth
@@ -142,7 +142,7 @@ def _value(content: dict[str, Any], folder: Path, kind: type[_Kind], *keys: str)
     for key in keys:
         value = value.get(key) if isinstance(value, dict) else None
     allowed = (int, float) if kind is float else kind
-    if not isinstance(value, allowed) or isinstance(value, bool):
+    if not isinstance(value, allowed) or isinstance(value, bool) or (kind is float and numbers(value, ()) is None):
         raise InputError(f"{folder / 'scene.json'} has no usable {'.'.join(keys)}: it is damaged")
     return kind(value)
 
@@ -160,10 +160,8 @@ def _layers(path: Path, layers: dict[str, str]) -> dict[str, np.ndarray]:
 
 
 def _coefficients(content: dict[str, Any], folder: Path) -> np.ndarray:
-    try:
-        light = np.array(content["illumination"]["coefficients"], np.float64)
-    except (KeyError, TypeError, ValueError):
-        light = np.zeros(0)
-    if light.shape != (9, 3) or not np.isfinite(light).all():
+    given = content.get("illumination")
+    light = numbers(given.get("coefficients"), (9, 3)) if isinstance(given, dict) else None
+    if light is None:
         raise InputError(f"{folder / 'scene.json'} has no illumination of 9 x 3 numbers: it is damaged")
     return light

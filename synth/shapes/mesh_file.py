@@ -221,7 +221,7 @@ def _texture(material: Any) -> np.ndarray | None:
         if factor is None or (np.asarray(factor)[:3] == _NO_COLOUR).all():
             return None
     if image is not None:
-        if image.format not in _PICTURES:
+        if image.format not in (None, *_PICTURES):  # one that trimesh made itself has none
             raise ValueError("a texture of a kind that is not read")
         USUAL.check_pixels("a texture", *image.size)
     numbers = np.ones(3) if factor is None else np.asarray(factor)[:3]
@@ -257,7 +257,8 @@ def _sound(path: Path, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndar
         raise InputError(f"{path}: the mesh is over {_DEEPEST} times deeper than wide: scale its z as its x and y")
     if not sized:
         raise InputError(f"{path}: the mesh has no size: all of its vertices lie in one place or one line toward the viewer")
-    vertices = (np.nan_to_num(vertices) - (low + high) / 2) * (2 / (high - low)[:2].max())
+    # Vertices that no face uses may lie anywhere: they are brought to where the others are.
+    vertices = (np.clip(np.nan_to_num(vertices), low, high) - (low + high) / 2) * (2 / (high - low)[:2].max())
     place = _places(vertices)
     whole = place[faces]
     faces = faces[(whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])]

@@ -7,14 +7,13 @@ Limits: bounds speak of the kind of scenes that they were taken from; another da
 """
 
 import json
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from isc_core.atomic import new_file
 from isc_core.errors import InputError
-from isc_core.json_files import read_json
+from isc_core.json_files import numbers, read_json
 
 from .bootstrap import Interval
 from .figures import Figure
@@ -112,6 +111,6 @@ def _bound(entry: object, path: Path) -> Bound:
     if not isinstance(entry, dict) or set(entry) != {*names, "limit"} or not all(isinstance(entry[name], str) for name in names):
         raise InputError(f"{path}: a bound has stage, metric, kind, value (texts) and limit (a number), not {str(entry)[:80]}")
     limit = entry["limit"]
-    if isinstance(limit, bool) or not isinstance(limit, int | float) or not math.isfinite(limit):
+    if isinstance(limit, bool) or not isinstance(limit, int | float) or numbers(limit, ()) is None:
         raise InputError(f"{path}: the limit of {entry['stage']} {entry['metric']} has to be a number, not {str(limit)[:40]}")
     return Bound(entry["stage"], entry["metric"], entry["kind"], entry["value"], float(limit))

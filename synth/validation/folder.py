@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from isc_core.atomic import new_folder, require_writable
+from isc_core.errors import InputError
 from isc_core.exr import write_channels
+from isc_core.json_files import read_json
 from isc_core.progress import Monitor
 
 from .cases import make_cases, worst_scenes, write_evidence
@@ -19,7 +21,7 @@ from .outcome import Outcome, to_json
 from .run import SceneResult
 
 FILES = ("report.json", "report.html", "summary.md")
-_EVIDENCE = re.compile(r"evidence/[^/\\]+/[a-z_]+\.exr")
+_EVIDENCE = re.compile(r"evidence/[^/\\.][^/\\]*/[a-z_]+\.exr")
 
 
 def require_writable_report(folder: Path) -> None:
@@ -63,8 +65,8 @@ def _write_evidence(outcome: Outcome, folder: Path, monitor: Monitor) -> tuple[s
 def _ours(folder: Path) -> Sequence[str]:
     """The files of a report, and the evidence that the one standing in `folder` names."""
     try:
-        content = json.loads((folder / "report.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = read_json(folder / "report.json")
+    except InputError:
         return FILES
     named = content.get("evidence") if isinstance(content, dict) else None
     return (*FILES, *(name for name in named if isinstance(name, str) and _EVIDENCE.fullmatch(name))) if isinstance(named, list) else FILES

@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.fuzzing import campaign, targets
 from benchmarks.fuzzing.__main__ import table
-from benchmarks.fuzzing.attempt import case_and_data, minimised
+from benchmarks.fuzzing.attempt import Finding, case_and_data, minimised
 from benchmarks.fuzzing.campaign import Campaign
 from benchmarks.fuzzing.case import Case, Target
 from benchmarks.fuzzing.mutation import mutated
@@ -116,9 +116,7 @@ def test_damage_changes_much_and_stays_small() -> None:
 
 
 def test_minimising_keeps_the_finding() -> None:
-    class Found:
-        signature = "same"
-
-    small = minimised(b"abcXdefgh" * 5, Found(), lambda data: Found() if b"X" in data else None, tries=1000)
+    found = Finding("exception", "somewhere", "")
+    small = minimised(b"abcXdefgh" * 5, found, lambda data: found if b"X" in data else None, tries=1000)
     assert small == b"X"
-    assert minimised(b"a" * 10_000, Found(), lambda data: None, tries=5) == b"a" * 10_000
+    assert minimised(b"a" * 10_000, found, lambda data: None, tries=5) == b"a" * 10_000

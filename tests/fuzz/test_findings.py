@@ -2,15 +2,18 @@
 
 import io
 import json
+import re
 import struct
 import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from benchmarks.fuzzing import data_files
 from benchmarks.fuzzing.data_files import deflated, matlab
 from benchmarks.fuzzing.mesh_files import glb
 from benchmarks.fuzzing.pictures import array, ball, coded, codes, exr
@@ -23,10 +26,14 @@ from isc_core.limits import Limits
 from isc_core.mat_files import read_matrix
 from isc_core.numpy_files import read_array, read_arrays
 from isc_core.photo import read_linear, read_photo
+from isc_core.result_folder import load
 from isc_core.separation.filter_statistics import read_table, shipped_table
 from isc_core.separation.layer_network import read_network
 from synth.dataset.reading import read_facts
 from synth.shapes.mesh_file import read_mesh_file
+from synth.validation import html
+from synth.validation.bounds import read_bounds
+from synth.validation.folder import FILES, _ours
 
 
 @pytest.fixture
@@ -232,6 +239,43 @@ def test_meshes_that_trip_the_loader_are_refused(refused: Callable[..., None]) -
         refused(read_mesh_file, "a.glb", glb(json.dumps(claims).encode(), b""), "claims more than|readable")
 
 
+def test_vertices_that_no_face_uses_are_no_matter(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "a.obj").write_text(CUBE.format(z=1).replace("f", "v 1e300 -1e308 nan\nf", 1), encoding="utf-8")
+    assert np.abs(read_mesh_file(tmp_path / "a.obj").mesh.vertices).max() <= 1
+    assert capfd.readouterr() == ("", "")
+
+
+def huge_number(text: bytes, key: bytes) -> bytes:
+    """A description whose first number behind `key` has 400 digits."""
+    return re.sub(rb'("' + key + rb'"[^0-9]*)[0-9.]+', rb"\g<1>" + b"9" * 400, text, count=1)
+
+
+def test_whole_numbers_of_any_length_are_refused(refused: Callable[..., None]) -> None:
+    result, scene = data_files._result(), data_files._scene()["scene.json"]
+    beside = {name.replace(".", "_"): data for name, data in result.items() if name != "decomposition.json"}
+    for key in (b"coefficients", b"scale", b"alpha", b"cone_68_degrees"):
+        damaged = huge_number(result["decomposition.json"], key)
+        refused(lambda path: load(path.parent), "decomposition.json", damaged, "damaged", **beside)
+    refused(lambda path: read_facts(path.parent), "scene.json", huge_number(scene, b"specular_share"), "specular_share")
+    bounds = b'{"schema_version": 1, "bounds": [{"stage": "a", "metric": "b", "kind": "c", "value": "d", "limit": 1}]}'
+    refused(read_bounds, "bounds.json", huge_number(bounds, b"limit"), "has to be a number")
+
+
+@pytest.mark.parametrize("given", [{"scale": 0}, {"scale": "1"}, {"size": [0, 1]}, {"size": "ab"}, {"bit_depth": None}, {"name": 3}])
+def test_what_a_result_says_of_its_photo_is_checked(refused: Callable[..., None], given: dict[str, object]) -> None:
+    result = dict(data_files._result())
+    described = json.loads(result.pop("decomposition.json"))
+    described["input"] |= given
+    beside = {name.replace(".", "_"): data for name, data in result.items()}
+    refused(
+        lambda path: load(path.parent),
+        "decomposition.json",
+        json.dumps(described).encode(),
+        f"no usable input.{next(iter(given))}",
+        **beside,
+    )
+
+
 TEXTURED = b"mtllib a.mtl\nusemtl a\n" + CUBE.format(z=1).replace("f ", "vt 0.1 0.2\nf ", 1).encode()
 
 
@@ -259,3 +303,35 @@ def test_texture_coordinates_without_end_are_quiet(tmp_path: Path, capfd: pytest
     found = read_mesh_file(tmp_path / "a.obj", painted=16)
     assert found.albedo is not None and np.isfinite(found.albedo).all()
     assert capfd.readouterr() == ("", "")
+
+
+# --- paths and pages --------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", ["evidence/../mine.exr", "evidence/a/../../../x.exr", "/etc/x.exr", "evidence/.hidden/x.exr", "evidence\\a\\x.exr"]
+)
+def test_an_earlier_report_names_no_files_but_its_evidence(tmp_path: Path, name: str) -> None:
+    report = {"evidence": ["evidence/scene3/diffuse.exr", name]}
+    (tmp_path / "report.json").write_text(json.dumps(report), encoding="utf-8")
+    assert _ours(tmp_path) == (*FILES, "evidence/scene3/diffuse.exr")
+
+
+def test_pages_show_names_as_text(monkeypatch: pytest.MonkeyPatch) -> None:
+    hostile = "<script>alert('1')</script>\"><img src=x onerror=alert(2)>"
+    table = html._table([hostile], [[hostile, hostile]])
+    check = SimpleNamespace(passed=False, text=hostile)
+    judged = html._judged(SimpleNamespace(verdicts=(), checks=(check,)), [f"evidence/{hostile}/a.exr"])
+    for part in (table, judged):
+        assert "<script" not in part and "<img" not in part
+
+
+def test_a_mesh_opens_nothing_through_a_link_out_of_its_folder(tmp_path: Path) -> None:
+    (tmp_path / "secret.png").write_bytes(coded(".png", codes()))
+    folder = tmp_path / "mesh"
+    folder.mkdir()
+    (folder / "a.png").symlink_to(tmp_path / "secret.png")
+    (folder / "a.mtl").write_bytes(b"newmtl a\nmap_Kd a.png\n")
+    (folder / "a.obj").write_bytes(TEXTURED)
+    with pytest.raises(InputError, match="not in its folder"):
+        read_mesh_file(folder / "a.obj")
