@@ -223,6 +223,21 @@ def _jpeg() -> tuple[Case, ...]:
     return tuple(Case("a.jpg", data, _photo) for data in files)
 
 
+def _tiled() -> bytes:
+    """A TIFF of 16 bits in four tiles of 16 x 16 pixels, which neither library writes."""
+    padded = np.zeros((32, 32, 3), "<u2")
+    padded[:24, :20] = codes(16)
+    tiles = [padded[y : y + 16, x : x + 16].tobytes() for y in (0, 16) for x in (0, 16)]
+    behind = 8 + 2 + 12 * 11 + 4  # where what fits in no entry begins: three numbers, two lists of four
+    start = behind + 6 + 32
+    places = struct.pack("<4I", *(start + k * len(tiles[0]) for k in range(4)))
+    entries = ((256, 4, 1, 20), (257, 4, 1, 24), (258, 3, 3, behind), (259, 3, 1, 1), (262, 3, 1, 2), (277, 3, 1, 3), (284, 3, 1, 1),
+               (322, 4, 1, 16), (323, 4, 1, 16), (324, 4, 4, behind + 6), (325, 4, 4, behind + 22))  # fmt: skip
+    directory = struct.pack("<H", len(entries)) + b"".join(struct.pack("<HHII", *entry) for entry in entries) + bytes(4)
+    lengths = struct.pack("<4I", *(len(tile) for tile in tiles))
+    return b"II*\0\x08\0\0\0" + directory + struct.pack("<3H", 16, 16, 16) + places + lengths + b"".join(tiles)
+
+
 def _tiff() -> tuple[Case, ...]:
     grey = np.rint(ball()[..., 0] * 65535).astype(np.uint16)
     compressions = (1, 5, 8, 32773)
@@ -230,7 +245,7 @@ def _tiff() -> tuple[Case, ...]:
     files += [coded(".tiff", ball().astype(np.float32), cv2.IMWRITE_TIFF_COMPRESSION, n) for n in (1, 5)]
     files += [coded(".tiff", _with_alpha(16)), coded(".tiff", codes(16), cv2.IMWRITE_TIFF_ROWSPERSTRIP, 3)]
     files += [saved("tiff", compression=name) for name in (None, "tiff_lzw", "tiff_adobe_deflate", "packbits", "jpeg")]
-    files += [saved("tiff", "P"), saved("tiff", "1", compression="group4"), saved("tiff", "LAB"), saved("tiff", big_tiff=True)]
+    files += [saved("tiff", "P"), saved("tiff", "1", compression="group4"), saved("tiff", "LAB"), saved("tiff", big_tiff=True), _tiled()]
     return (*(Case("a.tif", data, _photo) for data in files), Case("a.tif", coded(".tiff", grey), _height))
 
 

@@ -17,6 +17,7 @@ from benchmarks.fuzzing import data_files
 from benchmarks.fuzzing.data_files import deflated, matlab
 from benchmarks.fuzzing.mesh_files import glb
 from benchmarks.fuzzing.pictures import array, ball, coded, codes, exr
+from isc_core.cli import main
 from isc_core.datasets import load_natural_lights
 from isc_core.errors import InputError
 from isc_core.evidence_files import read_light
@@ -335,3 +336,14 @@ def test_a_mesh_opens_nothing_through_a_link_out_of_its_folder(tmp_path: Path) -
     (folder / "a.obj").write_bytes(TEXTURED)
     with pytest.raises(InputError, match="not in its folder"):
         read_mesh_file(folder / "a.obj")
+
+
+@pytest.mark.parametrize("words", ["decompose {} -o {}", "separate {} -o {}", "mask {} --box 2,2,14,14 -o {}.png"])
+def test_commands_hold_the_limit_of_pixels(tmp_path: Path, capfd: pytest.CaptureFixture[str], words: str) -> None:
+    (tmp_path / "a.png").write_bytes(coded(".png", codes()))
+    command = words.format(tmp_path / "a.png", tmp_path / "out").split()
+    assert main([*command, "--max-pixels", "479"]) == 2
+    assert "20 x 24 pixels" in capfd.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+    assert main([*command, "--max-pixels", "0"]) == 2
+    assert "not a whole number from 1 on" in capfd.readouterr().err
