@@ -4,7 +4,6 @@ import json
 import os
 import signal
 import subprocess
-import sys
 import time
 from collections import Counter
 from dataclasses import replace
@@ -36,7 +35,7 @@ def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
     while run.poll() is None and not (tmp_path / "out" / "one").exists():
         time.sleep(0.05)
     os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to all of them
-    told = run.communicate(timeout=60)[1]
+    told = run.communicate(timeout=300)[1]
     assert run.returncode in (130, 1), told  # 1: it was faster
     assert "dashboard: http://127.0.0.1:" in told
     assert "Traceback" not in told
@@ -62,4 +61,3 @@ def test_what_is_wrong_with_the_run_is_one_line(photos: Path, tmp_path: Path) ->
         assert told in done.stderr
         lines = [line for line in done.stderr.splitlines() if line != "isc: looking at the inputs"]
         assert len(lines) == 1, done.stderr
-    assert sys.executable
