@@ -245,7 +245,7 @@ def _specular_free(context: Context) -> Made:
     text = (
         f"{chosen.name}: each image made of the photo (above) and of its diffuse layer (below), in one exposure per column. Where both "
         "rows look alike, highlights do not reach the image. The dark channel is the opposite: mostly highlight, and what is left of pale "
-        "paint. What is left in the exact ones (SF1, SF2) is that highlights are not quite white."
+        "paint. What is left in SF1 and SF2 is noise, clipping, and tint: their highlights are white."
     )
     return Made((table,), (panels(shown, len(kinds)),), text)
 
