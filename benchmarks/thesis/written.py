@@ -9,6 +9,7 @@ import json
 import os
 import platform
 import subprocess
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -21,7 +22,7 @@ from isc_core.json_files import read_json
 
 from .claims import ABSTRACT
 from .context import Context
-from .item import Item, Made, Table, Verdict
+from .item import HOLDS, Item, Made, Table, Verdict
 from .style import finish, tabulated
 
 RECORDS = "records"
@@ -147,16 +148,16 @@ def index(items: Sequence[Item], records: dict[str, Record]) -> str:
     made = sum(item.name in records for item in items)
     lines = [
         "# The thesis' tables and figures", "",
-        *_INTRODUCTION, f"{made} of {len(items)} are here.", "",
+        *_INTRODUCTION, f"{made} of {len(items)} are here{_settings(records)}.", "",
         "## What the abstract claims", "", "| claim | here | holds | where |", "|---|---|---|---|",
     ]  # fmt: skip
     for claim in ABSTRACT:
         said = [(name, verdict) for name, record in records.items() for verdict in record.verdicts if verdict.claim == claim]
-        lines += [f"| {claim} | {v.here} | {v.holds} | [{_spoken(name)}]({name}.md) |" for name, v in said] or [
+        lines += [f"| {claim} | {_sentence(v.here)} | {v.holds} | [{_spoken(name)}]({name}.md) |" for name, v in said] or [
             f"| {claim} | | not measured | |"
         ]
     for kind in ("table", "figure"):
-        lines += ["", f"## {kind.capitalize()}s", "", "| | what | verdicts |", "|---|---|---|"]
+        lines += ["", f"## {kind.capitalize()}s", "", "| | what | claims that hold |", "|---|---|---|"]
         lines += [_index_row(item, records.get(item.name)) for item in items if item.kind == kind]
     return "\n".join(lines) + "\n"
 
@@ -189,8 +190,24 @@ def _processor() -> str:
 def _index_row(item: Item, record: Record | None) -> str:
     title = f"[{item.number}]({item.name}.md)" if record is not None else item.number
     state = f"not regenerable: {item.reason}" if item.make is None else "not made yet"
-    said = "; ".join(f"{verdict.holds}: {verdict.claim}" for verdict in record.verdicts) if record is not None else state
+    said = state if record is None else _counted(record.verdicts)
     return f"| {title} | {item.title} | {said} |"
+
+
+def _settings(records: dict[str, Record]) -> str:
+    """What kind of runs made them, in words."""
+    commands = [record.command for record in records.values()]
+    quick, own = (sum((word in command) == wanted for command in commands) for word, wanted in (("--quick", True), ("--data", False)))
+    parts = [f", {own} of them on the project's own rendered images alone"] if own else []
+    return "".join(
+        [*parts, f", {quick} of them by a quick run: small images and few repetitions, whose verdicts tell little"] if quick else parts
+    )
+
+
+def _counted(verdicts: Sequence[Verdict]) -> str:
+    """How many claims hold, in words: "no, cannot be told (3)"."""
+    many = Counter(verdict.holds for verdict in verdicts)
+    return ", ".join(f"{holds} ({many[holds]})" if many[holds] > 1 else holds for holds in HOLDS if many[holds])
 
 
 def _sentence(text: str) -> str:
