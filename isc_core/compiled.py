@@ -5,9 +5,12 @@ NUMBA_CACHE_DIR says; where none of them can be written, in a folder that lasts 
 """
 
 import atexit
+import contextlib
 import shutil
 import tempfile
 from collections.abc import Callable
+from functools import cache
+from pathlib import Path
 from typing import TypeVar, cast
 
 Loop = TypeVar("Loop", bound=Callable[..., object])
@@ -20,7 +23,19 @@ def compiled(loop: Loop) -> Loop:
     except ImportError:
         return loop
     ensure_cache_folder()
-    return cast(Loop, numba.njit(cache=True, nogil=True, error_model="numpy")(loop))
+    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(loop)
+    drop_broken(Path(str(dispatcher.stats.cache_path)))
+    return cast(Loop, dispatcher)
+
+
+@cache
+def drop_broken(folder: Path) -> None:
+    """Removes what a loss of power, or a full disk, cut short of the compiled code that is kept in `folder`: Numba would fail on it, at
+    every start."""
+    for kept in folder.glob("*.nb[ic]"):
+        with contextlib.suppress(OSError):  # another process replaced it, or it cannot be removed
+            if not kept.read_bytes().endswith(b"."):  # as all that `pickle` writes does
+                kept.unlink()
 
 
 def ensure_cache_folder() -> None:

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from ..compiled import ensure_cache_folder
+from ..compiled import drop_broken, ensure_cache_folder
 from ..progress import Monitor
 from .solver import compiled_engine_available
 
@@ -14,6 +14,7 @@ def announce_compilation(engine: str, monitor: Monitor) -> None:
     if engine == "numpy" or not compiled_engine_available():
         return
     ensure_cache_folder()
+    drop_broken(_folder())
     if not kernels_compiled():
         monitor.report("preparing the compiled kernels (only once, some 20 s)", 0.0)
 
@@ -26,5 +27,12 @@ def kernels_compiled() -> bool:
     code = kernel.py_func.__code__
     source = Path(code.co_filename)
     pattern = f"{source.stem}.{code.co_name}-{code.co_firstlineno}.py{sys.version_info[0]}{sys.version_info[1]}*.nbi"
-    found = Path(str(kernel.stats.cache_path)).glob(pattern)
+    found = _folder().glob(pattern)
     return any(index.stat().st_mtime >= source.stat().st_mtime for index in found)
+
+
+def _folder() -> Path:
+    """Where the kernels are kept."""
+    from . import kernels
+
+    return Path(str(kernels.forward_rows.stats.cache_path))
