@@ -11,8 +11,9 @@ import numpy as np
 from . import baselines
 from .datasets import MitBerkeleyObject
 from .evaluate import Estimate, Runner
-from .models.joint import Explain, JointOptions, doubt, stepped
+from .models.joint import Explain, JointOptions, believed, doubt, stepped
 from .models.mbp import split_reflectance
+from .models.shape import trust_of
 from .pipeline import BASELINE_MODELS, Settings
 from .progress import Monitor
 from .separation import BEST, separate
@@ -34,16 +35,17 @@ _HALF_CODE = 0.5 / 65535  # the images have 16 bits; a separation may leave less
 @dataclass(frozen=True)
 class RunnerOptions:
     """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for the models that separate;
-    `engine`, `threads`: see `SolverOptions`."""
+    `engine`, `threads`: see `SolverOptions`; `confidence_weights`: see `Settings`."""
 
     model: str = "sirfs"
     separator: str = BEST
     engine: str = "auto"
     threads: int = 0
+    confidence_weights: bool = False
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""
-        Settings(model=self.model, separator=self.separator, engine=self.engine, threads=self.threads).check()
+        Settings(self.model, self.separator, engine=self.engine, threads=self.threads, confidence_weights=self.confidence_weights).check()
 
 
 def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwork | None = None) -> Runner:
@@ -55,7 +57,8 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwo
     tables: dict[str, Priors] = {}
 
     def run(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
-        log_image = _log_diffuse(truth, options)
+        diffuse, trust = _separated_first(truth, options)
+        log_image = _log(diffuse, truth)
         if options.model in BASELINE_MODELS:
             guess = baselines.estimate(options.model, log_image, truth.valid)
             return _estimate(truth, log_image, guess.height, guess.light, log_shading=guess.log_shading)
@@ -64,7 +67,7 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwo
             tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
         if options.model == "joint":
             return joint_estimate(truth, tables[truth.illumination], options, monitor, network)
-        result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor)
+        result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor, trust)
         if options.model == "mbp":
             log_image = _log_separated_reflectance(truth, result, options)
         return _estimate(truth, log_image, result.height, result.light, result)
@@ -72,16 +75,23 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwo
     return run
 
 
-def pose(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, weights: Weights) -> Problem:
-    """The problem as the reference program poses it; `log_image` (H, W, 3) is read where `truth.valid`."""
+def pose(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, weights: Weights, trust: np.ndarray | None = None) -> Problem:
+    """The problem as the reference program poses it; `log_image` (H, W, 3) is read where `truth.valid`. `trust` (H, W): see `Problem`."""
     contour = occluding_contour(truth.mask, drop_near_edge=True)
     field = None if priors.silhouette is None else silhouette_field(truth.mask, priors.silhouette)
-    return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field)
+    return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field, trust=trust)
 
 
-def solve_sirfs(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, options: RunnerOptions, monitor: Monitor) -> SirfsResult:
+def solve_sirfs(
+    truth: MitBerkeleyObject,
+    log_image: np.ndarray,
+    priors: Priors,
+    options: RunnerOptions,
+    monitor: Monitor,
+    trust: np.ndarray | None = None,
+) -> SirfsResult:
     """SIRFS on one object of the set; `log_image` (H, W, 3) is read where `truth.valid`. Looks at nothing else but `truth.mask`."""
-    problem = pose(truth, log_image, priors, isc_weights(truth.illumination, 3))
+    problem = pose(truth, log_image, priors, isc_weights(truth.illumination, 3), trust)
     return solve(problem, SolverOptions(engine=options.engine, threads=options.threads), monitor=monitor)
 
 
@@ -90,26 +100,30 @@ def joint_estimate(
 ) -> Estimate:
     """`models.joint` on one object; `network`: of its layers, the shipped one if None."""
     joint, valid = JointOptions(), truth.valid
-    by_colour = separate(options.separator, truth.image, valid).diffuse
+    split = separate(options.separator, truth.image, valid)
+    found = doubt(truth.image, split.diffuse, valid, joint, network)
+    trust = trust_of(believed(split.confidence, found), options.confidence_weights)
     how = SolverOptions(engine=options.engine, threads=options.threads)
 
     def energy(diffuse: np.ndarray, there: SirfsResult) -> float:
-        problem = pose(truth, _log(diffuse, truth), priors, isc_weights(truth.illumination, 3))
+        problem = pose(truth, _log(diffuse, truth), priors, isc_weights(truth.illumination, 3), trust)
         return solve(problem, how, known_height=there.height, known_light=there.light).terms.total
 
     explain = Explain(
-        solve=lambda diffuse: solve_sirfs(truth, _log(diffuse, truth), priors, options, monitor),
+        solve=lambda diffuse: solve_sirfs(truth, _log(diffuse, truth), priors, options, monitor, trust),
         shading=lambda there: np.exp(_log_shading(normal_from_reference(normals(there.height)), there.light)),
         energy=energy,
     )
-    step = stepped(doubt(truth.image, by_colour, valid, joint, network), by_colour, valid, explain, joint)
+    step = stepped(found, split.diffuse, valid, explain, joint)
     return _estimate(truth, _log(step.diffuse, truth), step.shape.height, step.shape.light, step.shape)
 
 
-def _log_diffuse(truth: MitBerkeleyObject, options: RunnerOptions) -> np.ndarray:
-    """Log of what shape and light are recovered from (H, W, 3), 0 where it is not valid: the diffuse image, if separation comes first."""
-    diffuse = separate(options.separator, truth.image, truth.valid).diffuse if options.model == "mdr" else truth.image
-    return _log(diffuse, truth)
+def _separated_first(truth: MitBerkeleyObject, options: RunnerOptions) -> tuple[np.ndarray, np.ndarray | None]:
+    """What shape and light are recovered from (H, W, 3), the diffuse image if separation comes first, and its trust (H, W) if wanted."""
+    if options.model != "mdr":
+        return truth.image, None
+    split = separate(options.separator, truth.image, truth.valid)
+    return split.diffuse, trust_of(split.confidence, options.confidence_weights)
 
 
 def _log_separated_reflectance(truth: MitBerkeleyObject, result: SirfsResult, options: RunnerOptions) -> np.ndarray:

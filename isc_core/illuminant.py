@@ -59,12 +59,14 @@ class IlluminantOptions:
 @dataclass(frozen=True)
 class Illuminant:
     """`colour` (3,) > 0, of mean 1: white where nothing can be said. `confidence` in [0, 1]: how much of it is the photo's word.
-    `determined`: whether that is enough; `reason`: why not, or on what it rests."""
+    `determined`: whether that is enough; `reason`: why not, or on what it rests. `too_strong`: what looks like highlights has a colour that
+    no lamp has."""
 
     colour: np.ndarray
     confidence: float
     determined: bool
     reason: str
+    too_strong: bool = False
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ def estimate_illuminant(
     weakest = float(np.linalg.eigvalsh(precision)[0])
     confidence = weakest / (weakest + 1 / options.usual**2)
     if np.abs(_PLANE @ shift).max() > _FARTHEST:
-        return Illuminant(np.ones(3), 0.0, False, "what looks like highlights has too strong a colour for a light: it may be paint")
+        return Illuminant(np.ones(3), 0.0, False, "what looks like highlights has too strong a colour for a light: it may be paint", True)
     determined = confidence >= options.enough
     reason = f"{int(flanks.sum())} changes across highlights agree" if determined else "the highlights lie on one paint, or disagree"
     return Illuminant(_colour(shift), confidence, determined, reason)

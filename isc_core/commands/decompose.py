@@ -74,7 +74,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     status = result.provenance.status
     trouble = [] if status.get("converged", True) else [f"note: {status['help']}"]
     gloss = [f"gloss: {status['gloss']}"] if status.get("gloss") else []
-    return hints(options, *trouble, *gloss, f"look at {options.output / 'preview.png'}")
+    light = status.get("light_colour", {}).get("help")
+    return hints(options, *trouble, *gloss, *([f"note: {light}"] if light else []), f"look at {options.output / 'preview.png'}")
 
 
 def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:

@@ -36,6 +36,7 @@ def declare(commands: Commands) -> None:
     parser.add_argument("--illumination", choices=(*ILLUMINATIONS, "both"), help="default: both, or laboratory for --input original")
     parser.add_argument("--model", metavar="NAME", help="as for isc decompose (default: sirfs, or joint for --input original)")
     parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of joint, mdr, mbp (default %(default)s)")
+    parser.add_argument("--confidence-weights", action="store_true", help="of joint and mdr: as for isc decompose")
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
     add_engine(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
@@ -47,7 +48,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         require_writable_file(options.json)
     original = options.input == "original"
     model = options.model or ("joint" if original else "sirfs")
-    runner_options = RunnerOptions(model, options.separator, options.engine, options.threads)
+    runner_options = RunnerOptions(model, options.separator, options.engine, options.threads, options.confidence_weights)
     runner_options.check()
     prior_set = shipped_prior_set() if options.priors is None else load_prior_set(options.priors)
     report = evaluate(

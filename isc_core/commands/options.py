@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from ..errors import InputError
 from ..limits import USUAL, Limits
-from ..models.settings import ILLUMINATIONS, MODELS, Settings
+from ..models.settings import ILLUMINATIONS, LIGHT_COLOURS, MODELS, Settings
 from ..photo import TRANSFERS
 from ..separation import METHODS
 
@@ -121,6 +121,15 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--full-size", action="store_true", help="bring the result back to the photo's resolution")
     parser.add_argument("--shading-only", action="store_true", help="shape from shading: the object has one colour")
+    parser.add_argument(
+        "--confidence-weights",
+        action="store_true",
+        help="of joint and mdr: pixels whose separation is in doubt weigh less in shape and light",
+    )
+    parser.add_argument(
+        "--light-colour", choices=LIGHT_COLOURS, default=usual.light_colour,
+        help="the light is white, or has the colour that the highlights tell, where they do (default %(default)s)",
+    )  # fmt: skip
     parser.add_argument("--arrays", action="store_true", help="write arrays.npz too: everything as plain NumPy arrays, for other programs")
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
     parser.add_argument(

@@ -36,7 +36,7 @@ from ..separation.light_tint import held_to_light
 from ..separation.smoothing import masked_gaussian
 from .layers import separated_first, shaded
 from .lobe import fit_specular
-from .shape import Shape, energy_of, recover_shape
+from .shape import Shape, energy_of, recover_shape, trust_of
 from .task import Answer, Task
 
 _TAKEN = "highlights that colour does not show were taken off, and the paint under them continued with the help of shape and light"
@@ -90,15 +90,16 @@ class Step(Generic[Found]):
 def joint(task: Task, options: JointOptions | None = None) -> Answer:
     """MDR on what colour and form tell of the layers; the step beyond it, if the energy falls. Raises `InputError`, `Cancelled`."""
     options, monitor, working = options or JointOptions(), task.monitor, task.working
-    split, diffuse = separated_first(task)
+    split, layers = separated_first(task)
     with task.clock.stage("separation"):
-        found = doubt(working.image, diffuse, working.mask, options)
+        found = doubt(working.image, layers.diffuse, working.mask, options)
+    trust = trust_of(believed(layers.confidence, found), task.settings.confidence_weights)
     explain = Explain(
-        solve=lambda image: recover_shape(image, task, monitor.part(0.08, 0.9)),
+        solve=lambda image: recover_shape(image, task, monitor.part(0.08, 0.9), trust),
         shading=lambda shape: shaded(shape.working_height, shape.light, working.mask)[1],
-        energy=lambda image, shape: energy_of(image, shape, task),
+        energy=lambda image, shape: energy_of(image, shape, task, trust),
     )
-    step = stepped(found, diffuse, working.mask, explain, options)
+    step = stepped(found, layers.diffuse, working.mask, explain, options)
     said = _NOTHING_LEFT
     if found is not None:
         said = _TAKEN if step.taken else _NOT_CONTINUED
@@ -145,6 +146,11 @@ def doubt(
     return Doubt(cleaner.astype(diffuse.dtype), doubtful)
 
 
+def believed(confidence: np.ndarray, found: Doubt | None) -> np.ndarray:
+    """A separation's `confidence` (H, W), 0 where `found` doubts."""
+    return confidence if found is None else np.where(found.doubtful, 0, confidence).astype(np.float32)
+
+
 def repaint(found: Doubt, shading: np.ndarray, start: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """The diffuse image (H, W, 3), nowhere above `start` (H, W, 3), with the paint of doubtful pixels continued from around them.
 
@@ -176,7 +182,7 @@ def _split(start: Separation, found: Doubt, step: Step[Shape], task: Task, optio
             diffuse = repaint(of_maps, shading, of_maps.diffuse, photo.mask)
     diffuse = diffuse.astype(np.float32)
     specular = np.where(photo.mask[..., None], start.specular + (start.diffuse - diffuse), 0).astype(np.float32)
-    return Separation(diffuse, specular, start.residual, np.where(found.doubtful, 0, start.confidence).astype(np.float32))
+    return Separation(diffuse, specular, start.residual, believed(start.confidence, found))
 
 
 def _continued(values: np.ndarray, known: np.ndarray, mask: np.ndarray) -> np.ndarray:

@@ -16,8 +16,8 @@ def separated(photo: Photo, method: str, monitor: Monitor | None = None) -> Sepa
     return separate(method, photo.image, photo.mask, photo.clipped, monitor=monitor)
 
 
-def separated_first(task: Task) -> tuple[Separation, np.ndarray]:
-    """The layers of the maps' photo by the separator of the settings, and the diffuse image (H, W, 3) of the working one.
+def separated_first(task: Task) -> tuple[Separation, Separation]:
+    """The layers of the maps' photo by the separator of the settings, and those of the working one.
 
     Raises `InputError`, `Cancelled`.
     """
@@ -25,7 +25,7 @@ def separated_first(task: Task) -> tuple[Separation, np.ndarray]:
     monitor.report(f"separating ({method})", 0.03)
     with task.clock.stage("separation"):
         split = separated(task.maps, method, monitor.part(0.03, 0.06)) if task.split is None else task.split
-        return split, split.diffuse if task.one_scale else separated(task.working, method, monitor.part(0.06, 0.08)).diffuse
+        return split, split if task.one_scale else separated(task.working, method, monitor.part(0.06, 0.08))
 
 
 def unseparated(task: Task) -> tuple[Separation, np.ndarray]:

@@ -8,9 +8,11 @@ from ..separation import BEST, METHODS
 
 SIRFS_MODELS = ("mdr", "mbp", "joint", "sirfs")
 SEPARATING_MODELS = ("mdr", "mbp", "joint")
+WEIGHING_MODELS = ("mdr", "joint")
 BASELINE_MODELS = tuple(baselines.METHODS)
 MODELS = SIRFS_MODELS + BASELINE_MODELS
 ILLUMINATIONS = ("natural", "laboratory")
+LIGHT_COLOURS = ("white", "estimate")
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,9 @@ class Settings:
     "laboratory", which lights to expect. `max_size`: the object's long side in pixels at which the maps are made, 0 for the photo's;
     SIRFS is solved at a size of its own, `recover.SOLVE_SIZE`. `full_size`: the maps are then brought to the photo's resolution.
     `engine`, `threads`: see `SolverOptions`. `seed`: written into the result; no step of these models draws random numbers.
-    `shading_only`: shape-from-shading mode, an object of one colour.
+    `shading_only`: shape-from-shading mode, an object of one colour. `confidence_weights`: of "mdr" and "joint", whether pixels whose
+    separation is in doubt weigh less in SIRFS' terms of reflectance. `light_colour`: of `SEPARATING_MODELS`, "white", or "estimate" for the
+    colour that the photo's highlights tell, where they do.
     """
 
     model: str = "joint"
@@ -33,6 +37,8 @@ class Settings:
     threads: int = 0
     seed: int = 0
     shading_only: bool = False
+    confidence_weights: bool = False
+    light_colour: str = "white"
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""
@@ -40,9 +46,14 @@ class Settings:
             ("model", self.model, MODELS),
             ("separator", self.separator, METHODS),
             ("illumination", self.illumination, ILLUMINATIONS),
+            ("light colour", self.light_colour, LIGHT_COLOURS),
             ("engine", self.engine, ("auto", "numba", "numpy")),
         ):
             if value not in known:
                 raise InputError(f'unknown {name} "{value}": choose {", ".join(known)}')
+        if self.confidence_weights and self.model not in WEIGHING_MODELS:
+            raise InputError(f"--confidence-weights means nothing to {self.model}: use --model {' or '.join(WEIGHING_MODELS)}")
+        if self.light_colour != "white" and self.model not in SEPARATING_MODELS:
+            raise InputError(f"--light-colour means nothing to {self.model}: use --model {' or '.join(SEPARATING_MODELS)}")
         if self.max_size < 0 or self.threads < 0:
             raise InputError("--max-size and --threads cannot be negative: 0 means no limit and all cores")

@@ -14,6 +14,8 @@ from ..sirfs.settings import isc_weights
 from ..sirfs.solver import SolverOptions
 from .task import Task
 
+_LEAST_TRUST = 0.05
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -26,18 +28,29 @@ class Shape:
     working_height: np.ndarray
 
 
-def recover_shape(diffuse: np.ndarray, task: Task, monitor: Monitor) -> Shape:
-    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps. Raises `InputError`, `Cancelled`."""
-    result = _recover(diffuse, task, task.known, monitor)
+def recover_shape(diffuse: np.ndarray, task: Task, monitor: Monitor, trust: np.ndarray | None = None) -> Shape:
+    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps. `trust` (H, W): see `trust_of`.
+
+    Raises `InputError`, `Cancelled`.
+    """
+    result = _recover(diffuse, task, task.known, monitor, trust)
     return Shape(height_of_maps(result.height, task), np.broadcast_to(result.light, (9, 3)).copy(), _status(result), result.height)
 
 
-def energy_of(diffuse: np.ndarray, shape: Shape, task: Task) -> float:
-    """The SIRFS objective of the working photo's `diffuse` image (H, W, 3) at `shape`."""
-    return _recover(diffuse, task, Known(shape.working_height, shape.light, task.known.depth), Monitor()).terms.total
+def energy_of(diffuse: np.ndarray, shape: Shape, task: Task, trust: np.ndarray | None = None) -> float:
+    """The SIRFS objective of the working photo's `diffuse` image (H, W, 3) at `shape`; `trust` (H, W): see `trust_of`."""
+    return _recover(diffuse, task, Known(shape.working_height, shape.light, task.known.depth), Monitor(), trust).terms.total
 
 
-def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor) -> Recovered:
+def trust_of(confidence: np.ndarray, wanted: bool) -> np.ndarray | None:
+    """How much a pixel's reflectance counts in SIRFS, (H, W), of a separation's `confidence` (H, W) in [0, 1]: never nothing.
+
+    None, so that all count alike, unless that is `wanted`.
+    """
+    return np.maximum(confidence, _LEAST_TRUST).astype(np.float64) if wanted else None
+
+
+def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, trust: np.ndarray | None) -> Recovered:
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
@@ -48,7 +61,7 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor) ->
     with task.clock.stage("shape and light"):
         return recover(
             diffuse[..., :channels], working.mask, working.code_value / 2, priors, weights, options,
-            known=Known(known.height, light, known.depth), monitor=monitor,
+            trust=trust, known=Known(known.height, light, known.depth), monitor=monitor,
         )  # fmt: skip
 
 

@@ -105,8 +105,8 @@ def _mix(source, matrix, target):
 
 
 @compiled
-def smoothness_block(first, last, whitened, valid, spans, offsets, table, rises, low, inverse_step, gradient, spill, total, block):
-    """The smoothness term of the pairs whose upper pixel lies in rows [first, last); gradients unscaled.
+def smoothness_block(first, last, whitened, trust, spans, offsets, table, rises, low, inverse_step, gradient, spill, total, block):
+    """The smoothness term of the pairs whose upper pixel lies in rows [first, last); gradients unscaled. trust (H, W) in [0, 1].
 
     gradient (H, C, W) is overwritten in these rows; what goes to the two rows below goes to spill (2, C, W).
     """
@@ -132,7 +132,7 @@ def smoothness_block(first, last, whitened, valid, spans, offsets, table, rises,
             n = b - a
             if n <= 0:
                 continue
-            va, vb = valid[i, a:b], valid[q, a + right : b + right]
+            va, vb = trust[i, a:b], trust[q, a + right : b + right]
             for k in range(n):
                 w[k] = va[k] * vb[k]
             for c in range(channels):
@@ -246,7 +246,7 @@ def curvature_block(first, last, geometry, valid, spans, offsets, table, rises, 
 
 
 @compiled
-def palette_range(palette, valid, spans, low, step, nodes, bounds):
+def palette_range(palette, trust, spans, low, step, nodes, bounds):
     """The first and last occupied node on each axis: fills bounds (C, 2)."""
     height, channels, _ = palette.shape
     t = palette.dtype.type
@@ -255,7 +255,7 @@ def palette_range(palette, valid, spans, low, step, nodes, bounds):
         for i in range(height):
             row = palette[i, c]
             for j in range(spans[i, 0], spans[i, 1]):
-                if valid[i, j] > t(0):
+                if trust[i, j] > t(0):
                     least, most = min(least, row[j]), max(most, row[j])
         first = min(max((least - low) / step, 0.0), nodes - 1.0)
         final = min(max((most - low) / step, 0.0), nodes - 1.0)
@@ -285,17 +285,18 @@ def locate_color(palette, spans, low, inverse_step, nodes, bounds, cell, side):
 
 
 @compiled
-def splat_color(valid, spans, cell, side, counts):
-    """Adds every valid pixel to the eight nodes around its whitened log colour; counts (A, B, N)."""
+def splat_color(trust, spans, cell, side, counts):
+    """Adds every pixel's trust (H, W) to the eight nodes around its whitened log colour; counts (A, B, N)."""
     right, down = counts.shape[2], counts.shape[1] * counts.shape[2]
     flat = counts.reshape(counts.size)
-    for i in range(valid.shape[0]):
+    for i in range(trust.shape[0]):
         for j in range(spans[i, 0], spans[i, 1]):
-            if valid[i, j] == 0:
+            if trust[i, j] == 0:
                 continue
             k = cell[i, j]
             x, y, z = float(side[i, 0, j]), float(side[i, 1, j]), float(side[i, 2, j])
-            x0, y0 = 1 - x, 1 - y
+            share = float(trust[i, j])
+            x0, y0, x = share * (1 - x), 1 - y, share * x
             p00, p01, p10, p11 = x0 * y0, x0 * y, x * y0, x * y
             flat[k] += p00 * (1 - z)
             flat[k + 1] += p00 * z
@@ -308,8 +309,8 @@ def splat_color(valid, spans, cell, side, counts):
 
 
 @compiled
-def gather_color(palette, valid, spans, low, high, inverse_step, cell, side, node_gradient, gradient):
-    """Gradient (H, 3, W) of the whitened log colours from that of the node counts (A, B, N); 0 where not valid or off the grid."""
+def gather_color(palette, trust, spans, low, high, inverse_step, cell, side, node_gradient, gradient):
+    """Gradient (H, 3, W) of the whitened log colours from that of the node counts (A, B, N), times trust; 0 off the grid."""
     t = gradient.dtype.type
     inv = t(inverse_step)
     right, down = node_gradient.shape[2], node_gradient.shape[1] * node_gradient.shape[2]
@@ -317,9 +318,9 @@ def gather_color(palette, valid, spans, low, high, inverse_step, cell, side, nod
     for i in range(palette.shape[0]):
         gx_row, gy_row, gz_row = gradient[i, 0], gradient[i, 1], gradient[i, 2]
         for j in range(spans[i, 0], spans[i, 1]):
-            if valid[i, j] == 0:
+            if trust[i, j] == 0:
                 continue
-            k = cell[i, j]
+            k, share = cell[i, j], inv * trust[i, j]
             x, y, z = side[i, 0, j], side[i, 1, j], side[i, 2, j]
             g000, g001, g010, g011 = flat[k], flat[k + 1], flat[k + right], flat[k + right + 1]
             k += down
@@ -327,10 +328,10 @@ def gather_color(palette, valid, spans, low, high, inverse_step, cell, side, nod
             d00, d01, d10, d11 = g001 - g000, g011 - g010, g101 - g100, g111 - g110
             e00, e01, e10, e11 = g000 + z * d00, g010 + z * d01, g100 + z * d10, g110 + z * d11
             f0, f1 = e01 - e00, e11 - e10
-            gx_row[j] = inv * ((e10 + y * f1) - (e00 + y * f0))
-            gy_row[j] = inv * (f0 + x * (f1 - f0))
+            gx_row[j] = share * ((e10 + y * f1) - (e00 + y * f0))
+            gy_row[j] = share * (f0 + x * (f1 - f0))
             h0, h1 = d00 + y * (d01 - d00), d10 + y * (d11 - d10)
-            gz_row[j] = inv * (h0 + x * (h1 - h0))
+            gz_row[j] = share * (h0 + x * (h1 - h0))
         for c in range(3):
             values, out = palette[i, c], gradient[i, c]
             for j in range(spans[i, 0], spans[i, 1]):

@@ -54,7 +54,7 @@ class NumbaEngine:
     def _set_up_inputs(self) -> None:
         p, t = self.problem, self.dtype
         self._log_image = np.ascontiguousarray(p.log_image.transpose(0, 2, 1), t)
-        self._valid = p.valid.astype(t)
+        self._valid, self._trust = p.valid.astype(t), p.reflectance_weight.astype(t)
         height, width = p.valid.shape
         spans = np.zeros((height, 2), np.int64)
         rows = p.valid.any(axis=1)
@@ -163,7 +163,7 @@ class NumbaEngine:
             return
         table = p.priors.smoothness
         kernels.smoothness_block(
-            first, last, self._whitened, self._valid, self._spans, self._offsets, *self._smooth_table, table.low,
+            first, last, self._whitened, self._trust, self._spans, self._offsets, *self._smooth_table, table.low,
             1 / table.step, self._g_smooth, self._smooth_spill[k], self._smooth_cost, k,
         )  # fmt: skip
 
@@ -182,11 +182,11 @@ class NumbaEngine:
         nodes = table.values.shape[0]
         step = (table.high - table.low) / (nodes - 1)
         bounds = np.empty((3, 2), np.int64)
-        kernels.palette_range(self._palette, self._valid, self._spans, table.low, step, nodes, bounds)
+        kernels.palette_range(self._palette, self._trust, self._spans, table.low, step, nodes, bounds)
         counts = np.zeros(tuple(bounds[:, 1] - bounds[:, 0]))
         kernels.locate_color(self._palette, self._spans, table.low, 1 / step, nodes, bounds, self._cell, self._side)
-        kernels.splat_color(self._valid, self._spans, self._cell, self._side, counts)
-        pixels = int(p.valid.sum())
+        kernels.splat_color(self._trust, self._spans, self._cell, self._side, counts)
+        pixels = float(p.reflectance_weight.sum())
         blurred = np.empty_like(counts)
         kernels.blur_color(counts, reflectance.parzen_taps(w.parsimony_sigma / reflectance.SIGMA_UNIT, step, pixels, 3), blurred)
         overlap = float((blurred * counts).sum())
@@ -195,7 +195,7 @@ class NumbaEngine:
         node_gradient = (-2 * w.parsimony / overlap) * blurred + scale * costs
         self._palette_terms = {"parsimony": -w.parsimony * float(np.log(overlap)), "absolute": scale * float((costs * counts).sum())}
         kernels.gather_color(
-            self._palette, self._valid, self._spans, table.low, table.high, 1 / step, self._cell, self._side,
+            self._palette, self._trust, self._spans, table.low, table.high, 1 / step, self._cell, self._side,
             node_gradient.astype(self.dtype), self._g_palette,
         )  # fmt: skip
 
@@ -204,12 +204,12 @@ class NumbaEngine:
         p, w = self.problem, self.problem.weights
         values = self._palette.transpose(0, 2, 1)
         if p.shading_only:
-            cost, gradient = reflectance.one_color_cost(values, p.valid, w.shading_only)
+            cost, gradient = reflectance.one_color_cost(values, p.reflectance_weight, w.shading_only)
             self._palette_terms = {"shading_only": cost}
             self._g_palette[:] = gradient.transpose(0, 2, 1)
             return
         log_reflectance = values @ np.linalg.inv(self._whiten_palette).T
-        parsimony, absolute, gradient = reflectance.palette_cost(log_reflectance, p.valid, p.priors, w)
+        parsimony, absolute, gradient = reflectance.palette_cost(log_reflectance, p.reflectance_weight, p.priors, w)
         self._palette_terms = {"parsimony": parsimony, "absolute": absolute}
         self._g_palette[:] = (gradient @ np.linalg.inv(self._whiten_palette)).transpose(0, 2, 1)
 

@@ -14,6 +14,7 @@ class NumpyEngine:
     def __init__(self, problem: Problem, dtype: type[np.floating] = np.float64) -> None:
         self.problem = problem
         self.dtype = np.dtype(dtype)
+        self._trust = problem.reflectance_weight
         self._log_image = np.ascontiguousarray(problem.log_image, self.dtype)
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
@@ -36,10 +37,10 @@ class NumpyEngine:
     def _reflectance(self, log_reflectance: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
         p, w = self.problem, self.problem.weights
         if p.shading_only:
-            cost, gradient = reflectance.one_color_cost(log_reflectance, p.valid, w.shading_only)
+            cost, gradient = reflectance.one_color_cost(log_reflectance, self._trust, w.shading_only)
             return {"shading_only": cost}, gradient
-        smooth, d_smooth = reflectance.smoothness_cost(log_reflectance, p.valid, p.priors, w.smoothness)
-        parsimony, absolute, d_palette = reflectance.palette_cost(log_reflectance, p.valid, p.priors, w)
+        smooth, d_smooth = reflectance.smoothness_cost(log_reflectance, self._trust, p.priors, w.smoothness)
+        parsimony, absolute, d_palette = reflectance.palette_cost(log_reflectance, self._trust, p.priors, w)
         return {"smoothness": smooth, "parsimony": parsimony, "absolute": absolute}, d_smooth + d_palette
 
     def _shape(

@@ -33,6 +33,7 @@ class Problem:
     `mask`: (H, W) bool, the object; `contour`: its occluding contour.
 
     `silhouette`: what the outline says of the normals. `shading_only`: shape-from-shading mode, reflectance is taken as one unknown colour.
+    `trust`: (H, W) in [0, 1], how much a valid pixel counts in the terms of reflectance, of a pair the product; not 0 everywhere. None: 1.
     """
 
     log_image: np.ndarray
@@ -44,6 +45,12 @@ class Problem:
     observation: DepthObservation | None = None
     shading_only: bool = False
     silhouette: SilhouetteField | None = None
+    trust: np.ndarray | None = None
+
+    @property
+    def reflectance_weight(self) -> np.ndarray:
+        """`trust` (H, W) float64, 0 where not valid."""
+        return np.where(self.valid, 1.0 if self.trust is None else self.trust, 0.0)
 
 
 @dataclass(frozen=True)

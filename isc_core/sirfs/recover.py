@@ -103,19 +103,21 @@ def recover(
     weights: Weights,
     options: RecoverOptions | None = None,
     *,
+    trust: np.ndarray | None = None,
     known: Known | None = None,
     monitor: Monitor | None = None,
 ) -> Recovered:
     """Recovers height and light.
 
     `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`: zero channels are raised to it, in
-    the logarithm only. Raises `Cancelled`.
+    the logarithm only. `trust`: (H, W) in [0, 1], see `Problem`. Raises `Cancelled`.
     """
     options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
     known, base = _levelled(known, mask)
     window, factor = _window(mask, options)
     inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
-    scene = _Scene(window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window)
+    trusted = None if trust is None else window.cut(trust, 0)
+    scene = _Scene(window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window, trusted)
     problem = scene.problem(factor)
     given = None if known.height is None else _to_solve(window.cut_on(known.height), scene.inside, factor)
     result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=monitor)
@@ -167,10 +169,11 @@ class _Scene:
     options: RecoverOptions
     known: Known
     window: _Window
+    trust: np.ndarray | None
 
     def problem(self, factor: float) -> Problem:
         """The problem at `factor` times the image's scale."""
-        image, valid, outline, photo, depth = self.image, self.inside, self.outline, self.photo, self.known.depth
+        image, valid, outline, photo, depth, trust = self.image, self.inside, self.outline, self.photo, self.known.depth, self.trust
         if depth is not None:
             depth = DepthObservation(self.window.cut(depth.height, np.nan), depth.sigma, depth.weight)
         if factor != 1:
@@ -178,11 +181,12 @@ class _Scene:
             valid = share >= 0.5 * share.max()  # an object thinner than a pixel fills none by half
             outline, photo = (resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5 for m in (outline, photo))
             depth = None if depth is None else _scaled_depth(depth, factor)
+            trust = None if trust is None else resample_inside(trust, self.inside, factor)[0]
         log_image = np.where(valid[..., None], np.log(np.maximum(image, self.floor)), 0.0)
         profile = self.priors.silhouette
         return Problem(
             log_image, valid, outline, _seen(occluding_contour(outline), photo), self.priors, self.weights, depth,
-            self.options.shading_only, None if profile is None else silhouette_field(outline, profile),
+            self.options.shading_only, None if profile is None else silhouette_field(outline, profile), trust,
         )  # fmt: skip
 
 

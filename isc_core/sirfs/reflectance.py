@@ -1,11 +1,11 @@
 """What SIRFS believes of reflectance: locally smooth, few colours, likely colours.
 
-With log reflectance A = log I - log shading (n pixels in the crop, n_v of them valid):
-  smoothness  w (3/25)/(C n) * sum over valid pairs of cost(sqrt(m^2 + 1e-8)), m = 0.5 |B (A_p - A_q)|^2   (colour)
-              w 3/(25 n) * sum of cost(A_p - A_q)                                                          (grey)
-  parsimony   w * -log V, V ~ n_v^-2 sum_pq exp(-|w_p - w_q|^2 / (4 sigma^2)), w = W A: a quadratic Renyi entropy with a
-              Parzen window (Principe & Xu 1999), by splatting onto a grid, blurring and summing
-  absolute    w/(8 n_v) * sum of F at w, F tabulated on the same grid
+With log reflectance A = log I - log shading (n pixels in the crop) and a pixel's trust t in [0, 1], 0 where not valid, n_t = sum t:
+  smoothness  w (3/25)/(C n) * sum over pairs of t_p t_q cost(sqrt(m^2 + 1e-8)), m = 0.5 |B (A_p - A_q)|^2   (colour)
+              w 3/(25 n) * sum of t_p t_q cost(A_p - A_q)                                                     (grey)
+  parsimony   w * -log V, V ~ n_t^-2 sum_pq t_p t_q exp(-|w_p - w_q|^2 / (4 sigma^2)), w = W A: a quadratic Renyi entropy with
+              a Parzen window (Principe & Xu 1999), by splatting onto a grid, blurring and summing
+  absolute    w/(8 n_t) * sum of t F at w, F tabulated on the same grid
 Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: no term for highlights.
 """
 
@@ -25,28 +25,29 @@ SIGMA_UNIT = 20.0
 ABSOLUTE_DIVISOR = 8.0
 
 
-def smoothness_cost(log_reflectance: np.ndarray, valid: np.ndarray, priors: Priors, weight: float) -> tuple[float, np.ndarray]:
-    """The smoothness term and its gradient with respect to `log_reflectance` (H, W, C)."""
+def smoothness_cost(log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weight: float) -> tuple[float, np.ndarray]:
+    """The smoothness term and its gradient with respect to `log_reflectance` (H, W, C); `trust` (H, W)."""
     t = log_reflectance.dtype.type
+    valid, trust = trust > 0, trust.astype(t)
     whitened = log_reflectance @ priors.smoothness_whiten.astype(log_reflectance.dtype)
     gradient = np.zeros_like(whitened)
     total = 0.0
     for offset in PAIR_OFFSETS:
         p, q = pair_slices(*offset)
         both = valid[p] & valid[q]
-        difference = whitened[p][both] - whitened[q][both]
+        difference, counts = whitened[p][both] - whitened[q][both], trust[p][both] * trust[q][both]
         if priors.channels == 1:
-            cost, slope = priors.smoothness.evaluate(difference)
-            pull = slope
+            cost, slope = priors.smoothness.evaluate(difference[:, 0])
+            pull = (counts * slope)[:, None]
         else:
             m = np.einsum("kc,kc->k", difference, difference) / 2
             soft = np.sqrt(m * m + t(SOFT_SQUARE))
             cost, slope = priors.smoothness.evaluate(soft)
-            pull = (slope * m / soft)[:, None] * difference
-        total += float(cost.sum(dtype=float))
+            pull = (counts * slope * m / soft)[:, None] * difference
+        total += float((counts * cost).sum(dtype=float))
         gradient[p][both] += pull
         gradient[q][both] -= pull
-    n = valid.size
+    n = trust.size
     scale = weight * 3 / (25 * n * priors.channels)
     return scale * total, (gradient @ priors.smoothness_whiten.T.astype(gradient.dtype)) * t(scale)
 
@@ -103,7 +104,7 @@ def gather_gradient(where: Splat, node_gradient: np.ndarray) -> np.ndarray:
     return np.where(where.inside, gradient / where.step, 0.0)
 
 
-def parzen_taps(sigma: float, step: float, count: int, channels: int) -> np.ndarray:
+def parzen_taps(sigma: float, step: float, count: float, channels: int) -> np.ndarray:
     """Blur weights of one axis for the Parzen window of `parsimony_sigma / 20`, and the share 1/count^2 of all axes together."""
     half = min(100, int(np.ceil(6 * sigma / step)))
     k = np.arange(-half, half + 1)
@@ -117,14 +118,15 @@ def blur(counts: np.ndarray, taps: np.ndarray) -> np.ndarray:
     return np.maximum(counts, np.finfo(float).eps)
 
 
-def palette_cost(log_reflectance: np.ndarray, valid: np.ndarray, priors: Priors, weights: Weights) -> tuple[float, float, np.ndarray]:
-    """The parsimony and absolute terms, and the gradient of their sum with respect to `log_reflectance` (H, W, C)."""
-    whiten = priors.parsimony_whiten
+def palette_cost(log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weights: Weights) -> tuple[float, float, np.ndarray]:
+    """The parsimony and absolute terms, and the gradient of their sum with respect to `log_reflectance` (H, W, C); `trust` (H, W)."""
+    whiten, valid = priors.parsimony_whiten, trust > 0
     samples = log_reflectance[valid].astype(float) @ whiten.T
     where = splat(samples, priors.absolute)
-    count = len(samples)
+    share = trust[valid].astype(float)
+    count = float(share.sum())
     size = int(np.prod(where.shape))
-    counts = np.bincount(where.index.ravel(), where.weight.ravel(), size).reshape(where.shape)
+    counts = np.bincount(where.index.ravel(), (where.weight * share).ravel(), size).reshape(where.shape)
     taps = parzen_taps(weights.parsimony_sigma / SIGMA_UNIT, where.step, count, priors.channels)
     blurred = blur(counts, taps)
     overlap = float((blurred * counts).sum())
@@ -133,14 +135,15 @@ def palette_cost(log_reflectance: np.ndarray, valid: np.ndarray, priors: Priors,
     scale = weights.absolute / (ABSOLUTE_DIVISOR * count)
     node_gradient = (-2 * weights.parsimony / overlap) * blurred + scale * costs
     gradient = np.zeros_like(log_reflectance)
-    gradient[valid] = gather_gradient(where, node_gradient) @ whiten
+    gradient[valid] = (share[:, None] * gather_gradient(where, node_gradient)) @ whiten
     return -weights.parsimony * float(np.log(overlap)), scale * float((costs * counts).sum()), gradient
 
 
-def one_color_cost(log_reflectance: np.ndarray, valid: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
-    """Shape-from-shading mode: weight/(2 n_v) * sum of (A - mean A)^2, and its gradient (H, W, C)."""
-    away = log_reflectance[valid].astype(float)
-    away = away - away.mean(axis=0)
+def one_color_cost(log_reflectance: np.ndarray, trust: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
+    """Shape-from-shading mode: weight/(2 n_t) * sum of t (A - mean A)^2, the mean with t, and its gradient (H, W, C); `trust` (H, W)."""
+    valid = trust > 0
+    away, share = log_reflectance[valid].astype(float), trust[valid].astype(float)[:, None]
+    away = away - (share * away).sum(axis=0) / share.sum()
     gradient = np.zeros_like(log_reflectance)
-    gradient[valid] = away * (weight / len(away))
-    return weight / (2 * len(away)) * float((away * away).sum()), gradient
+    gradient[valid] = share * away * (weight / share.sum())
+    return weight / (2 * float(share.sum())) * float((share * away * away).sum()), gradient

@@ -134,6 +134,12 @@ def make_problem(
     return Problem(log_image, valid, scene.mask, contour, priors, chosen or weights(), observation, shading_only, silhouette=field)
 
 
+def some_trust(shape: tuple[int, ...]) -> np.ndarray:
+    """How far pixels of a photo may be trusted: between 0 and 1, not at all in places."""
+    trust = np.random.default_rng(12).uniform(-0.3, 1, shape)
+    return np.maximum(trust, 0)
+
+
 def random_state(shape: tuple[int, int], channels: int, seed: int, size: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
     """A smooth random height with slopes of up to about 1, and a light near the prior's mean."""
     rng = np.random.default_rng(seed)

@@ -11,18 +11,26 @@ from isc_core.sirfs.problem import DepthObservation, Problem
 from isc_core.sirfs.solver import SolverOptions, solve
 from isc_core.workers import Workers
 
-from .small_problems import blob, make_problem, random_state, weights
+from .small_problems import blob, make_problem, random_state, some_trust, weights
 
 numba_engine = pytest.importorskip("isc_core.sirfs.numba_engine", reason="needs numba", exc_type=ImportError)
 
-KINDS = {"colour": (3, False), "grey": (1, False), "shading only": (3, True), "grey shading only": (1, True)}
+KINDS = {
+    "colour": (3, False),
+    "trusted": (3, False),
+    "grey trusted": (1, False),
+    "grey": (1, False),
+    "shading only": (3, True),
+    "grey shading only": (1, True),
+}
 
 
 def problem_of(kind: str) -> Problem:
     channels, shading_only = KINDS[kind]
     scene = blob((70, 62), channels)
     seen = DepthObservation(np.where(np.random.default_rng(1).random(scene.mask.shape) < 0.3, np.nan, scene.height))
-    return make_problem(scene, weights(silhouette=2.0), shading_only=shading_only, observation=seen, holes=True, outline=True)
+    problem = make_problem(scene, weights(silhouette=2.0), shading_only=shading_only, observation=seen, holes=True, outline=True)
+    return replace(problem, trust=some_trust(scene.mask.shape) if "trusted" in kind else None)
 
 
 def states(problem: Problem, dtype: type[np.floating]) -> list[tuple[np.ndarray, np.ndarray]]:

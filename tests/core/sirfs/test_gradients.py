@@ -8,11 +8,11 @@ import pytest
 from scipy import ndimage
 
 from isc_core.sirfs.numpy_engine import NumpyEngine
-from isc_core.sirfs.problem import DepthObservation, Problem
+from isc_core.sirfs.problem import DepthObservation, Problem, Terms
 from isc_core.sirfs.solver import Engine
 from isc_core.sirfs.tables import CostTable
 
-from .small_problems import blob, make_problem, only, random_state, weights
+from .small_problems import blob, make_problem, only, random_state, some_trust, weights
 
 TERMS = ("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "silhouette", "observation", "shading_only")
 OF_HEIGHT = set(TERMS) - {"light"}
@@ -38,21 +38,22 @@ def coarser(table: CostTable) -> CostTable:
 def problem_of(term: str, channels: int) -> Problem:
     scene = blob((38, 45), channels)
     seen = None
-    if term in ("observation", "all"):
+    everything = term in ("all", "all, some trusted less")
+    if term == "observation" or everything:
         rng = np.random.default_rng(8)
         heights = np.where(rng.random(scene.mask.shape) < 0.4, np.nan, scene.height + rng.normal(size=scene.mask.shape))
         seen = DepthObservation(heights, sigma=1.5, weight=4.0)
     problem = make_problem(
         scene,
-        weights(silhouette=2.0) if term == "all" else only(term),
+        weights(silhouette=2.0) if everything else only(term),
         observation=seen,
         shading_only=term == "shading_only",
         holes=True,
-        outline=term in ("silhouette", "all"),
+        outline=term == "silhouette" or everything,
     )
     priors = problem.priors
     priors = replace(priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness))
-    return replace(problem, priors=priors)
+    return replace(problem, priors=priors, trust=some_trust(scene.mask.shape) if "trusted" in term else None)
 
 
 def directions(shape: tuple[int, int]) -> list[np.ndarray]:
@@ -71,7 +72,7 @@ def difference(engine: Engine, height: np.ndarray, light: np.ndarray, dz: np.nda
 
 @pytest.mark.parametrize("channels", [3, 1])
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
-@pytest.mark.parametrize("term", [*TERMS, "all"])
+@pytest.mark.parametrize("term", [*TERMS, "all", "all, some trusted less"])
 def test_gradient_is_the_slope(term: str, engine: str, channels: int) -> None:
     problem = problem_of(term, channels)
     shape: tuple[int, int] = problem.valid.shape  # type: ignore[assignment]
@@ -79,7 +80,7 @@ def test_gradient_is_the_slope(term: str, engine: str, channels: int) -> None:
     of_term = make_engine(engine, problem)
     result = of_term.evaluate(height, light)
     d_height, d_light = result.height_gradient.copy(), result.light_gradient.copy()
-    if term != "all":
+    if term in TERMS:
         others = {name: value for name, value in vars(result.terms).items() if name != term}
         assert getattr(result.terms, term) > 0 or term in ("parsimony", "absolute")
         assert not any(others.values())
@@ -96,4 +97,26 @@ def test_gradient_is_the_slope(term: str, engine: str, channels: int) -> None:
         slope = float((d_light * dl).sum())
         size = float(np.linalg.norm(d_light * dl))
         assert difference(of_term, height, light, flat_height, dl) == pytest.approx(slope, rel=1e-5, abs=1e-5 * size + 1e-9)
-    assert (np.abs(d_light).max() > 1e-5) == (term in OF_LIGHT or term == "all")
+    assert (np.abs(d_light).max() > 1e-5) == (term in OF_LIGHT or term not in TERMS)
+
+
+@pytest.mark.parametrize("shading_only", [False, True])
+@pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
+def test_what_trust_means(engine: str, shading_only: bool) -> None:
+    """None is 1; half of it everywhere asks half as much of pairs and nothing else; 0 leaves a pixel's reflectance out."""
+    problem = make_problem(blob((30, 34)), shading_only=shading_only)
+    height, light = random_state((30, 34), 3, 4)
+    doubtful = some_trust((30, 34)) == 0
+
+    def terms(trust: np.ndarray | None, valid: np.ndarray = problem.valid) -> Terms:
+        return make_engine(engine, replace(problem, trust=trust, valid=valid)).evaluate(height, light).terms
+
+    whole, half = terms(None), terms(np.full((30, 34), 0.5))
+    assert terms(np.ones((30, 34))) == whole
+    for name in ("parsimony", "absolute", "shading_only", "curvature", "contour"):
+        assert getattr(half, name) == pytest.approx(getattr(whole, name), rel=1e-9), name
+    assert half.smoothness == pytest.approx(whole.smoothness / 4, rel=1e-9)
+    less, without = terms(np.where(doubtful, 0, 1.0)), terms(None, problem.valid & ~doubtful)
+    for name in ("smoothness", "parsimony", "absolute", "shading_only"):
+        assert getattr(less, name) == pytest.approx(getattr(without, name), rel=1e-9), name
+    assert less.curvature == whole.curvature

@@ -1,0 +1,105 @@
+"""Photos under coloured light: what a model makes of them under white light, with the colour put back."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from isc_core.brdf.fitting import Interval, LobeFit, LobeLight
+from isc_core.decomposition import Separation
+from isc_core.errors import InputError
+from isc_core.illuminant import estimate_illuminant
+from isc_core.models import Answer, Settings, Task
+from isc_core.models.light_colour import under_light
+from isc_core.photo import Photo, PhotoSource
+from isc_core.pipeline import decompose
+from isc_core.separation import separate
+from isc_core.sirfs.frames import light_from_reference
+from tests.core.test_illuminant import LIGHT, PAINTS, ball
+
+
+def photo_of(paints: np.ndarray, light: np.ndarray, gloss: float = 0.5, size: int = 120) -> Photo:
+    image, mask = ball(paints, light, gloss, size)
+    source = PhotoSource("0" * 64, (size, size), 12, "linear", "file")
+    return Photo(image.astype(np.float32), mask, 1 / 4095, np.zeros(mask.shape, bool), source)
+
+
+def task_of(photo: Photo, light_colour: str = "estimate") -> Task:
+    return Task(photo, photo, Settings(model="mdr", light_colour=light_colour))
+
+
+def seen_by(task: Task) -> Answer:
+    """A model that separates and says that everything is evenly lit, with a white lobe."""
+    split = separate("isc", task.maps.image, task.maps.mask)
+    lamp = LobeLight(np.array([0.0, 0, 1]), 2.0, np.ones(3), Interval(0.5 * np.ones(3), 2 * np.ones(3)))
+    brdf = LobeFit("ggx", True, "", 0.2, Interval(0.1, 0.3), (lamp,), None, None, 1.0, split.specular)
+    return Answer(split, np.zeros(task.maps.mask.shape), np.zeros((9, 3)), {"reason": "made"}, brdf)
+
+
+def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> None:
+    photo, seen = photo_of(PAINTS, LIGHT), []
+
+    def solver(task: Task) -> Answer:
+        seen.append(task)
+        return seen_by(task)
+
+    answer = under_light(task_of(photo), solver)
+    colour = estimate_illuminant(photo.image, photo.mask).colour
+    assert seen[0].one_scale and np.allclose(seen[0].working.image, photo.image / colour, atol=1e-6)
+    split, white = answer.split, seen_by(seen[0]).split
+    np.testing.assert_allclose(split.specular, white.specular * colour, atol=1e-6)
+    assert np.abs(split.diffuse + split.specular + split.residual - photo.image)[photo.mask].max() < 1e-5 * photo.image.max()
+    shading = np.exp(light_from_reference(answer.light)[0] * np.sqrt(1 / (4 * np.pi)))
+    np.testing.assert_allclose(shading, colour)
+    assert answer.brdf is not None and np.allclose(answer.brdf.lights[0].strength_light, colour)
+    said = answer.status["light_colour"]
+    assert said["used"] == "estimate" and said["determined"] and np.allclose(said["estimate"], colour, atol=1e-4)
+    assert answer.status["reason"] == "made"
+
+
+@pytest.mark.parametrize(("paints", "asked"), [(PAINTS, "white"), (PAINTS[:1], "estimate")])
+def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(paints: np.ndarray, asked: str) -> None:
+    photo = photo_of(paints, LIGHT)
+    answer, usual = under_light(task_of(photo, asked), seen_by), seen_by(task_of(photo))
+    np.testing.assert_array_equal(answer.split.diffuse, usual.split.diffuse)
+    np.testing.assert_array_equal(answer.split.confidence, usual.split.confidence)
+    said = answer.status["light_colour"]
+    assert said["used"] == "white" and said["reason"]
+    assert ("--light-colour estimate" in said["help"]) == (asked == "white")
+
+
+def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() -> None:
+    photo = photo_of(PAINTS, np.array([1.3, 1.0, 0.7]))
+    answer, usual = under_light(task_of(photo), seen_by), seen_by(task_of(photo))
+    assert estimate_illuminant(photo.image, photo.mask).too_strong
+    np.testing.assert_allclose(answer.split.confidence, 0.5 * usual.split.confidence)
+    said = answer.status["light_colour"]
+    assert said["used"] == "white" and "strongly coloured" in said["help"] and "too strong" in said["reason"]
+
+
+def test_layers_that_are_known_already_are_taken_along() -> None:
+    photo = photo_of(PAINTS, LIGHT)
+    split = separate("none", photo.image, photo.mask)
+
+    def given(task: Task) -> Answer:
+        assert task.split is not None
+        return replace(seen_by(task), split=task.split)
+
+    found: Separation = under_light(replace(task_of(photo), split=split), given).split
+    np.testing.assert_allclose(found.diffuse, split.diffuse, atol=1e-6)
+
+
+@pytest.mark.parametrize("model", ["joint", "mbp"])
+def test_the_identities_hold_in_the_end(model: str) -> None:
+    d = decompose(photo_of(PAINTS, LIGHT, size=64), Settings(model=model, light_colour="estimate", confidence_weights=model == "joint"))
+    assert d.identity_errors().broken() == ()
+    assert d.provenance.status["light_colour"]["used"] == "estimate"
+    assert d.provenance.settings["light_colour"] == "estimate"
+
+
+def test_options_that_mean_nothing_to_a_model_are_refused() -> None:
+    for settings in (Settings(model="sirfs", light_colour="estimate"), Settings(model="mbp", confidence_weights=True)):
+        with pytest.raises(InputError, match="means nothing to"):
+            settings.check()
+    with pytest.raises(InputError, match="unknown light colour"):
+        Settings(light_colour="red").check()
