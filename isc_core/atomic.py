@@ -145,8 +145,11 @@ def _require_replaceable_file(target: Path) -> None:
 
 
 def _try_beside(target: Path) -> None:
-    with _explained(target), _made_parents(target, keep=False), _begun(target, is_folder=True):
-        pass
+    """Where parents lack, in the innermost that is there: to make and remove them could take them away from another process."""
+    with _explained(target):
+        place = next(parent for parent in target.parents if parent.exists())
+        with _begun(place / target.name, is_folder=True):
+            pass
 
 
 def _resolved(path: Path | str) -> Path:
@@ -327,13 +330,13 @@ def _replace_in_two_steps(partial: Path, target: Path) -> None:
 
 
 @contextmanager
-def _made_parents(target: Path, *, keep: bool = True) -> Iterator[None]:
-    """Creates the parent folders that lack; removes them again unless the block ends well and they are to be kept."""
+def _made_parents(target: Path) -> Iterator[None]:
+    """Creates the parent folders that lack; removes them again unless the block ends well."""
     missing = [parent for parent in target.parents if not parent.exists()]
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
         yield
-        missing = missing if not keep else []
+        missing = []
     finally:
         for parent in missing:  # the innermost first; one that somebody else has filled meanwhile stays
             with contextlib.suppress(OSError):
