@@ -39,16 +39,15 @@ def make_items(wanted: Sequence[Item], context: Context, *, again: bool = False)
     require_writable_file(context.output / "README.md")
     missing = [item for item in wanted if again or not is_complete(context.output, item.name, context.fingerprint)]
     failed: list[tuple[str, str]] = []
-    try:
-        for item, part in _watched(missing, context):
-            try:
-                _make(item, replace(context, monitor=part))
-            except InputError as error:
-                if len(wanted) == 1:
-                    raise
-                failed.append((f"{item.kind} {item.number}", str(error)))
-    finally:
-        if any(read_record(context.output, item.name) is not None for item in wanted):
+    for item, part in _watched(missing, context):
+        try:
+            _make(item, replace(context, monitor=part))
+        except InputError as error:
+            if len(wanted) == 1:
+                raise
+            failed.append((f"{item.kind} {item.number}", str(error)))
+        else:
+            # After each item, so that the index of a long run, or an interrupted one, is never behind.
             write_index(context.output, all_items())
     return Outcome(len(missing) - len(failed), len(wanted) - len(missing), tuple(failed))
 

@@ -62,7 +62,15 @@ def tabulated(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str
         if line % 2 == 0 and line:
             axes.axhspan(line, line + 1, color="0.94")
         for place, cell in zip(np.cumsum([1, *lengths[:-1]]), cells, strict=True):
-            axes.text(place, line + 0.5, cell, fontsize=LETTERS - 1, va="center", weight="normal" if line else "bold", parse_math=False)
+            axes.text(
+                place,
+                line + 0.5,
+                cell.replace("`", ""),
+                fontsize=LETTERS - 1,
+                va="center",
+                weight="normal" if line else "bold",
+                parse_math=False,
+            )
     axes.axhline(1, color="0", linewidth=0.6)
     if caption:
         made.text(0.01, 1 - _LINE * 0.75 / height, caption, fontsize=LETTERS, va="center", parse_math=False)
