@@ -158,7 +158,7 @@ def worked(
             waiting[key] = job, future
             future.add_done_callback(ended.put)
         for future in _some(ended):
-            if future.status == "pending":  # its worker died before it told; another does it again
+            if future.status in ("pending", "lost"):  # its worker died before it told; another does it again
                 future.add_done_callback(ended.put)
                 continue
             job, _ = waiting.pop(future.key)

@@ -14,6 +14,7 @@ import pytest
 from isc_core.batch import run as run_module
 from isc_core.batch.engine import Crew
 from isc_core.batch.item import DONE, FAILED, SKIPPED, Recipe
+from isc_core.batch.journal import Journal
 from isc_core.batch.run import run_batch
 from isc_core.batch.summary import PAGE
 from isc_core.errors import Cancelled, InputError
@@ -234,7 +235,7 @@ def test_a_stream_is_worked_off_in_a_window(tmp_path: Path, monkeypatch: pytest.
             next(taken)
             yield job
 
-    class Counted(run_module.Journal):
+    class Counted(Journal):
         def add(self, entry: object) -> None:
             super().add(entry)
             next(ended)
