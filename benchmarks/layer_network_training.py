@@ -1,6 +1,6 @@
 """Fits the network of `isc_core.separation.layer_network`.
 
-  python -m benchmarks.layer_network_training --scenes DIR [--data ROOT --glossy DIR [--leave a,b]] -o NETWORK.npz [--steps N]
+  python -m benchmarks.layer_network_training --scenes DIR [--data ROOT --glossy DIR... [--leave a,b]] -o NETWORK.npz [--steps N]
 
 `--scenes`: a folder of `isc synth`. `--data`, `--glossy`: the MIT-Berkeley set and what `isc synth glossy-mit` made of it; `--leave`:
 objects that the network must not see, because it will be measured on them. Needs PyTorch (`pip install 'isc3d[training]'`), which nothing
@@ -30,7 +30,7 @@ WIDTHS = (32, 48, 64, 96, 128)
 _DARK, _MARGIN = 0.03, 2.0  # as in layer_network
 _RATE, _DECAY, _WARM_UP = 8e-4, 1e-3, 200
 _COMMON, _MOST = 0.1, 3.0
-_SHARE = 0.4  # of the samples that are of the set's objects
+_SHARE = 0.5  # of the samples that are of the set's objects
 _HUBER = 0.4
 
 
@@ -182,7 +182,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scenes", type=Path, required=True)
     parser.add_argument("--data", type=Path)
-    parser.add_argument("--glossy", type=Path)
+    parser.add_argument("--glossy", type=Path, nargs="+")
     parser.add_argument("--leave", type=lambda text: text.split(","), default=[])
     parser.add_argument("--start", type=Path)
     parser.add_argument("--steps", type=int, default=12000)

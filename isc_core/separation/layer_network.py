@@ -45,7 +45,7 @@ class NetworkOptions:
     the photo and its mirror image, in twice the time."""
 
     long_side: int = 176
-    doubt: float = 0.0
+    doubt: float = 0.5
     tint: float = 1.5
     mirrored: bool = True
 
