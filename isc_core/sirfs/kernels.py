@@ -13,6 +13,9 @@ from numba import njit
 
 _FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}
 compiled = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
+# Part of each kernel that calls it: called as a function of its own it would round otherwise in the process that compiles it than in one
+# that reads it from the cache, for the two link it with another copy.
+inlined = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy", forceinline=True)
 # Differences of neighbouring heights are exact; reordering them would lose in float32 what the curvature needs.
 in_order = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
 
@@ -88,7 +91,7 @@ def forward_rows(first, last, zp, spans, log_image, light, whiten_smooth, whiten
         _mix(a[:, :count], whiten_palette, palette[i, :, start:stop])
 
 
-@compiled
+@inlined
 def _mix(source, matrix, target):
     """target[c] = sum_d matrix[c, d] source[d], row by row."""
     width = source.shape[1]
@@ -478,7 +481,7 @@ def backward_rows(
             _curvature_derivatives(row[:, start:stop], dk_all[:count], out[:, i + 2, start + 2 : stop + 2])
 
 
-@compiled
+@inlined
 def _curvature_derivatives(row, dk, out):
     """Adds what the curvature's gradient dk (W,), times n3^3, asks of the five derivatives in `out` (5, W); the last three are set."""
     t = row.dtype.type
@@ -507,7 +510,7 @@ def _curvature_derivatives(row, dk, out):
         o[j] = -dk[j] * zi[j] * zj[j]
 
 
-@compiled
+@inlined
 def _light_sums(d, n1, n2, n3, sums):
     """Sums of d times 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
     t = d.dtype.type
