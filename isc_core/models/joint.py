@@ -24,7 +24,7 @@ Limits: those of the network. A broad veil without a peak stays. Paint that ends
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -57,7 +57,7 @@ class JointOptions:
     above_usual: float = 0.3
     doubtful: float = 0.15
     change_of_variables: float = 5.0
-    network: NetworkOptions = NetworkOptions()
+    network: NetworkOptions = field(default_factory=NetworkOptions)
 
 
 @dataclass(frozen=True)
