@@ -20,7 +20,7 @@ from isc_core.datasets import list_objects, load_object
 from isc_core.exr import read_channels
 from isc_core.photo import averaged
 
-SIZE, CROP = 192, 128
+SIZE, CROP = 192, 160
 _LONG_SIDE = 176  # of an object that is larger
 _LEAST = 1e-5
 _LARGEST = 6e4  # of half precision
@@ -102,7 +102,7 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 def _placed(layers: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
     """The layers at another size, mirrored, turned, and cut to CROP pixels or set into them."""
-    layers = _resized(layers, _log_uniform(rng, 0.5, 0.95))
+    layers = _resized(layers, _log_uniform(rng, 0.7, 1.25))
     if rng.random() < 0.5:
         layers = layers.flip(2)
     if rng.random() < 0.25:
@@ -144,11 +144,11 @@ def _recoloured(diffuse: torch.Tensor, rng: np.random.Generator) -> torch.Tensor
 def _gloss(specular: float, level: float, rng: np.random.Generator) -> float:
     """The factor of the specular layer, of mean light `specular`: none, as it was relative to the diffuse `level`, or a drawn share."""
     kind = rng.random()
-    if specular < _LEAST or kind < 0.15:
+    if specular < _LEAST or kind < 0.2:
         return 0.0
-    if kind < 0.35 and level < 50:
+    if kind < 0.45 and level < 50:
         return 1 / level
-    share = _log_uniform(rng, 0.03, 0.6)
+    share = _log_uniform(rng, 0.02, 0.45)
     return min(share / (1 - share) / specular, 40.0)
 
 

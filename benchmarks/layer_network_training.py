@@ -30,7 +30,7 @@ WIDTHS = (32, 48, 64, 96, 128)
 _DARK, _MARGIN = 0.03, 2.0  # as in layer_network
 _RATE, _DECAY, _WARM_UP = 8e-4, 1e-3, 200
 _COMMON, _MOST = 0.1, 3.0
-_SHARE = 0.5  # of the samples that are of the set's objects
+_SHARE = 0.4  # of the samples that are of the set's objects
 _HUBER = 0.4
 
 
