@@ -9,14 +9,11 @@ Limits: values above 1 are shown as 1.
 """
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from PIL import Image
 
 from isc_core.photo import linear_to_srgb
 
@@ -161,11 +158,3 @@ def _bare(axes: Axes, title: str) -> None:
         side.set_visible(False)
     if title:
         axes.set_title(title, fontsize=LETTERS)
-
-
-def save(figure: Figure, path: Path) -> None:
-    """Writes a finished figure as PNG of at most 256 colours, a third of the size of one of all colours; the eye hardly tells."""
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    shown = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
-    shown.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.FLOYDSTEINBERG).save(path, format="PNG", optimize=True)

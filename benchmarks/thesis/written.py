@@ -23,7 +23,7 @@ from isc_core.json_files import read_json
 from .claims import ABSTRACT
 from .context import Context
 from .item import HOLDS, Item, Made, Table, Verdict
-from .style import finish, save, tabulated
+from .style import finish, tabulated
 
 RECORDS = "records"
 _SCHEMA = 1
@@ -68,7 +68,7 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     for file, figure in zip(pictures, drawings, strict=True):
         with new_file(folder / file) as partial:
             finish(figure)
-            save(figure, partial)
+            figure.savefig(partial, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
     for file, table in zip(lists, made.tables, strict=True):
         with new_file(folder / file) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
             csv.writer(stream, lineterminator="\n").writerows([table.header, *table.rows])
