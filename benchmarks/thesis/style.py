@@ -134,7 +134,7 @@ def sheet(
     cell = (width - _LABEL) / len(columns)
     heights = [max([image.shape[0] / image.shape[1] for image in images if image is not None] or [1.0]) * cell for _, images in rows]
     made, axes = figure(len(rows), len(columns), width=width, height=sum(heights) + _LINE * 1.5 + _GAP * len(rows))
-    made.set_layout_engine("constrained", w_pad=_GAP / 2, h_pad=_GAP / 2, wspace=0.0, hspace=0.0)
+    made.set_layout_engine("constrained", w_pad=_GAP / 2, h_pad=_GAP / 2, wspace=0.0, hspace=0.0, rect=(0.01, 0, 0.99, 1))
     grid = axes[0, 0].get_gridspec()
     grid.set_height_ratios(heights)
     for line, (name, images) in enumerate(rows):
