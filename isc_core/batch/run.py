@@ -63,12 +63,12 @@ def run_batch(
     recipe.settings.check()
     plan = _plan(batch)
     folder = RunFolder(plan.output)
+    monitor.report("looking at the inputs", 0.0)
+    inputs = Inputs(batch.inputs, batch.masks, recipe)
+    if next(iter(inputs), None) is None:  # before a folder is made
+        raise InputError(f"{', '.join(batch.inputs)}: names no image")
     with folder.held(plan.run):
-        monitor.report("looking at the inputs", 0.0)
-        inputs = Inputs(batch.inputs, batch.masks, recipe)
         names = Names(_watched(inputs, monitor))
-        if names.count == 0:
-            raise InputError(f"{', '.join(batch.inputs)}: names no image")
         with Journal(folder, names.count) as journal:
             try:
                 monitor.report("starting workers", 0.0)

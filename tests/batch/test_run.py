@@ -145,7 +145,8 @@ def test_patterns_folders_of_masks_and_what_is_not_there(photos: Path, tmp_path:
         run_batch(batch(photos, output=tmp_path / "out", masks=str(masks)))
     for missing in (tmp_path / "nowhere", tmp_path / "*.jpg", masks / "x.png"):
         with pytest.raises(InputError, match="there is no such photo"):
-            run_batch(batch(missing, output=tmp_path / "out"))
+            run_batch(batch(missing, output=tmp_path / "none"))
+        assert not (tmp_path / "none").exists()
 
 
 def test_inputs_of_an_object_store(photos: Path, tmp_path: Path) -> None:
