@@ -118,6 +118,8 @@ def _local_cluster(crew: Crew) -> Any:
             )  # fmt: skip
     except ValueError as error:
         raise InputError(f"--memory {crew.memory}: {error}") from error
+    except RuntimeError as error:  # a worker was lost while it started
+        raise InputError(f"the workers could not be started ({error}): give the same command again") from error
 
 
 @contextmanager
