@@ -35,6 +35,7 @@ from isc_core.pipeline import decompose
 from isc_core.result_folder import save
 
 from .batch_images import made_photos
+from .kept_rows import append_row, read_rows
 
 KINDS = ("worker", "run", "run and workers", "run", "scheduler")
 _WORKERS_A_RUN = 4
@@ -87,12 +88,11 @@ def main() -> None:
     again = [sys.executable, "-m", "benchmarks.batch_kills", *sys.argv[1:], "--reference"]
     subprocess.run(again, check=True, env={**os.environ, **_ONE_THREAD})
     log = place.root / "kills.jsonl"
-    rows = [json.loads(line) for line in log.read_text().splitlines()] if log.exists() else []
+    rows = read_rows(log)
     while (kills := sum(row["struck"] for row in rows)) < options.kills:
         row = one_run(place, KINDS[len(rows) % len(KINDS)], random.Random(f"{options.seed} {len(rows)}"))
         rows.append(row)
-        with log.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        append_row(log, row)
         print(f"{kills + row['struck']:4d}  {row}", flush=True)
     with running(place, cluster=False) as (run, _):  # what the last kill has left is completed, too
         ended_well(place, run, lost=False)

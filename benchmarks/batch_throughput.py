@@ -23,7 +23,6 @@ import time
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
-from typing import Any
 
 from isc_core.models.settings import Settings
 from isc_core.photo import read_photo
@@ -32,6 +31,7 @@ from isc_core.report import thumbnail
 from isc_core.result_folder import save
 
 from .batch_images import made_photos
+from .kept_rows import append_row, read_rows
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _WARM = 50  # images of which a peak is taken, at each end
@@ -64,25 +64,14 @@ def main() -> None:
 def plain_loop(place: Path, photos: list[Path], model: str, threads: int) -> None:
     """Seconds of each photo, without what the first of a process takes to load; those that are known are left out."""
     log = place / f"loop-{threads}.jsonl"
-    known = {row["photo"] for row in rows(log)}
+    known = {row["photo"] for row in read_rows(log)}
     missing = [photo for photo in photos if photo.name not in known]
     settings = Settings(model=model, threads=threads)
     for number, photo in enumerate([*missing[:1], *missing]):
         start = time.perf_counter()
         save(decompose(read_photo(photo), settings, name=photo.name), place / f"loop-{threads}" / photo.stem)
         if number:
-            append(log, {"photo": photo.name, "seconds": time.perf_counter() - start})
-
-
-def rows(path: Path) -> list[dict[str, Any]]:
-    """Of a file of JSON lines, none where there is no such file."""
-    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-
-
-def append(path: Path, row: dict[str, object]) -> None:
-    """One line more."""
-    with path.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row) + "\n")
+            append_row(log, {"photo": photo.name, "seconds": time.perf_counter() - start})
 
 
 # --- the batch ------------------------------------------------------------------------------------------------------------------------
@@ -107,7 +96,7 @@ def batch(place: Path, photos: Path, model: str, which: str) -> Run:
         start = time.perf_counter()
         subprocess.run([*command, "--workers", "2", "--threads", "1"], check=True)
         whole = time.perf_counter() - start
-        images = rows(output / "summary.jsonl")
+        images = read_rows(output / "summary.jsonl")
         if {row["status"] for row in images} != {"done" if which == "first" else "skipped"}:
             raise SystemExit(f"{output}: not what was expected of the run `{which}`: delete it and {log.name}, and begin again")
         found = Run(whole, [row["seconds"] for row in images], [row["peak_mb"] for row in images])
@@ -128,7 +117,7 @@ def thumbnail_seconds(place: Path) -> float:
 
 def table(place: Path, first: Run, again: Run, alone: Run) -> str:
     """Markdown: what was measured beside what is asked for."""
-    loops = [sum(row["seconds"] for row in rows(place / f"loop-{threads}.jsonl")) for threads in (1, 2)]
+    loops = [sum(row["seconds"] for row in read_rows(place / f"loop-{threads}.jsonl")) for threads in (1, 2)]
     count, small = len(first.seconds), thumbnail_seconds(place)
     runner = 2 * (again.whole - alone.whole) / max(count - 1, 1)
     start, end = (max(peaks) for peaks in (first.peaks[:_WARM], first.peaks[-_WARM:]))

@@ -10,7 +10,6 @@ and which share of the gain of the true diffuse image a model reaches.
 """
 
 import argparse
-import json
 import math
 import time
 from collections import defaultdict
@@ -19,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.kept_rows import append_row, read_rows
 from isc_core.datasets import MitBerkeleyObject, list_objects, load_object
 from isc_core.evaluate import Estimate, paired_bootstrap
 from isc_core.evaluation_runner import RunnerOptions, make_runner
@@ -52,7 +52,7 @@ def run(model: str, seen: MitBerkeleyObject, diffuse: MitBerkeleyObject, network
 def measure(given: argparse.Namespace) -> list[dict[str, object]]:
     """All rows: those that are on disk, and new ones."""
     path = given.output / "rows.jsonl"
-    rows = [json.loads(line) for line in path.read_text().splitlines()] if path.is_file() else []
+    rows = read_rows(path)
     done = {(row["set"], row["object"], row["model"]) for row in rows}
     folders = [given.data, *(sorted(p for p in given.glossy.iterdir() if p.is_dir()) if given.glossy else [])]
     for folder in folders:
@@ -71,8 +71,7 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
                 scores = score(seen, **maps)
                 row = {"set": label, "object": name, "model": model, "seconds": seconds, **asdict(scores), "average": scores.average}
                 rows.append(row)
-                with path.open("a") as file:
-                    file.write(json.dumps(row) + "\n")
+                append_row(path, row)
                 print(label, name, model, f"{scores.average:.5f}", flush=True)
     return rows
 

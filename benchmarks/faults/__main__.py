@@ -7,13 +7,13 @@ the table says so. Exit 1 if an output was wrong. On Linux.
 """
 
 import argparse
-import json
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+from ..kept_rows import append_row, read_rows
 from .commands import COMMANDS, Command, prepared
 from .disk import FAULTS, Faults, reference
 from .listing import many_images
@@ -34,29 +34,19 @@ def main() -> int:
     folder = given.output.resolve()
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "rows.jsonl"
-    rows = read(path)
+    rows = read_rows(path)
     known = {str(row["key"]) for row in rows}
     for key, work in _works(folder, given.kills):
         if key in known or given.only not in key:
             continue
         row = {"key": key, **work()}
         rows.append(row)
-        with path.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+        append_row(path, row)
         print(f"{key}: {row['runs']} runs, {len(row['wrong'])} wrong {row['wrong'][:2] or row['note']}", flush=True)
     text = table(rows)
     (folder / "table.md").write_text(text + "\n", encoding="utf-8")
     print(text)
     return 1 if any(row["wrong"] for row in rows) else 0
-
-
-def read(path: Path) -> list[Row]:
-    """The rows that were run, without a last line that was cut short."""
-    if not path.is_file():
-        return []
-    whole = path.read_text(encoding="utf-8").split("\n")[:-1]
-    path.write_text("".join(f"{line}\n" for line in whole), encoding="utf-8")
-    return [json.loads(line) for line in whole]
 
 
 def _row(found: list[str] | None, note: str = "") -> Row:

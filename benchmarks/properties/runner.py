@@ -1,6 +1,5 @@
 """Runs laws on drawn cases in chunks, each of them kept, so that a long run can be stopped and goes on."""
 
-import json
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -10,6 +9,7 @@ from pathlib import Path
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import seed as seeded
 
+from ..kept_rows import append_row, read_rows
 from .law import Law, Notes
 
 CHUNK = 200
@@ -61,9 +61,7 @@ def run(laws: Sequence[Law], examples: int, folder: Path) -> list[Outcome]:
     that costs more than .05 s a case proportionally fewer."""
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / "chunks.jsonl"
-    done = read(path)
-    if path.is_file():  # without a last line that was cut short
-        path.write_text("".join(json.dumps(asdict(outcome)) + "\n" for outcome in done), encoding="utf-8")
+    done = [Outcome(**row) for row in read_rows(path)]
     known = {(outcome.law, outcome.chunk) for outcome in done}
     wanted = {law.name: max(20, round(examples * min(1.0, 0.05 / law.cost))) for law in laws}
     for chunk in range(-(-max(wanted.values()) // CHUNK)):
@@ -73,18 +71,9 @@ def run(laws: Sequence[Law], examples: int, folder: Path) -> list[Outcome]:
                 continue
             outcome = run_chunk(law, chunk, left)
             done.append(outcome)
-            with path.open("a", encoding="utf-8") as file:
-                file.write(json.dumps(asdict(outcome)) + "\n")
+            append_row(path, asdict(outcome))
             print(f"{law.name}, chunk {chunk}: {outcome.examples} cases, {outcome.seconds:.0f} s {outcome.failure}", flush=True)
     return done
-
-
-def read(path: Path) -> list[Outcome]:
-    """The chunks that were run; a last line that was cut short is left out."""
-    if not path.is_file():
-        return []
-    lines = path.read_text(encoding="utf-8").split("\n")[:-1]
-    return [Outcome(**json.loads(line)) for line in lines]
 
 
 def table(laws: Sequence[Law], outcomes: Sequence[Outcome]) -> str:
