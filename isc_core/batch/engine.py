@@ -33,6 +33,7 @@ _SUSPICION = 100  # of the scheduler, before it gives a job up: `attempts` does 
 _LOOK_SECONDS = 2.0  # between two looks after the workers
 _LONELY_SECONDS = 900.0  # without any worker, before the run gives up
 _CLUSTER_PATIENCE = 60.0
+_STARTS = 3  # of workers that are lost while they start
 _LOST = "the scheduler is lost: give the same command again; what is finished stays"
 
 Client = Any  # Dask is optional
@@ -106,7 +107,8 @@ def _configuration(crew: Crew) -> dict[str, object]:
     }  # fmt: skip
 
 
-def _local_cluster(crew: Crew) -> Any:
+def _local_cluster(crew: Crew, starts: int = _STARTS) -> Any:
+    """Workers of this machine; all begin anew, up to so many `starts`, where one is lost before they are ready. Raises `InputError`."""
     from dask.distributed import LocalCluster
 
     try:
@@ -118,7 +120,9 @@ def _local_cluster(crew: Crew) -> Any:
             )  # fmt: skip
     except ValueError as error:
         raise InputError(f"--memory {crew.memory}: {error}") from error
-    except RuntimeError as error:  # a worker was lost while it started
+    except RuntimeError as error:
+        if starts > 1:
+            return _local_cluster(crew, starts - 1)
         raise InputError(f"the workers could not be started ({error}): give the same command again") from error
 
 

@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from ..batch.engine import Crew
-from ..batch.item import FAILED, Recipe
+from ..batch.item import DONE, FAILED, SKIPPED, Recipe
 from ..batch.run import Batch, run_batch
 from ..errors import Rejected
 from ..models.settings import Settings
@@ -72,4 +72,5 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     look = f"look at {options.output / 'summary.html'}"
     if counts[FAILED]:
         raise Rejected(f"{counts[FAILED]} of {sum(counts.values())} images failed, the reasons are in failures.jsonl: {look}")
-    return hints(options, f"{counts['done']} images done, {counts['skipped']} were there already: {look}")
+    done, there = counts[DONE], counts[SKIPPED]
+    return hints(options, f"{done} image{'s' * (done != 1)} done, {there} {'was' if there == 1 else 'were'} there already: {look}")

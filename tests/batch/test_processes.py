@@ -5,8 +5,11 @@ import signal
 import subprocess
 import time
 from collections import Counter
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+
+import psutil  # type: ignore[import-untyped]
 
 from isc_core.batch.attempts import MOST_LOST
 from isc_core.batch.engine import Crew
@@ -42,6 +45,19 @@ def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
     assert done.returncode == 1, done.stderr
     assert "1 of 4 images failed" in done.stderr
     assert all((tmp_path / "out" / name / "mesh.glb").is_file() for name in ("one", "two", "three"))
+
+
+def test_a_worker_that_is_lost_while_it_starts_is_started_again(photos: Path, tmp_path: Path) -> None:
+    words = ["batch", photos / "one.png", "-o", tmp_path / "out", "--model", "retinex", "--workers", "2", "--memory", "0"]
+    run = psutil.Popen(isc_command(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    starting: list[psutil.Process] = []
+    while run.poll() is None and not starting:
+        with suppress(psutil.Error):  # others come and go
+            starting = [child for child in run.children(recursive=True) if "spawn_main" in " ".join(child.cmdline())]
+    starting[0].kill()
+    printed, told = run.communicate(timeout=300)
+    assert "1 image done" in printed, told
+    assert (tmp_path / "out" / "one" / "mesh.glb").is_file()
 
 
 def test_what_is_wrong_with_the_run_is_one_line(photos: Path, tmp_path: Path) -> None:
