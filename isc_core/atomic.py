@@ -8,8 +8,8 @@ A process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial
 that nobody holds, which are of processes killed by force.
 
 Limits: without such locks (Windows, some network disks) and of other machines, siblings of killed processes stay; they may be deleted by
-hand, or by `remove_unfinished` in the program that killed it. Without the one step a process killed between two renames leaves what
-stood there before as `.NAME.xxxxxxxx.old`, which the next one puts back.
+hand, or by `remove_unfinished` where nobody else is at work. What is removed is renamed to `.NAME.xxxxxxxx.gone` first. Without the one
+step a process killed between two renames leaves what stood there before as `.NAME.xxxxxxxx.old`, which the next one puts back.
 """
 
 import contextlib
@@ -19,6 +19,7 @@ import hashlib
 import os
 import platform
 import re
+import secrets
 import shutil
 from collections.abc import Iterable, Iterator, Sequence, Set
 from contextlib import contextmanager
@@ -32,7 +33,7 @@ except ImportError:  # Windows
     fcntl = None  # type: ignore[assignment]
 
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")  # what file managers leave in any folder they have shown
-_TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old)", re.DOTALL)
+_TEMPORARY = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old|gone)", re.DOTALL)
 _MOST_SIBLINGS = 0x10000
 _LONGEST = 230  # bytes of a name that leave room, of the usual 255, for what a temporary sibling adds
 _AT_FDCWD, _RENAME_EXCHANGE = -100, 2  # linux/fs.h
@@ -111,11 +112,12 @@ def unfinished(path: Path | str) -> frozenset[Path]:
 
 
 def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None:
-    """Tidies up after a process that was killed by force while it wrote `path`: removes its temporary siblings, but for those `spared`,
-    and puts back what it had moved aside."""
+    """Tidies up after processes that were killed by force while they wrote `path`: removes their temporary siblings, but for those
+    `spared` and those that somebody holds, and puts back what they had moved aside."""
     target = _resolved(path)
     for left in sorted(unfinished(target) - spared):
-        _tidy(left, target)
+        with contextlib.suppress(OSError), _held(left, wait=False):
+            _tidy(left, target)
 
 
 def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
@@ -210,7 +212,10 @@ def _tidy(left: Path, target: Path) -> None:
     if left.suffix == ".old" and not target.exists():
         os.replace(left, target)
     else:
-        _remove(left)
+        # Renamed first: where there are no locks its writer may live, and give what is half removed the final name.
+        gone = target.with_name(f".{_label(target)}.{secrets.token_hex(4)}.gone")
+        os.replace(left, gone)
+        _remove(gone)
 
 
 def _remove(entry: Path) -> None:
@@ -297,7 +302,7 @@ def _put_in_place(partial: Path, target: Path) -> None:
             os.replace(partial, target)  # onto nothing, or an empty folder
             return
         except OSError as error:
-            if error.errno not in (errno.ENOTEMPTY, errno.EEXIST) and not target.is_dir():
+            if (error.errno not in (errno.ENOTEMPTY, errno.EEXIST) and not target.is_dir()) or not partial.exists():
                 raise
         with contextlib.suppress(_Gone), _held(target, wait=True):  # gone: another process has just replaced it
             if _exchanged(partial, target):
@@ -313,7 +318,10 @@ def _exchanged(one: Path, other: Path) -> bool:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):
         return False
-    return rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) == 0
+    done = rename(_AT_FDCWD, os.fsencode(one), _AT_FDCWD, os.fsencode(other), _RENAME_EXCHANGE) == 0
+    if not done and ctypes.get_errno() == errno.ENOENT:
+        raise _Gone(errno.ENOENT, "another process has removed it")
+    return done
 
 
 def _replace_in_two_steps(partial: Path, target: Path) -> None:

@@ -23,7 +23,7 @@ from ..atomic import remove_unfinished
 from ..errors import InputError
 from .names import OWN_FILES
 
-_LEFT = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old)")
+_LEFT = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old|gone)")
 
 
 class RunFolder:
@@ -90,7 +90,10 @@ class RunFolder:
             raise InputError(f"cannot write {self.output}: {error.strerror}; choose another place") from error
 
     def _tidy(self) -> None:
-        """Removes temporary siblings of results and what was fetched. Nobody else writes here: the lock is held, the workers are gone."""
+        """Removes temporary siblings of results and what was fetched.
+
+        No other run writes here, since the lock is held. Workers of a killed one may be at their last image: they hold what they write.
+        """
         for folder in (self.output, self.thumbnails, self.pages):
             with contextlib.suppress(FileNotFoundError):
                 for name in {left[1] for entry in os.scandir(folder) if (left := _LEFT.fullmatch(entry.name))}:

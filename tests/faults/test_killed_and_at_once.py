@@ -8,12 +8,13 @@ import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from isc_core import atomic
-from isc_core.atomic import new_file, new_folder, unfinished
+from isc_core.atomic import new_file, new_folder, remove_unfinished, unfinished
 from isc_core.errors import InputError
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -107,6 +108,32 @@ def test_the_one_at_work_is_left_alone(tmp_path: Path) -> None:
         make(target, "second")
         assert first.is_dir() and (target / "mark.json").read_text() == "second"
     assert (target / "mark.json").read_text() == "first", "the last one to end stands there"
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@posix
+@pytest.mark.parametrize(("locks", "kept"), [(True, "new"), (False, "old")])
+def test_who_tidies_while_another_writes_never_spoils_a_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, locks: bool, kept: str
+) -> None:
+    """As a batch does that begins while a worker of a killed one is at its last image: to remove takes a while."""
+    target, begun = tmp_path / "out", []
+    make(target, "old")
+    if not locks:
+        monkeypatch.setattr(atomic, "fcntl", None)
+    with suppress(InputError), new_folder(target, OURS) as partial:
+        for name in OURS:
+            (partial / name).write_text("new")
+        with monkeypatch.context() as patched:
+            patched.setattr(atomic, "_remove", lambda entry: begun.append((entry, os.open(entry, os.O_RDONLY))))
+            remove_unfinished(target)
+    for entry, descriptor in begun:
+        for name in OURS:
+            os.unlink(name, dir_fd=descriptor)
+        os.close(descriptor)
+        entry.rmdir()
+    assert len(begun) == (not locks)
+    assert {(target / name).read_text() for name in OURS} == {kept}
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
