@@ -24,7 +24,7 @@ from isc_core.illuminant import estimate_illuminant, tinted, whitened
 from isc_core.separation import separate
 
 WHITE = np.ones(3)
-TINTS = (0.0, 0.05, 0.1, 0.2)
+TINTS = (0.0, 0.05, 0.1, 0.2, 0.5, 0.8)
 _TESTS = ("test_objects", "test_materials", "test_lights", "test")
 _GLOSSY = 0.005  # of the light is specular; below, the light's colour cannot be seen and the tint itself counts as true
 _SEED = 5
@@ -32,13 +32,14 @@ _SEED = 5
 
 @dataclass(frozen=True)
 class Found:
-    """One photo: its `group`; angles in degrees of the estimate and of white; whether it is `determined`; `ratios`: of the separations, as
-    listed above, or none."""
+    """One photo: its `group`; angles in degrees of the estimate and of white; whether it is `determined`, and whether it is
+    called `too_strong`; `ratios`: of the separations, as listed above, or none."""
 
     group: str
     angle: float
     of_white: float
     determined: bool
+    too_strong: bool
     ratios: tuple[float, ...]
 
 
@@ -67,7 +68,7 @@ def measure(group: str, truth: SeparationTruth, tint: np.ndarray, colours_only: 
         as_white = _ratio(truth, WHITE)
         always = _ratio(truth, light.colour)
         ratios = (as_white, always if light.determined else as_white, always, _ratio(truth, true))
-    return Found(group, angle(light.colour, true), angle(WHITE, true), light.determined, ratios)
+    return Found(group, angle(light.colour, true), angle(WHITE, true), light.determined, light.too_strong, ratios)
 
 
 def _ratio(truth: SeparationTruth, colour: np.ndarray) -> float:
@@ -95,16 +96,17 @@ def photos(given: argparse.Namespace) -> Iterator[Found]:
 def markdown(found: Sequence[Found]) -> str:
     """The table of all groups."""
     lines = [
-        "| photos | number | angle: estimate / white | largest | determined | their angle / white | largest "
+        "| photos | number | called strongly coloured | angle: estimate / white | largest | determined | their angle / white | largest "
         "| isc as it is | if determined | always | true light |",
-        "|---" * 11 + "|",
+        "|---" * 12 + "|",
     ]
     for group in dict.fromkeys(one.group for one in found):
         rows = [one for one in found if one.group == group]
         sure = [one for one in rows if one.determined]
         ratios = np.array([one.ratios for one in rows if one.ratios])
         typical = np.exp(np.log(np.maximum(ratios, 1e-3)).mean(axis=0)) if len(ratios) else np.zeros(0)
-        cells = [group, str(len(rows)), _angles(rows), f"{max(one.angle for one in rows):.1f}°", str(len(sure))]
+        strong = sum(one.too_strong for one in rows)
+        cells = [group, str(len(rows)), str(strong), _angles(rows), f"{max(one.angle for one in rows):.1f}°", str(len(sure))]
         cells += [_angles(sure), f"{max(one.angle for one in sure):.1f}°"] if sure else ["-", "-"]
         cells += [f"{value:.3f}" for value in typical] or ["-"] * 4
         lines.append("| " + " | ".join(cells) + " |")

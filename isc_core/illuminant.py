@@ -22,8 +22,8 @@ square of the share that agrees lessens the precision: where half of the flanks 
 Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694; R. T. Tan, K. Nishino, K. Ikeuchi 2004, doi:10.1364/JOSAA.21.000321. The blocks: K.-Y.
 Liang and S. L. Zeger 1986, doi:10.1093/biomet/73.1.13.
 
-Limits: one colour of light, tinted by a quarter at most. Metals tint their highlights themselves. Paint that pales toward a common colour
-looks like a highlight; grey paint says nothing.
+Limits: one colour of light, tinted by a quarter at most; `light_gamut` looks whether it is stronger. Metals tint their highlights
+themselves. Paint that pales toward a common colour looks like a highlight; grey paint says nothing.
 """
 
 from dataclasses import dataclass
@@ -31,6 +31,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import InputError
+from .light_gamut import PLANE, without_white
 from .separation.smoothing import masked_gaussian
 
 _FINE = 0.006  # of the object's diagonal: changes are taken over twice this
@@ -41,8 +42,6 @@ _OPEN = 2.0  # how much farther from white than usual the rounds may look, befor
 _BLOCKS = 8
 _FEW = 20  # changes, below which nothing is said
 _FARTHEST = 0.25  # d beyond this is no light's, but paint's
-# An orthonormal basis of the colours d with sum 0, (3, 2).
-_PLANE = np.array([[1, -1, 0], [1, 1, -2]]).T / np.sqrt([2.0, 6.0])
 
 
 @dataclass(frozen=True)
@@ -59,8 +58,8 @@ class IlluminantOptions:
 @dataclass(frozen=True)
 class Illuminant:
     """`colour` (3,) > 0, of mean 1: white where nothing can be said. `confidence` in [0, 1]: how much of it is the photo's word.
-    `determined`: whether that is enough; `reason`: why not, or on what it rests. `too_strong`: what looks like highlights has a colour that
-    no lamp has."""
+    `determined`: whether that is enough; `reason`: why not, or on what it rests. `too_strong`: the light may have a
+    colour that no lamp has."""
 
     colour: np.ndarray
     confidence: float
@@ -91,6 +90,8 @@ def estimate_illuminant(
     if options.usual <= 0 or options.doubt < 0 or not 0 <= options.enough <= 1:
         raise InputError("usual must be above 0, doubt at least 0, enough within [0, 1]")
     changes = _changes(image, mask if clipped is None else mask & ~clipped)
+    if without_white(changes.colour, changes.change):
+        return Illuminant(np.ones(3), 0.0, False, "all of the object is of one strong colour, its brightest places too", True)
     shift = np.zeros(2)
     precision = np.zeros((2, 2))
     for _ in range(_GATES):
@@ -100,7 +101,7 @@ def estimate_illuminant(
         shift, precision = _planes(changes, flanks, shift, options)
     weakest = float(np.linalg.eigvalsh(precision)[0])
     confidence = weakest / (weakest + 1 / options.usual**2)
-    if np.abs(_PLANE @ shift).max() > _FARTHEST:
+    if np.abs(PLANE @ shift).max() > _FARTHEST:
         return Illuminant(np.ones(3), 0.0, False, "what looks like highlights has too strong a colour for a light: it may be paint", True)
     determined = confidence >= options.enough
     reason = f"{int(flanks.sum())} changes across highlights agree" if determined else "the highlights lie on one paint, or disagree"
@@ -125,7 +126,7 @@ def _checked(colour: np.ndarray) -> np.ndarray:
 
 
 def _colour(shift: np.ndarray) -> np.ndarray:
-    return np.ones(3) + _PLANE @ shift
+    return np.ones(3) + PLANE @ shift
 
 
 def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
@@ -168,11 +169,11 @@ def _flanks(changes: _Changes, light: np.ndarray) -> np.ndarray:
 
 
 def _planes(changes: _Changes, flanks: np.ndarray, shift: np.ndarray, options: IlluminantOptions) -> tuple[np.ndarray, np.ndarray]:
-    """The shift (2,) along `_PLANE` and the precision (2, 2) of what the planes say of it."""
+    """The shift (2,) along `PLANE` and the precision (2, 2) of what the planes say of it."""
     normals = np.cross(changes.colour[flanks], changes.change[flanks])
     length = np.linalg.norm(normals, axis=1)
     units = normals / length[:, None]
-    along, offset = units @ _PLANE, units.sum(axis=1)
+    along, offset = units @ PLANE, units.sum(axis=1)
     blocks = np.unique(changes.block[flanks], return_inverse=True)[1]
     prior = np.eye(2) / options.usual**2
     precision, wanted, agreeing = np.zeros((2, 2)), shift, 0.0

@@ -11,7 +11,7 @@ so that I = D + S + rest and the reflectance D / shading is that under white lig
 Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694.
 
 Limits: those of `illuminant`: few photos tell the colour. Where one does not, the light is taken for white, and the status says why. Light
-of a stronger colour than a lamp's is noticed where highlights show it; the result is then less to be trusted, and says so.
+of a stronger colour than a lamp's is mostly noticed, see `light_gamut`; the result is then less to be trusted, and says so.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,7 @@ from .task import Answer, Task
 WHITE, ESTIMATE = LIGHT_COLOURS
 _COLOURED = 0.1  # of a channel's share: less cannot be told from white
 _LESS = 0.5  # of the confidence, where the light is no lamp's
-_STRONG = "the light may be strongly coloured, or several lights: separation and paint are less to be trusted; white light would help"
+_STRONG = "the light may be strongly coloured, or all of the paint is: highlights and paint are less to be trusted; white light would tell"
 _HINT = "the light is coloured: --light-colour estimate takes that into account"
 
 

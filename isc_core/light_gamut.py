@@ -1,0 +1,95 @@
+"""Is there white among an object's colours, as there is under any lamp? Where not, the light is strongly coloured, or all of the paint is.
+
+Problem: a separation takes the light for white. Under red light everything is red, its highlights too; no constraint on one highlight shows
+that, if its colour is looked for near white only.
+
+Equation: the colours c of an object under light of the colour l are c = l r, r those under white light, so that the whole gamut moves with
+l (Forsyth 1990). With chromaticities p(c) of all but the darkest, in the plane of colours of mean 1 with white at 0, white's distance from
+their hull, but for a twentieth of them, is
+
+    max over unit u of the 5 % quantile of u . p.
+
+A gamut may also lie off white because paint does. Then highlights bring it back: their flanks' chromaticities move on lines toward the
+light's (Lehmann & Palm 2001), here toward white: a change dI of a colour I counts by its |I x dI|, and by how well white, or the best of
+the colours near it, lies in its plane and ahead of it.
+
+Citation: D. A. Forsyth 1990, doi:10.1007/BF00056770; T. M. Lehmann, C. Palm 2001, doi:10.1364/JOSAA.18.002679.
+
+Limits: matt paint of one strong colour cannot be told from grey paint under light of that colour, and is called the same. Light that
+takes grey no farther than .3 from white, such as (1.2, 1, .8), is not told; nor is stronger light on paint of many strong colours, or of
+one that makes up for it.
+"""
+
+import numpy as np
+
+# An orthonormal basis of the colours with sum 0, (3, 2).
+PLANE = np.array([[1, -1, 0], [1, 1, -2]]).T / np.sqrt([2.0, 6.0])
+_DARK, _STRAY = 0.3, 0.05  # quantiles: of the intensity, below which colours do not count; of those beyond the hull
+_FARTHEST = 0.3  # of white from the hull
+_DIRECTIONS = 72  # a multiple of 12 makes the channels alike
+_RISE, _TURN, _TOWARD, _TOLERANCE = 0.03, 0.05, 0.7, 0.04  # see `illuminant`
+_NEAR, _STEP = 0.25, 0.1  # the colours that count as white, and their grid
+_FEW, _FAINT = 20, 1e-4  # flanks, and their mean weight over all changes, below which they say nothing
+_ENOUGH = 20_000  # colours or flanks: more say the same
+_SHARE = 0.2  # of the flanks that move toward white
+
+
+def without_white(colour: np.ndarray, change: np.ndarray) -> bool:
+    """Whether white is neither among the colours nor where highlights lead. `colour`, `change` (N, 3) >= 0 in units of the bright pixels'.
+
+    `change` is that of the colour over a short way, upward.
+    """
+    if len(colour) < _FEW:
+        return False
+    return distance_of_white(colour) > _FARTHEST and share_toward_white(colour, change) < _SHARE
+
+
+def distance_of_white(colour: np.ndarray) -> float:
+    """Of the hull of the chromaticities of colours (N, 3) >= 0; negative inside."""
+    intensity = colour.sum(axis=1)
+    bright = intensity >= max(float(np.quantile(intensity, _DARK)), 1e-12)
+    if not bright.any():
+        return 0.0
+    some = np.flatnonzero(bright)[_thinned(int(bright.sum()))]
+    places = 3 * colour[some] / intensity[some, None] @ PLANE
+    angle = np.arange(_DIRECTIONS) * (2 * np.pi / _DIRECTIONS)
+    return float(np.quantile(places @ np.stack([np.cos(angle), np.sin(angle)]), _STRAY, axis=0).max())
+
+
+def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
+    """How much of what may be highlights' flanks leads to a colour near white, in [0, 1]; 0 where there is nothing."""
+    rise, sums = change.sum(axis=1), np.maximum(colour.sum(axis=1), 1e-12)
+    here = colour / sums[:, None]
+    turn = change / np.maximum(rise, 1e-12)[:, None] - here
+    flanks = np.flatnonzero((rise > _RISE) & (change.min(axis=1) > 0) & (np.linalg.norm(turn, axis=1) > _TURN))
+    normal = np.cross(colour[flanks], change[flanks])
+    if len(flanks) < _FEW or np.linalg.norm(normal, axis=1).sum() < _FAINT * len(colour):
+        return 0.0
+    kept = _thinned(len(flanks))
+    flanks, normal = flanks[kept], normal[kept]
+    weight = np.linalg.norm(normal, axis=1)
+    end = colour[flanks] + change[flanks] / 2
+    end /= end.sum(axis=1, keepdims=True)
+    return max(
+        float(weight @ _agreement(white, normal / weight[:, None], here[flanks], end, turn[flanks]) / weight.sum()) for white in _whites()
+    )
+
+
+def _thinned(number: int) -> slice:
+    return slice(None, None, -(-number // _ENOUGH))
+
+
+def _whites() -> np.ndarray:
+    """The colours (M, 3) of mean 1 that count as white."""
+    axis = np.arange(-int(_NEAR / _STEP), int(_NEAR / _STEP) + 1) * _STEP
+    places = np.stack(np.meshgrid(axis, axis), -1).reshape(-1, 2)
+    return np.ones(3) + places[np.linalg.norm(places, axis=1) < _NEAR] @ PLANE.T
+
+
+def _agreement(white: np.ndarray, normal: np.ndarray, here: np.ndarray, end: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """How well that light (3,) explains flanks (N, 3): in [0, 1], (N,). `end`: the chromaticity to which they have come."""
+    off = normal @ (white / np.linalg.norm(white))
+    way = white / 3 - here
+    cosine = (way * turn).sum(axis=1) / np.maximum(np.linalg.norm(way, axis=1) * np.linalg.norm(turn, axis=1), 1e-12)
+    ahead = ((white / 3 - end) * turn).sum(axis=1) > 0
+    return np.where(ahead & (cosine > _TOWARD), 1 / (1 + np.square(off / _TOLERANCE)), 0.0)
