@@ -1,12 +1,12 @@
 """Figures of the applications: highlights on a sphere and where their light is, dichromatic editing, reflectance editing.
 
 The sphere is a painted ball under one lamp with a little ambient light and a Blinn-Phong gloss of a known exponent. Its light is looked for
-four times: by the shading and by the highlight when shape and layers are the true ones, by the highlight when the layers are separated by
+five times: by the shading and by the highlight when shape and layers are the true ones, by the highlight when the layers are separated by
 `isc` from the picture, and by both when nothing but the picture is known (model MDR). Errors are angles between directions.
 
 The edits are those of `isc edit`, on photos where data are given, else on rendered things.
 
-Citation: J. F. Blinn (1977), doi:10.1145/563858.563893; S. A. Shafer (1985), doi:10.1002/col.5080100409; S. Akbar, thesis (2016).
+Citation: J. F. Blinn (1977), doi:10.1145/563858.563893; S. A. Shafer (1985), doi:10.1002/col.5080100409; H. Akbar, thesis (2016).
 
 Limits: a convex ball without shadows is the easiest object there is. How good an edit looks is not measured, only that it does what was
 asked for and nothing else.
@@ -71,7 +71,7 @@ def separated(d: Decomposition) -> Decomposition:
 
 def degrees_between(one: np.ndarray, other: np.ndarray) -> float:
     """Of unit vectors (3,)."""
-    return float(np.rad2deg(np.arccos(np.clip(one @ other, -1, 1))))
+    return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)))
 
 
 def found_lights(ball: Decomposition, picture_only: Decomposition | None = None) -> dict[str, np.ndarray]:
@@ -96,7 +96,7 @@ def _spheres(context: Context) -> Made:
         ball = lit_ball(direction, size)
         kept = context.rows(f"light on ball {number}", partial(_found_rows, context, ball, number))
         found = {str(row["way"]): np.array([float(row[axis] or 0) for axis in "xyz"]) for row in kept}
-        off = {name: degrees_between(way, direction) for name, way in found.items()}
+        off = {name: round(degrees_between(way, direction), 4) for name, way in found.items()}
         errors.append(off)
         rows.append((_word(direction), *(off.get(name, "") for name in _WAYS)))
         shown += _ball_panels(ball, found, off, size, context.quick)
@@ -105,8 +105,9 @@ def _spheres(context: Context) -> Made:
     header = ("light (x, y, z)", *_WAYS)
     table = Table(header, tuple(rows), "Degrees between the true direction and the one found; x right, y up, z toward the viewer.")
     text = (
-        "Each row: the ball under one lamp, its highlight as `isc` finds it, and balls lit from the direction that the separated highlight "
-        "and the shading tell. With the true shape both tell the light; from the picture alone they are as good as the recovered shape is."
+        "Each row: the ball under one lamp, its highlight as `isc` finds it, and balls lit from the directions that the separated "
+        "highlight, the true shading and the shading by MDR tell. With the true shape both tell the light; from the picture alone they are "
+        "as good as the recovered shape is."
     )
     if context.quick:
         text += " In a quick run the model sees the first ball only."
@@ -125,10 +126,10 @@ def _ball_panels(ball: Decomposition, found: dict[str, np.ndarray], off: dict[st
     gain = exposure(ball.image, ball.mask)
     parted = separated(ball)
     shown = [Panel("image", ball.image, ball.mask, gain=gain), Panel("specular, by isc", parted.specular, ball.mask, gain=gain)]
-    ways = (("lit as the highlight tells", _WAYS[2]), ("as the shading tells", _WAYS[0]), ("as MDR tells", _WAYS[3]))
+    ways = (("lit as the highlight tells", _WAYS[2]), ("as the shading tells", _WAYS[0]), ("by MDR", _WAYS[3]))
     for title, name in ways if _WAYS[3] in found and not quick else ways[:2]:
         lit, coverage = render_sphere(DirectionalLight(found[name], ambient=np.full(3, _AMBIENT)), size, EXPONENT, _GLOSS)
-        shown.append(Panel(f"{title}: {off[name]:.2g}° off", lit, coverage > 0.5, gain=0.8))
+        shown.append(Panel(f"{title}: {off[name]:.2f}° off", lit, coverage > 0.5, gain=0.6))
     return shown
 
 
@@ -136,16 +137,26 @@ def _word(direction: np.ndarray) -> str:
     return " ".join(f"{value:.2f}" for value in direction)
 
 
-def _photographed(context: Context) -> tuple[Subject, Decomposition]:
-    """The masked photo with the most light that `isc` takes for specular: editing highlights needs some, and SIRFS an outline."""
-
-    def share(subject: Subject) -> float:
-        split = separate("isc", subject.image, subject.mask, photo_of(subject).clipped)
-        return float(split.specular[subject.mask].sum(dtype=float) / subject.image[subject.mask].sum(dtype=float))
-
+def _photographed(context: Context, best: Callable[[Subject], float]) -> tuple[Subject, Decomposition]:
+    """The masked photo with the most of what an edit needs; SIRFS needs an outline."""
     photos = context.photos()
-    chosen = max([one for one in photos if not one.mask.all()] or photos, key=share)
+    chosen = max([one for one in photos if not one.mask.all()] or photos, key=best)
     return chosen, decomposed(context, chosen)
+
+
+def _glossy(subject: Subject) -> float:
+    """The share of its light that `isc` takes for specular."""
+    split = separate("isc", subject.image, subject.mask, photo_of(subject).clipped)
+    return float(split.specular[subject.mask].sum(dtype=float) / subject.image[subject.mask].sum(dtype=float))
+
+
+def _colourful(subject: Subject) -> float:
+    """The variance of its chromaticity, weighted by brightness."""
+    light = subject.image[subject.mask].astype(float)
+    bright = light.sum(axis=1, keepdims=True)
+    chromaticity = light / np.maximum(bright, 1e-12)
+    mean = np.average(chromaticity, axis=0, weights=bright[:, 0])
+    return float(np.average(np.square(chromaticity - mean).sum(axis=1), weights=bright[:, 0]))
 
 
 EDITS: tuple[tuple[str, DichromaticEdit], ...] = (
@@ -160,7 +171,7 @@ EDITS: tuple[tuple[str, DichromaticEdit], ...] = (
 
 
 def _dichromatic(context: Context) -> Made:
-    subject, d = _photographed(context)
+    subject, d = _photographed(context, _glossy)
     gain = exposure(d.image, d.mask)
     shown = [Panel("photo", d.image, d.mask, gain=gain)]
     rows = [_change("nothing asked for", d, edit_layers(d, DichromaticEdit()))]
@@ -198,7 +209,7 @@ def painted_region(d: Decomposition) -> np.ndarray:
 
 
 def _recolouring(context: Context) -> Made:
-    subject, d = _photographed(context)
+    subject, d = _photographed(context, _colourful)
     gain = exposure(d.image, d.mask)
     clusters = find_clusters(d, 4, context.seed)
     numbers = range(1, min(len(clusters.shares), 3) + 1)

@@ -229,9 +229,7 @@ def _specular_free(context: Context) -> Made:
     subjects = with_layers((*context.subjects("specular"), *context.subjects("synthetic")))
     kinds = (PHOTO, *KINDS, DARK)
     cells: list[tuple[str | int | float, ...]] = [(titled(one), *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects]
-    table = Table(
-        ("subject", *(kind.name for kind in kinds)), tuple(cells), "Share of the highlights' light that is left in each image (%)."
-    )
+    table = Table(("subject", *(kind.name for kind in kinds)), tuple(cells), _LEFT)
     chosen = subjects[0]
     assert chosen.diffuse is not None
     shown = []
@@ -245,7 +243,7 @@ def _specular_free(context: Context) -> Made:
     text = (
         f"{chosen.name}: each image made of the photo (above) and of its diffuse layer (below), in one exposure per column. Where both "
         "rows look alike, highlights do not reach the image. The dark channel is the opposite: mostly highlight, and what is left of pale "
-        "paint. What is left in SF1 and SF2 is noise, clipping, and tint: their highlights are white."
+        "paint. SF1 and SF2 take highlights for white: what is left in them is noise, clipping, and the tint of the light."
     )
     return Made((table,), (panels(shown, len(kinds)),), text)
 

@@ -1,6 +1,6 @@
 """What the thesis' abstract claims, in our words, with its figures. Items put what they measure beside one of these.
 
-Citation: S. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016).
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016).
 
 Limits: single tables and figures of the thesis carry more figures than these; they were measured on sets that are not public.
 """

@@ -28,7 +28,12 @@ def ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: int) -> 
 
 def in_words(found: Ratio | None) -> str:
     """A cell: the ratio and its interval."""
-    return "-" if found is None else f"{found.ratio:.3f} ({found.low:.3f} to {found.high:.3f})"
+    return "-" if found is None else f"{_brief(found.ratio)} ({_brief(found.low)} to {_brief(found.high)})"
+
+
+def _brief(value: float) -> str:
+    """With three decimals, from a hundred on without any."""
+    return f"{value:.3f}" if value < 100 else f"{value:,.0f}"
 
 
 def rank_sum(ours: Sequence[float], theirs: Sequence[float]) -> float | None:

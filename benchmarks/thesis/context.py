@@ -49,6 +49,11 @@ class Context:
         """Photos of real objects without a known truth; without data, rendered stand-ins."""
         return self._library.photos(self.monitor)
 
+    @property
+    def has_photos(self) -> bool:
+        """Whether `photos` are photos, not rendered stand-ins."""
+        return bool(self._library.photo_paths)
+
     def rows(self, key: str, compute: Callable[[], Sequence[JsonRow]]) -> list[JsonRow]:
         """The rows of `key`, computed only if they are not kept. Raises `Cancelled` before it computes, where the user asked to stop."""
         path = self._path(key)

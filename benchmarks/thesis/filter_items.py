@@ -7,7 +7,7 @@ so that tests which count pixels would promise far too much; subjects are counte
 
 The area is that under the curve of hits against false alarms, of single pixels of a subject judged by the histograms of the others.
 
-Citation: S. Akbar (2016), section 3.6.5.1; E. J. G. Pitman, "Significance tests which may be applied to samples from any populations",
+Citation: H. Akbar (2016), section 3.6.5.1; E. J. G. Pitman, "Significance tests which may be applied to samples from any populations",
 Supplement to the Journal of the Royal Statistical Society 4(1), 119-130 (1937), doi:10.2307/2984124 (exchanges); S. Holm, "A simple
 sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 6(2), 65-70 (1979), which has no DOI.
 

@@ -3,7 +3,7 @@
 Every picture is an intermediate result of the functions that separate and decompose, on the subject with the most specular light; nothing
 is drawn by hand. Specular layers have the photo's exposure.
 
-Citation: S. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016).
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016).
 
 Limits: the thesis' own drawings are not public; which stages belong to which of the numbers 3.2 to 3.4 and 3.9 to 3.11 is our reading.
 """
@@ -29,11 +29,12 @@ from isc_core.thresholding import OtsuObjective, exact, maximise, quantise
 from .context import Context
 from .decompositions import decomposed, photo_of
 from .item import Item, Made, Table
-from .panels import Panel, characteristics, light_panel, normals_panel, panels
+from .panels import COLOURS, Panel, characteristics, light_panel, normals_panel, panels
 from .style import LETTERS, OKABE_ITO, exposure, figure, legend, show_map
 from .subjects import Subject
 
 _LEVELS = 255
+_LEAST_EXPLAINED = 0.1  # share of the specular layer, below which a lobe's picture needs a warning
 
 
 def _subject(context: Context) -> Subject:
@@ -64,7 +65,10 @@ def _framework(context: Context) -> Made:
     shown.append(Panel("rebuilt: reflectance × shading + specular", rebuilt, d.mask, gain=gain))
     seconds = tuple((name, float(value)) for name, value in d.provenance.timings.items())
     table = Table(("stage", "seconds"), seconds, f"{subject.name}: what the stages took.")
-    text = f"{subject.name}: specular removal, shape, light, shading and reflectance, the lobe, and what the result is good for."
+    text = (
+        f"{subject.name}: specular removal, shape, light, shading and reflectance, the lobe, and what the result is good for."
+        f"{_lobe_words(d)} {COLOURS}"
+    )
     return Made((table,), (panels(shown, 4),), text)
 
 
@@ -159,7 +163,7 @@ def _sparse(context: Context) -> Made:
     s = stages(image.astype(float), mask, mask)
     split = separate("sparse_coding", image, mask)
     unit = float(s.brightness[mask].max())
-    groups = np.where(s.group >= 0, 1 + (s.group * 7919) % 11, 0).astype(float)
+    groups = np.where(s.group >= 0, 4 + (s.group * 7919) % 7, 0).astype(float)
     shown = [
         Panel("photo", image, mask, gain=gain),
         Panel("specular-free, SF1", fixed_chromaticity(image), mask),
@@ -167,7 +171,7 @@ def _sparse(context: Context) -> Made:
         Panel("across the highlight atom: alpha", s.alpha / unit, mask),
         Panel("along it: t", s.brightness / unit, mask),
         Panel("code of each pixel alone: beta", s.beta / unit, mask),
-        Panel("groups that switch the atom on", groups, mask, bar=False),
+        Panel("groups that switch the atom on", groups, mask, (0, 10), bar=False),
         Panel("code that the groups keep", s.code / unit, mask, (0, max(float((s.beta[mask] / unit).max()), 1e-9))),
         Panel("diffuse", split.diffuse, mask, gain=gain),
         Panel("specular", split.specular, mask, gain=gain),
@@ -182,7 +186,7 @@ def _sparse(context: Context) -> Made:
     )
     text = (
         f"{subject.name}. Paint has an atom for each hue; what a pixel has too much of white for its atom is the highlight's code, if its "
-        "group of pixels looks like a highlight. Groups have arbitrary colours."
+        "group of pixels looks like a highlight. Groups have arbitrary colours; where there is none it is darkest."
     )
     return Made((Table(("measure", "value"), rows),), (panels(shown, 5),), text)
 
@@ -206,7 +210,10 @@ def _mbp(context: Context) -> Made:
     shown += _lobe_panel(d, "3. Blinn-Phong lobe", gain)
     same = float(np.abs(again.diffuse - d.diffuse)[d.mask].max() / d.image.max())
     rows = (("specular light (%)", _specular_share(d)), ("largest difference, stage 2 run by itself", same), *_lobe_rows(d))
-    text = f"{subject.name}: SIRFS explains the photo as it is; highlights are then pale paint on evenly lit paint, and taken off there."
+    text = (
+        f"{subject.name}: SIRFS explains the photo as it is; highlights are then pale paint on evenly lit paint, and taken off there."
+        f"{_lobe_words(d)}"
+    )
     return Made((Table(("measure", "value"), rows),), (panels(shown, 5),), text)
 
 
@@ -230,7 +237,7 @@ def _mdr(context: Context) -> Made:
     shown += _lobe_panel(d, "3. GGX lobe", gain)
     same = float(np.abs(alone.diffuse - d.diffuse)[d.mask].max() / d.image.max())
     rows = (("specular light (%)", _specular_share(d)), ("largest difference, stage 1 run by itself", same), *_lobe_rows(d))
-    text = f"{subject.name}: highlights are taken off the photo; shape, light and paint are those of the diffuse image."
+    text = f"{subject.name}: highlights are taken off the photo; shape, light and paint are those of the diffuse image.{_lobe_words(d)}"
     return Made((Table(("measure", "value"), rows),), (panels(shown, 5),), text)
 
 
@@ -244,6 +251,13 @@ def _lobe_rows(d: Decomposition) -> tuple[tuple[str, str | float], ...]:
     alpha = "" if d.brdf.alpha is None else f"alpha {d.brdf.alpha:.2f}, "
     state = "determined" if d.brdf.determined else d.brdf.reason or "undetermined"
     return (("lobe", f"{alpha}{state}"), ("share of the specular layer that it explains", d.brdf.explained))
+
+
+def _lobe_words(d: Decomposition) -> str:
+    """A space and a sentence on a lobe whose highlights are not those of the photo; else nothing."""
+    if d.brdf is None or d.brdf.explained >= _LEAST_EXPLAINED:
+        return ""
+    return " The fitted lobe explains little of the specular layer: on the shape that was found its highlight falls elsewhere."
 
 
 def _specular_share(d: Decomposition) -> float:

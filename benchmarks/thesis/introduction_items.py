@@ -25,7 +25,7 @@ from isc_core.metrics import angular_error, height_error, truth_normal
 from .context import Context, JsonRow
 from .decompositions import decomposed
 from .item import Item, Made, Table
-from .panels import Panel, characteristics, panels
+from .panels import COLOURS, Panel, characteristics, panels
 from .subjects import Subject
 
 LIGHT = toward(-0.4, 0.5, 1.0)
@@ -131,7 +131,7 @@ def _shape_from_shading(method: str, context: Context) -> Made:
         shown += [
             Panel(f"{shaded.name}: image", shaded.image, shaded.mask),
             Panel("true height (pixels)", true, shaded.mask, ends),
-            Panel("found", found.height + np.nanmedian((true - found.height)[shaded.mask]), shaded.mask, ends),
+            Panel("found height (pixels)", found.height + np.nanmedian((true - found.height)[shaded.mask]), shaded.mask, ends),
             Panel("error of the normals (degrees)", found.angle, shaded.mask, (0, 60)),
         ]
     rows = _errors(context)
@@ -143,7 +143,10 @@ def _shape_from_shading(method: str, context: Context) -> Made:
     better = sum(a < b for a, b in zip(own, flat, strict=True))
     angles = ", ".join(f"{angle:.0f}" for angle in own)
     here = f"{_NAMES[method]}: normals off by {angles} degrees; better than a flat shape on {better} of {len(own)}."
-    text = f"{here} Heights are in one scale of colours for each object. The last object's brightness is paint as well as shape."
+    text = (
+        f"{here} Heights are in one scale of colours for each object; errors above 60 degrees are drawn as 60. The last object's "
+        "brightness is paint as well as shape."
+    )
     return Made((table,), (panels(shown, 4),), text)
 
 
@@ -159,13 +162,14 @@ def _characteristics(kind: str, context: Context) -> Made:
             ("shading = exp(SH(normal))", errors.sh),
             ("length of the normals = 1", errors.normal_length),
         ),
-        f"{subject.name}: how exactly the characteristics make up the photo; of the image's largest value, relative for the shading.",
+        f"{subject.name}: how exactly the characteristics make up the image. Errors of images are shares of its largest value, that of the "
+        "shading is relative.",
     )
     share = float(d.specular[d.mask].sum() / d.image[d.mask].sum())
     state = "all identities hold" if not errors.broken() else f"broken: {'; '.join(errors.broken())}"
     text = (
         f"{subject.name}, the first subject of its kind, in a real run of `isc decompose --model mdr`: {100 * share:.1f} % of its "
-        f"light was found to be specular; {state}."
+        f"light was found to be specular; {state}. {COLOURS}"
     )
     return Made((table,), (panels(characteristics(d), 4),), text)
 

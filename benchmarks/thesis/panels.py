@@ -19,6 +19,10 @@ from .style import LETTERS, WIDTH, exposure, figure, normal_colours, show, show_
 
 _LINE = 0.16  # inches of a line of letters
 _LETTERS_AN_INCH = 15  # that fit above a panel
+COLOURS = (
+    "Height grows toward the viewer; normals are red to the right, green up, blue toward the viewer. Light and reflectance share their "
+    "colour: blue light on grey paint and white light on blue paint give one photo, and any model may choose the wrong one."
+)
 
 
 @dataclass(frozen=True)

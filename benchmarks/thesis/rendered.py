@@ -4,7 +4,7 @@
 of MIT-Berkeley where a copy is given, else on our own shapes and paints: shading is exp(SH(normal)) exactly. "synth": scenes as `isc synth`
 draws them. All have the truth of every layer, laid out as that of MIT-Berkeley.
 
-Citation: S. Akbar (2016), thesis, whose MIT-Berkeley-UTeM set is not public: "glossy" stands in for it.
+Citation: H. Akbar (2016), thesis, whose MIT-Berkeley-UTeM set is not public: "glossy" stands in for it.
 
 Limits: what is kept in the folder is found by its name: it belongs to one version of the program.
 """

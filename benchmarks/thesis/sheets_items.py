@@ -26,7 +26,8 @@ from .context import Context
 from .decompositions import decomposed
 from .estimates import AFTER, BEFORE, BOUND, SIRFS, Framework, estimated, known, measured
 from .item import Cell, Item, Made, Table
-from .panels import characteristics, panels
+from .layer_tables import KINDS
+from .panels import COLOURS, characteristics, panels
 from .pictures import ball, beside, directions, fitted, lit, marked, relief, signed
 from .removal_items import METHODS
 from .segmentation_items import WAYS as SEGMENTATIONS
@@ -136,8 +137,8 @@ def _masks(kind: str, context: Context) -> Made:
             lines.append((subject.name, name, int(pixels.sum()), _percent(both, int(pixels.sum())), _percent(both, int(true.sum()))))
     table = Table(("image", "search", "pixels marked", "of them highlights, %", "of the highlights, %"), tuple(lines))
     text = (
-        "Pixels above the highest of three thresholds of the smallest channel, orange, and beside them where the true specular layer has a "
-        "tenth of its strongest light."
+        "Orange: the pixels above the highest of three thresholds of the smallest channel, as each search finds them; in the last column, "
+        "those where the true specular layer has at least a tenth of its strongest light."
     )
     return Made((table,), (sheet(("photo", *names, "true highlights"), rows, expose=False),), text)
 
@@ -146,9 +147,9 @@ def _layers(kind: str, rounds: Sequence[Sequence[Way]], index: int, context: Con
     subject, which = turn(index, context.subjects(kind), len(rounds))
     rows, table = separation_rows(subject, rounds[which], context.seed)
     text = (
-        f"{subject.name}. Under each name: the diffuse layer's mean square error over that of doing nothing, or, where no highlight is, "
-        "its RMS error. Errors: orange is light left over, blue is paint taken for light, in full colour from a tenth of the photo's white "
-        "on."
+        f"{subject.name}. Under each name: the diffuse layer's mean square error over that of doing nothing, or, where there is no "
+        "highlight, its RMS error. Errors: orange is light left over, blue is paint taken for light, in full colour from a tenth of the "
+        "photo's white on."
     )
     return Made((table,), (sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),), text)
 
@@ -158,7 +159,7 @@ def _characteristics(rounds: Sequence[Sequence[Framework]], index: int, context:
     rows = characteristics_rows(context, subject, rounds[which])
     text = (
         f"{subject.name} ({subject.kind}). Under each name the geometric mean of the six errors. Heights of all in one range, shading, "
-        "reflectance and light in the scale nearest to the truth; the light on a white ball."
+        f"reflectance and light in the scale nearest to the truth; the light on a white ball. {COLOURS}"
     )
     drawn = sheet(("height", "normals", "shading", "reflectance", "light"), rows, expose=False)
     return Made((absolute(measured(context, [subject], rounds[which])),), (drawn,), text)
@@ -169,9 +170,8 @@ def _photo(index: int, context: Context) -> Made:
     subjects = sorted(context.photos(), key=lambda subject: order.get(subject.name, len(order)))
     subject, which = turn(index, subjects, len(_MODELS))
     model = list(_MODELS)[which]
-    text = (
-        f"{subject.name}, by {_MODELS[model]}; its truth is not known. Photo, diffuse and specular share an exposure, the rest has its own."
-    )
+    source = "its truth is not known" if context.has_photos else "no photos were given, a rendered object stands in for one"
+    text = f"{subject.name}, by {_MODELS[model]}; {source}. Photo, diffuse and specular share an exposure, the rest has its own. {COLOURS}"
     found = decomposed(context, subject, model)
     heights = found.height[found.mask]
     lines = (("light taken off, %", _share(found.specular, subject)), ("range of heights, pixels", f"{np.ptp(heights):.0f}"))
@@ -208,7 +208,7 @@ def _family(words: str, kind: str, rounds: Sequence[Sequence[Way]], count: int) 
 
 def _plans() -> list[_Plan]:
     plans: list[_Plan] = [
-        (f"Highlights found by PSO, ClonalG and CS: {words}", functools.partial(_masks, kind)) for kind, words in _KINDS.items()
+        (f"Highlights found by PSO, ClonalG and CS: {words}", functools.partial(_masks, kind)) for kind, words in KINDS.items()
     ]
     for kind in _KINDS:
         plans += _family("Highlights painted over after PSO, ClonalG and CS", kind, (_PAINTED,), 1)

@@ -25,6 +25,7 @@ _BRIGHT = 0.9  # what all but the brightest hundredth of an image is shown below
 _LABEL = 1.05  # inches left of a sheet, for the names of its rows
 _LINE = 0.16  # inches that a line of letters takes
 _LETTER = 0.062  # inches that a small letter takes, on the average
+_BOLD = 1.15  # how much wider bold letters are
 _GAP = 0.03  # inches between the rows of a sheet
 
 
@@ -52,7 +53,8 @@ def finish(made: Figure) -> None:
 
 def tabulated(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Figure:
     """A picture of a table, for where Markdown is not shown: columns as wide as their longest cell, every second row shaded."""
-    lengths = [max(len(cell) for cell in column) + 2 for column in zip(header, *rows, strict=True)]
+    columns = zip(header, *rows, strict=True)
+    lengths = [max([round(_BOLD * len(head)), *map(len, cells)]) + 2 for head, *cells in columns]
     width, height = max(4.0, _LETTER * sum(lengths)), _LINE * 1.15 * (len(rows) + 1) + (_LINE * 1.6 if caption else 0.05)
     made = Figure(figsize=(width, height), dpi=DPI)
     axes = made.add_axes((0, 0, 1, (height - (_LINE * 1.5 if caption else 0)) / height))
@@ -73,7 +75,7 @@ def tabulated(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str
             )
     axes.axhline(1, color="0", linewidth=0.6)
     if caption:
-        made.text(0.01, 1 - _LINE * 0.75 / height, caption, fontsize=LETTERS, va="center", parse_math=False)
+        made.text(0.01, 1 - _LINE * 0.75 / height, caption.replace("`", ""), fontsize=LETTERS, va="center", parse_math=False)
     return made
 
 
@@ -86,8 +88,9 @@ def show(axes: Axes, image_linear: np.ndarray, title: str = "", mask: np.ndarray
     """Draws an image (H, W, 3), or (H, W) as grey, of linear light in sRGB, white outside `mask` (H, W), without ticks."""
     image = np.asarray(image_linear, float)
     image = np.repeat(image[..., None], 3, -1) if image.ndim == 2 else image
-    coded = linear_to_srgb(np.clip(np.nan_to_num(image), 0, 1))
-    axes.imshow(coded if mask is None else np.where(mask[..., None], coded, 1.0), interpolation="antialiased")
+    # Rounded here: matplotlib cuts off, which leaves white a shade darker than the paper around it.
+    coded = np.round(255 * linear_to_srgb(np.clip(np.nan_to_num(image), 0, 1))).astype(np.uint8)
+    axes.imshow(coded if mask is None else np.where(mask[..., None], coded, np.uint8(255)), interpolation="antialiased")
     _bare(axes, title)
 
 

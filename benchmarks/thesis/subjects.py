@@ -71,13 +71,18 @@ class Library:
 
     def photos(self, monitor: Monitor) -> tuple[Subject, ...]:
         """Photos of real objects; rendered stand-ins without data that has any."""
-        folders = [folder for name in ("photos", "highlight") if (folder := self._beside(name)) is not None]
-        paths = [p for folder in folders for p in sorted(folder.iterdir()) if p.suffix.lower() in _PHOTO_SUFFIXES]
-        paths = [path for path in paths if not path.stem.endswith("_gt") and not path.with_name(f"{path.stem}_gt.bmp").exists()]
+        paths = self.photo_paths
         if not paths:
             rendered = (subject for subject in self._rendered("scene", monitor))
             return tuple(self._sized(replace(s, kind="photo", diffuse=None, specular=None, truth=None)) for s in self._some(rendered))
         return tuple(self._sized(_photo(path)) for path in (paths[:_QUICK_MANY] if self.quick else paths))
+
+    @property
+    def photo_paths(self) -> list[Path]:
+        """The files of photos without a known truth."""
+        folders = [folder for name in ("photos", "highlight") if (folder := self._beside(name)) is not None]
+        paths = [p for folder in folders for p in sorted(folder.iterdir()) if p.suffix.lower() in _PHOTO_SUFFIXES]
+        return [path for path in paths if not path.stem.endswith("_gt") and not path.with_name(f"{path.stem}_gt.bmp").exists()]
 
     @property
     def fingerprint(self) -> str:

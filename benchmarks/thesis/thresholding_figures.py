@@ -86,7 +86,7 @@ def generators(context: Context) -> Made:
     values = uniformised(orbit(_start(context), _NUMBERS))
     sources = (
         ("one orbit, made uniform", values),
-        ("many orbits, each eighth value", ChaoticNumbers(context.seed).uniform((_NUMBERS,))),
+        ("many orbits, every eighth value", ChaoticNumbers(context.seed).uniform((_NUMBERS,))),
         ("pseudo-random (PCG64)", np.random.default_rng(context.seed).random(_NUMBERS)),
     )
     edges = np.linspace(0, 1, 51)
@@ -106,8 +106,8 @@ def generators(context: Context) -> Made:
     axes[1, 0].set_ylabel("next u")
     header = ("numbers", "chi square of 50 bins (49 expected)", "correlation with the next", "empty cells of 10 x 10 pairs")
     text = (
-        "All three are uniform. Below, each number against the next: of one orbit, the next is a function of the last, which correlation "
-        "does not see and pairs do. Many orbits, and each eighth value of them, leave nothing of it."
+        "All three are close to uniform. Below, each number against the next: in one orbit, each is a function of the one before, which "
+        "correlation does not see and pairs do. With many orbits, and every eighth value of them, nothing of it is left."
     )
     return Made((Table(header, tuple(rows), f"{_NUMBERS:,} numbers of each source."),), (made,), text)
 
@@ -118,6 +118,7 @@ def thresholded(context: Context, name: str) -> Made:
     made, axes = figure(2, 1 + len(COUNTS), height=4.1)
     show(axes[0, 0], srgb_to_linear(image / 255), name)
     shares = 100 * of.counts / of.counts.sum()
+    top = 1.25 * float(np.quantile(shares, 0.99))
     axes[1, 0].set(title="histogram", ylabel="pixels, %")
     rows = []
     for column, count in enumerate(COUNTS, 1):
@@ -126,15 +127,17 @@ def thresholded(context: Context, name: str) -> Made:
         show(axes[0, column], srgb_to_linear(_classes(image, found) / 255), f"{count} thresholds")
         for number, level in enumerate(found):
             axes[1, column].axvline(level, color=OKABE_ITO[1], linewidth=0.9, label="exact" if number == 0 else None)
-        top = float(np.quantile(shares, 0.99)) * 1.25
         axes[1, column].plot(searched, np.full(count, top * 0.94), "v", color=OKABE_ITO[0], markersize=4, label="CS, one run")
         rows.append((count, " ".join(map(str, found)), " ".join(map(str, searched)), float(exact(of, count).value)))
     for place in axes[1]:
-        place.stairs(shares, np.arange(_LEVELS + 1) - 0.5, fill=True, color="0.6")
-        place.set(xlim=(0, 255), ylim=(0, float(np.quantile(shares, 0.99)) * 1.25), xlabel="level", xticks=(0, 128, 255))
+        # Not snapped to pixels: bars narrower than one would come and go from panel to panel.
+        place.stairs(shares, np.arange(_LEVELS + 1) - 0.5, fill=True, color="0.6", snap=False)
+        place.set(xlim=(0, 255), ylim=(0, top), xlabel="level", xticks=(0, 128, 255))
     made.legend(*axes[1, 1].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=7)
     header = ("K", "exact thresholds", "CS, first run", "objective")
-    text = "Each class is shown at its mean level. The few highest bars of the histogram are cut off."
+    high = [f"{level} ({share:.1f} %)" for level, share in enumerate(shares) if share > top]
+    cut = f" Bars that the histogram cuts off: level {', '.join(high)}." if high else ""
+    text = f"Each class is shown at its mean level.{cut}"
     return Made((Table(header, tuple(rows), f"Thresholds of {name}."),), (made,), text)
 
 

@@ -25,6 +25,7 @@ from .item import Cell, Item, Made, Table, Verdict
 from .style import OKABE_ITO, figure, legend
 from .thresholding_runs import (
     COMPARED,
+    EVALUATIONS,
     SEARCHES,
     Runs,
     all_runs,
@@ -179,8 +180,10 @@ def times(context: Context) -> Made:
     for place, count in zip(axes[0], COUNTS, strict=True):
         for search, colour in zip(COMPARED, OKABE_ITO, strict=False):
             needed = np.sort(np.concatenate([found[search, name, count].needed for name in names]))
-            place.step(needed / 1e3, 100 * np.arange(1, len(needed) + 1) / len(needed), where="post", color=colour, label=search)
-        place.set(title=f"K = {count}", xlabel="evaluations, thousands", xlim=(0, 20), ylim=(0, 102))
+            reached = needed[np.isfinite(needed)]
+            shares = 100 * np.append(np.arange(1, len(reached) + 1), len(reached)) / len(needed)
+            place.step(np.append(reached, EVALUATIONS) / 1e3, shares, where="post", color=colour, label=search)
+        place.set(title=f"K = {count}", xlabel="evaluations, thousands", xlim=(0, EVALUATIONS / 1e3), ylim=(0, 102))
     axes[0, 0].set_ylabel("runs at the optimum, %")
     legend(axes[0, -1], "lower right")
     return Made((Table(header, tuple(rows), caption),), (made,), _TIMES_TEXT, (_speed_verdict(found, cases, p_values),))

@@ -29,7 +29,7 @@ from .context import Context, JsonRow
 SEARCHES = {"PSO": "particle_swarm", "ClonalG": "clonal_selection", "CS": "chaotic_clonal", "CS, one orbit": "chaotic, one orbit"}
 COMPARED = ("PSO", "ClonalG", "CS")
 _RUNS, _QUICK_RUNS, _TIMED_RUNS = 50, 3, 10
-_EVALUATIONS = 20_000
+EVALUATIONS = 20_000
 _QUICK_IMAGES = 3
 _SURE = 1.959964  # standard deviations, of 95 %
 
@@ -75,7 +75,7 @@ def milliseconds(context: Context, search: str, image: str, count: int) -> np.nd
         rows: list[JsonRow] = []
         for run in range(_QUICK_RUNS if context.quick else _TIMED_RUNS):
             begin = time.process_time()
-            OPTIMISERS[SEARCHES[search]](objective(image), count, _EVALUATIONS, context.seed + run)
+            OPTIMISERS[SEARCHES[search]](objective(image), count, EVALUATIONS, context.seed + run)
             rows.append({"milliseconds": 1e3 * (time.process_time() - begin)})
         return rows
 
@@ -135,7 +135,7 @@ def _searched(context: Context, search: str, image: str, count: int) -> list[Jso
     best = exact(objective(image), count).value
     rows: list[JsonRow] = []
     for run in range(_QUICK_RUNS if context.quick else _RUNS):
-        found = OPTIMISERS[SEARCHES[search]](objective(image), count, _EVALUATIONS, context.seed + run)
+        found = OPTIMISERS[SEARCHES[search]](objective(image), count, EVALUATIONS, context.seed + run)
         needed = to_optimum(found, best)
         rows.append(
             {

@@ -28,13 +28,30 @@ from .style import finish, tabulated
 RECORDS = "records"
 _SCHEMA = 1
 _INTRODUCTION = (
-    "Every table and figure in the lists of the thesis (S. Akbar, *3D Intrinsic Scene Characteristics Extraction Framework for a Single",
+    "Every table and figure in the lists of the thesis (H. Akbar, *3D Intrinsic Scene Characteristics Extraction Framework for a Single",
     "Image*, 2016), made again on open data by `isc thesis all`; one of them by `isc thesis table 4.5` or `isc thesis figure 4.50`.",
     "",
     "The thesis measures on MIT-Berkeley-UTeM, a set with rendered highlights that is not public. `isc synth glossy-mit` is its stand-in:",
     "objects of MIT-Berkeley, or the project's own where no copy is given, under a gloss of known strength. Figures are not those of the",
     "thesis, therefore; what can be compared is which method is better, and by how much.",
     "",
+)
+_SHORT_NAMES = (
+    ("PSO, ClonalG, CS", "searches for thresholds: a particle swarm, clonal selection, and clonal selection with chaotic numbers"),
+    ("CS of layers", "Chaotic Segmentation: highlights found by such thresholds and painted over"),
+    ("SC", "Sparse Coding of specular-free images: SF1, of a fixed chromaticity; SF2, of two bands"),
+    ("MZK06, YCK06, YWA10, SC09", "separations by Mallick et al., Yoon et al. (both 2006), Yang et al. (2010), Shen & Cai (2009)"),
+    ("iterative, ISC", "the separation by Tan & Ikeuchi (2005), and `isc`, this project's own"),
+    ("as published, improved", "a method as its authors describe it, and with this project's changes"),
+    ("doing nothing", "the photo itself taken for the diffuse layer: what does no better is of no use"),
+    ("SIRFS", "shape, light and reflectance from one image's shading (Barron & Malik 2015)"),
+    ("X-SIRFS, MDR-SIRFS", "SIRFS on the diffuse layer that the separation X, or `isc`, finds"),
+    ("SIRFS-X, SIRFS-MBP", "SIRFS on the photo; highlights are then taken off the reflectance that it finds, by X or by `isc`"),
+    ("joint", "MDR-SIRFS, whose shape and light then improve the separation"),
+    ("MSE, RMS", "the mean square error, and its root"),
+    ("LMSE", "the local error: in small windows, each at its best scale; 0 is perfect, 1 is an empty layer"),
+    ("RS-MSE", "the mean of the local errors of reflectance and shading"),
+    ("K", "the number of thresholds"),
 )
 
 
@@ -120,6 +137,7 @@ def page(item: Item, made: Made, record: Record, pictures: Sequence[str], lists:
     parts.append(
         f"Made by `{record.command}` (seed {record.seed}, ISC {record.version}, {record.machine}, {record.seconds:g} s)."
         + (f" Files: {files}." if files else "")
+        + " Short names are explained in [the index](README.md#short-names)."
     )
     return "\n\n".join(parts) + "\n"
 
@@ -157,8 +175,9 @@ def index(items: Sequence[Item], records: dict[str, Record]) -> str:
             f"| {claim} | | not measured | |"
         ]
     for kind in ("table", "figure"):
-        lines += ["", f"## {kind.capitalize()}s", "", "| | what | claims that hold |", "|---|---|---|"]
+        lines += ["", f"## {kind.capitalize()}s", "", "| | what | do its claims hold? |", "|---|---|---|"]
         lines += [_index_row(item, records.get(item.name)) for item in items if item.kind == kind]
+    lines += ["", "## Short names", "", "| name | meaning |", "|---|---|", *(f"| {name} | {words} |" for name, words in _SHORT_NAMES)]
     return "\n".join(lines) + "\n"
 
 
@@ -198,7 +217,7 @@ def _settings(records: dict[str, Record]) -> str:
     """What kind of runs made them, in words."""
     commands = [record.command for record in records.values()]
     quick, own = (sum((word in command) == wanted for command in commands) for word, wanted in (("--quick", True), ("--data", False)))
-    parts = [f", {own} of them on the project's own rendered images alone"] if own else []
+    parts = [f", {own} of them without public data: images are the project's own rendered ones, or come with scikit-image"] if own else []
     return "".join(
         [*parts, f", {quick} of them by a quick run: small images and few repetitions, whose verdicts tell little"] if quick else parts
     )

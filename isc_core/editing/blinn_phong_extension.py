@@ -10,7 +10,7 @@ the reflectance, and the surroundings are mirrored in that colour:
 
     diffuse' = (1 - M) diffuse,   specular' = s' (1 - M + M r / max r) + M r sum_w f(n, w) L(w) max(0, n . w).
 
-Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; S. Akbar 2016 (Blinn-Phong extension); for metals, R. L. Cook, K. E. Torrance 1982,
+Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (Blinn-Phong extension); for metals, R. L. Cook, K. E. Torrance 1982,
 doi:10.1145/357290.357293.
 
 Limits: remapping cannot spread a highlight beyond where some of it is, so a rougher look soon needs rendering. The mirrored surroundings

@@ -5,7 +5,7 @@ sharpened u = max(0, l + amount (l - G l)); then l' = gain u (m(u) / w)^(gamma -
 gamma keeps its hue. Gain 0 removes the layer.
 
 Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and Application 10(4), 210-218 (1985),
-doi:10.1002/col.5080100409; S. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016).
+doi:10.1002/col.5080100409; H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016).
 
 Limits: a gamma below 1 lifts what the separation left by mistake; sharpening does so with its noise.
 """

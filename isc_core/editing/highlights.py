@@ -2,7 +2,7 @@
 
 Equation: specular' = (specular or 0) + k E/|E| f(n; l) max(0, n . l), the lobe f of `lobes.Lobe`, k by `lobes.strength_of`.
 
-Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; S. Akbar 2016 (rendering highlights).
+Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (rendering highlights).
 
 Limits: the shape is what shading tells, smooth where the paint is busy; so is the highlight. It is clipped where the picture is.
 """

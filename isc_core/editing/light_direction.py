@@ -13,7 +13,7 @@ single pixels would promise far too much. The share explained: 1 - (remaining su
 constant for the shading and nothing for the highlight).
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; the sandwich of clustered errors: K.-Y. Liang, S. L. Zeger, Biometrika 73 (1986),
-doi:10.1093/biomet/73.1.13. S. Akbar 2016.
+doi:10.1093/biomet/73.1.13. H. Akbar 2016.
 
 Limits: the cone says how well THIS model's direction is fixed, not whether shape and separation are right. One light; a window and a lamp
 give something between them, and a low share.

@@ -6,7 +6,7 @@ paint in more or less light; back in linear light it is scaled to Y(r') = value 
 colour that cannot be that bright moves toward grey at that luminance just until it can. diffuse' = ((1 - w) r + w r') shading, w being the
 region's weight; the specular layer is not touched.
 
-Citation: B. Ottosson 2020 (Oklab, see `chroma`); S. Akbar 2016 (recolouring).
+Citation: B. Ottosson 2020 (Oklab, see `chroma`); H. Akbar 2016 (recolouring).
 
 Limits: what the separation left of the highlights in the diffuse layer is painted too. Black and pure white paint take hardly any colour.
 """

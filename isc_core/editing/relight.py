@@ -7,7 +7,7 @@ scale    each pixel's follow its own shading, specular' = specular S' / S, at mo
 remove   they go;
 render   a lobe is rendered under the new light, with the strength under which it has the present layer's energy in the recovered light.
 
-Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317; S. Akbar 2016 (relighting).
+Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317; H. Akbar 2016 (relighting).
 
 Limits: no cast shadows, old or new: those of the photo stay in the reflectance. Light from behind the object was seen by no normal.
 """

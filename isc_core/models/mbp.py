@@ -12,7 +12,7 @@ which sum up to I and keep diffuse = reflectance * shading. The specular layer t
 It is g that is divided by, since the light's hue is what SIRFS knows least: yellow fruit under white light comes out as orange fruit under
 blue light, and would get blue highlights. Measured on glossy objects, the two ways differ by 3 % of the reflectance's error at most.
 
-Citation: S. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016; no DOI); J. F. Blinn 1977,
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016; no DOI); J. F. Blinn 1977,
 doi:10.1145/563858.563893.
 
 Limits: highlights are taken to be white. Shape and light are those of plain SIRFS, bent by the highlights; what SIRFS explains of a

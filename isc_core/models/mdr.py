@@ -2,7 +2,7 @@
 
 Equation: image = reflectance * shading + specular.
 
-Citation: S. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016; no DOI); the dichromatic model:
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016; no DOI); the dichromatic model:
 S. A. Shafer 1985, doi:10.1002/col.5080100409.
 
 With `Settings.confidence_weights` a pixel counts in SIRFS' terms of reflectance by the separation's confidence (`sirfs.reflectance`).

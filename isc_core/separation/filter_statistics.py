@@ -15,7 +15,7 @@ Neighbouring outputs are far from independent, so Lambda promises too much: the 
 Both kinds count the same: .5 says nothing, which is what the `prior` of `isc` means by it. `python -m benchmarks.filter_statistics fit`
 fits histograms and T to rendered scenes.
 
-Citation: S. Akbar 2016; heavy-tailed outputs of derivative filters: B. A. Olshausen and D. J. Field 1996, doi:10.1038/381607a0, J. Huang
+Citation: H. Akbar 2016; heavy-tailed outputs of derivative filters: B. A. Olshausen and D. J. Field 1996, doi:10.1038/381607a0, J. Huang
 and D. Mumford 1999, doi:10.1109/CVPR.1999.786990; the temperature: C. Guo et al. 2017, arXiv:1706.04599.
 
 Limits: round shapes under a near lamp look like broad highlights and the other way round; how much it is worth is measured in
