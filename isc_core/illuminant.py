@@ -134,7 +134,9 @@ def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
     rows, columns = np.nonzero(mask)
     if len(rows) == 0:
         return _Changes(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int))
-    diagonal = float(np.hypot(np.ptp(rows) + 1, np.ptp(columns) + 1))
+    box = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    image, mask = image[box], mask[box]  # what is around the object does not count
+    diagonal = float(np.hypot(mask.shape[0], mask.shape[1]))
     sigma = max(_FINE * diagonal, 0.6)
     smooth = masked_gaussian(np.where(mask[..., None], image, 0).astype(float), mask, sigma)
     bright = max(float(np.quantile(smooth[mask].sum(axis=1), 0.99)), 1e-30)

@@ -84,7 +84,7 @@ def digests(output: Path) -> dict[str, str]:
     """The sum of each file of an output, without what differs between runs that are alike; without temporary siblings."""
     if output.is_file():
         return {output.name: _digest(output)}
-    files = [path for path in output.rglob("*") if path.is_file() and not path.relative_to(output).parts[0].startswith(".")]
+    files = [path for path in output.rglob("*") if path.is_file() and "/." not in f"/{path.relative_to(output).as_posix()}"]
     return {path.relative_to(output).as_posix(): _digest(path) for path in sorted(files)}
 
 

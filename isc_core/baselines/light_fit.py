@@ -24,4 +24,6 @@ def fit_light(log_shading: np.ndarray, normals: np.ndarray, mask: np.ndarray, ri
     count = functions.shape[1]
     penalty = ridge * np.eye(9)
     penalty[0, 0] = 1e-12
-    return np.linalg.solve(functions @ functions.T / count + penalty, functions @ log_shading[mask].astype(float) / count)
+    # Not as products of matrices, which a library shares among its threads and rounds accordingly.
+    own = np.einsum("kn,ln->kl", functions, functions) / count
+    return np.linalg.solve(own + penalty, np.einsum("kn,nc->kc", functions, log_shading[mask].astype(float)) / count)

@@ -75,7 +75,8 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     trouble = [] if status.get("converged", True) else [f"note: {status['help']}"]
     gloss = [f"gloss: {status['gloss']}"] if status.get("gloss") else []
     light = status.get("light_colour", {}).get("help")
-    return hints(options, *trouble, *gloss, *([f"note: {light}"] if light else []), f"look at {options.output / 'preview.png'}")
+    notes = [f"note: {line}" for line in ([light] if light else []) + status.get("doubts", [])]
+    return hints(options, *trouble, *gloss, *notes, f"look at {options.output / 'preview.png'}")
 
 
 def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:

@@ -1,16 +1,18 @@
 """The models: how separation, shape and light are joined to explain one photo. One model a file, and one function that knows their names.
 
 A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with.
-Of those that separate, `light_colour` decides which colour of light they see.
+Of those that separate, `light_colour` decides which colour of light they see; of those that find shape and light, `doubts` looks whether
+their answer contradicts what they assume.
 """
 
 from .baseline import baseline
+from .doubts import doubted
 from .joint import joint
 from .light_colour import under_light
 from .mbp import mbp
 from .mdr import mdr
 from .plain import sirfs
-from .settings import SEPARATING_MODELS, Settings
+from .settings import SEPARATING_MODELS, SIRFS_MODELS, Settings
 from .task import Answer, Task
 
 _SOLVERS = {"mdr": mdr, "mbp": mbp, "joint": joint, "sirfs": sirfs}
@@ -19,7 +21,8 @@ _SOLVERS = {"mdr": mdr, "mbp": mbp, "joint": joint, "sirfs": sirfs}
 def solve(task: Task) -> Answer:
     """What the model that `task.settings` names makes of the photo. Raises `InputError`, `Cancelled`."""
     solver = _SOLVERS.get(task.settings.model, baseline)
-    return under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
+    answer = under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
+    return doubted(task.maps, answer) if task.settings.model in SIRFS_MODELS else answer
 
 
 __all__ = ["Answer", "Settings", "Task", "solve"]

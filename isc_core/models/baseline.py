@@ -14,7 +14,8 @@ def baseline(task: Task) -> Answer:
     split, diffuse = unseparated(task)
     task.monitor.report(f"shape and light ({name})", 0.1)
     with task.clock.stage("shape and light"):
-        log_image = np.log(np.maximum(np.where(working.mask[..., None], diffuse, 1), working.code_value / 2))
+        floor = max(working.code_value / 2, float(np.finfo(diffuse.dtype).tiny))
+        log_image = np.log(np.maximum(np.where(working.mask[..., None], diffuse, 1), floor))
         guess = baselines.estimate(name, log_image, working.mask)
     status = {"converged": True, "reason": "direct method"}
     return Answer(split, height_of_maps(guess.height, task), guess.light, status)

@@ -44,5 +44,5 @@ def shaded(height: np.ndarray, light: np.ndarray, mask: np.ndarray) -> tuple[np.
     normal = normal_from_reference(normals(height)).astype(np.float32)
     normal[~mask] = (0, 0, 1)
     shading = np.zeros((*mask.shape, 3), np.float32)
-    shading[mask] = np.exp(real_sh(normal[mask].astype(float)) @ light_from_reference(light))
+    shading[mask] = np.exp(np.einsum("nk,kc->nc", real_sh(normal[mask].astype(float)), light_from_reference(light)))
     return normal, shading

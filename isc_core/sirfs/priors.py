@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from .linear import solved
 from .tables import CostTable
 
 
@@ -36,7 +37,7 @@ class Light:
     @cached_property
     def precision(self) -> np.ndarray:
         """The inverse covariance, computed once: a library's solver would wake its threads at every evaluation."""
-        inverse = np.linalg.inv(self.covariance)
+        inverse = solved(self.covariance, np.eye(len(self.covariance)))
         return (inverse + inverse.T) / 2
 
 

@@ -18,6 +18,7 @@ from ..progress import Monitor
 from ..workers import Workers
 from .illumination import stack, unstack
 from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
+from .linear import solved
 from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, level_shapes, synthesise
@@ -164,7 +165,7 @@ class _Unknowns:
     def set_light(self, light: np.ndarray) -> None:
         if self._known_light is None:
             prior = self._problem.priors.light
-            self.x[self._edges[-1] :] = np.linalg.solve(prior.unwhiten, stack(light) - prior.offset)
+            self.x[self._edges[-1] :] = solved(prior.unwhiten, (stack(light) - prior.offset)[:, None])[:, 0]
 
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         assert x is self.x

@@ -73,8 +73,8 @@ def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction
 def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """Unit normals (H, W, 3) without their detail: means over .3 of the object's size, within the mask; (0, 0, 1) outside it."""
     width = _BLUR * float(np.sqrt(mask.sum()))
-    cover = np.maximum(ndimage.gaussian_filter(mask.astype(float), width), 1e-9)
-    means = [ndimage.gaussian_filter(np.where(mask, normal[..., k], 0), width) / cover for k in range(3)]
+    cover = np.maximum(ndimage.gaussian_filter(mask.astype(float), width, mode="constant"), 1e-9)
+    means = [ndimage.gaussian_filter(np.where(mask, normal[..., k], 0), width, mode="constant") / cover for k in range(3)]
     blurred = np.dstack([means[0], means[1], np.maximum(means[2], _FLATTEST)])
     blurred /= np.linalg.norm(blurred, axis=-1, keepdims=True)
     blurred[~mask] = (0, 0, 1)
