@@ -1,6 +1,6 @@
 """Making a data set: scene after scene, each whole or not at all, so that an interrupted run goes on where it stopped.
 
-`manifest.json` is written before the first scene and says what the run is to become; a folder that holds another run is left alone. A
+`manifest.json` is written before the first scene that lacks and says what the run is to become; a folder that holds another run is left alone. A
 scene that is there is kept if it is the one planned and none of its files has changed since.
 
 Limits: a kept scene may come from another version of the program; its `scene.json` says which.
@@ -84,12 +84,13 @@ def make_dataset(run: Run, out: Path, monitor: Monitor | None = None) -> Outcome
     planned = plan(run)
     settings = describe_run(run)
     require_this_run(out, settings, run.count)
-    _write_root(out, run, settings, planned, complete=False)
     missing = []
     for index, scene in enumerate(planned):
         monitor.report("looking for finished scenes", _LOOKING * index / len(planned))
         if not is_finished(out / scene.split / scene.recipe.name, scene):
             missing.append(scene)
+    if missing:
+        _write_root(out, run, settings, planned, complete=False)
     _make(missing, len(planned), out, monitor.part(_LOOKING, 1.0))
     _write_root(out, run, settings, planned, complete=True)
     return Outcome(len(missing), len(planned) - len(missing))
@@ -199,7 +200,7 @@ def _described(path: Path | None) -> dict[str, str] | None:
 
 
 def _write_root(out: Path, run: Run, settings: dict[str, Any], planned: tuple[Planned, ...], *, complete: bool) -> None:
-    """`manifest.json` and `README.md`."""
+    """`manifest.json` and `README.md`; what says so already is left alone."""
     counted = Counter(scene.split for scene in planned)
     splits = {name: counted[name] for name in SPLITS if counted[name]}
     manifest = {
@@ -211,10 +212,12 @@ def _write_root(out: Path, run: Run, settings: dict[str, Any], planned: tuple[Pl
         "splits": splits,
         "scenes": [_listed(scene) for scene in planned],
     }
-    with new_file(out / MANIFEST) as partial:
-        partial.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
-    with new_file(out / "README.md") as partial:
-        partial.write_text(card(settings, run.count, splits), encoding="utf-8")
+    texts = {MANIFEST: json.dumps(manifest, indent=1) + "\n", "README.md": card(settings, run.count, splits)}
+    for name, text in texts.items():
+        content = text.encode()
+        if not (out / name).is_file() or (out / name).read_bytes() != content:
+            with new_file(out / name) as partial:
+                partial.write_bytes(content)
 
 
 def _listed(scene: Planned) -> dict[str, Any]:

@@ -194,6 +194,14 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return rendered
 
 
+def test_a_complete_set_is_not_written_again(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A full disk or a kill then cannot make it an incomplete one."""
+    before = contents(root)
+    monkeypatch.setattr(run_module, "new_file", None)
+    assert make_dataset(RUN, root).made == 0
+    assert contents(root) == before
+
+
 @pytest.mark.parametrize("steps", [1, 3, 6])
 def test_cancelling_leaves_whole_scenes_only(made: Path, tmp_path: Path, steps: int) -> None:
     asked = iter(range(1000))
