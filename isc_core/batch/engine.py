@@ -103,6 +103,7 @@ def _configuration(crew: Crew) -> dict[str, object]:
         "distributed.scheduler.allowed-failures": _SUSPICION,
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.deploy.lost-worker-timeout": "5 minutes",  # to start again; on a busy machine that takes more than the usual 15 s
+        "distributed.worker.profile.enabled": False,  # keeps its samples of an hour: half a megabyte an image
         f"{memory}.target": False, f"{memory}.spill": False, f"{memory}.pause": False, f"{memory}.terminate": 0.95,
     }  # fmt: skip
 
