@@ -1,7 +1,7 @@
 """Making a data set: scene after scene, each whole or not at all, so that an interrupted run goes on where it stopped.
 
-`manifest.json` is written before the first scene that lacks and says what the run is to become; a folder that holds another run is left alone. A
-scene that is there is kept if it is the one planned and none of its files has changed since.
+`manifest.json` is written before the first scene that lacks and says what the run is to become; a folder that holds another run is left
+alone. A scene that is there is kept if it is the one planned and none of its files has changed since.
 
 Limits: a kept scene may come from another version of the program; its `scene.json` says which.
 """
