@@ -120,6 +120,13 @@ def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None
             _tidy(left, target)
 
 
+def remove_unfinished_in(folder: Path) -> None:
+    """The same for everything that is written in `folder`; nothing where there is no such folder."""
+    with contextlib.suppress(FileNotFoundError, NotADirectoryError):
+        for name in {origin for entry in folder.iterdir() if (origin := _origin(entry)) is not None}:
+            remove_unfinished(folder / name)
+
+
 def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
     """Raises `InputError` unless `folder` may be created or replaced (see `new_folder`)."""
     with _explained(folder):

@@ -12,18 +12,15 @@ The lock is the kernel's (`flock`): it ends with its process, however that ends,
 import contextlib
 import fcntl
 import os
-import re
 import shutil
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..atomic import remove_unfinished
+from ..atomic import remove_unfinished_in
 from ..errors import InputError
 from .names import OWN_FILES
-
-_LEFT = re.compile(r"\.(.+)\.[0-9a-f]{8}\.(partial|old|gone)")
 
 
 class RunFolder:
@@ -95,9 +92,7 @@ class RunFolder:
         No other run writes here, since the lock is held. Workers of a killed one may be at their last image: they hold what they write.
         """
         for folder in (self.output, self.thumbnails, self.pages):
-            with contextlib.suppress(FileNotFoundError):
-                for name in {left[1] for entry in os.scandir(folder) if (left := _LEFT.fullmatch(entry.name))}:
-                    remove_unfinished(folder / name)
+            remove_unfinished_in(folder)
         shutil.rmtree(self.fetched, ignore_errors=True)
         with contextlib.suppress(FileNotFoundError):
             for entry in os.scandir(self.attempts):

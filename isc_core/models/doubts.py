@@ -19,12 +19,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..brdf.fitting.recovered import blurred_normals
-from ..light_gamut import PLANE
+from ..light_gamut import bright_chromaticities
 from ..photo import Photo
-from .layers import shaded
+from .layers import less_sure, shaded
 from .task import Answer
 
-_LESS = 0.5  # of the confidence
 _FARTHEST = 20.0  # degrees that highlights spread
 _MOST_COLOURS = 0.2  # of the shading
 _LEAST_SHARE = 1e-3  # of the light is specular; of less there is nothing to say
@@ -44,9 +43,7 @@ def doubted(maps: Photo, answer: Answer) -> Answer:
     normal, shading = shaded(answer.height, answer.light, maps.mask)
     spread, colours = highlight_spread(answer, normal, maps), colour_spread(shading[maps.mask])
     doubts = [*([_APART] if spread > _FARTHEST else []), *([_COLOURS] if colours > _MOST_COLOURS else [])]
-    split = answer.split
-    if doubts:
-        split = replace(split, confidence=np.float32(_LESS) * split.confidence)
+    split = less_sure(answer.split) if doubts else answer.split
     return replace(answer, split=split, status=answer.status | {"doubts": doubts})
 
 
@@ -65,10 +62,8 @@ def colour_spread(shading: np.ndarray) -> float:
     """Standard deviation of the chromaticities of shadings (N, C) >= 0, C = 1 or 3."""
     if shading.shape[1] == 1:
         return 0.0
-    sums = shading.sum(axis=1, dtype=float)
-    bright = sums >= max(float(np.quantile(sums, _DARK)), 1e-12)
-    if not bright.any():
+    places, weights = bright_chromaticities(shading, _DARK)
+    if not len(places):
         return 0.0
-    places = 3 * shading[bright] / sums[bright, None] @ PLANE
-    off = places - np.average(places, axis=0, weights=sums[bright])
-    return float(np.sqrt(np.average(np.square(off).sum(axis=1), weights=sums[bright])))
+    off = places - np.average(places, axis=0, weights=weights)
+    return float(np.sqrt(np.average(np.square(off).sum(axis=1), weights=weights)))

@@ -1,5 +1,7 @@
 """The steps that several models take: separating a photo, and shading a recovered shape."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..decomposition import Separation
@@ -34,6 +36,11 @@ def unseparated(task: Task) -> tuple[Separation, np.ndarray]:
     with task.clock.stage("separation"):
         split = separated(task.maps, "none")
         return split, split.diffuse if task.one_scale else separated(task.working, "none").diffuse
+
+
+def less_sure(split: Separation) -> Separation:
+    """The same layers, half as much to be trusted."""
+    return replace(split, confidence=np.float32(0.5) * split.confidence)
 
 
 def shaded(height: np.ndarray, light: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

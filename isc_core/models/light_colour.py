@@ -25,12 +25,12 @@ from ..decomposition import Separation
 from ..illuminant import Illuminant, estimate_illuminant, tinted, whitened
 from ..photo import Photo
 from ..sirfs.frames import light_from_reference, light_to_reference
+from .layers import less_sure
 from .settings import LIGHT_COLOURS
 from .task import Answer, Task
 
 WHITE, ESTIMATE = LIGHT_COLOURS
 _COLOURED = 0.1  # of a channel's share: less cannot be told from white
-_LESS = 0.5  # of the confidence, where the light is no lamp's
 _STRONG = "the light may be strongly coloured, or all of the paint is: highlights and paint are less to be trusted; white light would tell"
 _HINT = "the light is coloured: --light-colour estimate takes that into account"
 
@@ -44,9 +44,7 @@ def under_light(task: Task, solver: Callable[[Task], Answer]) -> Answer:
         light = estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
     used = light.determined and task.settings.light_colour == ESTIMATE
     answer = _back(solver(_whitened(task, light.colour)), light.colour) if used else solver(task)
-    split = answer.split
-    if light.too_strong:
-        split = replace(split, confidence=np.float32(_LESS) * split.confidence)
+    split = less_sure(answer.split) if light.too_strong else answer.split
     return replace(answer, split=split, status=answer.status | {"light_colour": _status(light, used)})
 
 
