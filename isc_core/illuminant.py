@@ -31,11 +31,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import InputError
-from .light_gamut import PLANE, without_white
+from .light_gamut import PLANE, leads_to, turns, without_white
 from .separation.smoothing import masked_gaussian
 
 _FINE = 0.006  # of the object's diagonal: changes are taken over twice this
-_RISE, _TURN, _TOWARD = 0.03, 0.05, 0.7  # of the intensity, over the bright pixels'; of the chromaticity; the cosine of its direction
 _LOOSE, _TOLERANCE = 0.2, 0.02  # of n . L / |n|, in the first round and in the last
 _ROUNDS, _GATES = 15, 3
 _OPEN = 2.0  # how much farther from white than usual the rounds may look, before the answer is weighed
@@ -161,13 +160,8 @@ def _slices(axis: int, start: int, length: int) -> tuple[slice, ...]:
 
 def _flanks(changes: _Changes, light: np.ndarray) -> np.ndarray:
     """Which changes (N,) may be highlights of that light."""
-    rise = changes.change.sum(axis=1)
-    here = changes.colour / np.maximum(changes.colour.sum(axis=1), 1e-12)[:, None]
-    turn = changes.change / np.maximum(rise, 1e-12)[:, None] - here
-    wanted = light / light.sum() - here
-    length = np.linalg.norm(turn, axis=1)
-    cosine = (turn * wanted).sum(axis=1) / np.maximum(length * np.linalg.norm(wanted, axis=1), 1e-12)
-    return (rise > _RISE) & (changes.change.min(axis=1) > 0) & (length > _TURN) & (cosine > _TOWARD)
+    here, turn, rising = turns(changes.colour, changes.change)
+    return rising & leads_to(light, here, turn)
 
 
 def _planes(changes: _Changes, flanks: np.ndarray, shift: np.ndarray, options: IlluminantOptions) -> tuple[np.ndarray, np.ndarray]:

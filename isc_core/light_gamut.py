@@ -27,7 +27,8 @@ PLANE = np.array([[1, -1, 0], [1, 1, -2]]).T / np.sqrt([2.0, 6.0])
 _DARK, _STRAY = 0.3, 0.05  # quantiles: of the intensity, below which colours do not count; of those beyond the hull
 _FARTHEST = 0.3  # of white from the hull
 _DIRECTIONS = 72  # a multiple of 12 makes the channels alike
-_RISE, _TURN, _TOWARD, _TOLERANCE = 0.03, 0.05, 0.7, 0.04  # see `illuminant`
+_RISE, _TURN = 0.03, 0.05  # of a flank: of the intensity, over the bright pixels'; of the chromaticity
+_TOWARD, _TOLERANCE = 0.7, 0.04  # the cosine of the turn's direction to the light; n . L / |n|
 _NEAR, _STEP = 0.25, 0.1  # the colours that count as white, and their grid
 _FEW, _FAINT = 20, 1e-4  # flanks, and their mean weight over all changes, below which they say nothing
 _ENOUGH = 20_000  # colours or flanks: more say the same
@@ -63,10 +64,8 @@ def bright_chromaticities(colour: np.ndarray, dark: float) -> tuple[np.ndarray, 
 
 def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
     """How much of what may be highlights' flanks leads to a colour near white, in [0, 1]; 0 where there is nothing."""
-    rise, sums = change.sum(axis=1), np.maximum(colour.sum(axis=1), 1e-12)
-    here = colour / sums[:, None]
-    turn = change / np.maximum(rise, 1e-12)[:, None] - here
-    flanks = np.flatnonzero((rise > _RISE) & (change.min(axis=1) > 0) & (np.linalg.norm(turn, axis=1) > _TURN))
+    here, turn, rising = turns(colour, change)
+    flanks = np.flatnonzero(rising)
     normal = np.cross(colour[flanks], change[flanks])
     if len(flanks) < _FEW or np.linalg.norm(normal, axis=1).sum() < _FAINT * len(colour):
         return 0.0
@@ -78,6 +77,24 @@ def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
     return max(
         float(weight @ _agreement(white, normal / weight[:, None], here[flanks], end, turn[flanks]) / weight.sum()) for white in _whites()
     )
+
+
+def turns(colour: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of colours and their changes (N, 3): the chromaticity, the way from it to the change's, and (N,) which may be highlights' flanks.
+
+    Those rise in all channels, and their chromaticity turns.
+    """
+    rise = change.sum(axis=1)
+    here = colour / np.maximum(colour.sum(axis=1), 1e-12)[:, None]
+    turn = change / np.maximum(rise, 1e-12)[:, None] - here
+    return here, turn, (rise > _RISE) & (change.min(axis=1) > 0) & (np.linalg.norm(turn, axis=1) > _TURN)
+
+
+def leads_to(light: np.ndarray, here: np.ndarray, turn: np.ndarray) -> np.ndarray:
+    """Which turns (N, 3) of chromaticities `here` (N, 3) go toward that of `light` (3,): (N,) bool."""
+    way = light / light.sum() - here
+    cosine = (turn * way).sum(axis=1) / np.maximum(np.linalg.norm(turn, axis=1) * np.linalg.norm(way, axis=1), 1e-12)
+    return cosine > _TOWARD
 
 
 def _thinned(number: int) -> slice:
@@ -94,7 +111,5 @@ def _whites() -> np.ndarray:
 def _agreement(white: np.ndarray, normal: np.ndarray, here: np.ndarray, end: np.ndarray, turn: np.ndarray) -> np.ndarray:
     """How well that light (3,) explains flanks (N, 3): in [0, 1], (N,). `end`: the chromaticity to which they have come."""
     off = normal @ (white / np.linalg.norm(white))
-    way = white / 3 - here
-    cosine = (way * turn).sum(axis=1) / np.maximum(np.linalg.norm(way, axis=1) * np.linalg.norm(turn, axis=1), 1e-12)
-    ahead = ((white / 3 - end) * turn).sum(axis=1) > 0
-    return np.where(ahead & (cosine > _TOWARD), 1 / (1 + np.square(off / _TOLERANCE)), 0.0)
+    ahead = ((white / white.sum() - end) * turn).sum(axis=1) > 0
+    return np.where(ahead & leads_to(white, here, turn), 1 / (1 + np.square(off / _TOLERANCE)), 0.0)
