@@ -5,17 +5,22 @@ Poisson equation with natural borders: nothing outside the mask matters. (Least-
 be integrable goes back to B. K. P. Horn and M. J. Brooks, CVGIP 33(2), 174-208 (1986), doi:10.1016/0734-189X(86)90114-3.)
 
 Solved by conjugate gradients, preconditioned by one V-cycle of multigrid with bilinear interpolation and Galerkin coarse
-operators: about 15 iterations whatever the size. Each connected part of the mask comes out with mean zero.
+operators: about 15 iterations whatever the size. Each connected part of the mask comes out with mean zero. (M. R. Hestenes and E. Stiefel,
+J. Res. Natl. Bur. Stand. 49(6), 409-436 (1952), doi:10.6028/jres.049.044.) All sums are taken here, in one order: a library's would round
+otherwise on one thread than on two.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy import ndimage, sparse
-from scipy.sparse import linalg
 
-_COARSEST = 400
+from ..linear import solved
+
+_COARSEST = 60
 _DAMPING = 0.7
+_MOST_STEPS = 200
+_LIFT = 1e-9  # of the coarsest diagonal: makes its inverse exist; the constants that it lifts are taken off in the end
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,7 @@ class _Multigrid:
     def cycle(self, residual: np.ndarray, depth: int = 0) -> np.ndarray:
         """One symmetric V-cycle: an approximate solution (n,) for the residual (n,)."""
         if depth == len(self.levels):
-            return self.coarsest_inverse @ residual
+            return np.einsum("ij,j->i", self.coarsest_inverse, residual)
         level = self.levels[depth]
         z = _DAMPING * level.inverse_diagonal * residual
         z += level.up @ self.cycle(level.up.T @ (residual - level.operator @ z), depth + 1)
@@ -54,12 +59,35 @@ def integrate(right: np.ndarray, down: np.ndarray, mask: np.ndarray, tolerance: 
     difference, horizontal, vertical = _differences(mask)
     operator = (difference.T @ difference).tocsr()
     multigrid = _build(operator, mask)
-    preconditioner = linalg.LinearOperator(operator.shape, matvec=multigrid.cycle, dtype=float)
     wanted = np.concatenate([right[:, :-1][horizontal], down[:-1][vertical]]).astype(float)
     columns = (difference.T @ wanted).reshape(operator.shape[0], -1)
-    solved = [linalg.cg(operator, b, rtol=tolerance, maxiter=200, M=preconditioner)[0] for b in columns.T]
-    out[mask] = np.stack(solved, axis=1).reshape(out[mask].shape)
+    values = [_conjugate_gradients(operator, multigrid, b, tolerance) for b in columns.T]
+    out[mask] = np.stack(values, axis=1).reshape(out[mask].shape)
     return _centred(out, mask)
+
+
+def _conjugate_gradients(operator: sparse.csr_array, multigrid: _Multigrid, right: np.ndarray, tolerance: float) -> np.ndarray:
+    """x (n,) of `operator` x = `right` (n,), to a relative residual of `tolerance`."""
+    size = np.abs(right).max(initial=0)
+    if size == 0:
+        return np.zeros(len(right))
+    x, residual = np.zeros(len(right)), right / size  # squares of tiny differences would be zero
+    enough = tolerance**2 * _dot(residual, residual)
+    direction, before = np.zeros(len(right)), 1.0
+    for _ in range(_MOST_STEPS):
+        if _dot(residual, residual) <= enough:
+            break
+        z = multigrid.cycle(residual)
+        now = _dot(residual, z)
+        direction = z + now / before * direction
+        image = operator @ direction
+        step = now / _dot(direction, image)
+        x, residual, before = x + step * direction, residual - step * image, now
+    return size * x
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.einsum("i,i->", a, b))
 
 
 def _differences(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
@@ -82,7 +110,9 @@ def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
         diagonal = operator.diagonal()
         levels.append(_Level(operator, 1 / np.where(diagonal > 0, diagonal, 1), up))
         operator = (up.T @ operator @ up).tocsr()
-    return _Multigrid(levels, np.linalg.pinv(operator.toarray(), hermitian=True))
+    coarsest = operator.toarray()
+    largest = coarsest.diagonal().max(initial=0) or 1.0
+    return _Multigrid(levels, solved(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest))))
 
 
 def _interpolation(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray]:

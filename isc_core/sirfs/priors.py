@@ -9,7 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .linear import solved
+from ..linear import solved
 from .tables import CostTable
 
 

@@ -14,11 +14,11 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import InputError
+from ..linear import solved
 from ..progress import Monitor
 from ..workers import Workers
 from .illumination import stack, unstack
 from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
-from .linear import solved
 from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, level_shapes, synthesise

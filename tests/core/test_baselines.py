@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core import baselines
 from isc_core.baselines import ikeuchi_horn_1981, naive, retinex, tsai_shah_1994
@@ -160,6 +161,18 @@ def test_integration_minimises_the_squares() -> None:
     best = integrate(right, down, mask, tolerance=1e-10)
     for _ in range(10):
         assert misfit(best + 1e-3 * rng.normal(size=mask.shape)) > misfit(best)
+
+
+def test_integration_is_the_same_on_any_number_of_threads_and_for_tiny_steps() -> None:
+    rng = np.random.default_rng(6)
+    right, down = rng.normal(size=(2, 50, 60))
+    mask = rng.random((50, 60)) < 0.7
+    found = []
+    for threads in (1, 3):
+        with threadpool_limits(threads):
+            found.append(integrate(right, down, mask))
+    np.testing.assert_array_equal(*found)
+    np.testing.assert_allclose(integrate(1e-200 * right, 1e-200 * down, mask) * 1e200, found[0], atol=1e-9)
 
 
 def test_fit_light_returns_the_light_that_was_used() -> None:

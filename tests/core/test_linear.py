@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from isc_core.sirfs.linear import solved
+from isc_core.linear import solved
 from isc_core.sirfs.prior_file import shipped_prior_set
 
 SYSTEMS = [np.random.default_rng(n).normal(size=(n, n)) for n in (1, 2, 9, 27)]
