@@ -34,12 +34,12 @@ import numpy as np
 from scipy import ndimage
 
 from ..decomposition import Separation
+from ..enlarging import enlarged
 from ..errors import InputError
 from ..progress import Monitor
 from .channels import largest, smallest
 from .checks import check_arrays
 from .edge_aware import Paths
-from .enlarging import enlarged
 from .evidence import colour_evidence
 from .filter_statistics import highlight_prior
 from .highlight_cues import Steps, far_from_borders, noise_level, paint_mixing, ramp, roughness, steps_of

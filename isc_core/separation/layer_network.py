@@ -23,10 +23,10 @@ from pathlib import Path
 import numpy as np
 
 from ..box import mask_slices
+from ..enlarging import enlarged
 from ..errors import InputError
 from ..numpy_files import read_arrays
 from ..photo import averaged
-from .enlarging import enlarged
 from .smoothing import masked_gaussian
 
 STRIDE = 32  # pixels: sides of what the network sees are multiples
@@ -36,6 +36,9 @@ _BLOCK = 2
 _CHANNELS = 4  # y of three colours, log b
 _BITS = 20  # of the largest factor: 9 x 1024 products of twice as many bits add up to less than 2^53
 _FRAME = 8  # pixels around the object: what lies beyond the picture's frame is background as well
+
+
+Steps = Iterator[tuple[np.ndarray, np.ndarray]]  # weights and biases of the convolutions still to come
 
 
 @dataclass(frozen=True)
@@ -74,14 +77,33 @@ class LayerNetwork:
             raw = 0.5 * (raw + self._run(image[:, ::-1], mask[:, ::-1])[:, ::-1])
         return raw[..., :3], raw[..., 3]
 
-    def _run(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        layer = _to_blocks(_inputs(image, mask))
-        depth = (len(self.weights) - 1) // 4 + 1
-        steps = iter(zip(self.weights, self.biases, strict=True))
-        kept = []
-        for level in range(depth):
+    def summary(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        """What the encoder sees, wherever on the object: of each of its channels, from the finest level to the coarsest, mean, deviation
+        and fourth moment's fourth root over the mask: (3 channels,) float64. Photo and mask as for a call."""
+        sums = []
+        cover = mask.astype(float)[..., None]
+        for layer in self._encoded(image, mask, self._steps()):
+            cover = _halved(cover)
+            weight = cover[..., 0] / cover.sum()
+            first, second, fourth = (np.einsum("ij,ijc->c", weight, layer.astype(float) ** power) for power in (1, 2, 4))
+            sums += [first, np.sqrt(np.maximum(second - first**2, 0)), fourth**0.25]
+        return np.concatenate(sums)
+
+    def _steps(self) -> Steps:
+        return iter(zip(self.weights, self.biases, strict=True))
+
+    def _encoded(self, image: np.ndarray, mask: np.ndarray, steps: Steps) -> list[np.ndarray]:
+        """The encoder's layers, the finest first."""
+        layer, kept = _to_blocks(_inputs(image, mask)), []
+        for level in range((len(self.weights) - 1) // 4 + 1):
             layer = _twice(layer if level == 0 else _halved(layer), steps)
             kept.append(layer)
+        return kept
+
+    def _run(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        steps = self._steps()
+        kept = self._encoded(image, mask, steps)
+        layer = kept[-1]
         for skipped in kept[-2::-1]:
             layer = _twice(np.concatenate([skipped, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps)
         raw = _from_blocks(_convolved(layer, *next(steps)))
@@ -92,7 +114,7 @@ class LayerNetwork:
 def log_ratio(image: np.ndarray, mask: np.ndarray, network: LayerNetwork, options: NetworkOptions) -> tuple[np.ndarray, np.ndarray]:
     """y (H, W, 3) >= 0 and b (H, W) > 0, float32, 0 outside `mask` (H, W) bool, of `image` (H, W, 3)."""
     box = mask_slices(mask)
-    small, inside, factor = averaged(image[box], mask[box], min(1.0, options.long_side / max(mask[box].shape)))
+    small, inside, factor = _as_seen(image[box], mask[box], options.long_side)
     framed, place = _framed(small, inside)
     raw, log_error = network(*framed, options.mirrored)
     error = np.exp(log_error)
@@ -101,6 +123,14 @@ def log_ratio(image: np.ndarray, mask: np.ndarray, network: LayerNetwork, option
     whole = np.zeros((*mask.shape, 4), np.float32)
     whole[box] = np.where(mask[box][..., None], _carried(found, inside, mask[box].shape, factor), 0)
     return whole[..., :3], whole[..., 3]
+
+
+def summary(image: np.ndarray, mask: np.ndarray, network: LayerNetwork, long_side: int = NetworkOptions.long_side) -> np.ndarray:
+    """`LayerNetwork.summary` of `image` (H, W, 3) within `mask` (H, W) bool, the mean of those for the photo and its mirror image."""
+    box = mask_slices(mask)
+    small, inside, _ = _as_seen(image[box], mask[box], long_side)
+    (framed, cover), _ = _framed(small, inside)
+    return 0.5 * (network.summary(framed, cover) + network.summary(framed[:, ::-1], cover[:, ::-1]))
 
 
 @cache
@@ -122,6 +152,11 @@ def read_network(path: Path) -> LayerNetwork:
     except (ValueError, KeyError) as error:
         raise InputError(f"{path} holds no layer network: {error}") from error
     return LayerNetwork(tuple(weights), tuple(biases))
+
+
+def _as_seen(image: np.ndarray, mask: np.ndarray, long_side: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """As `averaged`, an object that fills the picture no longer than `long_side`."""
+    return averaged(image, mask, min(1.0, long_side / max(mask.shape)))
 
 
 def _inputs(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
@@ -151,7 +186,7 @@ def _halved(layer: np.ndarray) -> np.ndarray:
     return layer.reshape(rows // 2, 2, columns // 2, 2, channels).mean(axis=(1, 3))
 
 
-def _twice(layer: np.ndarray, steps: Iterator[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def _twice(layer: np.ndarray, steps: Steps) -> np.ndarray:
     for _ in range(2):
         layer = np.maximum(_convolved(layer, *next(steps)), 0)
     return layer

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter
 
 from isc_core.brdf.blinn_phong import BlinnPhong
 from isc_core.brdf.fitting import LobeFitOptions, fit_lobe
@@ -12,6 +13,7 @@ from isc_core.brdf.fitting.environment_response import respond_to, surroundings
 from isc_core.brdf.fitting.lamps import Lamps, Problem, _measured, _moved
 from isc_core.brdf.fitting.observed import observe
 from isc_core.brdf.fitting.pixels import choose_pixels
+from isc_core.brdf.fitting.recovered import blurred_normals
 from isc_core.brdf.fitting.response import respond
 from isc_core.brdf.fitting.result import NARROW, NO_LIGHT, SMOOTH
 from isc_core.brdf.ggx import Ggx
@@ -290,6 +292,21 @@ def test_what_a_separator_leaves_on_a_matt_object_is_no_gloss() -> None:
     crumbs[40:44, 50:53] = 0.05
     fit = fit_lobe(crumbs, normal, mask, options=LobeFitOptions(recovered=True), shading=shading)
     assert fit.reason == NO_LIGHT and fit.alpha is None and fit.lights == ()
+
+
+@pytest.mark.parametrize("size", [40, 300])
+def test_normals_are_blurred_by_blocks_as_by_pixels(size: int) -> None:
+    normal, mask = ball(size)
+    mask &= np.arange(size) < 0.7 * size
+    normal += 0.2 * np.random.default_rng(1).normal(size=normal.shape)
+    width = 0.3 * np.sqrt(mask.sum())
+    wanted = np.dstack([gaussian_filter(np.where(mask, normal[..., k], 0), width, mode="constant") for k in range(3)])
+    wanted /= np.linalg.norm(wanted, axis=-1, keepdims=True)
+    found = blurred_normals(normal, mask)
+    assert np.degrees(np.arccos(np.clip((found * wanted).sum(-1)[mask], -1, 1))).max() < 0.5
+    np.testing.assert_array_equal(found[~mask], np.broadcast_to(VIEW, found[~mask].shape))
+    padded = blurred_normals(np.pad(normal, [(3, 5), (7, 0), (0, 0)]), np.pad(mask, [(3, 5), (7, 0)]))
+    np.testing.assert_array_equal(padded[3:-5, 7:], found)
 
 
 def test_recovered_images_need_their_shading() -> None:
