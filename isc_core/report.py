@@ -264,6 +264,8 @@ def _title(d: Decomposition) -> tuple[str, str]:
         words.append("converged" if converged else "stopped early")
     if d.brdf is not None:
         words.append(_gloss(d.brdf))
+    if status.get("doubts"):
+        words.append("doubtful, see status.doubts")
     return name, "   ·   ".join(words)
 
 

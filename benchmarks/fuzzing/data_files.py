@@ -17,6 +17,7 @@ import numpy as np
 import scipy.io
 
 from blender_addon.arrays import read_result
+from isc_core.appearance import read_appearance
 from isc_core.batch.item import Recipe
 from isc_core.batch.manifest import Manifest
 from isc_core.brdf.fitting import Interval, LobeFit, LobeLight
@@ -200,6 +201,7 @@ def _npz() -> tuple[Case, ...]:
         *_npz_cases("priors.npz", (_DATA / "priors.npz").read_bytes(), load_prior_set),
         *_npz_cases("table.npz", (_DATA / "filter_statistics.npz").read_bytes(), read_table),
         *_npz_cases("network.npz", stream.getvalue(), read_network),
+        *_npz_cases("appearance.npz", stream.getvalue(), read_appearance),
         *_npz_cases("arrays.npz", result["arrays.npz"], lambda path: read_result(path.parent), description),
     )
 

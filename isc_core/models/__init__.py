@@ -2,7 +2,7 @@
 
 A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with.
 Of those that separate, `light_colour` decides which colour of light they see; of those that find shape and light, `doubts` looks whether
-their answer contradicts what they assume.
+the photo shows what they assume.
 """
 
 from .baseline import baseline

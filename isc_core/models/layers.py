@@ -38,9 +38,9 @@ def unseparated(task: Task) -> tuple[Separation, np.ndarray]:
         return split, split.diffuse if task.one_scale else separated(task.working, "none").diffuse
 
 
-def less_sure(split: Separation) -> Separation:
-    """The same layers, half as much to be trusted."""
-    return replace(split, confidence=np.float32(0.5) * split.confidence)
+def less_sure(split: Separation, share: float = 0.5) -> Separation:
+    """The same layers, with that share of their confidence."""
+    return replace(split, confidence=np.float32(share) * split.confidence)
 
 
 def shaded(height: np.ndarray, light: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

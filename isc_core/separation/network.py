@@ -20,7 +20,8 @@ from ..decomposition import Separation
 from ..errors import InputError
 from ..progress import Monitor
 from .checks import check_arrays
-from .layer_network import STRIDE, LayerNetwork, NetworkOptions, log_ratio, shipped_network
+from .convolutions import STRIDE
+from .layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
 from .layers import diffuse_layers
 from .light_tint import held_to_light
 

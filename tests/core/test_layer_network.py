@@ -6,16 +6,8 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.separation import separate
-from isc_core.separation.layer_network import (
-    LayerNetwork,
-    NetworkOptions,
-    _convolved,
-    _from_blocks,
-    _to_blocks,
-    log_ratio,
-    read_network,
-    shipped_network,
-)
+from isc_core.separation.convolutions import convolved, from_blocks, to_blocks
+from isc_core.separation.layer_network import LayerNetwork, NetworkOptions, log_ratio, read_network, shipped_network
 from isc_core.separation.light_tint import held_to_light
 
 
@@ -44,14 +36,14 @@ def test_convolution_is_correlation_with_zeros_around():
     expected = [
         sum(ndimage.correlate(layer[..., i], weight[:, i, o].reshape(3, 3), mode="constant") for i in range(3)) + bias[o] for o in range(2)
     ]
-    assert np.allclose(_convolved(layer, weight, bias), np.stack(expected, -1), atol=5e-5)  # steps of 2^-20 of the largest factors
+    assert np.allclose(convolved(layer, weight, bias), np.stack(expected, -1), atol=5e-5)  # steps of 2^-20 of the largest factors
 
 
 def test_blocks_of_pixels_go_there_and_back():
     layer = np.arange(4 * 6 * 3.0).reshape(4, 6, 3)
-    blocks = _to_blocks(layer)
+    blocks = to_blocks(layer)
     assert np.array_equal(blocks[1, 2].reshape(3, 2, 2), layer[2:4, 4:6].transpose(2, 0, 1))
-    assert np.array_equal(_from_blocks(blocks), layer)
+    assert np.array_equal(from_blocks(blocks), layer)
 
 
 def test_exposure_and_mirror_images_change_nothing():

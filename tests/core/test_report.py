@@ -165,6 +165,8 @@ def test_the_title_says_what_was_fitted() -> None:
     fit = fit_lobe(d.specular, d.normal, d.mask)
     assert fit.blender_roughness is not None
     assert _title(replace(d, brdf=fit))[1].endswith(f"roughness {fit.blender_roughness:.2f}")
+    doubtful = replace(d.provenance, status=d.provenance.status | {"doubts": ["it looks like a mirror"]})
+    assert "doubtful" in _title(replace(d, provenance=doubtful))[1] and "doubtful" not in _title(d)[1]
     assert _title(replace(d, brdf=replace(fit, determined=False)))[1].endswith(f"roughness at most {fit.blender_roughness:.2f}")
     assert _title(replace(d, brdf=replace(fit, alpha=None)))[1].endswith("gloss undetermined")
     assert _title(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))[1].endswith("no highlights")

@@ -17,6 +17,7 @@ from benchmarks.fuzzing import data_files
 from benchmarks.fuzzing.data_files import deflated, matlab
 from benchmarks.fuzzing.mesh_files import glb
 from benchmarks.fuzzing.pictures import array, ball, coded, codes, exr
+from isc_core.appearance import read_appearance
 from isc_core.cli import main
 from isc_core.datasets import load_natural_lights
 from isc_core.errors import InputError
@@ -196,7 +197,8 @@ def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(refused
     broken[0] = np.nan
     refused(read_table, "a.npz", archive(**{key: array(np.asarray(v)) for key, v in (members | {"spread": broken}).items()}), "a.npz")
     weights = {"weight00": np.full((3, 3), np.nan, np.float32), "bias00": np.zeros(3, np.float32)}
-    refused(read_network, "a.npz", archive(**{key: array(value) for key, value in weights.items()}), "not finite")
+    for read in (read_network, read_appearance):
+        refused(read, "a.npz", archive(**{key: array(value) for key, value in weights.items()}), "not finite")
 
 
 # --- descriptions -----------------------------------------------------------------------------------------------------------------------

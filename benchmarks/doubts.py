@@ -1,0 +1,97 @@
+"""How often a photo is doubted that should be, and how often one that should not.
+
+  python -m benchmarks.doubts SCENES... [--photos DIR...] [--data ROOT...] [--only NAME...] [--appearance FILE]
+
+SCENES: of `python -m benchmarks.doubt_scenes`. `--photos`: folders of photos with masks; `--data`: sets like MIT-Berkeley's, their
+laboratory photos as they are and without gloss. `--only`: those of these families of shapes and objects of sets. A Markdown table; what is
+doubted of the photos is named below it. Of "rig" scenes, one lamp and then several are lit.
+"""
+
+import argparse
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.appearance import GLASS, KINDS, MIRROR, AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
+from isc_core.datasets import list_objects, load_object
+from isc_core.models.doubts import LIKELY, doubts_of
+from isc_core.photo import read_photo
+
+
+@dataclass(frozen=True)
+class Case:
+    """`image` (H, W, 3), `mask` (H, W); `group`: of the table; `name`: to be told where it is a photo that is doubted, else ""."""
+
+    image: np.ndarray
+    mask: np.ndarray
+    group: str
+    name: str = ""
+
+
+def scenes(folder: Path, only: list[str]) -> Iterator[Case]:
+    """Those of `benchmarks.doubt_scenes`."""
+    for path in sorted(folder.glob("*_*.npz")):
+        with np.load(path, allow_pickle=False) as data:
+            layers, mask, family, around = data["layers"].astype(np.float32), data["mask"], str(data["shape"]), str(data["surroundings"])
+        kind = path.stem.partition("_")[0]
+        if only and family not in only:
+            continue
+        if kind == "rig":
+            yield Case(layers[0] + 0.1 * layers[-1], mask, "rig, one lamp")
+            yield Case(layers[:-1].sum(0) + 0.1 * layers[-1], mask, f"rig, {len(layers) - 1} lamps")
+        else:
+            yield Case(layers.sum(0), mask, f"{kind}, {around}")
+
+
+def photos(folder: Path) -> Iterator[Case]:
+    """Photographs, of which nothing is known."""
+    for path in sorted(folder.glob("*.png")):
+        photo = read_photo(path)
+        yield Case(photo.image, photo.mask, folder.name, path.stem)
+
+
+def laboratory(root: Path, only: list[str]) -> Iterator[Case]:
+    """The objects of a set like MIT-Berkeley's."""
+    for name in list_objects(root, "laboratory"):
+        for kind in ("original", "diffuse"):
+            if not only or name in only:
+                seen = load_object(root, name, "laboratory", kind)
+                yield Case(seen.image, seen.valid, f"{root.name}, {kind}", name)
+
+
+def main() -> None:
+    """Measures and prints."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", type=Path, nargs="*")
+    parser.add_argument("--photos", type=Path, nargs="+", default=[])
+    parser.add_argument("--data", type=Path, nargs="+", default=[])
+    parser.add_argument("--only", nargs="+", default=[])
+    parser.add_argument("--appearance", type=Path)
+    given = parser.parse_args()
+    network = shipped_appearance() if given.appearance is None else read_appearance(given.appearance)
+    cases = [*(case for folder in given.scenes for case in scenes(folder, given.only))]
+    cases += [case for folder in given.photos for case in photos(folder)]
+    cases += [case for root in given.data for case in laboratory(root, given.only)]
+    report(cases, network)
+
+
+def report(cases: list[Case], network: AppearanceNetwork) -> None:
+    """Prints the table, and what is doubted of the photos."""
+    found = [kinds_of(case.image, case.mask, network) for case in cases]
+    lines = [f"| photos | number | doubted | mirror or glass | {' | '.join(KINDS)} |", "|---|---:|---:|---:|" + "---:|" * len(KINDS)]
+    for group in sorted({case.group for case in cases}):
+        rows = [kinds for kinds, case in zip(found, cases, strict=True) if case.group == group]
+        doubted = np.mean([bool(doubts_of(kinds)) for kinds in rows])
+        clear = np.mean([kinds[MIRROR] + kinds[GLASS] > LIKELY for kinds in rows])
+        means = " | ".join(f"{np.mean([kinds[kind] for kinds in rows]):.2f}" for kind in KINDS)
+        lines.append(f"| {group} | {len(rows)} | {doubted:.1%} | {clear:.1%} | {means} |")
+    named = [(case, kinds) for case, kinds in zip(cases, found, strict=True) if case.name and doubts_of(kinds)]
+    lines += ["", *(f"{case.group}: {case.name} seems {max(kinds, key=lambda kind: kinds[kind])}" for case, kinds in named)]
+    sys.stdout.write("\n".join(lines) + "\n")
+
+
+if __name__ == "__main__":
+    main()

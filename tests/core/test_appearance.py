@@ -1,0 +1,120 @@
+"""What a photo seems to show: what the network's answer must not depend on, and what the shipped weights can do."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+
+from benchmarks.surroundings import PLACES, make_surroundings
+from isc_core.appearance import GLASS, KINDS, LAMPS, MIRROR, ORDINARY, AppearanceNetwork, kinds_of, read_appearance
+from isc_core.errors import InputError
+from isc_core.models.doubts import doubts_of
+
+SIDE = 150
+SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
+
+
+def small_network(rng: np.random.Generator) -> AppearanceNetwork:
+    """Two levels, random weights."""
+    weights = tuple(rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32) for inputs, outputs in SHAPES)
+    biases = tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in SHAPES)
+    return AppearanceNetwork(weights, biases, rng.normal(size=30), rng.uniform(1, 2, 30), rng.normal(size=(30, 4)), rng.normal(size=4))
+
+
+def photo(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    mask = np.zeros((70, 50), bool)
+    mask[5:60, 8:42] = True
+    mask[6:59, 9:41] = rng.random((53, 32)) < 0.9
+    return rng.uniform(0.01, 1, (70, 50, 3)).astype(np.float32), mask
+
+
+def shares(kinds: dict[str, float]) -> np.ndarray:
+    return np.array([kinds[name] for name in KINDS])
+
+
+def ball() -> tuple[np.ndarray, np.ndarray]:
+    """Normals (SIDE, SIDE, 3) and mask of a ball."""
+    y, x = np.mgrid[1 : -1 : SIDE * 1j, -1 : 1 : SIDE * 1j] / 0.9
+    mask = x**2 + y**2 < 0.99
+    return np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], -1) * mask[..., None], mask
+
+
+def under_lamps(*lamps: tuple[float, float, float], paint: tuple[float, float, float] = (0.5, 0.3, 0.2)) -> tuple[np.ndarray, np.ndarray]:
+    """A glossy painted ball."""
+    normal, mask = ball()
+    image = 0.06 * np.ones((SIDE, SIDE, 3)) * paint
+    for lamp in lamps:
+        toward = np.array(lamp) / np.linalg.norm(lamp)
+        half = toward + (0, 0, 1)
+        image += np.maximum(normal @ toward, 0)[..., None] * paint
+        image += 1.2 * np.maximum(normal @ (half / np.linalg.norm(half)), 0)[..., None] ** 150
+    return (image * mask[..., None]).astype(np.float32), mask
+
+
+def mirror_ball(surroundings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A mirror, seen from far away."""
+    normal, mask = ball()
+    seen = 2 * normal[..., 2:] * normal - (0, 0, 1)
+    rows = np.clip(np.arccos(np.clip(seen[..., 1], -1, 1)) / np.pi * len(surroundings), 0, len(surroundings) - 1).astype(int)
+    turn = np.mod(np.arctan2(seen[..., 0], -seen[..., 2]), 2 * np.pi) / (2 * np.pi)
+    columns = np.minimum(turn * surroundings.shape[1], surroundings.shape[1] - 1).astype(int)
+    image = np.minimum(surroundings[rows, columns], np.quantile(surroundings, 0.98))
+    return (image * mask[..., None]).astype(np.float32), mask
+
+
+def test_the_answer_is_one_of_probabilities_whatever_the_exposure_and_the_side() -> None:
+    rng = np.random.default_rng(0)
+    network, (image, mask) = small_network(rng), photo(rng)
+    found = shares(kinds_of(image, mask, network))
+    assert found.min() > 0 and found.sum() == pytest.approx(1)
+    np.testing.assert_allclose(shares(kinds_of(8 * image, mask, network)), found, rtol=1e-4)
+    np.testing.assert_allclose(shares(kinds_of(image[:, ::-1], mask[:, ::-1], network)), found, rtol=1e-9)
+
+
+def test_what_is_outside_the_mask_and_the_number_of_threads_change_nothing() -> None:
+    rng = np.random.default_rng(1)
+    network, (image, mask) = small_network(rng), photo(rng)
+    found = shares(kinds_of(image, mask, network))
+    padded = np.pad(np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9)
+    for threads in (1, 3):
+        with threadpool_limits(threads):
+            np.testing.assert_array_equal(shares(kinds_of(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found)
+
+
+@pytest.mark.parametrize("level", [0.0, 1e-30, 1.0])
+def test_photos_without_anything_in_them_are_judged_too(level: float) -> None:
+    found = shares(kinds_of(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool)))
+    assert np.isfinite(found).all() and found.sum() == pytest.approx(1)
+
+
+@pytest.mark.parametrize("place", PLACES)
+def test_mirrors_look_like_mirrors(place: str) -> None:
+    found = [kinds_of(*mirror_ball(make_surroundings(place, np.random.default_rng([9, k])))) for k in range(10)]
+    assert sum(kinds[MIRROR] + kinds[GLASS] > 0.5 for kinds in found) >= (6 if place == "clutter" else 8)
+
+
+def test_paint_under_one_lamp_is_ordinary_and_under_three_it_is_not() -> None:
+    assert kinds_of(*under_lamps((-0.5, 0.5, 0.7)))[ORDINARY] > 0.7
+    assert not doubts_of(kinds_of(*under_lamps((0.2, 0.4, 0.8), paint=(0.2, 0.4, 0.2))))
+    assert kinds_of(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7)))[LAMPS] > 0.8
+
+
+def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.npz"
+    bad.write_bytes(b"no archive")
+    with pytest.raises(InputError, match=r"bad\.npz holds no appearance network"):
+        read_appearance(bad)
+    network = small_network(np.random.default_rng(2))
+    parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}
+    parts |= {f"bias{k:02d}": values for k, values in enumerate(network.biases)}
+    parts |= {name: getattr(network, name) for name in ("middle", "scale", "head", "odds")}
+    for wrong in ({"head": network.head[:9]}, {"scale": 0 * network.scale}, {"bias01": np.ones(3)}, {"weight00": np.ones((9, 3, 4))}):
+        np.savez(bad, **(parts | wrong))
+        with pytest.raises(InputError, match="not the weights"):
+            read_appearance(bad)
+    np.savez(bad, **{name: values for name, values in parts.items() if name != "odds"})
+    with pytest.raises(InputError, match="odds"):
+        read_appearance(bad)
+    np.savez(bad, **parts)
+    assert len(read_appearance(bad).weights) == 4
