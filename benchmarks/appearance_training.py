@@ -301,6 +301,8 @@ def main() -> None:
     subjects = [*synthetic(given.synth), *(subject for folder in given.scenes for subject in rendered(folder))]
     subjects += photographed(given.data, given.glossy) if given.data else ()
     subjects = [subject for subject in subjects if not {subject.family, subject.around} & set(given.leave)]
+    if not subjects:
+        parser.error("there is nothing to learn from: make scenes with benchmarks.doubt_scenes and isc synth")
     given.output.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(given.output, **fit(subjects, given).arrays())  # type: ignore[arg-type]
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from isc_core.appearance import GLASS, KINDS, MIRROR, AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
 from isc_core.datasets import list_objects, load_object
+from isc_core.errors import InputError
 from isc_core.models.doubts import LIKELY, doubts_of
 from isc_core.photo import read_photo
 
@@ -71,15 +72,26 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=[])
     parser.add_argument("--appearance", type=Path)
     given = parser.parse_args()
-    network = shipped_appearance() if given.appearance is None else read_appearance(given.appearance)
-    cases = [*(case for folder in given.scenes for case in scenes(folder, given.only))]
-    cases += [case for folder in given.photos for case in photos(folder)]
-    cases += [case for root in given.data for case in laboratory(root, given.only)]
-    report(cases, network)
+    try:
+        network = shipped_appearance() if given.appearance is None else read_appearance(given.appearance)
+        report(list(_cases(given)), network)
+    except InputError as error:
+        parser.error(str(error))
+
+
+def _cases(given: argparse.Namespace) -> Iterator[Case]:
+    for folder in given.scenes:
+        yield from scenes(folder, given.only)
+    for folder in given.photos:
+        yield from photos(folder)
+    for root in given.data:
+        yield from laboratory(root, given.only)
 
 
 def report(cases: list[Case], network: AppearanceNetwork) -> None:
-    """Prints the table, and what is doubted of the photos."""
+    """Prints the table, and what is doubted of the photos. Raises `InputError` where there are none."""
+    if not cases:
+        raise InputError("there is nothing to judge: name folders of scenes, --photos or --data")
     found = [kinds_of(case.image, case.mask, network) for case in cases]
     lines = [f"| photos | number | doubted | mirror or glass | {' | '.join(KINDS)} |", "|---|---:|---:|---:|" + "---:|" * len(KINDS)]
     for group in sorted({case.group for case in cases}):
