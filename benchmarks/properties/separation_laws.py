@@ -114,7 +114,7 @@ def _scale(task: Task, notes: Notes) -> None:
 
 
 # Of the mean light, what may change its layer: measured over many ordinary photos (docs/properties.md), with room to spare.
-TURN_BOUNDS: dict[str, float] = dict.fromkeys(METHODS, 0.05) | {"network": 0.1}
+TURN_BOUNDS: dict[str, float] = dict.fromkeys(METHODS, 0.05) | {"network": 0.2}
 SCALE_BOUNDS: dict[str, float] = dict.fromkeys(METHODS, 0.01)
 
 LAWS = (

@@ -31,4 +31,5 @@ def saturation(colours: np.ndarray) -> float:
 def fade_in(low: np.ndarray, base: float, fade: float) -> np.ndarray:
     """The share (...) of a specular layer that counts: none where the smallest channel `low` (...) is at most `base`, all from
     (1 + fade) base on. A highlight, being white, lies high in the smallest channel; `fade` >= 0, zero for a step."""
-    return np.clip((low - base) / max(fade * base, 1e-30), 0, 1)
+    room = max(fade * base, 1e-30)
+    return np.clip(low - base, 0, room) / room

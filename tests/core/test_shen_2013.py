@@ -9,6 +9,7 @@ import pytest
 from isc_core.errors import InputError
 from isc_core.inpainting.pull_push import fill
 from isc_core.separation import METHODS, separate, shen_2013
+from isc_core.separation.channels import fade_in
 from isc_core.separation.shen_2013 import VARIANTS, Shen2013Options
 from tests.core.separation_scenes import assert_layers_hold, read
 
@@ -159,3 +160,9 @@ def test_refuses_what_it_cannot_use() -> None:
         shen_2013.separate(image, mask, Shen2013Options(bright_saturation=1.1))
     with pytest.raises(InputError, match="cluster_radius"):
         shen_2013.separate(image, mask, Shen2013Options(cluster_radius=0))
+
+
+def test_bright_pixels_above_a_black_base_count_in_full() -> None:
+    with np.errstate(all="raise"):
+        np.testing.assert_array_equal(fade_in(np.array([0, 1e-3, 1e12], np.float32), 0.0, 0.2), [0, 1, 1])
+        np.testing.assert_allclose(fade_in(np.array([0.4, 0.55, 0.7], np.float32), 0.5, 0.2), [0, 0.5, 1], atol=1e-6)
