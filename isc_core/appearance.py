@@ -11,7 +11,7 @@ their channels over the object make f (n,), and the probability of each kind is
 averaged over the photo and its mirror image.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24574-4_28 (the encoder); pooled moments:
-A. Babenko, V. Lempitsky, "Aggregating deep convolutional features for image retrieval", ICCV 2015, doi:10.1109/ICCV.2015.150. Weights,
+A. Babenko, V. Lempitsky, "Aggregating local deep features for image retrieval", ICCV 2015, doi:10.1109/ICCV.2015.150. Weights,
 training scenes and loss are our own: `python -m benchmarks.appearance_training`.
 
 Limits: measured in docs/methods/doubts.md. A mirror of surroundings without detail looks like paint, and two lamps may look like two bumps.
