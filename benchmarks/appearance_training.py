@@ -29,6 +29,9 @@ import torch
 from torch import nn
 from torch.nn import functional
 
+from benchmarks.doubt_scenes import scenes_in
+from benchmarks.layer_network_samples import log_uniform
+from benchmarks.layer_network_training import arrays_of, inputs
 from isc_core.appearance import GLASS, KINDS, LAMPS, LONG_SIDE, MIRROR, ORDINARY
 from isc_core.box import mask_slices
 from isc_core.datasets import list_objects, load_object
@@ -67,12 +70,10 @@ class Subject:
 
 def rendered(folder: Path) -> Iterator[Subject]:
     """The scenes of `benchmarks.doubt_scenes`."""
-    for path in sorted(folder.glob("*_*.npz")):
-        with np.load(path, allow_pickle=False) as data:
-            layers, mask, family, around = data["layers"].astype(np.float32), data["mask"], str(data["shape"]), str(data["surroundings"])
-        group = path.stem.partition("_")[0]
-        truth = group if group in KINDS else "either" if group == "place" and around in _SEVERAL else ORDINARY
-        yield Subject(*_packed(layers, mask), "" if group == "rig" else truth, group, family, around)
+    for scene in scenes_in(folder):
+        truth = scene.kind if scene.kind in KINDS else "either" if scene.kind == "place" and scene.surroundings in _SEVERAL else ORDINARY
+        layers, mask = _packed(scene.layers, scene.mask)
+        yield Subject(layers, mask, "" if scene.kind == "rig" else truth, scene.kind, scene.shape, scene.surroundings)
 
 
 def synthetic(run: Path) -> Iterator[Subject]:
@@ -125,10 +126,6 @@ def _packed(layers: np.ndarray, mask: np.ndarray) -> tuple[torch.Tensor, torch.T
     return torch.from_numpy(packed), torch.from_numpy(cover)
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
-
-
 def _colour(rng: np.random.Generator, strength: float) -> torch.Tensor:
     return torch.tensor(np.exp(rng.normal(0, strength, 3)), dtype=torch.float32)[:, None, None]
 
@@ -139,7 +136,7 @@ def _lit(subject: Subject, rng: np.random.Generator) -> tuple[torch.Tensor, str]
     if subject.group != "rig":
         return layers.sum(0), subject.truth
     several, lamps = bool(rng.random() < 0.5) and len(layers) > 2, len(layers) - 1
-    image = layers[-1] * _log_uniform(rng, 0.02, 0.3) * _colour(rng, 0.08)
+    image = layers[-1] * log_uniform(rng, 0.02, 0.3) * _colour(rng, 0.08)
     count = int(rng.integers(2, lamps + 1)) if several else 1
     coloured = 0.6 if several and rng.random() < 0.5 else 0.05
     for lamp in rng.permutation(lamps)[:count]:
@@ -151,18 +148,12 @@ def draw(subject: Subject, rng: np.random.Generator) -> tuple[torch.Tensor, tupl
     """What the network sees (4, side, side) of one photo as some camera takes it, and which kinds are right."""
     image, truth = _lit(subject, rng)
     image, mask = _placed(torch.cat([image * subject.mask, subject.mask[None]]), rng)
-    return seen_by_network(_sensed(image, mask, rng), mask), _ALLOWED[truth]
-
-
-def seen_by_network(image: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
-    """(4, side, side): as `isc_core.separation.convolutions.inputs_of`."""
-    mean = ((image * mask).sum() / (3 * mask.sum().clamp(min=1))).clamp(min=1e-9)
-    return torch.cat([torch.log(image / mean + 0.03) * mask, mask[None]])
+    return inputs(_sensed(image, mask, rng)[None], mask[None, None])[0], _ALLOWED[truth]
 
 
 def _placed(layers: torch.Tensor, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
     """At another size, mirrored, turned, elsewhere."""
-    factor = _log_uniform(rng, 0.6, 1.05)
+    factor = log_uniform(rng, 0.6, 1.05)
     resized = functional.interpolate(layers[None], scale_factor=factor, mode="bilinear", antialias=factor < 1, align_corners=False)[0]
     if rng.random() < 0.5:
         resized = resized.flip(2)
@@ -179,7 +170,7 @@ def _placed(layers: torch.Tensor, rng: np.random.Generator) -> tuple[torch.Tenso
 
 def _sensed(image: torch.Tensor, mask: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
     """Noisy, clipped, tinted, with other hues or less of them."""
-    noise, mean = _log_uniform(rng, 0.003, 0.08), (image * mask).sum() / (3 * mask.sum().clamp(min=1))
+    noise, mean = log_uniform(rng, 0.003, 0.08), (image * mask).sum() / (3 * mask.sum().clamp(min=1))
     if rng.random() < 0.8:
         image = (image * (1 + noise * torch.randn_like(image)) + 0.3 * noise * mean * torch.randn_like(image)).clamp(min=0)
     if rng.random() < 0.7 and mask.sum() > 0:
@@ -226,13 +217,8 @@ class Network(nn.Module):  # type: ignore[misc]
 
     def arrays(self) -> dict[str, np.ndarray]:
         """As `isc_core.appearance.read_appearance` reads them."""
-        found: dict[str, np.ndarray] = {}
-        for k, one in enumerate(self.convolutions):
-            weight = one.weight.detach().numpy().transpose(2, 3, 1, 0)
-            found[f"weight{k:02d}"] = weight.reshape(9, *weight.shape[2:]).astype(np.float16)
-            found[f"bias{k:02d}"] = one.bias.detach().numpy().astype(np.float16)
         norm, head = self.scaled, self.head
-        return found | {
+        return arrays_of(self.convolutions) | {
             "middle": norm.running_mean.numpy(),
             "scale": torch.sqrt(norm.running_var + norm.eps).numpy(),
             "head": (head.weight * norm.weight).detach().numpy().T,

@@ -19,7 +19,7 @@ Limits: glass is solid. Metals and glass stand in surroundings only, for under l
 import argparse
 import tempfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -70,6 +70,25 @@ def make_scene(kind: str, number: int, given: Given = Given()) -> dict[str, np.n
         level = float(np.quantile(layers.sum(0)[mask].max(-1), _WHITE_AT))
         layers *= rng.uniform(0.6, 1.1) / max(level, 1e-9)
     return {"layers": layers.astype(np.float16), "mask": mask, "shape": np.array(family), "surroundings": np.array(place)}
+
+
+@dataclass(frozen=True)
+class Scene:
+    """A scene as it was written: `layers` (K, SIZE, SIZE, 3) float32; `kind`, of KINDS; `shape`, `surroundings`: their names."""
+
+    layers: np.ndarray
+    mask: np.ndarray
+    kind: str
+    shape: str
+    surroundings: str
+
+
+def scenes_in(folder: Path) -> Iterator[Scene]:
+    """The scenes of a folder, by name."""
+    for path in sorted(folder.glob("*_*.npz")):
+        with np.load(path, allow_pickle=False) as data:
+            layers, mask, names = data["layers"].astype(np.float32), data["mask"], (str(data["shape"]), str(data["surroundings"]))
+        yield Scene(layers, mask, path.stem.partition("_")[0], *names)
 
 
 def _lights(kind: str, rng: np.random.Generator, panorama: Path | None) -> tuple[str, list[dict[str, Any]]]:

@@ -15,10 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.appearance import GLASS, KINDS, MIRROR, AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
+from benchmarks.doubt_scenes import scenes_in
+from isc_core.appearance import KINDS, AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
 from isc_core.datasets import list_objects, load_object
 from isc_core.errors import InputError
-from isc_core.models.doubts import LIKELY, doubts_of
+from isc_core.models.doubts import CLEAR, doubts_of
 from isc_core.photo import read_photo
 
 
@@ -34,17 +35,15 @@ class Case:
 
 def scenes(folder: Path, only: list[str]) -> Iterator[Case]:
     """Those of `benchmarks.doubt_scenes`."""
-    for path in sorted(folder.glob("*_*.npz")):
-        with np.load(path, allow_pickle=False) as data:
-            layers, mask, family, around = data["layers"].astype(np.float32), data["mask"], str(data["shape"]), str(data["surroundings"])
-        kind = path.stem.partition("_")[0]
-        if only and family not in only:
+    for scene in scenes_in(folder):
+        layers = scene.layers
+        if only and scene.shape not in only:
             continue
-        if kind == "rig":
-            yield Case(layers[0] + 0.1 * layers[-1], mask, "rig, one lamp")
-            yield Case(layers[:-1].sum(0) + 0.1 * layers[-1], mask, f"rig, {len(layers) - 1} lamps")
+        if scene.kind == "rig":
+            yield Case(layers[0] + 0.1 * layers[-1], scene.mask, "rig, one lamp")
+            yield Case(layers[:-1].sum(0) + 0.1 * layers[-1], scene.mask, f"rig, {len(layers) - 1} lamps")
         else:
-            yield Case(layers.sum(0), mask, f"{kind}, {around}")
+            yield Case(layers.sum(0), scene.mask, f"{scene.kind}, {scene.surroundings}")
 
 
 def photos(folder: Path) -> Iterator[Case]:
@@ -97,7 +96,7 @@ def report(cases: list[Case], network: AppearanceNetwork) -> None:
     for group in sorted({case.group for case in cases}):
         rows = [kinds for kinds, case in zip(found, cases, strict=True) if case.group == group]
         doubted = np.mean([bool(doubts_of(kinds)) for kinds in rows])
-        clear = np.mean([kinds[MIRROR] + kinds[GLASS] > LIKELY for kinds in rows])
+        clear = np.mean([CLEAR in doubts_of(kinds) for kinds in rows])
         means = " | ".join(f"{np.mean([kinds[kind] for kinds in rows]):.2f}" for kind in KINDS)
         lines.append(f"| {group} | {len(rows)} | {doubted:.1%} | {clear:.1%} | {means} |")
     named = [(case, kinds) for case, kinds in zip(cases, found, strict=True) if case.name and doubts_of(kinds)]

@@ -96,13 +96,14 @@ def _resized(layers: torch.Tensor, factor: float) -> torch.Tensor:
     return functional.interpolate(layers[None], scale_factor=factor, mode="bilinear", antialias=factor < 1, align_corners=False)[0]
 
 
-def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
+    """From `low` to `high` > 0, its logarithm evenly."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def _placed(layers: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
     """The layers at another size, mirrored, turned, and cut to CROP pixels or set into them."""
-    layers = _resized(layers, _log_uniform(rng, 0.7, 1.25))
+    layers = _resized(layers, log_uniform(rng, 0.7, 1.25))
     if rng.random() < 0.5:
         layers = layers.flip(2)
     if rng.random() < 0.25:
@@ -124,7 +125,7 @@ def _other_paint(layers: torch.Tensor, rng: np.random.Generator) -> torch.Tensor
     """Another object's paint (3, CROP, CROP), its mean beyond its mask."""
     paint, mask = layers[_PAINT], layers[_MASK]
     mean = (paint * mask).sum((1, 2)) / mask.sum().clamp(min=1)
-    paint = _resized(torch.where(mask > 0.5, paint, mean[:, None, None]), _log_uniform(rng, 0.6, 2.2))
+    paint = _resized(torch.where(mask > 0.5, paint, mean[:, None, None]), log_uniform(rng, 0.6, 2.2))
     while min(paint.shape[1:]) < CROP:
         paint = torch.cat([paint, paint.flip(1)], 1)
         paint = torch.cat([paint, paint.flip(2)], 2)
@@ -148,7 +149,7 @@ def _gloss(specular: float, level: float, rng: np.random.Generator) -> float:
         return 0.0
     if kind < 0.45 and level < 50:
         return 1 / level
-    share = _log_uniform(rng, 0.02, 0.45)
+    share = log_uniform(rng, 0.02, 0.45)
     return min(share / (1 - share) / specular, 40.0)
 
 
@@ -159,7 +160,7 @@ def _sensed(image: torch.Tensor, diffuse: torch.Tensor, mask: torch.Tensor, rng:
         image = image.clamp(max=top)
         diffuse = torch.minimum(diffuse, image)
     if rng.random() < 0.6:
-        noise = _log_uniform(rng, 0.002, 0.03)
+        noise = log_uniform(rng, 0.002, 0.03)
         image = (image * (1 + noise * torch.randn_like(image)) + 0.3 * noise * torch.randn_like(image)).clamp(min=1e-4)
     if rng.random() < 0.15:
         image, diffuse = (

@@ -15,7 +15,7 @@ F. Hutter 2019, arXiv:1711.05101), a cosine of steps, averaged weights; He's ini
 import argparse
 import copy
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -75,13 +75,17 @@ class Network(nn.Module):  # type: ignore[misc]
     def arrays(self) -> dict[str, np.ndarray]:
         """As `layer_network.read_network` reads them."""
         blocks = [*self.down, *reversed(self.up)]
-        layers = [layer for block in blocks for layer in (block.c1, block.c2)] + [self.out]
-        found: dict[str, np.ndarray] = {}
-        for k, layer in enumerate(layers):
-            weight = layer.weight.detach().numpy().transpose(2, 3, 1, 0)
-            found[f"weight{k:02d}"] = weight.reshape(9, *weight.shape[2:]).astype(np.float16)
-            found[f"bias{k:02d}"] = layer.bias.detach().numpy().astype(np.float16)
-        return found
+        return arrays_of([layer for block in blocks for layer in (block.c1, block.c2)] + [self.out])
+
+
+def arrays_of(convolutions: Iterable[nn.Conv2d]) -> dict[str, np.ndarray]:
+    """Weights and biases as `isc_core.separation.convolutions.weights_in` reads them."""
+    found: dict[str, np.ndarray] = {}
+    for k, one in enumerate(convolutions):
+        weight = one.weight.detach().numpy().transpose(2, 3, 1, 0)
+        found[f"weight{k:02d}"] = weight.reshape(9, *weight.shape[2:]).astype(np.float16)
+        found[f"bias{k:02d}"] = one.bias.detach().numpy().astype(np.float16)
+    return found
 
 
 class Draws(torch.utils.data.IterableDataset[list[torch.Tensor]]):  # type: ignore[misc]

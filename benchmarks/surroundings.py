@@ -154,17 +154,23 @@ def _studio(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
     for _ in range(int(rng.integers(2, 6))):
         forward = rng.normal(size=3) + (0, 0.3, 0.5)
         forward /= np.linalg.norm(forward)
-        across = np.cross((0, 1, 0), forward)
-        across /= np.linalg.norm(across)
-        upward = np.cross(forward, across)
-        depth = toward @ forward
-        x, y = (toward @ axis / np.where(depth > 0.05, depth, np.inf) for axis in (across, upward))
+        before, x, y = _on_plane(toward, forward, np.cross((0, 1, 0), forward))
         if rng.random() < 0.4:
-            lit = (depth > 0.05) & (np.hypot(x, y) < rng.uniform(0.05, 0.5))
+            lit = before & (np.hypot(x, y) < rng.uniform(0.05, 0.5))
         else:
-            lit = (depth > 0.05) & (np.abs(x) < rng.uniform(0.05, 0.6)) & (np.abs(y) < rng.uniform(0.05, 0.6))
+            lit = before & (np.abs(x) < rng.uniform(0.05, 0.6)) & (np.abs(y) < rng.uniform(0.05, 0.6))
         out = np.where(lit[..., None], np.exp(rng.uniform(np.log(2), np.log(40))) * _colour(rng, 0.05), out)
     return out
+
+
+def _on_plane(toward: np.ndarray, forward: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where directions (..., 3) meet the plane at the distance 1 along the unit vector `forward`: whether they do, and the place there, x
+    along `across`, which is at right angles to it."""
+    across = across / np.linalg.norm(across)
+    depth = toward @ forward
+    before = depth > 0.05
+    x, y = (toward @ axis / np.where(before, depth, np.inf) for axis in (across, np.cross(forward, across)))
+    return before, x, y
 
 
 def _clutter(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
@@ -177,13 +183,10 @@ def _clutter(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
     for size in np.sort(0.03 * rng.pareto(1.0, int(rng.integers(150, 500))) + 0.03)[::-1]:
         middle = rng.normal(size=3)
         middle /= np.linalg.norm(middle)
-        across = np.cross(middle, rng.normal(size=3))
-        across /= np.linalg.norm(across)
-        depth = toward @ middle
-        x, y = (toward @ axis / np.where(depth > 0.05, depth, np.inf) for axis in (across, np.cross(middle, across)))
+        before, x, y = _on_plane(toward, middle, np.cross(middle, rng.normal(size=3)))
         there = (np.hypot(x, y) < size) if rng.random() < 0.5 else (np.abs(x) < size) & (np.abs(y) < size * rng.uniform(0.2, 1))
         colour = palette[rng.integers(6)] * np.exp(rng.normal(0, 0.25) + rng.normal(0, 0.07, 3))
         ends = colour * (30 if size < 0.2 and rng.random() < 0.02 else 1) * rng.uniform(0.6, 1.4, 2)[:, None]
         shade = np.clip(0.5 + x / (2 * size), 0, 1)[..., None]
-        out = np.where(((depth > 0.05) & there)[..., None], ends[0] * shade + ends[1] * (1 - shade), out)
+        out = np.where((before & there)[..., None], ends[0] * shade + ends[1] * (1 - shade), out)
     return np.asarray(gaussian_filter(out * level**height, (rng.uniform(0, 1.2),) * 2 + (0,), mode=("nearest", "wrap", "nearest")))

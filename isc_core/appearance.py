@@ -28,7 +28,7 @@ from .box import mask_slices
 from .errors import InputError
 from .numpy_files import read_arrays
 from .photo import averaged
-from .separation.convolutions import encoded, framed, halved
+from .separation.convolutions import encoded, framed, halved, weights_in
 
 ORDINARY, MIRROR, GLASS, LAMPS = KINDS = ("ordinary", "mirror", "glass", "lamps")
 LONG_SIDE = 144  # of the object, in pixels, as the network sees it
@@ -99,11 +99,10 @@ def read_appearance(path: Path) -> AppearanceNetwork:
 
     Raises `InputError` for a file that is none."""
     try:
-        data = {name: values.astype(np.float32) for name, values in read_arrays(path).items()}
-        if not all(np.isfinite(values).all() for values in data.values()):
+        data = read_arrays(path)
+        judge = [data[name].astype(np.float32).astype(float) for name in ("middle", "scale", "head", "odds")]
+        if not all(np.isfinite(values).all() for values in judge):
             raise ValueError("some of its numbers are not finite")
-        count = sum(name.startswith("weight") for name in data)
-        weights, biases = (tuple(data[f"{kind}{k:02d}"] for k in range(count)) for kind in ("weight", "bias"))
-        return AppearanceNetwork(weights, biases, *(data[name].astype(float) for name in ("middle", "scale", "head", "odds")))
+        return AppearanceNetwork(*weights_in(data), *judge)
     except (ValueError, KeyError) as error:
         raise InputError(f"{path} holds no appearance network: {error}") from error

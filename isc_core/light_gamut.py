@@ -47,19 +47,14 @@ def without_white(colour: np.ndarray, change: np.ndarray) -> bool:
 
 def distance_of_white(colour: np.ndarray) -> float:
     """Of the hull of the chromaticities of colours (N, 3) >= 0; negative inside."""
-    places = bright_chromaticities(colour, _DARK)[0]
-    if not len(places):
+    intensity = colour.sum(axis=1, dtype=float)
+    bright = intensity >= max(float(np.quantile(intensity, _DARK)), 1e-12)
+    if not bright.any():
         return 0.0
+    places = 3 * colour[bright] / intensity[bright, None] @ PLANE
     places = places[_thinned(len(places))]
     angle = np.arange(_DIRECTIONS) * (2 * np.pi / _DIRECTIONS)
     return float(np.quantile(places @ np.stack([np.cos(angle), np.sin(angle)]), _STRAY, axis=0).max())
-
-
-def bright_chromaticities(colour: np.ndarray, dark: float) -> tuple[np.ndarray, np.ndarray]:
-    """Of colours (N, 3) >= 0 not below the quantile `dark` of brightness: places (M, 2) in the plane, white at 0, and brightness (M,)."""
-    intensity = colour.sum(axis=1, dtype=float)
-    bright = intensity >= max(float(np.quantile(intensity, dark)), 1e-12)
-    return 3 * colour[bright] / intensity[bright, None] @ PLANE, intensity[bright]
 
 
 def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:

@@ -19,14 +19,14 @@ from .task import Answer
 
 LIKELY = 0.6  # of a mirror or glass together, or of several lamps: a doubt
 _LEAST = 0.1  # of the confidence is left
-_CLEAR = "the object looks like a mirror or like something transparent: what was found would be an opaque one's, hardly its own"
-_SEVERAL = "there seem to be several lights: one was looked for, so shape, paint and gloss are less to be trusted; use one lamp if you can"
+CLEAR = "the object looks like a mirror or like something transparent: what was found would be an opaque one's, hardly its own"
+SEVERAL = "there seem to be several lights: one was looked for, so shape, paint and gloss are less to be trusted; use one lamp if you can"
 
 
 def doubts_of(kinds: dict[str, float]) -> list[str]:
     """Lines for people, of the probabilities that `appearance.kinds_of` found; none where there is no doubt."""
     clear, several = kinds[MIRROR] + kinds[GLASS], kinds[LAMPS]
-    return [*([_CLEAR] if clear > LIKELY else []), *([_SEVERAL] if several > LIKELY else [])]
+    return [*([CLEAR] if clear > LIKELY else []), *([SEVERAL] if several > LIKELY else [])]
 
 
 def doubted(maps: Photo, answer: Answer) -> Answer:

@@ -9,7 +9,7 @@ doi:10.1109/CVPR.2016.207.
 Limits: one matrix product of doubles a layer: made for networks of some hundred thousand weights.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -29,6 +29,16 @@ def encoded(image: np.ndarray, mask: np.ndarray, steps: Steps, depth: int) -> li
         layer = twice(layer if level == 0 else halved(layer), steps)
         kept.append(layer)
     return kept
+
+
+def weights_in(data: Mapping[str, np.ndarray]) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+    """Weights and biases, float32, of an archive's arrays `weight00`, `bias00`, ... Raises `KeyError` where one is missing, `ValueError`
+    where their numbers are not finite."""
+    count = sum(name.startswith("weight") for name in data)
+    weights, biases = (tuple(data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count)) for kind in ("weight", "bias"))
+    if not all(np.isfinite(values).all() for values in (*weights, *biases)):
+        raise ValueError("some of its numbers are not finite")
+    return weights, biases
 
 
 def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:

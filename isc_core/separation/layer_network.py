@@ -26,7 +26,7 @@ from ..enlarging import enlarged
 from ..errors import InputError
 from ..numpy_files import read_arrays
 from ..photo import averaged
-from .convolutions import BLOCK, convolved, encoded, framed, from_blocks, twice
+from .convolutions import BLOCK, convolved, encoded, framed, from_blocks, twice, weights_in
 from .smoothing import masked_gaussian
 
 _MARGIN = 2.0  # of the output: without evidence it says "hardly anything"
@@ -105,14 +105,10 @@ def shipped_network() -> LayerNetwork:
 def read_network(path: Path) -> LayerNetwork:
     """An archive of float16 or float32 arrays `weight00`, `bias00`, ... Raises `InputError` for a file that is none."""
     try:
-        data = read_arrays(path)
-        count = sum(name.startswith("weight") for name in data)
-        weights, biases = ([data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count)] for kind in ("weight", "bias"))
-        if not all(np.isfinite(values).all() for values in (*weights, *biases)):
-            raise ValueError("some of its numbers are not finite")
+        weights, biases = weights_in(read_arrays(path))
     except (ValueError, KeyError) as error:
         raise InputError(f"{path} holds no layer network: {error}") from error
-    return LayerNetwork(tuple(weights), tuple(biases))
+    return LayerNetwork(weights, biases)
 
 
 def _carried(found: np.ndarray, known: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
