@@ -100,9 +100,10 @@ def read_appearance(path: Path) -> AppearanceNetwork:
     Raises `InputError` for a file that is none."""
     try:
         data = read_arrays(path)
+        weights, biases = weights_in(data)
         judge = [data[name].astype(np.float32).astype(float) for name in ("middle", "scale", "head", "odds")]
         if not all(np.isfinite(values).all() for values in judge):
             raise ValueError("some of its numbers are not finite")
-        return AppearanceNetwork(*weights_in(data), *judge)
+        return AppearanceNetwork(weights, biases, *judge)
     except (ValueError, KeyError) as error:
         raise InputError(f"{path} holds no appearance network: {error}") from error
