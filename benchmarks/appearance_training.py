@@ -5,7 +5,8 @@
 SCENES: of `benchmarks.doubt_scenes`; `--synth`: a run of `isc synth`, whose training scenes are ordinary; `--data`, `--glossy`: the
 MIT-Berkeley set and what `isc synth glossy-mit` made of it, ordinary too; `--leave`: families of shapes, objects of the set and
 surroundings that the network must not see, because it will be measured on them (`benchmarks.doubts`). `--start`: a layer network, whose
-encoder it begins with (the shipped one if none). Needs PyTorch (`pip install 'isc3d[training]'`), which nothing else of ISC does.
+encoder it begins with (the shipped one if none): what that has seen, `--leave` does not take back. Needs PyTorch
+(`pip install 'isc3d[training]'`), which nothing else of ISC does.
 
 Scenes whose second lamp is nearly as strong as the first, and surroundings with several windows or softboxes, may be called ordinary or
 "lamps": of them the loss is -log of the sum. Each photo is drawn anew at another size, turned, noisier, brighter than the sensor's most,
