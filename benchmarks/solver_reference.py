@@ -1,6 +1,6 @@
 """Our solver with the reference's priors against the reference program: losses, scores, time.
 
-  python -m benchmarks.solver_reference [--float64] [--engine numpy]
+python -m benchmarks.solver_reference [--float64] [--engine numpy]
 """
 
 import time

@@ -1,6 +1,6 @@
 """The smoothness of the tables of absolute reflectance, cross-validated: log likelihood of each object under the others' table.
 
-  python -m benchmarks.table_smoothness [--grey]
+python -m benchmarks.table_smoothness [--grey]
 """
 
 from dataclasses import replace

@@ -4,7 +4,7 @@ import argparse
 import tempfile
 import time
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 
 from .arrays import ARRAYS
+from .messages import notes_of
 from .operators.request import Method, Request
 from .operators.result import build_in_one_step
 from .preferences import choices, worker_environment
@@ -37,28 +38,38 @@ class Plan:
     picture: Path | None
 
 
-def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does what the options of `command_line` say, and returns a line for each source that failed.
+@dataclass(frozen=True)
+class Said:
+    """A line each. `notes`: what the work says of a source's result, such as why it is doubtful. `failures`: sources without a result."""
+
+    notes: list[str] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> Said:
+    """Does what the options of `command_line` say, and returns what is to be said of the sources.
 
     Raises `InputError` before any work where they cannot be followed; `Cancelled`.
     """
     plans = make_plan(options)
     if not hasattr(bpy.types.Scene, "isc"):  # not an enabled extension
         register()
-    failures = []
+    said = Said()
     with ExitStack() as stack:
         results = options.results or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="isc-results-")))
         earlier: Path | None = None
         for number, plan in enumerate(plans):
             part = monitor.part(number / len(plans), (number + 1) / len(plans))
             try:
-                folder = _result_of(plan.source, results, options, part.part(0.0, 0.9))
+                folder, notes = _result_of(plan.source, results, options, part.part(0.0, 0.9))
+                if notes:
+                    said.notes.append(f"{plan.source.path}: {notes}")
                 if options.output is not None or options.render is not None:
                     _make(folder, plan, options, part.part(0.9, 1.0), empty=earlier is None or plan.blend != earlier)
                     earlier = plan.blend
             except InputError as error:
-                failures.append(f"{plan.source.path}: {error}")
-    return failures
+                said.failures.append(f"{plan.source.path}: {error}")
+    return said
 
 
 def make_plan(options: argparse.Namespace) -> list[Plan]:
@@ -81,8 +92,8 @@ def make_plan(options: argparse.Namespace) -> list[Plan]:
 # --- the work of the core -------------------------------------------------------------------------------------------------------------
 
 
-def _result_of(source: Source, results: Path, options: argparse.Namespace, monitor: Monitor) -> Path:
-    """The folder of the source's result, with its arrays."""
+def _result_of(source: Source, results: Path, options: argparse.Namespace, monitor: Monitor) -> tuple[Path, str]:
+    """The folder of the source's result, with its arrays, and what the work said of it, "" for nothing."""
     environment = worker_environment(choices(bpy.context))
     if not source.is_result:
         folder = results / source.name
@@ -97,15 +108,17 @@ def _result_of(source: Source, results: Path, options: argparse.Namespace, monit
             threads=options.threads,
             transfer=options.transfer,
         )
-        _wait(start(job, environment), monitor)
-        return folder
+        return folder, notes_of(_wait(start(job, environment), monitor))
     if not (source.path / ARRAYS).is_file():
         _wait(start_arrays(source.path.resolve(), environment), monitor)
-    return source.path
+    return source.path, ""
 
 
-def _wait(worker: Worker, monitor: Monitor) -> None:
-    """Until the worker is done. Raises `InputError` with what it says if it fails; `Cancelled`. No worker is left either way."""
+def _wait(worker: Worker, monitor: Monitor) -> str:
+    """Until the worker is done; returns its last words. No worker is left either way.
+
+    Raises `InputError` with what it says if it fails; `Cancelled`.
+    """
     try:
         while (update := worker.poll()).state == "running":
             monitor.report(update.stage, update.fraction)
@@ -117,6 +130,7 @@ def _wait(worker: Worker, monitor: Monitor) -> None:
         raise Cancelled
     if update.state == "failed":
         raise InputError(update.message)
+    return update.message
 
 
 # --- the work of Blender --------------------------------------------------------------------------------------------------------------

@@ -1,6 +1,7 @@
 """The command behind `headless`: each photo is taken apart by a worker, the objects are built, saved and rendered.
 
-A photo that fails is named on stderr and the others go on; the exit code is then 2. Files appear whole or not at all. Ctrl-C ends the
+What there is to say of a photo's result, such as why it is doubtful, is printed once all is done. A photo that fails is named on stderr
+and the others go on; the exit code is then 2. Files appear whole or not at all. Ctrl-C ends the
 worker; during a render it is answered once the render is done.
 """
 
@@ -31,7 +32,7 @@ def main(arguments: Sequence[str]) -> int:
         from .batch import run
 
         with Interrupts() as interrupts, ProgressBar(sys.stderr, quiet=options.quiet) as bar:
-            failures = run(options, interrupts.monitor(bar))
+            said = run(options, interrupts.monitor(bar))
     except SystemExit as done:  # --help
         return int(done.code or 0)
     except InputError as error:
@@ -39,9 +40,11 @@ def main(arguments: Sequence[str]) -> int:
     except (Cancelled, KeyboardInterrupt):
         print("blender: cancelled", file=sys.stderr)
         return CANCELLED
-    for failure in failures:
+    for note in said.notes:
+        print(note)
+    for failure in said.failures:
         _refuse(failure)
-    return REFUSED if failures else DONE
+    return REFUSED if said.failures else DONE
 
 
 def _require_blender() -> None:

@@ -98,8 +98,7 @@ class EvaluationReport:
                 for light in self.illuminations
             },
             "results": {
-                f"{light}/{self.input}": {result.name: _result_json(result) for result in self.under(light)}
-                for light in self.illuminations
+                f"{light}/{self.input}": {result.name: _result_json(result) for result in self.under(light)} for light in self.illuminations
             },
         }
 

@@ -71,9 +71,7 @@ def pair_slices(down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice
     return (rows_p, slice(b, -a or None)), (rows_q, slice(a, -b or None))
 
 
-def curvature_cost(
-    curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float
-) -> tuple[float, np.ndarray]:
+def curvature_cost(curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float) -> tuple[float, np.ndarray]:
     """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`, both (H, W)."""
     gradient = np.zeros_like(curvature)
     total = 0.0

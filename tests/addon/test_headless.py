@@ -15,6 +15,7 @@ import pytest
 from blender_addon.headless import main
 from isc_core.terminal import Interrupts
 from tests.addon.scene_fixture import bump, write_result
+from tests.core.lit_balls import under_lamps
 
 ROOT = Path(__file__).resolve().parents[2]
 pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="needs the extra `blender` (Python 3.11 or 3.13)")
@@ -111,6 +112,17 @@ def test_a_photo_is_taken_apart_when_blender_runs_the_file_from_the_source_tree(
     about = json.loads((kept / "bump" / "decomposition.json").read_text())
     assert about["input"]["name"] == "bump.png"
     assert (kept / "bump" / "arrays.npz").is_file()
+
+
+def test_why_a_result_is_doubtful_is_said(tmp_path: Path) -> None:
+    image, mask = under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))
+    np.save(tmp_path / "ball.npy", image)
+    cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255) * mask)
+    done = run(tmp_path / "ball.npy", "--mask", tmp_path / "mask.png", "--results", tmp_path / "kept", "--max-size", 48)
+    assert done.returncode == 0, done.stderr
+    doubts = json.loads((tmp_path / "kept" / "ball" / "decomposition.json").read_text())["status"]["doubts"]
+    assert doubts, "the case does not serve"
+    assert all(f"note: {line}" in done.stdout for line in doubts), done.stdout
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ from benchmarks.surroundings import PLACES, make_surroundings
 from isc_core.appearance import GLASS, KINDS, LAMPS, MIRROR, ORDINARY, AppearanceNetwork, kinds_of, read_appearance
 from isc_core.errors import InputError
 from isc_core.models.doubts import doubts_of
+from tests.core.lit_balls import mirror_ball, under_lamps
 
-SIDE = 150
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
 
 
@@ -31,36 +31,6 @@ def photo(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 def shares(kinds: dict[str, float]) -> np.ndarray:
     return np.array([kinds[name] for name in KINDS])
-
-
-def ball() -> tuple[np.ndarray, np.ndarray]:
-    """Normals (SIDE, SIDE, 3) and mask of a ball."""
-    y, x = np.mgrid[1 : -1 : SIDE * 1j, -1 : 1 : SIDE * 1j] / 0.9
-    mask = x**2 + y**2 < 0.99
-    return np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], -1) * mask[..., None], mask
-
-
-def under_lamps(*lamps: tuple[float, float, float], paint: tuple[float, float, float] = (0.5, 0.3, 0.2)) -> tuple[np.ndarray, np.ndarray]:
-    """A glossy painted ball."""
-    normal, mask = ball()
-    image = 0.06 * np.ones((SIDE, SIDE, 3)) * paint
-    for lamp in lamps:
-        toward = np.array(lamp) / np.linalg.norm(lamp)
-        half = toward + (0, 0, 1)
-        image += np.maximum(normal @ toward, 0)[..., None] * paint
-        image += 1.2 * np.maximum(normal @ (half / np.linalg.norm(half)), 0)[..., None] ** 150
-    return (image * mask[..., None]).astype(np.float32), mask
-
-
-def mirror_ball(surroundings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A mirror, seen from far away."""
-    normal, mask = ball()
-    seen = 2 * normal[..., 2:] * normal - (0, 0, 1)
-    rows = np.clip(np.arccos(np.clip(seen[..., 1], -1, 1)) / np.pi * len(surroundings), 0, len(surroundings) - 1).astype(int)
-    turn = np.mod(np.arctan2(seen[..., 0], -seen[..., 2]), 2 * np.pi) / (2 * np.pi)
-    columns = np.minimum(turn * surroundings.shape[1], surroundings.shape[1] - 1).astype(int)
-    image = np.minimum(surroundings[rows, columns], np.quantile(surroundings, 0.98))
-    return (image * mask[..., None]).astype(np.float32), mask
 
 
 def test_the_answer_is_one_of_probabilities_whatever_the_exposure_and_the_side() -> None:
