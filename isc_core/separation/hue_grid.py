@@ -10,6 +10,7 @@ Limits: a cell's histogram knows nothing finer than the cell; where few pixels v
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -49,9 +50,8 @@ class HueGrid:
 
     def histograms(self, places: "Places", bins: np.ndarray, count: int, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Votes near and everywhere: (down, across, hues, count) and (hues, count), of `bins` (n,) from 0 with `weight` (n,) >= 0."""
-        votes = np.zeros(int(np.prod(self.shape)) * count)
-        for cell, share in places.corners():
-            votes += np.bincount(cell * count + bins, share * weight, len(votes))
+        cells = np.concatenate([cell * count + bins for cell, _ in places.corners])
+        votes = np.bincount(cells, np.concatenate([share * weight for _, share in places.corners]), int(np.prod(self.shape)) * count)
         near = ndimage.convolve1d(votes.reshape(*self.shape, count), _BLUR, axis=2, mode="wrap")
         everywhere = near.sum(axis=(0, 1))
         for axis in (0, 1):
@@ -74,6 +74,7 @@ class Places:
     beyond: np.ndarray
     shape: tuple[int, int, int]
 
+    @cached_property
     def corners(self) -> list[tuple[np.ndarray, np.ndarray]]:
         """The eight cells around each pixel, as flat indices (n,), and its shares in them (n,)."""
         return [self._corner(row, column, hue) for row in (0, 1) for column in (0, 1) for hue in (0, 1)]
@@ -81,7 +82,7 @@ class Places:
     def read(self, table: np.ndarray) -> np.ndarray:
         """A table (down, across, hues) at the pixels (n,), linear between cells."""
         flat = np.ascontiguousarray(table, np.float32).ravel()
-        return np.sum([share * flat[cell] for cell, share in self.corners()], axis=0)
+        return np.sum([share * flat[cell] for cell, share in self.corners], axis=0)
 
     def _corner(self, row: int, column: int, hue: int) -> tuple[np.ndarray, np.ndarray]:
         y, x, h = self.first

@@ -27,6 +27,7 @@ Limits: the light must be white. Near-grey paint keeps its highlights, because i
 objects with a fine pattern all over. Pale paint that fades in smoothly on a coloured object passes for a highlight.
 """
 
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -140,15 +141,12 @@ class _Photo:
 @dataclass(frozen=True)
 class _Paints:
     """What the pixels of like hue say: `share` of the smallest in the largest channel of their paint, and their `chroma`, as tables of the
-    `grid`, in units of 1 and of the photo's peak."""
+    `grid`, in units of 1 and of the photo's peak. `places`: those of the pixels that they were learned from."""
 
     grid: HueGrid
+    places: Places
     share: np.ndarray
     chroma: np.ndarray
-
-    def places(self, photo: _Photo, scale: float) -> Places:
-        rows, columns = np.nonzero(photo.mask)
-        return self.grid.places((rows + 0.5) / scale - 0.5, (columns + 0.5) / scale - 0.5, photo.hue[photo.mask])
 
 
 @dataclass(frozen=True)
@@ -258,8 +256,7 @@ def _paints(photo: _Photo, options: IscOptions) -> _Paints:
     """The tables of `_Paints`, from bright and coloured pixels; chroma from those that show little candidate highlight."""
     mask, low, high, chroma = photo.mask, photo.low, photo.high, photo.chroma
     grid = HueGrid((mask.shape[0], mask.shape[1]), max(options.cell * max(mask.shape), 1.0), options.hues)
-    paints = _Paints(grid, np.zeros(grid.shape), np.zeros(grid.shape))
-    places = paints.places(photo, 1)
+    places = _places(grid, photo, 1)
     telling = (photo.usable & (low > photo.base) & (chroma > photo.base / 2))[mask].astype(np.float32)
     bins = np.minimum((_BINS * low[mask] / np.maximum(high[mask], _TINY)).astype(np.int64), _BINS - 1)
     near, everywhere = grid.histograms(places, bins, _BINS, telling)
@@ -270,7 +267,13 @@ def _paints(photo: _Photo, options: IscOptions) -> _Paints:
     bins = np.minimum((np.clip(chroma[mask] / photo.peak, 0, 1) * (_CHROMA_BINS - 0.01)).astype(np.int64), _CHROMA_BINS - 1)
     near, everywhere = grid.histograms(places, bins, _CHROMA_BINS, telling)
     everywhere /= everywhere.sum(axis=-1, keepdims=True)
-    return _Paints(grid, share, quantile(near + 20 * everywhere, 0.5))
+    return _Paints(grid, places, share, quantile(near + 20 * everywhere, 0.5))
+
+
+def _places(grid: HueGrid, photo: _Photo, scale: float) -> Places:
+    """Of the mask's pixels; `scale`: how many of them to a pixel of the photo that the grid is of."""
+    rows, columns = np.nonzero(photo.mask)
+    return grid.places((rows + 0.5) / scale - 0.5, (columns + 0.5) / scale - 0.5, photo.hue[photo.mask])
 
 
 def _specular(low: np.ndarray, chroma: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -291,13 +294,14 @@ def _spread(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 def _judge(photo: _Photo, paints: _Paints, options: IscOptions) -> _Judged:
     """Both candidates and what the evidence leaves of them."""
-    places = paints.places(photo, 1)
-    hue_share, usual_chroma = (_spread(places.read(table), photo.mask) for table in (paints.share, photo.peak * paints.chroma))
+    hue_share, usual_chroma = (_spread(paints.places.read(table), photo.mask) for table in (paints.share, photo.peak * paints.chroma))
     by_hue = _specular(photo.low, photo.chroma, hue_share)
     trust = far_from_borders(_chroma_steps(photo), photo.mask, blur=1.5, unit=0.6)
-    gain_by_hue = _gain_by_hue(photo, by_hue, hue_share, trust, options)
-    by_place, gain_by_place, share = _by_place(photo, usual_chroma, trust, options)
-    return _Judged(by_hue, gain_by_hue, by_place, gain_by_place, share)
+    with ThreadPoolExecutor(1) as beside:  # filters release the interpreter's lock, and neither needs what the other finds
+        in_groups = beside.submit(grouped_specular, photo.image, photo.mask, photo.usable if photo.usable.any() else photo.mask)
+        gain_by_hue = beside.submit(_gain_by_hue, photo, by_hue, hue_share, trust, options)
+        by_place, gain_by_place, share = _by_place(photo, usual_chroma, trust, in_groups, options)
+        return _Judged(by_hue, gain_by_hue.result(), by_place, gain_by_place, share)
 
 
 def _chroma_steps(photo: _Photo) -> Steps:
@@ -341,8 +345,10 @@ def _carried_in(found: np.ndarray, trust: np.ndarray, reach: float = 2.5) -> np.
     return trust * found + (1 - trust) * np.minimum(around, found)
 
 
-def _by_place(photo: _Photo, usual_chroma: np.ndarray, trust: np.ndarray, options: IscOptions) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The candidate by place, its gain and the paint's min / max, all (H, W)."""
+def _by_place(
+    photo: _Photo, usual_chroma: np.ndarray, trust: np.ndarray, in_groups: "Future[np.ndarray]", options: IscOptions
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The candidate by place, its gain and the paint's min / max, all (H, W); `in_groups`: what `grouped_specular` is to find."""
     mask = photo.mask
     smooth = np.where(mask[..., None], masked_gaussian(photo.image, mask, _BY_PLACE), 0)
     low, high = smallest(smooth), largest(smooth)
@@ -362,8 +368,7 @@ def _by_place(photo: _Photo, usual_chroma: np.ndarray, trust: np.ndarray, option
     gain *= ramp(paint_mixing(candidate, photo.chroma, ratio, photo.usable, scale), options.unmixed_here)
     safe = gain * trust * ramp(1 - share, options.coloured)
     _, rough_here = roughness(candidate * safe, trust, mask, scale, fine=1.5)
-    in_groups = grouped_specular(photo.image, mask, photo.usable if photo.usable.any() else mask)
-    agreed = np.minimum(gain, in_groups / np.maximum(candidate, _TINY))
+    agreed = np.minimum(gain, in_groups.result() / np.maximum(candidate, _TINY))
     proven = np.where(mask, np.maximum(safe * ramp(rough_here, options.smooth_by_place), agreed), 0)
     # A highlight fades out: around what is proven, what would not be enough by itself belongs to it.
     around = ndimage.maximum_filter(ramp(proven, options.proven), 2 * round(_NEARBY * photo.diagonal) + 1)
@@ -388,7 +393,7 @@ def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Phot
 def _carried_over(full: _Photo, paints: _Paints, judged: _Judged, factor: int) -> _Judged:
     """What was found on averages of `factor` x `factor` pixels, for the full photo."""
     mask = full.mask
-    hue_share = _spread(paints.places(full, factor).read(paints.share), mask)
+    hue_share = _spread(_places(paints.grid, full, factor).read(paints.share), mask)
     gain_by_hue, gain_by_place, share = (
         enlarged(layer, mask.shape, factor) for layer in (judged.gain_by_hue, judged.gain_by_place, judged.share)
     )

@@ -58,13 +58,13 @@ def test_every_pixel_lies_among_the_cells() -> None:
     for cell in (1.0, 7.3, 80.0, 500.0):
         grid = HueGrid((60, 80), cell, 6)
         places = grid.places(corner_rows, corner_columns, np.array([0.0, 5.9999, 3, 1.5]))
-        for index, share in places.corners():
+        for index, share in places.corners:
             assert index.min() >= 0 and index.max() < np.prod(grid.shape)
             assert share.min() >= 0 and share.max() <= 1
 
 
 def test_shares_of_the_eight_cells_add_up() -> None:
-    shares = [share for _, share in GRID.places(*pixels()).corners()]
+    shares = [share for _, share in GRID.places(*pixels()).corners]
     assert len(shares) == 8 and np.allclose(np.sum(shares, axis=0), 1, atol=1e-6)
 
 
