@@ -52,10 +52,11 @@ class HueGrid:
         """Votes near and everywhere: (down, across, hues, count) and (hues, count), of `bins` (n,) from 0 with `weight` (n,) >= 0."""
         cells = np.concatenate([cell * count + bins for cell, _ in places.corners])
         votes = np.bincount(cells, np.concatenate([share * weight for _, share in places.corners]), int(np.prod(self.shape)) * count)
-        near = ndimage.convolve1d(votes.reshape(*self.shape, count), _BLUR, axis=2, mode="wrap")
+        near = votes.reshape(*self.shape, count)
+        ndimage.convolve1d(near, _BLUR, axis=2, output=near, mode="wrap")
         everywhere = near.sum(axis=(0, 1))
         for axis in (0, 1):
-            near = ndimage.convolve1d(near, 2 * _BLUR, axis=axis, mode="constant")
+            ndimage.convolve1d(near, 2 * _BLUR, axis=axis, output=near, mode="constant")
         total = everywhere.sum(axis=0) + 1e-9
         return near, everywhere + _OF_ALL * total / total.sum()
 

@@ -261,13 +261,15 @@ def _paints(photo: _Photo, options: IscOptions) -> _Paints:
     bins = np.minimum((_BINS * low[mask] / np.maximum(high[mask], _TINY)).astype(np.int64), _BINS - 1)
     near, everywhere = grid.histograms(places, bins, _BINS, telling)
     everywhere /= everywhere.sum(axis=-1, keepdims=True)
-    share = quantile(near + options.borrowed * everywhere, options.low_quantile)
+    near += options.borrowed * everywhere
+    share = quantile(near, options.low_quantile)
     found = _specular(low[mask], chroma[mask], places.read(share))
     telling *= np.exp(-np.square(found / np.maximum(0.1 * high[mask], _TINY)))
     bins = np.minimum((np.clip(chroma[mask] / photo.peak, 0, 1) * (_CHROMA_BINS - 0.01)).astype(np.int64), _CHROMA_BINS - 1)
     near, everywhere = grid.histograms(places, bins, _CHROMA_BINS, telling)
     everywhere /= everywhere.sum(axis=-1, keepdims=True)
-    return _Paints(grid, places, share, quantile(near + 20 * everywhere, 0.5))
+    near += 20 * everywhere
+    return _Paints(grid, places, share, quantile(near, 0.5))
 
 
 def _places(grid: HueGrid, photo: _Photo, scale: float) -> Places:
