@@ -13,6 +13,7 @@ import argparse
 import math
 import time
 from collections import defaultdict
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 
@@ -67,21 +68,26 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
             network = read_network(given.networks / f"{name}.npz") if given.networks else None
             for model in missing:
                 answer, seconds = run(model, seen, diffuse, network)
-                maps = {key: getattr(answer, key) for key in ("height", "normal", "shading", "reflectance", "light")}
-                scores = score(seen, **maps)
-                row = {"set": label, "object": name, "model": model, "seconds": seconds, **asdict(scores), "average": scores.average}
-                rows.append(row)
-                append_row(path, row)
-                print(label, name, model, f"{scores.average:.5f}", flush=True)
+                rows.append(row_of(label, name, model, seen, answer, seconds))
+                append_row(path, rows[-1])
     return rows
 
 
-def tables(rows: list[dict[str, object]]) -> str:
-    """Markdown: for the laboratory originals and all glossy sets, a row a model."""
+def row_of(label: str, name: str, model: str, seen: MitBerkeleyObject, answer: Estimate, seconds: float) -> dict[str, object]:
+    """What is kept of an answer, printed."""
+    maps = {key: getattr(answer, key) for key in ("height", "normal", "shading", "reflectance", "light")}
+    scores = score(seen, **maps)
+    print(label, name, model, f"{scores.average:.5f}", flush=True)
+    return {"set": label, "object": name, "model": model, "seconds": seconds, **asdict(scores), "average": scores.average}
+
+
+def tables(rows: list[dict[str, object]], models: Sequence[str] = MODELS) -> str:
+    """Markdown: for the laboratory originals and all glossy sets, a row for each of `models` but the first; "plain" and "true diffuse" are
+    among them."""
     values: dict[tuple[str, str], dict[str, dict[str, float]]] = defaultdict(dict)
     for row in rows:
         values[str(row["set"]), str(row["object"])][str(row["model"])] = {name: float(row[name]) for name in (*METRICS, "seconds")}  # type: ignore[arg-type]
-    whole = {key: found for key, found in values.items() if all(model in found for model in MODELS)}
+    whole = {key: found for key, found in values.items() if all(model in found for model in models)}
     text = []
     groups = sorted({key[0] for key in whole})
     for title, members in [("all glossy sets", [g for g in groups if g.startswith("level")]), *((g, [g]) for g in groups)]:
@@ -90,7 +96,7 @@ def tables(rows: list[dict[str, object]]) -> str:
             continue
         text += [f"\n## {title}: {len(part)} photos\n", "| relative to plain | " + " | ".join((*METRICS, "seconds")) + " |"]
         text.append("|---" * (len(METRICS) + 2) + "|")
-        text += [_line(model, part) for model in MODELS[1:]]
+        text += [_line(model, part) for model in models[1:]]
     return "\n".join(text) + "\n"
 
 

@@ -1,0 +1,42 @@
+"""What is taken off in place of the true specular layer."""
+
+import numpy as np
+import pytest
+
+from benchmarks.layer_precision import TAKEN, mirrored
+from isc_core.environment import environment_from_shading
+from isc_core.evaluate import Estimate
+from synth.glossy_mit.gloss import environment_gloss
+from synth.glossy_mit.settings import GlossySettings
+from tests.core.lit_balls import ball
+
+
+def answer() -> tuple[Estimate, np.ndarray]:
+    """A ball under a light from above, as it would be recovered, and its mask."""
+    normal, mask = ball()
+    light = np.zeros((9, 3))
+    light[0], light[1] = -1.0, [0.8, 0.7, 0.6]
+    still = np.zeros((*mask.shape, 3))
+    return Estimate(np.zeros(mask.shape), np.where(mask[..., None], normal, (0, 0, 1)), still, still, light), mask
+
+
+def test_the_mirrored_light_is_what_the_set_mirrors() -> None:
+    plain, mask = answer()
+    layer = np.zeros((*mask.shape, 3))
+    layer[mask] = environment_gloss(environment_from_shading(plain.light), plain.normal[mask], GlossySettings().exponent)
+    facing = plain.normal[mask][:, 2] > 0.3  # a table of a disc is coarse at its edge
+    np.testing.assert_allclose(mirrored(layer, mask, plain)[mask][facing], layer[mask][facing], rtol=0.05)
+
+
+@pytest.mark.parametrize(("name", "share"), [("80 %", 0.8), ("50 %", 0.5), ("mean", 1.0), ("mirrored light", 1.0)])
+def test_as_much_light_is_taken_as_is_said(name: str, share: float) -> None:
+    plain, mask = answer()
+    layer = np.where(mask[..., None], np.random.default_rng(0).random((*mask.shape, 3)), 0)
+    assert TAKEN[name](layer, mask, plain)[mask].sum() == pytest.approx(share * layer.sum())
+
+
+@pytest.mark.parametrize("name", ["blurred 2 %", "blurred 5 %"])
+def test_a_blurred_layer_keeps_what_is_even(name: str) -> None:
+    plain, mask = answer()
+    even = np.where(mask[..., None], 0.3, 0) * np.ones(3)
+    np.testing.assert_allclose(TAKEN[name](even, mask, plain)[mask], 0.3, rtol=1e-5)
