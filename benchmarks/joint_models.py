@@ -1,10 +1,12 @@
 """What each model makes of glossy photos, against SIRFS on the photo as it is and on the true diffuse image.
 
   python -m benchmarks.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural]
-                                    [--networks FOLDER] [--models plain,joint]
+                                    [--networks FOLDER] [--models plain,joint] [--roundings K]
 
 Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them. `--networks`: a network for each object that
-has not seen it, `OBJECT.npz` of `benchmarks.layer_network_training`; without it the shipped one, which has. Writes OUT/rows.jsonl, a row a
+has not seen it, `OBJECT.npz` of `benchmarks.layer_network_training`; without it the shipped one, which has. `--roundings`: each photo is
+measured as often, its values changed by some 1e-7 of themselves but for the first time: SIRFS has many minima, and the last digit decides
+between them. Writes OUT/rows.jsonl, a row a
 run, which is not run again, and OUT/tables.md: geometric means of errors relative to plain SIRFS with the interval of resampled objects,
 and which share of the gain of the true diffuse image a model reaches.
 """
@@ -29,6 +31,7 @@ from isc_core.separation.layer_network import LayerNetwork, read_network
 from isc_core.sirfs.prior_file import shipped_prior_set
 
 MODELS = ("plain", "mdr", "mbp", "joint", "true diffuse")
+_LAST_DIGIT = 1e-7
 METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light", "average")
 
 
@@ -54,23 +57,29 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
     """All rows: those that are on disk, and new ones."""
     path = given.output / "rows.jsonl"
     rows = read_rows(path)
-    done = {(row["set"], row["object"], row["model"]) for row in rows}
+    done = {(row["set"], row["object"], row["model"], row.get("rounding", 0)) for row in rows}
     folders = [given.data, *(sorted(p for p in given.glossy.iterdir() if p.is_dir()) if given.glossy else [])]
     for folder in folders:
         label = "laboratory originals" if folder == given.data else folder.name
         if given.sets and label not in given.sets:
             continue
         for name in given.objects or list_objects(folder, "laboratory"):
-            missing = [model for model in given.models if (label, name, model) not in done]
-            if not missing:
-                continue
-            seen, diffuse = photo_of(folder, name)
+            photos = photo_of(folder, name)
             network = read_network(given.networks / f"{name}.npz") if given.networks else None
-            for model in missing:
-                answer, seconds = run(model, seen, diffuse, network)
-                rows.append(row_of(label, name, model, seen, answer, seconds))
-                append_row(path, rows[-1])
+            for rounding in range(given.roundings):
+                seen, diffuse = (rounded(photo, rounding) for photo in photos)
+                for model in given.models:
+                    if (label, name, model, rounding) not in done:
+                        answer, seconds = run(model, seen, diffuse, network)
+                        rows.append(row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding})
+                        append_row(path, rows[-1])
     return rows
+
+
+def rounded(photo: MitBerkeleyObject, number: int) -> MitBerkeleyObject:
+    """The photo with its last digits changed, another way for each `number`; as it is for 0."""
+    noise = np.random.default_rng(number).standard_normal(photo.image.shape) if number else 0.0
+    return replace(photo, image=photo.image * (1 + _LAST_DIGIT * noise))
 
 
 def row_of(label: str, name: str, model: str, seen: MitBerkeleyObject, answer: Estimate, seconds: float) -> dict[str, object]:
@@ -84,27 +93,31 @@ def row_of(label: str, name: str, model: str, seen: MitBerkeleyObject, answer: E
 def tables(rows: list[dict[str, object]], models: Sequence[str] = MODELS) -> str:
     """Markdown: for the laboratory originals and all glossy sets, a row for each of `models` but the first; "plain" and "true diffuse" are
     among them."""
-    values: dict[tuple[str, str], dict[str, dict[str, float]]] = defaultdict(dict)
+    values: dict[tuple[str, str, int], dict[str, dict[str, float]]] = defaultdict(dict)
     for row in rows:
-        values[str(row["set"]), str(row["object"])][str(row["model"])] = {name: float(row[name]) for name in (*METRICS, "seconds")}  # type: ignore[arg-type]
+        key = str(row["set"]), str(row["object"]), int(row.get("rounding", 0))  # type: ignore[call-overload]
+        values[key][str(row["model"])] = {name: float(row[name]) for name in (*METRICS, "seconds")}  # type: ignore[arg-type]
     whole = {key: found for key, found in values.items() if all(model in found for model in models)}
     text = []
     groups = sorted({key[0] for key in whole})
     for title, members in [("all glossy sets", [g for g in groups if g.startswith("level")]), *((g, [g]) for g in groups)]:
         part = {key: found for key, found in whole.items() if key[0] in members}
-        if len({name for _, name in part}) < 2:
+        if len({name for _, name, _ in part}) < 2:
             continue
-        text += [f"\n## {title}: {len(part)} photos\n", "| relative to plain | " + " | ".join((*METRICS, "seconds")) + " |"]
+        text += [
+            f"\n## {title}: {len({key[:2] for key in part})} photos\n",
+            "| relative to plain | " + " | ".join((*METRICS, "seconds")) + " |",
+        ]
         text.append("|---" * (len(METRICS) + 2) + "|")
         text += [_line(model, part) for model in models[1:]]
     return "\n".join(text) + "\n"
 
 
-def _line(model: str, part: dict[tuple[str, str], dict[str, dict[str, float]]]) -> str:
+def _line(model: str, part: dict[tuple[str, str, int], dict[str, dict[str, float]]]) -> str:
     cells = []
     for metric in (*METRICS, "seconds"):
         logs: dict[str, dict[str, list[float]]] = {"plain": defaultdict(list), model: defaultdict(list), "true diffuse": defaultdict(list)}
-        for (_, name), found in part.items():
+        for (_, name, _), found in part.items():
             for who in logs:
                 logs[who][name].append(math.log(found[who][metric]))
         mean = {who: [float(np.mean(of[name])) for name in sorted(of)] for who, of in logs.items()}
@@ -124,6 +137,7 @@ def main() -> None:
     parser.add_argument("--objects", type=lambda text: text.split(","), default=[])
     parser.add_argument("--sets", type=lambda text: text.split(","), default=[])
     parser.add_argument("--models", type=lambda text: text.split(","), default=MODELS)
+    parser.add_argument("--roundings", type=int, default=1)
     parser.add_argument("-o", "--output", type=Path, required=True)
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import baselines
 from .datasets import MitBerkeleyObject
+from .decomposition import Separation
 from .evaluate import Estimate, Runner
 from .models.joint import Explain, JointOptions, believed, doubt, stepped
 from .models.mbp import split_reflectance
@@ -101,7 +102,8 @@ def joint_estimate(
     """`models.joint` on one object; `network`: of its layers, the shipped one if None."""
     joint, valid = JointOptions(), truth.valid
     split = separate(options.separator, truth.image, valid)
-    found = doubt(truth.image, split.diffuse, valid, joint, network)
+    by_colour = _left_of(truth, split)
+    found = doubt(truth.image, by_colour, valid, joint, network)
     trust = trust_of(believed(split.confidence, found), options.confidence_weights)
     how = SolverOptions(engine=options.engine, threads=options.threads)
 
@@ -114,7 +116,7 @@ def joint_estimate(
         shading=lambda there: np.exp(_log_shading(normal_from_reference(normals(there.height)), there.light)),
         energy=energy,
     )
-    step = stepped(found, split.diffuse, valid, explain, joint)
+    step = stepped(found, by_colour, valid, explain, joint)
     return _estimate(truth, _log(step.diffuse, truth), step.shape.height, step.shape.light, step.shape)
 
 
@@ -123,7 +125,12 @@ def _separated_first(truth: MitBerkeleyObject, options: RunnerOptions) -> tuple[
     if options.model != "mdr":
         return truth.image, None
     split = separate(options.separator, truth.image, truth.valid)
-    return split.diffuse, trust_of(split.confidence, options.confidence_weights)
+    return _left_of(truth, split), trust_of(split.confidence, options.confidence_weights)
+
+
+def _left_of(truth: MitBerkeleyObject, split: Separation) -> np.ndarray:
+    """The diffuse image (H, W, 3) in the image's own precision, so that SIRFS sees the same image where nothing was taken off."""
+    return np.asarray(np.maximum(truth.image - split.specular, 0))
 
 
 def _log_separated_reflectance(truth: MitBerkeleyObject, result: SirfsResult, options: RunnerOptions) -> np.ndarray:

@@ -15,7 +15,8 @@ found by place, be found by the groups of `sparse_coding` as well. Beside border
 comes from around. The layer is the larger of the two.
 
 All statistics are of the mask's pixels. Objects longer than 640 pixels are judged on averages of square blocks: q's tables and the gains
-are carried over, s itself is computed from the full photo. Where nothing can be proven the pixel stays as it is.
+are carried over, s itself is computed from the full photo. Where nothing can be proven the pixel stays as it is, and so does
+a photo whose whole layer no display would show.
 
 `prior` is the door for what shape and light say: the probability that a highlight can be seen at each pixel. It multiplies the odds of the
 gain there: .5 says nothing, 0 forbids a highlight, 1 takes all of a candidate that has any gain. What colour refuses stays refused.
@@ -53,6 +54,8 @@ from .sparse_coding import grouped_specular
 _LONGEST = 640
 _BINS, _CHROMA_BINS = 100, 64
 _TINY = np.float32(1e-9)
+# A layer that is nowhere brighter is none, as a share of the brightest value: half a step of a display of eight bits.
+_FAINTEST = 1 / 512
 # Gaussian smoothing, in pixels, before the ratios by hue and by place are taken.
 _BY_HUE, _BY_PLACE = 0.7, 1.0
 # A step of log C, and of the hue's shares, that counts as a border; the share of the brightest value below which C is noise.
@@ -199,6 +202,8 @@ def separate(
         photo = _photo(image, mask, usable)
         judged = _carried_over(photo, paints, judged, factor)
     specular = np.maximum(judged.by_hue * _at_odds(judged.gain_by_hue, prior), judged.by_place * _at_odds(judged.gain_by_place, prior))
+    if float(specular.max()) < _FAINTEST * photo.peak:
+        specular = np.zeros_like(specular)
     forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
     split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
     trusted = np.ones(mask.shape, bool) if clipped is None else ~clipped

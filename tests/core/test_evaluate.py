@@ -79,6 +79,15 @@ def test_a_baseline_is_scored_on_its_own_shading(root: Path) -> None:
     np.testing.assert_allclose((answer.shading * answer.reflectance)[truth.valid], truth.image[truth.valid])
 
 
+@pytest.mark.parametrize("model", ["mdr", "joint"])
+def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(root: Path, model: str) -> None:
+    """To the bit: the layers are stored in fewer digits than the set's images, and SIRFS' many minima would show that."""
+    truth = load_object(root, "ball", "natural")
+    plain, other = (make_runner(RunnerOptions(name, "none"), shipped_prior_set())(truth, Monitor()) for name in ("sirfs", model))
+    np.testing.assert_array_equal(other.height, plain.height)
+    np.testing.assert_array_equal(other.reflectance, plain.reflectance)
+
+
 @pytest.fixture(scope="module")
 def report(root: Path) -> EvaluationReport:
     return evaluate(root, model="naive", runner=naive)

@@ -212,6 +212,17 @@ def test_without_colours_to_compare_nothing_is_removed(kind: str) -> None:
     assert trust.max() < 1 and (kind.startswith("one") or rank_correlation(trust, image[scene.mask].mean(axis=1)) < -0.95)
 
 
+def test_what_no_display_shows_is_no_highlight() -> None:
+    """Not even in one pixel: a layer is nothing, or can be seen."""
+    diffuse, mask = sectors(glossy=False).diffuse, disc()[2]
+    found = []
+    for height in np.geomspace(1e-4, 0.1, 8):
+        scene = lit(diffuse, mask, SPOTS, height=float(height), noise=0)
+        found.append(float(separate("isc", scene.image, mask).specular.max() / scene.image.max()))
+    assert found[0] == 0 and found[-1] > 0.05
+    assert all(share == 0 or share >= 0.99 / 512 for share in found), found
+
+
 # --- clipped ----------------------------------------------------------------------------------------------------------------------------
 
 
