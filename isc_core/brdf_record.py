@@ -6,7 +6,10 @@ from typing import Any
 import numpy as np
 
 from .brdf.fitting import Interval, LobeFit, LobeLight
+from .brdf.fitting.result import CONVENTION
 from .json_files import numbers
+
+_LENGTH = 1e-3  # that a direction's may differ from 1
 
 
 def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> LobeFit:
@@ -15,6 +18,10 @@ def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> Lobe
     Raises `KeyError`, `TypeError` or `ValueError` where the record is not one of a fit.
     """
     alpha, strength = record["alpha"], record["strength"]
+    if record["model"] not in CONVENTION.values():
+        raise ValueError(f"the lobe {str(record['model'])[:80]!r} is not known")
+    if alpha is not None and not 0 < _number(alpha) <= 1:
+        raise ValueError(f"alpha is {alpha}, not within (0, 1]")
     return LobeFit(
         model=str(record["model"]),
         determined=_truth(record["determined"]),
@@ -33,9 +40,10 @@ def _light(record: Mapping[str, Any]) -> LobeLight:
     interval = _interval(record["strength_light_interval_68"], (3,))
     if interval is None:
         raise ValueError("a light without an interval")
-    return LobeLight(
-        _numbers(record["direction"], (3,)), _number(record["cone_68_degrees"]), _numbers(record["strength_light"], (3,)), interval
-    )
+    direction = _numbers(record["direction"], (3,))
+    if abs(float(np.linalg.norm(direction)) - 1) > _LENGTH:
+        raise ValueError("the direction of a light is not of length 1")
+    return LobeLight(direction, _number(record["cone_68_degrees"]), _numbers(record["strength_light"], (3,)), interval)
 
 
 def _interval(record: Any, shape: tuple[int, ...]) -> Interval | None:

@@ -95,7 +95,8 @@ class Decomposition:
         inside = {name: getattr(self, name)[self.mask].astype(np.float64) for name in COLOR_MAPS + ("normal",)}
         scale = max(float(np.abs(inside["image"]).max()), 1e-6)
         layers = inside["diffuse"] + inside["specular"] + inside["residual"]
-        expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
+        with np.errstate(over="ignore"):  # of a light that none of the photos has: then the shading is not that
+            expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
         return IdentityErrors(
             image=_worst(inside["image"] - layers) / scale,
             shading_product=_worst(inside["diffuse"] - inside["reflectance"] * inside["shading"]) / scale,

@@ -52,7 +52,7 @@ _OTHER_LIGHTS = (
 )
 _USUAL_LEVEL = 0.7
 _OF_THE_COMMAND = ("run", "act", "quiet", "progress", "output", "action", "usual", "max_pixels")
-_PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp")
+_COEFFICIENTS = ("", ".json", ".npy")  # files of lights that are no pictures
 
 
 @dataclass(frozen=True)
@@ -87,26 +87,48 @@ def declare(commands: Commands) -> None:
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work; what can be wrong is found before anything is written."""
-    require_writable_edit(options.output, (options.photo, options.mask))
+    read = (getattr(options, name, None) for name in ("photo", "mask", "region", "light"))
+    require_writable_edit(options.output, read)
     if options.photo is None and (options.mask is not None or options.transfer is not None):
         raise InputError("--mask and --transfer say how --photo is read: give it too")
     monitor.report("reading", 0.0)
     d = load(options.result)
     if not d.mask.any():
         raise InputError(f"{options.result} has an empty mask: it is damaged; decompose the photo again")
+    _require_sound(d, options.result)
     monitor.report("editing", 0.2)
     done = options.act(d, options)
     original = None if options.photo is None else _original(d, options)
+    notes = [*done.edit.notes, *_notes(d, done, original)]
     monitor.report("writing", 0.7)
     parameters = {name: _plain(value) for name, value in vars(options).items() if name not in _OF_THE_COMMAND}
     name = Path(str(d.provenance.input.get("name", ""))).name or options.result.name
     sheet = Sheet(f"{name}: {options.action}", _said(options), done.panels, done.layers)
     record = Record(options.action, parameters, done.measured)
-    save_edit(d, done.edit, options.output, record, sheet, original=original, clusters=done.clusters)
+    edit = replace(done.edit, notes=tuple(notes))
+    save_edit(d, edit, options.output, record, sheet, original=original, clusters=done.clusters)
     monitor.report("writing", 1.0)
-    for note in () if options.quiet else done.edit.notes:
+    for note in () if options.quiet else notes:
         print(f"isc: note: {note}", file=sys.stderr)
     return [*done.lines, *hints(options, f"look at {options.output / 'before_after.png'}")]
+
+
+def _require_sound(d: Decomposition, folder: Path) -> None:
+    """Raises `InputError` for a result that no decomposition gives: an edit would divide by its zeros."""
+    broken = list(d.identity_errors().broken())
+    broken += [f"{name} >= 0" for name in ("image", "diffuse", "specular", "reflectance", "shading") if getattr(d, name)[d.mask].min() < 0]
+    if broken:
+        raise InputError(f"{folder} does not keep to {broken[0]}: it is damaged; decompose the photo again")
+
+
+def _notes(d: Decomposition, done: _Done, original: Original | None) -> list[str]:
+    """What is to be said beside what the edit itself says."""
+    notes = []
+    if original is not None and d.provenance.input.get("sha256") != original.photo.original.sha256:
+        notes.append("the photo's file is not the one that was decomposed; the edit is brought into it all the same")
+    if done.layers and np.array_equal(done.edit.image, d.image):
+        notes.append("the picture stays as it was: nothing of what was asked for changes it")
+    return notes
 
 
 # --- the actions ------------------------------------------------------------------------------------------------------------------------
@@ -139,6 +161,8 @@ def _highlight(d: Decomposition, options: argparse.Namespace) -> _Done:
 
 def _gloss(d: Decomposition, options: argparse.Namespace) -> _Done:
     usual: dict[str, float] = _LOOKS.get(options.look, {})
+    if options.present is not None and options.exponent is None and "sharper" not in usual:
+        raise InputError("--present says how sharp the gloss is now: say how sharp it shall be, with --exponent or --look")
     if options.exponent is not None and "sharper" in usual:
         raise InputError(f"--exponent says how sharp, and so does --look {options.look}: give one of them")
     sharper = usual.get("sharper", 1.0)
@@ -153,6 +177,8 @@ def _dichromatic(d: Decomposition, options: argparse.Namespace) -> _Done:
     for layer in ("diffuse", "specular"):
         values = {name: getattr(options, f"{layer}_{name}") for name in ("gain", "gamma", "sharpen", "radius")}
         if options.remove == layer:
+            if LayerEdit(**values) != LayerEdit():
+                raise InputError(f"--remove {layer} leaves nothing that --{layer}-... could change: give one of them")
             values["gain"] = 0.0
         layers.append(LayerEdit(**values))
     return _Done(edit_layers(d, DichromaticEdit(*layers)), {})
@@ -175,7 +201,10 @@ def _recolour(d: Decomposition, options: argparse.Namespace) -> _Done:
 def _relight(d: Decomposition, options: argparse.Namespace) -> _Done:
     rotation = turn(options.yaw, options.pitch, options.roll)
     light, fixed = _new_light(d, options, rotation)
-    choice = Relighting(options.highlights, _lobe(options), options.exposure, not fixed)
+    lobe = _lobe(options)
+    if lobe is not None and options.highlights not in ("auto", "render"):
+        raise InputError(f"--exponent and --alpha are of rendered highlights, not of --highlights {options.highlights}: give one of them")
+    choice = Relighting(options.highlights, lobe, options.exposure, not fixed)
     edit = relight(d, light, choice)
     ball = _ball(light.shading(sphere_normals(320)[0].reshape(-1, 3)).reshape(320, 320, 3), "New light", "on a white ball")
     measured = {} if light.coefficients is None else {"coefficients": _plain(light.coefficients)}
@@ -188,10 +217,12 @@ def _relight(d: Decomposition, options: argparse.Namespace) -> _Done:
 def _chosen_light(d: Decomposition, options: argparse.Namespace) -> DirectionalLight:
     color = np.ones(3) if options.color is None else options.color
     if options.direction is not None:
+        if options.like is not None:
+            raise InputError("--direction and --like both say where the light is: give one of them")
         return DirectionalLight(toward(*options.direction), np.pi * color)
     found = explain_specular(d) if options.like == "specular" else explain_shading(d)
     if not found.light.irradiance.any():
-        raise InputError(f"the {options.like} tells no light here: give --direction X Y Z")
+        raise InputError(f"the {options.like or 'shading'} tells no light here: give --direction X Y Z")
     own = found.light.irradiance / found.light.irradiance.max()
     return DirectionalLight(found.light.direction, np.pi * (own if options.color is None else color))
 
@@ -207,13 +238,17 @@ def _new_light(d: Decomposition, options: argparse.Namespace, rotation: np.ndarr
         color = np.ones(3) if options.color is None else options.color
         ambient = 0.15 if options.ambient is None else options.ambient
         return NewLight(sun=DirectionalLight(rotation @ toward(*options.direction), np.pi * color, ambient * color)), False
-    if options.light is not None and options.light.suffix.lower() in _PICTURES:
+    if options.light is not None and not options.light.is_dir() and options.light.suffix.lower() not in _COEFFICIENTS:
         if turned:
             raise InputError("an environment picture is not turned here: turn the picture itself, or give a direction")
+        if not np.isfinite(read_raster(options.light, limits_of(options)).values).all():
+            raise InputError(
+                f"{options.light} holds NaN or infinite values: a sun that bright has to be clipped, or saved as 32-bit floats"
+            )
         return NewLight(sky=read_linear(options.light, limits=limits_of(options))), False
-    return NewLight(
-        coefficients=turned_light(d.illumination if options.light is None else _read_coefficients(options.light), rotation)
-    ), True
+    if options.light is None:
+        return NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation), True
+    return NewLight(coefficients=turned_light(_read_coefficients(options.light), rotation)), True
 
 
 def _read_coefficients(path: Path) -> np.ndarray:
@@ -234,8 +269,15 @@ def _lobe(options: argparse.Namespace) -> Lobe | None:
 
 
 def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
-    """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's."""
-    region = np.clip(read_linear(path, "linear", limits).mean(axis=2), 0, 1)
+    """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's: its alpha where that is not opaque; else its
+    codes, of which 1 is white where none is larger."""
+    raster = read_raster(path, limits)
+    if raster.alpha is not None and (raster.alpha < 1).any():
+        region = raster.alpha
+    else:
+        codes = np.nan_to_num(raster.values.astype(float), nan=0.0, posinf=1.0, neginf=0.0)
+        white = 1.0 if raster.peak is None or codes.max() <= 1 else float(raster.peak)
+        region = np.clip(codes.mean(axis=2) / white, 0, 1)
     if region.shape == d.mask.shape:
         return region
     scale, size = d.provenance.input.get("scale"), d.provenance.input.get("size")
@@ -252,8 +294,6 @@ def _original(d: Decomposition, options: argparse.Namespace) -> Original:
         raise InputError("the result was made with a mask of its own: give the same one with --mask")
     limits = limits_of(options)
     photo = read_photo(options.photo, options.mask, transfer, limits=limits)
-    if given.get("sha256") != photo.original.sha256 and not options.quiet:
-        print("isc: note: the photo's file is not the one that was decomposed; the edit is brought into it all the same", file=sys.stderr)
     raster = read_raster(options.photo, limits)
     if raster.sha256 != photo.original.sha256:
         raise InputError(f"{options.photo} changed while it was read: run the command again")
@@ -339,7 +379,7 @@ def _add_common(parser: argparse.ArgumentParser) -> None:
     picture.add_argument("--transfer", choices=TRANSFERS, help="how it is coded (default: as isc decompose read it)")
     add_limits(parser)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier edit is replaced")
-    add_speech(parser)
+    add_speech(parser, again=True)
     parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))
 
 
@@ -364,7 +404,7 @@ def _add_direction(parser: argparse.ArgumentParser) -> None:
 def _add_highlight(parser: argparse.ArgumentParser) -> None:
     _add_direction(parser)
     parser.add_argument(
-        "--like", choices=("shading", "specular"), default="shading",
+        "--like", choices=("shading", "specular"),
         help="without --direction: the one light that best explains the shading (default) or the present highlights",
     )  # fmt: skip
     _add_lobe(parser)
@@ -448,7 +488,7 @@ def _color(text: str) -> np.ndarray:
         codes = np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)])
     except ValueError:
         codes = np.zeros(0)
-    if len(digits) != 6 or len(codes) != 3 or not digits.isalnum():
+    if len(digits) != 6 or len(codes) != 3 or not (digits.isascii() and digits.isalnum()):
         raise argparse.ArgumentTypeError(f"{text!r} is not a colour: write red, green and blue as rrggbb, like 2060c0")
     return srgb_to_linear(codes / 255)
 

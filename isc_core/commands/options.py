@@ -44,12 +44,15 @@ def add_command(commands: Commands, name: str, run: Any, summary: str, descripti
     return parser
 
 
-def add_speech(parser: argparse.ArgumentParser) -> None:
-    """--quiet and --progress."""
-    parser.add_argument("--quiet", action="store_true", help="show no progress, and print nothing but what was asked for")
+def add_speech(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
+    """--quiet and --progress. `again`: for an action of a command that has them, so that they may stand before it or behind it."""
+    told = argparse.SUPPRESS if again else None  # what stands before the action is not to be undone by a default
     parser.add_argument(
-        "--progress", choices=("bar", "json"), default="bar",
-        help="json: for programs, a JSON object a line on stdout, cancelled by `cancel` or the end of stdin (default %(default)s)",
+        "--quiet", action="store_true", default=told or False, help="show no progress, and print nothing but what was asked for"
+    )
+    parser.add_argument(
+        "--progress", choices=("bar", "json"), default=told or "bar",
+        help="json: for programs, a JSON object a line on stdout, cancelled by `cancel` or the end of stdin (default bar)",
     )  # fmt: skip
 
 

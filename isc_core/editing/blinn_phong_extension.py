@@ -25,7 +25,7 @@ from ..brdf.model import check_range
 from ..decomposition import Decomposition
 from ..environment import environment_from_shading
 from ..errors import InputError
-from .edited import Edited, edited, light_color, luminance, white_of
+from .edited import MOST_GAIN, Edited, edited, light_color, luminance, white_of
 from .light_direction import explain_specular
 from .lights import DirectionalLight
 from .lobes import USUAL_EXPONENT, Lobe, known_lobe, lobe_in, lobe_under, strength_of
@@ -38,7 +38,7 @@ _CENTRE = 99.9  # percentile: the lobe's own centre, but for a few wrong pixels
 @dataclass(frozen=True)
 class Gloss:
     """`exponent`: the new lobe's, in [1, 1e5]; None for `sharper` > 0 times the present one's. `present`: the present lobe's, None for the
-    fitted one. `gain` >= 0: of the specular layer. `metal` in [0, 1]: the share of metal. `method`: "remap" or "render".
+    fitted one. `gain` in [0, 1e6]: of the specular layer. `metal` in [0, 1]: the share of metal. `method`: "remap" or "render".
     Raises `InputError`."""
 
     exponent: float | None = None
@@ -53,7 +53,7 @@ class Gloss:
             if getattr(self, name) is not None:
                 check_range(name, getattr(self, name), 1, 1e5)
         check_range("sharper", self.sharper, 1e-3, 1e3)
-        check_range("gain", self.gain, 0, np.inf)
+        check_range("gain", self.gain, 0, MOST_GAIN)
         check_range("metal", self.metal, 0, 1)
         if self.method not in METHODS:
             raise InputError(f'unknown method "{self.method}" of gloss: choose {" or ".join(METHODS)}')

@@ -54,10 +54,12 @@ class Clusters:
 def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
     """Splits the object into at most `count` paints, 1 to 12; fewer where there are not so many colours. The same seed, the same clusters.
 
-    Raises `InputError` for another count.
+    Raises `InputError` for another count, or a seed below 0.
     """
-    if not 1 <= count <= LARGEST_COUNT:
+    if count not in range(1, LARGEST_COUNT + 1):
         raise InputError(f"{count} clusters are not possible: give 1 to {LARGEST_COUNT}")
+    if seed < 0:
+        raise InputError(f"{seed} is no seed of random numbers: give 0 or more")
     seen = np.maximum(d.reflectance * light_color(d), 0)
     paint = seen[d.mask]
     lab = to_oklab(paint / white_of(seen, d.mask))

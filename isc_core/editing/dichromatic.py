@@ -17,13 +17,13 @@ from scipy import ndimage
 
 from ..brdf.model import check_range
 from ..decomposition import Decomposition
-from .edited import Edited, edited, white_of
+from .edited import MOST_GAIN, Edited, edited, white_of
 
 
 @dataclass(frozen=True)
 class LayerEdit:
-    """`gain` >= 0, 0 removes the layer. `gamma` in [.05, 20], above 1 is more contrast. `sharpen` in [-1, 20]: the share of detail that is
-    added; -1 takes all of it away. `radius` in [.3, 100]: sigma of what counts as detail, in pixels. Raises `InputError`."""
+    """`gain` in [0, 1e6], 0 removes the layer. `gamma` in [.05, 20], above 1 is more contrast. `sharpen` in [-1, 20]: the share of detail
+    that is added; -1 takes all of it away. `radius` in [.3, 100]: sigma of what counts as detail, in pixels. Raises `InputError`."""
 
     gain: float = 1.0
     gamma: float = 1.0
@@ -31,7 +31,7 @@ class LayerEdit:
     radius: float = 2.0
 
     def __post_init__(self) -> None:
-        for name, low, high in (("gain", 0, np.inf), ("gamma", 0.05, 20), ("sharpen", -1, 20), ("radius", 0.3, 100)):
+        for name, low, high in (("gain", 0, MOST_GAIN), ("gamma", 0.05, 20), ("sharpen", -1, 20), ("radius", 0.3, 100)):
             check_range(name, getattr(self, name), low, high)
 
 
@@ -56,7 +56,7 @@ def edited_layer(layer: np.ndarray, mask: np.ndarray, change: LayerEdit) -> np.n
     if change.sharpen:
         result = np.maximum(result + change.sharpen * (result - masked_blur(result, mask, change.radius)), 0)
     if change.gamma != 1:
-        level = result.max(-1, keepdims=True) / white_of(layer, mask)
+        level = result.max(-1, keepdims=True).astype(float) / white_of(layer, mask)
         # The factor of gamma < 1 is unbounded at black, where there is nothing to lift.
         result = result * np.where(level > 1e-6, np.maximum(level, 1e-6) ** (change.gamma - 1), 0)
     return result if change.gain == 1 else result * change.gain

@@ -1,8 +1,13 @@
 """The result of an edit: the layers of the picture as it would have been.
 
-Equation: image' = diffuse' + specular' + residual'. The residual is what the sensor lost under a highlight, so it goes with that:
-residual' = residual min(1, specular' / specular). A pixel whose layers are unchanged keeps the photo's own value, bit by bit, which the
-rounded sum would not.
+Equation, per channel, with L = diffuse + specular the light and L' the edited one: image' = L' + residual' where the residual is not below
+0; it belongs to a highlight and goes with that, residual' = residual min(1, specular' / specular). Below 0 it is what the sensor cut off of
+L: there the picture stays cut off at the photo's value while the light is enough for it, and a stronger light lifts it as much
+(Y: luminance),
+
+    image' = min(L', image max(1, Y(L') / Y(L))).
+
+A pixel whose layers are unchanged keeps the photo's own value, bit by bit, which the rounded sum would not.
 """
 
 from dataclasses import dataclass
@@ -11,6 +16,8 @@ import numpy as np
 
 from ..decomposition import Decomposition
 
+MOST_GAIN = 1e6  # of any layer that is made stronger
+_MOST_LIGHT = 1e30  # far from what single precision cannot hold
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
 
 
@@ -34,7 +41,11 @@ def edited(d: Decomposition, diffuse: np.ndarray | None = None, specular: np.nda
     before, after = d.specular.sum(-1, keepdims=True), new_specular.sum(-1, keepdims=True)
     kept = np.divide(after, before, out=np.ones_like(before), where=before > after)
     same = ((new_diffuse == d.diffuse) & (new_specular == d.specular)).all(-1, keepdims=True)
-    total = np.maximum(new_diffuse + new_specular + d.residual * kept, 0)
+    new_light = new_diffuse + new_specular
+    levels = luminance(d.diffuse + d.specular), luminance(new_light)
+    brighter = np.maximum(np.divide(levels[1], levels[0], out=np.ones_like(levels[0]), where=levels[0] > 0), 1)
+    cut_off = np.minimum(new_light, d.image * brighter[..., None]).astype(np.float32)
+    total = np.where(d.residual < 0, cut_off, np.maximum(new_light + d.residual * kept, 0))
     return Edited(np.where(same, d.image, total), new_diffuse, new_specular, notes)
 
 
@@ -58,4 +69,4 @@ def white_of(layer: np.ndarray, mask: np.ndarray, percentile: float = 99.5) -> f
 
 
 def _layer(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    return np.where(mask[..., None], np.maximum(values, 0), 0).astype(np.float32)
+    return np.where(mask[..., None], np.clip(values, 0, _MOST_LIGHT), 0).astype(np.float32)

@@ -23,7 +23,7 @@ from ..brdf.roughness import exponent_from_alpha, fitted_exponent
 from ..brdf.shading import Lights, directional, radiance
 from ..decomposition import Decomposition
 from ..environment import directions, solid_angles
-from .edited import luminance, white_of
+from .edited import MOST_GAIN, luminance, white_of
 from .light_direction import VIEW
 from .lights import DirectionalLight
 
@@ -100,11 +100,11 @@ def lobe_in(lobe: Lobe, normal: np.ndarray, sky: np.ndarray) -> np.ndarray:
 def strength_of(d: Decomposition, lobe: Lobe, unscaled: np.ndarray, level: float | None) -> float:
     """The factor for `unscaled` (H, W, 3), the lobe of strength 1 as rendered under a light of irradiance 1 across its beam.
 
-    `level` >= 0: brightness relative to the photo's white, see the module; None keeps the energy of the present specular layer, as far as
-    that does not make the lobe's centre brighter than twice the white, and is level 1 where there is none. Raises `InputError`.
+    `level` in [0, 1e6]: brightness relative to the photo's white, see the module; None keeps the energy of the present specular layer,
+    as far as that does not make the lobe's centre brighter than twice the white, and is level 1 where there is none. Raises `InputError`.
     """
     if level is not None:
-        check_range("strength", level, 0, np.inf)
+        check_range("strength", level, 0, MOST_GAIN)
     white = white_of(d.image, d.mask)
     unit_level = white / _centre(Lobe())
     present, rendered = luminance(d.specular[d.mask]).sum(), luminance(unscaled[d.mask]).sum()

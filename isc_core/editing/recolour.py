@@ -68,7 +68,7 @@ def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -
     share = weight[inside][:, None]
     tint = light_color(d)
     old = np.maximum(d.reflectance[inside] * tint, 0)
-    new = repainted(old, paint, white_of(d.reflectance * tint, d.mask), share)
+    new = repainted(old, paint, _room(d, tint), share)
     diffuse = d.diffuse.copy()
     diffuse[inside] = (1 - share) * d.diffuse[inside] + share * new * (d.shading[inside] / tint)
     return edited(d, diffuse)
@@ -90,6 +90,13 @@ def repainted(old_paint: np.ndarray, paint: Paint, white: float, weight: np.ndar
     hue, chroma = hue + np.deg2rad(paint.hue), chroma * paint.saturation
     color = from_oklab(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], -1))
     return _at_luminance(np.maximum(color, 0), wanted, np.maximum(white * max(paint.value, 1.0), old_paint.max(-1)))
+
+
+def _room(d: Decomposition, tint: np.ndarray) -> float:
+    """How bright paint may get: as the object's brightest, or as what the photo shows white in the object's brightest light."""
+    float_photo = d.provenance.input.get("bit_depth", 8) == 32
+    white = white_of(d.image, d.mask) if float_photo else 1.0
+    return max(white_of(d.reflectance * tint, d.mask), white / white_of(d.shading / tint, d.mask))
 
 
 def _at_luminance(color: np.ndarray, wanted: np.ndarray, most: np.ndarray) -> np.ndarray:

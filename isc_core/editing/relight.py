@@ -5,14 +5,19 @@ environment's K L of `environment`. What becomes of the highlights is a choice:
 keep     they stay as they are;
 scale    each pixel's follow its own shading, specular' = specular S' / S, at most fourfold: dimmed where the light has gone, not moved;
 remove   they go;
-render   a lobe is rendered under the new light, with the strength under which it has the present layer's energy in the recovered light.
+render   a lobe is rendered under the new light, with the strength under which it has the present layer's energy in the present light.
+
+The present light that a lobe is rendered in is the distant light that best explains the specular layer, or else that of the fit, since the
+recovered one is too smooth for highlights; where neither tells, the recovered one. A light that is turned takes it along. Left to itself
+("auto") a turn fades from the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the angle that this light moves: the
+smallest turn changes least, and a highlight that has gone elsewhere is all rendered.
 
 Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317; H. Akbar 2016 (relighting).
 
 Limits: no cast shadows, old or new: those of the photo stay in the reflectance. Light from behind the object was seen by no normal.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,23 +27,27 @@ from ..decomposition import Decomposition
 from ..environment import environment_from_shading, resampled, shading_under
 from ..errors import InputError
 from .edited import Edited, edited, light_color, luminance
+from .light_direction import explain_specular
 from .lights import DirectionalLight
-from .lobes import Lobe, known_lobe, lobe_in, lobe_under
+from .lobes import Lobe, known_lobe, lobe_in, lobe_under, strength_of
 
 HIGHLIGHTS = ("auto", "keep", "scale", "remove", "render")
 _MOST = 4.0  # times: how much brighter scaling makes a highlight
 _ROWS = 32  # of environments that matt surfaces are lit by
 _LOBE_ROWS = 16  # and of those that a lobe is rendered in, where every sample costs
+_FADE = 10.0  # degrees that a light moves until its highlights are new ones
 
 
 @dataclass(frozen=True)
 class NewLight:
     """A light of one of three kinds, the others None. `coefficients` (9, 3): of log shading. `sun`: one distant light. `sky`: environment
-    (rows, 2 rows, 3) of linear radiance >= 0, see `environment`. Raises `InputError` unless there is exactly one, and sound."""
+    (rows, 2 rows, 3) of linear radiance >= 0, see `environment`. `turned` (3, 3): the rotation that makes `coefficients` of the recovered
+    light, None for another light. Raises `InputError` unless there is exactly one, and sound."""
 
     coefficients: np.ndarray | None = None
     sun: DirectionalLight | None = None
     sky: np.ndarray | None = None
+    turned: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if sum(part is not None for part in (self.coefficients, self.sun, self.sky)) != 1:
@@ -92,12 +101,15 @@ class Relighting:
 
 
 def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None) -> Edited:
-    """The scene under `light`. The recovered light itself, at exposure 1, returns the image as it is.
+    """The scene under `light`. The recovered light itself, at exposure 1, returns the image as it is, but for highlights that are to be
+    removed or rendered.
 
     Raises `InputError` for a light that leaves the object black.
     """
     choice = choice or Relighting()
-    if light.coefficients is not None and np.array_equal(light.coefficients, d.illumination) and choice.exposure == 1:
+    same = light.coefficients is not None and np.array_equal(light.coefficients, d.illumination)
+    untouched = same and choice.exposure == 1
+    if untouched and choice.highlights not in ("remove", "render") and choice.lobe is None:
         return edited(d)
     normals = d.normal[d.mask].astype(float)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
@@ -111,14 +123,14 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
         factor = factor * tint * float(luminance(d.reflectance[d.mask] * old).sum() / luminance(d.reflectance[d.mask] * new * tint).sum())
     shading = np.zeros(d.image.shape)
     shading[d.mask] = new * factor
-    highlights, note = _highlights(d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor)
-    return edited(d, d.reflectance * shading, highlights, (note,) if note else ())
+    highlights, note = _highlights(d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, same)
+    return edited(d, d.diffuse if untouched else d.reflectance * shading, highlights, (note,) if note else ())
 
 
 def _highlights(
-    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray
+    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray, same: bool
 ) -> tuple[np.ndarray, str]:
-    """The new specular layer, and what to say of it."""
+    """The new specular layer, and what to say of it. `same`: whether the light is the present one."""
     lobe = choice.lobe or known_lobe(d)
     how = choice.highlights if choice.highlights != "auto" else "render" if lobe is not None else "scale"
     present = d.specular
@@ -132,8 +144,41 @@ def _highlights(
         told = "" if choice.highlights == "scale" else "no lobe is known, so the highlights follow the shading and do not move"
         return result, told
     lobe = lobe or Lobe()
-    before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
-    strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
-    result[d.mask] = strength * factor * light.lobe(lobe, normals)
-    smooth = light.sun is None
-    return result, "the highlights are rendered in a smooth light, so they are broad" if smooth and light.coefficients is not None else ""
+    turned = np.eye(3) if same else light.turned
+    lamp = None if turned is None else _lamp(d)
+    if lamp is None or turned is None:
+        before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
+        strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
+        result[d.mask] = strength * factor * light.lobe(lobe, normals)
+        return result, "the highlights are rendered in a smooth light, so they are broad" if light.sun is None else ""
+    moved = replace(lamp, direction=turned @ lamp.direction)
+    before, after = (_spread(lobe_under(lobe, normals, one), d.mask) for one in (lamp, moved))
+    kept = _still(lamp.direction, moved.direction) if choice.highlights == "auto" and choice.lobe is None else 0.0
+    return factor * (kept * present + (1 - kept) * strength_of(d, lobe, before, None) * after), ""
+
+
+def _lamp(d: Decomposition) -> DirectionalLight | None:
+    """The one light that the highlights come from, of luminance 1 across its beam, or None where nothing tells it."""
+    found = explain_specular(d)
+    lights = () if d.brdf is None or not d.brdf.determined else d.brdf.lights
+    if not found.determined and not lights:
+        return None
+    if found.determined:
+        direction, color = found.light.direction, found.light.irradiance
+    else:
+        direction, color = lights[0].direction, lights[0].strength_light
+    return DirectionalLight(direction, color / max(float(luminance(color)), 1e-12))
+
+
+def _spread(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """`values` (N, 3) of the mask's pixels as a map (H, W, 3)."""
+    layer = np.zeros((*mask.shape, 3))
+    layer[mask] = values
+    return layer
+
+
+def _still(before: np.ndarray, after: np.ndarray) -> float:
+    """The share of the present highlights that stays when their light moves from one unit vector to another."""
+    # Of the chord: exact for the smallest angles.
+    angle = np.degrees(2 * np.arcsin(min(float(np.linalg.norm(after - before)) / 2, 1.0)))
+    return float(np.exp(-np.square(angle / _FADE)))

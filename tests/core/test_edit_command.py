@@ -1,6 +1,7 @@
 """`isc edit`: each action ends with pictures, a mistake with one line and nothing written."""
 
 import json
+import shutil
 from pathlib import Path
 
 import cv2
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 
 from isc_core.cli import main
+from isc_core.exr import read_channels, write_channels
 from isc_core.photo import linear_to_srgb
 from isc_core.result_folder import save
 from tests.core.ball_scene import LIGHT, ball
@@ -27,6 +29,8 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "light.json").write_text(json.dumps(LIGHT[::-1].tolist()))
     np.save(folder / "light.npy", LIGHT)
     cv2.imwrite(str(folder / "sky.png"), np.random.default_rng(0).integers(0, 255, (16, 32, 3), np.uint8))
+    sky = np.full((16, 32, 3), 0.5, np.float32)
+    write_channels(folder / "broken.exr", {name: np.where(np.arange(32) == 3, np.inf, sky[..., 0]) for name in "RGB"})
     cv2.imwrite(str(folder / "region.png"), np.uint8(255 * (np.arange(120) < 60)) * np.ones((96, 1), np.uint8))
     return folder
 
@@ -104,6 +108,15 @@ MISTAKES = {
     "highlight --strength -1": "strength",
     "dichromatic --diffuse-gain -1": "gain",
     "dichromatic --specular-gamma nan": "not a number",
+    "dichromatic --specular-gain 1e39": "gain",
+    "dichromatic --remove specular --specular-gain 2": "give one of them",
+    "gloss --gain 1e308": "gain",
+    "gloss --present 30": "--exponent",
+    "highlight --strength 1e308": "strength",
+    "highlight --like specular --direction 0 0 1": "give one of them",
+    "relight --highlights keep --exponent 30 --yaw 5": "give one of them",
+    "relight --light {}/broken.exr": "infinite",
+    "recolour --color ١٢٣٤٥٦": "rrggbb",
     "recolour --cluster 9": "no cluster 9",
     "recolour --clusters 99": "clusters are not possible",
     "recolour --cluster 1 --region {}/region.png": "give one of them",
@@ -139,6 +152,64 @@ def test_a_folder_that_is_not_ours_is_left_alone(work: Path, tmp_path: Path, cap
         assert main(["edit", str(work / "ball"), "gloss", "-o", str(folder), "--quiet"]) == 2
     assert main(["edit", str(tmp_path), "gloss", "-o", str(tmp_path / "out"), "--quiet"]) == 2
     assert (tmp_path / "mine.txt").read_text() == "mine" and "decomposition.json" in capsys.readouterr().err
+
+
+def edited(result: Path, output: Path, *words: str) -> np.ndarray:
+    """The picture's codes (H, W, 3) after an edit that works."""
+    assert main(["edit", str(result), *words, "-o", str(output), "--quiet"]) == 0
+    return cv2.imread(str(output / "edited.png"), cv2.IMREAD_UNCHANGED)[..., :3].astype(int)
+
+
+@pytest.mark.parametrize("coding", ["alpha", "0 and 1"])
+def test_a_region_is_read_as_a_mask_is(work: Path, tmp_path: Path, coding: str) -> None:
+    left = (np.arange(120) < 60) * np.ones((96, 1), np.uint8)
+    region = np.dstack([np.full((96, 120, 3), 255, np.uint8), np.uint8(255) * left]) if coding == "alpha" else left
+    cv2.imwrite(str(tmp_path / "region.png"), region.astype(np.uint8))
+    words = ("recolour", "--hue", "120", "--region")
+    found = edited(work / "ball", tmp_path / "found", *words, str(tmp_path / "region.png"))
+    assert np.array_equal(found, edited(work / "ball", tmp_path / "wanted", *words, str(work / "region.png")))
+
+
+@pytest.mark.parametrize(("option", "action"), [("--light", "relight"), ("--region", "recolour --hue 5")])
+def test_what_is_read_is_never_replaced(work: Path, tmp_path: Path, option: str, action: str, capsys: pytest.CaptureFixture[str]) -> None:
+    edited(work / "ball", tmp_path / "out", "recolour", "--hue", "9")
+    given = tmp_path / "out" / "edited.png"
+    before = given.read_bytes()
+    assert main(["edit", str(work / "ball"), *action.split(), option, str(given), "-o", str(tmp_path / "out"), "--quiet"]) == 2
+    assert "lies in" in capsys.readouterr().err and given.read_bytes() == before
+
+
+@pytest.mark.parametrize("damage", ["shading", "normal", "diffuse", "light"])
+def test_a_damaged_result_is_named(work: Path, tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]) -> None:
+    broken = tmp_path / "broken"
+    shutil.copytree(work / "ball", broken)
+    if damage == "light":
+        record = json.loads((broken / "decomposition.json").read_text())
+        record["illumination"]["coefficients"] = (1e5 * LIGHT).tolist()
+        (broken / "decomposition.json").write_text(json.dumps(record))
+    else:
+        channels = read_channels(broken / "maps.exr")
+        write_channels(
+            broken / "maps.exr",
+            {name: (-1 if damage == "diffuse" else 0) * v if name.startswith(damage) else v for name, v in channels.items()},
+        )
+    for action in ("light-direction", "recolour --hue 5", "relight --yaw 10"):
+        assert main(["edit", str(broken), *action.split(), "-o", str(tmp_path / "out"), "--quiet"]) == 2
+        error = capsys.readouterr().err
+        assert "damaged" in error and error.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_quiet_is_heard_before_the_action_too(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["edit", "--quiet", str(work / "ball"), "relight", "--yaw", "30", "-o", str(tmp_path / "out")]) == 0
+    output = capsys.readouterr()
+    assert not output.out and not output.err
+
+
+def test_an_edit_that_changes_nothing_says_so(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["edit", str(work / "ball"), "recolour", "--hue", "360", "-o", str(tmp_path / "out")]) == 0
+    assert "stays as it was" in capsys.readouterr().err
+    assert json.loads((tmp_path / "out" / "edit.json").read_text())["notes"]
 
 
 def test_every_action_explains_itself(capsys: pytest.CaptureFixture[str]) -> None:

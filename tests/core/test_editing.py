@@ -11,7 +11,7 @@ from isc_core.editing.blinn_phong_extension import Gloss, change_gloss, remapped
 from isc_core.editing.chroma import from_oklab, to_oklab
 from isc_core.editing.clusters import find_clusters
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers, masked_blur
-from isc_core.editing.edited import LUMINANCE, light_color, luminance
+from isc_core.editing.edited import LUMINANCE, light_color, luminance, white_of
 from isc_core.editing.highlights import add_highlight
 from isc_core.editing.light_direction import explain_specular
 from isc_core.editing.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
@@ -133,12 +133,23 @@ def test_a_target_colour_is_reached_at_the_texture_s_luminance(scene: Decomposit
     assert luminance(bright * light_color(scene)).mean() == pytest.approx(target @ LUMINANCE, rel=0.01)
 
 
-def test_no_colour_is_brighter_than_the_paint_was(scene: Decomposition) -> None:
-    edit = recolour(scene, Paint(target=np.array([0.0, 0.0, 1.0])))
+def test_no_colour_is_brighter_than_the_paint_was_or_what_the_photo_shows_white(scene: Decomposition) -> None:
     seen = scene.reflectance * light_color(scene)
-    new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
-    assert new.max() <= seen.max() * 1.001
-    assert luminance(new) == pytest.approx(luminance(seen[scene.mask]), rel=1e-4)
+    for bits in (8, 32):
+        given = replace(scene, provenance=replace(scene.provenance, input={"bit_depth": bits}))
+        edit = recolour(given, Paint(target=np.array([0.0, 0.0, 1.0])))
+        new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
+        white = 1.0 if bits == 8 else white_of(scene.image, scene.mask)
+        assert new.max() <= max(seen.max(), white / white_of(scene.shading / light_color(scene), scene.mask)) * 1.001
+        assert luminance(new) == pytest.approx(luminance(seen[scene.mask]), rel=1e-4)
+
+
+def test_evenly_grey_paint_takes_colour(scene: Decomposition) -> None:
+    grey = np.where(scene.mask[..., None], 0.2, 0).astype(np.float32) * np.ones(3, np.float32)
+    diffuse = (grey * scene.shading).astype(np.float32)
+    even = replace(scene, reflectance=grey, diffuse=diffuse, image=diffuse + scene.specular, residual=0 * diffuse)
+    red = recolour(even, Paint(target=np.array([1.0, 0.0, 0.0]))).diffuse[scene.mask].mean(0)
+    assert red[0] > 2 * red[1:].max()
 
 
 def test_a_region_is_where_paint_changes(scene: Decomposition) -> None:
@@ -232,6 +243,59 @@ def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decompo
     assert np.array_equal(relight(fitted(scene, False), light).specular, relight(scene, light, Relighting("scale")).specular)
     sharper = change_gloss(fitted(scene, True), Gloss(exponent=100))
     assert np.array_equal(sharper.specular, change_gloss(scene, Gloss(exponent=100, present=Lobe(alpha=0.2).nearest_exponent)).specular)
+
+
+@pytest.mark.parametrize("lobe", ["fitted", "none"])
+def test_the_smallest_change_of_light_changes_least(scene: Decomposition, lobe: str) -> None:
+    d = fitted(scene, lobe == "fitted")
+    before = d.image[d.mask]
+    for yaw, exposure, most in ((0.01, 1.0, 0.002), (0.0, 1.0001, 0.002), (1.0, 1.0, 0.2)):
+        rotation = turn(yaw=yaw)
+        light = NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation)
+        assert np.abs(relight(d, light, Relighting(exposure=exposure)).image[d.mask] - before).max() < most * before.max()
+
+
+def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> None:
+    d, centres = fitted(scene, True), []
+    columns = np.indices(d.mask.shape)[1]
+    for yaw in (0.0, 30.0, 60.0):
+        rotation = turn(yaw=yaw)
+        new = relight(d, NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation)).specular
+        weight = luminance(new) ** 2
+        centres.append((weight * columns).sum() / weight.sum())
+        assert luminance(new).max() <= 4 * luminance(d.specular).max()
+    assert centres[0] + 3 < centres[1] < centres[2] - 3
+
+
+def test_highlights_are_removed_and_rendered_in_the_present_light_too(scene: Decomposition) -> None:
+    light = NewLight(coefficients=scene.illumination)
+    removed, rendered = relight(scene, light, Relighting("remove")), relight(scene, light, Relighting("render", Lobe(200)))
+    assert not removed.specular.any() and np.array_equal(removed.diffuse, scene.diffuse)
+    assert not np.allclose(rendered.specular, scene.specular, atol=0.01) and np.array_equal(rendered.diffuse, scene.diffuse)
+    assert not np.array_equal(relight(scene, light, Relighting(lobe=Lobe(200))).image, scene.image)
+
+
+# --- clipped highlights ----------------------------------------------------------------------------------------------------------------
+
+
+def test_a_clipped_highlight_stays_white_on_other_paint(scene: Decomposition) -> None:
+    """What the sensor cut off was of the old paint's colour, and says nothing of the new one's."""
+    light, full = scene.diffuse + scene.specular, 0.4
+    d = replace(scene, residual=np.minimum(full - light, 0) * scene.mask[..., None], image=np.minimum(light, full) * scene.mask[..., None])
+    clipped = (d.residual < 0).all(-1) & (d.specular > full).all(-1)
+    assert clipped.sum() > 5
+    for edit in (recolour(d, Paint(hue=180)), edit_layers(d, DichromaticEdit(diffuse=LayerEdit(gain=0.05)))):
+        assert (edit.image[clipped] >= full - 1e-6).all()
+        assert (edit.image[clipped] <= 1.5 * full).all()
+
+
+def test_what_was_cut_off_neither_stays_dark_in_more_light_nor_glows_in_less(scene: Decomposition) -> None:
+    clipped = (scene.residual < -1e-3).any(-1)
+    images = [edit_layers(scene, DichromaticEdit(LayerEdit(gain=g), LayerEdit(gain=g))).image for g in (0.1, 0.9, 0.999, 1.001, 2.0)]
+    for less, more in zip(images, images[1:], strict=False):
+        assert (more[clipped] >= less[clipped] - 1e-6).all()
+    assert images[4][clipped] == pytest.approx(2 * scene.image[clipped], rel=1e-5)
+    assert images[0][clipped] == pytest.approx(0.1 * (scene.diffuse + scene.specular)[clipped], rel=1e-5)
 
 
 # --- gloss ------------------------------------------------------------------------------------------------------------------------------

@@ -151,6 +151,9 @@ def test_a_fit_under_an_environment_is_read_back(tmp_path: Path) -> None:
     "changes",
     [
         {"alpha": "rough"},
+        {"alpha": -3.0},
+        {"alpha": 1e9},
+        {"model": "unknown"},
         {"determined": None},
         {"lights": 3},
         {"lights": [{}]},
