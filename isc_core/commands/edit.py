@@ -1,7 +1,6 @@
 """`isc edit`: another light, gloss or colour for a decomposed photo."""
 
 import argparse
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -108,9 +107,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     edit = replace(done.edit, notes=tuple(notes))
     save_edit(d, edit, options.output, record, sheet, original=original, clusters=done.clusters)
     monitor.report("writing", 1.0)
-    for note in () if options.quiet else notes:
-        print(f"isc: note: {note}", file=sys.stderr)
-    return [*done.lines, *hints(options, f"look at {options.output / 'before_after.png'}")]
+    return [*done.lines, *hints(options, *(f"note: {note}" for note in notes), f"look at {options.output / 'before_after.png'}")]
 
 
 def _require_sound(d: Decomposition, folder: Path) -> None:
@@ -322,7 +319,7 @@ def _no_ball(label: str, remark: str) -> Panel:
 
 
 def _short(found: LightEstimate) -> str:
-    return f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}°" if found.determined else "undetermined"
+    return f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}° here" if found.determined else "undetermined"
 
 
 def _long(found: LightEstimate) -> str:
@@ -331,7 +328,7 @@ def _long(found: LightEstimate) -> str:
     x, y, z = found.light.direction
     lobe = "" if found.exponent is None else f", exponent {found.exponent:.0f}"
     share = f"explains {100 * found.explained:.0f} %"
-    return f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees, {share}{lobe}"
+    return f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees on this shape, {share}{lobe}"
 
 
 def _measured(found: LightEstimate) -> dict[str, object]:

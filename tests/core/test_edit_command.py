@@ -208,7 +208,7 @@ def test_quiet_is_heard_before_the_action_too(work: Path, tmp_path: Path, capsys
 
 def test_an_edit_that_changes_nothing_says_so(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["edit", str(work / "ball"), "recolour", "--hue", "360", "-o", str(tmp_path / "out")]) == 0
-    assert "stays as it was" in capsys.readouterr().err
+    assert "stays as it was" in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "edit.json").read_text())["notes"]
 
 
