@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from isc_core.errors import Cancelled, InputError
-from isc_core.terminal import Interrupts, ProgressBar
+from isc_core.terminal import Interrupts, ProgressBar, printable
 
 DONE, REFUSED, CANCELLED = 0, 2, 130
 
@@ -41,7 +41,7 @@ def main(arguments: Sequence[str]) -> int:
         print("blender: cancelled", file=sys.stderr)
         return CANCELLED
     for note in said.notes:
-        print(note)
+        print(printable(note, sys.stdout))
     for failure in said.failures:
         _refuse(failure)
     return REFUSED if said.failures else DONE

@@ -32,7 +32,7 @@ def discard_output() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _printable(text: str, stream: TextIO) -> str:
+def printable(text: str, stream: TextIO) -> str:
     """`text`, which may have several lines, in characters that `stream` can write."""
     coding = getattr(stream, "encoding", None) or "utf-8"
     return "\n".join(map(readable, text.split("\n"))).encode(coding, "backslashreplace").decode(coding)
@@ -57,7 +57,7 @@ class TerminalSpeaker:
         """The work's result is written to `output`; `lines` say what a person should know."""
         del output
         for line in lines:
-            print(_printable(line, sys.stdout))
+            print(printable(line, sys.stdout))
 
     def failed(self, message: str, code: int) -> None:
         """One line says why there is no result."""

@@ -150,7 +150,8 @@ def _highlights(
         before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
         strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
         result[d.mask] = strength * factor * light.lobe(lobe, normals)
-        return result, "the highlights are rendered in a smooth light, so they are broad" if light.sun is None else ""
+        smooth = light.coefficients is not None
+        return result, "the highlights are rendered in a smooth light, so they are broad" if smooth else ""
     moved = replace(lamp, direction=turned @ lamp.direction)
     before, after = (_spread(lobe_under(lobe, normals, one), d.mask) for one in (lamp, moved))
     kept = _still(lamp.direction, moved.direction) if choice.highlights == "auto" and choice.lobe is None else 0.0
