@@ -4,7 +4,8 @@ Equations. Remapping needs no shape: under one light the specular layer is s = w
 
     s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),     m the pixel's largest channel, w the layer's brightest but for a few,
 
-with the usual factor, which keeps the energy, and a gain g. Rendering draws the lobe anew on the recovered shape under the light that best
+with the usual factor, which keeps the energy, and a gain g; for a wider lobe, q < p, m / w counts as a quarter at least, or the edge
+at which the separated layer ends would be lifted with it. Rendering draws the lobe anew on the recovered shape under the light that best
 explains the layer. Metal has no body colour of its own: of the share M of metal the diffuse light goes, the highlight takes the colour of
 the reflectance, and the surroundings are mirrored in that colour:
 
@@ -32,6 +33,7 @@ from .lobes import USUAL_EXPONENT, Lobe, known_lobe, lobe_in, lobe_under, streng
 
 METHODS = ("remap", "render")
 _SKY_ROWS = 16
+_FOUND = 0.25  # of the brightest: below, a separation finds less and less of a highlight, until it ends in an edge
 _CENTRE = 99.9  # percentile: the lobe's own centre, but for a few wrong pixels
 
 
@@ -84,7 +86,8 @@ def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: f
     if exponent == present:
         return specular
     level = np.minimum(specular.max(-1, keepdims=True) / white_of(specular, mask, _CENTRE), 1)
-    shape = np.where(level > 1e-6, np.maximum(level, 1e-6) ** (exponent / present - 1), 0)
+    least = 1e-6 if exponent > present else _FOUND
+    shape = np.where(level > 1e-6, np.maximum(level, least) ** (exponent / present - 1), 0)
     return specular * shape * ((exponent + 8) / (present + 8))
 
 

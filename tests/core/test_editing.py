@@ -320,6 +320,16 @@ def test_remapping_makes_one_exponent_of_another(scene: Decomposition) -> None:
     assert np.array_equal(remapped(wide, ones, 20, 20), wide)
 
 
+def test_a_wider_lobe_does_not_lift_the_edge_at_which_a_highlight_was_cut_off() -> None:
+    y, x = np.mgrid[-1:1:61j, -1:1:61j]
+    full = np.exp(-(x**2 + y**2) / 0.1)
+    found = np.repeat(np.where(full > 0.05, full, 0)[..., None], 3, 2)
+    wider = remapped(found, np.ones(full.shape, bool), 60, 24)[..., 0]
+    edge = (full > 0.05) & (full < 0.07)
+    assert wider[edge].max() < 0.18 * wider.max() and not wider[full <= 0.05].any()
+    assert wider[(full > 0.5) & (full < 0.6)].min() > 0.6 * wider.max()
+
+
 def test_a_new_highlight_is_where_its_light_says_and_as_strong_as_before(scene: Decomposition) -> None:
     light = DirectionalLight(toward(-0.6, 0.4, 0.7))
     edit = add_highlight(scene, light, Lobe(60.0), replacing=True)
