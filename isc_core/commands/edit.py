@@ -319,7 +319,7 @@ def _no_ball(label: str, remark: str) -> Panel:
 
 
 def _short(found: LightEstimate) -> str:
-    return f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}° here" if found.determined else "undetermined"
+    return f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}°" if found.determined else "undetermined"
 
 
 def _long(found: LightEstimate) -> str:
