@@ -6,9 +6,8 @@
 Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them. `--networks`: a network for each object that
 has not seen it, `OBJECT.npz` of `benchmarks.layer_network_training`; without it the shipped one, which has. `--roundings`: each photo is
 measured as often, its values changed by some 1e-7 of themselves but for the first time: SIRFS has many minima, and the last digit decides
-between them. Writes OUT/rows.jsonl, a row a
-run, which is not run again, and OUT/tables.md: geometric means of errors relative to plain SIRFS with the interval of resampled objects,
-and which share of the gain of the true diffuse image a model reaches.
+between them. Writes OUT/rows.jsonl, a row a run, which is not run again, and OUT/tables.md: geometric means of errors relative to plain
+SIRFS with the interval of resampled objects, and which share of the gain of the true diffuse image a model reaches.
 """
 
 import argparse
@@ -64,15 +63,17 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
         if given.sets and label not in given.sets:
             continue
         for name in given.objects or list_objects(folder, "laboratory"):
+            wanted = [(rounding, model) for rounding in range(given.roundings) for model in given.models]
+            missing = [(rounding, model) for rounding, model in wanted if (label, name, model, rounding) not in done]
+            if not missing:
+                continue
             photos = photo_of(folder, name)
             network = read_network(given.networks / f"{name}.npz") if given.networks else None
-            for rounding in range(given.roundings):
+            for rounding, model in missing:
                 seen, diffuse = (rounded(photo, rounding) for photo in photos)
-                for model in given.models:
-                    if (label, name, model, rounding) not in done:
-                        answer, seconds = run(model, seen, diffuse, network)
-                        rows.append(row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding})
-                        append_row(path, rows[-1])
+                answer, seconds = run(model, seen, diffuse, network)
+                rows.append(row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding})
+                append_row(path, rows[-1])
     return rows
 
 

@@ -14,7 +14,6 @@ Writes OUT/rows.jsonl, a row a run, which is not run again, and OUT/tables.md, l
 """
 
 import argparse
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -22,15 +21,12 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from benchmarks.joint_models import photo_of, row_of, tables
+from benchmarks.joint_models import photo_of, row_of, run, tables
 from benchmarks.kept_rows import append_row, read_rows
 from isc_core.datasets import MitBerkeleyObject, list_objects
 from isc_core.environment import environment_from_shading
 from isc_core.evaluate import Estimate
-from isc_core.evaluation_runner import RunnerOptions, make_runner
-from isc_core.progress import Monitor
 from isc_core.separation.smoothing import masked_gaussian
-from isc_core.sirfs.prior_file import shipped_prior_set
 from synth.glossy_mit.gloss import environment_gloss
 from synth.glossy_mit.settings import GlossySettings
 
@@ -73,14 +69,13 @@ TAKEN: dict[str, Taken] = {
 def measure(given: argparse.Namespace) -> list[dict[str, object]]:
     """All rows: those that are on disk, and new ones."""
     path = given.output / "rows.jsonl"
-    rows, runner = read_rows(path), make_runner(RunnerOptions("sirfs"), shipped_prior_set())
+    rows = read_rows(path)
     done = {(row["set"], row["object"], row["model"]) for row in rows}
 
     def solved(label: str, name: str, model: str, image: np.ndarray, seen: MitBerkeleyObject) -> Estimate:
-        began = time.perf_counter()
-        answer = runner(replace(seen, image=image), Monitor())
+        answer, seconds = run("plain", replace(seen, image=image), seen, None)
         if (label, name, model) not in done:
-            rows.append(row_of(label, name, model, seen, answer, time.perf_counter() - began))
+            rows.append(row_of(label, name, model, seen, answer, seconds))
             append_row(path, rows[-1])
         return answer
 

@@ -69,6 +69,11 @@ class Raster:
     bit_depth: int
     sha256: str = ""
 
+    @property
+    def transparency(self) -> np.ndarray | None:
+        """The alpha channel where it tells something: None where it is opaque everywhere."""
+        return None if self.alpha is None or not (self.alpha < 1).any() else self.alpha
+
 
 @dataclass(frozen=True)
 class PhotoSource:
@@ -177,12 +182,14 @@ def _as_rgb(values: np.ndarray) -> np.ndarray:
     return np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values
 
 
-def read_linear(path: str | Path, transfer: str = "auto", limits: Limits = USUAL) -> np.ndarray:
+def read_linear(path: str | Path, transfer: str = "auto", limits: Limits = USUAL, *, finite: bool = False) -> np.ndarray:
     """The whole image without a mask: (H, W, 3) float32, linear Rec.709; what is not finite or negative in a float file becomes 0.
 
-    Raises `InputError` as `read_photo` does.
+    Raises `InputError` as `read_photo` does, and with `finite` for values that are not.
     """
     raster = read_raster(path, limits)
+    if finite and not np.isfinite(raster.values).all():
+        raise InputError(f"{path} holds NaN or infinite values: light that bright has to be clipped, or saved as 32-bit floats")
     linear = _as_rgb(_to_linear(raster, _transfer_used(transfer, raster)))
     return np.where(np.isfinite(linear) & (linear > 0), linear, np.float32(0))
 
@@ -290,8 +297,8 @@ def _find_mask(
 ) -> tuple[np.ndarray, str]:
     if mask_path is not None:
         return _mask_of_file(mask_path, raster, limits), "file"
-    if raster.alpha is not None and (raster.alpha < 1).any():
-        return raster.alpha >= 0.5, "alpha"
+    if raster.transparency is not None:
+        return raster.transparency >= 0.5, "alpha"
     light = _finite(_brightest(linear))
     if not (light > 0).any():
         raise InputError(f"{path}: the image is black: there is nothing to recover; use another photo")
@@ -315,8 +322,8 @@ def _mask_of_file(mask_path: str | Path, photo: Raster, limits: Limits) -> np.nd
     if raster.values.shape[:2] != photo.values.shape[:2]:
         (h, w), (mask_h, mask_w) = photo.values.shape[:2], raster.values.shape[:2]
         raise InputError(f"{mask_path}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: give a mask of the photo's size")
-    if raster.alpha is not None and (raster.alpha < 1).any():
-        return raster.alpha >= 0.5
+    if raster.transparency is not None:
+        return raster.transparency >= 0.5
     values = _finite(_brightest(raster.values))
     # Half of the largest value, not of the coding's maximum: masks of 0 and 1 are common.
     return values > 0.5 * max(float(values.max()), 0.0)

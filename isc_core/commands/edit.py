@@ -238,11 +238,7 @@ def _new_light(d: Decomposition, options: argparse.Namespace, rotation: np.ndarr
     if options.light is not None and not options.light.is_dir() and options.light.suffix.lower() not in _COEFFICIENTS:
         if turned:
             raise InputError("an environment picture is not turned here: turn the picture itself, or give a direction")
-        if not np.isfinite(read_raster(options.light, limits_of(options)).values).all():
-            raise InputError(
-                f"{options.light} holds NaN or infinite values: a sun that bright has to be clipped, or saved as 32-bit floats"
-            )
-        return NewLight(sky=read_linear(options.light, limits=limits_of(options))), False
+        return NewLight(sky=read_linear(options.light, limits=limits_of(options), finite=True)), False
     if options.light is None:
         return NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation), True
     return NewLight(coefficients=turned_light(_read_coefficients(options.light), rotation)), True
@@ -269,9 +265,8 @@ def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
     """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's: its alpha where that is not opaque; else its
     codes, of which 1 is white where none is larger."""
     raster = read_raster(path, limits)
-    if raster.alpha is not None and (raster.alpha < 1).any():
-        region = raster.alpha
-    else:
+    region = raster.transparency
+    if region is None:
         codes = np.nan_to_num(raster.values.astype(float), nan=0.0, posinf=1.0, neginf=0.0)
         white = 1.0 if raster.peak is None or codes.max() <= 1 else float(raster.peak)
         region = np.clip(codes.mean(axis=2) / white, 0, 1)

@@ -121,16 +121,17 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
     if choice.balanced:
         tint = light_color(d)
         factor = factor * tint * float(luminance(d.reflectance[d.mask] * old).sum() / luminance(d.reflectance[d.mask] * new * tint).sum())
-    shading = np.zeros(d.image.shape)
-    shading[d.mask] = new * factor
-    highlights, note = _highlights(d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, same)
-    return edited(d, d.diffuse if untouched else d.reflectance * shading, highlights, (note,) if note else ())
+    turned = np.eye(3) if same else light.turned
+    highlights, note = _highlights(d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, turned)
+    diffuse = d.diffuse if untouched else d.reflectance * _spread(new * factor, d.mask)
+    return edited(d, diffuse, highlights, (note,) if note else ())
 
 
 def _highlights(
-    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray, same: bool
-) -> tuple[np.ndarray, str]:
-    """The new specular layer, and what to say of it. `same`: whether the light is the present one."""
+    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray,
+    turned: np.ndarray | None,
+) -> tuple[np.ndarray, str]:  # fmt: skip
+    """The new specular layer, and what to say of it. `turned` (3, 3): how the present light became this one, None for another one."""
     lobe = choice.lobe or known_lobe(d)
     how = choice.highlights if choice.highlights != "auto" else "render" if lobe is not None else "scale"
     present = d.specular
@@ -138,20 +139,16 @@ def _highlights(
         return present, ""
     if how == "remove":
         return np.zeros_like(present), ""
-    result = np.zeros(present.shape)
     if how == "scale":
-        result[d.mask] = present[d.mask] * np.minimum(ratio, _MOST)
         told = "" if choice.highlights == "scale" else "no lobe is known, so the highlights follow the shading and do not move"
-        return result, told
+        return _spread(present[d.mask] * np.minimum(ratio, _MOST), d.mask), told
     lobe = lobe or Lobe()
-    turned = np.eye(3) if same else light.turned
     lamp = None if turned is None else _lamp(d)
     if lamp is None or turned is None:
         before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
         strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
-        result[d.mask] = strength * factor * light.lobe(lobe, normals)
-        smooth = light.coefficients is not None
-        return result, "the highlights are rendered in a smooth light, so they are broad" if smooth else ""
+        told = "" if light.coefficients is None else "the highlights are rendered in a smooth light, so they are broad"
+        return _spread(strength * factor * light.lobe(lobe, normals), d.mask), told
     moved = replace(lamp, direction=turned @ lamp.direction)
     before, after = (_spread(lobe_under(lobe, normals, one), d.mask) for one in (lamp, moved))
     kept = _still(lamp.direction, moved.direction) if choice.highlights == "auto" and choice.lobe is None else 0.0
