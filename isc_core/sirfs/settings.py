@@ -1,4 +1,4 @@
-"""How the terms of the SIRFS objective are weighed, and what the solver may change.
+"""How the terms of the SIRFS objective are weighed, and where the solver begins.
 
 The three published weight sets are those of the SIRFS release 1.5 (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712),
 as printed with it. Grey photos under natural light have no published set: the laboratory grey set stands in.
@@ -17,6 +17,9 @@ class Weights:
     `contour`: normals on the occluding contour point outward, with the penalty's power `contour_power`.
     `light`: likely illuminations. `silhouette`: surfaces lean outward near the outline (ours; not in the
     published sets). `shading_only`: in shape-from-shading mode, how strictly reflectance is one colour.
+
+    Where the solver begins (ours): `start_dome`, with the dome that the outline suggests, where the priors have a silhouette, instead of
+    a flat shape; `start_light`, with the light that the priors expect instead of none.
     """
 
     smoothness: float
@@ -30,6 +33,8 @@ class Weights:
     contour_power: float = 0.75
     silhouette: float = 0.0
     shading_only: float = 50.0
+    start_dome: bool = False
+    start_light: bool = False
 
 
 COLOR_NATURAL = Weights(16, 3.3636, 2.8284, 4.7568, 4.7568, 1, 2.8284, 3.3636)
@@ -47,9 +52,13 @@ ISC_NATURAL = replace(
     curvature=1.4 * COLOR_NATURAL.curvature,
     light=0.8 * COLOR_NATURAL.light,
     silhouette=0.3,
+    start_dome=True,
+    start_light=True,
 )
-ISC_LABORATORY = replace(COLOR_LABORATORY, slant=0.5 * COLOR_LABORATORY.slant, light=4 * COLOR_LABORATORY.light, silhouette=0.3)
-ISC_GREY = replace(GREY_LABORATORY, slant=0.7 * GREY_LABORATORY.slant, light=2 * GREY_LABORATORY.light, silhouette=0.3)
+ISC_LABORATORY = replace(
+    COLOR_LABORATORY, slant=0.5 * COLOR_LABORATORY.slant, light=4 * COLOR_LABORATORY.light, silhouette=0.3, start_dome=True
+)
+ISC_GREY = replace(GREY_LABORATORY, slant=0.7 * GREY_LABORATORY.slant, light=2 * GREY_LABORATORY.light, silhouette=0.3, start_dome=True)
 
 
 def isc_weights(illumination: str, channels: int) -> Weights:

@@ -4,7 +4,8 @@ For a pixel at distance d from the silhouette, u = d / max d, let c be the outwa
 distance) and t = (N1, N2) the normal's part in the image plane. Over real objects t has mean m(u) c and spread s(u) a component:
   cost = w/n_v * sum over valid pixels of |t - m(u) c|^2 / (2 s(u)^2).
 The profile m, s is fitted to objects of known shape (`fitting`). The occluding contour alone speaks only of the outline itself; this term
-carries it inward, where convex and concave would otherwise be equally likely. Ours; in the spirit of inflation from contours
+carries it inward, where convex and concave would otherwise be equally likely. The dome that the profile adds up to is where the solver
+begins. Ours; in the spirit of inflation from contours
 (Terzopoulos, Witkin & Kass 1988, doi:10.1016/0004-3702(88)90080-X). Limits: one object seen whole; hollow forms disagree with it.
 """
 
@@ -15,6 +16,8 @@ from scipy import ndimage
 
 from .priors import SilhouetteProfile
 
+_STEPS = 257
+_STEEPEST = 0.99  # of an in-plane part of a normal
 _SMOOTHING = 0.05  # of the largest distance: the outward direction ignores finer detail of the outline
 
 
@@ -32,13 +35,31 @@ def outline_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
 
     A mask that reaches the border goes on beyond it: there is no silhouette. One without any outline is deep everywhere, u = 1.
     """
-    padded = np.pad(mask, 1, mode="edge")
-    distance = np.ones(mask.shape) if padded.all() else ndimage.distance_transform_edt(padded)[1:-1, 1:-1]
-    deepest = max(float(distance.max()), 1.0)
+    distance, deepest = _depth(mask)
     smooth = ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest))
     down, right = np.gradient(smooth)
     length = np.maximum(np.hypot(down, right), 1e-6)
     return distance / deepest, -down / length, -right / length
+
+
+def outline_dome(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
+    """The heights (H, W) in pixels of a dome over `mask` (H, W) bool that leans as `profile` says on average; 0 outside.
+
+    A slope of m / sqrt(1 - m^2) at depth u adds up to Z(d) = d_max integral_0^u m / sqrt(1 - m^2) du.
+    """
+    distance, deepest = _depth(mask)
+    u = np.linspace(0, 1, _STEPS)
+    lean, _ = profile.at(u)
+    slope = lean / np.sqrt(1 - np.square(np.clip(lean, -_STEEPEST, _STEEPEST)))
+    height = np.concatenate([[0], np.cumsum((slope[1:] + slope[:-1]) / 2 * np.diff(u))])
+    return np.where(mask, deepest * np.interp(distance / deepest, u, height), 0)
+
+
+def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
+    """How far each pixel (H, W) lies behind the outline, and the most of it, at least 1. Ones where there is no outline."""
+    padded = np.pad(mask, 1, mode="edge")
+    distance = np.ones(mask.shape) if padded.all() else ndimage.distance_transform_edt(padded)[1:-1, 1:-1]
+    return distance, max(float(distance.max()), 1.0)
 
 
 def silhouette_field(mask: np.ndarray, profile: SilhouetteProfile) -> SilhouetteField:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from isc_core.sirfs.priors import SilhouetteProfile
-from isc_core.sirfs.silhouette import outline_coordinates, silhouette_cost, silhouette_field
+from isc_core.sirfs.silhouette import outline_coordinates, outline_dome, silhouette_cost, silhouette_field
 from isc_core.sirfs.stencils import normals
 
 
@@ -54,3 +54,27 @@ def test_a_half_ball_costs_less_than_flat_and_a_hollow_more(sign: int) -> None:
     flat = silhouette_cost(0 * n1, 0 * n2, mask, field, 1.0)[0]
     cost = silhouette_cost(n1, n2, mask, field, 1.0)[0]
     assert cost < 0.2 * flat if sign == 1 else cost > 2 * flat
+
+
+def test_the_dome_leans_as_the_profile_says_on_average() -> None:
+    """The profile of a half ball gives a half ball back."""
+    mask, i, j = disc()
+    depth = (np.arange(64) + 0.5) / 64
+    profile = SilhouetteProfile(1 - depth, np.full(64, 0.2))
+    height = outline_dome(mask, profile)
+    ball = np.sqrt(np.maximum(34.0**2 - i * i - j * j, 0))
+    assert (height[~mask] == 0).all()
+    np.testing.assert_allclose(height[mask], ball[mask], atol=5)
+    # The steepest part at the very rim falls between two pixels.
+    np.testing.assert_allclose(height[40, 15:66] - height[40, 40], ball[40, 15:66] - 34, atol=1)
+
+
+def test_a_dome_scales_with_its_outline_and_does_not_end_where_the_photo_does() -> None:
+    profile = SilhouetteProfile(np.array([0.6, 0.1]), np.array([0.2, 0.3]))
+    small, large = outline_dome(disc()[0], profile), outline_dome(disc(161, 68.0)[0], profile)
+    assert large.max() == pytest.approx(2 * small.max(), rel=0.03)
+    mask, _, _ = disc()
+    cut = outline_dome(mask[:, :41], profile)
+    np.testing.assert_allclose(cut[20:60, 36:], outline_dome(mask, profile)[20:60, 36:41], atol=1)
+    for other in (np.zeros((5, 6), bool), np.ones((5, 6), bool), np.eye(7, dtype=bool)):
+        assert np.isfinite(outline_dome(other, profile)).all()
