@@ -27,6 +27,7 @@ from scipy.optimize import nnls
 
 from .brdf.fitting import LobeFit
 from .brdf.fitting.response import F0
+from .brdf.fitting.result import NO_LIGHT
 from .decomposition import Decomposition
 
 FITTED, BOUND, NONE_FOUND, NOT_FITTED = "fitted", "upper bound", "no highlights found", "not fitted"
@@ -58,14 +59,14 @@ def gloss_of(d: Decomposition) -> Gloss:
     fit = d.brdf
     if fit is None:
         return Gloss()
-    if not fit.lights and not fit.determined:
+    if fit.reason == NO_LIGHT:
         return Gloss(specular=0.0, specular_source=NONE_FOUND)
     if fit.blender_roughness is None:
         return Gloss()
-    if not fit.determined:
-        return Gloss(fit.blender_roughness, None, BOUND)
     level = _level(d, fit)
     source = NOT_FITTED if level is None else FITTED
+    if not fit.determined:
+        return Gloss(fit.blender_roughness, level, BOUND, source)
     return Gloss(fit.blender_roughness, level, FITTED, source, None if level is None else specular_variation(d))
 
 

@@ -45,6 +45,7 @@ MIN_SIDE = 8
 MIN_MASK_PIXELS = 64
 BLACK = 2.0 / 255.0
 FLOAT_STEP = 2.0**-14
+_WILD = 1e9  # times the median light of the object: no lamp shows that bright, a broken pixel does
 
 _ORIENTATION_TAG = 0x0112
 _DECODING_ERRORS = (
@@ -101,6 +102,7 @@ class Photo:
         so that the exposure of a file does not matter. Zero channels are floored at half of it, in logarithms only.
     `clipped`: (H, W) bool, some channel is at the coding's maximum, so the light may have been brighter; never in float files.
         After resizing: some part of the object's pixel is.
+    `exposed`: whether the numbers tell how bright the scene was exposed, 1 being white: of codes they do, of floats they need not.
     `original`: the file. `scale`: working size / original size; a working pixel coordinate is `scale` times the original's.
     """
 
@@ -110,6 +112,7 @@ class Photo:
     clipped: np.ndarray
     original: PhotoSource
     scale: float = 1.0
+    exposed: bool = True
 
     @property
     def box(self) -> tuple[int, int, int, int]:
@@ -223,6 +226,7 @@ def read_photo(
         code_value=_code_value(raster, used, linear, mask),
         clipped=np.zeros_like(mask) if raster.peak is None else _brightest(raster.values) == raster.peak,
         original=PhotoSource(raster.sha256, (width, height), raster.bit_depth, used, mask_from),
+        exposed=raster.peak is not None,
     )
 
 
@@ -234,13 +238,25 @@ def _refuse_constant(values: np.ndarray, what: str) -> None:
 
 def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.ndarray:
     """The image with zeros for unusable values outside the mask; raises `InputError` for those inside."""
-    for bad, what in ((~np.isfinite(linear).all(axis=2), "NaN or infinite"), ((linear < 0).any(axis=2), "negative")):
+    wild = f"brighter than {_WILD:g} times most of the object"
+    for bad, what in (
+        (~np.isfinite(linear).all(axis=2), "NaN or infinite"),
+        ((linear < 0).any(axis=2), "negative"),
+        (_brightest(linear) > _WILD * _usual(linear, mask), wild),
+    ):
         count = int((bad & mask).sum())
         if count:
             raise InputError(f"{path}: {count} pixels inside the mask are {what}: mend them, or leave them out of the mask")
         if bad.any():
             linear = np.where(bad[..., None], np.float32(0), linear)
     return linear
+
+
+def _usual(linear: np.ndarray, mask: np.ndarray) -> float:
+    """The median of the pixels of the mask that are lit, infinite where none is."""
+    light = _brightest(linear)[mask]
+    light = light[light > 0]
+    return float(np.median(light)) if light.size else np.inf
 
 
 def _brightest(values: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from . import __version__
 from .decomposition import Decomposition, Provenance, Separation
 from .errors import InputError
 from .models import Answer, Settings, Task, solve
+from .models.doubts import share_in_blocks
 from .models.layers import shaded
 from .models.settings import BASELINE_MODELS, ILLUMINATIONS, MODELS, SEPARATING_MODELS, SIRFS_MODELS
 from .models.task import Clock
@@ -68,6 +69,8 @@ def decompose(
         working = photo.resized_to_object(settings.max_size)
         maps = photo if settings.full_size else working
         known = _at_scale(evidence, photo, working)
+        if not share_in_blocks(maps.mask):
+            raise InputError("the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region or use a larger photo")
     answer = solve(Task(working, maps, settings, known, prior_set, monitor, clock))
     monitor.report("maps", 0.96)
     provenance = Provenance(_settings_json(settings), settings.seed, _versions(), clock.seconds, _input_json(maps, name), answer.status)

@@ -17,6 +17,7 @@ from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from .atomic import new_file
 from .brdf.fitting import LobeFit
+from .brdf.fitting.result import NO_LIGHT
 from .decomposition import Decomposition, Separation
 from .errors import InputError
 from .names import readable
@@ -272,7 +273,7 @@ def _title(d: Decomposition) -> tuple[str, str]:
 def _gloss(fit: LobeFit) -> str:
     """The fit in a few words; roughness as Blender and glTF count it."""
     if fit.blender_roughness is None:
-        return "gloss undetermined" if fit.lights else "no highlights"
+        return "no highlights" if fit.reason == NO_LIGHT else "gloss undetermined"
     return f"roughness {'' if fit.determined else 'at most '}{fit.blender_roughness:.2f}"
 
 

@@ -43,5 +43,7 @@ def most_level(d: Decomposition, roughness: float, sky: np.ndarray) -> float:
     """
     lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
     sheen = lobe_in(lobe, d.normal[d.mask].astype(float), resampled(sky, _ROWS))
-    room = np.divide(d.image[d.mask], sheen, out=np.full(sheen.shape, np.inf), where=sheen > 1e-9)
+    seen = d.image[d.mask]
+    # A channel of zero tells nothing: cameras cut there what their colours cannot hold.
+    room = np.divide(seen, sheen, out=np.full(sheen.shape, np.inf), where=(sheen > 1e-9) & (seen > 0))
     return float(np.percentile(room.min(-1), _SHARE, method="lower"))  # infinite values cannot be interpolated

@@ -66,9 +66,10 @@ class Lobe:
 
 
 def known_lobe(d: Decomposition) -> Lobe | None:
-    """The lobe that was fitted to the photo, or None where there was no fit or its roughness is undetermined."""
+    """The lobe that was fitted to the photo, the widest that it can be where only that is known; None where there is no fit or it says
+    nothing of the roughness."""
     fit = d.brdf
-    if fit is None or not fit.determined or fit.alpha is None:
+    if fit is None or fit.alpha is None:
         return None
     alpha = float(np.clip(fit.alpha, 0.01, 1))
     return Lobe(alpha=alpha) if fit.model.startswith("ggx") else Lobe(float(np.clip(exponent_from_alpha(alpha), 1, 1e5)))

@@ -158,7 +158,7 @@ def _highlights(
 def _lamp(d: Decomposition) -> DirectionalLight | None:
     """The one light that the highlights come from, of luminance 1 across its beam, or None where nothing tells it."""
     found = explain_specular(d)
-    lights = () if d.brdf is None or not d.brdf.determined else d.brdf.lights
+    lights = () if d.brdf is None or d.brdf.alpha is None else d.brdf.lights
     if not found.determined and not lights:
         return None
     if found.determined:

@@ -3,7 +3,8 @@
 Problem: of a mirror, of glass, or under several lamps a model also finds paint, shape and light that add up to the photo: wrong ones.
 
 Equation: `appearance` tells how likely the photo shows each of them. Beyond a bound that is a doubt: the confidence is multiplied by what
-is left for ordinary paint, and the status says why.
+is left for ordinary paint, and the status says why. It also says where much of the object is too bright for the photo, or the mask too
+ragged for a mesh.
 
 Citation: see `appearance`.
 
@@ -12,11 +13,16 @@ Limits: measured in docs/methods/doubts.md. Strongly coloured light is another m
 
 from dataclasses import replace
 
+import numpy as np
+from scipy import ndimage
+
 from ..appearance import GLASS, LAMPS, MIRROR, ORDINARY, kinds_of
 from ..photo import Photo
 from .layers import less_sure
 from .task import Answer
 
+_MUCH_CLIPPED = 0.1  # of the object; where single highlights are, it is less
+_RAGGED = 0.5  # of the mask that no block of 2 x 2 pixels holds, and no mesh will
 LIKELY = 0.6  # of a mirror or glass together, or of several lamps: a doubt
 _LEAST = 0.1  # of the confidence is left
 CLEAR = "the object looks like a mirror or like something transparent: what was found would be an opaque one's, hardly its own"
@@ -29,10 +35,26 @@ def doubts_of(kinds: dict[str, float]) -> list[str]:
     return [*([CLEAR] if clear > LIKELY else []), *([SEVERAL] if several > LIKELY else [])]
 
 
+def doubts_of_photo(photo: Photo) -> list[str]:
+    """Lines for people, of what the photo does not show and its mask leaves out."""
+    clipped, ragged = float(photo.clipped[photo.mask].mean()), 1 - share_in_blocks(photo.mask)
+    lines = []
+    if clipped > _MUCH_CLIPPED:
+        lines.append(f"{100 * clipped:.0f} % of the object is too bright for the photo: what is there is a guess; expose less")
+    if ragged > _RAGGED:
+        lines.append(f"the mask is so thin or ragged that the mesh leaves out {100 * ragged:.0f} % of it: fill the mask")
+    return lines
+
+
+def share_in_blocks(mask: np.ndarray) -> float:
+    """Which share of the pixels of `mask` (H, W) bool lies in a block of 2 x 2 pixels that it holds whole."""
+    return float(ndimage.binary_opening(mask, np.ones((2, 2))).sum() / max(int(mask.sum()), 1))
+
+
 def doubted(maps: Photo, answer: Answer) -> Answer:
     """The answer to the photo of its maps, with its doubts in the status: `kinds`, the probabilities, and `doubts`, lines for people."""
     kinds = kinds_of(maps.image, maps.mask)
     doubts = doubts_of(kinds)
     split = less_sure(answer.split, max(kinds[ORDINARY], _LEAST)) if doubts else answer.split
     told = {kind: round(share, 4) for kind, share in kinds.items()}
-    return replace(answer, split=split, status=answer.status | {"kinds": told, "doubts": doubts})
+    return replace(answer, split=split, status=answer.status | {"kinds": told, "doubts": doubts + doubts_of_photo(maps)})

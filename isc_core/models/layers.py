@@ -8,7 +8,7 @@ from ..decomposition import Separation
 from ..photo import Photo
 from ..progress import Monitor
 from ..separation import separate
-from ..sirfs.frames import light_from_reference, normal_from_reference, real_sh
+from ..sirfs.frames import light_from_reference, light_to_reference, normal_from_reference, real_sh
 from ..sirfs.stencils import normals
 from .task import Task
 
@@ -53,3 +53,10 @@ def shaded(height: np.ndarray, light: np.ndarray, mask: np.ndarray) -> tuple[np.
     shading = np.zeros((*mask.shape, 3), np.float32)
     shading[mask] = np.exp(np.einsum("nk,kc->nc", real_sh(normal[mask].astype(float)), light_from_reference(light)))
     return normal, shading
+
+
+def shifted(light: np.ndarray, log_colour: np.ndarray | float) -> np.ndarray:
+    """The light (9, C), reference convention, with `log_colour`, (3,) or one number, added to the log shading; of one channel the mean."""
+    ours, gain = light_from_reference(light), np.broadcast_to(log_colour, 3)
+    ours[0] += np.sqrt(4 * np.pi) * (gain if ours.shape[1] == 3 else gain.mean())
+    return light_to_reference(ours)

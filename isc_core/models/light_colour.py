@@ -24,8 +24,7 @@ from ..brdf.fitting import Interval, LobeFit
 from ..decomposition import Separation
 from ..illuminant import Illuminant, estimate_illuminant, tinted, whitened
 from ..photo import Photo
-from ..sirfs.frames import light_from_reference, light_to_reference
-from .layers import less_sure
+from .layers import less_sure, shifted
 from .settings import LIGHT_COLOURS
 from .task import Answer, Task
 
@@ -67,7 +66,7 @@ def _whitened(task: Task, colour: np.ndarray) -> Task:
     maps = working if task.one_scale else _recoloured(task.maps, colour)
     split = None if task.split is None else _relit(task.split, 1 / colour)
     light = task.known.light
-    known = task.known if light is None else replace(task.known, light=_shifted(light, -np.log(colour)))
+    known = task.known if light is None else replace(task.known, light=shifted(light, -np.log(colour)))
     return replace(task, working=working, maps=maps, split=split, known=known)
 
 
@@ -78,19 +77,12 @@ def _recoloured(photo: Photo, colour: np.ndarray) -> Photo:
 def _back(answer: Answer, colour: np.ndarray) -> Answer:
     """The answer under the light again; height and confidence stay."""
     brdf = None if answer.brdf is None else _lobe(answer.brdf, colour)
-    return replace(answer, split=_relit(answer.split, colour), light=_shifted(answer.light, np.log(colour)), brdf=brdf)
+    return replace(answer, split=_relit(answer.split, colour), light=shifted(answer.light, np.log(colour)), brdf=brdf)
 
 
 def _relit(split: Separation, colour: np.ndarray) -> Separation:
     diffuse, specular, residual = (tinted(layer, colour) for layer in (split.diffuse, split.specular, split.residual))
     return Separation(diffuse, specular, residual, split.confidence)
-
-
-def _shifted(light: np.ndarray, log_colour: np.ndarray) -> np.ndarray:
-    """The light (9, C), reference convention, with `log_colour` (3,) added to the log shading; of one channel their mean."""
-    ours = light_from_reference(light)
-    ours[0] += np.sqrt(4 * np.pi) * (log_colour if ours.shape[1] == 3 else log_colour.mean())
-    return light_to_reference(ours)
 
 
 def _lobe(fit: LobeFit, colour: np.ndarray) -> LobeFit:

@@ -1,12 +1,14 @@
 """What a photo shows that the models do not assume lowers the confidence, and the status says so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from isc_core.appearance import GLASS, KINDS, LAMPS, MIRROR, ORDINARY
 from isc_core.decomposition import Separation
 from isc_core.models import Answer, doubts
-from isc_core.models.doubts import doubted, doubts_of
+from isc_core.models.doubts import doubted, doubts_of, doubts_of_photo, share_in_blocks
 from isc_core.photo import Photo, PhotoSource
 
 SIZE = 20
@@ -51,3 +53,19 @@ def test_a_doubt_leaves_the_confidence_left_for_paint(monkeypatch: pytest.Monkey
 def test_the_status_tells_how_likely_each_kind_is() -> None:
     found = doubted(*answered()).status["kinds"]
     assert list(found) == list(KINDS) and sum(found.values()) == pytest.approx(1, abs=1e-3)
+
+
+def test_much_that_is_too_bright_is_said() -> None:
+    photo, answer = answered()
+    assert doubts_of_photo(photo) == []
+    clipped = photo.mask & (np.indices(photo.mask.shape)[0] > SIZE / 2)
+    lines = doubted(replace(photo, clipped=clipped), answer).status["doubts"]
+    assert any("too bright for the photo" in line and "%" in line for line in lines)
+
+
+def test_a_ragged_mask_is_said() -> None:
+    photo, _ = answered()
+    assert share_in_blocks(photo.mask) == 1
+    speckled = photo.mask & (np.indices(photo.mask.shape).sum(0) % 2 == 0)
+    assert share_in_blocks(speckled) == 0
+    assert any("ragged" in line for line in doubts_of_photo(replace(photo, mask=speckled)))

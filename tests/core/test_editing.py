@@ -232,7 +232,8 @@ def test_highlights_are_kept_scaled_removed_or_rendered(scene: Decomposition) ->
 
 
 def fitted(scene: Decomposition, determined: bool) -> Decomposition:
-    return replace(scene, brdf=LobeFit("ggx: of the test", determined, "", 0.2, None, (), None, None, 0.9, scene.specular))
+    alpha = 0.2 if determined else None
+    return replace(scene, brdf=LobeFit("ggx: of the test", determined, "", alpha, None, (), None, None, 0.9, scene.specular))
 
 
 def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decomposition) -> None:
@@ -241,6 +242,8 @@ def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decompo
     assert not any("no lobe" in note for note in by_fit.notes)
     assert np.array_equal(by_fit.specular, relight(scene, light, Relighting("render", Lobe(alpha=0.2))).specular)
     assert np.array_equal(relight(fitted(scene, False), light).specular, relight(scene, light, Relighting("scale")).specular)
+    bound = replace(scene, brdf=LobeFit("ggx: of the test", False, "narrow", 0.2, None, (), None, None, 0.9, scene.specular))
+    assert np.array_equal(relight(bound, light).specular, by_fit.specular)
     sharper = change_gloss(fitted(scene, True), Gloss(exponent=100))
     assert np.array_equal(sharper.specular, change_gloss(scene, Gloss(exponent=100, present=Lobe(alpha=0.2).nearest_exponent)).specular)
 

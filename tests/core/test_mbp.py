@@ -8,10 +8,12 @@ import pytest
 from isc_core.brdf.ggx import Ggx
 from isc_core.brdf.shading import directional, radiance
 from isc_core.decomposition import Decomposition
-from isc_core.models.lobe import MATT
+from isc_core.errors import InputError
+from isc_core.models.lobe import HIDDEN, MATT, NOT_LOOKED_FOR
 from isc_core.models.mbp import split_reflectance
 from isc_core.photo import Photo, PhotoSource
 from isc_core.pipeline import Evidence, Settings, decompose
+from isc_core.progress import Monitor
 from isc_core.separation import separate
 from tests.core.ball_scene import ball
 
@@ -91,6 +93,47 @@ def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
     assert found.brdf.alpha is None
     assert "no specular light" in found.brdf.reason
     assert found.provenance.status["gloss"] == MATT
+
+
+@pytest.mark.parametrize("model", ["mdr", "mbp"])
+def test_where_nobody_looked_for_highlights_the_object_is_not_called_matt(model: str) -> None:
+    d = glossy((52, 60), 23.0)
+    found = decompose(photo_of(d, d.image), Settings(model=model, separator="none"), evidence=truth_of(d))
+    assert found.brdf is None and found.provenance.status["gloss"] == NOT_LOOKED_FOR
+
+
+def test_an_overexposed_object_is_not_called_matt() -> None:
+    d = glossy((52, 60), 23.0)
+    photo = photo_of(d, np.where(d.mask[..., None], np.minimum(40 * d.image, 1 - 1e-3 * d.normal[..., :1]), 0))
+    found = decompose(replace(photo, clipped=d.mask & (photo.image.min(-1) > 0.9)), Settings(model="mdr"), evidence=truth_of(d))
+    assert found.provenance.status["gloss"] == HIDDEN
+    assert any("too bright" in line for line in found.provenance.status["doubts"])
+
+
+def test_the_exposure_of_a_float_file_does_not_matter() -> None:
+    d = glossy((52, 60), 23.0)
+    found = []
+    for factor in (2.0**-10, 1.0, 2.0**10):  # scaled without rounding
+        photo = replace(photo_of(d, 4 * factor * d.image), code_value=factor / 4095, exposed=False)
+        found.append(decompose(photo, Settings(model="mdr")))
+    dim, usual, bright = found
+    assert usual.brdf is not None and usual.brdf.alpha is not None
+    for other, factor in ((dim, 2.0**-10), (bright, 2.0**10)):
+        assert other.brdf is not None and other.brdf.alpha == pytest.approx(usual.brdf.alpha, rel=1e-4)
+        cosine = (other.normal * usual.normal).sum(-1)[d.mask]
+        assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 1
+        assert other.identity_errors().broken() == ()
+        assert other.diffuse.sum() == pytest.approx(factor * usual.diffuse.sum(), rel=1e-3)
+        assert other.reflectance[d.mask] == pytest.approx(usual.reflectance[d.mask], rel=1e-3)
+
+
+def test_a_mask_without_an_inside_is_refused_before_the_work() -> None:
+    d = glossy((52, 60), 23.0)
+    speckled = d.mask & (np.indices(d.mask.shape).sum(0) % 2 == 0)
+    stages: list[str] = []
+    with pytest.raises(InputError, match="2 x 2"):
+        decompose(replace(photo_of(d, d.image), mask=speckled), Settings(), monitor=Monitor(lambda stage, share: stages.append(stage)))
+    assert stages == []
 
 
 def test_it_is_the_reflectance_that_is_separated() -> None:

@@ -629,6 +629,17 @@ def test_unusable_values_of_an_exr(tmp_path: Path, bad: float, word: str) -> Non
     refused(path, "3 pixels inside the mask are", word)
 
 
+def test_a_broken_pixel_of_an_exr_is_refused_and_a_lamp_is_not(tmp_path: Path) -> None:
+    light = (codes(65535) / 65535).astype(np.float32)
+    mask = saved(tmp_path / "m.png", Image.fromarray(object_mask()))
+    light[20, 20] = 1e5
+    assert read_photo(write_exr(tmp_path / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}), mask).image.max() == np.float32(1e5)
+    light[20, 20] = 1e30
+    refused(
+        write_exr(tmp_path / "b.exr", {c: light[..., i] for i, c in enumerate("RGB")}), "1 pixels inside the mask are brighter", mask=mask
+    )
+
+
 def test_constant_and_black_images(tmp_path: Path) -> None:
     flat = np.full((H, W, 3), (200, 10, 10), np.uint8)
     refused(write(tmp_path / "a.png", png(flat, 8, 2)), "every pixel is the same")

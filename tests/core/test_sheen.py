@@ -38,6 +38,15 @@ def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> 
     assert (shown.specular_source, shown.roughness) == (LOWERED, gloss.roughness)
 
 
+def test_channels_of_zero_tell_nothing_of_the_room() -> None:
+    d = glossy()
+    sky = environment_from_shading(d.illumination, 16)
+    image = d.image.copy()
+    rows, columns = np.nonzero(d.mask)
+    image[rows[::8], columns[::8], 2] = 0
+    assert most_level(replace(d, image=image), 0.4, sky) == pytest.approx(most_level(d, 0.4, sky), rel=0.1)
+
+
 @pytest.mark.parametrize("factor", [1.0, 100.0])
 def test_every_file_of_a_result_has_the_same_level(tmp_path: Path, factor: float) -> None:
     d = stronger(glossy(), factor)

@@ -161,11 +161,12 @@ def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOp
     pixels = problem.pixels
     spread = covariance(fitted.jacobian, fitted.residual, fitted.weight, pixels)
     image, gains, explained = _coloured(seen, problem, fitted)
-    lights = _lights(problem, fitted, spread, gains, options)
-    convention = CONVENTION[options.model]
     at = fitted.lamps.count + len(fitted.lamps.base)
     sd = float(np.sqrt(spread[at, at] + np.radians(options.normal_error) ** 2 + _MODEL_ALPHA**2))
     reason = _reason(problem, fitted, explained, sd)
+    if reason == UNLIKE:
+        return replace(_nothing(seen, options, UNLIKE), explained=explained)
+    lights = _lights(problem, fitted, spread, gains, options)
     alpha: float | None = fitted.lamps.alpha
     low, high = float(max(fitted.lamps.alpha * np.exp(-sd), ALPHAS[0])), float(min(fitted.lamps.alpha * np.exp(min(sd, 20)), 1.0))
     interval: Interval | None = Interval(low, high)
@@ -174,7 +175,7 @@ def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOp
         interval = Interval(ALPHAS[0], alpha)
     elif reason != FOUND:
         alpha = interval = None
-    return LobeFit(convention, reason == FOUND, reason, alpha, interval, lights, None, None, explained, image)
+    return LobeFit(CONVENTION[options.model], reason == FOUND, reason, alpha, interval, lights, None, None, explained, image)
 
 
 def _lights(problem: Problem, fitted: Fitted, spread: np.ndarray, gains: np.ndarray, options: LobeFitOptions) -> tuple[LobeLight, ...]:

@@ -23,7 +23,7 @@ _PEAK_PIXELS = 5  # the peak is the mean of that many: one hot pixel is no highl
 class Pixels:
     """N pixels: `normal` (N, 3), `place` (N, 3) (zeros where not known), `colour` (N, 3) and its mean `value` (N,), `sigma` and `weight`
     (N,), `clipped` (N,) bool, `cell` (N, 2): rows and columns. `peak` of the highlight; `dark`: as good as no light; `bright`: how many
-    pixels of the picture reach half of the peak."""
+    pixels of the picture reach half of the peak; `peak_clipped`: the share of the pixels of the peak that are clipped."""
 
     normal: np.ndarray
     place: np.ndarray
@@ -36,6 +36,7 @@ class Pixels:
     peak: float
     dark: float
     bright: int
+    peak_clipped: float
 
 
 def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixels:
@@ -65,4 +66,5 @@ def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixe
         peak=peak,
         dark=_DARK * peak,
         bright=int((value > 0.5 * peak).sum()),
+        peak_clipped=float(seen.clipped[inside][order[:_PEAK_PIXELS]].mean()),
     )

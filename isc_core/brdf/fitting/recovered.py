@@ -19,6 +19,8 @@ through the whole chain; each left out in turn, alpha was within a factor 1.5 on
 Citation: the brightness of highlights as a measure of gloss: J. A. Ferwerda, F. Pellacini, D. P. Greenberg, "A psychophysically-based
 model of surface gloss perception", SPIE 4299 (2001), doi:10.1117/12.429501. Facets: B. Walter et al., doi:10.2312/EGWR/EGSR07/195-206.
 
+A clipped highlight was brighter than P: alpha_P then is too wide, and what is said is an upper bound.
+
 Limits: insulators (metals mirror ten times as much) under lights that are small beside the highlight; one light, the strongest. Strength
 is relative to the shading that was given: how dark a paint is, one photo does not tell, so the shading's own scale may be off by two.
 """
@@ -32,7 +34,7 @@ from .lamps import ALPHAS, Lamps, contributions
 from .observed import Observed
 from .pixels import Pixels
 from .response import F0
-from .result import CONVENTION, FOUND, NARROW, NO_LIGHT, SMOOTH, Interval, LobeFit, LobeFitOptions, LobeLight
+from .result import CLIPPED, CONVENTION, FOUND, NARROW, NO_LIGHT, SMOOTH, Interval, LobeFit, LobeFitOptions, LobeLight
 from .starts import light_of_half_vector
 
 _BLUR = 0.3  # of the root of the object's area
@@ -45,6 +47,7 @@ _LEAST_SHARE = 1e-3  # of specular light over shading: a separator leaves less o
 _WIDEST = 0.6
 _NARROWEST_PIXELS = 6
 _FLATTEST = 0.05
+_MOST_CLIPPED = 0.5  # of the pixels of the peak
 
 
 def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction: np.ndarray | None, options: LobeFitOptions) -> LobeFit:
@@ -63,14 +66,22 @@ def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction
     product = mirrored * np.pi * brightest * np.exp(_STRENGTH_OFFSET) * colour / max(float(colour.mean()), 1e-300)
     light = LobeLight(towards, cone, product, Interval(product * np.exp(-_STRENGTH_SPREAD), product * np.exp(_STRENGTH_SPREAD)))
     image, explained = _predicted(seen, normal, light, alpha, options)
-    reason = SMOOTH if alpha > _WIDEST else NARROW if pixels.bright < _NARROWEST_PIXELS else FOUND
+    reason = _reason(alpha, pixels)
     interval: Interval | None = Interval(max(alpha * np.exp(-_ALPHA_SPREAD), ALPHAS[0]), min(alpha * np.exp(_ALPHA_SPREAD), 1.0))
     if reason == SMOOTH:
         return LobeFit(convention, False, reason, None, None, (light,), None, None, explained, image)
-    if reason == NARROW:
+    if reason in (NARROW, CLIPPED):
         alpha = float(interval.high) if interval else alpha
         interval = Interval(ALPHAS[0], alpha)
     return LobeFit(convention, reason == FOUND, reason, alpha, interval, (light,), None, None, explained, image)
+
+
+def _reason(alpha: float, pixels: Pixels) -> str:
+    if pixels.peak_clipped > _MOST_CLIPPED:
+        return CLIPPED  # also where the bound is so wide that it says little: that the light is smooth it does not
+    if alpha > _WIDEST:
+        return SMOOTH
+    return NARROW if pixels.bright < _NARROWEST_PIXELS else FOUND
 
 
 def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:

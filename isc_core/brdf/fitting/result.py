@@ -17,6 +17,7 @@ CONVENTION = {
 NO_LIGHT = "undetermined: no specular light"
 SMOOTH = "undetermined: the light is smooth, any roughness explains it"
 NARROW = "the highlight is narrower than a pixel: only an upper bound"
+CLIPPED = "the highlight is brighter than the photo could show: only an upper bound"
 UNLIKE = "undetermined: the specular image has no highlight that a lobe explains"
 FOUND = "determined"
 
@@ -72,9 +73,10 @@ class LobeLight:
 class LobeFit:
     """A lobe and its lights. `model`: what alpha means, in words. `determined`: whether alpha is; else `reason` says why not.
 
-    `alpha`: None where it is not known at all; where the highlight is narrower than a pixel, the upper bound. `alpha_interval`: likewise.
-    `lights`: the brightest first; none where there is no specular light or an environment was given. `strength`, `strength_interval`: of
-    the lobe (3,), where an environment was given, else None. `explained`: share of the squared specular image, in [0, 1].
+    `alpha`: None where it is not known at all; where the highlight is narrower than a pixel, or clipped, the upper bound.
+    `alpha_interval`: likewise. `lights`: the brightest first; none where there is no specular light, no lobe explains it, or an environment
+    was given. `strength`, `strength_interval`: of the lobe (3,), where an environment was given, else None. `explained`: share of the
+    squared specular image, in [0, 1].
     `predicted`: (H, W, 3) float32, the specular image of the fit, 0 outside the mask; what a separator left out is in it.
     """
 

@@ -15,7 +15,7 @@ from isc_core.brdf.fitting.observed import observe
 from isc_core.brdf.fitting.pixels import choose_pixels
 from isc_core.brdf.fitting.recovered import blurred_normals
 from isc_core.brdf.fitting.response import respond
-from isc_core.brdf.fitting.result import NARROW, NO_LIGHT, SMOOTH
+from isc_core.brdf.fitting.result import CLIPPED, NARROW, NO_LIGHT, SMOOTH, UNLIKE
 from isc_core.brdf.ggx import Ggx
 from isc_core.brdf.model import Lobe
 from isc_core.brdf.roughness import alpha_from_exponent
@@ -284,6 +284,29 @@ def test_the_recovered_fit_does_not_depend_on_the_exposure() -> None:
     bright = fit_lobe(50 * specular, normal, mask, options=options, shading=50 * shading)
     assert bright.alpha == pytest.approx(dim.alpha, rel=1e-9)
     np.testing.assert_allclose(bright.strength_light, 50 * np.asarray(dim.strength_light), rtol=1e-9)
+
+
+@pytest.mark.parametrize("shown", [0.5, 0.2, 0.1])
+@pytest.mark.parametrize("alpha", [0.1, 0.2])
+def test_a_highlight_brighter_than_the_photo_could_show_gives_an_upper_bound(alpha: float, shown: float) -> None:
+    specular, normal, mask, shading = whole_chain(alpha)
+    white = shown * specular.max()
+    cut, clipped = np.minimum(specular, white), (specular >= white).any(-1)
+    fit = fit_lobe(cut, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, clipped=clipped)
+    assert (fit.determined, fit.reason) == (False, CLIPPED) and fit.alpha is not None and fit.alpha_interval is not None
+    assert fit.alpha_interval.low < alpha < fit.alpha_interval.high == fit.alpha
+    assert angle(fit.direction, KEY) < 25
+    one_hot = np.zeros_like(mask)
+    one_hot[np.unravel_index(specular.sum(-1).argmax(), mask.shape)] = True
+    assert fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, clipped=one_hot).determined
+
+
+def test_where_no_lobe_explains_the_light_none_and_no_lamps_are_made_up() -> None:
+    _, normal, mask = seen(Ggx(0.2), directional(KEY, np.pi))
+    noise = np.where(mask[..., None], np.random.default_rng(3).uniform(size=(*mask.shape, 1)) ** 40 * np.ones(3), 0)
+    fit = fit_lobe(noise, normal, mask)
+    assert (fit.reason, fit.determined, fit.alpha, fit.lights) == (UNLIKE, False, None, ())
+    assert not fit.predicted.any() and fit.explained < 0.25
 
 
 def test_what_a_separator_leaves_on_a_matt_object_is_no_gloss() -> None:
