@@ -38,6 +38,8 @@ from .limits import USUAL, Limits
 from .memory_files import named
 from .numpy_files import array_header
 from .quiet import quiet
+from .srgb import linear_to_srgb as linear_to_srgb
+from .srgb import srgb_to_linear as srgb_to_linear
 
 TRANSFERS = ("auto", "srgb", "linear")
 MAX_ASPECT = 100
@@ -150,18 +152,6 @@ def _size_needed(box: tuple[int, int, int, int]) -> int:
 
 
 # --- transfer ---------------------------------------------------------------------------------------------------------------------------
-
-
-def srgb_to_linear(coded: np.ndarray | float) -> np.ndarray:
-    """Linear light of sRGB-coded values (any shape, nominally [0, 1]; larger and negative values follow the curve's two branches)."""
-    x = np.asarray(coded)
-    return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0.0) + 0.055) / 1.055) ** 2.4)
-
-
-def linear_to_srgb(linear: np.ndarray | float) -> np.ndarray:
-    """sRGB-coded values of linear light (any shape, nominally [0, 1]); the inverse of `srgb_to_linear`."""
-    x = np.asarray(linear)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1.0 / 2.4) - 0.055)
 
 
 def _transfer_used(transfer: str, raster: Raster) -> str:

@@ -1,7 +1,8 @@
 """Files for other programs: the mesh as GLB, the maps as OpenEXR.
 
 Where the result's folder is still there, its own files are copied: mesh.glb and the multilayer maps.exr, as recovered. Later, or in another
-file, they come from the scene: the mesh as Blender's exporter writes it, with a plain material, and each packed map as an EXR of its own.
+file, they come from the scene: the mesh as Blender's exporter writes it, with a plain material that has the paint as it was recoloured
+(`scene.stand_in`), and each packed map as an EXR of its own.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender wants its options as sets)
@@ -16,8 +17,8 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..scene.build import Built, find
-from ..scene.material import dichromatic_node
 from ..scene.provenance import KEY, ROLE
+from ..scene.stand_in import stand_in
 
 _FILES = ("mesh.glb", "maps.exr", "decomposition.json", "preview.png")
 
@@ -100,39 +101,17 @@ def _write_maps(key: str, folder: Path) -> list[str]:
 
 def _write_mesh(built: Built, path: Path) -> str:
     """The object by Blender's exporter, which knows no node groups: a plain material stands in while it writes."""
-    plain = _plain_material(built)
-    theirs = built.object.data.materials[0]
     selected, layer = [thing for thing in bpy.context.selected_objects if thing != built.object], bpy.context.view_layer
-    try:
-        built.object.data.materials[0] = plain
-        for thing in selected:
-            thing.select_set(False)
-        built.object.select_set(True, view_layer=layer)
-        bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", use_selection=True, use_active_scene=True, export_apply=True)
-    except (RuntimeError, AttributeError) as error:
-        raise InputError(f"Blender's glTF exporter failed ({str(error).strip().splitlines()[-1]}): enable it in the preferences") from error
-    finally:
-        built.object.data.materials[0] = theirs
-        for thing in selected:
-            thing.select_set(True)
-        bpy.data.materials.remove(plain)
+    with stand_in(built.object, built.material):
+        try:
+            for thing in selected:
+                thing.select_set(False)
+            built.object.select_set(True, view_layer=layer)
+            bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", use_selection=True, use_active_scene=True, export_apply=True)
+        except (RuntimeError, AttributeError) as error:
+            said = str(error).strip().splitlines()[-1]
+            raise InputError(f"Blender's glTF exporter failed ({said}): enable it in the preferences") from error
+        finally:
+            for thing in selected:
+                thing.select_set(True)
     return path.name
-
-
-def _plain_material(built: Built) -> Any:
-    """A Principled material of the base colour's image, the roughness and the level, as glTF knows it."""
-    material = bpy.data.materials.new("plain")
-    if material.node_tree is None:
-        material.use_nodes = True
-    tree = material.node_tree
-    surface = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
-    group = dichromatic_node(built.material)
-    if group is not None:
-        surface.inputs["Roughness"].default_value = group.inputs["Roughness"].default_value
-        level = group.inputs["Specular Level"].default_value * group.inputs["Specular Gain"].default_value
-        surface.inputs["Specular IOR Level"].default_value = 0.5 * level
-        for link in group.inputs["Reflectance"].links:
-            picture = tree.nodes.new("ShaderNodeTexImage")
-            picture.image = link.from_node.image
-            tree.links.new(picture.outputs["Color"], surface.inputs["Base Color"])
-    return material

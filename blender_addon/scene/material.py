@@ -72,6 +72,12 @@ def dichromatic_node(material: bpy.types.Material) -> bpy.types.Node | None:
     return next((node for node in groups if node.node_tree.get("isc_group") == DICHROMATIC), None)
 
 
+def shows_highlights(material: bpy.types.Material) -> bool:
+    """Whether the photo's own highlights stand in for the gloss."""
+    nodes = material.node_tree.nodes if material.node_tree else ()
+    return any(node.type == "GROUP" and node.node_tree and node.node_tree.get("isc_group") == HIGHLIGHTS for node in nodes)
+
+
 def set_specular_gain(material: bpy.types.Material, gain: float) -> None:
     """Sets the gain of the gloss wherever it comes from: the lobe or the photo's highlights."""
     for node in material.node_tree.nodes:

@@ -7,6 +7,7 @@ Limits: a datablock linked from another file belongs to that file: it is never f
 """
 
 import json
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -17,6 +18,7 @@ from isc_core.errors import InputError
 from ..arrays import Result
 
 KEY, ROLE = "isc_key", "isc_role"
+SPECULAR_LEVEL = "isc_specular_level"
 _NAME_BYTES = 63  # of a datablock's name in Blender 4.5; later ones take more
 
 
@@ -55,7 +57,9 @@ def require_local(key: str) -> None:
 
 
 def record(block: Any, result: Result, options: str) -> None:
-    """Writes what the datablock was made from: photo, settings, versions, status, light. `options`: of the build, as JSON."""
+    """Writes what the datablock was made from: photo, settings, versions, status, light, and the level of the gloss, 0 where it is not
+    known. `options`: of the build, as JSON.
+    """
     described = result.description
     source, settings = described.get("input", {}), described.get("settings", {})
     block["isc_version"] = str(described.get("versions", {}).get("isc", ""))
@@ -67,5 +71,6 @@ def record(block: Any, result: Result, options: str) -> None:
     for name in ("sun_direction", "sun_strength", "sun_ambient"):
         block[f"isc_{name}"] = [float(part) for part in getattr(result, name)]
     block["isc_sun_explained"], block["isc_sun_cone"] = result.sun_explained, result.sun_cone
+    block[SPECULAR_LEVEL] = result.specular_level if math.isfinite(result.specular_level) else 0.0
     block["isc_options"] = options
     block["isc_decomposition"] = json.dumps(described, ensure_ascii=False)

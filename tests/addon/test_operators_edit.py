@@ -1,5 +1,9 @@
 """Editing what was built: paint, gains, light, files; and what is said where it cannot be edited."""
 
+import colorsys
+import json
+import struct
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -13,8 +17,11 @@ from mathutils import Vector  # noqa: E402 (after the skip)
 
 from blender_addon.arrays import read_result  # noqa: E402
 from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # noqa: E402
-from blender_addon.scene.build import Built, find  # noqa: E402
-from blender_addon.scene.material import dichromatic_node  # noqa: E402
+from blender_addon.operators.export import write  # noqa: E402
+from blender_addon.scene.build import BuildOptions, Built, build, find  # noqa: E402
+from blender_addon.scene.material import dichromatic_node, set_specular_gain  # noqa: E402
+from blender_addon.scene.stand_in import recoloured  # noqa: E402
+from isc_core.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 
 
@@ -175,6 +182,107 @@ def test_without_them_the_scene_is_written(addon: Any, built: Built, bump_folder
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), np.ptp(places(built), axis=0)[[0, 2, 1]], rtol=1e-4)
     assert mesh.visual.material.baseColorTexture is not None, "the paint goes with it"
     assert built.object.data.materials[0] == material and "plain" not in addon.data.materials
+
+
+def texture(path: Path) -> np.ndarray:
+    """(H, W, 3) codes of the paint in a mesh.glb, row 0 at the top."""
+    import trimesh
+
+    return np.asarray(trimesh.load(path, force="mesh").visual.material.baseColorTexture.convert("RGB")).astype(float)
+
+
+def surface(path: Path) -> dict[str, Any]:
+    """The first material of a mesh.glb, as its JSON has it."""
+    data = path.read_bytes()
+    tree: dict[str, Any] = json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])
+    return tree["materials"][0]
+
+
+def specular_factor(path: Path) -> float:
+    """1, as the extension says, where the file says nothing."""
+    return float(surface(path).get("extensions", {}).get("KHR_materials_specular", {}).get("specularFactor", 1.0))
+
+
+@pytest.mark.parametrize(
+    "edit", [{}, {"Hue": 0.72, "Saturation": 0.6, "Value": 1.4, "Diffuse Gain": 0.8}, {"Saturation": 1.8}, {"Diffuse Gain": 0.3}], ids=str
+)
+def test_the_paint_is_written_as_it_is_shown(addon: Any, built: Built, bump_folder: Path, tmp_path: Path, edit: dict[str, float]) -> None:
+    """Coded as sRGB, after the edits: what Cycles shows of the paint is what another program will read."""
+    result, node = read_result(bump_folder), dichromatic_node(built.material)
+    assert node is not None
+    for name, value in edit.items():
+        node.inputs[name].default_value = value
+    images = set(addon.data.images)
+    assert addon.ops.isc.export(directory=str(tmp_path), from_scene=True) == {"FINISHED"}
+    assert set(addon.data.images) == images and "plain" not in addon.data.materials
+    codes, inside = texture(tmp_path / "bump" / "mesh.glb"), result.mask & (result.confidence > 0.8)
+    if not edit:
+        np.testing.assert_allclose(codes, 255 * linear_to_srgb(np.clip(result.base_color, 0, 1)), atol=0.51)
+    shown = render(built.scene, tmp_path)["Diffuse Color"][inside]
+    np.testing.assert_allclose(codes[inside], 255 * linear_to_srgb(np.clip(shown, 0, 1)), atol=1.0)
+
+
+def test_recolouring_is_that_of_hsv() -> None:
+    paint = np.random.default_rng(3).uniform(0, 1.2, (300, 3))
+    paint[:20] = paint[:20, :1]  # greys
+    paint[20] = 0
+    for hue, saturation in ((0.5, 1.3), (0.1, 0.4), (0.93, 2.0), (0.0, 1.0), (1.0, 0.0)):
+        hsv = [colorsys.rgb_to_hsv(*color) for color in paint.tolist()]
+        wanted = [colorsys.hsv_to_rgb((h + hue + 0.5) % 1, min(s * saturation, 1), v) for h, s, v in hsv]
+        np.testing.assert_allclose(recoloured(paint, hue, saturation, 0.7), 0.7 * np.array(wanted), atol=1e-12)
+    np.testing.assert_array_equal(recoloured(paint, 0.5, 1.0, 2.0), 2 * paint)
+
+
+@pytest.mark.parametrize(("source", "level"), [("lobe", 0.3), ("image", 0.3), ("none", 0.0)])
+def test_the_gloss_that_is_written_is_the_fitted_one_unless_it_is_not_wanted(
+    addon: Any, bump_folder: Path, tmp_path: Path, source: Any, level: float
+) -> None:
+    """The photo's highlights, that Blender may show instead, do not fit into the file."""
+    fitted = replace(read_result(bump_folder), specular_level=0.6, roughness=0.35)
+    thing = build(fitted, BuildOptions(specular_from=source, own_scene=False))
+    set_specular_gain(thing.material, 0.5)
+    write(thing, tmp_path, from_scene=True)
+    path = tmp_path / "bump" / "mesh.glb"
+    assert specular_factor(path) == pytest.approx(level)
+    assert surface(path)["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.35)
+
+
+def test_gloss_that_is_not_known_is_not_written(addon: Any, bump_folder: Path, tmp_path: Path) -> None:
+    write(build(read_result(bump_folder), BuildOptions(specular_from="image", own_scene=False)), tmp_path, from_scene=True)
+    assert specular_factor(tmp_path / "bump" / "mesh.glb") == 0
+
+
+def test_paint_that_is_one_colour_or_comes_from_other_nodes(addon: Any, built: Built, tmp_path: Path) -> None:
+    tree, node = built.material.node_tree, dichromatic_node(built.material)
+    assert node is not None
+    tree.links.remove(node.inputs["Reflectance"].links[0])
+    node.inputs["Reflectance"].default_value = (0.2, 0.4, 0.1, 1)
+    node.inputs["Value"].default_value = 0.5
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    factor = surface(tmp_path / "bump" / "mesh.glb")["pbrMetallicRoughness"]["baseColorFactor"]
+    assert factor == pytest.approx([0.1, 0.2, 0.05, 1])
+    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], node.inputs["Reflectance"])
+    assert "does not come from an image" in say(addon.ops.isc.export, directory=str(tmp_path))
+    assert "plain" not in addon.data.materials
+
+
+def test_an_object_without_material_slots_is_written(addon: Any, built: Built, tmp_path: Path) -> None:
+    built.object.data.materials.clear()
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    assert texture(tmp_path / "bump" / "mesh.glb").shape == (64, 88, 3)
+    assert not built.object.material_slots
+
+
+def test_every_slot_that_has_the_material_is_written_with_its_paint(addon: Any, built: Built, tmp_path: Path) -> None:
+    mine = addon.data.materials.new("mine")
+    built.object.data.materials.clear()
+    for material in (mine, built.material):
+        built.object.data.materials.append(material)
+    for face in built.object.data.polygons:
+        face.material_index = 1
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    assert texture(tmp_path / "bump" / "mesh.glb").shape == (64, 88, 3)
+    assert list(built.object.data.materials) == [mine, built.material]
 
 
 def places(built: Built) -> np.ndarray:
