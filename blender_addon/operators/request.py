@@ -11,9 +11,10 @@ from isc_core.errors import InputError
 
 from ..photo_files import Picture, examine
 from ..scene.build import SHADOWS, BuildOptions
+from ..scene.provenance import KEY, SOURCE_IMAGE
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".hdr", ".tga", ".webp")
-_IMAGE, _MASK, _REQUEST = "isc_source_image", "isc_source_mask", "isc_request"
+_IMAGE, _MASK, _REQUEST = SOURCE_IMAGE, "isc_source_mask", "isc_request"
 
 
 @dataclass(frozen=True)
@@ -117,8 +118,10 @@ def key_of(image: Any) -> str:
 
 
 def remember(thing: Any, request: Request) -> None:
-    """Writes into an object how it was made; its images are pointed at, so that they stay with it whatever they are called."""
-    thing[_REQUEST] = request.to_json()
+    """Writes into an object how it was made, under the name it was given; its images are pointed at, so that they stay with it
+    whatever they are called.
+    """
+    thing[_REQUEST] = replace(request, build=replace(request.build, name=str(thing[KEY]))).to_json()
     for role, name in ((_IMAGE, request.image), (_MASK, request.mask)):
         image = named(bpy.data.images, name) if name else None
         if image is not None:

@@ -18,8 +18,8 @@ from .displacement import displace, flattened, undo_displacement
 from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps, require_spaces
 from .material import Gloss, Maps, ensure_material
 from .mesh import fill_mesh, sheet
+from .provenance import PHOTO_HASH, SOURCE_IMAGE, is_isc, label, mark, photo_hash, record, require_local
 from .provenance import find as find_block
-from .provenance import is_isc, label, mark, record, require_local
 from .sun import relight
 from .world import ensure_world
 
@@ -77,14 +77,15 @@ def build(
     scene: bpy.types.Scene | None = None,
     photo: bpy.types.Image | None = None,
 ) -> Built:
-    """Builds the result, or updates what was built under its name before.
+    """Builds the result, or updates what was built of the same photo under its name before; another photo's object is left alone, the
+    new one is then called "name-2" and so on.
 
     `scene`: where to, without a scene of its own; the current one if None. `photo`: shown behind the object; the masked one if None.
     Raises `InputError`, before anything is changed, for a size that is none, things linked from another file, a mesh being
     edited, a colour configuration without the spaces that maps need.
     """
     options = options or BuildOptions()
-    key = options.name or result.name
+    key = _key(options.name or result.name, result, photo)
     _require_ready(key, options, scene or bpy.context.scene)
     scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
     collection = ensure_collection(key, scene)
@@ -120,6 +121,23 @@ def find(thing: bpy.types.Object | None) -> Built | None:
     scene = find_block(bpy.data.scenes, key, "scene") or next(iter(made.users_scene), None)
     camera, world = find_block(bpy.data.objects, key, "camera"), find_block(bpy.data.worlds, key, "world")
     return Built(collection, made, camera, world, scene, material)
+
+
+def _key(name: str, result: Result, photo: bpy.types.Image | None) -> str:
+    """The name, with a number behind it where it is that of another photo's object: photos of different folders may be called alike."""
+    key, number = name, 1
+    while (thing := find_block(bpy.data.objects, key, "object")) is not None and not _of_same_photo(thing, result, photo):
+        number += 1
+        key = f"{name}-{number}"
+    return key
+
+
+def _of_same_photo(thing: bpy.types.Object, result: Result, photo: bpy.types.Image | None) -> bool:
+    """An image of this file is the same photo however it was changed since; else the photos' bytes tell, where they are known."""
+    if photo is not None and thing.get(SOURCE_IMAGE) is not None:
+        return bool(thing[SOURCE_IMAGE] == photo)
+    made_of, given = thing.get(PHOTO_HASH, ""), photo_hash(result)
+    return not made_of or not given or made_of == given
 
 
 def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> None:

@@ -1,7 +1,7 @@
 """How what ISC made is recognised, and where it comes from: custom properties that are saved and appended with each datablock.
 
-`isc_key` is the name of the image it was made of, `isc_role` what it is there for ("object", "base_color", "camera", ...). Datablocks
-are found by these two, since people rename things and Blender cuts long names.
+`isc_key` is the name of the image it was made of (with a number where photos are called alike), `isc_role` what it is there for ("object",
+"base_color", "camera", ...). Datablocks are found by these two, since people rename things and Blender cuts long names.
 
 Limits: a datablock linked from another file belongs to that file: it is never found here, and cannot be changed.
 """
@@ -18,7 +18,7 @@ from isc_core.errors import InputError
 from ..arrays import Result
 
 KEY, ROLE = "isc_key", "isc_role"
-SPECULAR_LEVEL = "isc_specular_level"
+PHOTO_HASH, SOURCE_IMAGE, SPECULAR_LEVEL = "isc_photo_sha256", "isc_source_image", "isc_specular_level"
 _NAME_BYTES = 63  # of a datablock's name in Blender 4.5; later ones take more
 
 
@@ -56,6 +56,11 @@ def require_local(key: str) -> None:
             )
 
 
+def photo_hash(result: Result) -> str:
+    """The SHA-256 of the result's photo, "" where it is not known."""
+    return str(result.description.get("input", {}).get("sha256", ""))
+
+
 def record(block: Any, result: Result, options: str) -> None:
     """Writes what the datablock was made from: photo, settings, versions, status, light, and the level of the gloss, 0 where it is not
     known. `options`: of the build, as JSON.
@@ -64,7 +69,7 @@ def record(block: Any, result: Result, options: str) -> None:
     source, settings = described.get("input", {}), described.get("settings", {})
     block["isc_version"] = str(described.get("versions", {}).get("isc", ""))
     block["isc_photo"] = str(source.get("name", ""))
-    block["isc_photo_sha256"] = str(source.get("sha256", ""))
+    block[PHOTO_HASH] = photo_hash(result)
     block["isc_model"] = str(settings.get("model", ""))
     block["isc_separator"] = str(settings.get("separator", ""))
     block["isc_folder"] = str(result.folder)

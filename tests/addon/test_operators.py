@@ -320,6 +320,25 @@ def test_the_same_object_is_updated(addon: Any, bump_folder: Path) -> None:
     assert census(addon) == once
 
 
+def test_photos_of_one_name_stand_beside_each_other(addon: Any, bump_folder: Path, tmp_path: Path) -> None:
+    """From two folders; what panels remember goes by the name that was given."""
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    first = addon.context.object
+    about = json.loads((bump_folder / "decomposition.json").read_text())
+    shutil.copytree(bump_folder, tmp_path / "bump")
+    about["input"]["sha256"] = 64 * "1"
+    (tmp_path / "bump" / "decomposition.json").write_text(json.dumps(about))
+    addon.ops.isc.import_result(directory=str(tmp_path / "bump"))
+    second = addon.context.object
+    assert second != first and (first["isc_key"], second["isc_key"]) == ("bump", "bump-2")
+    assert first["isc_photo_sha256"] == 64 * "0" and second["isc_photo_sha256"] == 64 * "1"
+    assert json.loads(second["isc_request"])["build"]["name"] == "bump-2"
+    for folder, thing in ((bump_folder, first), (tmp_path / "bump", second)):
+        addon.ops.isc.import_result(directory=str(folder))
+        assert addon.context.object == thing
+    assert sum(thing.type == "MESH" for thing in addon.data.objects) == 2
+
+
 def test_what_is_built_comes_with_the_object_into_another_file(addon: Any, tmp_path: Path) -> None:
     addon.context.scene.isc.image = photo()
     request = request_from_settings(addon.context.scene)

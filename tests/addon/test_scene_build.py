@@ -74,6 +74,39 @@ def test_two_photos_stand_beside_each_other(blender: Any, result: Result) -> Non
     assert first.object.data != second.object.data and len(blender.data.node_groups) == 1
 
 
+def of_photo(result: Result, letter: str) -> Result:
+    """The same result as if it were that of another photo of the same name."""
+    source = {**result.description["input"], "sha256": 64 * letter}
+    return replace(result, description={**result.description, "input": source})
+
+
+def test_photos_of_one_name_do_not_replace_each_other(blender: Any, result: Result) -> None:
+    """Cameras count from DSC0001 in every folder."""
+    results = [of_photo(result, letter) for letter in "abc"]
+    made = [build(one) for one in results]
+    assert [one.object["isc_key"] for one in made] == ["bump", "bump-2", "bump-3"]
+    assert [one.object["isc_photo_sha256"][0] for one in made] == ["a", "b", "c"]
+    assert len({one.object.data for one in made} | {one.material for one in made} | {one.scene for one in made}) == 9
+    once = census(blender)
+    assert [build(one).object for one in results] == [one.object for one in made] and census(blender) == once
+
+
+def test_a_photo_of_unknown_origin_is_told_by_its_name(blender: Any, result: Result) -> None:
+    thing = build(of_photo(result, "a")).object
+    assert build(replace(result, description={}), name="bump").object == thing
+
+
+def test_an_image_is_the_same_photo_after_it_was_painted_on(blender: Any, result: Result) -> None:
+    from blender_addon.scene import BuildOptions
+    from blender_addon.scene import build as build_scene
+
+    first, second = (blender.data.images.new("bump", 8, 8) for _ in range(2))
+    thing = build_scene(of_photo(result, "a"), BuildOptions(name="bump"), photo=first).object
+    thing["isc_source_image"] = first
+    assert build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=first).object == thing
+    assert build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=second).object != thing
+
+
 NAMES = ["a/b\\c", "чашка 杯 ☕", "x" * 300, "é" * 100, "  ", "ISC Dichromatic", "con.png", '"quoted"\n']
 
 
