@@ -8,7 +8,8 @@ that level <= min over c of I_c(x) / s_c(n(x)) at every pixel x. The 5th percent
 
 Citation: B. Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206 (the lobe, see `brdf.ggx`).
 
-Limits: a bound, no estimate: pale paint has room for nearly any gloss. Toward grazing angles a sheen falls less than its level does.
+Limits: a bound, no estimate: pale paint has room for nearly any gloss. Renderers mirror no more than all: above a level of 1 their sheen
+grows less toward grazing angles than the equation says.
 """
 
 from dataclasses import replace

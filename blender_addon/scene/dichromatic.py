@@ -1,18 +1,25 @@
 """The node group "ISC Dichromatic": a surface that is the sum of paint and gloss, as the photo was taken apart.
 
 Equation: radiance = g_d * rho' / pi * E + g_s * (what the gloss mirrors); rho' is the reflectance, recoloured in hue, saturation and
-value; E the irradiance. The gloss is a GGX lobe of the given roughness, with Fresnel's equations at the facets and f0 = 0.04 * level
-along the normal. The two are ADDED: a Diffuse BSDF beside a Principled one that has a black base, since Principled alone takes from the
-paint what its gloss mirrors, and the recovered diffuse image would come out darker than it is in the photo.
+value; E the irradiance. The gloss is a GGX lobe of the given roughness, with Fresnel's equations at the facets. Its level scales all of it,
+as the fit and glTF's KHR_materials_specular mean it: what is mirrored along the normal is f0 = 0.04 * level, toward grazing light it is
+f90 = min(level, 1). Blender's own level moves f0 alone, so that the lobe of plastic is mixed with black by min(level, 1), and only what
+exceeds 1 goes to Blender's level. A coloured specular image is split into its luminance, a factor of the level, and its tint, of f0.
+
+Paint and gloss are ADDED: a Diffuse BSDF beside a Principled one that has a black base, since Principled alone takes from the paint what
+its gloss mirrors, and the recovered diffuse image would come out darker than it is in the photo.
 
 "ISC Photo Highlights" shows the photo's own specular image to the camera instead: exact from where the photo was taken, and no light.
 
-A group carries its version. A file made by another version keeps its own group, this one is added beside it; materials share it.
+A group carries its version. A file made by another version keeps its own group, this one is added beside it; materials share it. Version 1
+scaled f0 alone: such an object keeps its look until it is built again.
 
 Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and Application 10 (1985),
-doi:10.1002/col.5080100409. B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206.
+doi:10.1002/col.5080100409. B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206. KHR_materials_specular, Khronos Group 2021 (no
+DOI).
 
-Limits: f0 cannot exceed 0.99: level * gain above 24 changes nothing. Toward grazing light all gloss mirrors all, whatever its level.
+Limits: f0 cannot exceed 0.99: level * gain above 24 changes nothing. f90 cannot exceed 1: above a level of 1 the gloss grows less toward
+grazing light than along the normal.
 """
 
 from dataclasses import dataclass
@@ -22,7 +29,7 @@ import bpy
 
 from .nodes import add_node, connect
 
-VERSION = 1
+VERSION = 2
 DICHROMATIC, HIGHLIGHTS = "ISC Dichromatic", "ISC Photo Highlights"
 
 
@@ -94,25 +101,44 @@ def _new(name: str, sockets: tuple[Socket, ...]) -> bpy.types.NodeTree:
 def _wire_dichromatic(group: bpy.types.NodeTree) -> bpy.types.NodeTree:
     given = add_node(group, "NodeGroupInput", (-900, 0)).outputs
     matt = add_node(group, "BsdfDiffuse", (50, 200), label="Paint")
-    gloss = add_node(group, "BsdfPrincipled", (50, 0), distribution="GGX", label="Gloss alone")
-    both = add_node(group, "AddShader", (400, 100))
-    out = add_node(group, "NodeGroupOutput", (600, 100))
-    gloss.inputs["Base Color"].default_value = BLACK
-    level = _product(group, given["Specular Level"], given["Specular Gain"], (-450, -150))
-    halved = _product(group, level, 0.5, (-250, -150))  # Blender's level of plastic is 0.5
+    both = add_node(group, "AddShader", (600, 100))
+    out = add_node(group, "NodeGroupOutput", (800, 100))
     connect(
         group,
         (_bright(group, given), matt.inputs["Color"]),
         (given["Normal"], matt.inputs["Normal"]),
-        (halved, gloss.inputs["Specular IOR Level"]),
-        (given["Specular Image"], gloss.inputs["Specular Tint"]),
-        (given["Roughness"], gloss.inputs["Roughness"]),
-        (given["Normal"], gloss.inputs["Normal"]),
         (matt.outputs["BSDF"], both.inputs[0]),
-        (gloss.outputs["BSDF"], both.inputs[1]),
+        (_scaled_gloss(group, given), both.inputs[1]),
         (both.outputs["Shader"], out.inputs["Surface"]),
     )
     return group
+
+
+def _scaled_gloss(group: bpy.types.NodeTree, given: Any) -> bpy.types.NodeSocket:
+    """The lobe of plastic, mixed with black where the level is below 1, and with a larger f0 where it is above."""
+    grey = add_node(group, "RGBToBW", (-650, -350))
+    tint = add_node(group, "VectorMath", (-200, -450), operation="DIVIDE", label="Tint")  # by zero it is zero, and so is the level
+    excess = add_node(group, "Math", (-200, -250), operation="MAXIMUM", label="What exceeds 1")
+    gloss = add_node(group, "BsdfPrincipled", (50, 0), distribution="GGX", label="Gloss alone")
+    mixed = add_node(group, "MixShader", (400, 0), label="Level")  # its first input stays empty: that is black; its factor ends at 1
+    gloss.inputs["Base Color"].default_value = BLACK
+    excess.inputs[1].default_value = 0.5  # Blender's level of plastic
+    level = _product(group, given["Specular Level"], given["Specular Gain"], (-650, -150))
+    here = _product(group, level, grey.outputs["Val"], (-420, -150))
+    connect(
+        group,
+        (given["Specular Image"], grey.inputs["Color"]),
+        (given["Specular Image"], tint.inputs[0]),
+        (grey.outputs["Val"], tint.inputs[1]),
+        (_product(group, here, 0.5, (-420, -320)), excess.inputs[0]),
+        (excess.outputs["Value"], gloss.inputs["Specular IOR Level"]),
+        (tint.outputs["Vector"], gloss.inputs["Specular Tint"]),
+        (given["Roughness"], gloss.inputs["Roughness"]),
+        (given["Normal"], gloss.inputs["Normal"]),
+        (here, mixed.inputs["Fac"]),
+        (gloss.outputs["BSDF"], mixed.inputs[2]),
+    )
+    return mixed.outputs["Shader"]
 
 
 def _bright(group: bpy.types.NodeTree, given: Any) -> bpy.types.NodeSocket:

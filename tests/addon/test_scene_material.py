@@ -114,6 +114,77 @@ def test_gloss_is_added_to_the_paint(blender: Any, result: Result, tmp_path: Pat
     np.testing.assert_allclose(edited, 0.5 * matt + 3 * gloss, rtol=0.002, atol=1e-5)
 
 
+@pytest.fixture
+def mirror(blender: Any) -> Any:
+    """A plane of black paint, to be seen at an angle under an even sky of radiance 1: what is seen is the share that it mirrors."""
+    from blender_addon.scene.dichromatic import dichromatic_group
+    from blender_addon.scene.nodes import node_tree
+
+    scene, world = blender.context.scene, blender.data.worlds.new("even")
+    scene.world, scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = world, "CYCLES", 4, 4
+    next(node for node in node_tree(world).nodes if node.type == "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
+    mesh = blender.data.meshes.new("plane")
+    mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
+    material = blender.data.materials.new("black")
+    tree = node_tree(material)
+    tree.nodes.clear()
+    group, output = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeOutputMaterial")
+    group.node_tree = dichromatic_group()
+    tree.links.new(group.outputs["Surface"], output.inputs["Surface"])
+    group.inputs["Reflectance"].default_value, group.inputs["Roughness"].default_value = (0, 0, 0, 1), 0
+    mesh.materials.append(material)
+    camera = blender.data.objects.new("camera", blender.data.cameras.new("camera"))
+    camera.data.type, camera.data.ortho_scale, scene.camera = "ORTHO", 0.1, camera
+    for thing in (camera, blender.data.objects.new("plane", mesh)):
+        scene.collection.objects.link(thing)
+    return group.inputs
+
+
+def mirrored(blender: Any, folder: Path, degrees: float) -> np.ndarray:
+    """The share (3,) that the plane mirrors toward a viewer so many degrees off its normal."""
+    angle = np.radians(degrees)
+    camera = blender.context.scene.camera
+    camera.location, camera.rotation_euler = (0, -5 * np.sin(angle), 5 * np.cos(angle)), (angle, 0, 0)
+    seen: np.ndarray = render(blender.context.scene, folder, samples=4)["Combined"][..., :3].mean((0, 1))
+    return seen
+
+
+def fresnel(degrees: float, f0: float = 0.04) -> float:
+    """What a dielectric of that f0 mirrors of unpolarised light."""
+    index = (1 + f0**0.5) / (1 - f0**0.5)
+    cosine = np.cos(np.radians(degrees))
+    inner = np.sqrt(1 - np.sin(np.radians(degrees)) ** 2 / index**2)
+    across, along = (cosine - index * inner) / (cosine + index * inner), (inner - index * cosine) / (inner + index * cosine)
+    return float((across**2 + along**2) / 2)
+
+
+@pytest.mark.parametrize("degrees", [0, 60, 85])
+def test_the_level_scales_all_of_the_gloss_at_grazing_angles_too(blender: Any, mirror: Any, tmp_path: Path, degrees: float) -> None:
+    """As the fit has it: a weak gloss whose edges mirrored all would lay a veil over the object."""
+    plastic = fresnel(degrees)
+    for level, gain in ((0.0, 1.0), (0.38, 1.0), (0.8, 0.25), (1.0, 1.0)):
+        mirror["Specular Level"].default_value, mirror["Specular Gain"].default_value = level, gain
+        np.testing.assert_allclose(mirrored(blender, tmp_path, degrees), level * gain * plastic, rtol=0.01, atol=1e-5)
+
+
+def test_a_level_above_plastic_mirrors_no_more_than_all(blender: Any, mirror: Any, tmp_path: Path) -> None:
+    mirror["Specular Level"].default_value = 3.0
+    np.testing.assert_allclose(mirrored(blender, tmp_path, 0), 0.12, rtol=0.01)
+    steep = mirrored(blender, tmp_path, 85)
+    assert (fresnel(85) < steep).all() and (steep < 1).all()
+
+
+def test_a_specular_image_is_a_factor_of_the_level(blender: Any, mirror: Any, tmp_path: Path) -> None:
+    """A grey one of all of the gloss; a coloured one tints what is mirrored along the normal."""
+    mirror["Specular Level"].default_value = 0.8
+    mirror["Specular Image"].default_value = (0.5, 0.5, 0.5, 1)
+    np.testing.assert_allclose(mirrored(blender, tmp_path, 85), 0.4 * fresnel(85), rtol=0.01)
+    mirror["Specular Image"].default_value = (0.9, 0.5, 0.1, 1)
+    np.testing.assert_allclose(mirrored(blender, tmp_path, 0), 0.04 * 0.8 * np.array([0.9, 0.5, 0.1]), rtol=0.01)
+    mirror["Specular Image"].default_value = (0, 0, 0, 1)
+    assert mirrored(blender, tmp_path, 85).max() == 0
+
+
 def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result) -> None:
     fitted = replace(result, roughness=0.3, specular_level=1.7, specular_variation=result.confidence)
     node = group_node(build(fitted))
@@ -156,13 +227,19 @@ def test_what_people_set_stays(blender: Any, result: Result) -> None:
 
 
 def test_the_group_is_shared_and_another_versions_is_left_alone(blender: Any, result: Result) -> None:
+    from blender_addon.scene.dichromatic import VERSION
+
     first, second = build(result, name="one"), build(result, name="two")
     assert group_node(first).node_tree == group_node(second).node_tree
     old = group_node(first).node_tree
     old["isc_group_version"] = 0
     third = build(result, name="three")
     assert group_node(third).node_tree != old and group_node(second).node_tree == old
-    assert group_node(third).node_tree["isc_group_version"] == 1
+    assert group_node(third).node_tree["isc_group_version"] == VERSION
+    group_node(second).inputs["Hue"].default_value = 0.2
+    second = build(result, name="two")
+    assert group_node(second).node_tree == group_node(third).node_tree, "built again, an object has this version's group"
+    assert group_node(second).inputs["Hue"].default_value == pytest.approx(0.2)
 
 
 def test_an_edited_group_is_kept_and_a_broken_one_replaced(blender: Any, result: Result) -> None:
