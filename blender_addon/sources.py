@@ -91,7 +91,8 @@ def output_files(
     """The file that each source goes to.
 
     `output`: None for no files; a path that ends in one of `suffixes` is a file; any other is a folder, where each source gets a file with
-    its name and the first suffix. `together`: whether several sources may share one file. Raises `InputError` where they may not.
+    its name and the first suffix. `together`: whether several sources may share one file. Raises `InputError` where they may not, and for
+    another suffix, unless a folder is called so: who writes out.jpg means a file.
     """
     if output is None:
         return [None] * len(sources)
@@ -99,4 +100,6 @@ def output_files(
         if len(sources) > 1 and not together:
             raise InputError(f"{option} {output} is one file, but there are {len(sources)} objects: give a folder")
         return [output] * len(sources)
+    if output.suffix and not output.is_dir():
+        raise InputError(f"{option} {output}: give a file that ends in {' or '.join(suffixes)}, or a folder (one with a dot has to exist)")
     return [output / f"{source.name}{suffixes[0]}" for source in sources]

@@ -133,6 +133,8 @@ def test_why_a_result_is_doubtful_is_said(tmp_path: Path) -> None:
         (["RESULT", "-o", "x.blend", "--samples", "0"], "--samples must be 1 or more"),
         (["RESULT", "-o", "x.blend", "--size", "nan"], "--size must be above 0"),
         (["RESULT", "-o", "RESULT/arrays.npz/x.blend"], "a part of the path is a file"),
+        (["RESULT", "--render", "x.jpg"], "--render x.jpg: give a file that ends in .png or .exr, or a folder"),
+        (["RESULT", "-o", "x.txt"], "-o x.txt: give a file that ends in .blend, or a folder"),
         (["RESULT", "--render", "x.png", "--nonsense"], "unrecognized arguments: --nonsense"),
     ],
 )

@@ -74,3 +74,15 @@ def test_where_the_files_go() -> None:
     assert output_files(one, Path("o.EXR"), (".png", ".exr"), "--render", together=False) == [Path("o.EXR")]
     with pytest.raises(InputError, match="--render o.png is one file, but there are 2 objects: give a folder"):
         output_files(two, Path("o.png"), (".png", ".exr"), "--render", together=False)
+
+
+def test_another_suffix_is_no_folder_unless_there_is_one(tmp_path: Path) -> None:
+    one = [Source(Path("a.png"), "a")]
+    for name in ("out.jpg", "out.txt", "v1.2"):
+        with pytest.raises(InputError, match=r"--render .*: give a file that ends in .png or .exr, or a folder"):
+            output_files(one, tmp_path / name, (".png", ".exr"), "--render", together=False)
+    (tmp_path / "v1.2").mkdir()
+    assert output_files(one, tmp_path / "v1.2", (".png", ".exr"), "--render", together=False) == [tmp_path / "v1.2" / "a.png"]
+    touch(tmp_path / "out.txt")
+    with pytest.raises(InputError, match=r"-o .*: give a file that ends in .blend, or a folder"):
+        output_files(one, tmp_path / "out.txt", (".blend",), "-o", together=True)
