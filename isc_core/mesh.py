@@ -19,7 +19,8 @@ belongs to it is the recovered one divided by k, that is log shading - log k. Be
 inside, so that filtering draws no dark fringe.
 
 Gloss: roughness and specular level are those given (see `sheen.shown_gloss`), the level times k, as the base colour is. A level up to 1,
-and its variation over the object in a texture's alpha, are KHR_materials_specular's factor; what lies above 1 is its colour.
+and its variation over the object in a texture's alpha, are KHR_materials_specular's factor; what lies above 1 is its colour. Where no level
+is known the factor is 0: what is not known is not shown as gloss, which a file without the extension would be, as shiny as plastic.
 
 Reference: Khronos Group (2021), glTF 2.0 specification, https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 
@@ -86,8 +87,8 @@ class MeshResult:
 
     @property
     def specular(self) -> float:
-        """The specular level for the base colour, >= 0; 1, plastic, where it is not known."""
-        return 1.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
+        """The specular level for the base colour, >= 0; 0 where it is not known, so that nothing is shown that the photo may not have."""
+        return 0.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
 
     def illumination(self, recovered: np.ndarray) -> np.ndarray:
         """The light, (9, 3), that gives the photo's diffuse image with the base colour: `recovered` divided by k."""
@@ -103,8 +104,6 @@ class MeshResult:
 
     def _add_specular(self, buffers: dict[str, bytes], tree: dict[str, Any]) -> None:
         """Writes KHR_materials_specular into glTF's tree and the texture's picture among its buffers, which trimesh cannot."""
-        if self.gloss.specular is None:
-            return
         variation = self.gloss.variation
         largest = 1.0 if variation is None else float(variation.max())
         level = self.specular * largest
@@ -150,7 +149,8 @@ def build_mesh(
     """Builds the mesh of the pixels inside the mask.
 
     `height`: (H, W), pixels toward the viewer. `normal`: (H, W, 3), unit, camera frame. `mask`: (H, W) bool.
-    `reflectance`: (H, W, 3), linear, >= 0. All finite inside the mask. `gloss`: of its surface, usual values where it says nothing.
+    `reflectance`: (H, W, 3), linear, >= 0. All finite inside the mask. `gloss`: of its surface; where it says nothing, the usual
+    roughness and no gloss.
     Raises `InputError` if the mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
     """
     options, gloss = options or MeshOptions(), gloss or Gloss()

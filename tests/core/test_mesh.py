@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from isc_core.decomposition import Decomposition
 from isc_core.errors import InputError
-from isc_core.gloss import FITTED, Gloss
+from isc_core.gloss import BOUND, FITTED, NOT_FITTED, Gloss
 from isc_core.mesh import MeshOptions, MeshResult, _interpolated, base_color, build_mesh, limit_rim
 from isc_core.photo import srgb_to_linear
 from isc_core.sirfs.frames import real_sh
@@ -305,11 +305,15 @@ def test_a_gloss_that_varies_is_a_texture_in_the_alpha_channel() -> None:
     assert len(reopened(glossy(0.4, variation)).faces) > 100
 
 
-def test_an_unknown_gloss_leaves_the_extension_out() -> None:
-    tree = gltf(built(ball()).glb())
-    assert "extensionsUsed" not in tree
-    assert "extensions" not in tree["materials"][0]
-    assert built(ball()).describe()["specular"]["source"] == "not fitted"
+@pytest.mark.parametrize("source", [NOT_FITTED, BOUND])
+def test_an_unknown_gloss_is_not_shown(source: str) -> None:
+    """Without the extension viewers would show plastic."""
+    d = ball()
+    result = build_mesh(d.height, d.normal, d.mask, d.reflectance, gloss=Gloss(0.3, None, source, source))
+    tree = gltf(result.glb())
+    assert tree["extensionsUsed"] == ["KHR_materials_specular"]
+    assert tree["materials"][0]["extensions"] == {"KHR_materials_specular": {"specularFactor": 0.0}}
+    assert (result.describe()["specular"]["value"], result.describe()["specular"]["source"]) == (0.0, source)
 
 
 def test_equal_maps_give_equal_bytes() -> None:
@@ -390,3 +394,14 @@ def test_blender_gets_the_fitted_gloss(tmp_path: Path, level: float, varies: boo
         assert factor.inputs[0].links[0].from_socket.name == "Alpha"
     else:
         assert socket.default_value * tint[0] == pytest.approx(0.5 * level)
+
+
+def test_blender_shows_no_gloss_that_is_not_known(tmp_path: Path) -> None:
+    """As the object that the add-on builds of the same result."""
+    bpy = pytest.importorskip("bpy", reason="needs the bpy module (extra `blender`)")
+    (tmp_path / "mesh.glb").write_bytes(built(ball()).glb())
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert bpy.ops.import_scene.gltf(filepath=str(tmp_path / "mesh.glb")) == {"FINISHED"}
+    material = next(o for o in bpy.data.objects if o.type == "MESH").data.materials[0]
+    shader = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    assert shader.inputs["Specular IOR Level"].default_value == 0
