@@ -115,14 +115,15 @@ class Result:
 def read_result(folder: Path | str) -> Result:
     """Reads the result folder of `isc decompose --arrays`. Raises `InputError` if it is none, is damaged, or has no arrays."""
     folder = Path(folder)
-    description = _read_description(folder / DESCRIPTION)
+    description = read_description(folder / DESCRIPTION)
     if not (folder / ARRAYS).is_file():
         raise InputError(f"{folder} has no {ARRAYS}: run `isc arrays` on it, or decompose with --arrays")
     values = _checked(read_arrays(folder / ARRAYS), folder / ARRAYS)
     return Result(**values, description=description, folder=folder)
 
 
-def _read_description(path: Path) -> dict[str, Any]:
+def read_description(path: Path) -> dict[str, Any]:
+    """What decomposition.json says; its input, settings and status are objects. Raises `InputError` if it cannot be read or is none."""
     description = read_json(path, "decompose the photo again")
     parts = [description.get(name, {}) for name in ("input", "settings", "status")] if isinstance(description, dict) else [None]
     if not all(isinstance(part, dict) for part in parts):

@@ -13,8 +13,9 @@ import bpy
 from isc_core.atomic import new_file, require_writable_file
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
+from isc_core.status_lines import status_lines
 
-from .arrays import ARRAYS
+from .arrays import ARRAYS, DESCRIPTION, read_description
 from .messages import notes_of
 from .operators.request import Method, Request
 from .operators.result import build_in_one_step
@@ -111,7 +112,8 @@ def _result_of(source: Source, results: Path, options: argparse.Namespace, monit
         return folder, notes_of(_wait(start(job, environment), monitor))
     if not (source.path / ARRAYS).is_file():
         _wait(start_arrays(source.path.resolve(), environment), monitor)
-    return source.path, ""
+    status = read_description(source.path / DESCRIPTION).get("status", {})
+    return source.path, notes_of("\n".join(status_lines(status)))
 
 
 def _wait(worker: Worker, monitor: Monitor) -> str:

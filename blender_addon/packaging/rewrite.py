@@ -12,7 +12,8 @@ from isc_core.errors import InputError
 
 CORE = "isc_core"
 # Of the core, only what needs nothing but Python and NumPy may be loaded into Blender's own process.
-LIGHT = {f"{CORE}.{name}" for name in ("atomic", "environment", "errors", "json_files", "numpy_files", "progress", "srgb", "terminal")}
+_LIGHT_NAMES = ("atomic", "environment", "errors", "json_files", "numpy_files", "progress", "srgb", "status_lines", "terminal")
+LIGHT = {f"{CORE}.{name}" for name in _LIGHT_NAMES}
 _BLENDER = {"addon_utils", "bl_ui", "blf", "bmesh", "bpy", "bpy_extras", "gpu", "gpu_extras", "imbuf", "mathutils", "numpy"}
 _ALLOWED = _BLENDER | set(sys.stdlib_module_names)
 

@@ -10,6 +10,7 @@ from ..pipeline import Evidence, Settings, decompose
 from ..progress import Monitor
 from ..result_folder import require_room, require_writable_result, save
 from ..sirfs.prior_file import load_prior_set
+from ..status_lines import status_lines
 from .options import Commands, add_command, add_engine, add_photo, add_settings, hints, limits_of, number, positive
 
 _EXAMPLES = """  isc decompose cup.png -o cup
@@ -71,12 +72,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     require_room(options.output, _pixels(photo, settings), arrays=options.arrays)
     result = decompose(photo, settings, evidence=evidence, prior_set=prior_set, name=options.photo.name, monitor=monitor.part(0.0, 0.8))
     save(result, options.output, arrays=options.arrays, monitor=monitor.part(0.8, 1.0))
-    status = result.provenance.status
-    trouble = [] if status.get("converged", True) else [f"note: {status['help']}"]
-    gloss = [f"gloss: {status['gloss']}"] if status.get("gloss") else []
-    light = status.get("light_colour", {}).get("help")
-    notes = [f"note: {line}" for line in ([light] if light else []) + status.get("doubts", [])]
-    return hints(options, *trouble, *gloss, *notes, f"look at {options.output / 'preview.png'}")
+    return hints(options, *status_lines(result.provenance.status), f"look at {options.output / 'preview.png'}")
 
 
 def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:

@@ -125,6 +125,21 @@ def test_why_a_result_is_doubtful_is_said(tmp_path: Path) -> None:
     assert all(f"note: {line}" in done.stdout for line in doubts), done.stdout
 
 
+def test_a_results_folder_says_why_it_is_doubtful_too(tmp_path: Path) -> None:
+    """What the photo's own run said; a status that is not as it should be says nothing."""
+    result, odd = write_result(tmp_path / "all" / "cup"), write_result(tmp_path / "all" / "odd")
+    for folder, status in (
+        (result, {"converged": False, "help": "more steps", "gloss": "none found", "doubts": ["it looks like a mirror", "two lamps"]}),
+        (odd, {"gloss": 3, "doubts": {"a": 1}, "light_colour": "red"}),
+    ):
+        about = json.loads((folder / "decomposition.json").read_text())
+        (folder / "decomposition.json").write_text(json.dumps({**about, "status": status}))
+    done = run(tmp_path / "all", "-o", tmp_path / "out", "--quiet")
+    assert done.returncode == 0, done.stderr
+    said = [line for line in done.stdout.splitlines() if line.startswith(str(tmp_path / "all"))]
+    assert said == [f"{result}: note: more steps; gloss: none found; note: it looks like a mirror; note: two lamps"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
