@@ -11,6 +11,7 @@ import bpy
 
 from .operators.run import active
 from .scene.build import Built, find
+from .scene.copies import sharers
 from .scene.material import dichromatic_node
 
 _PLACES = ("VIEW_3D", "IMAGE_EDITOR")
@@ -133,6 +134,10 @@ class _Edit(_Panel):
         node = dichromatic_node(built.material)
         if node is None:
             self.layout.label(text="The material's nodes were replaced", icon="INFO")
+            return
+        if sharers(built.object, built.material):  # sliders would change them all, and drawing may change nothing
+            self.layout.label(text="Its copies share paint and gloss", icon="INFO")
+            self.layout.operator("isc.own_material", icon="MATERIAL")
             return
         column = self.columns()
         column.label(text="Paint", icon="COLOR")

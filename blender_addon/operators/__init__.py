@@ -1,7 +1,7 @@
 """What the panels' buttons do; `CLASSES` is what Blender has to know of."""
 
 from .decompose import ISC_OT_decompose, ISC_OT_redo
-from .edit import ISC_OT_dichromatic, ISC_OT_recolour, ISC_OT_relight
+from .edit import ISC_OT_dichromatic, ISC_OT_own_material, ISC_OT_recolour, ISC_OT_relight
 from .export import ISC_OT_export
 from .mask import ISC_OT_cut_mask, ISC_OT_draw_box, ISC_OT_new_mask, ISC_OT_take_mask
 from .modal import ISC_OT_cancel
@@ -20,6 +20,7 @@ CLASSES = (
     ISC_OT_complete_result,
     ISC_OT_recolour,
     ISC_OT_dichromatic,
+    ISC_OT_own_material,
     ISC_OT_relight,
     ISC_OT_export,
 )

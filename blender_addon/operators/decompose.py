@@ -13,6 +13,7 @@ from isc_core.errors import InputError
 from ..arrays import ARRAYS
 from ..preferences import choices, new_folder, worker_environment
 from ..scene.build import find
+from ..scene.copies import is_copy, original_of
 from .modal import WorkerOperator
 from .request import Request, pictures_of, remembered, request_from_settings
 from .result import build_in_one_step
@@ -83,6 +84,10 @@ class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
         built = find(context.object)
         if built is None:
             raise InputError("choose an object that ISC made")
+        if is_copy(built.object):
+            original = original_of(built.object)
+            instead = "press Decompose" if original is None else f"choose {original.name}"
+            raise InputError(f"{built.object.name} is a copy, and only the original is updated: {instead}")
         return run_of(context, remembered(built.object, built.scene, self.max_size))
 
 

@@ -2,6 +2,7 @@
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender wants its options as sets)
 
+from dataclasses import replace
 from typing import Any
 
 import bpy
@@ -11,6 +12,7 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
 from isc_core.errors import InputError
 
 from ..scene.build import Built, find
+from ..scene.copies import material_of, own_material
 from ..scene.material import dichromatic_node, set_specular_gain
 from ..scene.provenance import KEY
 from ..scene.sun import ensure_sun, relight
@@ -74,7 +76,7 @@ class ISC_OT_recolour(EditOperator, bpy.types.Operator):
 
     def edit(self, built: Built) -> None:
         """Sets the node's inputs."""
-        inputs = inputs_of(built)
+        inputs = own_inputs_of(built)
         for name, value in (("Hue", self.hue), ("Saturation", self.saturation), ("Value", self.value)):
             inputs[name].default_value = value
 
@@ -98,8 +100,20 @@ class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
 
     def edit(self, built: Built) -> None:
         """Sets the nodes' inputs: highlights may come from the lobe or from the photo."""
-        inputs_of(built)["Diffuse Gain"].default_value = self.diffuse_gain
-        set_specular_gain(built.material, self.specular_gain)
+        own_inputs_of(built)["Diffuse Gain"].default_value = self.diffuse_gain
+        set_specular_gain(material_of(built.object), self.specular_gain)
+
+
+class ISC_OT_own_material(EditOperator, bpy.types.Operator):
+    """Paint and gloss that no copy shares."""
+
+    bl_idname = "isc.own_material"
+    bl_label = "Own Paint and Gloss"
+    bl_description = "Give the object a material of its own: now its copies, or what it was copied from, change with it"
+
+    def edit(self, built: Built) -> None:
+        """Copies the material."""
+        own_inputs_of(built)
 
 
 class ISC_OT_relight(EditOperator, bpy.types.Operator):
@@ -144,6 +158,13 @@ def inputs_of(built: Built | None) -> Any:
     if built.material.library is not None:
         raise InputError(f"{built.material.name} is linked from another file: make it local first (Object, Relations, Make Local)")
     return node.inputs
+
+
+def own_inputs_of(built: Built) -> Any:
+    """As `inputs_of`, on a material that no copy of the object shares: made where it has none. Raises `InputError` as that does."""
+    inputs_of(built)
+    own = own_material(built.object, built.material)
+    return inputs_of(replace(built, material=own))
 
 
 def _stored(thing: Any, name: str) -> np.ndarray:

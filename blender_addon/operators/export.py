@@ -17,6 +17,7 @@ from bpy.props import BoolProperty, StringProperty
 from isc_core.errors import InputError
 
 from ..scene.build import Built, find
+from ..scene.copies import is_copy
 from ..scene.provenance import KEY, ROLE
 from ..scene.stand_in import stand_in
 
@@ -70,9 +71,13 @@ class ISC_OT_export(bpy.types.Operator):
 
 
 def write(built: Built, place: Path, *, from_scene: bool = False) -> list[str]:
-    """Writes the files of an object into a folder of its own in `place`; their names. Raises `InputError` where that cannot be done."""
+    """Writes the files of an object into a folder of its own in `place`; their names. A copy's folder has the copy's name.
+
+    Raises `InputError` where that cannot be done.
+    """
     key = str(built.object[KEY])
-    folder = place / "".join(letter if letter.isalnum() or letter in " -_." else "_" for letter in key).strip(" .")
+    name = built.object.name if is_copy(built.object) else key
+    folder = place / "".join(letter if letter.isalnum() or letter in " -_." else "_" for letter in name).strip(" .")
     recovered = Path(str(built.object.get("isc_folder", "")))
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -14,11 +14,12 @@ from .back import close_back
 from .background import show_photo
 from .camera import ensure_camera, frame_as_photo
 from .collection import ensure_collection, ensure_scene, put, show_as_photographed
+from .copies import COPY, OBJECT, material_of
 from .displacement import displace, flattened, undo_displacement
 from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps, require_spaces
 from .material import Gloss, Maps, ensure_material
 from .mesh import fill_mesh, sheet
-from .provenance import PHOTO_HASH, SOURCE_IMAGE, is_isc, label, mark, photo_hash, record, require_local
+from .provenance import PHOTO_HASH, ROLE, SOURCE_IMAGE, is_isc, label, mark, photo_hash, record, require_local
 from .provenance import find as find_block
 from .sun import relight
 from .world import ensure_world
@@ -108,13 +109,15 @@ def build(
 def find(thing: bpy.types.Object | None) -> Built | None:
     """What belongs to an object, camera or sun that ISC made; None for others, and where object or material are gone.
 
-    Camera, world, scene and collection are None where they were deleted, or not appended with the object.
+    A copy of an object is itself what is found, with the material that it wears, beside what it shares with the original. Camera, world,
+    scene and collection are None where they were deleted, or not appended with the object.
     """
     if thing is None or not is_isc(thing):
         return None
     key = thing["isc_key"]
-    made = find_block(bpy.data.objects, key, "object")
-    material = find_block(bpy.data.materials, key, "material")
+    own = thing.get(ROLE) in (OBJECT, COPY) and thing.library is None
+    made = thing if own else find_block(bpy.data.objects, key, OBJECT)
+    material = None if made is None else material_of(made)
     if made is None or material is None:
         return None
     collection = find_block(bpy.data.collections, key, "collection") or next(iter(made.users_collection), None)

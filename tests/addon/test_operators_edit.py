@@ -19,6 +19,7 @@ from blender_addon.arrays import read_result  # noqa: E402
 from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # noqa: E402
 from blender_addon.operators.export import write  # noqa: E402
 from blender_addon.scene.build import BuildOptions, Built, build, find  # noqa: E402
+from blender_addon.scene.copies import sharers  # noqa: E402
 from blender_addon.scene.material import dichromatic_node, set_specular_gain  # noqa: E402
 from blender_addon.scene.stand_in import recoloured  # noqa: E402
 from isc_core.srgb import linear_to_srgb  # noqa: E402
@@ -145,6 +146,92 @@ def test_an_object_of_unknown_origin_is_not_made_again(addon: Any, built: Built)
     assert "is not in this file: open it, and press Decompose" in say(addon.ops.isc.redo, max_size=64)
     del built.object["isc_request"]
     assert "not known how this object was made" in say(addon.ops.isc.redo, max_size=64)
+
+
+# --- copies -----------------------------------------------------------------------------------------------------------------------------
+
+
+def copied(bpy: Any, built: Built, linked: bool = False) -> Built:
+    """What Shift D makes, or Alt D where `linked`; it is active then."""
+    bpy.ops.object.duplicate(linked=linked)
+    copy = find(bpy.context.object)
+    assert copy is not None and copy.object != built.object, "edits would go to the original"
+    return copy
+
+
+def hue(thing: Any) -> float:
+    found = find(thing)
+    assert found is not None
+    return sockets(found)["Hue"]
+
+
+@pytest.mark.parametrize("linked", [False, True])
+@pytest.mark.parametrize("active", ["copy", "original"])
+def test_an_edit_changes_the_active_object_alone(addon: Any, built: Built, tmp_path: Path, linked: bool, active: str) -> None:
+    copy = copied(addon, built, linked)
+    other = addon.context.object.copy()
+    built.scene.collection.objects.link(other)
+    edited = {"copy": copy.object, "original": built.object}[active]
+    built.scene.view_layers[0].objects.active = edited
+    assert addon.ops.isc.recolour(hue=0.2, saturation=0.5, value=1.0) == {"FINISHED"}
+    assert addon.ops.isc.dichromatic(diffuse_gain=0.5, specular_gain=2.0) == {"FINISHED"}
+    values = {thing: sockets(find(thing))["Diffuse Gain"] for thing in (built.object, copy.object, other)}  # type: ignore[arg-type]
+    assert values == {thing: 0.5 if thing == edited else 1.0 for thing in values}
+    assert hue(edited) == pytest.approx(0.2) and sum(hue(thing) == 0.5 for thing in values) == 2
+    shown = render(built.scene, tmp_path)["Diffuse Color"]
+    assert np.isfinite(shown).all()
+
+
+def test_a_material_that_people_made_single_is_the_copys(addon: Any, built: Built) -> None:
+    copy = copied(addon, built)
+    copy.object.material_slots[0].material = built.material.copy()
+    addon.ops.isc.recolour(hue=0.3)
+    assert hue(built.object) == 0.5 and hue(copy.object) == pytest.approx(0.3)
+    assert len(addon.data.materials) == 2, "it was its own already"
+
+
+def test_a_copy_is_never_taken_for_the_original_once_it_was_edited(addon: Any, built: Built, bump_folder: Path) -> None:
+    copy = copied(addon, built)
+    addon.ops.isc.recolour(hue=0.3)
+    copy.object.name, built.object.name = "a", "z"
+    copy.object.material_slots[0].material.name, built.material.name = "a", "z"
+    addon.ops.isc.import_result(directory=str(bump_folder))
+    assert addon.context.object == built.object and hue(copy.object) == pytest.approx(0.3) and hue(built.object) == 0.5
+    assert find(built.object).material == built.material  # type: ignore[union-attr]
+
+
+def test_a_copy_is_not_decomposed_again(addon: Any, built: Built) -> None:
+    copied(addon, built)
+    assert "is a copy, and only the original is updated: choose bump" in say(addon.ops.isc.redo, max_size=64)
+    addon.ops.isc.recolour(hue=0.3)
+    addon.data.objects.remove(built.object)
+    assert "is a copy, and only the original is updated: press Decompose" in say(addon.ops.isc.redo, max_size=64)
+
+
+def test_a_copy_is_exported_as_it_is(addon: Any, built: Built, tmp_path: Path) -> None:
+    copy = copied(addon, built)
+    addon.ops.isc.dichromatic(diffuse_gain=0.25, specular_gain=1.0)
+    copy.object.location.x = 1.0
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    built.scene.view_layers[0].objects.active = built.object
+    assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
+    mine, original = (texture(tmp_path / name / "mesh.glb")[20, 38] for name in ("bump.001", "bump"))
+    assert (mine < 0.8 * original).all()
+
+
+def test_what_else_a_copy_wears_is_not_edited(addon: Any, built: Built) -> None:
+    copy = copied(addon, built)
+    copy.object.material_slots[0].material = addon.data.materials.new("mine")
+    assert find(copy.object) is None and not addon.ops.isc.recolour.poll()
+
+
+def test_own_paint_and_gloss_are_given_on_demand(addon: Any, built: Built) -> None:
+    """What the panel offers instead of sliders that would change both."""
+    copy = copied(addon, built)
+    assert sharers(copy.object, copy.material) == [built.object]
+    assert addon.ops.isc.own_material() == {"FINISHED"}
+    own = find(copy.object)
+    assert own is not None and own.material != built.material and not sharers(own.object, own.material)
 
 
 # --- files ------------------------------------------------------------------------------------------------------------------------------
