@@ -15,6 +15,8 @@ from ..brdf.fitting.result import NO_LIGHT
 from ..brdf.roughness import blender_from_alpha
 from ..decomposition import Separation
 from ..progress import Monitor
+from ..sirfs.prior_file import shipped_prior_set
+from ..sirfs.silhouette import outline_normals
 from .layers import shaded
 from .shape import Shape
 from .task import Task
@@ -64,7 +66,13 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
         options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None)
         fit = fit_lobe(
-            split.specular, normal, photo.mask,
-            options=options, clipped=photo.clipped, height=shape.height, shading=shading, monitor=monitor,
+            split.specular, normal, photo.mask, options=options, clipped=photo.clipped,
+            height=shape.height, shading=shading, outline=_outline(task), monitor=monitor,
         )  # fmt: skip
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))
+
+
+def _outline(task: Task) -> np.ndarray | None:
+    """What the outline alone says of the normals of the maps, (H, W, 3); None where the priors say nothing of outlines."""
+    profile = (task.prior_set or shipped_prior_set()).priors(task.settings.illumination, 3).silhouette
+    return None if profile is None else outline_normals(task.maps.mask, profile)

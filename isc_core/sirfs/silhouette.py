@@ -55,6 +55,14 @@ def outline_dome(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
     return np.where(mask, deepest * np.interp(distance / deepest, u, height), 0)
 
 
+def outline_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
+    """Unit normals (H, W, 3), camera frame, that lean outward as `profile` says on average; (0, 0, 1) outside `mask` (H, W) bool."""
+    u, down, right = outline_coordinates(mask)
+    lean = np.where(mask, np.clip(profile.at(u)[0], -_STEEPEST, _STEEPEST), 0)
+    normal = np.dstack([lean * right, -lean * down, np.sqrt(1 - lean**2)])
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+
 def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
     """How far each pixel (H, W) lies behind the outline, and the most of it, at least 1. Ones where there is no outline."""
     padded = np.pad(mask, 1, mode="edge")

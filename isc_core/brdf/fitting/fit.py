@@ -58,18 +58,20 @@ def fit_lobe(
     clipped: np.ndarray | None = None,
     height: np.ndarray | None = None,
     shading: np.ndarray | None = None,
+    outline: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> LobeFit:
     """Fits a lobe to `specular` (H, W, 3), linear, >= 0, seen from (0, 0, 1), on the unit normals (H, W, 3), inside `mask` (H, W) bool.
 
     `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the light is a lower bound.
     `height` (H, W) in pixels toward the viewer: with it lights may be near, else they are taken to be infinitely far.
-    `shading` (H, W, 3), of a white matt surface: needed where `options.recovered`, for all this then is from one photo. Either the light
+    `shading` (H, W, 3), of a white matt surface: needed where `options.recovered`, for all this then is from one photo. `outline`
+    (H, W, 3), unit normals that the outline alone suggests: helps there, else it is not looked at. Either the light
     is found, or it is given: `light_direction` (3,), a unit vector, or `environment` (rows, 2 rows, 3), see `isc_core.environment`.
     What cannot be known is said in the result. Raises `InputError` for arrays that do not fit together, `Cancelled`.
     """
     options, monitor = options or LobeFitOptions(), monitor or Monitor()
-    seen = observe(specular, normal, mask, confidence, clipped, height)
+    seen = observe(specular, normal, mask, confidence, clipped, height, outline)
     if light_direction is not None and environment is not None:
         raise InputError("give light_direction or environment, not both")
     fixed = None if light_direction is None else unit(light_direction, "light_direction")

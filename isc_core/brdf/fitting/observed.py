@@ -12,7 +12,7 @@ from ..directions import unit
 class Observed:
     """`specular` (H, W, 3), `normal` (H, W, 3), `mask` (H, W) bool, `confidence` (H, W), `clipped` (H, W) bool. `inside` (H, W): what
     counts. `place` (H, W, 3): where each pixel's surface is, in radii of the object (half of the longer side of the mask's box) from the
-    middle of that box; None where the height is not known."""
+    middle of that box; None where the height is not known. `outline` (H, W, 3): unit normals that the outline alone suggests, or None."""
 
     specular: np.ndarray
     normal: np.ndarray
@@ -21,6 +21,7 @@ class Observed:
     clipped: np.ndarray
     inside: np.ndarray
     place: np.ndarray | None
+    outline: np.ndarray | None = None
 
     @property
     def peak(self) -> float:
@@ -35,6 +36,7 @@ def observe(
     confidence: np.ndarray | None,
     clipped: np.ndarray | None,
     height: np.ndarray | None,
+    outline: np.ndarray | None = None,
 ) -> Observed:
     """Checks what was given, see `fit.fit_lobe`. Raises `InputError`."""
     specular, normal, mask = np.asarray(specular, float), np.asarray(normal, float), np.asarray(mask)
@@ -51,8 +53,13 @@ def observe(
     if not (np.isfinite(confidence[mask]).all() and (confidence[mask] >= 0).all() and (confidence[mask] <= 1).all()):
         raise InputError("the confidence has to be within [0, 1] inside the mask")
     unit(normal[mask], "normal")
+    if outline is not None:
+        outline = np.asarray(outline, float)
+        if outline.shape != normal.shape:
+            raise InputError(f"the outline's normals have shape {outline.shape}: give (H, W, 3) as the normals are")
+        unit(outline[mask], "outline")
     inside = mask & (confidence > 0) & (normal[..., 2] > 0)
-    return Observed(specular, normal, mask, confidence, clipped, inside, _places(height, mask))
+    return Observed(specular, normal, mask, confidence, clipped, inside, _places(height, mask), outline)
 
 
 def _places(height: np.ndarray | None, mask: np.ndarray) -> np.ndarray | None:

@@ -2,19 +2,22 @@
 
 Problem: recovered normals are wrong by 10 to 20 degrees, most of all where a highlight was, so the WIDTH of the highlight among them tells
 next to nothing (alpha came out with a deviation of a factor 1.9, the light 30 to 60 degrees off). Its brightness tells more: an insulator
-mirrors about f0 = 4 % of the light along the normal, and how bright that light is, the shading shows.
+mirrors about f0 = 4 % of the light along the normal, and how bright that light is, the shading shows. So does how much of the OBJECT it
+covers, whatever the normals there: all directions toward the viewer are on it somewhere.
 
 Equation: with A the brightest shading (97th percentile), a light across whose beam the irradiance is E = pi A, and the highlight's peak P,
 the lobe's height D F G / (4 cos) at n = h gives
 
-    alpha_P = sqrt(f0 A / (4 cos P)),    log alpha = a + b log alpha_P,    strength E = pi A e^c,
+    alpha_P = sqrt(f0 A / (4 cos P)),    f = sum of max(s - .2 P, 0) over the object / (P times its pixels),
+    log alpha = a + b log alpha_P + c log sqrt(f),    strength E = pi A,
 
-cos = .85 being the usual tilt of h. h is the mean of the normals, weighted by the squared specular light, after the normals were blurred
-over .3 of the object's size (the root of its area): what is left is where on the object the highlight sits.
+s the specular light (what is darker a separator may have left or not), cos = .85 the usual tilt of h. h is the mean of the normals,
+weighted by the squared specular light, after the normals were blurred over .3 of the object's size (the root of its area): what is left is
+where on the object the highlight sits. Where the caller knows what the outline alone says of the normals, h is the mean of both.
 
-a, b, c and the widths of the intervals were fitted to 38 rendered GGX objects (alpha .05 to .45, strength .6 to 1.5, ior 1.5) that went
-through the whole chain; each left out in turn, alpha was within a factor 1.5 on 81 % of those from .1 to .4, strength over shading within
-40 % on 74 %, and the light 20 degrees off in the median. `benchmarks/lobe_fitting.py` measures other ones.
+a, b, c and the widths of the intervals were fitted to 45 rendered GGX objects (alpha .05 to .45, strength .6 to 1.5, ior 1.5) that went
+through the whole chain; each left out in turn, alpha was within a factor 1.5 on 81 % of those from .1 to .4 (65 % without f), strength over
+shading within 40 % on 80 %, and the light 22 degrees off in the median. `benchmarks/lobe_fitting.py` measures other ones.
 
 Citation: the brightness of highlights as a measure of gloss: J. A. Ferwerda, F. Pellacini, D. P. Greenberg, "A psychophysically-based
 model of surface gloss perception", SPIE 4299 (2001), doi:10.1117/12.429501. Facets: B. Walter et al., doi:10.2312/EGWR/EGSR07/195-206.
@@ -41,8 +44,9 @@ _BLUR = 0.3  # of the root of the object's area
 _BLOCKS = 16  # to a width of the blur
 _BRIGHTEST = 97.0  # percentile of the shading
 _TILT = 0.85
-_OFFSET, _SLOPE, _STRENGTH_OFFSET = -0.51, 0.79, 0.0
-_ALPHA_SPREAD, _STRENGTH_SPREAD, _CONE = 0.34, 0.40, 29.0  # hold 68 %: factors as logarithms, degrees
+_OFFSET, _SLOPE, _COVERED = 0.368, 0.567, 0.459
+_TOPS = 0.2  # of the peak: what is brighter counts as covered
+_ALPHA_SPREAD, _STRENGTH_SPREAD, _CONE = 0.32, 0.40, 30.0  # hold 68 %: factors as logarithms, degrees
 _LEAST_SHARE = 1e-3  # of specular light over shading: a separator leaves less on matt objects
 _WIDEST = 0.6
 _NARROWEST_PIXELS = 6
@@ -54,16 +58,18 @@ def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction
     """The fit to a picture whose `shading` (H, W, 3), that of a white matt surface, is given; `direction` (3,) where the light is known."""
     convention, inside = CONVENTION[options.model], seen.inside
     light_there = shading[inside].mean(axis=1)
-    brightest = float(np.percentile(light_there, _BRIGHTEST))
-    if brightest <= 0 or seen.specular[inside].mean(axis=1).sum() < _LEAST_SHARE * light_there.sum():
+    brightest, mirrored_light = float(np.percentile(light_there, _BRIGHTEST)), seen.specular[inside].mean(axis=1)
+    if brightest <= 0 or mirrored_light.sum() < _LEAST_SHARE * light_there.sum():
         return LobeFit(convention, False, NO_LIGHT, None, None, (), None, None, 0.0, np.zeros(seen.specular.shape, np.float32))
-    log_alpha = _OFFSET + _SLOPE * 0.5 * float(np.log(F0 * brightest / (4 * _TILT * pixels.peak)))
+    by_brightness = 0.5 * float(np.log(F0 * brightest / (4 * _TILT * pixels.peak)))
+    by_size = 0.5 * float(np.log(np.maximum(mirrored_light / pixels.peak - _TOPS, 0).mean()))
+    log_alpha = _OFFSET + _SLOPE * by_brightness + _COVERED * by_size
     alpha = float(np.clip(np.exp(log_alpha), *ALPHAS))
     normal = blurred_normals(seen.normal, seen.mask)
-    towards, cone = (_half_way(seen, normal), _CONE) if direction is None else (direction, 0.0)
+    towards, cone = (_light_direction(seen, normal), _CONE) if direction is None else (direction, 0.0)
     colour = (pixels.weight * pixels.value) @ pixels.colour
     mirrored = 1.0 if options.model == "ggx" else F0  # the strength of Blinn-Phong's lobe has f0 in it
-    product = mirrored * np.pi * brightest * np.exp(_STRENGTH_OFFSET) * colour / max(float(colour.mean()), 1e-300)
+    product = mirrored * np.pi * brightest * colour / max(float(colour.mean()), 1e-300)
     light = LobeLight(towards, cone, product, Interval(product * np.exp(-_STRENGTH_SPREAD), product * np.exp(_STRENGTH_SPREAD)))
     image, explained = _predicted(seen, normal, light, alpha, options)
     reason = _reason(alpha, pixels)
@@ -111,12 +117,17 @@ def _block_sums(layers: np.ndarray, step: int) -> np.ndarray:
     return padded.reshape(rows, step, columns, step, -1).sum(axis=(1, 3)).transpose(2, 0, 1)
 
 
-def _half_way(seen: Observed, normal: np.ndarray) -> np.ndarray:
-    """The direction of the light, from the mean normal of the highlight."""
+def _light_direction(seen: Observed, normal: np.ndarray) -> np.ndarray:
+    """From the mean normal of the highlight; where the outline says something, from the mean of both."""
     weight = np.square(seen.specular[seen.inside].mean(axis=1)) * seen.confidence[seen.inside]
-    mean = weight @ normal[seen.inside]
-    half = mean / max(float(np.linalg.norm(mean)), 1e-300)
+    half = _unit(weight @ normal[seen.inside])
+    if seen.outline is not None:
+        half = _unit(half + _unit(weight @ seen.outline[seen.inside]))
     return light_of_half_vector(half)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / max(float(np.linalg.norm(vector)), 1e-300)
 
 
 def _predicted(seen: Observed, normal: np.ndarray, light: LobeLight, alpha: float, options: LobeFitOptions) -> tuple[np.ndarray, float]:

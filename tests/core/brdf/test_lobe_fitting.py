@@ -277,6 +277,18 @@ def test_what_was_recovered_from_one_photo_gives_alpha_by_the_brightness_of_the_
     assert angle(fit.direction, KEY) < 25
 
 
+def test_what_the_outline_says_helps_where_the_normals_are_wrong() -> None:
+    specular, normal, mask, shading = whole_chain(0.2)
+    flat = normal * (0.4, 0.4, 1)
+    flat /= np.linalg.norm(flat, axis=-1, keepdims=True)
+    true = seen(Ggx(0.2), directional(KEY, np.pi))[1]
+    options = LobeFitOptions(recovered=True)
+    without, helped = (fit_lobe(specular, flat, mask, options=options, shading=shading, outline=outline) for outline in (None, true))
+    assert angle(helped.direction, KEY) < angle(without.direction, KEY) - 5
+    with pytest.raises(InputError, match="outline"):
+        fit_lobe(specular, flat, mask, options=options, shading=shading, outline=true[1:])
+
+
 def test_the_recovered_fit_does_not_depend_on_the_exposure() -> None:
     specular, normal, mask, shading = whole_chain(0.2)
     options = LobeFitOptions(recovered=True)

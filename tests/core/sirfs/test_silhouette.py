@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from isc_core.sirfs.priors import SilhouetteProfile
-from isc_core.sirfs.silhouette import outline_coordinates, outline_dome, silhouette_cost, silhouette_field
+from isc_core.sirfs.silhouette import outline_coordinates, outline_dome, outline_normals, silhouette_cost, silhouette_field
 from isc_core.sirfs.stencils import normals
 
 
@@ -78,3 +78,14 @@ def test_a_dome_scales_with_its_outline_and_does_not_end_where_the_photo_does() 
     np.testing.assert_allclose(cut[20:60, 36:], outline_dome(mask, profile)[20:60, 36:41], atol=1)
     for other in (np.zeros((5, 6), bool), np.ones((5, 6), bool), np.eye(7, dtype=bool)):
         assert np.isfinite(outline_dome(other, profile)).all()
+
+
+def test_normals_of_the_outline_lean_outward_as_the_profile_says() -> None:
+    mask, i, j = disc()
+    profile = SilhouetteProfile(np.array([0.8, 0.4, 0.1]), np.full(3, 0.3))
+    normal = outline_normals(mask, profile)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=-1), 1, atol=1e-12)
+    assert (normal[~mask] == (0, 0, 1)).all() and normal[40, 40, 2] > 0.99
+    rim = mask & (np.hypot(i, j) > 32)
+    assert np.hypot(normal[..., 0], normal[..., 1])[rim].mean() == pytest.approx(0.8, abs=0.05)
+    assert normal[40, 70, 0] > 0.5 and normal[10, 40, 1] > 0.5, "x to the right, y up"
