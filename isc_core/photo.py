@@ -228,11 +228,11 @@ def _refuse_constant(values: np.ndarray, what: str) -> None:
 
 def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.ndarray:
     """The image with zeros for unusable values outside the mask; raises `InputError` for those inside."""
-    wild = f"brighter than {_WILD:g} times most of the object"
+    brightest, wild = _brightest(linear), f"brighter than {_WILD:g} times most of the object"
     for bad, what in (
         (~np.isfinite(linear).all(axis=2), "NaN or infinite"),
         ((linear < 0).any(axis=2), "negative"),
-        (_brightest(linear) > _WILD * _usual(linear, mask), wild),
+        (brightest > _WILD * _usual(brightest[mask]), wild),
     ):
         count = int((bad & mask).sum())
         if count:
@@ -242,9 +242,8 @@ def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.n
     return linear
 
 
-def _usual(linear: np.ndarray, mask: np.ndarray) -> float:
-    """The median of the pixels of the mask that are lit, infinite where none is."""
-    light = _brightest(linear)[mask]
+def _usual(light: np.ndarray) -> float:
+    """The median of the values (N,) above 0, infinite where none is."""
     light = light[light > 0]
     return float(np.median(light)) if light.size else np.inf
 

@@ -67,7 +67,7 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
         options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None)
         fit = fit_lobe(
             split.specular, normal, photo.mask, options=options, clipped=photo.clipped,
-            height=shape.height, shading=shading, outline=_outline(task), monitor=monitor,
+            height=shape.height, shading=shading, outline=_outline(task) if options.recovered else None, monitor=monitor,
         )  # fmt: skip
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))
 
