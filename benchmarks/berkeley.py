@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from isc_core.sirfs.solver import SirfsResult
 from isc_core.sirfs.stencils import normals
 
 LIGHTS = ("natural", "laboratory")
+_LAST_DIGIT = 1e-7
 
 
 def parser(text: str | None) -> argparse.ArgumentParser:
@@ -30,6 +32,16 @@ def parser(text: str | None) -> argparse.ArgumentParser:
 def training_object(shared: Path, name: str, illumination: str) -> MitBerkeleyObject:
     """One training object with its diffuse image."""
     return load_object(shared / "data" / "mit_berkeley_train", name, illumination, "diffuse")
+
+
+def rounded(photo: MitBerkeleyObject, number: int) -> MitBerkeleyObject:
+    """The photo with its last digits changed, another way for each `number`; as it is for 0."""
+    return replace(photo, image=rounded_image(photo.image, number))
+
+
+def rounded_image(image: np.ndarray, number: int) -> np.ndarray:
+    """The same of linear light (H, W, 3)."""
+    return image * (1 + _LAST_DIGIT * np.random.default_rng(number).standard_normal(image.shape)) if number else image
 
 
 def reference_results(shared: Path, illumination: str) -> dict[str, dict[str, float]]:

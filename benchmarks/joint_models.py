@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.berkeley import rounded
 from benchmarks.kept_rows import append_row, read_rows
 from isc_core.datasets import MitBerkeleyObject, list_objects, load_object
 from isc_core.evaluate import Estimate, paired_bootstrap
@@ -30,7 +31,6 @@ from isc_core.separation.layer_network import LayerNetwork, read_network
 from isc_core.sirfs.prior_file import shipped_prior_set
 
 MODELS = ("plain", "mdr", "mbp", "joint", "true diffuse")
-_LAST_DIGIT = 1e-7
 METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light", "average")
 
 
@@ -75,12 +75,6 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
                 rows.append(row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding})
                 append_row(path, rows[-1])
     return rows
-
-
-def rounded(photo: MitBerkeleyObject, number: int) -> MitBerkeleyObject:
-    """The photo with its last digits changed, another way for each `number`; as it is for 0."""
-    noise = np.random.default_rng(number).standard_normal(photo.image.shape) if number else 0.0
-    return replace(photo, image=photo.image * (1 + _LAST_DIGIT * noise))
 
 
 def row_of(label: str, name: str, model: str, seen: MitBerkeleyObject, answer: Estimate, seconds: float) -> dict[str, object]:

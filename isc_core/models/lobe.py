@@ -16,6 +16,7 @@ from ..brdf.roughness import blender_from_alpha
 from ..decomposition import Separation
 from ..progress import Monitor
 from ..sirfs.prior_file import shipped_prior_set
+from ..sirfs.priors import Priors
 from ..sirfs.silhouette import outline_normals
 from .layers import shaded
 from .shape import Shape
@@ -65,14 +66,14 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
         normal, shading = shaded(shape.height, shape.light, photo.mask)
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
         options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None)
+        priors = (task.prior_set or shipped_prior_set()).priors(task.settings.illumination, 3)
         fit = fit_lobe(
-            split.specular, normal, photo.mask, options=options, clipped=photo.clipped,
-            height=shape.height, shading=shading, outline=_outline(task) if options.recovered else None, monitor=monitor,
+            split.specular, normal, photo.mask, options=options, clipped=photo.clipped, height=shape.height, shading=shading,
+            outline=outline_of(photo.mask, priors) if options.recovered else None, monitor=monitor,
         )  # fmt: skip
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))
 
 
-def _outline(task: Task) -> np.ndarray | None:
-    """What the outline alone says of the normals of the maps, (H, W, 3); None where the priors say nothing of outlines."""
-    profile = (task.prior_set or shipped_prior_set()).priors(task.settings.illumination, 3).silhouette
-    return None if profile is None else outline_normals(task.maps.mask, profile)
+def outline_of(mask: np.ndarray, priors: Priors) -> np.ndarray | None:
+    """What the outline of `mask` (H, W) alone says of normals, (H, W, 3), camera frame; None where `priors` say nothing of outlines."""
+    return None if priors.silhouette is None else outline_normals(mask, priors.silhouette)

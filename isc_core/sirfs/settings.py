@@ -8,6 +8,18 @@ from dataclasses import dataclass, replace
 
 
 @dataclass(frozen=True)
+class Start:
+    """Where the solver begins (ours; published: a flat shape and no light).
+
+    `dome`: how much of the dome that the outline suggests (`silhouette.SilhouetteField`), where the problem has one and no depth was seen.
+    `light`: how much of the log light that the priors expect.
+    """
+
+    dome: float = 0.0
+    light: float = 0.0
+
+
+@dataclass(frozen=True)
 class Weights:
     """Multipliers of the objective's terms.
 
@@ -17,9 +29,7 @@ class Weights:
     `contour`: normals on the occluding contour point outward, with the penalty's power `contour_power`.
     `light`: likely illuminations. `silhouette`: surfaces lean outward near the outline (ours; not in the
     published sets). `shading_only`: in shape-from-shading mode, how strictly reflectance is one colour.
-
-    Where the solver begins (ours): `start_dome`, with the dome that the outline suggests, where the priors have a silhouette, instead of
-    a flat shape; `start_light`, with the light that the priors expect instead of none.
+    `start`: into which of the objective's many minima it goes.
     """
 
     smoothness: float
@@ -33,8 +43,7 @@ class Weights:
     contour_power: float = 0.75
     silhouette: float = 0.0
     shading_only: float = 50.0
-    start_dome: bool = False
-    start_light: bool = False
+    start: Start = Start()
 
 
 COLOR_NATURAL = Weights(16, 3.3636, 2.8284, 4.7568, 4.7568, 1, 2.8284, 3.3636)
@@ -52,13 +61,12 @@ ISC_NATURAL = replace(
     curvature=1.4 * COLOR_NATURAL.curvature,
     light=0.8 * COLOR_NATURAL.light,
     silhouette=0.3,
-    start_dome=True,
-    start_light=True,
+    start=Start(dome=1, light=0.5),
 )
 ISC_LABORATORY = replace(
-    COLOR_LABORATORY, slant=0.5 * COLOR_LABORATORY.slant, light=4 * COLOR_LABORATORY.light, silhouette=0.3, start_dome=True
+    COLOR_LABORATORY, slant=0.5 * COLOR_LABORATORY.slant, light=4 * COLOR_LABORATORY.light, silhouette=0.3, start=Start(dome=1)
 )
-ISC_GREY = replace(GREY_LABORATORY, slant=0.7 * GREY_LABORATORY.slant, light=2 * GREY_LABORATORY.light, silhouette=0.3, start_dome=True)
+ISC_GREY = replace(GREY_LABORATORY, slant=0.7 * GREY_LABORATORY.slant, light=2 * GREY_LABORATORY.light, silhouette=0.3, start=Start(dome=1))
 
 
 def isc_weights(illumination: str, channels: int) -> Weights:

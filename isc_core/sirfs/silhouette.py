@@ -23,11 +23,16 @@ _SMOOTHING = 0.05  # of the largest distance: the outward direction ignores fine
 
 @dataclass(frozen=True)
 class SilhouetteField:
-    """Expected in-plane part of the normal, `down` and `right`, and its `precision` 1/s^2, each (H, W); 0 outside the mask."""
+    """Expected in-plane part of the normal, `down` and `right`, and its `precision` 1/s^2, each (H, W); 0 outside the mask.
+
+    `dome`: (H, W) heights in pixels of what leans so everywhere, a slope of m / sqrt(1 - m^2) at depth u adding up to
+    Z(d) = d_max integral_0^u m / sqrt(1 - m^2) du; 0 outside.
+    """
 
     down: np.ndarray
     right: np.ndarray
     precision: np.ndarray
+    dome: np.ndarray
 
 
 def outline_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -36,23 +41,7 @@ def outline_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     A mask that reaches the border goes on beyond it: there is no silhouette. One without any outline is deep everywhere, u = 1.
     """
     distance, deepest = _depth(mask)
-    smooth = ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest))
-    down, right = np.gradient(smooth)
-    length = np.maximum(np.hypot(down, right), 1e-6)
-    return distance / deepest, -down / length, -right / length
-
-
-def outline_dome(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
-    """The heights (H, W) in pixels of a dome over `mask` (H, W) bool that leans as `profile` says on average; 0 outside.
-
-    A slope of m / sqrt(1 - m^2) at depth u adds up to Z(d) = d_max integral_0^u m / sqrt(1 - m^2) du.
-    """
-    distance, deepest = _depth(mask)
-    u = np.linspace(0, 1, _STEPS)
-    lean, _ = profile.at(u)
-    slope = lean / np.sqrt(1 - np.square(np.clip(lean, -_STEEPEST, _STEEPEST)))
-    height = np.concatenate([[0], np.cumsum((slope[1:] + slope[:-1]) / 2 * np.diff(u))])
-    return np.where(mask, deepest * np.interp(distance / deepest, u, height), 0)
+    return distance / deepest, *_outward(distance, deepest)
 
 
 def outline_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
@@ -70,11 +59,28 @@ def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
     return distance, max(float(distance.max()), 1.0)
 
 
+def _outward(distance: np.ndarray, deepest: float) -> tuple[np.ndarray, np.ndarray]:
+    smooth = ndimage.gaussian_filter(distance, max(1.0, _SMOOTHING * deepest))
+    down, right = np.gradient(smooth)
+    length = np.maximum(np.hypot(down, right), 1e-6)
+    return -down / length, -right / length
+
+
 def silhouette_field(mask: np.ndarray, profile: SilhouetteProfile) -> SilhouetteField:
-    """What `profile` expects inside `mask`."""
-    u, down, right = outline_coordinates(mask)
+    """What `profile` expects inside `mask` (H, W) bool."""
+    distance, deepest = _depth(mask)
+    u, (down, right) = distance / deepest, _outward(distance, deepest)
     mean, spread = profile.at(u)
-    return SilhouetteField(np.where(mask, mean * down, 0), np.where(mask, mean * right, 0), np.where(mask, 1 / spread**2, 0))
+    maps = (mean * down, mean * right, 1 / spread**2, deepest * _dome_at(u, profile))
+    return SilhouetteField(*(np.where(mask, values, 0) for values in maps))
+
+
+def _dome_at(u: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
+    """Heights at relative depths `u`, in units of the largest distance."""
+    steps = np.linspace(0, 1, _STEPS)
+    lean = np.clip(profile.at(steps)[0], -_STEEPEST, _STEEPEST)
+    slope = lean / np.sqrt(1 - lean**2)
+    return np.interp(u, steps, np.concatenate([[0], np.cumsum((slope[1:] + slope[:-1]) / 2 * np.diff(steps))]))
 
 
 def silhouette_cost(

@@ -1,8 +1,8 @@
 """Shape and illumination from one image: the minimiser of the SIRFS objective (Barron & Malik 2015).
 
 One L-BFGS run moves the height's pyramid levels and the whitened light together. Reflectance is not an unknown:
-log A = log I - log shading reproduces the image exactly. It begins with a dome over the outline (`silhouette.outline_dome`): from a flat
-shape the last digit of a photo decides more often into which minimum it goes. Limits: the objective has many minima; this finds one of
+log A = log I - log shading reproduces the image exactly. It begins where `settings.Start` says: from a flat shape the last digit of
+a photo decides more often into which minimum it goes. Limits: the objective has many minima; this finds one of
 them. Solving halved problems first finds others, as often worse as better, and saved no time.
 Source: Barron & Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8), 2015, doi:10.1109/TPAMI.2014.2377712.
 """
@@ -23,7 +23,6 @@ from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
 from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
-from .silhouette import outline_dome
 
 MOST_THREADS = 64  # more only wait for each other
 _START_LEVEL = 2  # of the pyramid: finer detail of the start is the outline's, not the shape's
@@ -173,14 +172,12 @@ class _Unknowns:
 
     def begin(self) -> None:
         """Brings the unknowns to where the problem's settings want the solver to begin."""
-        p = self._problem
-        if not p.weights.start_light:
-            self.set_light(np.zeros((9, self.channels)))  # else whitened zeros: the light that is expected
-        profile = p.priors.silhouette
-        if not p.weights.start_dome or profile is None or p.observation is not None or not self.shapes:
+        p, start = self._problem, self._problem.weights.start
+        self.set_light(start.light * unstack(p.priors.light.offset, self.channels))
+        if not start.dome or p.silhouette is None or p.observation is not None or not self.shapes:
             return
         level = min(_START_LEVEL, len(self.shapes) - 1)
-        height = outline_dome(p.mask, profile)
+        height = start.dome * p.silhouette.dome
         for _ in range(level):
             height = down(height) / _COARSER
         self.levels(self.x)[level][...] = height
@@ -207,7 +204,7 @@ def solve(
 ) -> SirfsResult:
     """Minimises the objective of `problem`.
 
-    Begins with a flat shape and no light, or as `Weights` say. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress
+    Begins as the problem's `settings.Start` says. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress
     reports carry the loss. Raises `Cancelled`.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from isc_core.sirfs.priors import SilhouetteProfile
-from isc_core.sirfs.silhouette import outline_coordinates, outline_dome, outline_normals, silhouette_cost, silhouette_field
+from isc_core.sirfs.silhouette import outline_coordinates, outline_normals, silhouette_cost, silhouette_field
 from isc_core.sirfs.stencils import normals
 
 
@@ -40,7 +40,7 @@ def test_the_field_is_empty_outside_and_finite_on_any_mask() -> None:
     masks = [disc()[0], np.zeros((5, 6), bool), np.ones((5, 6), bool), np.eye(7, dtype=bool)]
     for mask in masks:
         field = silhouette_field(mask, profile)
-        for values in (field.down, field.right, field.precision):
+        for values in (field.down, field.right, field.precision, field.dome):
             assert np.isfinite(values).all() and (values[~mask] == 0).all()
 
 
@@ -61,7 +61,7 @@ def test_the_dome_leans_as_the_profile_says_on_average() -> None:
     mask, i, j = disc()
     depth = (np.arange(64) + 0.5) / 64
     profile = SilhouetteProfile(1 - depth, np.full(64, 0.2))
-    height = outline_dome(mask, profile)
+    height = silhouette_field(mask, profile).dome
     ball = np.sqrt(np.maximum(34.0**2 - i * i - j * j, 0))
     assert (height[~mask] == 0).all()
     np.testing.assert_allclose(height[mask], ball[mask], atol=5)
@@ -71,13 +71,13 @@ def test_the_dome_leans_as_the_profile_says_on_average() -> None:
 
 def test_a_dome_scales_with_its_outline_and_does_not_end_where_the_photo_does() -> None:
     profile = SilhouetteProfile(np.array([0.6, 0.1]), np.array([0.2, 0.3]))
-    small, large = outline_dome(disc()[0], profile), outline_dome(disc(161, 68.0)[0], profile)
+    small, large = (silhouette_field(m, profile).dome for m in (disc()[0], disc(161, 68.0)[0]))
     assert large.max() == pytest.approx(2 * small.max(), rel=0.03)
     mask, _, _ = disc()
-    cut = outline_dome(mask[:, :41], profile)
-    np.testing.assert_allclose(cut[20:60, 36:], outline_dome(mask, profile)[20:60, 36:41], atol=1)
+    cut = silhouette_field(mask[:, :41], profile).dome
+    np.testing.assert_allclose(cut[20:60, 36:], silhouette_field(mask, profile).dome[20:60, 36:41], atol=1)
     for other in (np.zeros((5, 6), bool), np.ones((5, 6), bool), np.eye(7, dtype=bool)):
-        assert np.isfinite(outline_dome(other, profile)).all()
+        assert np.isfinite(silhouette_field(other, profile).dome).all()
 
 
 def test_normals_of_the_outline_lean_outward_as_the_profile_says() -> None:

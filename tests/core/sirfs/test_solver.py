@@ -14,7 +14,8 @@ from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors import SilhouetteProfile
 from isc_core.sirfs.problem import DepthObservation
-from isc_core.sirfs.silhouette import outline_dome
+from isc_core.sirfs.settings import Start
+from isc_core.sirfs.silhouette import silhouette_field
 from isc_core.sirfs.solver import MOST_THREADS, SolverOptions, solve, thread_count
 from isc_core.sirfs.stencils import normals
 
@@ -204,13 +205,14 @@ def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
     scene = hemisphere()
     profile = SilhouetteProfile(np.array([0.7, 0.5, 0.3, 0.1]), np.full(4, 0.3))
     plain = make_problem(scene)
-    plain = replace(plain, priors=replace(plain.priors, silhouette=profile))
+    field = silhouette_field(scene.mask, profile)
+    plain = replace(plain, silhouette=field)
     unmoved = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(iterations=0))
     flat = solve(plain, unmoved)
     assert not flat.height.any() and np.abs(flat.light).max() < 1e-12
-    begun = solve(replace(plain, weights=replace(plain.weights, start_dome=True, start_light=True)), unmoved)
+    begun = solve(replace(plain, weights=replace(plain.weights, start=Start(dome=0.5, light=0.5))), unmoved)
     inner = ndimage.binary_erosion(scene.mask, iterations=4)
-    np.testing.assert_allclose(begun.height[inner], outline_dome(scene.mask, profile)[inner], atol=0.15 * begun.height.max())
-    np.testing.assert_allclose(begun.light, unstack(plain.priors.light.offset, 3), atol=1e-9)
-    seen = replace(plain, weights=replace(plain.weights, start_dome=True), observation=DepthObservation(scene.height))
+    np.testing.assert_allclose(begun.height[inner], field.dome[inner] / 2, atol=0.15 * begun.height.max())
+    np.testing.assert_allclose(begun.light, unstack(plain.priors.light.offset, 3) / 2, atol=1e-9)
+    seen = replace(plain, weights=replace(plain.weights, start=Start(dome=1)), observation=DepthObservation(scene.height))
     assert not solve(seen, unmoved).height.any(), "what was seen decides, not the outline"

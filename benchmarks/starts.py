@@ -1,0 +1,175 @@
+"""Where should SIRFS begin? Its objective has many minima, and the start decides into which it goes: several, on objects not seen.
+
+  python -m benchmarks.starts                                     the MIT-Berkeley objects as they are
+  python -m benchmarks.starts --others 0,2,4,6                    each under four of the other objects' lights
+  python -m benchmarks.starts --scenes FOLDER                     rendered scenes of `isc synth`
+
+A start is "dome:light", how much of the outline's dome and of the expected light (`sirfs.settings.Start`). MIT-Berkeley objects are solved
+with priors fitted to the other nine; under another's light the picture is their paint times the shading of their shape. Of a rendered scene
+the true diffuse layer is solved with the priors that ship, at 256 pixels and as bright as photos are; its light is not compared. Errors are
+over the first start's, geometric means; a rounding changes the picture's last digits. Cases in which the starts' avg differs by
+more than half are printed, with each start's avg over the best and its final loss: whether the loss tells which minimum is the worse.
+"""
+
+import argparse
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.datasets import MitBerkeleyObject, list_objects, load_natural_lights
+from isc_core.metrics import Scores, truth_normal
+from isc_core.sirfs.fitting.fit import FitOptions, fit_priors
+from isc_core.sirfs.fitting.prior_set import PriorSet
+from isc_core.sirfs.fitting.statistics import collect_statistics
+from isc_core.sirfs.fitting.training import read_training_objects
+from isc_core.sirfs.frames import light_from_reference, normal_from_reference, real_sh
+from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.recover import RecoverOptions, recover
+from isc_core.sirfs.settings import Start, Weights, isc_weights
+from isc_core.sirfs.solver import SolverOptions, solve
+from isc_core.sirfs.stencils import normals
+from synth.dataset.reading import list_scenes, read_truth
+from synth.validation.sirfs_stage import score_sirfs, with_normals
+from synth.validation.stages import BLACK, Inputs
+
+from .berkeley import LIGHTS, parser, problem, rounded, rounded_image, scores, training_object, write_json
+
+METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
+_APART = 1.5
+_BRIGHT, _USUAL = 95.0, 0.75  # as `models.shape` exposes float files
+
+
+@dataclass(frozen=True)
+class Task:
+    """One solve: of an object under its own light or, with `other`, under that object's, or of a scene's folder (`priors` then None)."""
+
+    case: str
+    start: Start
+    rounding: int
+    light: str
+    shared: Path
+    other: str | None = None
+    priors: PriorSet | None = None
+
+
+@dataclass(frozen=True)
+class Found:
+    """Six errors (five of a scene, NaN last) and the final loss."""
+
+    task: Task
+    errors: tuple[float, ...]
+    loss: float
+
+    @property
+    def average(self) -> float:
+        """The geometric mean of the errors."""
+        return float(np.exp(np.nanmean(np.log(self.errors))))
+
+
+def run(task: Task) -> Found:
+    """Solves from the task's start."""
+    weights = replace(isc_weights(task.light, 3), start=task.start)
+    return _of_scene(task, weights) if task.priors is None else _of_object(task, task.priors, weights)
+
+
+def _of_object(task: Task, priors: PriorSet, weights: Weights) -> Found:
+    truth = training_object(task.shared, task.case, task.light)
+    if task.other is not None:
+        truth = _lit(truth, training_object(task.shared, task.other, task.light).light)
+    truth = rounded(truth, task.rounding)
+    result = solve(problem(truth, priors.priors(task.light, 3), weights), SolverOptions(threads=1))
+    return _found(task, scores(truth, result), result.terms.total)
+
+
+def _lit(truth: MitBerkeleyObject, light: np.ndarray) -> MitBerkeleyObject:
+    """The object under `light` (9, 3), reference convention: its paint times the shading of its shape."""
+    normal = truth_normal(truth.height)
+    known = np.isfinite(normal).all(axis=-1, keepdims=True) & truth.valid[..., None]
+    shading = np.where(known, np.exp(real_sh(np.where(known, normal, 0)) @ light_from_reference(light)), 0)
+    image = truth.reflectance * shading
+    return replace(truth, image=image, valid=(image > 0).all(axis=-1), shading=shading, light=light)
+
+
+def _of_scene(task: Task, weights: Weights) -> Found:
+    truth = read_truth(task.case)
+    diffuse = rounded_image(np.maximum(truth.diffuse, 0).astype(float), task.rounding)
+    gain = _USUAL / float(np.percentile(diffuse[truth.mask].max(axis=1), _BRIGHT))
+    options = RecoverOptions(solver=SolverOptions(threads=1))
+    result = recover(diffuse * gain, truth.mask, BLACK, shipped_prior_set().priors(task.light, 3), weights, options)
+    normal = normal_from_reference(normals(result.height))
+    seen = Inputs(truth.image, truth.mask, np.zeros_like(truth.mask), diffuse)
+    errors = score_sirfs(truth, with_normals(seen, result.height, normal, light_from_reference(result.light)))
+    return _found(task, replace(errors, light=np.nan), result.terms.total)
+
+
+def _found(task: Task, errors: Scores, loss: float) -> Found:
+    return Found(task, tuple(float(getattr(errors, metric)) for metric in METRICS), loss)
+
+
+def object_tasks(starts: Sequence[Start], given: argparse.Namespace) -> Iterator[Task]:
+    """All solves of MIT-Berkeley objects; fits the folds."""
+    root = given.shared / "data" / "mit_berkeley_train"
+    statistics, lights = collect_statistics(read_training_objects(root)), load_natural_lights(root)
+    for name in list_objects(root, given.light):
+        fold = fit_priors({key: value for key, value in statistics.items() if key != name}, lights, FitOptions())
+        names = [other for other in list_objects(root, given.light) if other != name]
+        for other in [names[k] for k in given.others] or [None]:
+            for rounding in range(given.roundings):
+                yield from (Task(name, start, rounding, given.light, given.shared, other, fold) for start in starts)
+
+
+def scene_tasks(starts: Sequence[Start], given: argparse.Namespace) -> Iterator[Task]:
+    """All solves of rendered scenes."""
+    for folder in list_scenes(given.scenes):
+        for rounding in range(given.roundings):
+            yield from (Task(str(folder), start, rounding, given.light, given.shared) for start in starts)
+
+
+def report(found: Sequence[Found], starts: Sequence[Start]) -> None:
+    """A row a start, and the cases in which the starts are far apart."""
+    cases: dict[tuple[str, str | None, int], dict[Start, Found]] = {}
+    for one in found:
+        cases.setdefault((one.task.case, one.task.other, one.task.rounding), {})[one.task.start] = one
+    print(f"\n{len(cases)} cases\n\n| dome | light | " + " | ".join(METRICS) + " | avg | standard error |\n" + "|---" * 10 + "|")
+    first = starts[0]
+    for start in starts:
+        ratios = np.log([[*by[start].errors, by[start].average] for by in cases.values()])
+        ratios -= np.log([[*by[first].errors, by[first].average] for by in cases.values()])
+        cells = [f"{value:.3f}" for value in np.exp(ratios.mean(axis=0))]
+        print(f"| {start.dome:g} | {start.light:g} | {' | '.join(cells)} | {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |")
+    for (case, other, rounding), by in cases.items():
+        best = min(one.average for one in by.values())
+        if max(one.average for one in by.values()) > _APART * best:
+            each = (f"{start.dome:g}:{start.light:g} {one.average / best:.2f} at {one.loss:.2f}" for start, one in by.items())
+            print(f"{Path(case).name}{f' under the light of {other}' if other else ''}, rounding {rounding}: " + ", ".join(each))
+
+
+def main() -> None:
+    """Runs and prints."""
+    options = parser(__doc__)
+    options.add_argument("--starts", type=_starts, default=_starts("0:0,1:0,1:0.5,1:1,0:0.5"), help="dome:light, ...")
+    options.add_argument("--light", choices=LIGHTS, default=LIGHTS[0])
+    options.add_argument("--others", type=lambda text: [int(k) for k in text.split(",")], default=[], help="of the nine other lights")
+    options.add_argument("--scenes", type=Path, help="a folder of isc synth")
+    options.add_argument("--roundings", type=int, default=1)
+    options.add_argument("--processes", type=int, default=2)
+    given = options.parse_args()
+    tasks = object_tasks(given.starts, given) if given.scenes is None else scene_tasks(given.starts, given)
+    with ProcessPoolExecutor(given.processes) as pool:
+        found = list(pool.map(run, tasks))
+    report(found, given.starts)
+    rows = [
+        (one.task.case, one.task.other, one.task.rounding, one.task.start.dome, one.task.start.light, one.errors, one.loss) for one in found
+    ]
+    write_json(given.json, rows)
+
+
+def _starts(text: str) -> list[Start]:
+    return [Start(*(float(part) for part in pair.split(":"))) for pair in text.split(",")]
+
+
+if __name__ == "__main__":
+    main()
