@@ -4,11 +4,12 @@
   python -m benchmarks.starts --others 0,2,4,6                    each under four of the other objects' lights
   python -m benchmarks.starts --scenes FOLDER                     rendered scenes of `isc synth`
 
-A start is "dome:light", how much of the outline's dome and of the expected light (`sirfs.settings.Start`). MIT-Berkeley objects are solved
-with priors fitted to the other nine; under another's light the picture is their paint times the shading of their shape. Of a rendered scene
-the true diffuse layer is solved with the priors that ship, at 256 pixels and as bright as photos are; its light is not compared. Errors are
-over the first start's, geometric means; a rounding changes the picture's last digits. Cases in which the starts' avg differs by
-more than half are printed, with each start's avg over the best and its final loss: whether the loss tells which minimum is the worse.
+A start is "dome:light", how much of the outline's dome and of the expected light (`sirfs.settings.Start`); "1:0.5+0:0.5" tries two.
+MIT-Berkeley objects are solved with priors fitted to the other nine; under another's light the picture is their paint times the shading of
+their shape. Of a rendered scene the true diffuse layer is solved with the priors that ship, at 256 pixels and as bright as photos are; its
+light is not compared. Errors are over the first start's, geometric means; a rounding changes the picture's last digits. Cases in which the
+starts' avg differs by more than half are printed, with each start's avg over the best and its final loss: whether the loss tells which
+minimum is the worse.
 """
 
 import argparse
@@ -38,6 +39,7 @@ from synth.validation.stages import BLACK, Inputs
 from .berkeley import LIGHTS, parser, problem, rounded, rounded_image, scores, training_object, write_json
 
 METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
+Starts = tuple[Start, ...]
 _APART = 1.5
 _BRIGHT, _USUAL = 95.0, 0.75  # as `models.shape` exposes float files
 
@@ -47,7 +49,7 @@ class Task:
     """One solve: of an object under its own light or, with `other`, under that object's, or of a scene's folder (`priors` then None)."""
 
     case: str
-    start: Start
+    starts: Starts
     rounding: int
     light: str
     shared: Path
@@ -71,7 +73,7 @@ class Found:
 
 def run(task: Task) -> Found:
     """Solves from the task's start."""
-    weights = replace(isc_weights(task.light, 3), start=task.start)
+    weights = replace(isc_weights(task.light, 3), starts=task.starts)
     return _of_scene(task, weights) if task.priors is None else _of_object(task, task.priors, weights)
 
 
@@ -109,7 +111,7 @@ def _found(task: Task, errors: Scores, loss: float) -> Found:
     return Found(task, tuple(float(getattr(errors, metric)) for metric in METRICS), loss)
 
 
-def object_tasks(starts: Sequence[Start], given: argparse.Namespace) -> Iterator[Task]:
+def object_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[Task]:
     """All solves of MIT-Berkeley objects; fits the folds."""
     root = given.shared / "data" / "mit_berkeley_train"
     statistics, lights = collect_statistics(read_training_objects(root)), load_natural_lights(root)
@@ -118,39 +120,38 @@ def object_tasks(starts: Sequence[Start], given: argparse.Namespace) -> Iterator
         names = [other for other in list_objects(root, given.light) if other != name]
         for other in [names[k] for k in given.others] or [None]:
             for rounding in range(given.roundings):
-                yield from (Task(name, start, rounding, given.light, given.shared, other, fold) for start in starts)
+                yield from (Task(name, starts, rounding, given.light, given.shared, other, fold) for starts in ways)
 
 
-def scene_tasks(starts: Sequence[Start], given: argparse.Namespace) -> Iterator[Task]:
+def scene_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[Task]:
     """All solves of rendered scenes."""
     for folder in list_scenes(given.scenes):
         for rounding in range(given.roundings):
-            yield from (Task(str(folder), start, rounding, given.light, given.shared) for start in starts)
+            yield from (Task(str(folder), starts, rounding, given.light, given.shared) for starts in ways)
 
 
-def report(found: Sequence[Found], starts: Sequence[Start]) -> None:
+def report(found: Sequence[Found], ways: Sequence[Starts]) -> None:
     """A row a start, and the cases in which the starts are far apart."""
-    cases: dict[tuple[str, str | None, int], dict[Start, Found]] = {}
+    cases: dict[tuple[str, str | None, int], dict[Starts, Found]] = {}
     for one in found:
-        cases.setdefault((one.task.case, one.task.other, one.task.rounding), {})[one.task.start] = one
-    print(f"\n{len(cases)} cases\n\n| dome | light | " + " | ".join(METRICS) + " | avg | standard error |\n" + "|---" * 10 + "|")
-    first = starts[0]
-    for start in starts:
-        ratios = np.log([[*by[start].errors, by[start].average] for by in cases.values()])
-        ratios -= np.log([[*by[first].errors, by[first].average] for by in cases.values()])
+        cases.setdefault((one.task.case, one.task.other, one.task.rounding), {})[one.task.starts] = one
+    print(f"\n{len(cases)} cases\n\n| start | " + " | ".join(METRICS) + " | avg | standard error |\n" + "|---" * 9 + "|")
+    for starts in ways:
+        ratios = np.log([[*by[starts].errors, by[starts].average] for by in cases.values()])
+        ratios -= np.log([[*by[ways[0]].errors, by[ways[0]].average] for by in cases.values()])
         cells = [f"{value:.3f}" for value in np.exp(ratios.mean(axis=0))]
-        print(f"| {start.dome:g} | {start.light:g} | {' | '.join(cells)} | {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |")
+        print(f"| {_words(starts)} | {' | '.join(cells)} | {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |")
     for (case, other, rounding), by in cases.items():
         best = min(one.average for one in by.values())
         if max(one.average for one in by.values()) > _APART * best:
-            each = (f"{start.dome:g}:{start.light:g} {one.average / best:.2f} at {one.loss:.2f}" for start, one in by.items())
+            each = (f"{_words(starts)} {one.average / best:.2f} at {one.loss:.2f}" for starts, one in by.items())
             print(f"{Path(case).name}{f' under the light of {other}' if other else ''}, rounding {rounding}: " + ", ".join(each))
 
 
 def main() -> None:
     """Runs and prints."""
     options = parser(__doc__)
-    options.add_argument("--starts", type=_starts, default=_starts("0:0,1:0,1:0.5,1:1,0:0.5"), help="dome:light, ...")
+    options.add_argument("--starts", type=_ways, default=_ways("0:0,1:0,0:0.5,1:0.5,1:1,1:0.5+0:0.5"), help="dome:light, ...")
     options.add_argument("--light", choices=LIGHTS, default=LIGHTS[0])
     options.add_argument("--others", type=lambda text: [int(k) for k in text.split(",")], default=[], help="of the nine other lights")
     options.add_argument("--scenes", type=Path, help="a folder of isc synth")
@@ -161,14 +162,16 @@ def main() -> None:
     with ProcessPoolExecutor(given.processes) as pool:
         found = list(pool.map(run, tasks))
     report(found, given.starts)
-    rows = [
-        (one.task.case, one.task.other, one.task.rounding, one.task.start.dome, one.task.start.light, one.errors, one.loss) for one in found
-    ]
-    write_json(given.json, rows)
+    keys = [(one.task.case, one.task.other, one.task.rounding, _words(one.task.starts)) for one in found]
+    write_json(given.json, [(*key, one.errors, one.loss) for key, one in zip(keys, found, strict=True)])
 
 
-def _starts(text: str) -> list[Start]:
-    return [Start(*(float(part) for part in pair.split(":"))) for pair in text.split(",")]
+def _ways(text: str) -> list[Starts]:
+    return [tuple(Start(*(float(part) for part in pair.split(":"))) for pair in way.split("+")) for way in text.split(",")]
+
+
+def _words(starts: Starts) -> str:
+    return "+".join(f"{start.dome:g}:{start.light:g}" for start in starts)
 
 
 if __name__ == "__main__":

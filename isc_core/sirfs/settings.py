@@ -29,7 +29,7 @@ class Weights:
     `contour`: normals on the occluding contour point outward, with the penalty's power `contour_power`.
     `light`: likely illuminations. `silhouette`: surfaces lean outward near the outline (ours; not in the
     published sets). `shading_only`: in shape-from-shading mode, how strictly reflectance is one colour.
-    `start`: into which of the objective's many minima it goes.
+    `starts`: each is tried, and the one that leads deeper goes on.
     """
 
     smoothness: float
@@ -43,7 +43,7 @@ class Weights:
     contour_power: float = 0.75
     silhouette: float = 0.0
     shading_only: float = 50.0
-    start: Start = Start()
+    starts: tuple[Start, ...] = (Start(),)
 
 
 COLOR_NATURAL = Weights(16, 3.3636, 2.8284, 4.7568, 4.7568, 1, 2.8284, 3.3636)
@@ -61,12 +61,14 @@ ISC_NATURAL = replace(
     curvature=1.4 * COLOR_NATURAL.curvature,
     light=0.8 * COLOR_NATURAL.light,
     silhouette=0.3,
-    start=Start(dome=1, light=0.5),
+    starts=(Start(dome=1, light=0.5), Start(light=0.5)),
 )
 ISC_LABORATORY = replace(
-    COLOR_LABORATORY, slant=0.5 * COLOR_LABORATORY.slant, light=4 * COLOR_LABORATORY.light, silhouette=0.3, start=Start(dome=1)
+    COLOR_LABORATORY, slant=0.5 * COLOR_LABORATORY.slant, light=4 * COLOR_LABORATORY.light, silhouette=0.3, starts=(Start(dome=1),)
 )
-ISC_GREY = replace(GREY_LABORATORY, slant=0.7 * GREY_LABORATORY.slant, light=2 * GREY_LABORATORY.light, silhouette=0.3, start=Start(dome=1))
+ISC_GREY = replace(
+    GREY_LABORATORY, slant=0.7 * GREY_LABORATORY.slant, light=2 * GREY_LABORATORY.light, silhouette=0.3, starts=(Start(dome=1),)
+)
 
 
 def isc_weights(illumination: str, channels: int) -> Weights:

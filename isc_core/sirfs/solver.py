@@ -1,15 +1,15 @@
 """Shape and illumination from one image: the minimiser of the SIRFS objective (Barron & Malik 2015).
 
 One L-BFGS run moves the height's pyramid levels and the whitened light together. Reflectance is not an unknown:
-log A = log I - log shading reproduces the image exactly. It begins where `settings.Start` says: from a flat shape the last digit of
-a photo decides more often into which minimum it goes. Limits: the objective has many minima; this finds one of
-them. Solving halved problems first finds others, as often worse as better, and saved no time.
+log A = log I - log shading reproduces the image exactly. It begins where `settings.Start` says; of several starts the one goes on that has
+the lowest loss after a while. Limits: the objective has many minima; this finds one of them. Solving halved problems first finds others, as
+often worse as better, and saved no time.
 Source: Barron & Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8), 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 import os
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -23,9 +23,11 @@ from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
 from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
+from .settings import Start
 
 MOST_THREADS = 64  # more only wait for each other
 _START_LEVEL = 2  # of the pyramid: finer detail of the start is the outline's, not the shape's
+_TRIAL = 80  # evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum have parted
 _COARSER = 16  # what `down` multiplies heights by, and that heights of a step up are doubled
 
 
@@ -170,9 +172,10 @@ class _Unknowns:
             prior = self._problem.priors.light
             self.x[self._edges[-1] :] = solved(prior.unwhiten, (stack(light) - prior.offset)[:, None])[:, 0]
 
-    def begin(self) -> None:
-        """Brings the unknowns to where the problem's settings want the solver to begin."""
-        p, start = self._problem, self._problem.weights.start
+    def begin(self, start: Start) -> None:
+        """Brings the unknowns to `start`, as far as they are unknown and nothing else is seen of them."""
+        p = self._problem
+        self.x[...] = 0
         self.set_light(start.light * unstack(p.priors.light.offset, self.channels))
         if not start.dome or p.silhouette is None or p.observation is not None or not self.shapes:
             return
@@ -204,7 +207,7 @@ def solve(
 ) -> SirfsResult:
     """Minimises the objective of `problem`.
 
-    Begins as the problem's `settings.Start` says. `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress
+    Begins as the problem's weights say (`settings.Start`). `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress
     reports carry the loss. Raises `Cancelled`.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()
@@ -214,8 +217,8 @@ def solve(
     with Workers(thread_count(options)) as workers:
         tools = _Tools(options, workers)
         unknowns = _Unknowns(problem, tools, options.levels, known_height, known_light)
-        unknowns.begin()
         monitor.report("shape and light", 0.0)
+        _begin(unknowns, problem.weights.starts, options.lbfgs, tools.algebra(), monitor)
         if unknowns.x.size:
             outcome = minimise(unknowns, unknowns.x, options.lbfgs, tools.algebra(), _reporter(monitor, options.lbfgs.iterations))
         else:
@@ -224,6 +227,24 @@ def solve(
             np.array(unknowns.height(), float), np.array(unknowns.light(), float), unknowns.terms,
             outcome.iterations, unknowns.evaluations, outcome.reason, outcome.converged,
         )  # fmt: skip
+
+
+def _begin(unknowns: _Unknowns, starts: Sequence[Start], options: LbfgsOptions, algebra: Algebra, monitor: Monitor) -> None:
+    """Leaves the unknowns at the only start there is, or where the start had got whose loss was lowest after `_TRIAL` evaluations."""
+    ways: list[np.ndarray] = []
+    for start in starts:
+        unknowns.begin(start)
+        if not any(np.array_equal(unknowns.x, way) for way in ways):
+            ways.append(unknowns.x.copy())
+    losses = [0.0] * len(ways)
+    trial = replace(options, evaluations=min(_TRIAL, options.evaluations))
+    for k, way in enumerate(ways if len(ways) > 1 else ()):
+        unknowns.x[...] = way
+        losses[k] = minimise(
+            unknowns, unknowns.x, trial, algebra, lambda _, loss: monitor.report(f"shape and light, loss {loss:.3f}", 0.0)
+        ).loss
+        way[...] = unknowns.x
+    unknowns.x[...] = ways[int(np.argmin(losses))]
 
 
 def _reporter(monitor: Monitor, most: int) -> Callable[[int, float], None]:

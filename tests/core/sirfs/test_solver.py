@@ -16,7 +16,7 @@ from isc_core.sirfs.priors import SilhouetteProfile
 from isc_core.sirfs.problem import DepthObservation
 from isc_core.sirfs.settings import Start
 from isc_core.sirfs.silhouette import silhouette_field
-from isc_core.sirfs.solver import MOST_THREADS, SolverOptions, solve, thread_count
+from isc_core.sirfs.solver import MOST_THREADS, SirfsResult, SolverOptions, solve, thread_count
 from isc_core.sirfs.stencils import normals
 
 from .small_problems import Scene, blob, make_problem, weights
@@ -210,9 +210,35 @@ def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
     unmoved = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(iterations=0))
     flat = solve(plain, unmoved)
     assert not flat.height.any() and np.abs(flat.light).max() < 1e-12
-    begun = solve(replace(plain, weights=replace(plain.weights, start=Start(dome=0.5, light=0.5))), unmoved)
+    begun = solve(replace(plain, weights=replace(plain.weights, starts=(Start(dome=0.5, light=0.5),))), unmoved)
     inner = ndimage.binary_erosion(scene.mask, iterations=4)
     np.testing.assert_allclose(begun.height[inner], field.dome[inner] / 2, atol=0.15 * begun.height.max())
     np.testing.assert_allclose(begun.light, unstack(plain.priors.light.offset, 3) / 2, atol=1e-9)
-    seen = replace(plain, weights=replace(plain.weights, start=Start(dome=1)), observation=DepthObservation(scene.height))
+    seen = replace(plain, weights=replace(plain.weights, starts=(Start(dome=1),)), observation=DepthObservation(scene.height))
     assert not solve(seen, unmoved).height.any(), "what was seen decides, not the outline"
+
+
+def test_of_several_starts_the_one_that_leads_deeper_goes_on() -> None:
+    """A light far from any likely one is a bad start; which of the starts stands first does not matter."""
+    problem = make_problem(hemisphere())
+    good, bad = Start(), Start(light=40)
+    options = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(evaluations=60))
+
+    def lowest(*starts: Start) -> SirfsResult:
+        return solve(replace(problem, weights=replace(problem.weights, starts=starts)), options)
+
+    alone, both, turned = lowest(good), lowest(bad, good), lowest(good, bad)
+    assert lowest(bad).terms.total > 1.5 * alone.terms.total
+    assert both.terms.total <= alone.terms.total
+    np.testing.assert_array_equal(both.height, turned.height)
+    assert lowest(good, good).evaluations == alone.evaluations, "the same start is not tried twice"
+
+
+def test_trying_starts_can_be_cancelled_and_does_not_pretend_to_advance() -> None:
+    problem = make_problem(hemisphere())
+    problem = replace(problem, weights=replace(problem.weights, starts=(Start(), Start(light=1))))
+    seen: list[float] = []
+    solve(problem, SolverOptions(threads=1, lbfgs=LbfgsOptions(evaluations=60)), monitor=Monitor(lambda _, share: seen.append(share)))
+    assert seen == sorted(seen)
+    with pytest.raises(Cancelled):
+        solve(problem, SolverOptions(threads=1), monitor=Monitor(cancelled=lambda: True))
