@@ -29,7 +29,7 @@ class Weights:
     `contour`: normals on the occluding contour point outward, with the penalty's power `contour_power`.
     `light`: likely illuminations. `silhouette`: surfaces lean outward near the outline (ours; not in the
     published sets). `shading_only`: in shape-from-shading mode, how strictly reflectance is one colour.
-    `starts`: each is tried, and the one that leads deeper goes on.
+    `starts`: one at least; each is tried, and the one that leads deeper goes on.
     """
 
     smoothness: float

@@ -236,15 +236,18 @@ def _begin(unknowns: _Unknowns, starts: Sequence[Start], options: LbfgsOptions, 
         unknowns.begin(start)
         if not any(np.array_equal(unknowns.x, way) for way in ways):
             ways.append(unknowns.x.copy())
-    losses = [0.0] * len(ways)
-    trial = replace(options, evaluations=min(_TRIAL, options.evaluations))
-    for k, way in enumerate(ways if len(ways) > 1 else ()):
+    if len(ways) == 1:
+        return
+    trial, losses = replace(options, evaluations=min(_TRIAL, options.evaluations)), []
+    for way in ways:
         unknowns.x[...] = way
-        losses[k] = minimise(
-            unknowns, unknowns.x, trial, algebra, lambda _, loss: monitor.report(f"shape and light, loss {loss:.3f}", 0.0)
-        ).loss
+        losses.append(minimise(unknowns, unknowns.x, trial, algebra, _waiting(monitor)).loss)
         way[...] = unknowns.x
     unknowns.x[...] = ways[int(np.argmin(losses))]
+
+
+def _waiting(monitor: Monitor) -> Callable[[int, float], None]:
+    return lambda _, loss: monitor.report(f"shape and light, loss {loss:.3f}", 0.0)
 
 
 def _reporter(monitor: Monitor, most: int) -> Callable[[int, float], None]:
