@@ -26,6 +26,7 @@ import numpy as np
 from scipy.optimize import least_squares, nnls
 
 from ..brdf.blinn_phong import BlinnPhong
+from ..brdf.fitting.result import NO_LIGHT
 from ..brdf.shading import directional, radiance
 from ..decomposition import Decomposition
 from .edited import luminance, white_of
@@ -98,9 +99,12 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
 
 
 def explain_specular(d: Decomposition) -> LightEstimate:
-    """The distant light, and the exponent of the lobe, that best explain the specular layer. Where there is none nothing is explained."""
+    """The distant light, and the exponent of the lobe, that best explain the specular layer.
+
+    Where there is none, or next to none by the fit of the lobe, nothing is explained: some light goes through any two faint specks.
+    """
     samples = _samples(d, d.specular, _RIM)
-    if not samples.values.any():
+    if not samples.values.any() or (d.brdf is not None and d.brdf.reason == NO_LIGHT):
         return LightEstimate(DirectionalLight(VIEW, np.zeros(3)), 0.0, 180.0, None)
 
     def model(light: np.ndarray, rest: np.ndarray) -> np.ndarray:

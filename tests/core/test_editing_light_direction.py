@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from isc_core.brdf.fitting.result import NO_LIGHT, LobeFit
 from isc_core.decomposition import Decomposition
 from isc_core.editing.light_direction import explain_shading, explain_specular, lobe_light
 from isc_core.editing.lights import DirectionalLight, toward
@@ -97,3 +98,14 @@ def test_the_sphere_is_brightest_where_it_faces_the_light() -> None:
     assert color.max() == pytest.approx(1.0, abs=1e-3)
     glint, _ = render_sphere(DirectionalLight(toward(0.5, 0.5, 0.7)), size=101, exponent=60.0)
     assert (glint >= color).all() and glint.max() > 1.05
+
+
+def test_specks_of_a_matt_object_tell_no_light() -> None:
+    """Where the fit of the lobe says that there are next to no highlights, two faint pixels are no direction."""
+    scene = ball()
+    specks = np.zeros_like(scene.specular)
+    specks[30:32, 40] = 0.01
+    fit = LobeFit("ggx", False, NO_LIGHT, None, None, (), None, None, 0.0, np.zeros_like(specks))
+    matt = replace(scene, specular=specks, brdf=fit)
+    assert not explain_specular(matt).determined
+    assert explain_specular(replace(matt, brdf=None)).exponent is not None, "without a fit whatever there is is explained"
