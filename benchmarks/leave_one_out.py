@@ -69,12 +69,13 @@ def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool) -> list[Task]
     for method in methods:
         whole = fit_priors(statistics, lights, fit_options(method)) if in_sample else None
         for name in statistics:
-            fold = whole or fit_priors(_without(statistics, name), lights, fit_options(method))
+            fold = whole or fit_priors(without(statistics, name), lights, fit_options(method))
             made += [Task(method, name, light, fold, shared) for light in LIGHTS]
     return made
 
 
-def _without(statistics: dict[str, ObjectStatistics], name: str) -> dict[str, ObjectStatistics]:
+def without(statistics: dict[str, ObjectStatistics], name: str) -> dict[str, ObjectStatistics]:
+    """The other objects: what the priors of a fold are fitted to."""
     return {key: value for key, value in statistics.items() if key != name}
 
 

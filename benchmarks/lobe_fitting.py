@@ -19,10 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.brdf.fitting import Interval, LobeFit, LobeFitOptions, fit_lobe
-from isc_core.models.lobe import outline_of
 from isc_core.photo import Photo, PhotoSource
 from isc_core.pipeline import decompose
 from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.silhouette import outline_normals
 from synth.albedos import make_albedo
 from synth.light_rigs import make_lights
 from synth.light_rigs.placing import places, white
@@ -184,7 +184,7 @@ def chain_fit(case: Case) -> Found:
     m, mask = case.maps, case.maps["mask"]
     start = time.perf_counter()
     options = LobeFitOptions(recovered=True)
-    outline = outline_of(mask, shipped_prior_set().priors("natural", 3))
+    outline = outline_normals(mask, shipped_prior_set().silhouette)
     fit = fit_lobe(m["chain_specular"], m["chain_normal"], mask, options=options, shading=m["chain_shading"], outline=outline)
     seconds = time.perf_counter() - start
     return compare(case, fit, seconds, float(m["chain_shading"][mask].mean() / m["shading"][mask].mean()))

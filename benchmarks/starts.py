@@ -22,6 +22,7 @@ import numpy as np
 
 from isc_core.datasets import MitBerkeleyObject, list_objects, load_natural_lights
 from isc_core.metrics import Scores, truth_normal
+from isc_core.models.shape import usual_gain
 from isc_core.sirfs.fitting.fit import FitOptions, fit_priors
 from isc_core.sirfs.fitting.prior_set import PriorSet
 from isc_core.sirfs.fitting.statistics import collect_statistics
@@ -37,11 +38,10 @@ from synth.validation.sirfs_stage import score_sirfs, with_normals
 from synth.validation.stages import BLACK, Inputs
 
 from .berkeley import LIGHTS, parser, problem, rounded, rounded_image, scores, training_object, write_json
+from .leave_one_out import METRICS, without
 
-METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
 Starts = tuple[Start, ...]
 _APART = 1.5
-_BRIGHT, _USUAL = 95.0, 0.75  # as `models.shape` exposes float files
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ def _lit(truth: MitBerkeleyObject, light: np.ndarray) -> MitBerkeleyObject:
 def _of_scene(task: Task, weights: Weights) -> Found:
     truth = read_truth(task.case)
     diffuse = rounded_image(np.maximum(truth.diffuse, 0).astype(float), task.rounding)
-    gain = _USUAL / float(np.percentile(diffuse[truth.mask].max(axis=1), _BRIGHT))
+    gain = usual_gain(diffuse, truth.mask)
     options = RecoverOptions(solver=SolverOptions(threads=1))
     result = recover(diffuse * gain, truth.mask, BLACK, shipped_prior_set().priors(task.light, 3), weights, options)
     normal = normal_from_reference(normals(result.height))
@@ -116,7 +116,7 @@ def object_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[
     root = given.shared / "data" / "mit_berkeley_train"
     statistics, lights = collect_statistics(read_training_objects(root)), load_natural_lights(root)
     for name in list_objects(root, given.light):
-        fold = fit_priors({key: value for key, value in statistics.items() if key != name}, lights, FitOptions())
+        fold = fit_priors(without(statistics, name), lights, FitOptions())
         names = [other for other in list_objects(root, given.light) if other != name]
         for other in [names[k] for k in given.others] or [None]:
             for rounding in range(given.roundings):
@@ -139,7 +139,7 @@ def report(found: Sequence[Found], ways: Sequence[Starts]) -> None:
     for starts in ways:
         ratios = np.log([[*by[starts].errors, by[starts].average] for by in cases.values()])
         ratios -= np.log([[*by[ways[0]].errors, by[ways[0]].average] for by in cases.values()])
-        cells = [f"{value:.3f}" for value in np.exp(ratios.mean(axis=0))]
+        cells = ["-" if np.isnan(value) else f"{value:.3f}" for value in np.exp(ratios.mean(axis=0))]
         print(f"| {_words(starts)} | {' | '.join(cells)} | {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |")
     for (case, other, rounding), by in cases.items():
         best = min(one.average for one in by.values())
@@ -162,8 +162,13 @@ def main() -> None:
     with ProcessPoolExecutor(given.processes) as pool:
         found = list(pool.map(run, tasks))
     report(found, given.starts)
-    keys = [(one.task.case, one.task.other, one.task.rounding, _words(one.task.starts)) for one in found]
-    write_json(given.json, [(*key, one.errors, one.loss) for key, one in zip(keys, found, strict=True)])
+    write_json(given.json, [_row(one) for one in found])
+
+
+def _row(found: Found) -> tuple[object, ...]:
+    """A case, its start, what was compared and the loss, JSON-ready."""
+    task, errors = found.task, [None if np.isnan(error) else error for error in found.errors]
+    return task.case, task.other, task.rounding, _words(task.starts), errors, found.loss
 
 
 def _ways(text: str) -> list[Starts]:

@@ -16,7 +16,6 @@ from ..brdf.roughness import blender_from_alpha
 from ..decomposition import Separation
 from ..progress import Monitor
 from ..sirfs.prior_file import shipped_prior_set
-from ..sirfs.priors import Priors
 from ..sirfs.silhouette import outline_normals
 from .layers import shaded
 from .shape import Shape
@@ -66,14 +65,9 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
         normal, shading = shaded(shape.height, shape.light, photo.mask)
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
         options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None)
-        priors = (task.prior_set or shipped_prior_set()).priors(task.settings.illumination, 3)
+        profile = (task.prior_set or shipped_prior_set()).silhouette
         fit = fit_lobe(
             split.specular, normal, photo.mask, options=options, clipped=photo.clipped, height=shape.height, shading=shading,
-            outline=outline_of(photo.mask, priors) if options.recovered else None, monitor=monitor,
+            outline=outline_normals(photo.mask, profile) if options.recovered else None, monitor=monitor,
         )  # fmt: skip
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))
-
-
-def outline_of(mask: np.ndarray, priors: Priors) -> np.ndarray | None:
-    """What the outline of `mask` (H, W) alone says of normals, (H, W, 3), camera frame; None where `priors` say nothing of outlines."""
-    return None if priors.silhouette is None else outline_normals(mask, priors.silhouette)

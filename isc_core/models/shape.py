@@ -82,7 +82,12 @@ def _usual_exposure(photo: Photo) -> float:
     """What the light of a photo of unknown exposure is multiplied by, so that it is as bright as photos are; 1 of others."""
     if photo.exposed:
         return 1.0
-    brightest = photo.image[photo.mask].max(axis=1)
+    return usual_gain(photo.image, photo.mask)
+
+
+def usual_gain(image: np.ndarray, mask: np.ndarray) -> float:
+    """What linear light (H, W, C) is multiplied by, so that it is as bright inside `mask` (H, W) bool as photos are."""
+    brightest = image[mask].max(axis=1)
     level = float(np.percentile(brightest, _BRIGHT)) or float(brightest.max())
     return _USUAL / level
 
