@@ -73,7 +73,8 @@ def lathe_form(name: str, rng: np.random.Generator) -> Mesh:
 
 
 def hollow(outer: np.ndarray, wall: float) -> np.ndarray:
-    """The outline (n, 2) of a vessel with a wall, from the inner floor over the rim to the lower pole, from its outer one, rim first."""
+    """The outline (n, 2) of a vessel with a wall, from the inner floor over the rim to the lower pole, from its outer one, rim first; a
+    solid one's, closed at the top, where even the rim leaves no room for a wall."""
     side = outer[:-1]
     floor = side[-1, 1] + 2 * wall
     fine = np.linspace(side[0, 1] - wall / 2, floor + wall, 60)
@@ -82,6 +83,8 @@ def hollow(outer: np.ndarray, wall: float) -> np.ndarray:
     radius = PchipInterpolator(heights, side[upward, 0][first])(fine) - wall
     # A narrow foot or neck leaves no room for a second wall: the inside ends above it.
     room = np.argmax(radius < wall) if (radius < wall).any() else len(fine)
+    if room == 0:
+        return np.concatenate([[(0, outer[0, 1])], outer])
     inner = np.stack([radius, fine], -1)[:room]
     bottom = (0.6 * inner[-1, 0], inner[-1, 1] - wall)
     return np.concatenate([[(0, bottom[1])], [bottom], inner[::-1], side[:1] - (wall / 2, -wall / 8), side, outer[-1:]])

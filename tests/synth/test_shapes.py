@@ -158,6 +158,14 @@ def test_every_turned_form_is_closed_and_has_its_normals(form: str) -> None:
     assert (mesh.normals[mesh.faces[:, 0]] * normal).sum(1)[solid].min() > 0.2
 
 
+@pytest.mark.parametrize("seed", [10, 22, 41])
+def test_a_bottle_whose_neck_is_too_narrow_for_a_wall_is_solid(seed: int) -> None:
+    mesh = lathe_form("bottle", np.random.default_rng(seed))
+    assert_closed(mesh)
+    normal, solid = facing(mesh)
+    assert (mesh.normals[mesh.faces[:, 0]] * normal).sum(1)[solid].min() > 0.2
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_extruded_outline_is_seen_whole_from_its_middle(kind: str) -> None:
     for seed in range(30):
