@@ -143,38 +143,65 @@ def minimise(
 
     `each(iteration, loss)` is called after every step; what it raises ends the run.
     """
-    memory = _Memory(options.memory, x.size, x.dtype, algebra)
-    direction, start, old_gradient = np.empty_like(x), np.empty_like(x), np.empty_like(x)
-    loss = function(x, memory.gradient)
-    evaluations, losses = 1, [loss]
-    memory.refresh(None)
-    for iteration in range(1, options.iterations + 1):
-        if float(np.abs(memory.gradient).max()) <= options.gradient_tolerance:
-            return LbfgsResult(loss, iteration - 1, evaluations, "gradient")
-        slope = memory.direction(direction)
+    return Minimisation(function, x, options, algebra).run(each)
+
+
+class Minimisation:
+    """One that can be put down and taken up again, as if it had never stopped. `x` (N,) is where it is, changed in place; `loss` there."""
+
+    def __init__(self, function: Function, x: np.ndarray, options: LbfgsOptions, algebra: Algebra) -> None:
+        self.x, self._function, self._options = x, function, options
+        self._memory = _Memory(options.memory, x.size, x.dtype, algebra)
+        self._direction, self._start, self._old_gradient = np.empty_like(x), np.empty_like(x), np.empty_like(x)
+        self.loss = function(x, self._memory.gradient)
+        self._losses, self._evaluations, self._reason = [self.loss], 1, ""
+        self._memory.refresh(None)
+
+    def run(self, each: Callable[[int, float], None] = lambda iteration, loss: None, evaluations: int | None = None) -> LbfgsResult:
+        """Goes on until there is no more to gain, or until it has taken `evaluations` in all (None: as many as the options allow)."""
+        most = self._options.evaluations if evaluations is None else min(evaluations, self._options.evaluations)
+        while not self._reason:
+            if float(np.abs(self._memory.gradient).max()) <= self._options.gradient_tolerance:
+                self._reason = "gradient"
+            elif self._iterations >= self._options.iterations:
+                return self._result("iterations")
+            elif self._evaluations >= most:
+                return self._result("evaluations")
+            else:
+                self._step()
+                each(self._iterations, self.loss)
+        return self._result(self._reason)
+
+    @property
+    def _iterations(self) -> int:
+        return len(self._losses) - 1
+
+    def _result(self, reason: str) -> LbfgsResult:
+        return LbfgsResult(self.loss, self._iterations, self._evaluations, reason)
+
+    def _step(self) -> None:
+        memory, options = self._memory, self._options
+        slope = memory.direction(self._direction)
         if not slope < 0:
             memory.forget()
-            slope = memory.direction(direction)
-        first = 1.0 if iteration > 1 else min(1.0, 1.0 / float(np.abs(memory.gradient).sum(dtype=float)))
-        np.copyto(start, x)
-        np.copyto(old_gradient, memory.gradient)
-        search = _Search(function, x, start, direction, memory.gradient, options)
-        step, loss = search.run(loss, slope, first)
-        evaluations += search.evaluations
+            slope = memory.direction(self._direction)
+        first = 1.0 if self._iterations else min(1.0, 1.0 / float(np.abs(memory.gradient).sum(dtype=float)))
+        np.copyto(self._start, self.x)
+        np.copyto(self._old_gradient, memory.gradient)
+        search = _Search(self._function, self.x, self._start, self._direction, memory.gradient, options)
+        step, self.loss = search.run(self.loss, slope, first)
+        self._evaluations += search.evaluations
         slot = memory.next_slot()
-        np.subtract(x, start, out=memory.vectors[slot])
-        np.subtract(memory.gradient, old_gradient, out=memory.vectors[memory.size + slot])
+        np.subtract(self.x, self._start, out=memory.vectors[slot])
+        np.subtract(memory.gradient, self._old_gradient, out=memory.vectors[memory.size + slot])
         memory.refresh(slot)
-        each(iteration, loss)
-        losses.append(loss)
-        recent = losses[-1 - options.loss_window : -1]
-        if len(recent) == options.loss_window and all(abs(v - loss) <= options.loss_tolerance * abs(loss) for v in recent):
-            return LbfgsResult(loss, iteration, evaluations, "loss")
-        if step * float(np.abs(direction).max()) < options.step_tolerance or abs(losses[-2] - loss) < options.step_tolerance:
-            return LbfgsResult(loss, iteration, evaluations, "step")
-        if evaluations >= options.evaluations:
-            return LbfgsResult(loss, iteration, evaluations, "evaluations")
-    return LbfgsResult(loss, options.iterations, evaluations, "iterations")
+        recent = self._losses[-options.loss_window :]
+        settled = all(abs(v - self.loss) <= options.loss_tolerance * abs(self.loss) for v in recent)
+        if len(recent) == options.loss_window and settled:
+            self._reason = "loss"
+        elif step * float(np.abs(self._direction).max()) < options.step_tolerance or abs(recent[-1] - self.loss) < options.step_tolerance:
+            self._reason = "step"
+        self._losses.append(self.loss)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ Source: Barron & Malik, "Shape, Illumination, and Reflectance from Shading", TPA
 
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..linear import solved
 from ..progress import Monitor
 from ..workers import Workers
 from .illumination import stack, unstack
-from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, NumpyAlgebra, minimise
+from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, Minimisation, NumpyAlgebra
 from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
@@ -172,21 +172,22 @@ class _Unknowns:
             prior = self._problem.priors.light
             self.x[self._edges[-1] :] = solved(prior.unwhiten, (stack(light) - prior.offset)[:, None])[:, 0]
 
-    def begin(self, start: Start) -> None:
-        """Brings the unknowns to `start`, as far as they are unknown and nothing else is seen of them."""
+    def at(self, start: Start) -> np.ndarray:
+        """The vector of `start`, as far as the unknowns are unknown and nothing else is seen of them."""
         p = self._problem
-        self.x[...] = 0
+        self.x = np.zeros_like(self.x)
         self.set_light(start.light * unstack(p.priors.light.offset, self.channels))
         if not start.dome or p.silhouette is None or p.observation is not None or not self.shapes:
-            return
+            return self.x
         level = min(_START_LEVEL, len(self.shapes) - 1)
         height = start.dome * p.silhouette.dome
         for _ in range(level):
             height = down(height) / _COARSER
         self.levels(self.x)[level][...] = height
+        return self.x
 
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
-        assert x is self.x
+        self.x = x
         self.evaluations += 1
         result = self._engine.evaluate(self.height(), self.light())
         if self._known_height is None:
@@ -218,9 +219,11 @@ def solve(
         tools = _Tools(options, workers)
         unknowns = _Unknowns(problem, tools, options.levels, known_height, known_light)
         monitor.report("shape and light", 0.0)
-        _begin(unknowns, problem.weights.starts, options.lbfgs, tools.algebra(), monitor)
         if unknowns.x.size:
-            outcome = minimise(unknowns, unknowns.x, options.lbfgs, tools.algebra(), _reporter(monitor, options.lbfgs.iterations))
+            begun = _begun(unknowns, problem.weights.starts, options.lbfgs, tools.algebra(), monitor)
+            outcome = begun.run(_reporter(monitor, options.lbfgs.iterations))
+            if unknowns.x is not begun.x:  # it had come to its end before another start was tried
+                unknowns(begun.x, np.empty_like(begun.x))
         else:
             outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")  # all is known: only the loss is asked for
         return SirfsResult(
@@ -229,21 +232,19 @@ def solve(
         )  # fmt: skip
 
 
-def _begin(unknowns: _Unknowns, starts: Sequence[Start], options: LbfgsOptions, algebra: Algebra, monitor: Monitor) -> None:
-    """Leaves the unknowns at the only start there is, or where the start had got whose loss was lowest after `_TRIAL` evaluations."""
+def _begun(unknowns: _Unknowns, starts: Sequence[Start], options: LbfgsOptions, algebra: Algebra, monitor: Monitor) -> Minimisation:
+    """The minimisation from the only start there is, or, taken that far, the one whose loss is lowest after `_TRIAL` evaluations."""
     ways: list[np.ndarray] = []
     for start in starts:
-        unknowns.begin(start)
-        if not any(np.array_equal(unknowns.x, way) for way in ways):
-            ways.append(unknowns.x.copy())
+        way = unknowns.at(start)
+        if not any(np.array_equal(way, other) for other in ways):
+            ways.append(way)
     if len(ways) == 1:
-        return
-    trial, losses = replace(options, evaluations=min(_TRIAL, options.evaluations)), []
-    for way in ways:
-        unknowns.x[...] = way
-        losses.append(minimise(unknowns, unknowns.x, trial, algebra, _waiting(monitor)).loss)
-        way[...] = unknowns.x
-    unknowns.x[...] = ways[int(np.argmin(losses))]
+        return Minimisation(unknowns, ways[0], options, algebra)
+    begun = [Minimisation(unknowns, way, options, algebra) for way in ways]
+    for one in begun:
+        one.run(_waiting(monitor), _TRIAL)
+    return min(begun, key=lambda one: one.loss)
 
 
 def _waiting(monitor: Monitor) -> Callable[[int, float], None]:

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.sirfs.lbfgs import Algebra, LbfgsOptions, NumpyAlgebra, _Memory, minimise
+from isc_core.sirfs.lbfgs import Algebra, LbfgsOptions, Minimisation, NumpyAlgebra, _Memory, minimise
 from isc_core.workers import Workers
 
 EXACT = LbfgsOptions(loss_tolerance=0.0, gradient_tolerance=1e-9, step_tolerance=0.0, evaluations=5000)
@@ -50,6 +50,18 @@ def test_rosenbrock_in_20_dimensions() -> None:
     assert result.reason == "gradient"
     assert result.evaluations < 400
     np.testing.assert_allclose(x, 1.0, atol=1e-7)
+
+
+def test_put_down_and_taken_up_it_goes_on_as_if_it_had_never_stopped() -> None:
+    whole, parts = np.tile([-1.2, 1.0], 10), np.tile([-1.2, 1.0], 10)
+    expected = minimise(rosenbrock, whole, EXACT, NumpyAlgebra())
+    minimisation = Minimisation(rosenbrock, parts, EXACT, NumpyAlgebra())
+    stops = [minimisation.run(evaluations=most) for most in (20, 20, 50)]
+    assert [stop.reason for stop in stops] == ["evaluations"] * 3
+    assert 20 <= stops[0].evaluations == stops[1].evaluations < stops[2].evaluations < 50 + EXACT.trials
+    assert minimisation.run() == expected
+    assert minimisation.run() == expected, "at its end it stays there"
+    np.testing.assert_array_equal(parts, whole)
 
 
 def test_losses_fall_and_the_result_is_what_the_last_point_gives() -> None:

@@ -234,6 +234,18 @@ def test_of_several_starts_the_one_that_leads_deeper_goes_on() -> None:
     assert lowest(good, good).evaluations == alone.evaluations, "the same start is not tried twice"
 
 
+def test_the_start_that_goes_on_ends_where_it_would_have_ended_alone() -> None:
+    """However far it had got when it was chosen: in the middle of its way, or at its end."""
+    problem = make_problem(hemisphere())
+    good, bad = Start(), Start(light=40)
+    for tolerance in (1e-4, 0.5):
+        options = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(loss_tolerance=tolerance, evaluations=150))
+        alone, chosen = (solve(replace(problem, weights=replace(problem.weights, starts=s)), options) for s in ((good,), (good, bad)))
+        np.testing.assert_array_equal(chosen.height, alone.height)
+        np.testing.assert_array_equal(chosen.light, alone.light)
+        assert (chosen.terms, chosen.reason) == (alone.terms, alone.reason)
+
+
 def test_trying_starts_can_be_cancelled_and_does_not_pretend_to_advance() -> None:
     problem = make_problem(hemisphere())
     problem = replace(problem, weights=replace(problem.weights, starts=(Start(), Start(light=1))))
