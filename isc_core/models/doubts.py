@@ -23,7 +23,8 @@ from .task import Answer
 
 _MUCH_CLIPPED = 0.1  # of the object; where single highlights are, it is less
 _RAGGED = 0.5  # of the mask that no block of 2 x 2 pixels holds, and no mesh will
-LIKELY = 0.6  # of a mirror or glass together, or of several lamps: a doubt
+LIKELY_CLEAR = 0.6  # of a mirror or glass together: a doubt
+LIKELY_SEVERAL = 0.5  # of several lamps: lower, for that network is seldom sure of them
 _LEAST = 0.1  # of the confidence is left
 CLEAR = "the object looks like a mirror or like something transparent: what was found would be an opaque one's, hardly its own"
 SEVERAL = "there seem to be several lights: one was looked for, so shape, paint and gloss are less to be trusted; use one lamp if you can"
@@ -32,7 +33,7 @@ SEVERAL = "there seem to be several lights: one was looked for, so shape, paint 
 def doubts_of(kinds: dict[str, float]) -> list[str]:
     """Lines for people, of the probabilities that `appearance.kinds_of` found; none where there is no doubt."""
     clear, several = kinds[MIRROR] + kinds[GLASS], kinds[LAMPS]
-    return [*([CLEAR] if clear > LIKELY else []), *([SEVERAL] if several > LIKELY else [])]
+    return [*([CLEAR] if clear > LIKELY_CLEAR else []), *([SEVERAL] if several > LIKELY_SEVERAL else [])]
 
 
 def doubts_of_photo(photo: Photo) -> list[str]:

@@ -33,6 +33,8 @@ def answered() -> tuple[Photo, Answer]:
         (MIRRORED, ["mirror"]),
         ({ORDINARY: 0.3, MIRROR: 0.0, GLASS: 0.0, LAMPS: 0.7}, ["several lights"]),
         ({ORDINARY: 0.3, MIRROR: 0.15, GLASS: 0.15, LAMPS: 0.4}, []),
+        ({ORDINARY: 0.45, MIRROR: 0.0, GLASS: 0.0, LAMPS: 0.55}, ["several lights"]),
+        ({ORDINARY: 0.45, MIRROR: 0.25, GLASS: 0.3, LAMPS: 0.0}, []),
     ],
 )
 def test_each_kind_has_its_line(kinds: dict[str, float], words: list[str]) -> None:
