@@ -2,6 +2,8 @@
 
   python -m benchmarks.leave_one_out --json loo.json        baseline B (the published recipe and weights) and ours, both lights
   python -m benchmarks.leave_one_out --in-sample            the same with priors fitted to all ten
+  python -m benchmarks.leave_one_out --grey                 the photos without their colours; for grey ones in natural light no weights are
+                                                            published: those for laboratory light stand in
 
 Both lights of the object are left out, so its shape, paint and lights are unknown to the priors. The statistics of the ten objects are
 condensed once; a fold is a fit to nine of them. The comparison is paired: the ratio of geometric means with a 95 % bootstrap interval
@@ -25,7 +27,7 @@ from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.settings import isc_weights, published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .berkeley import LIGHTS, parser, problem, scores, training_object, write_json
+from .berkeley import LIGHTS, greyed, parser, problem, scores, training_object, write_json
 
 METHODS = ("B", "B, lights scaled", "ours")
 METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
@@ -33,13 +35,14 @@ METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
 
 @dataclass(frozen=True)
 class Task:
-    """One solve: a method's priors without `name` (or with it) on `name` under `light`."""
+    """One solve: a method's priors without `name` (or with it) on `name` under `light`, in colour or `grey`."""
 
     method: str
     name: str
     light: str
     priors: PriorSet
     shared: Path
+    grey: bool = False
 
 
 def fit_options(method: str) -> FitOptions:
@@ -49,9 +52,11 @@ def fit_options(method: str) -> FitOptions:
 
 def run(task: Task) -> tuple[str, str, str, list[float], float]:
     """Six errors and the loss."""
-    weights = isc_weights(task.light, 3) if task.method == "ours" else published_weights(task.light, 3)
+    channels = 1 if task.grey else 3
+    weights = isc_weights(task.light, channels) if task.method == "ours" else published_weights(task.light, channels)
     truth = training_object(task.shared, task.name, task.light)
-    priors = task.priors.priors(task.light, 3)
+    truth = greyed(truth) if task.grey else truth
+    priors = task.priors.priors(task.light, channels)
     if task.method != "ours":
         priors = priors.without_silhouette()
     options = SolverOptions(threads=1) if task.method == "ours" else SolverOptions(threads=1, lbfgs=LbfgsOptions())  # the published rule
@@ -60,7 +65,7 @@ def run(task: Task) -> tuple[str, str, str, list[float], float]:
     return task.method, task.light, task.name, [getattr(errors, metric) for metric in METRICS], result.terms.total
 
 
-def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool) -> list[Task]:
+def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool, grey: bool) -> list[Task]:
     """All solves; fits the folds."""
     root = shared / "data" / "mit_berkeley_train"
     statistics = collect_statistics(read_training_objects(root))
@@ -70,7 +75,7 @@ def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool) -> list[Task]
         whole = fit_priors(statistics, lights, fit_options(method)) if in_sample else None
         for name in statistics:
             fold = whole or fit_priors(without(statistics, name), lights, fit_options(method))
-            made += [Task(method, name, light, fold, shared) for light in LIGHTS]
+            made += [Task(method, name, light, fold, shared, grey) for light in LIGHTS]
     return made
 
 
@@ -83,13 +88,16 @@ def main() -> None:
     """Runs and prints."""
     options = parser(__doc__)
     options.add_argument("--in-sample", action="store_true", help="priors fitted to all ten objects")
+    options.add_argument(
+        "--grey", action="store_true", help="the photos without their colours (natural light: no published weights are for it)"
+    )
     options.add_argument("--methods", default=",".join(METHODS).replace("B, lights scaled", "scaled"), help="of B, scaled, ours")
     options.add_argument("--processes", type=int, default=2)
     given = options.parse_args()
     methods = tuple("B, lights scaled" if m == "scaled" else m for m in given.methods.split(","))
     results: dict[tuple[str, str], dict[str, list[float]]] = {}
     with ProcessPoolExecutor(given.processes) as pool:
-        for method, light, name, errors, loss in pool.map(run, tasks(given.shared, methods, given.in_sample)):
+        for method, light, name, errors, loss in pool.map(run, tasks(given.shared, methods, given.in_sample, given.grey)):
             results.setdefault((method, light), {})[name] = errors
             print(f"{method:18s} {light:10s} {name:9s} avg {geometric_mean(errors):.5f}  loss {loss:.3f}", flush=True)
     report(results)
