@@ -242,13 +242,22 @@ def _begun(unknowns: _Unknowns, starts: Sequence[Start], options: LbfgsOptions, 
     if len(ways) == 1:
         return Minimisation(unknowns, ways[0], options, algebra)
     begun = [Minimisation(unknowns, way, options, algebra) for way in ways]
+    waiting = _waiting(monitor)
     for one in begun:
-        one.run(_waiting(monitor), _TRIAL)
+        one.run(waiting, _TRIAL)
     return min(begun, key=lambda one: one.loss)
 
 
 def _waiting(monitor: Monitor) -> Callable[[int, float], None]:
-    return lambda _, loss: monitor.report(f"shape and light, loss {loss:.3f}", 0.0)
+    """Tells the lowest loss of all starts so far: that of the one that will go on."""
+    lowest = np.inf
+
+    def each(_: int, loss: float) -> None:
+        nonlocal lowest
+        lowest = min(lowest, loss)
+        monitor.report(f"shape and light, loss {lowest:.3f}", 0.0)
+
+    return each
 
 
 def _reporter(monitor: Monitor, most: int) -> Callable[[int, float], None]:
