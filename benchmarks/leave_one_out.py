@@ -88,9 +88,7 @@ def main() -> None:
     """Runs and prints."""
     options = parser(__doc__)
     options.add_argument("--in-sample", action="store_true", help="priors fitted to all ten objects")
-    options.add_argument(
-        "--grey", action="store_true", help="the photos without their colours (natural light: no published weights are for it)"
-    )
+    options.add_argument("--grey", action="store_true", help="the photos without their colours")
     options.add_argument("--methods", default=",".join(METHODS).replace("B, lights scaled", "scaled"), help="of B, scaled, ours")
     options.add_argument("--processes", type=int, default=2)
     given = options.parse_args()

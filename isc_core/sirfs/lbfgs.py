@@ -154,30 +154,31 @@ class Minimisation:
         self._memory = _Memory(options.memory, x.size, x.dtype, algebra)
         self._direction, self._start, self._old_gradient = np.empty_like(x), np.empty_like(x), np.empty_like(x)
         self.loss = function(x, self._memory.gradient)
-        self._losses, self._evaluations, self._reason = [self.loss], 1, ""
+        self._losses, self._evaluations = [self.loss], 1
+        self._settled = ""  # why the last step was the last
         self._memory.refresh(None)
 
     def run(self, each: Callable[[int, float], None] = lambda iteration, loss: None, evaluations: int | None = None) -> LbfgsResult:
         """Goes on until there is no more to gain, or until it has taken `evaluations` in all (None: as many as the options allow)."""
         most = self._options.evaluations if evaluations is None else min(evaluations, self._options.evaluations)
-        while not self._reason:
-            if float(np.abs(self._memory.gradient).max()) <= self._options.gradient_tolerance:
-                self._reason = "gradient"
-            elif self._iterations >= self._options.iterations:
-                return self._result("iterations")
-            elif self._evaluations >= most:
-                return self._result("evaluations")
-            else:
-                self._step()
-                each(self._iterations, self.loss)
-        return self._result(self._reason)
+        while not (reason := self._stop(most)):
+            self._step()
+            each(self._iterations, self.loss)
+        return LbfgsResult(self.loss, self._iterations, self._evaluations, reason)
 
     @property
     def _iterations(self) -> int:
         return len(self._losses) - 1
 
-    def _result(self, reason: str) -> LbfgsResult:
-        return LbfgsResult(self.loss, self._iterations, self._evaluations, reason)
+    def _stop(self, evaluations: int) -> str:
+        """Why not to take another step, "" for no reason."""
+        if self._settled:
+            return self._settled
+        if float(np.abs(self._memory.gradient).max()) <= self._options.gradient_tolerance:
+            return "gradient"
+        if self._iterations >= self._options.iterations:
+            return "iterations"
+        return "evaluations" if self._evaluations >= evaluations else ""
 
     def _step(self) -> None:
         memory, options = self._memory, self._options
@@ -198,9 +199,9 @@ class Minimisation:
         recent = self._losses[-options.loss_window :]
         settled = all(abs(v - self.loss) <= options.loss_tolerance * abs(self.loss) for v in recent)
         if len(recent) == options.loss_window and settled:
-            self._reason = "loss"
+            self._settled = "loss"
         elif step * float(np.abs(self._direction).max()) < options.step_tolerance or abs(recent[-1] - self.loss) < options.step_tolerance:
-            self._reason = "step"
+            self._settled = "step"
         self._losses.append(self.loss)
 
 

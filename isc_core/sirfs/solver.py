@@ -167,24 +167,19 @@ class _Unknowns:
         stacked = np.einsum("ij,j->i", prior.unwhiten, self.x[self._edges[-1] :].astype(float)) + prior.offset
         return unstack(stacked, self.channels)
 
-    def set_light(self, light: np.ndarray) -> None:
-        if self._known_light is None:
-            prior = self._problem.priors.light
-            self.x[self._edges[-1] :] = solved(prior.unwhiten, (stack(light) - prior.offset)[:, None])[:, 0]
-
     def at(self, start: Start) -> np.ndarray:
         """The vector of `start`, as far as the unknowns are unknown and nothing else is seen of them."""
-        p = self._problem
-        self.x = np.zeros_like(self.x)
-        self.set_light(start.light * unstack(p.priors.light.offset, self.channels))
-        if not start.dome or p.silhouette is None or p.observation is not None or not self.shapes:
-            return self.x
-        level = min(_START_LEVEL, len(self.shapes) - 1)
-        height = start.dome * p.silhouette.dome
-        for _ in range(level):
-            height = down(height) / _COARSER
-        self.levels(self.x)[level][...] = height
-        return self.x
+        p, x = self._problem, np.zeros_like(self.x)
+        prior = p.priors.light
+        if self._known_light is None:  # whitened, the expected light is at 0
+            x[self._edges[-1] :] = solved(prior.unwhiten, (start.light - 1) * prior.offset[:, None])[:, 0]
+        if start.dome and p.silhouette is not None and p.observation is None and self.shapes:
+            level = min(_START_LEVEL, len(self.shapes) - 1)
+            height = start.dome * p.silhouette.dome
+            for _ in range(level):
+                height = down(height) / _COARSER
+            self.levels(x)[level][...] = height
+        return x
 
     def __call__(self, x: np.ndarray, gradient: np.ndarray) -> float:
         self.x = x
