@@ -31,7 +31,7 @@ from torch import nn
 from torch.nn import functional
 
 from benchmarks.doubt_scenes import scenes_in
-from benchmarks.layer_network_samples import log_uniform
+from benchmarks.drawing import log_uniform
 from benchmarks.layer_network_training import arrays_of, inputs
 from isc_core.appearance import GLASS, KINDS, LAMPS, LONG_SIDE, MIRROR, ORDINARY
 from isc_core.box import mask_slices

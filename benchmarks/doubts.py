@@ -1,6 +1,7 @@
 """How often a photo is doubted that should be, and how often one that should not.
 
-  python -m benchmarks.doubts SCENES... [--photos DIR...] [--data ROOT...] [--only NAME...] [--appearance FILE]
+  python -m benchmarks.doubts SCENES... [--photos DIR...] [--data ROOT...] [--only NAME...]
+      [--appearance FILE] [--lamps FILE]
 
 SCENES: of `python -m benchmarks.doubt_scenes`. `--photos`: folders of photos with masks; `--data`: sets like MIT-Berkeley's, their
 laboratory photos as they are and without gloss. `--only`: those of these families of shapes and objects of sets. A Markdown table; what is
@@ -16,10 +17,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.doubt_scenes import scenes_in
-from isc_core.appearance import KINDS, AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
+from isc_core.appearance import AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
 from isc_core.datasets import list_objects, load_object
 from isc_core.errors import InputError
-from isc_core.models.doubts import CLEAR, doubts_of
+from isc_core.lamp_network import LampNetwork, glance_at, read_lamp_network, shipped_lamp_network
+from isc_core.models.doubts import CLEAR, SEVERAL, doubts_of
 from isc_core.photo import read_photo
 
 
@@ -69,11 +71,13 @@ def main() -> None:
     parser.add_argument("--photos", type=Path, nargs="+", default=[])
     parser.add_argument("--data", type=Path, nargs="+", default=[])
     parser.add_argument("--only", nargs="+", default=[])
-    parser.add_argument("--appearance", type=Path)
+    parser.add_argument("--appearance", type=Path, help="another network for mirrors and glass")
+    parser.add_argument("--lamps", type=Path, help="another network for several lamps")
     given = parser.parse_args()
     try:
-        network = shipped_appearance() if given.appearance is None else read_appearance(given.appearance)
-        report(list(_cases(given)), network)
+        appearance = shipped_appearance() if given.appearance is None else read_appearance(given.appearance)
+        lamps = shipped_lamp_network() if given.lamps is None else read_lamp_network(given.lamps)
+        report(list(_cases(given)), appearance, lamps)
     except InputError as error:
         parser.error(str(error))
 
@@ -87,20 +91,18 @@ def _cases(given: argparse.Namespace) -> Iterator[Case]:
         yield from laboratory(root, given.only)
 
 
-def report(cases: list[Case], network: AppearanceNetwork) -> None:
+def report(cases: list[Case], appearance: AppearanceNetwork, lamps: LampNetwork) -> None:
     """Prints the table, and what is doubted of the photos. Raises `InputError` where there are none."""
     if not cases:
         raise InputError("there is nothing to judge: name folders of scenes, --photos or --data")
-    found = [kinds_of(case.image, case.mask, network) for case in cases]
-    lines = [f"| photos | number | doubted | mirror or glass | {' | '.join(KINDS)} |", "|---|---:|---:|---:|" + "---:|" * len(KINDS)]
+    found = [doubts_of(kinds_of(case.image, case.mask, appearance), glance_at(case.image, case.mask, lamps)) for case in cases]
+    lines = ["| photos | number | doubted | mirror or glass | several lights |", "|---|---:|---:|---:|---:|"]
     for group in sorted({case.group for case in cases}):
-        rows = [kinds for kinds, case in zip(found, cases, strict=True) if case.group == group]
-        doubted = np.mean([bool(doubts_of(kinds)) for kinds in rows])
-        clear = np.mean([CLEAR in doubts_of(kinds) for kinds in rows])
-        means = " | ".join(f"{np.mean([kinds[kind] for kinds in rows]):.2f}" for kind in KINDS)
-        lines.append(f"| {group} | {len(rows)} | {doubted:.1%} | {clear:.1%} | {means} |")
-    named = [(case, kinds) for case, kinds in zip(cases, found, strict=True) if case.name and doubts_of(kinds)]
-    lines += ["", *(f"{case.group}: {case.name} seems {max(kinds, key=lambda kind: kinds[kind])}" for case, kinds in named)]
+        rows = [doubts for doubts, case in zip(found, cases, strict=True) if case.group == group]
+        shares = [np.mean([bool(doubts) if kind is None else kind in doubts for doubts in rows]) for kind in (None, CLEAR, SEVERAL)]
+        lines.append(f"| {group} | {len(rows)} | " + " | ".join(f"{share:.1%}" for share in shares) + " |")
+    named = [(case, doubts) for case, doubts in zip(cases, found, strict=True) if case.name and doubts]
+    lines += ["", *(f"{case.group}: {case.name}: {'; '.join(doubts)}" for case, doubts in named)]
     sys.stdout.write("\n".join(lines) + "\n")
 
 

@@ -20,6 +20,8 @@ from isc_core.datasets import list_objects, load_object
 from isc_core.exr import read_channels
 from isc_core.photo import averaged
 
+from .drawing import log_uniform
+
 SIZE, CROP = 192, 160
 _LONG_SIDE = 176  # of an object that is larger
 _LEAST = 1e-5
@@ -94,11 +96,6 @@ def _colour(values: np.ndarray) -> torch.Tensor:
 
 def _resized(layers: torch.Tensor, factor: float) -> torch.Tensor:
     return functional.interpolate(layers[None], scale_factor=factor, mode="bilinear", antialias=factor < 1, align_corners=False)[0]
-
-
-def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """From `low` to `high` > 0, its logarithm evenly."""
-    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
 def _placed(layers: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:

@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.brdf.fitting import Interval, LobeFit, LobeFitOptions, fit_lobe
+from isc_core.lamp_network import glance_at
 from isc_core.photo import Photo, PhotoSource
 from isc_core.pipeline import decompose
 from isc_core.sirfs.prior_file import shipped_prior_set
@@ -185,7 +186,10 @@ def chain_fit(case: Case) -> Found:
     start = time.perf_counter()
     options = LobeFitOptions(recovered=True)
     outline = outline_normals(mask, shipped_prior_set().silhouette)
-    fit = fit_lobe(m["chain_specular"], m["chain_normal"], mask, options=options, shading=m["chain_shading"], outline=outline)
+    glance = glance_at(np.maximum(m["image"], 0), mask)
+    fit = fit_lobe(
+        m["chain_specular"], m["chain_normal"], mask, options=options, shading=m["chain_shading"], outline=outline, glance=glance
+    )
     seconds = time.perf_counter() - start
     return compare(case, fit, seconds, float(m["chain_shading"][mask].mean() / m["shading"][mask].mean()))
 

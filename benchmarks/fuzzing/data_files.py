@@ -23,6 +23,7 @@ from isc_core.batch.manifest import Manifest
 from isc_core.brdf.fitting import Interval, LobeFit, LobeLight
 from isc_core.datasets import load_natural_lights, load_object
 from isc_core.evidence_files import read_light
+from isc_core.lamp_network import read_lamp_network
 from isc_core.photo import read_photo
 from isc_core.pipeline import Settings, decompose
 from isc_core.result_folder import load, save
@@ -202,6 +203,7 @@ def _npz() -> tuple[Case, ...]:
         *_npz_cases("table.npz", (_DATA / "filter_statistics.npz").read_bytes(), read_table),
         *_npz_cases("network.npz", stream.getvalue(), read_network),
         *_npz_cases("appearance.npz", stream.getvalue(), read_appearance),
+        *_npz_cases("lamps.npz", stream.getvalue(), read_lamp_network),
         *_npz_cases("arrays.npz", result["arrays.npz"], lambda path: read_result(path.parent), description),
     )
 

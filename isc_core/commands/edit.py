@@ -22,6 +22,8 @@ from ..editing.relight import HIGHLIGHTS, NewLight, Relighting, relight
 from ..editing.spheres import render_sphere, sphere_normals
 from ..errors import InputError
 from ..evidence_files import read_light
+from ..glance import Glance
+from ..lamp_network import glance_at
 from ..limits import Limits
 from ..names import readable
 from ..numpy_files import read_array
@@ -139,11 +141,14 @@ def _light_direction(d: Decomposition, options: argparse.Namespace) -> _Done:
     for label, found in (("Best for the shading", shading), ("Best for the highlights", specular)):
         remark = _short(found)
         panels.append(_ball(_directed(found.light, found.exponent), label, remark) if found.determined else _no_ball(label, remark))
+    glance = glance_at(d.image, d.mask)
+    panels.append(_ball_of_glance(d, glance))
     for label, direction in _OTHER_LIGHTS:
         _, share = share_explained(d, toward(*direction))
         panels.append(_ball(_directed(DirectionalLight(toward(*direction))), f"Light {label}", f"explains {100 * share:.0f} %"))
-    measured = {"shading": _measured(shading), "specular": _measured(specular)}
+    measured = {"shading": _measured(shading), "specular": _measured(specular), "glance": _measured_glance(glance)}
     lines = [f"{label}: {_long(found)}" for label, found in (("shading", shading), ("highlights", specular))]
+    lines.append(f"at first sight: {_long_glance(glance)}")
     return _Done(edit, measured, tuple(panels), None, tuple(lines), layers=False)
 
 
@@ -336,6 +341,36 @@ def _measured(found: LightEstimate) -> dict[str, object]:
         "explained": found.explained,
         "cone_degrees": found.cone,
         "exponent": found.exponent,
+    }
+
+
+def _ball_of_glance(d: Decomposition, glance: Glance) -> Panel:
+    label, remark = "At first sight", _lamps_of_glance(glance)
+    if not glance.determined:
+        return _no_ball(label, remark)
+    light, share = share_explained(d, glance.direction)
+    return _ball(_directed(light), label, f"explains {100 * share:.0f} %, ± {glance.cone:.0f}°, {remark}")
+
+
+def _lamps_of_glance(glance: Glance) -> str:
+    shares = {"smooth light": glance.none, "one lamp": glance.one, "several lamps": glance.several}
+    likely = max(shares, key=lambda name: shares[name])
+    return f"{likely} ({100 * shares[likely]:.0f} %)"
+
+
+def _long_glance(glance: Glance) -> str:
+    if not glance.determined:
+        return f"{_lamps_of_glance(glance)}, no direction that could be told"
+    x, y, z = glance.direction
+    return f"{_lamps_of_glance(glance)}, the strongest from {x:.3f} {y:.3f} {z:.3f} ± {glance.cone:.1f} degrees, whatever the shape"
+
+
+def _measured_glance(glance: Glance) -> dict[str, object]:
+    return {
+        "determined": glance.determined,
+        "direction": _plain(glance.direction),
+        "cone_degrees": glance.cone,
+        "lamps": {"none": glance.none, "one": glance.one, "several": glance.several},
     }
 
 

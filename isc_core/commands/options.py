@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from ..errors import InputError
 from ..limits import USUAL, Limits
-from ..models.settings import ILLUMINATIONS, LIGHT_COLOURS, MODELS, Settings
+from ..models.settings import ILLUMINATIONS, LIGHT_COLOURS, LIGHT_PRIORS, MODELS, Settings
 from ..photo import TRANSFERS
 from ..separation import METHODS
 
@@ -132,6 +132,10 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--light-colour", choices=LIGHT_COLOURS, default=usual.light_colour,
         help="the light is white, or has the colour that the highlights tell, where they do (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--light-prior", choices=LIGHT_PRIORS, default=usual.light_prior,
+        help="expect the light that the photo seems to show, or that of all photos alike (default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--arrays", action="store_true", help="write arrays.npz too: everything as plain NumPy arrays, for other programs")
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")

@@ -1,10 +1,13 @@
 """The models: how separation, shape and light are joined to explain one photo. One model a file, and one function that knows their names.
 
 A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with.
-Of those that separate, `light_colour` decides which colour of light they see; of those that find shape and light, `doubts` looks whether
-the photo shows what they assume.
+Of those that separate, `light_colour` decides which colour of light they see; those that find shape and light are told how the light
+looks (`lamp_network`), and of what they find `doubts` looks whether the photo shows what they assume.
 """
 
+from dataclasses import replace
+
+from ..lamp_network import glance_at
 from .baseline import baseline
 from .doubts import doubted
 from .joint import joint
@@ -21,8 +24,13 @@ _SOLVERS = {"mdr": mdr, "mbp": mbp, "joint": joint, "sirfs": sirfs}
 def solve(task: Task) -> Answer:
     """What the model that `task.settings` names makes of the photo. Raises `InputError`, `Cancelled`."""
     solver = _SOLVERS.get(task.settings.model, baseline)
+    if task.settings.model not in SIRFS_MODELS:
+        return solver(task)
+    with task.clock.stage("light at first sight"):
+        glance = glance_at(task.maps.image, task.maps.mask)
+    task = replace(task, glance=glance)
     answer = under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
-    return doubted(task.maps, answer) if task.settings.model in SIRFS_MODELS else answer
+    return doubted(task.maps, answer, glance)
 
 
 __all__ = ["Answer", "Settings", "Task", "solve"]

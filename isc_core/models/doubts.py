@@ -2,11 +2,11 @@
 
 Problem: of a mirror, of glass, or under several lamps a model also finds paint, shape and light that add up to the photo: wrong ones.
 
-Equation: `appearance` tells how likely the photo shows each of them. Beyond a bound that is a doubt: the confidence is multiplied by what
-is left for ordinary paint, and the status says why. It also says where much of the object is too bright for the photo, or the mask too
-ragged for a mesh.
+Equation: `appearance` tells how likely the photo shows each of them, `lamp_network` how likely several lamps; of the two for those the
+mean of the log odds. Beyond a bound that is a doubt: the confidence is multiplied by what is left for opaque paint under one lamp, and the
+status says why. It also says where much of the object is too bright for the photo, or the mask too ragged for a mesh.
 
-Citation: see `appearance`.
+Citation: see `appearance` and `lamp_network`.
 
 Limits: measured in docs/methods/doubts.md. Strongly coloured light is another matter, see `light_gamut`.
 """
@@ -17,6 +17,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..appearance import GLASS, LAMPS, MIRROR, ORDINARY, kinds_of
+from ..glance import Glance
 from ..photo import Photo
 from .layers import less_sure
 from .task import Answer
@@ -24,16 +25,24 @@ from .task import Answer
 _MUCH_CLIPPED = 0.1  # of the object; where single highlights are, it is less
 _RAGGED = 0.5  # of the mask that no block of 2 x 2 pixels holds, and no mesh will
 LIKELY_CLEAR = 0.6  # of a mirror or glass together: a doubt
-LIKELY_SEVERAL = 0.5  # of several lamps: lower, for that network is seldom sure of them
+LIKELY_SEVERAL = 0.4  # of several lamps: lower, for a second lamp is often weak
 _LEAST = 0.1  # of the confidence is left
+_SURE = 1e-4  # no network is surer
 CLEAR = "the object looks like a mirror or like something transparent: what was found would be an opaque one's, hardly its own"
 SEVERAL = "there seem to be several lights: one was looked for, so shape, paint and gloss are less to be trusted; use one lamp if you can"
 
 
-def doubts_of(kinds: dict[str, float]) -> list[str]:
-    """Lines for people, of the probabilities that `appearance.kinds_of` found; none where there is no doubt."""
-    clear, several = kinds[MIRROR] + kinds[GLASS], kinds[LAMPS]
+def doubts_of(kinds: dict[str, float], glance: Glance) -> list[str]:
+    """Lines for people, of what `appearance.kinds_of` and `lamp_network.glance_at` found; none where there is no doubt."""
+    clear, several = kinds[MIRROR] + kinds[GLASS], several_lamps(kinds, glance)
     return [*([CLEAR] if clear > LIKELY_CLEAR else []), *([SEVERAL] if several > LIKELY_SEVERAL else [])]
+
+
+def several_lamps(kinds: dict[str, float], glance: Glance) -> float:
+    """The probability of several lamps: the mean of what two networks say, as the logarithms of odds. One has seen photos, mirrors and
+    rooms, the other many more lamps."""
+    odds = [np.log((share + _SURE) / (1 - share + _SURE)) for share in (kinds[LAMPS], glance.several)]
+    return float(1 / (1 + np.exp(-np.mean(odds))))
 
 
 def doubts_of_photo(photo: Photo) -> list[str]:
@@ -52,10 +61,22 @@ def share_in_blocks(mask: np.ndarray) -> float:
     return float(ndimage.binary_opening(mask, np.ones((2, 2))).sum() / max(int(mask.sum()), 1))
 
 
-def doubted(maps: Photo, answer: Answer) -> Answer:
-    """The answer to the photo of its maps, with its doubts in the status: `kinds`, the probabilities, and `doubts`, lines for people."""
+def doubted(maps: Photo, answer: Answer, glance: Glance) -> Answer:
+    """The answer to the photo of its maps, whose light looks like `glance`, with its doubts in the status: `kinds` and `lamps`, the
+    probabilities, and `doubts`, lines for people."""
     kinds = kinds_of(maps.image, maps.mask)
-    doubts = doubts_of(kinds)
-    split = less_sure(answer.split, max(kinds[ORDINARY], _LEAST)) if doubts else answer.split
-    told = {kind: round(share, 4) for kind, share in kinds.items()}
-    return replace(answer, split=split, status=answer.status | {"kinds": told, "doubts": doubts + doubts_of_photo(maps)})
+    doubts = doubts_of(kinds, glance)
+    split = less_sure(answer.split, max(_left(doubts, kinds, glance), _LEAST)) if doubts else answer.split
+    told = {
+        "kinds": {kind: round(share, 4) for kind, share in kinds.items()},
+        "lamps": {"none": round(glance.none, 4), "one": round(glance.one, 4), "several": round(glance.several, 4)},
+        "several_lamps": round(several_lamps(kinds, glance), 4),
+        "doubts": doubts + doubts_of_photo(maps),
+    }
+    return replace(answer, split=split, status=answer.status | told)
+
+
+def _left(doubts: list[str], kinds: dict[str, float], glance: Glance) -> float:
+    """How likely what is doubted is not so."""
+    opaque = kinds[ORDINARY] + kinds[LAMPS] if CLEAR in doubts else 1.0
+    return opaque * (1 - several_lamps(kinds, glance) if SEVERAL in doubts else 1.0)

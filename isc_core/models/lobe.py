@@ -1,6 +1,7 @@
 """The lobe that a model's specular layer shows on the shape that it recovered, and what is to be said of it.
 
-Where the shape was given, the fit is to its normals; else to what is left of recovered ones, see `brdf.fitting.recovered`.
+Where the shape was given, the fit is to its normals; else to what is left of recovered ones and to how the light looks, see
+`brdf.fitting.recovered`.
 
 Limits: those of `brdf.fitting`.
 """
@@ -68,6 +69,6 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
         profile = (task.prior_set or shipped_prior_set()).silhouette
         fit = fit_lobe(
             split.specular, normal, photo.mask, options=options, clipped=photo.clipped, height=shape.height, shading=shading,
-            outline=outline_normals(photo.mask, profile) if options.recovered else None, monitor=monitor,
+            outline=outline_normals(photo.mask, profile) if options.recovered else None, glance=task.glance, monitor=monitor,
         )  # fmt: skip
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))

@@ -13,6 +13,7 @@ BASELINE_MODELS = tuple(baselines.METHODS)
 MODELS = SIRFS_MODELS + BASELINE_MODELS
 ILLUMINATIONS = ("natural", "laboratory")
 LIGHT_COLOURS = ("white", "estimate")
+SEEN, USUAL = LIGHT_PRIORS = ("seen", "usual")
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Settings:
     `engine`, `threads`: see `SolverOptions`. `seed`: written into the result; no step of these models draws random numbers.
     `shading_only`: shape-from-shading mode, an object of one colour. `confidence_weights`: of "mdr" and "joint", whether pixels whose
     separation is in doubt weigh less in SIRFS' terms of reflectance. `light_colour`: of `SEPARATING_MODELS`, "white", or "estimate" for the
-    colour that the photo's highlights tell, where they do.
+    colour that the photo's highlights tell, where they do. `light_prior`: of `SIRFS_MODELS`, which lights SIRFS expects: those that the
+    photo's looks like ("seen", see `lamp_network`), or those of all photos of this `illumination` ("usual").
     """
 
     model: str = "joint"
@@ -39,6 +41,7 @@ class Settings:
     shading_only: bool = False
     confidence_weights: bool = False
     light_colour: str = "white"
+    light_prior: str = USUAL
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""
@@ -47,6 +50,7 @@ class Settings:
             ("separator", self.separator, METHODS),
             ("illumination", self.illumination, ILLUMINATIONS),
             ("light colour", self.light_colour, LIGHT_COLOURS),
+            ("light prior", self.light_prior, LIGHT_PRIORS),
             ("engine", self.engine, ("auto", "numba", "numpy")),
         ):
             if value not in known:

@@ -14,16 +14,20 @@ from ..photo import Photo
 from ..progress import Monitor
 from ..sirfs.kernel_cache import announce_compilation
 from ..sirfs.prior_file import shipped_prior_set
+from ..sirfs.priors import Priors
 from ..sirfs.recover import Known, Recovered, RecoverOptions, recover
 from ..sirfs.resampling import resample_height
+from ..sirfs.seen_light import seen_light
 from ..sirfs.settings import isc_weights
 from ..sirfs.solver import SolverOptions
 from .layers import shifted
+from .settings import USUAL
 from .task import Task
 
 _USUAL = 0.75  # of white, of the brightest channels' percentile below; of the training photos it is .23 to .87, of others .4 to 1
 _BRIGHT = 95.0  # percentile: most highlights are smaller
 _LEAST_TRUST = 0.05
+_CARE = 0.5  # of the deviations that the network states
 
 
 @dataclass(frozen=True)
@@ -63,7 +67,7 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, tr
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
-    priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
+    priors = _looked_at(task, (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels))
     options = RecoverOptions(shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads))
     weights = isc_weights(settings.illumination, channels)
     light = known.light if known.light is None or channels == 3 else known.light.mean(axis=1, keepdims=True)
@@ -76,6 +80,13 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, tr
             trust=trust, known=Known(known.height, light, known.depth), monitor=monitor,
         )  # fmt: skip
     return found if gain == 1 else replace(found, light=shifted(found.light, -np.log(gain)))
+
+
+def _looked_at(task: Task, priors: Priors) -> Priors:
+    """`priors`, told how the photo's light looks where that is asked for and somebody looked."""
+    if task.glance is None or task.settings.light_prior == USUAL:
+        return priors
+    return replace(priors, light=seen_light(priors.light, task.glance.light, _CARE * task.glance.deviations))
 
 
 def _usual_exposure(photo: Photo) -> float:

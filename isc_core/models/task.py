@@ -10,6 +10,7 @@ import numpy as np
 
 from ..brdf.fitting import LobeFit
 from ..decomposition import Separation
+from ..glance import Glance
 from ..photo import Photo
 from ..progress import Monitor
 from ..sirfs.fitting.prior_set import PriorSet
@@ -37,7 +38,8 @@ class Task:
 
     `working`: the photo at the scale at which shape and light are looked for; `maps`: at the scale of the result's maps, the same object
     where the two scales are one. `known`: at the working scale. `prior_set`: the shipped one if None. `split`: the layers of `maps` by the
-    separator of the settings, where they have been found before; else None.
+    separator of the settings, where they have been found before; else None. `glance`: how the photo's light looks,
+    None where nobody looked.
     """
 
     working: Photo
@@ -48,6 +50,7 @@ class Task:
     monitor: Monitor = field(default_factory=Monitor)
     clock: Clock = field(default_factory=Clock)
     split: Separation | None = None
+    glance: Glance | None = None
 
     @property
     def one_scale(self) -> bool:

@@ -9,7 +9,6 @@ from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 from benchmarks.surroundings import PLACES, make_surroundings
 from isc_core.appearance import GLASS, KINDS, LAMPS, MIRROR, ORDINARY, AppearanceNetwork, kinds_of, read_appearance
 from isc_core.errors import InputError
-from isc_core.models.doubts import doubts_of
 from tests.core.lit_balls import mirror_ball, under_lamps
 
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
@@ -66,7 +65,6 @@ def test_mirrors_look_like_mirrors(place: str) -> None:
 
 def test_paint_under_one_lamp_is_ordinary_and_under_three_it_is_not() -> None:
     assert kinds_of(*under_lamps((-0.5, 0.5, 0.7)))[ORDINARY] > 0.7
-    assert not doubts_of(kinds_of(*under_lamps((0.2, 0.4, 0.8), paint=(0.2, 0.4, 0.2))))
     assert kinds_of(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7)))[LAMPS] > 0.8
 
 

@@ -24,6 +24,7 @@ from isc_core.errors import InputError
 from isc_core.evidence_files import read_light
 from isc_core.exr import read_channels
 from isc_core.json_files import read_json
+from isc_core.lamp_network import read_lamp_network
 from isc_core.limits import Limits
 from isc_core.mat_files import read_matrix
 from isc_core.numpy_files import read_array, read_arrays
@@ -197,7 +198,7 @@ def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(refused
     broken[0] = np.nan
     refused(read_table, "a.npz", archive(**{key: array(np.asarray(v)) for key, v in (members | {"spread": broken}).items()}), "a.npz")
     weights = {"weight00": np.full((3, 3), np.nan, np.float32), "bias00": np.zeros(3, np.float32)}
-    for read in (read_network, read_appearance):
+    for read in (read_network, read_appearance, read_lamp_network):
         refused(read, "a.npz", archive(**{key: array(value) for key, value in weights.items()}), "not finite")
 
 

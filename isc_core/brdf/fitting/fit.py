@@ -20,6 +20,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ...errors import InputError
+from ...glance import Glance
 from ...progress import Monitor
 from ..directions import unit
 from .environment_fit import fit_under
@@ -59,6 +60,7 @@ def fit_lobe(
     height: np.ndarray | None = None,
     shading: np.ndarray | None = None,
     outline: np.ndarray | None = None,
+    glance: Glance | None = None,
     monitor: Monitor | None = None,
 ) -> LobeFit:
     """Fits a lobe to `specular` (H, W, 3), linear, >= 0, seen from (0, 0, 1), on the unit normals (H, W, 3), inside `mask` (H, W) bool.
@@ -66,7 +68,8 @@ def fit_lobe(
     `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the light is a lower bound.
     `height` (H, W) in pixels toward the viewer: with it lights may be near, else they are taken to be infinitely far.
     `shading` (H, W, 3), of a white matt surface: needed where `options.recovered`, for all this then is from one photo. `outline`
-    (H, W, 3), unit normals that the outline alone suggests: helps there, else it is not looked at. Either the light
+    (H, W, 3), unit normals that the outline alone suggests, and `glance`, how the photo's light looks: help there, else they are not looked
+    at. Either the light
     is found, or it is given: `light_direction` (3,), a unit vector, or `environment` (rows, 2 rows, 3), see `isc_core.environment`.
     What cannot be known is said in the result. Raises `InputError` for arrays that do not fit together, `Cancelled`.
     """
@@ -85,7 +88,7 @@ def fit_lobe(
     if environment is not None:
         return fit_under(np.asarray(environment, float), seen, pixels, options)
     if options.recovered:
-        return fit_recovered(seen, pixels, _checked_shading(shading, seen), fixed, options)
+        return fit_recovered(seen, pixels, _checked_shading(shading, seen), fixed, glance, options)
     problem = Problem(pixels, options.model, options.thresholded, directions=fixed is None, nearness=seen.place is not None)
     fitted = _search(problem, options, fixed, monitor)
     monitor.report("how sure the gloss is", 0.7)

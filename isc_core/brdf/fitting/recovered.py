@@ -29,11 +29,14 @@ Limits: insulators (metals mirror ten times as much) under lights that are small
 is relative to the shading that was given: how dark a paint is, one photo does not tell, so the shading's own scale may be off by two.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from scipy import ndimage
 
 from ...box import mask_slices
 from ...enlarging import enlarged
+from ...glance import Glance
 from .lamps import ALPHAS, Lamps, contributions
 from .observed import Observed
 from .pixels import Pixels
@@ -55,8 +58,11 @@ _FLATTEST = 0.05
 _MOST_CLIPPED = 0.5  # of the pixels of the peak
 
 
-def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction: np.ndarray | None, options: LobeFitOptions) -> LobeFit:
-    """The fit to a picture whose `shading` (H, W, 3), that of a white matt surface, is given; `direction` (3,) where the light is known."""
+def fit_recovered(
+    seen: Observed, pixels: Pixels, shading: np.ndarray, direction: np.ndarray | None, glance: Glance | None, options: LobeFitOptions
+) -> LobeFit:
+    """The fit to a picture whose `shading` (H, W, 3), that of a white matt surface, is given; `direction` (3,) where the light is known,
+    `glance` where somebody looked at it."""
     convention, inside = CONVENTION[options.model], seen.inside
     light_there = shading[inside].mean(axis=1)
     brightest, mirrored_light = float(np.percentile(light_there, _BRIGHTEST)), seen.specular[inside].mean(axis=1)
@@ -67,13 +73,16 @@ def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction
     log_alpha = _OFFSET + _SLOPE * by_brightness + _COVERED * by_size
     alpha = float(np.clip(np.exp(log_alpha), *ALPHAS))
     normal = blurred_normals(seen.normal, seen.mask)
-    towards, cone = (_light_direction(seen, normal), _CONE) if direction is None else (direction, 0.0)
+    mirrored_at = _light_direction(seen, normal) if direction is None else direction
+    towards, cone = (mirrored_at, _CONE) if glance is None else (glance.direction, glance.cone)
+    if direction is not None:
+        towards, cone = direction, 0.0
     colour = (pixels.weight * pixels.value) @ pixels.colour
     mirrored = 1.0 if options.model == "ggx" else F0  # the strength of Blinn-Phong's lobe has f0 in it
     product = mirrored * np.pi * brightest * colour / max(float(colour.mean()), 1e-300)
     light = LobeLight(towards, cone, product, Interval(product * np.exp(-_STRENGTH_SPREAD), product * np.exp(_STRENGTH_SPREAD)))
-    image, explained = _predicted(seen, normal, light, alpha, options)
-    reason = _reason(alpha, pixels)
+    image, explained = _predicted(seen, normal, replace(light, direction=mirrored_at), alpha, options)
+    reason = _reason(alpha, pixels, glance)
     interval: Interval | None = Interval(max(alpha * np.exp(-_ALPHA_SPREAD), ALPHAS[0]), min(alpha * np.exp(_ALPHA_SPREAD), 1.0))
     if reason == SMOOTH:
         return LobeFit(convention, False, reason, None, None, (light,), None, None, explained, image)
@@ -83,10 +92,10 @@ def fit_recovered(seen: Observed, pixels: Pixels, shading: np.ndarray, direction
     return LobeFit(convention, reason == FOUND, reason, alpha, interval, (light,), None, None, explained, image)
 
 
-def _reason(alpha: float, pixels: Pixels) -> str:
+def _reason(alpha: float, pixels: Pixels, glance: Glance | None) -> str:
     if pixels.peak_clipped > _MOST_CLIPPED:
         return CLIPPED  # also where the bound is so wide that it says little: that the light is smooth it does not
-    if alpha > _WIDEST:
+    if alpha > _WIDEST or (glance is not None and glance.smooth):
         return SMOOTH
     return NARROW if pixels.bright < _NARROWEST_PIXELS else FOUND
 

@@ -22,6 +22,7 @@ from isc_core.brdf.roughness import alpha_from_exponent
 from isc_core.brdf.shading import Lights, directional, environment, radiance
 from isc_core.environment import directions, solid_angles
 from isc_core.errors import Cancelled, InputError
+from isc_core.glance import PLACES, Glance
 from isc_core.progress import Monitor
 
 VIEW = np.array([0.0, 0, 1])
@@ -287,6 +288,30 @@ def test_what_the_outline_says_helps_where_the_normals_are_wrong() -> None:
     assert angle(helped.direction, KEY) < angle(without.direction, KEY) - 5
     with pytest.raises(InputError, match="outline"):
         fit_lobe(specular, flat, mask, options=options, shading=shading, outline=true[1:])
+
+
+def seen_at_first_sight(toward: np.ndarray, none: float = 0.1) -> Glance:
+    """A lamp, with some doubt."""
+    places = np.exp(30 * (PLACES @ toward))
+    return Glance(none, 0.9 - none, 0.1, places / places.sum(), np.zeros(8), np.ones(8))
+
+
+def test_where_the_lamp_seems_to_stand_is_believed_and_the_picture_stays() -> None:
+    specular, normal, mask, shading = whole_chain(0.2)
+    options, toward = LobeFitOptions(recovered=True), np.array([0.6, -0.1, np.sqrt(1 - 0.37)])
+    glance = seen_at_first_sight(toward)
+    without, told = (fit_lobe(specular, normal, mask, options=options, shading=shading, glance=seen) for seen in (None, glance))
+    assert angle(told.direction, toward) < 1 and told.lights[0].cone == pytest.approx(glance.cone)
+    assert told.alpha == without.alpha and told.explained == without.explained
+    np.testing.assert_array_equal(told.predicted, without.predicted)
+    known = fit_lobe(specular, normal, mask, options=options, shading=shading, glance=glance, light_direction=KEY)
+    assert angle(known.direction, KEY) < 1e-4 and known.lights[0].cone == 0
+
+
+def test_a_light_that_looks_smooth_leaves_the_roughness_open() -> None:
+    specular, normal, mask, shading = whole_chain(0.2)
+    fit = fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, glance=seen_at_first_sight(KEY, 0.7))
+    assert not fit.determined and fit.alpha is None and "smooth" in fit.reason
 
 
 def test_the_recovered_fit_does_not_depend_on_the_exposure() -> None:
