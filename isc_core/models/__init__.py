@@ -26,8 +26,10 @@ def solve(task: Task) -> Answer:
     solver = _SOLVERS.get(task.settings.model, baseline)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
-    with task.clock.stage("light at first sight"):
-        glance = glance_at(task.maps.image, task.maps.mask)
+    glance = task.glance
+    if glance is None:
+        with task.clock.stage("light at first sight"):
+            glance = glance_at(task.maps.image, task.maps.mask)
     task = replace(task, glance=glance)
     answer = under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
     return doubted(task.maps, answer, glance)

@@ -41,7 +41,7 @@ class Settings:
     shading_only: bool = False
     confidence_weights: bool = False
     light_colour: str = "white"
-    light_prior: str = USUAL
+    light_prior: str = SEEN
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""

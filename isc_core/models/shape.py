@@ -27,7 +27,7 @@ from .task import Task
 _USUAL = 0.75  # of white, of the brightest channels' percentile below; of the training photos it is .23 to .87, of others .4 to 1
 _BRIGHT = 95.0  # percentile: most highlights are smaller
 _LEAST_TRUST = 0.05
-_CARE = 0.5  # of the deviations that the network states
+_CARE = 1.0  # of the deviations that the network states
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class Task:
     `working`: the photo at the scale at which shape and light are looked for; `maps`: at the scale of the result's maps, the same object
     where the two scales are one. `known`: at the working scale. `prior_set`: the shipped one if None. `split`: the layers of `maps` by the
     separator of the settings, where they have been found before; else None. `glance`: how the photo's light looks,
-    None where nobody looked.
+    None where nobody has looked yet.
     """
 
     working: Photo

@@ -16,6 +16,7 @@ from typing import Any, Generic, TypeVar
 import numpy as np
 
 from isc_core.evaluate import Estimate
+from isc_core.lamp_network import glance_at
 from isc_core.metrics import Scores
 from isc_core.models import Answer, Settings, Task, solve
 from isc_core.models.layers import separated, shaded
@@ -63,11 +64,12 @@ def run_models(inputs: Inputs, options: StageOptions, monitor: Monitor) -> Varia
         raise ValueError("the models are compared with SIRFS on the true diffuse layer, which has to be given")
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
+    glance = glance_at(photo.image, photo.mask)  # at the photo, also where only its diffuse layer is explained
 
     def solved(model: str, image: Photo, start: Answer | None = None) -> Answer:
         known = Known() if start is None else Known(start.height, start.light)
         settings = Settings(model, options.separator, options.illumination, threads=options.threads)
-        return solve(Task(image, image, settings, known, monitor=monitor, split=split))
+        return solve(Task(image, image, settings, known, monitor=monitor, split=split, glance=glance))
 
     answers = {PLAIN: solved("sirfs", photo)}
     for name in (name for name in SEPARATING_MODELS if name in options.models):
