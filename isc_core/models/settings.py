@@ -11,7 +11,7 @@ SEPARATING_MODELS = ("mdr", "mbp", "joint")
 WEIGHING_MODELS = ("mdr", "joint")
 BASELINE_MODELS = tuple(baselines.METHODS)
 MODELS = SIRFS_MODELS + BASELINE_MODELS
-ILLUMINATIONS = ("natural", "laboratory")
+NATURAL, LABORATORY = ILLUMINATIONS = ("natural", "laboratory")
 LIGHT_COLOURS = ("white", "estimate")
 SEEN, USUAL = LIGHT_PRIORS = ("seen", "usual")
 
@@ -27,7 +27,7 @@ class Settings:
     `shading_only`: shape-from-shading mode, an object of one colour. `confidence_weights`: of "mdr" and "joint", whether pixels whose
     separation is in doubt weigh less in SIRFS' terms of reflectance. `light_colour`: of `SEPARATING_MODELS`, "white", or "estimate" for the
     colour that the photo's highlights tell, where they do. `light_prior`: of `SIRFS_MODELS`, which lights SIRFS expects: those that the
-    photo's looks like ("seen", see `lamp_network`), or those of all photos of this `illumination` ("usual").
+    photo's looks like ("seen", see `lamp_network`; in natural illumination), or those of all photos of this `illumination` ("usual").
     """
 
     model: str = "joint"

@@ -21,7 +21,7 @@ from ..sirfs.seen_light import seen_light
 from ..sirfs.settings import isc_weights
 from ..sirfs.solver import SolverOptions
 from .layers import shifted
-from .settings import USUAL
+from .settings import LABORATORY, USUAL
 from .task import Task
 
 _USUAL = 0.75  # of white, of the brightest channels' percentile below; of the training photos it is .23 to .87, of others .4 to 1
@@ -83,8 +83,8 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, tr
 
 
 def _looked_at(task: Task, priors: Priors) -> Priors:
-    """`priors`, told how the photo's light looks where that is asked for and somebody looked."""
-    if task.glance is None or task.settings.light_prior == USUAL:
+    """`priors`, told how the photo's light looks where that is asked for and somebody looked. A laboratory's light is known as well."""
+    if task.glance is None or task.settings.light_prior == USUAL or task.settings.illumination == LABORATORY:
         return priors
     return replace(priors, light=seen_light(priors.light, task.glance.light, _CARE * task.glance.deviations))
 
