@@ -149,7 +149,7 @@ def draw(subject: Subject, rng: np.random.Generator) -> tuple[torch.Tensor, tupl
     """What the network sees (4, side, side) of one photo as some camera takes it, and which kinds are right."""
     image, truth = _lit(subject, rng)
     image, mask = _placed(torch.cat([image * subject.mask, subject.mask[None]]), rng)
-    return inputs(_sensed(image, mask, rng)[None], mask[None, None])[0], _ALLOWED[truth]
+    return inputs(sensed(image, mask, rng)[None], mask[None, None])[0], _ALLOWED[truth]
 
 
 def _placed(layers: torch.Tensor, rng: np.random.Generator) -> tuple[torch.Tensor, torch.Tensor]:
@@ -169,7 +169,7 @@ def _placed(layers: torch.Tensor, rng: np.random.Generator) -> tuple[torch.Tenso
     return resized[:3], (resized[3] > 0.98).float()
 
 
-def _sensed(image: torch.Tensor, mask: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
+def sensed(image: torch.Tensor, mask: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
     """Noisy, clipped, tinted, with other hues or less of them."""
     noise, mean = log_uniform(rng, 0.003, 0.08), (image * mask).sum() / (3 * mask.sum().clamp(min=1))
     if rng.random() < 0.8:
@@ -250,7 +250,7 @@ def fit(subjects: Sequence[Subject], given: argparse.Namespace) -> Network:
         loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
-        _follow(average, network, step)
+        follow(average, network, step)
         shown = 0.99 * shown + 0.01 * float(loss.detach())
         if step % 100 == 99:
             print(f"step {step + 1} of {given.steps}, loss {shown / (1 - 0.99 ** (step + 1)):.4f}", flush=True)
@@ -263,7 +263,8 @@ def _loss(odds: torch.Tensor, allowed: torch.Tensor) -> torch.Tensor:
     return -((1 - _SMOOTHING) * right + _SMOOTHING * log_share.mean(1)).mean()
 
 
-def _follow(average: Network, network: Network, step: int) -> None:
+def follow(average: nn.Module, network: nn.Module, step: int) -> None:
+    """Brings the weights of `average` nearer to those of `network`, by less and less."""
     with torch.no_grad():
         for kept, new in zip(average.state_dict().values(), network.state_dict().values(), strict=True):
             if kept.is_floating_point():

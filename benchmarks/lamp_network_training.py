@@ -23,7 +23,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from benchmarks.appearance_training import _follow, _sensed
+from benchmarks.appearance_training import follow, sensed
 from benchmarks.drawing import log_uniform
 from benchmarks.layer_network_training import arrays_of, inputs
 from benchmarks.relit_objects import NONE, ONE, SEVERAL, Relit, draw_photo
@@ -86,7 +86,7 @@ def draw(relit: Relit, rng: np.random.Generator) -> tuple[torch.Tensor, ...]:
     layers = functional.pad(layers, (left, room - left, top, room - top))
     mask = (layers[6] > 0.98).float()
     cells = functional.avg_pool2d(layers[3:6] * mask, CELL) / functional.avg_pool2d(mask[None], CELL).clamp(min=1e-3)
-    seen = inputs(_sensed(layers[:3], mask, rng)[None], mask[None, None])[0]
+    seen = inputs(sensed(layers[:3], mask, rng)[None], mask[None, None])[0]
     known = count + len(lit.toward)
     light = _log_light(vectors[known:].numpy(), lit.shading[::_EVERY])
     return seen, torch.tensor(lit.lamps), _blurred(vectors[count:known], lit.shares), cells, torch.from_numpy(light)
@@ -217,7 +217,7 @@ def fit(objects: list[Relit], given: argparse.Namespace) -> Network:
         loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
-        _follow(average, network, step)
+        follow(average, network, step)
         shown = 0.99 * shown + 0.01 * np.array(parts)
         if step % 100 == 99:
             told = ", ".join(f"{part:.4f}" for part in shown / (1 - 0.99 ** (step + 1)))

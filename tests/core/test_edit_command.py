@@ -65,7 +65,7 @@ def test_every_action_writes_its_pictures(work: Path, tmp_path: Path, action: st
     assert told["action"] == words[0] and told["schema_version"] == 1
     output = capsys.readouterr()
     assert not output.err
-    assert ("shading: from" in output.out) == (words[0] == "light-direction")
+    assert ("shading: from" in output.out) == (words[0] == "light-direction") == ("at first sight: " in output.out)
 
 
 def test_an_edit_of_the_photo_keeps_what_is_not_the_object(work: Path, tmp_path: Path) -> None:
