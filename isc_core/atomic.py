@@ -259,11 +259,18 @@ def _held(entry: Path, *, wait: bool) -> Iterator[bool]:
         raise _Gone(errno.ENOENT, "it is gone") from error
     try:
         held = _locked(descriptor, wait)
-        if not (entry.exists() and os.path.samestat(os.fstat(descriptor), entry.stat())):
+        if not _is_named(descriptor, entry):
             raise _Gone(errno.ENOENT, "it is gone")
         yield held
     finally:
         os.close(descriptor)
+
+
+def _is_named(descriptor: int, entry: Path) -> bool:
+    """Whether an open file or folder still has that name: looked up once, for between two looks it may be renamed."""
+    with contextlib.suppress(FileNotFoundError):
+        return os.path.samestat(os.fstat(descriptor), entry.stat())
+    return False
 
 
 def _locked(descriptor: int, wait: bool) -> bool:
