@@ -32,7 +32,7 @@ from torch.nn import functional
 
 from benchmarks.doubt_scenes import scenes_in
 from benchmarks.drawing import log_uniform
-from benchmarks.layer_network_training import arrays_of, inputs
+from benchmarks.layer_network_training import arrays_of, encoder_of, inputs
 from isc_core.appearance import GLASS, KINDS, LAMPS, LONG_SIDE, MIRROR, ORDINARY
 from isc_core.box import mask_slices
 from isc_core.datasets import list_objects, load_object
@@ -190,13 +190,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
     def __init__(self, start: Path | None) -> None:
         super().__init__()
-        layers = shipped_network() if start is None else read_network(start)
-        self.convolutions = nn.ModuleList()
-        for weight, bias in list(zip(layers.weights, layers.biases, strict=True))[: 2 * ((len(layers.weights) - 1) // 4 + 1)]:
-            one = nn.Conv2d(weight.shape[1], weight.shape[2], 3, padding=1)
-            one.weight.data.copy_(torch.from_numpy(weight.reshape(3, 3, *weight.shape[1:]).transpose(3, 2, 0, 1).copy()))
-            one.bias.data.copy_(torch.from_numpy(bias))
-            self.convolutions.append(one)
+        self.convolutions = encoder_of(shipped_network() if start is None else read_network(start))
         count = 3 * sum(one.out_channels for one in list(self.convolutions)[1::2])
         self.scaled, self.dropped, self.head = nn.BatchNorm1d(count, momentum=0.05), nn.Dropout(0.3), nn.Linear(count, len(KINDS))
         nn.init.zeros_(self.head.weight)

@@ -6,9 +6,10 @@ OBJECTS: of `benchmarks.unlit_objects`; every picture lights one of them anew (`
 lamp, or by two to four. `--leave`: families of shapes that the network must not see, because it will be measured on them. It begins with
 the encoder of the layer network that ships. Needs PyTorch (`pip install 'isc3d[training]'`), which nothing else of ISC does.
 
-Loss: the cross entropy of how many lamps there are; that of where they stand, their shares of the light blurred over some degrees; and,
-so that light and shape are told apart, the squared error of the mean normals of patches of 16 x 16 pixels. Adam with decoupled weight
-decay (I. Loshchilov and F. Hutter 2019, arXiv:1711.05101), a cosine of steps, averaged weights.
+Loss: the cross entropy of how many lamps there are; that of where they stand, their shares of the light blurred over some degrees; so that
+light and shape are told apart, the squared error of the mean normals of patches of 16 x 16 pixels; and minus the log likelihood of how the
+light looks (`sirfs.seen_light`). Adam with decoupled weight decay (I. Loshchilov and F. Hutter 2019, arXiv:1711.05101), a cosine of steps,
+averaged weights.
 """
 
 import argparse
@@ -25,7 +26,7 @@ from torch.nn import functional
 
 from benchmarks.appearance_training import follow, sensed
 from benchmarks.drawing import log_uniform
-from benchmarks.layer_network_training import arrays_of, inputs
+from benchmarks.layer_network_training import arrays_of, encoder_of, inputs
 from benchmarks.relit_objects import NONE, ONE, SEVERAL, Relit, draw_photo
 from benchmarks.unlit_objects import SIZE, objects_in
 from isc_core.glance import PLACES
@@ -116,13 +117,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__()
-        layers = shipped_network()
-        self.convolutions = nn.ModuleList()
-        for weight, bias in list(zip(layers.weights, layers.biases, strict=True))[: 2 * ((len(layers.weights) - 1) // 4 + 1)]:
-            one = nn.Conv2d(weight.shape[1], weight.shape[2], 3, padding=1)
-            one.weight.data.copy_(torch.from_numpy(weight.reshape(3, 3, *weight.shape[1:]).transpose(3, 2, 0, 1).copy()))
-            one.bias.data.copy_(torch.from_numpy(bias))
-            self.convolutions.append(one)
+        self.convolutions = encoder_of(shipped_network())
         count = sum(one.out_channels for one in list(self.convolutions)[1::2])
         self.scaled = nn.BatchNorm1d(count, momentum=0.02)
         self.local = nn.Linear(count + 5, _LOCAL)

@@ -25,6 +25,7 @@ from torch import nn
 from torch.nn import functional
 
 from benchmarks.layer_network_samples import Subject, draw, photographed, rendered
+from isc_core.separation.layer_network import LayerNetwork
 
 WIDTHS = (32, 48, 64, 96, 128)
 _DARK, _MARGIN = 0.03, 2.0  # as in layer_network
@@ -76,6 +77,18 @@ class Network(nn.Module):  # type: ignore[misc]
         """As `layer_network.read_network` reads them."""
         blocks = [*self.down, *reversed(self.up)]
         return arrays_of([layer for block in blocks for layer in (block.c1, block.c2)] + [self.out])
+
+
+def encoder_of(network: LayerNetwork) -> nn.ModuleList:
+    """The convolutions of a layer network's encoder, to begin another network with."""
+    pairs = list(zip(network.weights, network.biases, strict=True))
+    convolutions = nn.ModuleList()
+    for weight, bias in pairs[: 2 * ((len(pairs) - 1) // 4 + 1)]:
+        one = nn.Conv2d(weight.shape[1], weight.shape[2], 3, padding=1)
+        one.weight.data.copy_(torch.from_numpy(weight.reshape(3, 3, *weight.shape[1:]).transpose(3, 2, 0, 1).copy()))
+        one.bias.data.copy_(torch.from_numpy(bias))
+        convolutions.append(one)
+    return convolutions
 
 
 def arrays_of(convolutions: Iterable[nn.Conv2d]) -> dict[str, np.ndarray]:

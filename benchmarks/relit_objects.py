@@ -18,9 +18,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.polynomial.legendre import legval
 
 from isc_core.environment import directions
+from synth.light_rigs.harmonics import smooth_pattern, turned_to_front
 
 from .drawing import log_uniform
 from .unlit_objects import LAMPS, WIDEST, Unlit
@@ -157,16 +157,12 @@ def _masking(cosine: np.ndarray, square: float) -> np.ndarray:
 def _around(rng: np.random.Generator) -> np.ndarray:
     """The light from around, of mean about 1, at `directions(_ROWS)`, as one row."""
     towards = directions(_ROWS).reshape(-1, 3)
-    degree, contrast, light = int(rng.integers(1, 5)), rng.uniform(0.2, 1.7), np.ones(len(towards))
-    for l in range(1, degree + 1):
-        axes = rng.normal(size=(2 * l + 1, 3))
-        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
-        light += contrast / l**0.75 * (legval(towards @ axes.T, [0] * l + [1]) @ rng.normal(size=2 * l + 1))
-    light = np.maximum(light, 0)
+    degree, contrast = int(rng.integers(1, 5)), rng.uniform(0.2, 1.7)
+    light = np.maximum(1 + smooth_pattern(towards, degree, contrast, rng), 0)
     front, above = light @ towards[:, 2], light @ towards[:, 1]
     grid = light.reshape(_ROWS, 2 * _ROWS)
     if front < 0:
-        grid = grid[:, (_ROWS - 1 - np.arange(2 * _ROWS)) % (2 * _ROWS)]
+        grid = turned_to_front(grid)
     if above < 0 and rng.random() < 0.7:
         grid = grid[::-1]
     return np.asarray(grid / max(float(light.mean()), 1e-9), np.float32).ravel()

@@ -24,16 +24,16 @@ from pathlib import Path
 
 import numpy as np
 
-from .box import mask_slices
 from .errors import InputError
 from .numpy_files import read_arrays
-from .photo import averaged
-from .separation.convolutions import encoded, framed, halved, weights_in
+from .photo import averaged_object
+from .separation.convolutions import encoded, framed, halved, is_encoder, weights_in
 
 ORDINARY, MIRROR, GLASS, LAMPS = KINDS = ("ordinary", "mirror", "glass", "lamps")
 LONG_SIDE = 144  # of the object, in pixels, as the network sees it
 _MOMENTS = 3
 _LEAST, _MOST = 1e-6, 1e4
+_NONE = "these are not the weights of an appearance network"
 
 
 @dataclass(frozen=True)
@@ -49,14 +49,13 @@ class AppearanceNetwork:
     odds: np.ndarray
 
     def __post_init__(self) -> None:
-        shapes = [w.shape for w in self.weights]
-        chained = all(a[2:] == b[1:2] for a, b in zip(shapes, shapes[1:], strict=False)) and all(len(s) == 3 and s[0] == 9 for s in shapes)
-        biased = [w.shape[2:] for w in self.weights] == [b.shape for b in self.biases]
-        count = _MOMENTS * sum(shape[-1] for shape in shapes[1::2])
+        if not is_encoder(self.weights, self.biases):
+            raise InputError(_NONE)
+        count = _MOMENTS * sum(w.shape[-1] for w in self.weights[1::2])
         wanted = [(count,), (count,), (count, len(KINDS)), (len(KINDS),)]
         fits = [part.shape for part in (self.middle, self.scale, self.head, self.odds)] == wanted
-        if not (shapes and len(shapes) % 2 == 0 and shapes[0][1:2] == (16,) and chained and biased and fits and (self.scale > 0).all()):
-            raise InputError("these are not the weights of an appearance network")
+        if not (fits and (self.scale > 0).all()):
+            raise InputError(_NONE)
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         """The probabilities (4,) of `KINDS`; `image` (H, W, 3) and `mask` (H, W) as `separation.convolutions.framed` makes them."""
@@ -79,9 +78,7 @@ class AppearanceNetwork:
 def kinds_of(image: np.ndarray, mask: np.ndarray, network: AppearanceNetwork | None = None) -> dict[str, float]:
     """The probability of each of `KINDS` for a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the shipped network if
     None."""
-    box = mask_slices(mask)
-    small, inside, _ = averaged(image[box], mask[box], min(1.0, LONG_SIDE / max(mask[box].shape)))
-    (light, cover), _ = framed(small, inside)
+    (light, cover), _ = framed(*averaged_object(image, mask, LONG_SIDE)[:2])
     judge = network or shipped_appearance()
     found = 0.5 * (judge(light, cover) + judge(light[:, ::-1], cover[:, ::-1]))
     return {kind: float(share) for kind, share in zip(KINDS, found, strict=True)}

@@ -27,12 +27,11 @@ from pathlib import Path
 
 import numpy as np
 
-from .box import mask_slices
 from .errors import InputError
 from .glance import PLACES, Glance
 from .numpy_files import read_arrays
-from .photo import averaged
-from .separation.convolutions import encoded, framed, weights_in
+from .photo import averaged_object
+from .separation.convolutions import encoded, framed, is_encoder, weights_in
 
 LONG_SIDE = 112  # of the object, in pixels, as the network sees it
 CELL = 16
@@ -57,17 +56,14 @@ class LampNetwork:
     layers: Mapping[str, tuple[np.ndarray, np.ndarray]]
 
     def __post_init__(self) -> None:
-        shapes = [w.shape for w in self.weights]
-        chained = all(a[2:] == b[1:2] for a, b in zip(shapes, shapes[1:], strict=False)) and all(len(s) == 3 and s[0] == 9 for s in shapes)
-        biased = [w.shape[2:] for w in self.weights] == [b.shape for b in self.biases]
-        if not (shapes and len(shapes) % 2 == 0 and shapes[0][1:2] == (16,) and chained and biased and self._layers_fit(shapes)):
+        if not (is_encoder(self.weights, self.biases) and self._layers_fit()):
             raise InputError("these are not the weights of a lamp network")
 
-    def _layers_fit(self, shapes: list[tuple[int, ...]]) -> bool:
+    def _layers_fit(self) -> bool:
         matrices, added = ([self.layers[name][k] for name in _LAYERS] for k in (0, 1))
         if any(matrix.ndim != 2 for matrix in matrices):
             return False
-        count, wide, deep = sum(shape[-1] for shape in shapes[1::2]), matrices[0].shape[1], matrices[1].shape[1]
+        count, wide, deep = sum(w.shape[-1] for w in self.weights[1::2]), matrices[0].shape[1], matrices[1].shape[1]
         wanted = [(count + _WHERE, wide), (3 * wide, deep), (deep, 3), (deep, len(PLACES)), (deep, 2 * _LOOK)]
         fits = [matrix.shape for matrix in matrices] == wanted and [values.shape for values in added] == [shape[1:] for shape in wanted]
         return fits and self.middle.shape == self.scale.shape == (count,)
@@ -98,9 +94,7 @@ class LampNetwork:
 
 def glance_at(image: np.ndarray, mask: np.ndarray, network: LampNetwork | None = None) -> Glance:
     """The lamps of a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the shipped network if None."""
-    box = mask_slices(mask)
-    small, inside, _ = averaged(image[box], mask[box], min(1.0, LONG_SIDE / max(mask[box].shape)))
-    (light, cover), _ = framed(small, inside)
+    (light, cover), _ = framed(*averaged_object(image, mask, LONG_SIDE)[:2])
     judge = network or shipped_lamp_network()
     (counts, places, told), (other, mirrored, reversed_) = judge(light, cover), judge(light[:, ::-1], cover[:, ::-1])
     none, one, several = (float(share) for share in (counts + other) / 2)

@@ -366,6 +366,12 @@ def _overlaps(count: int, factor: float) -> Any:
     return sparse.csr_matrix((weights, (np.concatenate([first, second]), np.concatenate([old, old]))), shape=(new, count))
 
 
+def averaged_object(image: np.ndarray, mask: np.ndarray, long_side: int) -> tuple[np.ndarray, np.ndarray, float]:
+    """`averaged` of the object's box, at most `long_side` pixels long."""
+    box = mask_slices(mask)
+    return averaged(image[box], mask[box], min(1.0, long_side / max(mask[box].shape)))
+
+
 def averaged(image: np.ndarray, mask: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray, float]:
     """`image` (H, W, 3) and `mask` (H, W) bool, `factor` times as large, 0 < factor <= 1: means of the mask's light over the new pixels,
     and the pixels of which the mask covers half, or any, where that leaves none. Returns (h, w, 3) float32, (h, w) bool, and the factor."""

@@ -27,7 +27,6 @@ from .task import Task
 _USUAL = 0.75  # of white, of the brightest channels' percentile below; of the training photos it is .23 to .87, of others .4 to 1
 _BRIGHT = 95.0  # percentile: most highlights are smaller
 _LEAST_TRUST = 0.05
-_CARE = 1.0  # of the deviations that the network states
 
 
 @dataclass(frozen=True)
@@ -86,7 +85,7 @@ def _looked_at(task: Task, priors: Priors) -> Priors:
     """`priors`, told how the photo's light looks where that is asked for and somebody looked. A laboratory's light is known as well."""
     if task.glance is None or task.settings.light_prior == USUAL or task.settings.illumination == LABORATORY:
         return priors
-    return replace(priors, light=seen_light(priors.light, task.glance.light, _CARE * task.glance.deviations))
+    return replace(priors, light=seen_light(priors.light, task.glance.light, task.glance.deviations))
 
 
 def _usual_exposure(photo: Photo) -> float:

@@ -41,6 +41,14 @@ def weights_in(data: Mapping[str, np.ndarray]) -> tuple[tuple[np.ndarray, ...], 
     return weights, biases
 
 
+def is_encoder(weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...]) -> bool:
+    """Whether these are convolutions of an encoder, two for each level, each taking what the one before gives."""
+    shapes = [w.shape for w in weights]
+    chained = all(a[2:] == b[1:2] for a, b in zip(shapes, shapes[1:], strict=False)) and all(len(s) == 3 and s[0] == 9 for s in shapes)
+    biased = [w.shape[2:] for w in weights] == [b.shape for b in biases]
+    return bool(shapes) and len(shapes) % 2 == 0 and shapes[0][1:2] == (4 * BLOCK**2,) and chained and biased
+
+
 def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """(H, W, 4) float32: log light over the object's mean, 0 outside, and the mask."""
     light = np.where(mask[..., None], image, 0).astype(np.float32)

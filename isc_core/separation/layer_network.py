@@ -25,7 +25,7 @@ from ..box import mask_slices
 from ..enlarging import enlarged
 from ..errors import InputError
 from ..numpy_files import read_arrays
-from ..photo import averaged
+from ..photo import averaged_object
 from .convolutions import BLOCK, convolved, encoded, framed, from_blocks, twice, weights_in
 from .smoothing import masked_gaussian
 
@@ -83,7 +83,7 @@ class LayerNetwork:
 def log_ratio(image: np.ndarray, mask: np.ndarray, network: LayerNetwork, options: NetworkOptions) -> tuple[np.ndarray, np.ndarray]:
     """y (H, W, 3) >= 0 and b (H, W) > 0, float32, 0 outside `mask` (H, W) bool, of `image` (H, W, 3)."""
     box = mask_slices(mask)
-    small, inside, factor = averaged(image[box], mask[box], min(1.0, options.long_side / max(mask[box].shape)))
+    small, inside, factor = averaged_object(image, mask, options.long_side)
     (light, cover), place = framed(small, inside)
     raw, log_error = network(light, cover, options.mirrored)
     error = np.exp(log_error)

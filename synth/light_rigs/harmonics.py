@@ -26,16 +26,27 @@ def harmonic_lights(rng: np.random.Generator) -> tuple[Light, ...]:
     """One environment of degree 2, 3 or 4, mirrored so that most of its light comes from the viewer's side and from above."""
     degree, contrast = int(rng.integers(2, 5)), rng.uniform(0.7, 1.7)
     towards, solid = directions(_ROWS), solid_angles(_ROWS)[..., None]
-    pattern = sum(contrast / l**0.75 * _harmonic(towards, l, rng) for l in range(1, degree + 1))
+    pattern = smooth_pattern(towards, degree, contrast, rng)
     colour = np.stack([_COLOUR * _harmonic(towards, 1, rng) for _ in range(3)], -1)
-    radiance = np.maximum(0, 1 + np.asarray(pattern)[..., None] + colour)
+    radiance = np.maximum(0, 1 + pattern[..., None] + colour)
     radiance *= 4 * np.pi / (radiance * solid).sum((0, 1)).mean()
     _, up, front = (radiance * solid).sum(-1).ravel() @ towards.reshape(-1, 3)
     if up < 0:
         radiance = radiance[::-1]
     if front < 0:
-        radiance = radiance[:, (_ROWS - 1 - np.arange(2 * _ROWS)) % (2 * _ROWS)]
+        radiance = turned_to_front(radiance)
     return (EnvironmentLight(radiance * white(rng)),)
+
+
+def smooth_pattern(towards: np.ndarray, degree: int, contrast: float, rng: np.random.Generator) -> np.ndarray:
+    """What the radiance at the directions (..., 3) differs by from its mean, 1: (...); `degree` >= 1, `contrast` of degree 1."""
+    return np.asarray(sum(contrast / l**0.75 * _harmonic(towards, l, rng) for l in range(1, degree + 1)))
+
+
+def turned_to_front(radiance: np.ndarray) -> np.ndarray:
+    """An environment (rows, 2 rows, ...) whose front is its back: z mirrored."""
+    rows = len(radiance)
+    return radiance[:, (rows - 1 - np.arange(2 * rows)) % (2 * rows)]
 
 
 def _harmonic(towards: np.ndarray, degree: int, rng: np.random.Generator) -> np.ndarray:

@@ -68,9 +68,9 @@ def fit_lobe(
     `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the light is a lower bound.
     `height` (H, W) in pixels toward the viewer: with it lights may be near, else they are taken to be infinitely far.
     `shading` (H, W, 3), of a white matt surface: needed where `options.recovered`, for all this then is from one photo. `outline`
-    (H, W, 3), unit normals that the outline alone suggests, and `glance`, how the photo's light looks: help there, else they are not looked
-    at. Either the light
-    is found, or it is given: `light_direction` (3,), a unit vector, or `environment` (rows, 2 rows, 3), see `isc_core.environment`.
+    (H, W, 3), unit normals that the outline alone suggests, and `glance`, how the photo's light looks, help there, else they are not looked
+    at. Either the light is found, or it is given: `light_direction` (3,), a unit vector, or `environment` (rows, 2 rows, 3), see
+    `isc_core.environment`.
     What cannot be known is said in the result. Raises `InputError` for arrays that do not fit together, `Cancelled`.
     """
     options, monitor = options or LobeFitOptions(), monitor or Monitor()
