@@ -190,7 +190,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
     def __init__(self, start: Path | None) -> None:
         super().__init__()
-        self.convolutions = encoder_of(shipped_network() if start is None else read_network(start))
+        self.convolutions = encoder_of(*(shipped_network() if start is None else read_network(start)).encoder)
         count = 3 * sum(one.out_channels for one in list(self.convolutions)[1::2])
         self.scaled, self.dropped, self.head = nn.BatchNorm1d(count, momentum=0.05), nn.Dropout(0.3), nn.Linear(count, len(KINDS))
         nn.init.zeros_(self.head.weight)

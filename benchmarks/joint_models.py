@@ -1,7 +1,7 @@
 """What each model makes of glossy photos, against SIRFS on the photo as it is and on the true diffuse image.
 
   python -m benchmarks.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural]
-                                    [--networks FOLDER] [--models plain,joint] [--roundings K]
+                                    [--networks FOLDER] [--models plain,joint] [--roundings K] [--shape-prior seen]
 
 Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them. `--networks`: a network for each object that
 has not seen it, `OBJECT.npz` of `benchmarks.layer_network_training`; without it the shipped one, which has. `--roundings`: each photo is
@@ -26,6 +26,7 @@ from isc_core.datasets import MitBerkeleyObject, list_objects, load_object
 from isc_core.evaluate import Estimate, paired_bootstrap
 from isc_core.evaluation_runner import RunnerOptions, make_runner
 from isc_core.metrics import score
+from isc_core.models.settings import OUTLINE, SHAPE_PRIORS
 from isc_core.progress import Monitor
 from isc_core.separation.layer_network import LayerNetwork, read_network
 from isc_core.sirfs.prior_file import shipped_prior_set
@@ -43,10 +44,12 @@ def photo_of(folder: Path, name: str) -> tuple[MitBerkeleyObject, MitBerkeleyObj
     )
 
 
-def run(model: str, seen: MitBerkeleyObject, diffuse: MitBerkeleyObject, network: LayerNetwork | None) -> tuple[Estimate, float]:
+def run(
+    model: str, seen: MitBerkeleyObject, diffuse: MitBerkeleyObject, network: LayerNetwork | None, shape_prior: str = OUTLINE
+) -> tuple[Estimate, float]:
     """A model's answer and its seconds."""
     truth = diffuse if model == "true diffuse" else seen
-    options = RunnerOptions("sirfs" if model in ("plain", "true diffuse") else model)
+    options = RunnerOptions("sirfs" if model in ("plain", "true diffuse") else model, shape_prior=shape_prior)
     began = time.perf_counter()
     answer = make_runner(options, shipped_prior_set(), network)(truth, Monitor())
     return answer, time.perf_counter() - began
@@ -71,7 +74,7 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
             network = read_network(given.networks / f"{name}.npz") if given.networks else None
             for rounding, model in missing:
                 seen, diffuse = (rounded(photo, rounding) for photo in photos)
-                answer, seconds = run(model, seen, diffuse, network)
+                answer, seconds = run(model, seen, diffuse, network, given.shape_prior)
                 rows.append(row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding})
                 append_row(path, rows[-1])
     return rows
@@ -133,6 +136,7 @@ def main() -> None:
     parser.add_argument("--sets", type=lambda text: text.split(","), default=[])
     parser.add_argument("--models", type=lambda text: text.split(","), default=MODELS)
     parser.add_argument("--roundings", type=int, default=1)
+    parser.add_argument("--shape-prior", choices=SHAPE_PRIORS, default=RunnerOptions().shape_prior, help="as for isc evaluate")
     parser.add_argument("-o", "--output", type=Path, required=True)
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)

@@ -117,7 +117,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__()
-        self.convolutions = encoder_of(shipped_network())
+        self.convolutions = encoder_of(*shipped_network().encoder)
         count = sum(one.out_channels for one in list(self.convolutions)[1::2])
         self.scaled = nn.BatchNorm1d(count, momentum=0.02)
         self.local = nn.Linear(count + 5, _LOCAL)

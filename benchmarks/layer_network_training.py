@@ -15,7 +15,7 @@ F. Hutter 2019, arXiv:1711.05101), a cosine of steps, averaged weights; He's ini
 import argparse
 import copy
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,6 @@ from torch import nn
 from torch.nn import functional
 
 from benchmarks.layer_network_samples import Subject, draw, photographed, rendered
-from isc_core.separation.layer_network import LayerNetwork
 
 WIDTHS = (32, 48, 64, 96, 128)
 _DARK, _MARGIN = 0.03, 2.0  # as in layer_network
@@ -79,11 +78,10 @@ class Network(nn.Module):  # type: ignore[misc]
         return arrays_of([layer for block in blocks for layer in (block.c1, block.c2)] + [self.out])
 
 
-def encoder_of(network: LayerNetwork) -> nn.ModuleList:
-    """The convolutions of a layer network's encoder, to begin another network with."""
-    pairs = list(zip(network.weights, network.biases, strict=True))
+def encoder_of(weights: Sequence[np.ndarray], biases: Sequence[np.ndarray]) -> nn.ModuleList:
+    """The convolutions of an encoder of `isc_core.separation.convolutions`, to begin another network with."""
     convolutions = nn.ModuleList()
-    for weight, bias in pairs[: 2 * ((len(pairs) - 1) // 4 + 1)]:
+    for weight, bias in zip(weights, biases, strict=True):
         one = nn.Conv2d(weight.shape[1], weight.shape[2], 3, padding=1)
         one.weight.data.copy_(torch.from_numpy(weight.reshape(3, 3, *weight.shape[1:]).transpose(3, 2, 0, 1).copy()))
         one.bias.data.copy_(torch.from_numpy(bias))

@@ -15,7 +15,7 @@ Limits: one bounce of light alone; no light from behind the object.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,9 +52,15 @@ class Relit:
     def of(cls, unlit: Unlit) -> "Relit":
         """The object's pixels."""
         normals = unlit.normals[unlit.mask].astype(np.float32)
-        mirrored = _place_around(2 * normals[:, 2:] * normals - _VIEW)
         reached = np.ascontiguousarray(unlit.reached[:, unlit.mask])
-        return cls(normals.astype(np.float16), unlit.albedos[:, unlit.mask], mirrored, unlit.toward, reached, unlit.mask, unlit.shape)
+        albedos, mirrored = unlit.albedos[:, unlit.mask], _mirrored(normals)
+        return cls(normals.astype(np.float16), albedos, mirrored, unlit.toward, reached, unlit.mask, unlit.shape)
+
+    def mapped(self, space: np.ndarray) -> "Relit":
+        """The object after a linear map of `space` (3, 3) that keeps the view: what sees what stays true, and its pixels are as they were,
+        to be moved by whoever shows them where the map moves them in the picture."""
+        normals = _unit(self.normals.astype(np.float32) @ np.linalg.inv(space).astype(np.float32))
+        return replace(self, normals=normals, mirrored=_mirrored(normals), toward=_unit(self.toward @ space.T.astype(np.float32)))
 
 
 @dataclass(frozen=True)
@@ -170,11 +176,19 @@ def _around(rng: np.random.Generator) -> np.ndarray:
 
 def _place_around(towards: np.ndarray) -> np.ndarray:
     """Where unit vectors (N, 3) are in `directions(_ROWS)`, as one row: (N,) int32, the nearest of a latitude and longitude."""
-    grid = directions(_ROWS)
-    rows = np.argmin(np.abs(np.arccos(np.clip(towards[:, 1:2], -1, 1)) - np.arccos(grid[:, 0, 1])[None]), axis=1)
-    turns = np.arctan2(grid[0, :, 0], grid[0, :, 2])
-    columns = np.argmax(np.cos(np.arctan2(towards[:, 0], towards[:, 2])[:, None] - turns[None]), axis=1)
+    turn = np.float32(_ROWS / np.pi)
+    rows = np.minimum((np.arccos(np.clip(towards[:, 1], -1, 1)) * turn).astype(np.int32), _ROWS - 1)
+    columns = np.floor(np.arctan2(towards[:, 0], -towards[:, 2]) * turn).astype(np.int32) % (2 * _ROWS)
     return np.asarray(rows * 2 * _ROWS + columns, np.int32)
+
+
+def _mirrored(normals: np.ndarray) -> np.ndarray:
+    """Where the view is mirrored to (N,), in the light from around."""
+    return _place_around(2 * normals[:, 2:] * normals - _VIEW)
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9), np.float32)
 
 
 def _tint(rng: np.random.Generator, strength: float) -> np.ndarray:

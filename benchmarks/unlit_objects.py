@@ -1,10 +1,13 @@
 """Objects of which it is known what each of many lamps would reach: to be lit anew, by any of them, whenever a network learns from one.
 
-  python -m benchmarks.unlit_objects -o DIR [--count N] [--first K]
+  python -m benchmarks.unlit_objects -o DIR [--count N] [--first K] [--groups]
+  python -m benchmarks.unlit_objects -o DIR --data ROOT
 
 DIR/NUMBER.npz: mask (SIZE, SIZE); normals (SIZE, SIZE, 3) and albedos (PAINTS, SIZE, SIZE, 3) float16; toward (LAMPS, 3) float32, unit
 vectors to far lamps before the object; reached (LAMPS, SIZE, SIZE) bool, packed along its last axis (`numpy.packbits`): which pixels see
-them; shape, its family's name. An object that is there is not made again. Shapes and paints are those of `isc synth`.
+them; shape, its family's name. An object that is there is not made again. Shapes and paints are those of `isc synth`;
+with `--groups` mostly up to five bodies of them that have grown together, each turned anyhow. With `--data` the MIT-Berkeley objects that
+ROOT holds, each with three pairs of those paints: DIR/NAME-K.npz, shape its name.
 
 Limits: light that goes from one part of the object to another is left to whoever lights it.
 """
@@ -15,18 +18,25 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from isc_core.atomic import new_file
+from isc_core.datasets import list_objects, load_object
 from synth.albedos import ALBEDOS, make_albedo
 from synth.light_rigs.placing import toward
 from synth.materials import texture_at
-from synth.recipe import camera_around
+from synth.meshes import Mesh
+from synth.recipe import camera_around, centred
 from synth.shapes import SHAPES, make_shape
+from synth.shapes.height_field import mesh_of_height
 from synth.tracing import LIFT, Tracer
 
 SIZE, LAMPS, PAINTS = 160, 32, 2
 _FILL = 0.9
 WIDEST = 80.0  # degrees from the viewer
+GROUP, LABORATORY = "group", "laboratory"
+_TOGETHER, _COPIES = 0.75, 3
+_SIZES, _STRETCHED = (0.25, 0.8), 0.3  # of the smaller bodies of a group; how unequally, as a logarithm
 
 
 @dataclass(frozen=True)
@@ -45,7 +55,47 @@ def make_object(number: int) -> dict[str, np.ndarray]:
     """Object `number`, always the same, as it is written."""
     rng = np.random.default_rng([17, number])
     family = str(rng.choice(SHAPES))
-    mesh = make_shape(family, rng)
+    return traced(make_shape(family, rng), family, rng)
+
+
+def make_group(number: int) -> dict[str, np.ndarray]:
+    """Group `number`, always the same, as it is written; one in four is a single body."""
+    rng = np.random.default_rng([18, number])
+    return traced(_grown_together(rng) if rng.random() < _TOGETHER else _turned(str(rng.choice(SHAPES)), rng), GROUP, rng)
+
+
+def measured_objects(root: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
+    """Names of files and what they hold, of the MIT-Berkeley objects below `root`."""
+    for k, name in enumerate(list_objects(root, LABORATORY)):
+        truth = load_object(root, name, LABORATORY)
+        mesh = centred(mesh_of_height(np.where(truth.mask, truth.height, np.nan)))
+        for copy in range(_COPIES):
+            yield f"{name}-{copy}", traced(mesh, name, np.random.default_rng([19, k, copy]))
+
+
+def _turned(family: str, rng: np.random.Generator) -> Mesh:
+    """A body of a family, seen from anywhere."""
+    return make_shape(family, rng).rotated(Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()).fitted()
+
+
+def _grown_together(rng: np.random.Generator) -> Mesh:
+    """Two to five bodies, the smaller ones on the surface of the first."""
+    bodies = [family for family in SHAPES if family != "height_field"]
+    parts = [_turned(str(rng.choice(bodies)), rng)]
+    for _ in range(int(rng.integers(1, 5))):
+        part, at = _turned(str(rng.choice(bodies)), rng), parts[0].vertices[int(rng.integers(len(parts[0].vertices)))]
+        size = rng.uniform(*_SIZES) * np.exp(rng.normal(0, _STRETCHED, 3))
+        normals = part.normals / size
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        parts.append(Mesh(part.vertices * size + at * rng.uniform(0.7, 1.05), normals, part.uv, part.faces))
+    first = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    faces = np.concatenate([part.faces + k for part, k in zip(parts, first, strict=False)])
+    vertices, normals, uv = (np.concatenate([getattr(part, name) for part in parts]) for name in ("vertices", "normals", "uv"))
+    return Mesh(vertices, normals, uv, faces).fitted()
+
+
+def traced(mesh: Mesh, shape: str, rng: np.random.Generator) -> dict[str, np.ndarray]:
+    """A mesh with lamps and paints drawn from `rng`, as it is written."""
     camera, tracer = camera_around(mesh, SIZE, _FILL), Tracer(mesh)
     hits = tracer.hits(*(part.reshape(-1, 3) for part in camera.rays()))
     mask = hits.valid.reshape(SIZE, SIZE)
@@ -64,7 +114,7 @@ def make_object(number: int) -> dict[str, np.ndarray]:
         "albedos": albedos,
         "toward": lamps.astype(np.float32),
         "reached": packed,
-        "shape": np.array(family),
+        "shape": np.array(shape),
     }
 
 
@@ -87,13 +137,23 @@ def main() -> None:
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     parser.add_argument("--count", type=int, default=1000, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="the first one's number")
+    parser.add_argument("--groups", action="store_true", help="bodies that have grown together")
+    parser.add_argument("--data", type=Path, metavar="ROOT", help="the MIT-Berkeley objects that this folder holds")
     wanted = parser.parse_args()
     wanted.output.mkdir(parents=True, exist_ok=True)
+    if wanted.data is not None:
+        for name, parts in measured_objects(wanted.data):
+            _write(wanted.output / f"{name}.npz", parts)
+        return
     for number in range(wanted.first, wanted.first + wanted.count):
         path = wanted.output / f"{number:06d}.npz"
         if not path.exists():
-            with new_file(path) as temporary, temporary.open("wb") as file:
-                np.savez_compressed(file, **make_object(number))  # type: ignore[arg-type]
+            _write(path, (make_group if wanted.groups else make_object)(number))
+
+
+def _write(path: Path, parts: dict[str, np.ndarray]) -> None:
+    with new_file(path) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **parts)  # type: ignore[arg-type]
 
 
 if __name__ == "__main__":

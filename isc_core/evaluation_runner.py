@@ -4,7 +4,7 @@ The protocol of J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712: t
 zero, and the occluding contour is that of the object's mask, without the points near the crop's frame.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,20 +12,24 @@ from . import baselines
 from .datasets import MitBerkeleyObject
 from .decomposition import Separation
 from .evaluate import Estimate, Runner
+from .lamp_network import glance_at
 from .models.joint import Explain, JointOptions, believed, doubt, stepped
 from .models.mbp import split_reflectance
-from .models.shape import trust_of
+from .models.settings import OUTLINE, SEEN, USUAL
+from .models.shape import looked_at, trust_of
 from .pipeline import BASELINE_MODELS, Settings
 from .progress import Monitor
 from .separation import BEST, separate
 from .separation.layer_network import LayerNetwork
+from .shape_network import shape_at
 from .sirfs.contour import occluding_contour
 from .sirfs.fitting.prior_set import PriorSet
 from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
 from .sirfs.kernel_cache import announce_compilation
 from .sirfs.priors import Priors
 from .sirfs.problem import Problem
-from .sirfs.settings import Weights, isc_weights
+from .sirfs.seen_shape import SeenShape, seen_field
+from .sirfs.settings import SEEN_SHAPE, Weights, isc_weights
 from .sirfs.silhouette import silhouette_field
 from .sirfs.solver import SirfsResult, SolverOptions, solve
 from .sirfs.stencils import normals
@@ -36,17 +40,41 @@ _HALF_CODE = 0.5 / 65535  # the images have 16 bits; a separation may leave less
 @dataclass(frozen=True)
 class RunnerOptions:
     """`model`: one of `pipeline.MODELS`; `separator`: one of `separation.METHODS`, for the models that separate;
-    `engine`, `threads`: see `SolverOptions`; `confidence_weights`: see `Settings`."""
+    `engine`, `threads`: see `SolverOptions`; `confidence_weights`, `light_prior`, `shape_prior`: see `Settings`. SIRFS is
+    measured by itself unless more is asked for: it expects the usual lights, and what the outline suggests."""
 
     model: str = "sirfs"
     separator: str = BEST
     engine: str = "auto"
     threads: int = 0
     confidence_weights: bool = False
+    light_prior: str = USUAL
+    shape_prior: str = OUTLINE
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""
-        Settings(self.model, self.separator, engine=self.engine, threads=self.threads, confidence_weights=self.confidence_weights).check()
+        Settings(
+            self.model, self.separator, engine=self.engine, threads=self.threads, confidence_weights=self.confidence_weights,
+            light_prior=self.light_prior, shape_prior=self.shape_prior,
+        ).check()  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Expected:
+    """What SIRFS is told beforehand; `seen`: of the shape, where it was asked for."""
+
+    priors: Priors
+    weights: Weights
+    seen: SeenShape | None = None
+
+
+def _expected(truth: MitBerkeleyObject, usual: Priors, options: RunnerOptions) -> _Expected:
+    weights, photo = isc_weights(truth.illumination, 3), np.maximum(truth.image, 0).astype(np.float32)
+    glance = glance_at(photo, truth.valid) if options.light_prior == SEEN else None
+    priors = looked_at(usual, glance, options.light_prior, truth.illumination)
+    if options.shape_prior == SEEN:
+        return _Expected(priors, replace(weights, silhouette=SEEN_SHAPE), shape_at(photo, truth.valid))
+    return _Expected(priors, weights)
 
 
 def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwork | None = None) -> Runner:
@@ -66,9 +94,10 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwo
         announce_compilation(options.engine, monitor)
         if truth.illumination not in tables:
             tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
+        expected = _expected(truth, tables[truth.illumination], options)
         if options.model == "joint":
-            return joint_estimate(truth, tables[truth.illumination], options, monitor, network)
-        result = solve_sirfs(truth, log_image, tables[truth.illumination], options, monitor, trust)
+            return joint_estimate(truth, expected, options, monitor, network)
+        result = solve_sirfs(truth, log_image, expected, options, monitor, trust)
         if options.model == "mbp":
             log_image = _log_separated_reflectance(truth, result, options)
         return _estimate(truth, log_image, result.height, result.light, result)
@@ -76,28 +105,37 @@ def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwo
     return run
 
 
-def pose(truth: MitBerkeleyObject, log_image: np.ndarray, priors: Priors, weights: Weights, trust: np.ndarray | None = None) -> Problem:
-    """The problem as the reference program poses it; `log_image` (H, W, 3) is read where `truth.valid`. `trust` (H, W): see `Problem`."""
+def pose(
+    truth: MitBerkeleyObject,
+    log_image: np.ndarray,
+    priors: Priors,
+    weights: Weights,
+    trust: np.ndarray | None = None,
+    seen: SeenShape | None = None,
+) -> Problem:
+    """The problem as the reference program poses it; `log_image` (H, W, 3) is read where `truth.valid`. `trust` (H, W): see `Problem`;
+    `seen`: of the shape, instead of what the outline suggests."""
     contour = occluding_contour(truth.mask, drop_near_edge=True)
     field = None if priors.silhouette is None else silhouette_field(truth.mask, priors.silhouette)
+    field = field if seen is None else seen_field(seen, truth.mask)
     return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field, trust=trust)
 
 
 def solve_sirfs(
     truth: MitBerkeleyObject,
     log_image: np.ndarray,
-    priors: Priors,
+    expected: _Expected,
     options: RunnerOptions,
     monitor: Monitor,
     trust: np.ndarray | None = None,
 ) -> SirfsResult:
     """SIRFS on one object of the set; `log_image` (H, W, 3) is read where `truth.valid`. Looks at nothing else but `truth.mask`."""
-    problem = pose(truth, log_image, priors, isc_weights(truth.illumination, 3), trust)
+    problem = pose(truth, log_image, expected.priors, expected.weights, trust, expected.seen)
     return solve(problem, SolverOptions(engine=options.engine, threads=options.threads), monitor=monitor)
 
 
 def joint_estimate(
-    truth: MitBerkeleyObject, priors: Priors, options: RunnerOptions, monitor: Monitor, network: LayerNetwork | None = None
+    truth: MitBerkeleyObject, expected: _Expected, options: RunnerOptions, monitor: Monitor, network: LayerNetwork | None = None
 ) -> Estimate:
     """`models.joint` on one object; `network`: of its layers, the shipped one if None."""
     joint, valid = JointOptions(), truth.valid
@@ -108,11 +146,11 @@ def joint_estimate(
     how = SolverOptions(engine=options.engine, threads=options.threads)
 
     def energy(diffuse: np.ndarray, there: SirfsResult) -> float:
-        problem = pose(truth, _log(diffuse, truth), priors, isc_weights(truth.illumination, 3), trust)
+        problem = pose(truth, _log(diffuse, truth), expected.priors, expected.weights, trust, expected.seen)
         return solve(problem, how, known_height=there.height, known_light=there.light).terms.total
 
     explain = Explain(
-        solve=lambda diffuse: solve_sirfs(truth, _log(diffuse, truth), priors, options, monitor, trust),
+        solve=lambda diffuse: solve_sirfs(truth, _log(diffuse, truth), expected, options, monitor, trust),
         shading=lambda there: np.exp(_log_shading(normal_from_reference(normals(there.height)), there.light)),
         energy=energy,
     )

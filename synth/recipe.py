@@ -172,13 +172,13 @@ def camera_around(mesh: Mesh, size: int, fill: float, perspective: bool = False)
 def _mesh(recipe: Recipe) -> Mesh:
     shape, sources = recipe.shape, recipe.sources
     if shape.family == MESH_FILE:
-        return _centred(read_mesh_file(_given(sources.mesh, "--mesh")).mesh)
+        return centred(read_mesh_file(_given(sources.mesh, "--mesh")).mesh)
     if shape.family == HEIGHT_FILE:
-        return _centred(mesh_of_height(read_height(_given(sources.height, "--height"))))
-    return _centred(make_shape(shape.family, shape.generator("shape")))
+        return centred(mesh_of_height(read_height(_given(sources.height, "--height"))))
+    return centred(make_shape(shape.family, shape.generator("shape")))
 
 
-def _centred(mesh: Mesh) -> Mesh:
+def centred(mesh: Mesh) -> Mesh:
     """With the middle of its outline on the camera's axis."""
     low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
     return replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))

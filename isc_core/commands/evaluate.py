@@ -8,6 +8,7 @@ from ..atomic import new_file, require_writable_file
 from ..datasets import ILLUMINATIONS, INPUTS
 from ..evaluate import evaluate
 from ..evaluation_runner import RunnerOptions, make_runner
+from ..models.settings import LIGHT_PRIORS, SHAPE_PRIORS
 from ..progress import Monitor
 from ..sirfs.prior_file import load_prior_set, shipped_prior_set
 from .options import Commands, add_command, add_engine, names
@@ -19,6 +20,8 @@ _EXAMPLES = """  isc evaluate DATA --dataset mit-berkeley --json scores.json
 The package's own priors were fitted on the training objects of this set. For a fair figure leave the object out:
   isc fit-priors DATA --leave-out apple -o priors.npz
   isc evaluate DATA --dataset mit-berkeley --objects apple --priors priors.npz"""
+
+_PRIOR = "as for isc decompose (default %(default)s, so that SIRFS is measured by itself)"
 
 
 def declare(commands: Commands) -> None:
@@ -37,6 +40,8 @@ def declare(commands: Commands) -> None:
     parser.add_argument("--model", metavar="NAME", help="as for isc decompose (default: sirfs, or joint for --input original)")
     parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of joint, mdr, mbp (default %(default)s)")
     parser.add_argument("--confidence-weights", action="store_true", help="of joint and mdr: as for isc decompose")
+    parser.add_argument("--light-prior", choices=LIGHT_PRIORS, default=RunnerOptions().light_prior, help=_PRIOR)
+    parser.add_argument("--shape-prior", choices=SHAPE_PRIORS, default=RunnerOptions().shape_prior, help=_PRIOR)
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
     add_engine(parser)
     parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
@@ -48,7 +53,10 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         require_writable_file(options.json)
     original = options.input == "original"
     model = options.model or ("joint" if original else "sirfs")
-    runner_options = RunnerOptions(model, options.separator, options.engine, options.threads, options.confidence_weights)
+    runner_options = RunnerOptions(
+        model, options.separator, options.engine, options.threads, options.confidence_weights,
+        options.light_prior, options.shape_prior,
+    )  # fmt: skip
     runner_options.check()
     prior_set = shipped_prior_set() if options.priors is None else load_prior_set(options.priors)
     report = evaluate(

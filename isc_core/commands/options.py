@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from ..errors import InputError
 from ..limits import USUAL, Limits
-from ..models.settings import ILLUMINATIONS, LIGHT_COLOURS, LIGHT_PRIORS, MODELS, Settings
+from ..models.settings import ILLUMINATIONS, LIGHT_COLOURS, LIGHT_PRIORS, MODELS, SHAPE_PRIORS, Settings
 from ..photo import TRANSFERS
 from ..separation import METHODS
 
@@ -136,6 +136,10 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--light-prior", choices=LIGHT_PRIORS, default=usual.light_prior,
         help="expect the light that the photo seems to show, or that of all photos alike (default %(default)s)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--shape-prior", choices=SHAPE_PRIORS, default=usual.shape_prior,
+        help="expect the shape that the photo seems to show, or what its outline alone suggests (default %(default)s)",
     )  # fmt: skip
     parser.add_argument("--arrays", action="store_true", help="write arrays.npz too: everything as plain NumPy arrays, for other programs")
     parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")

@@ -2,12 +2,13 @@
 
 A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with.
 Of those that separate, `light_colour` decides which colour of light they see; those that find shape and light are told how the light
-looks (`lamp_network`), and of what they find `doubts` looks whether the photo shows what they assume.
+and the shape look (`lamp_network`, `shape_network`), and of what they find `doubts` looks whether the photo shows what they assume.
 """
 
 from dataclasses import replace
 
 from ..lamp_network import glance_at
+from ..shape_network import shape_at
 from .baseline import baseline
 from .doubts import doubted
 from .joint import joint
@@ -26,11 +27,14 @@ def solve(task: Task) -> Answer:
     solver = _SOLVERS.get(task.settings.model, baseline)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
-    glance = task.glance
+    glance, seen = task.glance, task.seen
     if glance is None:
         with task.clock.stage("light at first sight"):
             glance = glance_at(task.maps.image, task.maps.mask)
-    task = replace(task, glance=glance)
+    if seen is None and task.settings.looks_at_shape and task.known.depth is None:
+        with task.clock.stage("shape at first sight"):
+            seen = shape_at(task.working.image, task.working.mask)
+    task = replace(task, glance=glance, seen=seen)
     answer = under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
     return doubted(task.maps, answer, glance)
 

@@ -13,7 +13,9 @@ BASELINE_MODELS = tuple(baselines.METHODS)
 MODELS = SIRFS_MODELS + BASELINE_MODELS
 NATURAL, LABORATORY = ILLUMINATIONS = ("natural", "laboratory")
 LIGHT_COLOURS = ("white", "estimate")
-SEEN, USUAL = LIGHT_PRIORS = ("seen", "usual")
+SEEN, USUAL, OUTLINE = "seen", "usual", "outline"
+LIGHT_PRIORS = (SEEN, USUAL)
+SHAPE_PRIORS = (SEEN, OUTLINE)
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Settings:
     separation is in doubt weigh less in SIRFS' terms of reflectance. `light_colour`: of `SEPARATING_MODELS`, "white", or "estimate" for the
     colour that the photo's highlights tell, where they do. `light_prior`: of `SIRFS_MODELS`, which lights SIRFS expects: those that the
     photo's looks like ("seen", see `lamp_network`; in natural illumination), or those of all photos of this `illumination` ("usual").
+    `shape_prior`: of `SIRFS_MODELS`, what SIRFS expects of the shape: what the photo looks like ("seen", see `shape_network`; in natural
+    illumination, where no depth is known), or what its outline alone suggests ("outline").
     """
 
     model: str = "joint"
@@ -42,6 +46,12 @@ class Settings:
     confidence_weights: bool = False
     light_colour: str = "white"
     light_prior: str = SEEN
+    shape_prior: str = SEEN
+
+    @property
+    def looks_at_shape(self) -> bool:
+        """Whether the shape is expected that the photo seems to show."""
+        return self.shape_prior == SEEN and self.illumination != LABORATORY
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""
@@ -51,6 +61,7 @@ class Settings:
             ("illumination", self.illumination, ILLUMINATIONS),
             ("light colour", self.light_colour, LIGHT_COLOURS),
             ("light prior", self.light_prior, LIGHT_PRIORS),
+            ("shape prior", self.shape_prior, SHAPE_PRIORS),
             ("engine", self.engine, ("auto", "numba", "numpy")),
         ):
             if value not in known:

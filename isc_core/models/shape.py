@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..glance import Glance
 from ..photo import Photo
 from ..progress import Monitor
 from ..sirfs.kernel_cache import announce_compilation
@@ -18,7 +19,7 @@ from ..sirfs.priors import Priors
 from ..sirfs.recover import Known, Recovered, RecoverOptions, recover
 from ..sirfs.resampling import resample_height
 from ..sirfs.seen_light import seen_light
-from ..sirfs.settings import isc_weights
+from ..sirfs.settings import SEEN_SHAPE, isc_weights
 from ..sirfs.solver import SolverOptions
 from .layers import shifted
 from .settings import LABORATORY, USUAL
@@ -66,9 +67,13 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, tr
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
-    priors = _looked_at(task, (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels))
+    priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
+    priors = looked_at(priors, task.glance, settings.light_prior, settings.illumination)
     options = RecoverOptions(shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads))
     weights = isc_weights(settings.illumination, channels)
+    seen = task.seen if settings.looks_at_shape and known.depth is None else None
+    if seen is not None:
+        weights = replace(weights, silhouette=SEEN_SHAPE)
     light = known.light if known.light is None or channels == 3 else known.light.mean(axis=1, keepdims=True)
     gain = _usual_exposure(working)
     if light is not None and gain != 1:
@@ -76,16 +81,16 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, tr
     with task.clock.stage("shape and light"):
         found = recover(
             diffuse[..., :channels] * diffuse.dtype.type(gain), working.mask, gain * working.code_value / 2, priors, weights, options,
-            trust=trust, known=Known(known.height, light, known.depth), monitor=monitor,
+            trust=trust, seen=seen, known=Known(known.height, light, known.depth), monitor=monitor,
         )  # fmt: skip
     return found if gain == 1 else replace(found, light=shifted(found.light, -np.log(gain)))
 
 
-def _looked_at(task: Task, priors: Priors) -> Priors:
+def looked_at(priors: Priors, glance: Glance | None, light_prior: str, illumination: str) -> Priors:
     """`priors`, told how the photo's light looks where that is asked for and somebody looked. A laboratory's light is known as well."""
-    if task.glance is None or task.settings.light_prior == USUAL or task.settings.illumination == LABORATORY:
+    if glance is None or light_prior == USUAL or illumination == LABORATORY:
         return priors
-    return replace(priors, light=seen_light(priors.light, task.glance.light, task.glance.deviations))
+    return replace(priors, light=seen_light(priors.light, glance.light, glance.deviations))
 
 
 def _usual_exposure(photo: Photo) -> float:

@@ -15,6 +15,7 @@ from ..photo import Photo
 from ..progress import Monitor
 from ..sirfs.fitting.prior_set import PriorSet
 from ..sirfs.recover import Known
+from ..sirfs.seen_shape import SeenShape
 from .settings import Settings
 
 
@@ -39,7 +40,7 @@ class Task:
     `working`: the photo at the scale at which shape and light are looked for; `maps`: at the scale of the result's maps, the same object
     where the two scales are one. `known`: at the working scale. `prior_set`: the shipped one if None. `split`: the layers of `maps` by the
     separator of the settings, where they have been found before; else None. `glance`: how the photo's light looks,
-    None where nobody has looked yet.
+    `seen`: how its shape does, at the working scale; None where nobody has looked yet.
     """
 
     working: Photo
@@ -51,6 +52,7 @@ class Task:
     clock: Clock = field(default_factory=Clock)
     split: Separation | None = None
     glance: Glance | None = None
+    seen: SeenShape | None = None
 
     @property
     def one_scale(self) -> bool:

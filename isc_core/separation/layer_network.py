@@ -59,6 +59,15 @@ class LayerNetwork:
         if count < 7 or count % 4 != 3 or not fits or self.weights[-1].shape[2] != _CHANNELS * BLOCK**2:
             raise InputError("these are not the weights of a layer network")
 
+    @property
+    def encoder(self) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+        """The weights and biases of its levels down."""
+        return self.weights[: 2 * self._levels], self.biases[: 2 * self._levels]
+
+    @property
+    def _levels(self) -> int:
+        return (len(self.weights) - 1) // 4 + 1
+
     def __call__(self, image: np.ndarray, mask: np.ndarray, mirrored: bool = True) -> tuple[np.ndarray, np.ndarray]:
         """y (H, W, 3) >= 0 and log b (H, W), float32, of `image` (H, W, 3) linear >= 0 and `mask` (H, W) bool; H, W multiples of 32.
 
@@ -71,7 +80,7 @@ class LayerNetwork:
 
     def _run(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         steps = iter(zip(self.weights, self.biases, strict=True))
-        kept = encoded(image, mask, steps, (len(self.weights) - 1) // 4 + 1)
+        kept = encoded(image, mask, steps, self._levels)
         layer = kept[-1]
         for skipped in kept[-2::-1]:
             layer = twice(np.concatenate([skipped, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps)

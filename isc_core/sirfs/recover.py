@@ -14,8 +14,9 @@ from .framing import continued
 from .priors import Priors
 from .problem import DepthObservation, Problem, Terms
 from .resampling import height_scale, resample_height, resample_inside
+from .seen_shape import SeenShape, seen_field
 from .settings import Weights
-from .silhouette import silhouette_field
+from .silhouette import SilhouetteField, silhouette_field
 from .solver import SolverOptions, solve
 
 MARGIN = 20
@@ -104,20 +105,25 @@ def recover(
     options: RecoverOptions | None = None,
     *,
     trust: np.ndarray | None = None,
+    seen: SeenShape | None = None,
     known: Known | None = None,
     monitor: Monitor | None = None,
 ) -> Recovered:
     """Recovers height and light.
 
     `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`: zero channels are raised to it, in
-    the logarithm only. `trust`: (H, W) in [0, 1], see `Problem`. Raises `Cancelled`.
+    the logarithm only. `trust`: (H, W) in [0, 1], see `Problem`. `seen`: what was seen of the shape, instead of what the outline suggests.
+    Raises `Cancelled`.
     """
     options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
     known, base = _levelled(known, mask)
     window, factor = _window(mask, options)
     inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
-    trusted = None if trust is None else window.cut(trust, 0)
-    scene = _Scene(window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window, trusted)
+    scene = _Scene(
+        window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window,
+        None if trust is None else window.cut(trust, 0),
+        None if seen is None else SeenShape(window.cut(seen.normal, 0), window.cut(seen.deviation, 0)),
+    )  # fmt: skip
     problem = scene.problem(factor)
     given = None if known.height is None else _to_solve(window.cut_on(known.height), scene.inside, factor)
     result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=monitor)
@@ -170,10 +176,12 @@ class _Scene:
     known: Known
     window: _Window
     trust: np.ndarray | None
+    seen: SeenShape | None
 
     def problem(self, factor: float) -> Problem:
         """The problem at `factor` times the image's scale."""
-        image, valid, outline, photo, depth, trust = self.image, self.inside, self.outline, self.photo, self.known.depth, self.trust
+        image, valid, outline, photo, depth = self.image, self.inside, self.outline, self.photo, self.known.depth
+        trust, seen = self.trust, self.seen
         if depth is not None:
             depth = DepthObservation(self.window.cut(depth.height, np.nan), depth.sigma, depth.weight)
         if factor != 1:
@@ -182,12 +190,18 @@ class _Scene:
             outline, photo = (resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5 for m in (outline, photo))
             depth = None if depth is None else _scaled_depth(depth, factor)
             trust = None if trust is None else resample_inside(trust, self.inside, factor)[0]
+            seen = None if seen is None else SeenShape(*(resample_inside(m, self.inside, factor)[0] for m in (seen.normal, seen.deviation)))
         log_image = np.where(valid[..., None], np.log(np.maximum(image, self.floor)), 0.0)
-        profile = self.priors.silhouette
         return Problem(
             log_image, valid, outline, _seen(occluding_contour(outline), photo), self.priors, self.weights, depth,
-            self.options.shading_only, None if profile is None else silhouette_field(outline, profile), trust,
+            self.options.shading_only, self._field(outline, seen), trust,
         )  # fmt: skip
+
+    def _field(self, outline: np.ndarray, seen: SeenShape | None) -> SilhouetteField | None:
+        if seen is not None:
+            return seen_field(seen, outline)
+        profile = self.priors.silhouette
+        return None if profile is None else silhouette_field(outline, profile)
 
 
 def _seen(contour: Contour, photo: np.ndarray) -> Contour:

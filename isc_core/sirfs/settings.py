@@ -79,6 +79,8 @@ ISC_GREY_NATURAL = replace(
     starts=ISC_NATURAL.starts,
 )
 
+SEEN_SHAPE = 0.4  # the silhouette's weight where its field is what was seen of the shape (`seen_shape`); docs/methods/first_shape.md
+
 
 def isc_weights(illumination: str, channels: int) -> Weights:
     """Our own set for "natural" or "laboratory" illumination and 3 or 1 channels."""

@@ -23,6 +23,7 @@ from isc_core.models.layers import separated, shaded
 from isc_core.models.settings import SEPARATING_MODELS
 from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
+from isc_core.shape_network import shape_at
 from isc_core.sirfs.frames import light_from_reference
 from isc_core.sirfs.recover import Known
 
@@ -64,12 +65,12 @@ def run_models(inputs: Inputs, options: StageOptions, monitor: Monitor) -> Varia
         raise ValueError("the models are compared with SIRFS on the true diffuse layer, which has to be given")
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
-    glance = glance_at(photo.image, photo.mask)  # at the photo, also where only its diffuse layer is explained
+    glance, seen = glance_at(photo.image, photo.mask), shape_at(photo.image, photo.mask)  # of the photo, also for its diffuse layer alone
 
     def solved(model: str, image: Photo, start: Answer | None = None) -> Answer:
         known = Known() if start is None else Known(start.height, start.light)
         settings = Settings(model, options.separator, options.illumination, threads=options.threads)
-        return solve(Task(image, image, settings, known, monitor=monitor, split=split, glance=glance))
+        return solve(Task(image, image, settings, known, monitor=monitor, split=split, glance=glance, seen=seen))
 
     answers = {PLAIN: solved("sirfs", photo)}
     for name in (name for name in SEPARATING_MODELS if name in options.models):

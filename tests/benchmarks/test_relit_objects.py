@@ -8,7 +8,7 @@ import pytest
 pytest.importorskip("mitsuba")
 
 from benchmarks.relit_objects import NONE, ONE, SEVERAL, Relit, draw_photo
-from benchmarks.unlit_objects import LAMPS, SIZE, Unlit, make_object, objects_in
+from benchmarks.unlit_objects import GROUP, LAMPS, SIZE, Unlit, make_group, make_object, objects_in
 
 
 @pytest.fixture(scope="module")
@@ -59,3 +59,26 @@ def test_an_object_that_is_there_is_read_by_name(tmp_path: Path) -> None:
     for number in (5, 4):
         np.savez_compressed(tmp_path / f"{number:06d}.npz", **make_object(number))  # type: ignore[arg-type]
     assert [one.shape for one in objects_in(tmp_path)] == [str(make_object(number)["shape"]) for number in (4, 5)]
+
+
+def test_a_map_of_space_keeps_what_faces_what_and_the_view(unlit: Unlit) -> None:
+    relit = Relit.of(unlit)
+    space = np.array([[0.7, 0, 0], [0, 1, 0], [0.2, -0.3, 1.4]])
+    mapped = relit.mapped(space)
+    np.testing.assert_allclose(np.linalg.norm(mapped.normals, axis=1), 1, rtol=1e-5)
+    facing, before = mapped.normals @ mapped.toward.T, relit.normals.astype(np.float32) @ relit.toward.T
+    clear = np.abs(before) > 1e-2
+    np.testing.assert_array_equal(np.sign(facing[clear]), np.sign(before[clear]))
+    np.testing.assert_array_equal(mapped.normals[:, 2] > 0, relit.normals[:, 2] > 0)
+    ball = np.array([[0.6, 0, 0.8]])  # of x^2 + y^2 + z^2 = 1; twice as deep its normal is along (x, y, z / 4) at (x, y, 2 z)
+    deep = Relit(ball, relit.albedos, relit.mirrored, relit.toward, relit.reached, relit.mask, "").mapped(np.diag([1, 1, 2.0])).normals
+    np.testing.assert_allclose(deep, np.array([[0.6, 0, 0.4]]) / np.hypot(0.6, 0.4), rtol=1e-5)
+
+
+def test_a_group_is_the_same_each_time_and_its_normals_face_the_viewer() -> None:
+    one, again = make_group(1), make_group(1)
+    assert str(one["shape"]) == GROUP
+    for name in one:
+        np.testing.assert_array_equal(one[name], again[name])
+    assert (one["normals"][one["mask"]][:, 2] > -1e-3).all()
+    assert 0.1 < one["mask"].mean() < 0.85

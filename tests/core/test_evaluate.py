@@ -88,6 +88,19 @@ def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(root: Path
     np.testing.assert_array_equal(other.reflectance, plain.reflectance)
 
 
+def test_what_was_seen_is_expected_where_that_is_asked_for(root: Path) -> None:
+    def height(illumination: str, **priors: str) -> np.ndarray:
+        options = RunnerOptions(threads=1, **priors)  # type: ignore[arg-type]
+        return make_runner(options, shipped_prior_set())(load_object(root, "ball", illumination), Monitor()).height
+
+    by_itself = height("natural")
+    for prior in ("light_prior", "shape_prior"):
+        assert not np.array_equal(height("natural", **{prior: "seen"}), by_itself)
+    np.testing.assert_array_equal(height("laboratory", light_prior="seen"), height("laboratory"))  # its light is known
+    with pytest.raises(InputError, match="unknown shape prior"):
+        RunnerOptions(shape_prior="round").check()
+
+
 @pytest.fixture(scope="module")
 def report(root: Path) -> EvaluationReport:
     return evaluate(root, model="naive", runner=naive)

@@ -27,7 +27,7 @@ def error(d: Decomposition) -> float:
 @pytest.mark.parametrize("grey", [False, True])
 def test_a_ball_is_rounder_in_the_light_that_was_seen(grey: bool) -> None:
     toward = (-0.7, 0.2, 0.6)
-    seen, usual = found(toward, grey), found(toward, grey, light_prior="usual")
+    seen, usual = (found(toward, grey, shape_prior="outline", light_prior=prior) for prior in ("seen", "usual"))
     assert seen.identity_errors().broken() == ()
     assert error(seen) < 0.9 * error(usual)
     assert seen.provenance.settings["light_prior"] == "seen" and usual.provenance.settings["light_prior"] == "usual"

@@ -1,0 +1,47 @@
+"""What SIRFS expects of the shape: what the photo shows at first sight, or what its outline alone suggests."""
+
+import numpy as np
+import pytest
+
+from isc_core.decomposition import Decomposition
+from isc_core.errors import InputError
+from isc_core.photo import Photo, PhotoSource
+from isc_core.pipeline import Evidence, Settings, decompose
+from tests.core.lit_balls import ball, under_lamps
+
+
+def found(evidence: Evidence | None = None, **settings: str) -> Decomposition:
+    """A painted ball under one lamp, explained."""
+    image, mask = under_lamps((-0.7, 0.2, 0.6))
+    photo = Photo(image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file"))
+    return decompose(photo, Settings(model="mdr", threads=1, **settings), evidence=evidence)  # type: ignore[arg-type]
+
+
+def error(d: Decomposition) -> float:
+    """Degrees between the normals and the ball's, in the mean."""
+    normal, mask = ball()
+    return float(np.degrees(np.arccos(np.clip((d.normal * normal).sum(-1)[mask], -1, 1))).mean())
+
+
+def test_a_ball_is_rounder_as_it_was_seen() -> None:
+    seen, outline = found(), found(shape_prior="outline")
+    assert seen.identity_errors().broken() == ()
+    assert error(seen) < 0.8 * error(outline)
+    assert seen.provenance.settings["shape_prior"] == "seen" and outline.provenance.settings["shape_prior"] == "outline"
+
+
+def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
+    normal, _ = ball()
+    evidence = Evidence(depth=67.5 * normal[..., 2])
+    one, other = (found(evidence, shape_prior=prior) for prior in ("seen", "outline"))
+    np.testing.assert_array_equal(one.height, other.height)
+
+
+def test_in_the_laboratory_the_outline_is_enough() -> None:
+    one, other = (found(illumination="laboratory", shape_prior=prior) for prior in ("seen", "outline"))
+    np.testing.assert_array_equal(one.height, other.height)
+
+
+def test_an_unknown_prior_is_refused() -> None:
+    with pytest.raises(InputError, match="unknown shape prior"):
+        Settings(shape_prior="round").check()
