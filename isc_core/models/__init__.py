@@ -9,6 +9,7 @@ from dataclasses import replace
 
 from ..lamp_network import glance_at
 from ..shape_network import shape_at
+from ..sirfs.framing import is_cut
 from .baseline import baseline
 from .doubts import doubted
 from .joint import joint
@@ -31,7 +32,7 @@ def solve(task: Task) -> Answer:
     if glance is None:
         with task.clock.stage("light at first sight"):
             glance = glance_at(task.maps.image, task.maps.mask)
-    if seen is None and task.settings.looks_at_shape and task.known.depth is None:
+    if seen is None and task.settings.looks_at_shape and task.known.depth is None and not is_cut(task.working.mask):
         with task.clock.stage("shape at first sight"):
             seen = shape_at(task.working.image, task.working.mask)
     task = replace(task, glance=glance, seen=seen)

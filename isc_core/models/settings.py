@@ -31,7 +31,7 @@ class Settings:
     colour that the photo's highlights tell, where they do. `light_prior`: of `SIRFS_MODELS`, which lights SIRFS expects: those that the
     photo's looks like ("seen", see `lamp_network`; in natural illumination), or those of all photos of this `illumination` ("usual").
     `shape_prior`: of `SIRFS_MODELS`, what SIRFS expects of the shape: what the photo looks like ("seen", see `shape_network`; in natural
-    illumination, where no depth is known), or what its outline alone suggests ("outline").
+    illumination, where no depth is known and the frame does not cut the object), or what its outline alone suggests ("outline").
     """
 
     model: str = "joint"

@@ -27,9 +27,19 @@ def cut_line(mask: np.ndarray) -> np.ndarray:
     return cut
 
 
+def is_cut(mask: np.ndarray) -> bool:
+    """Whether the frame cuts the object of `mask` (H, W) bool."""
+    return any(bool(cut_line(m).any()) for m in _sides(mask))
+
+
+def _sides(mask: np.ndarray) -> tuple[np.ndarray, ...]:
+    """`mask`, turned so that its upper, lower, left and right side is the first row."""
+    return mask, mask[::-1], mask.T, mask.T[::-1]
+
+
 def continued(mask: np.ndarray, top: int, bottom: int, left: int, right: int) -> np.ndarray:
     """`mask` with so many rows and columns added; the object goes on into them where the frame cuts it, else they are empty."""
-    upper, lower, first, last = (cut_line(m) for m in (mask, mask[::-1], mask.T, mask.T[::-1]))
+    upper, lower, first, last = (cut_line(m) for m in _sides(mask))
     out = np.pad(mask, [(top, bottom), (left, right)])
     rows, columns = slice(top, top + mask.shape[0]), slice(left, left + mask.shape[1])
     out[:top, columns], out[top + mask.shape[0] :, columns] = upper, lower

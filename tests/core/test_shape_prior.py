@@ -10,9 +10,9 @@ from isc_core.pipeline import Evidence, Settings, decompose
 from tests.core.lit_balls import ball, under_lamps
 
 
-def found(evidence: Evidence | None = None, **settings: str) -> Decomposition:
+def found(evidence: Evidence | None = None, cut: int = 0, **settings: str) -> Decomposition:
     """A painted ball under one lamp, explained."""
-    image, mask = under_lamps((-0.7, 0.2, 0.6))
+    image, mask = (part[cut:] for part in under_lamps((-0.7, 0.2, 0.6)))
     photo = Photo(image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file"))
     return decompose(photo, Settings(model="mdr", threads=1, **settings), evidence=evidence)  # type: ignore[arg-type]
 
@@ -34,6 +34,11 @@ def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
     normal, _ = ball()
     evidence = Evidence(depth=67.5 * normal[..., 2])
     one, other = (found(evidence, shape_prior=prior) for prior in ("seen", "outline"))
+    np.testing.assert_array_equal(one.height, other.height)
+
+
+def test_what_the_frame_cuts_was_not_seen_whole() -> None:
+    one, other = (found(cut=60, shape_prior=prior) for prior in ("seen", "outline"))
     np.testing.assert_array_equal(one.height, other.height)
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from isc_core.sirfs.framing import continued, cut_line
+from isc_core.sirfs.framing import continued, cut_line, is_cut
 
 
 def disc(size: int, radius: float, center: tuple[float, float]) -> np.ndarray:
@@ -37,3 +37,9 @@ def test_each_side_is_judged_alone() -> None:
 
 def test_a_full_frame_goes_on_everywhere() -> None:
     assert continued(np.ones((20, 30), bool), 3, 3, 3, 3).all()
+
+
+def test_whole_discs_are_not_cut_and_halves_are_on_any_side() -> None:
+    whole, half = disc(101, 50, (50, 50)), disc(101, 50, (50, 50))[40:]
+    assert not is_cut(whole) and not is_cut(np.pad(half, 1))
+    assert all(is_cut(np.rot90(half, turn)) for turn in range(4))
