@@ -13,9 +13,7 @@ averaged weights.
 """
 
 import argparse
-import copy
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -24,9 +22,10 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from benchmarks.appearance_training import follow, sensed
+from benchmarks.appearance_training import sensed
 from benchmarks.drawing import log_uniform
 from benchmarks.layer_network_training import arrays_of, encoder_of, inputs
+from benchmarks.network_fitting import optimised
 from benchmarks.relit_objects import NONE, ONE, SEVERAL, Relit, draw_photo
 from benchmarks.unlit_objects import SIZE, objects_in
 from isc_core.glance import PLACES
@@ -40,7 +39,7 @@ _OBJECT = 0.9 * SIZE  # of an unlit object, its longer side
 _CHANCES = (0.25, 0.4, 0.35)  # of NONE, ONE, SEVERAL
 _SPREAD = math.radians(8)  # of a lamp's place
 _NORMALS = 1.0  # weight of the normals in the loss
-_RATE, _HEAD_RATE, _DECAY, _WARM_UP, _BATCH = 4e-4, 1e-3, 1e-2, 100, 32
+_BATCH = 32
 _LOCAL, _WHOLE = 192, 256
 _EVERY = 8  # pixels: one of them tells of the light
 _DARKEST = 0.05  # of the mean shading: what is darker is in shadow
@@ -190,7 +189,7 @@ def loss_of(network: Network, batch: list[torch.Tensor]) -> tuple[torch.Tensor, 
 
 
 def fit(objects: list[Relit], given: argparse.Namespace) -> Network:
-    """The fitted network, its weights averaged over the last steps; a copy of it is kept every thousand steps beside the output."""
+    """The fitted network, its weights averaged over the last steps; see `network_fitting`."""
     torch.manual_seed(given.seed)
     torch.set_num_threads(given.threads)
     network = Network()
@@ -198,29 +197,7 @@ def fit(objects: list[Relit], given: argparse.Namespace) -> Network:
         known = torch.load(given.start, weights_only=True)
         network.load_state_dict({name: part for name, part in known.items() if not name.startswith("light")}, strict=False)
     batches = iter(torch.utils.data.DataLoader(Draws(objects, given.seed), batch_size=None, num_workers=1, prefetch_factor=8))
-    heads = [value for name, value in network.named_parameters() if not name.startswith("convolutions")]
-    optimizer = torch.optim.AdamW(
-        [{"params": network.convolutions.parameters(), "lr": _RATE}, {"params": heads, "lr": _HEAD_RATE}], weight_decay=_DECAY
-    )
-    average, shown, began = copy.deepcopy(network).eval(), np.zeros(4), time.time()
-    for step in range(given.steps):
-        rate = min(1.0, (step + 1) / _WARM_UP) * 0.5 * (1 + math.cos(math.pi * step / given.steps))
-        for group, full in zip(optimizer.param_groups, (_RATE, _HEAD_RATE), strict=True):
-            group["lr"] = rate * full
-        loss, parts = loss_of(network, next(batches))
-        optimizer.zero_grad()
-        loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimizer.step()
-        follow(average, network, step)
-        shown = 0.99 * shown + 0.01 * np.array(parts)
-        if step % 100 == 99:
-            told = ", ".join(f"{part:.4f}" for part in shown / (1 - 0.99 ** (step + 1)))
-            print(f"step {step + 1} of {given.steps}, losses {told}, {time.time() - began:.0f} s", flush=True)
-        if step % 1000 == 999:
-            np.savez_compressed(given.output, **average.arrays())
-            torch.save(average.state_dict(), given.output.with_suffix(".pt"))
-    return average
+    return optimised(network, network.convolutions, batches, loss_of, given)
 
 
 def main() -> None:

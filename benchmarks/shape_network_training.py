@@ -12,9 +12,7 @@ means are held. Adam with decoupled weight decay (I. Loshchilov and F. Hutter 20
 """
 
 import argparse
-import copy
 import math
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,9 +21,10 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from benchmarks.appearance_training import follow, sensed
+from benchmarks.appearance_training import sensed
 from benchmarks.drawing import log_uniform
 from benchmarks.layer_network_training import Block, arrays_of, encoder_of, inputs
+from benchmarks.network_fitting import optimised
 from benchmarks.relit_objects import NONE, ONE, SEVERAL, Lit, Relit, draw_photo
 from benchmarks.unlit_objects import SIZE, objects_in
 from isc_core.lamp_network import shipped_lamp_network
@@ -37,7 +36,7 @@ _CHANCES = (0.35, 0.45, 0.2)  # of NONE, ONE, SEVERAL
 _MAPPED, _MEASURED = 0.7, 0.25  # shares of the pictures
 _NARROW, _DEEP, _LEANING = (0.6, 1.0), (0.35, 1.5), 0.2  # of the maps: across, in depth, how much depth rises across
 _AT_THE_SIDE = math.cos(math.radians(75))  # some lamps have to stand before it
-_RATE, _HEAD_RATE, _DECAY, _WARM_UP, _BATCH = 4e-4, 1e-3, 1e-2, 100, 32
+_BATCH = 32
 _LIKELIHOOD = 0.1  # weight in the loss
 
 
@@ -166,34 +165,14 @@ def loss_of(network: Network, batch: list[torch.Tensor]) -> tuple[torch.Tensor, 
 
 
 def fit(objects: list[Relit], measured: list[Relit], given: argparse.Namespace) -> Network:
-    """The fitted network, its weights averaged over the last steps; a copy of it is kept every five hundred steps beside the output."""
+    """The fitted network, its weights averaged over the last steps; see `network_fitting`."""
     torch.manual_seed(given.seed)
     torch.set_num_threads(given.threads)
     network = Network().to(memory_format=torch.channels_last)
     if given.start is not None:
         network.load_state_dict(torch.load(given.start, weights_only=True))
     batches = iter(torch.utils.data.DataLoader(Draws(objects, measured, given.seed), batch_size=None, num_workers=1, prefetch_factor=8))
-    rates = (_RATE, _HEAD_RATE)
-    groups = [network.down.parameters(), [*network.up.parameters(), *network.out.parameters()]]
-    optimizer = torch.optim.AdamW([{"params": group, "lr": rate} for group, rate in zip(groups, rates, strict=True)], weight_decay=_DECAY)
-    average, shown, began = copy.deepcopy(network).eval(), np.zeros(2), time.time()
-    for step in range(given.steps):
-        share = min(1.0, (step + 1) / _WARM_UP) * 0.5 * (1 + math.cos(math.pi * step / given.steps))
-        for group, full in zip(optimizer.param_groups, rates, strict=True):
-            group["lr"] = share * full
-        loss, parts = loss_of(network, next(batches))
-        optimizer.zero_grad()
-        loss.backward()
-        nn.utils.clip_grad_norm_(network.parameters(), 1.0)
-        optimizer.step()
-        follow(average, network, step)
-        shown = 0.99 * shown + 0.01 * np.array(parts)
-        if step % 100 == 99:
-            told = ", ".join(f"{part:.4f}" for part in shown / (1 - 0.99 ** (step + 1)))
-            print(f"step {step + 1} of {given.steps}, losses {told}, {time.time() - began:.0f} s", flush=True)
-        if step % 500 == 499:
-            torch.save(average.state_dict(), given.output.with_suffix(".pt"))
-    return average
+    return optimised(network, network.down, batches, loss_of, given)
 
 
 def main() -> None:

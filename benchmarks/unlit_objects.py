@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 
 from isc_core.atomic import new_file
 from isc_core.datasets import list_objects, load_object
+from isc_core.models.settings import LABORATORY
 from synth.albedos import ALBEDOS, make_albedo
 from synth.light_rigs.placing import toward
 from synth.materials import texture_at
@@ -34,7 +35,7 @@ from synth.tracing import LIFT, Tracer
 SIZE, LAMPS, PAINTS = 160, 32, 2
 _FILL = 0.9
 WIDEST = 80.0  # degrees from the viewer
-GROUP, LABORATORY = "group", "laboratory"
+GROUP = "group"
 _TOGETHER, _COPIES = 0.75, 3
 _SIZES, _STRETCHED = (0.25, 0.8), 0.3  # of the smaller bodies of a group; how unequally, as a logarithm
 

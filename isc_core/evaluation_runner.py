@@ -4,7 +4,7 @@ The protocol of J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712: t
 zero, and the occluding contour is that of the object's mask, without the points near the crop's frame.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -28,9 +28,8 @@ from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
 from .sirfs.kernel_cache import announce_compilation
 from .sirfs.priors import Priors
 from .sirfs.problem import Problem
-from .sirfs.seen_shape import SeenShape, seen_field
-from .sirfs.settings import SEEN_SHAPE, Weights, isc_weights
-from .sirfs.silhouette import silhouette_field
+from .sirfs.seen_shape import SeenShape, expected_field
+from .sirfs.settings import Weights, isc_weights
 from .sirfs.solver import SirfsResult, SolverOptions, solve
 from .sirfs.stencils import normals
 
@@ -69,12 +68,11 @@ class _Expected:
 
 
 def _expected(truth: MitBerkeleyObject, usual: Priors, options: RunnerOptions) -> _Expected:
-    weights, photo = isc_weights(truth.illumination, 3), np.maximum(truth.image, 0).astype(np.float32)
+    photo = np.maximum(truth.image, 0).astype(np.float32)
     glance = glance_at(photo, truth.valid) if options.light_prior == SEEN else None
     priors = looked_at(usual, glance, options.light_prior, truth.illumination)
-    if options.shape_prior == SEEN:
-        return _Expected(priors, replace(weights, silhouette=SEEN_SHAPE), shape_at(photo, truth.valid))
-    return _Expected(priors, weights)
+    seen = shape_at(photo, truth.valid) if options.shape_prior == SEEN else None
+    return _Expected(priors, isc_weights(truth.illumination, 3, shape_seen=seen is not None), seen)
 
 
 def make_runner(options: RunnerOptions, prior_set: PriorSet, network: LayerNetwork | None = None) -> Runner:
@@ -116,8 +114,7 @@ def pose(
     """The problem as the reference program poses it; `log_image` (H, W, 3) is read where `truth.valid`. `trust` (H, W): see `Problem`;
     `seen`: of the shape, instead of what the outline suggests."""
     contour = occluding_contour(truth.mask, drop_near_edge=True)
-    field = None if priors.silhouette is None else silhouette_field(truth.mask, priors.silhouette)
-    field = field if seen is None else seen_field(seen, truth.mask)
+    field = expected_field(truth.mask, priors.silhouette, seen)
     return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field, trust=trust)
 
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 from ..lamp_network import glance_at
 from ..shape_network import shape_at
 from ..sirfs.framing import is_cut
+from ..sirfs.seen_shape import SeenShape
 from .baseline import baseline
 from .doubts import doubted
 from .joint import joint
@@ -28,16 +29,23 @@ def solve(task: Task) -> Answer:
     solver = _SOLVERS.get(task.settings.model, baseline)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
-    glance, seen = task.glance, task.seen
+    glance = task.glance
     if glance is None:
         with task.clock.stage("light at first sight"):
             glance = glance_at(task.maps.image, task.maps.mask)
-    if seen is None and task.settings.looks_at_shape and task.known.depth is None and not is_cut(task.working.mask):
-        with task.clock.stage("shape at first sight"):
-            seen = shape_at(task.working.image, task.working.mask)
-    task = replace(task, glance=glance, seen=seen)
+    task = replace(task, glance=glance, seen=_seen_shape(task))
     answer = under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
     return doubted(task.maps, answer, glance)
+
+
+def _seen_shape(task: Task) -> SeenShape | None:
+    """What was seen of the shape; None where that is not asked for, a depth tells more, or the frame cuts the object."""
+    if not task.settings.looks_at_shape or task.known.depth is not None or is_cut(task.working.mask):
+        return None
+    if task.seen is not None:
+        return task.seen
+    with task.clock.stage("shape at first sight"):
+        return shape_at(task.working.image, task.working.mask)
 
 
 __all__ = ["Answer", "Settings", "Task", "solve"]

@@ -19,7 +19,7 @@ from ..sirfs.priors import Priors
 from ..sirfs.recover import Known, Recovered, RecoverOptions, recover
 from ..sirfs.resampling import resample_height
 from ..sirfs.seen_light import seen_light
-from ..sirfs.settings import SEEN_SHAPE, isc_weights
+from ..sirfs.settings import isc_weights
 from ..sirfs.solver import SolverOptions
 from .layers import shifted
 from .settings import LABORATORY, USUAL
@@ -70,10 +70,7 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, tr
     priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
     priors = looked_at(priors, task.glance, settings.light_prior, settings.illumination)
     options = RecoverOptions(shading_only=settings.shading_only, solver=SolverOptions(engine=settings.engine, threads=settings.threads))
-    weights = isc_weights(settings.illumination, channels)
-    seen = task.seen if settings.looks_at_shape and known.depth is None else None
-    if seen is not None:
-        weights = replace(weights, silhouette=SEEN_SHAPE)
+    weights = isc_weights(settings.illumination, channels, shape_seen=task.seen is not None)
     light = known.light if known.light is None or channels == 3 else known.light.mean(axis=1, keepdims=True)
     gain = _usual_exposure(working)
     if light is not None and gain != 1:
@@ -81,7 +78,7 @@ def _recover(diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, tr
     with task.clock.stage("shape and light"):
         found = recover(
             diffuse[..., :channels] * diffuse.dtype.type(gain), working.mask, gain * working.code_value / 2, priors, weights, options,
-            trust=trust, seen=seen, known=Known(known.height, light, known.depth), monitor=monitor,
+            trust=trust, seen=task.seen, known=Known(known.height, light, known.depth), monitor=monitor,
         )  # fmt: skip
     return found if gain == 1 else replace(found, light=shifted(found.light, -np.log(gain)))
 

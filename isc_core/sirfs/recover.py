@@ -14,9 +14,8 @@ from .framing import continued
 from .priors import Priors
 from .problem import DepthObservation, Problem, Terms
 from .resampling import height_scale, resample_height, resample_inside
-from .seen_shape import SeenShape, seen_field
+from .seen_shape import SeenShape, expected_field
 from .settings import Weights
-from .silhouette import SilhouetteField, silhouette_field
 from .solver import SolverOptions, solve
 
 MARGIN = 20
@@ -194,14 +193,8 @@ class _Scene:
         log_image = np.where(valid[..., None], np.log(np.maximum(image, self.floor)), 0.0)
         return Problem(
             log_image, valid, outline, _seen(occluding_contour(outline), photo), self.priors, self.weights, depth,
-            self.options.shading_only, self._field(outline, seen), trust,
+            self.options.shading_only, expected_field(outline, self.priors.silhouette, seen), trust,
         )  # fmt: skip
-
-    def _field(self, outline: np.ndarray, seen: SeenShape | None) -> SilhouetteField | None:
-        if seen is not None:
-            return seen_field(seen, outline)
-        profile = self.priors.silhouette
-        return None if profile is None else silhouette_field(outline, profile)
 
 
 def _seen(contour: Contour, photo: np.ndarray) -> Contour:

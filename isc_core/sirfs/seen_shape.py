@@ -16,7 +16,8 @@ import numpy as np
 from scipy import ndimage
 
 from ..enlarging import enlarged
-from .silhouette import SilhouetteField
+from .priors import SilhouetteProfile
+from .silhouette import SilhouetteField, silhouette_field
 
 _STEP = 4  # pixels of the coarse grid
 _STEEPEST = 0.97  # of an in-plane part, where slopes are added up
@@ -31,6 +32,13 @@ class SeenShape:
 
     normal: np.ndarray
     deviation: np.ndarray
+
+
+def expected_field(mask: np.ndarray, profile: SilhouetteProfile | None, seen: SeenShape | None) -> SilhouetteField | None:
+    """What is expected of the normals inside `mask` (H, W) bool: what was `seen`, else what the outline suggests by `profile`."""
+    if seen is not None:
+        return seen_field(seen, mask)
+    return None if profile is None else silhouette_field(mask, profile)
 
 
 def seen_field(seen: SeenShape, mask: np.ndarray) -> SilhouetteField:

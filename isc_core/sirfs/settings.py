@@ -82,11 +82,13 @@ ISC_GREY_NATURAL = replace(
 SEEN_SHAPE = 0.4  # the silhouette's weight where its field is what was seen of the shape (`seen_shape`); docs/methods/first_shape.md
 
 
-def isc_weights(illumination: str, channels: int) -> Weights:
-    """Our own set for "natural" or "laboratory" illumination and 3 or 1 channels."""
+def isc_weights(illumination: str, channels: int, *, shape_seen: bool = False) -> Weights:
+    """Our own set for "natural" or "laboratory" illumination and 3 or 1 channels; `shape_seen`: with what was seen of the shape."""
     if channels == 1:
-        return ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
-    return ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
+        found = ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
+    else:
+        found = ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
+    return replace(found, silhouette=SEEN_SHAPE) if shape_seen else found
 
 
 def published_weights(illumination: str, channels: int) -> Weights:
