@@ -1,7 +1,9 @@
-"""Made photos for the benchmarks of `isc batch`: any number, all different, from a seed, in milliseconds each.
+"""Made photos for the benchmarks of `isc batch`: any number, all different, from a seed, in
+milliseconds each.
 
-A lumpy dome: its outline is a low Fourier series, its paint a few flat colours, its light exp(SH(normal)) plus one Blinn-Phong highlight.
-Limits: no shadows and no light between parts; for throughput and faults, not for accuracy.
+A lumpy dome: its outline is a low Fourier series, its paint a few flat colours, its light
+exp(SH(normal)) plus one Blinn-Phong highlight. Limits: no shadows and no light between parts; for
+throughput and faults, not for accuracy.
 """
 
 from pathlib import Path
@@ -28,7 +30,12 @@ def made_photo(size: int, seed: int) -> np.ndarray:
     mask = radius < outline
     height = np.sqrt(np.maximum(1 - (radius / outline) ** 2, 0))
     normal = _normals(cv2.GaussianBlur(height, (0, 0), 0.02 * size), 2.0 / size)
-    light = np.concatenate([rng.normal(-1.2, 0.1, (1, 3)), rng.normal(0, 0.45, (1, 1)) + rng.normal(0, 0.1, (8, 3)) * 0.8])
+    light = np.concatenate(
+        [
+            rng.normal(-1.2, 0.1, (1, 3)),
+            rng.normal(0, 0.45, (1, 1)) + rng.normal(0, 0.1, (8, 3)) * 0.8,
+        ]
+    )
     half = np.array([rng.uniform(-0.5, 0.5), rng.uniform(0.1, 0.6), 1.0])
     gloss = 0.6 * np.maximum(normal @ (half / np.linalg.norm(half)), 0) ** rng.uniform(30, 120)
     image = _paint(rng, rows, columns) * np.exp(real_sh(normal) @ light) + gloss[..., None]
@@ -55,7 +62,9 @@ def made_photos(folder: Path, count: int, size: int) -> list[Path]:
     paths = [folder / f"{number:04d}.png" for number in range(count)]
     for number, path in enumerate(paths):
         if not path.exists():
-            data = cv2.imencode(".png", cv2.cvtColor(made_photo(size, number), cv2.COLOR_RGBA2BGRA))[1].tobytes()
+            data = cv2.imencode(
+                ".png", cv2.cvtColor(made_photo(size, number), cv2.COLOR_RGBA2BGRA)
+            )[1].tobytes()
             path.with_suffix(".part").write_bytes(data)
             path.with_suffix(".part").replace(path)
     return paths

@@ -1,15 +1,18 @@
-"""Does a batch that is killed lose or spoil anything? Kills at random moments, a check after each, the same command again until it is done.
+"""Does a batch that is killed lose or spoil anything? Kills at random moments, a check after each,
+the same command again until it is done.
 
   python -m benchmarks.batch_kills -o FOLDER [--kills 100] [--images 10]
 
-Four kinds, in turn: worker processes, several while a run goes on; the run, whose workers are left to themselves; the run and its workers
-at once; the scheduler of a cluster that stands by itself. After each kill every folder of the output is compared with a reference that a
-plain loop has written: all files byte by byte, of decomposition.json all but the seconds and the two entries that only a batch writes. The
-campaign stops at the first that is wrong or incomplete. Every other time the next run begins while orphans of the last may still be at
-work. A run that comes to its end has to have made everything, with exit code 0; then the output begins anew.
+Four kinds, in turn: worker processes, several while a run goes on; the run, whose workers are left
+to themselves; the run and its workers at once; the scheduler of a cluster that stands by itself.
+After each kill every folder of the output is compared with a reference that a plain loop has
+written: all files byte by byte, of decomposition.json all but the seconds and the two entries that
+only a batch writes. The campaign stops at the first that is wrong or incomplete. Every other time
+the next run begins while orphans of the last may still be at work. A run that comes to its end has
+to have made everything, with exit code 0; then the output begins anew.
 
-The rows of FOLDER/kills.jsonl are kept: given again, the command goes on. Images of 36 pixels and no shape solver: the writing is what is
-tested. Some 10 s a kill on two quiet cores.
+The rows of FOLDER/kills.jsonl are kept: given again, the command goes on. Images of 36 pixels and
+no shape solver: the writing is what is tested. Some 10 s a kill on two quiet cores.
 """
 
 import argparse
@@ -47,7 +50,9 @@ _OWN = ("thumbnails", "summary-pages")
 
 
 class Spoilt(Exception):
-    """The output holds what no undisturbed run would have written, or a run did not end as it should."""
+    """The output holds what no undisturbed run would have written, or a run did not end as it
+    should.
+    """
 
 
 @dataclass(frozen=True)
@@ -74,7 +79,9 @@ class Place:
 
 def main() -> None:
     """Runs the campaign and prints what it found."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--kills", type=int, default=100)
     parser.add_argument("--images", type=int, default=10)
@@ -90,7 +97,9 @@ def main() -> None:
     log = place.root / "kills.jsonl"
     rows = read_rows(log)
     while (kills := sum(row["struck"] for row in rows)) < options.kills:
-        row = one_run(place, KINDS[len(rows) % len(KINDS)], random.Random(f"{options.seed} {len(rows)}"))
+        row = one_run(
+            place, KINDS[len(rows) % len(KINDS)], random.Random(f"{options.seed} {len(rows)}")
+        )
         rows.append(row)
         append_row(log, row)
         print(f"{kills + row['struck']:4d}  {row}", flush=True)
@@ -100,17 +109,25 @@ def main() -> None:
 
 
 def make_reference(place: Place, count: int) -> None:
-    """The inputs, and a plain loop over them; in a process with one thread, since sums in other orders end in other last digits."""
+    """The inputs, and a plain loop over them; in a process with one thread, since sums in other
+    orders end in other last digits.
+    """
     for photo in made_photos(place.photos, count, _SIZE):
         if not (place.reference / photo.stem).is_dir():
-            save(decompose(read_photo(photo), _SETTINGS, name=photo.name), place.reference / photo.stem)
+            save(
+                decompose(read_photo(photo), _SETTINGS, name=photo.name),
+                place.reference / photo.stem,
+            )
 
 
-# --- kills ----------------------------------------------------------------------------------------------------------------------------
+# --- kills ----------------------------------------------------------------------------------------
 
 
 def one_run(place: Place, kind: str, rng: random.Random) -> dict[str, object]:
-    """Starts or goes on, kills at random moments, checks after each. A run that ends before its kill is checked as a whole."""
+    """Starts or goes on, kills at random moments, checks after each.
+
+    A run that ends before its kill is checked as a whole.
+    """
     begun, start, struck, complete = len(results(place.output)), time.monotonic(), 0, []
     with running(place, kind == "scheduler") as (run, scheduler):
         for _ in range(_WORKERS_A_RUN if kind == "worker" else 1):
@@ -126,11 +143,18 @@ def one_run(place: Place, kind: str, rng: random.Random) -> dict[str, object]:
             ended_well(place, run, lost=kind == "scheduler" and struck > 0)
         check(place)
     seconds = round(time.monotonic() - start, 1)
-    return {"kind": kind, "struck": struck, "found": begun, "complete": complete, "seconds": seconds}
+    return {
+        "kind": kind,
+        "struck": struck,
+        "found": begun,
+        "complete": complete,
+        "seconds": seconds,
+    }
 
 
 def struck_now(place: Place, run: psutil.Process, rng: random.Random) -> bool:
-    """Waits until so many more results are there as chance says, and a little longer; false where the run ends before.
+    """Waits until so many more results are there as chance says, and a little longer; false where
+    the run ends before.
 
     Some kills come during the start, some during the end.
     """
@@ -147,8 +171,13 @@ def alive(process: psutil.Process) -> bool:
     return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
 
 
-def strike(kind: str, family: list[psutil.Process], scheduler: psutil.Process | None, rng: random.Random) -> bool:
-    """Kills by force, so that nothing can be tidied up. False where there is nobody to kill yet, or any more."""
+def strike(
+    kind: str, family: list[psutil.Process], scheduler: psutil.Process | None, rng: random.Random
+) -> bool:
+    """Kills by force, so that nothing can be tidied up.
+
+    False where there is nobody to kill yet, or any more.
+    """
     workers = [process for process in family[1:] if "spawn_main" in " ".join(command_of(process))]
     victims = {
         "worker": workers and [rng.choice(workers)],
@@ -170,7 +199,9 @@ def command_of(process: psutil.Process) -> list[str]:
 
 
 def ended_well(place: Place, run: psutil.Process, lost: bool) -> None:
-    """Waits for the end of a run that was left alone, or lost a worker, or its scheduler, which it has to say with exit code 2."""
+    """Waits for the end of a run that was left alone, or lost a worker, or its scheduler, which it
+    has to say with exit code 2.
+    """
     try:
         code = run.wait(timeout=_LONGEST)
     except psutil.TimeoutExpired as error:
@@ -188,8 +219,19 @@ def ended_well(place: Place, run: psutil.Process, lost: bool) -> None:
 
 @contextmanager
 def running(place: Place, cluster: bool) -> Iterator[tuple[psutil.Process, psutil.Process | None]]:
-    """A run of `isc batch`; with a scheduler and two workers of its own where `cluster`, which are ended afterwards."""
-    command = [sys.executable, "-m", "isc_core", "batch", str(place.photos), "-o", str(place.output), "--quiet"]
+    """A run of `isc batch`; with a scheduler and two workers of its own where `cluster`, which are
+    ended afterwards.
+    """
+    command = [
+        sys.executable,
+        "-m",
+        "isc_core",
+        "batch",
+        str(place.photos),
+        "-o",
+        str(place.output),
+        "--quiet",
+    ]
     command += ["--model", "retinex", "--workers", "2", "--threads", "1", "--memory", "0"]
     if not cluster:
         yield _started(command, place), None
@@ -198,14 +240,34 @@ def running(place: Place, cluster: bool) -> Iterator[tuple[psutil.Process, psuti
     contact.unlink(missing_ok=True)
     dask = [str(Path(sys.executable).parent / "dask")]
     there = ["--scheduler-file", str(contact)]
-    scheduler = _started([*dask, "scheduler", *there, "--host", "127.0.0.1", "--port", "0", "--dashboard-address", ":0"], place)
-    workers = _started([*dask, "worker", *there, "--nthreads", "1", "--nworkers", "2", "--death-timeout", "300"], place)
+    scheduler = _started(
+        [
+            *dask,
+            "scheduler",
+            *there,
+            "--host",
+            "127.0.0.1",
+            "--port",
+            "0",
+            "--dashboard-address",
+            ":0",
+        ],
+        place,
+    )
+    workers = _started(
+        [*dask, "worker", *there, "--nthreads", "1", "--nworkers", "2", "--death-timeout", "300"],
+        place,
+    )
     try:
         while not contact.exists() or not (text := contact.read_text()):
             time.sleep(0.1)
         yield _started([*command, "--scheduler", json.loads(text)["address"]], place), scheduler
     finally:
-        for process in [scheduler, workers, *(workers.children(recursive=True) if workers.is_running() else [])]:
+        for process in [
+            scheduler,
+            workers,
+            *(workers.children(recursive=True) if workers.is_running() else []),
+        ]:
             with contextlib.suppress(psutil.NoSuchProcess):
                 process.kill()
 
@@ -213,21 +275,33 @@ def running(place: Place, cluster: bool) -> Iterator[tuple[psutil.Process, psuti
 def _started(command: list[str], place: Place) -> psutil.Process:
     """A process in a session of its own, so that no signal for this one reaches it."""
     with (place.root / "stderr").open("w") as told:
-        return psutil.Popen(command, stdout=subprocess.DEVNULL, stderr=told, stdin=subprocess.DEVNULL, start_new_session=True)
+        return psutil.Popen(
+            command,
+            stdout=subprocess.DEVNULL,
+            stderr=told,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
 
 
-# --- what the output holds ------------------------------------------------------------------------------------------------------------
+# --- what the output holds ------------------------------------------------------------------------
 
 
 def results(output: Path) -> list[Path]:
     """The results that stand under their final names."""
     if not output.is_dir():
         return []
-    return [path for path in output.iterdir() if path.is_dir() and not path.name.startswith(".") and path.name not in _OWN]
+    return [
+        path
+        for path in output.iterdir()
+        if path.is_dir() and not path.name.startswith(".") and path.name not in _OWN
+    ]
 
 
 def check(place: Place) -> int:
-    """Compares every result with the reference and looks at the other files; returns how many results there are. Raises `Spoilt`."""
+    """Compares every result with the reference and looks at the other files; returns how many
+    results there are. Raises `Spoilt`.
+    """
     found = results(place.output)
     for folder in found:
         if content(folder) != content(place.reference / folder.name):
@@ -244,16 +318,24 @@ def check(place: Place) -> int:
 
 def content(folder: Path) -> dict[str, bytes | str]:
     """All files; of the description what does not depend on when and by whom it was made."""
-    files: dict[str, bytes | str] = {p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+    files: dict[str, bytes | str] = {
+        p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()
+    }
     description = json.loads(files.pop("decomposition.json"))
     del description["timings"]
-    source = {name: value for name, value in description["input"].items() if name not in ("mask_sha256", "fingerprint")}
+    source = {
+        name: value
+        for name, value in description["input"].items()
+        if name not in ("mask_sha256", "fingerprint")
+    }
     return {**files, "description": json.dumps({**description, "input": source}, sort_keys=True)}
 
 
 def whole(place: Place) -> bool:
     """Whether the output holds a result of every photo."""
-    return {path.name for path in results(place.output)} == {path.name for path in results(place.reference)}
+    return {path.name for path in results(place.output)} == {
+        path.name for path in results(place.reference)
+    }
 
 
 def table(rows: list[dict[str, object]]) -> str:
@@ -263,9 +345,19 @@ def table(rows: list[dict[str, object]]) -> str:
     for row in struck:
         kinds[str(row["kind"])] += int(str(row["struck"]))
     compared = sum(sum(json.loads(str(row["complete"]))) for row in rows)
-    lines = ["| killed | times |", "|---|---|", *(f"| {kind} | {count} |" for kind, count in sorted(kinds.items()))]
+    lines = [
+        "| killed | times |",
+        "|---|---|",
+        *(f"| {kind} | {count} |" for kind, count in sorted(kinds.items())),
+    ]
     lines.append(f"| all | {kinds.total()} |")
-    return "\n".join([*lines, "", f"{compared} results compared after kills; wrong or incomplete: 0; runs that did not complete: 0"])
+    return "\n".join(
+        [
+            *lines,
+            "",
+            f"{compared} results compared after kills; wrong or incomplete: 0; runs that did not complete: 0",
+        ]
+    )
 
 
 if __name__ == "__main__":

@@ -2,9 +2,11 @@
 
   python -m benchmarks.batch_manifest -o FOLDER [--lines 1000000]
 
-Writes a manifest of so many lines, of each kind, and starts `isc batch` on it in a process of its own, with one worker process whose task
-does nothing. Measured: seconds from the process's start to the first outcome; how fast outcomes come; and the process's memory when the
-first outcome is there and after 500 of them, against a manifest of 1000 lines. Then the run is ended. About a minute on two quiet cores.
+Writes a manifest of so many lines, of each kind, and starts `isc batch` on it in a process of its
+own, with one worker process whose task does nothing. Measured: seconds from the process's start to
+the first outcome; how fast outcomes come; and the process's memory when the first outcome is there
+and after 500 of them, against a manifest of 1000 lines. Then the run is ended. About a minute on
+two quiet cores.
 """
 
 import argparse
@@ -29,7 +31,9 @@ _OUTCOMES = 500
 
 def main() -> None:
     """Prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--lines", type=int, default=1_000_000)
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
@@ -44,7 +48,15 @@ def main() -> None:
     for suffix in (".csv", ".jsonl"):
         for lines in (1000, options.lines):
             path = written(options.output / f"{lines}{suffix}", lines)
-            again = [sys.executable, "-m", "benchmarks.batch_manifest", "-o", str(options.output / "out"), "--one", str(path)]
+            again = [
+                sys.executable,
+                "-m",
+                "benchmarks.batch_manifest",
+                "-o",
+                str(options.output / "out"),
+                "--one",
+                str(path),
+            ]
             done = subprocess.run(again, check=True, capture_output=True, text=True)
             print(f"| {suffix} | {lines} | {done.stdout.strip()} |", flush=True)
 
@@ -56,11 +68,16 @@ def written(path: Path, lines: int) -> Path:
             if path.suffix == ".csv":
                 file.write("image,mask,max_size\n")
             for number in range(lines):
-                image, mask = f"catalogue/{number // 3:06d}/{('front', 'side', 'back')[number % 3]}.jpg", f"masks/{number:07d}.png"
+                image, mask = (
+                    f"catalogue/{number // 3:06d}/{('front', 'side', 'back')[number % 3]}.jpg",
+                    f"masks/{number:07d}.png",
+                )
                 if path.suffix == ".csv":
                     file.write(f"{image},{mask},256\n")
                 else:
-                    file.write(f'{{"image": "{image}", "mask": "{mask}", "options": {{"max_size": 256}}}}\n')
+                    file.write(
+                        f'{{"image": "{image}", "mask": "{mask}", "options": {{"max_size": 256}}}}\n'
+                    )
     return path
 
 
@@ -68,7 +85,11 @@ def start(manifest: Path, output: Path) -> None:
     """One run, in this process; prints the cells of its row."""
     process, told = psutil.Process(), Told()
     with contextlib.suppress(Cancelled):
-        run_batch(Batch([str(manifest)], output, crew=Crew(1, 1, "0")), Monitor(told.progress, told.enough), task=nothing)
+        run_batch(
+            Batch([str(manifest)], output, crew=Crew(1, 1, "0")),
+            Monitor(told.progress, told.enough),
+            task=nothing,
+        )
     rate = told.count / (time.time() - told.first) if told.first else 0.0
     first = told.first - process.create_time()
     print(f"{first:.1f} s | {told.memory:.0f} MB | {rate:.0f} | {_peak_mb():.0f} MB")

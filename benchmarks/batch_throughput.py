@@ -2,14 +2,16 @@
 
   python -m benchmarks.batch_throughput -o FOLDER [--images 200] [--size 256] [--model joint]
 
-The same photos, made here: a plain loop over them (read, decompose, write) with one thread, the loop with two, and `isc batch` with two
-workers of one thread each; each in processes of its own. Then `isc batch` once more, which finds everything done, and for one photo alone:
-their difference is what the runner costs for an image (scheduling, checksums, looking whether it is done, journal, summary), to which the
-drawing of a thumbnail comes. Memory: of the workers' peaks at each image, as the system counts them, the greatest of the last 50 images
-against that of the first 50.
+The same photos, made here: a plain loop over them (read, decompose, write) with one thread, the
+loop with two, and `isc batch` with two workers of one thread each; each in processes of its own.
+Then `isc batch` once more, which finds everything done, and for one photo alone: their difference
+is what the runner costs for an image (scheduling, checksums, looking whether it is done, journal,
+summary), to which the drawing of a thumbnail comes. Memory: of the workers' peaks at each image, as
+the system counts them, the greatest of the last 50 images against that of the first 50.
 
-What is measured is kept in FOLDER: given again, the command goes on with what is missing, also in the middle of a loop. 200 images of
-256 x 256 with the model joint take about 35 minutes on two quiet cores.
+What is measured is kept in FOLDER: given again, the command goes on with what is missing, also in
+the middle of a loop. 200 images of 256 x 256 with the model joint take about 35 minutes on two
+quiet cores.
 """
 
 import argparse
@@ -39,7 +41,9 @@ _WARM = 50  # images of which a peak is taken, at each end
 
 def main() -> None:
     """Measures what is missing and prints the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.add_argument("--images", type=int, default=200)
     parser.add_argument("--size", type=int, default=256)
@@ -51,35 +55,54 @@ def main() -> None:
         plain_loop(options.output, photos, options.model, options.loop)
         return
     for threads in (1, 2):
-        command = [sys.executable, "-m", "benchmarks.batch_throughput", *sys.argv[1:], "--loop", str(threads)]
-        subprocess.run(command, check=True, env={**os.environ, **dict.fromkeys(_THREADS, str(threads))})
-    first, again = (batch(options.output, photos[0].parent, options.model, which) for which in ("first", "again"))
+        command = [
+            sys.executable,
+            "-m",
+            "benchmarks.batch_throughput",
+            *sys.argv[1:],
+            "--loop",
+            str(threads),
+        ]
+        subprocess.run(
+            command, check=True, env={**os.environ, **dict.fromkeys(_THREADS, str(threads))}
+        )
+    first, again = (
+        batch(options.output, photos[0].parent, options.model, which)
+        for which in ("first", "again")
+    )
     alone = batch(options.output, photos[0], options.model, "alone")
     print(table(options.output, first, again, alone))
 
 
-# --- the loop -------------------------------------------------------------------------------------------------------------------------
+# --- the loop -------------------------------------------------------------------------------------
 
 
 def plain_loop(place: Path, photos: list[Path], model: str, threads: int) -> None:
-    """Seconds of each photo, without what the first of a process takes to load; those that are known are left out."""
+    """Seconds of each photo, without what the first of a process takes to load; those that are
+    known are left out.
+    """
     log = place / f"loop-{threads}.jsonl"
     known = {row["photo"] for row in read_rows(log)}
     missing = [photo for photo in photos if photo.name not in known]
     settings = Settings(model=model, threads=threads)
     for number, photo in enumerate([*missing[:1], *missing]):
         start = time.perf_counter()
-        save(decompose(read_photo(photo), settings, name=photo.name), place / f"loop-{threads}" / photo.stem)
+        save(
+            decompose(read_photo(photo), settings, name=photo.name),
+            place / f"loop-{threads}" / photo.stem,
+        )
         if number:
             append_row(log, {"photo": photo.name, "seconds": time.perf_counter() - start})
 
 
-# --- the batch ------------------------------------------------------------------------------------------------------------------------
+# --- the batch ------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Run:
-    """One run of `isc batch`: its seconds as a whole, and those and the peak memory in MB of each image, in the inputs' order."""
+    """One run of `isc batch`: its seconds as a whole, and those and the peak memory in MB of each
+    image, in the inputs' order.
+    """
 
     whole: float
     seconds: list[float]
@@ -87,18 +110,33 @@ class Run:
 
 
 def batch(place: Path, photos: Path, model: str, which: str) -> Run:
-    """Runs `isc batch` with two workers, unless that is known: the `first` time, or one that finds everything done."""
+    """Runs `isc batch` with two workers, unless that is known: the `first` time, or one that finds
+    everything done.
+    """
     log, output = place / f"batch-{which}.json", place / "batch"
     if not log.exists():
         if which == "first":  # one that was broken off would go on, and take too few seconds
             shutil.rmtree(output, ignore_errors=True)
-        command = [sys.executable, "-m", "isc_core", "batch", str(photos), "-o", str(output), "--model", model, "--quiet"]
+        command = [
+            sys.executable,
+            "-m",
+            "isc_core",
+            "batch",
+            str(photos),
+            "-o",
+            str(output),
+            "--model",
+            model,
+            "--quiet",
+        ]
         start = time.perf_counter()
         subprocess.run([*command, "--workers", "2", "--threads", "1"], check=True)
         whole = time.perf_counter() - start
         images = read_rows(output / "summary.jsonl")
         if {row["status"] for row in images} != {"done" if which == "first" else "skipped"}:
-            raise SystemExit(f"{output}: not what was expected of the run `{which}`: delete it and {log.name}, and begin again")
+            raise SystemExit(
+                f"{output}: not what was expected of the run `{which}`: delete it and {log.name}, and begin again"
+            )
         found = Run(whole, [row["seconds"] for row in images], [row["peak_mb"] for row in images])
         log.write_text(json.dumps(asdict(found)))
     return Run(**json.loads(log.read_text()))
@@ -117,7 +155,10 @@ def thumbnail_seconds(place: Path) -> float:
 
 def table(place: Path, first: Run, again: Run, alone: Run) -> str:
     """Markdown: what was measured beside what is asked for."""
-    loops = [sum(row["seconds"] for row in read_rows(place / f"loop-{threads}.jsonl")) for threads in (1, 2)]
+    loops = [
+        sum(row["seconds"] for row in read_rows(place / f"loop-{threads}.jsonl"))
+        for threads in (1, 2)
+    ]
     count, small = len(first.seconds), thumbnail_seconds(place)
     runner = 2 * (again.whole - alone.whole) / max(count - 1, 1)
     start, end = (max(peaks) for peaks in (first.peaks[:_WARM], first.peaks[-_WARM:]))

@@ -1,4 +1,6 @@
-"""What the benchmarks on MIT-Berkeley share: where the data is, a SIRFS problem in the reference's protocol, its scores."""
+"""What the benchmarks on MIT-Berkeley share: where the data is, a SIRFS problem in the reference's
+protocol, its scores.
+"""
 
 import argparse
 import json
@@ -24,7 +26,9 @@ _LAST_DIGIT = 1e-7
 def parser(text: str | None) -> argparse.ArgumentParser:
     """The options that every benchmark has."""
     options = argparse.ArgumentParser(description=text)
-    options.add_argument("--shared", type=Path, default=Path("../shared"), help="folder with data/ and anchors/")
+    options.add_argument(
+        "--shared", type=Path, default=Path("../shared"), help="folder with data/ and anchors/"
+    )
     options.add_argument("--json", type=Path, help="write the figures here")
     return options
 
@@ -41,28 +45,47 @@ def rounded(photo: MitBerkeleyObject, number: int) -> MitBerkeleyObject:
 
 def rounded_image(image: np.ndarray, number: int) -> np.ndarray:
     """The same of linear light (H, W, 3)."""
-    return image * (1 + _LAST_DIGIT * np.random.default_rng(number).standard_normal(image.shape)) if number else image
+    return (
+        image * (1 + _LAST_DIGIT * np.random.default_rng(number).standard_normal(image.shape))
+        if number
+        else image
+    )
 
 
 def greyed(photo: MitBerkeleyObject) -> MitBerkeleyObject:
-    """The photo as a camera without colours takes it, three equal channels everywhere: the channels' mean, of shading and log light too."""
-    image, shading, light = (np.repeat(part.mean(axis=-1, keepdims=True), 3, axis=-1) for part in (photo.image, photo.shading, photo.light))
+    """The photo as a camera without colours takes it, three equal channels everywhere: the
+    channels' mean, of shading and log light too.
+    """
+    image, shading, light = (
+        np.repeat(part.mean(axis=-1, keepdims=True), 3, axis=-1)
+        for part in (photo.image, photo.shading, photo.light)
+    )
     lit = shading > 0
-    reflectance = np.where(lit, image / np.where(lit, shading, 1), photo.reflectance.mean(axis=-1, keepdims=True))
-    return replace(photo, image=image, valid=image[..., 0] > 0, shading=shading, reflectance=reflectance, light=light)
+    reflectance = np.where(
+        lit, image / np.where(lit, shading, 1), photo.reflectance.mean(axis=-1, keepdims=True)
+    )
+    return replace(
+        photo,
+        image=image,
+        valid=image[..., 0] > 0,
+        shading=shading,
+        reflectance=reflectance,
+        light=light,
+    )
 
 
 def reference_results(shared: Path, illumination: str) -> dict[str, dict[str, float]]:
     """The reference program's measured results by object, diffuse input."""
-    results: dict[str, dict[str, float]] = json.loads((shared / "anchors" / "sirfs_reference.json").read_text())["results"][
-        f"{illumination}/diffuse"
-    ]
+    results: dict[str, dict[str, float]] = json.loads(
+        (shared / "anchors" / "sirfs_reference.json").read_text()
+    )["results"][f"{illumination}/diffuse"]
     return results
 
 
 def problem(truth: MitBerkeleyObject, priors: Priors, weights: Weights) -> Problem:
-    """The problem as the reference program poses it: the data set's crop, contour points near its edge dropped. Of as many channels of the
-    photo as the priors have."""
+    """The problem as the reference program poses it: the data set's crop, contour points near its
+    edge dropped. Of as many channels of the photo as the priors have.
+    """
     image = truth.image[..., : priors.channels]
     log_image = np.where(truth.valid[..., None], np.log(np.where(image > 0, image, 1)), 0.0)
     return pose(truth, log_image, priors, weights)
@@ -74,7 +97,14 @@ def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:
     light = light_from_reference(result.light)
     light = np.broadcast_to(light, (len(light), 3))
     shading = np.exp(real_sh(normal) @ light)
-    return score(truth, height=result.height, normal=normal, shading=shading, reflectance=truth.image / shading, light=light)
+    return score(
+        truth,
+        height=result.height,
+        normal=normal,
+        shading=shading,
+        reflectance=truth.image / shading,
+        light=light,
+    )
 
 
 def write_json(path: Path | None, figures: object) -> None:

@@ -1,18 +1,23 @@
-"""The closed loop: does what stands in Blender look like the photo, and does it stay right under another light?
+"""The closed loop: does what stands in Blender look like the photo, and does it stay right under
+another light?
 
-  python -m benchmarks.closed_loop -o FOLDER --photos ../shared/data/photos          five photos and three rendered objects
-  python -m benchmarks.closed_loop -o FOLDER                                         the rendered objects alone
-  python -m benchmarks.closed_loop -o FOLDER --names gourd --size 64 --samples 16    a quick look
+  python -m benchmarks.closed_loop -o FOLDER --photos ../shared/data/photos          five photos and
+  three rendered objects python -m benchmarks.closed_loop -o FOLDER
+  the rendered objects alone python -m benchmarks.closed_loop -o FOLDER --names gourd --size 64
+  --samples 16    a quick look
 
-Each object is decomposed, built in Blender by the add-on's own `scene.build`, and rendered with Cycles from the scene's camera, linear,
-view transform Standard. Judged inside the mask; peak: the 99.9th percentile of the photo there.
+Each object is decomposed, built in Blender by the add-on's own `scene.build`, and rendered with
+Cycles from the scene's camera, linear, view transform Standard. Judged inside the mask; peak: the
+99.9th percentile of the photo there.
 
-Equations: relative RMS = sqrt(sum (k W - S)^2 / sum S^2), W the render in white matt, S the shading, k that of the base colour;
-PSNR = 10 log10(peak^2 / mean square). Under a new light the render may take one gain g = <x, t> / <x, x>, as the scale between
-reflectance and light cannot be known from one photo; g is the same for all colours, and the peak is the truth's. An object made of the
-true maps has no such freedom.
+Equations: relative RMS = sqrt(sum (k W - S)^2 / sum S^2), W the render in white matt, S the
+shading, k that of the base colour; PSNR = 10 log10(peak^2 / mean square). Under a new light the
+render may take one gain g = <x, t> / <x, x>, as the scale between reflectance and light cannot be
+known from one photo; g is the same for all colours, and the peak is the truth's. An object made of
+the true maps has no such freedom.
 
-Writes tables.md, rows.json and sheets of pictures to FOLDER; renders are kept in FOLDER/renders and not made again (--fresh: they are).
+Writes tables.md, rows.json and sheets of pictures to FOLDER; renders are kept in FOLDER/renders and
+not made again (--fresh: they are).
 """
 
 import argparse
@@ -44,10 +49,11 @@ _SHEET_WIDTH, _SHEET_ROWS = 1000, 3
 class LoopRow:
     """One object in its own light.
 
-    Relative RMS: `shading`, without its outline (`inner`), with the object's own shadows (`shadowed`), of the sky without any geometry
-    (`sky`). PSNR in dB of the diffuse render: `diffuse`, `diffuse_inner`, `diffuse_shadowed`, and by Blender's usual pixel filter
-    (`diffuse_usual`). PSNR of whole images against the photo: renders `matt`, `lobe`, `image` (with the specular image), and, for
-    comparison, of the maps diffuse + lobe (`maps_lobe`).
+    Relative RMS: `shading`, without its outline (`inner`), with the object's own shadows
+    (`shadowed`), of the sky without any geometry (`sky`). PSNR in dB of the diffuse render:
+    `diffuse`, `diffuse_inner`, `diffuse_shadowed`, and by Blender's usual pixel filter
+    (`diffuse_usual`). PSNR of whole images against the photo: renders `matt`, `lobe`, `image` (with
+    the specular image), and, for comparison, of the maps diffuse + lobe (`maps_lobe`).
     """
 
     name: str
@@ -69,9 +75,10 @@ class LoopRow:
 class RelitRow:
     """One object in a new light.
 
-    PSNR in dB against the true picture: the `photo` as it is, the matt object without and with its own shadows (`matt`, `shadowed`), with
-    the lobe and shadows (`lobe`). Of diffuse light alone: the imported object (`diffuse`), and an object made of the true maps
-    (`true_maps`), which is what the way through Blender costs. `gain`: g of `shadowed`.
+    PSNR in dB against the true picture: the `photo` as it is, the matt object without and with its
+    own shadows (`matt`, `shadowed`), with the lobe and shadows (`lobe`). Of diffuse light alone:
+    the imported object (`diffuse`), and an object made of the true maps (`true_maps`), which is
+    what the way through Blender costs. `gain`: g of `shadowed`.
     """
 
     name: str
@@ -147,8 +154,18 @@ def relit_row(name: str, new: Relit, renders: Renders, ideal: Renders) -> RelitR
     }
     figures = {what: scaled_psnr(new.image, seen, mask) for what, seen in judged.items()}
     perfect = ideal(Look(own_shadows=True, relit=new)) / ideal.result.reflectance_scale
-    diffuse, true_maps = scaled_psnr(new.diffuse, shadowed, mask), psnr(new.diffuse, perfect, mask, peak=white(new.diffuse, mask))
-    return RelitRow(name, new.light, **figures, diffuse=diffuse, true_maps=true_maps, gain=gain(new.image, shadowed, mask))
+    diffuse, true_maps = (
+        scaled_psnr(new.diffuse, shadowed, mask),
+        psnr(new.diffuse, perfect, mask, peak=white(new.diffuse, mask)),
+    )
+    return RelitRow(
+        name,
+        new.light,
+        **figures,
+        diffuse=diffuse,
+        true_maps=true_maps,
+        gain=gain(new.image, shadowed, mask),
+    )
 
 
 def white(image: np.ndarray, mask: np.ndarray) -> float:
@@ -158,7 +175,9 @@ def white(image: np.ndarray, mask: np.ndarray) -> float:
 
 def relative_rms(seen: np.ndarray, wanted: np.ndarray, mask: np.ndarray) -> float:
     """RMS of the difference of (H, W, 3) over the RMS of `wanted`, inside the mask."""
-    return float(np.sqrt(np.square(seen[mask] - wanted[mask]).mean() / np.square(wanted[mask]).mean()))
+    return float(
+        np.sqrt(np.square(seen[mask] - wanted[mask]).mean() / np.square(wanted[mask]).mean())
+    )
 
 
 def gain(truth: np.ndarray, seen: np.ndarray, mask: np.ndarray) -> float:
@@ -186,8 +205,19 @@ def loop_table(rows: Sequence[LoopRow]) -> str:
     ]
     for r in rows:
         shares = [f"{100 * value:.1f} %" for value in (r.shading, r.inner, r.shadowed, r.sky)]
-        ratios = (r.diffuse, r.diffuse_inner, r.diffuse_shadowed, r.diffuse_usual, r.lobe, r.matt, r.image, r.maps_lobe)
-        lines.append(f"| {r.name} | " + " | ".join(shares + [f"{value:.1f} dB" for value in ratios]) + " |")
+        ratios = (
+            r.diffuse,
+            r.diffuse_inner,
+            r.diffuse_shadowed,
+            r.diffuse_usual,
+            r.lobe,
+            r.matt,
+            r.image,
+            r.maps_lobe,
+        )
+        lines.append(
+            f"| {r.name} | " + " | ".join(shares + [f"{value:.1f} dB" for value in ratios]) + " |"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -200,7 +230,11 @@ def relit_table(rows: Sequence[RelitRow]) -> str:
     ]
     for r in rows:
         ratios = (r.photo, r.matt, r.shadowed, r.lobe, r.diffuse, r.true_maps)
-        lines.append(f"| {r.name} | {r.light} | " + " | ".join(f"{value:.1f} dB" for value in ratios) + f" | {r.gain:.2f} |")
+        lines.append(
+            f"| {r.name} | {r.light} | "
+            + " | ".join(f"{value:.1f} dB" for value in ratios)
+            + f" | {r.gain:.2f} |"
+        )
     return "\n".join(lines) + "\n"
 
 
@@ -221,26 +255,40 @@ def loop_panels(name: str, renders: Renders) -> list[Shown]:
 
 
 def relit_panels(name: str, new: Relit, renders: Renders, ideal: Renders) -> list[Shown]:
-    """The photo, the truth in the new light, and what Blender makes of the recovered and of the true maps."""
+    """The photo, the truth in the new light, and what Blender makes of the recovered and of the
+    true maps.
+    """
     mask, peak = ideal.result.mask, white(new.image, ideal.result.mask)
-    matt, glossy = renders(Look(own_shadows=True, relit=new)), renders(Look("lobe", own_shadows=True, relit=new))
+    matt, glossy = (
+        renders(Look(own_shadows=True, relit=new)),
+        renders(Look("lobe", own_shadows=True, relit=new)),
+    )
     perfect = ideal(Look(own_shadows=True, relit=new)) / ideal.result.reflectance_scale
     shown = [(renders.result.image, f"{name}: photo"), (new.image, f"Truth, new {new.light}")]
-    shown += [(gain(new.image, seen, mask) * seen, f"Blender, {label}") for seen, label in ((matt, "matt"), (glossy, "lobe"))]
+    shown += [
+        (gain(new.image, seen, mask) * seen, f"Blender, {label}")
+        for seen, label in ((matt, "matt"), (glossy, "lobe"))
+    ]
     shown += [(new.diffuse, "Truth, diffuse"), (perfect, "Blender, true maps")]
     return [Shown(values / peak, mask, label) for values, label in shown]
 
 
-def save_sheet(path: Path, title: str, subtitle: str, panels: Sequence[Shown], columns: int) -> None:
+def save_sheet(
+    path: Path, title: str, subtitle: str, panels: Sequence[Shown], columns: int
+) -> None:
     """Writes a sheet small enough for a page."""
     sheet = edit_sheet(title, subtitle, panels, columns=columns)
-    sheet = sheet.resize((_SHEET_WIDTH, round(sheet.height * _SHEET_WIDTH / sheet.width)), Image.Resampling.LANCZOS)
+    sheet = sheet.resize(
+        (_SHEET_WIDTH, round(sheet.height * _SHEET_WIDTH / sheet.width)), Image.Resampling.LANCZOS
+    )
     path.parent.mkdir(parents=True, exist_ok=True)
     sheet.save(path, optimize=True)
 
 
 def measure(given: argparse.Namespace) -> None:
-    """Does everything that the command line asks for; tables and sheets are rewritten after each object."""
+    """Does everything that the command line asks for; tables and sheets are rewritten after each
+    object.
+    """
     making = Making(given.output, given.photos, given.size, max(16, 4 * given.samples))
     loops: list[LoopRow] = []
     relits: list[RelitRow] = []
@@ -261,7 +309,9 @@ def _renders(given: argparse.Namespace, name: str, result: Path) -> Renders:
     return Renders(read_result(result), path, given.samples)
 
 
-def _relit(given: argparse.Namespace, case: Case, renders: Renders, panels: list[Shown]) -> list[RelitRow]:
+def _relit(
+    given: argparse.Namespace, case: Case, renders: Renders, panels: list[Shown]
+) -> list[RelitRow]:
     rows = []
     if case.truth is not None:
         ideal = _renders(given, f"{case.name}_true", case.truth)
@@ -271,8 +321,15 @@ def _relit(given: argparse.Namespace, case: Case, renders: Renders, panels: list
     return rows
 
 
-def _write(given: argparse.Namespace, loops: list[LoopRow], relits: list[RelitRow], panels: dict[str, list[Shown]]) -> None:
-    (given.output / "tables.md").write_text(loop_table(loops) + "\n" + relit_table(relits), encoding="utf-8")
+def _write(
+    given: argparse.Namespace,
+    loops: list[LoopRow],
+    relits: list[RelitRow],
+    panels: dict[str, list[Shown]],
+) -> None:
+    (given.output / "tables.md").write_text(
+        loop_table(loops) + "\n" + relit_table(relits), encoding="utf-8"
+    )
     rows = {"loop": [asdict(row) for row in loops], "relit": [asdict(row) for row in relits]}
     (given.output / "rows.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     about = f"Cycles, {given.samples} samples, {given.size} px"
@@ -280,7 +337,9 @@ def _write(given: argparse.Namespace, loops: list[LoopRow], relits: list[RelitRo
         columns = 6 if what == "relit" else 7
         for page, first in enumerate(range(0, len(shown), _SHEET_ROWS * columns), start=1):
             path = given.output / f"closed_loop_{what}_{page}.png"
-            save_sheet(path, _TITLES[what], about, shown[first : first + _SHEET_ROWS * columns], columns)
+            save_sheet(
+                path, _TITLES[what], about, shown[first : first + _SHEET_ROWS * columns], columns
+            )
 
 
 _TITLES = {
@@ -293,13 +352,23 @@ _TITLES = {
 def main(arguments: list[str] | None = None) -> int:
     """The command. Returns 0, or 2 after one line about what was wrong."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.closed_loop", description="Render imported results and hold them to the photo."
+        prog="python -m benchmarks.closed_loop",
+        description="Render imported results and hold them to the photo.",
     )
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for everything that is made")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, help="folder for everything that is made"
+    )
     parser.add_argument("--photos", type=Path, help="folder with the real photos")
     parser.add_argument("--names", nargs="+", help=f"of {', '.join(RENDERED + PHOTOS)}")
-    parser.add_argument("--size", type=int, default=256, help="long side of the objects in pixels (default: %(default)s)")
-    parser.add_argument("--samples", type=int, default=64, help="of Cycles, a pixel (default: %(default)s)")
+    parser.add_argument(
+        "--size",
+        type=int,
+        default=256,
+        help="long side of the objects in pixels (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--samples", type=int, default=64, help="of Cycles, a pixel (default: %(default)s)"
+    )
     parser.add_argument("--fresh", action="store_true", help="render anew what is there")
     try:
         measure(parser.parse_args(arguments))

@@ -1,7 +1,9 @@
-"""Pictures that Blender makes of an imported result, as linear arrays, through the scene's own camera.
+"""Pictures that Blender makes of an imported result, as linear arrays, through the scene's own
+camera.
 
-Cycles on the processor, no denoising, a fixed seed, a float OpenEXR read back; pixels are divided by their coverage. The scene is the one
-that people get; what a measurement needs to be otherwise (`Look`) is set on it afterwards.
+Cycles on the processor, no denoising, a fixed seed, a float OpenEXR read back; pixels are divided
+by their coverage. The scene is the one that people get; what a measurement needs to be otherwise
+(`Look`) is set on it afterwards.
 
 Limits: the render has the size of the maps.
 """
@@ -24,13 +26,21 @@ from isc_core.exr import read_channels
 from .closed_loop_cases import Relit
 
 Gloss = Literal["none", "lobe", "image"]
-LIT = ("photo", "image", "diffuse", "specular", "residual", "lobe")  # roles of images that are light already
+LIT = (
+    "photo",
+    "image",
+    "diffuse",
+    "specular",
+    "residual",
+    "lobe",
+)  # roles of images that are light already
 
 
 @dataclass(frozen=True)
 class Look:
-    """What a picture shows. `gloss`: as `BuildOptions.specular_from`. `white`: a white matt surface instead of the material.
-    `own_shadows`: as in `BuildOptions`. `filter_width`: Blender's, pixels; the scene's own if None. `relit`: another light, direct only.
+    """What a picture shows. `gloss`: as `BuildOptions.specular_from`. `white`: a white matt surface
+    instead of the material. `own_shadows`: as in `BuildOptions`. `filter_width`: Blender's, pixels;
+    the scene's own if None. `relit`: another light, direct only.
     """
 
     gloss: Gloss = "none"
@@ -41,9 +51,11 @@ class Look:
 
 
 def picture(result: Result, look: Look, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """The picture (H, W, 3), linear, 0 where nothing is, and the coverage (H, W) in [0, 1]. Blender's file is emptied first.
+    """The picture (H, W, 3), linear, 0 where nothing is, and the coverage (H, W) in [0, 1].
+    Blender's file is emptied first.
 
-    Raises `RuntimeError` if a material that should do without shines by itself or shows the photo's specular image.
+    Raises `RuntimeError` if a material that should do without shines by itself or shows the photo's
+    specular image.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
     built = build(result, BuildOptions(specular_from=look.gloss, own_shadows=look.own_shadows))
@@ -57,11 +69,17 @@ def picture(result: Result, look: Look, samples: int) -> tuple[np.ndarray, np.nd
 
 
 def shining(material: bpy.types.Material) -> list[str]:
-    """Names of the nodes that a material, with the groups in it, shines by: emission, and images that hold the photo's light."""
+    """Names of the nodes that a material, with the groups in it, shines by: emission, and images
+    that hold the photo's light.
+    """
     found = []
     for node in _nodes(material.node_tree):
         emits = node.type == "EMISSION" or (node.type == "BSDF_PRINCIPLED" and _may_emit(node))
-        shows = node.type == "TEX_IMAGE" and node.image is not None and node.image.get("isc_role") in LIT
+        shows = (
+            node.type == "TEX_IMAGE"
+            and node.image is not None
+            and node.image.get("isc_role") in LIT
+        )
         found += [node.name] if emits or shows else []
     return found
 
@@ -75,7 +93,11 @@ def _nodes(tree: bpy.types.NodeTree) -> Iterator[Any]:
 
 def _may_emit(node: Any) -> bool:
     strength, color = node.inputs["Emission Strength"], node.inputs["Emission Color"]
-    return bool(strength.is_linked or color.is_linked or (strength.default_value > 0 and any(tuple(color.default_value)[:3])))
+    return bool(
+        strength.is_linked
+        or color.is_linked
+        or (strength.default_value > 0 and any(tuple(color.default_value)[:3]))
+    )
 
 
 def _white() -> bpy.types.Material:
@@ -84,7 +106,10 @@ def _white() -> bpy.types.Material:
         material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
-    matt, output = tree.nodes.new("ShaderNodeBsdfDiffuse"), tree.nodes.new("ShaderNodeOutputMaterial")
+    matt, output = (
+        tree.nodes.new("ShaderNodeBsdfDiffuse"),
+        tree.nodes.new("ShaderNodeOutputMaterial"),
+    )
     matt.inputs["Color"].default_value = (1, 1, 1, 1)
     tree.links.new(matt.outputs["BSDF"], output.inputs["Surface"])
     return material
@@ -100,7 +125,9 @@ def _relight(built: Built, new: Relit) -> None:
     built.scene.cycles.max_bounces = 0
 
 
-def _rendered(scene: bpy.types.Scene, filter_width: float | None, samples: int) -> tuple[np.ndarray, np.ndarray]:
+def _rendered(
+    scene: bpy.types.Scene, filter_width: float | None, samples: int
+) -> tuple[np.ndarray, np.ndarray]:
     scene.render.engine = "CYCLES"
     cycles, image = scene.cycles, scene.render.image_settings
     cycles.device, cycles.samples, cycles.seed = "CPU", samples, 0

@@ -3,9 +3,10 @@
   python -m benchmarks.doubts SCENES... [--photos DIR...] [--data ROOT...] [--only NAME...]
       [--appearance FILE] [--lamps FILE]
 
-SCENES: of `python -m benchmarks.doubt_scenes`. `--photos`: folders of photos with masks; `--data`: sets like MIT-Berkeley's, their
-laboratory photos as they are and without gloss. `--only`: those of these families of shapes and objects of sets. A Markdown table; what is
-doubted of the photos is named below it. Of "rig" scenes, one lamp and then several are lit.
+SCENES: of `python -m benchmarks.doubt_scenes`. `--photos`: folders of photos with masks; `--data`:
+sets like MIT-Berkeley's, their laboratory photos as they are and without gloss. `--only`: those of
+these families of shapes and objects of sets. A Markdown table; what is doubted of the photos is
+named below it. Of "rig" scenes, one lamp and then several are lit.
 """
 
 import argparse
@@ -27,7 +28,10 @@ from isc_core.photo import read_photo
 
 @dataclass(frozen=True)
 class Case:
-    """`image` (H, W, 3), `mask` (H, W); `group`: of the table; `name`: to be told where it is a photo that is doubted, else ""."""
+    """`image` (H, W, 3), `mask` (H, W);
+
+    `group`: of the table; `name`: to be told where it is a photo that is doubted, else "".
+    """
 
     image: np.ndarray
     mask: np.ndarray
@@ -43,7 +47,9 @@ def scenes(folder: Path, only: list[str]) -> Iterator[Case]:
             continue
         if scene.kind == "rig":
             yield Case(layers[0] + 0.1 * layers[-1], scene.mask, "rig, one lamp")
-            yield Case(layers[:-1].sum(0) + 0.1 * layers[-1], scene.mask, f"rig, {len(layers) - 1} lamps")
+            yield Case(
+                layers[:-1].sum(0) + 0.1 * layers[-1], scene.mask, f"rig, {len(layers) - 1} lamps"
+            )
         else:
             yield Case(layers.sum(0), scene.mask, f"{scene.kind}, {scene.surroundings}")
 
@@ -66,7 +72,9 @@ def laboratory(root: Path, only: list[str]) -> Iterator[Case]:
 
 def main() -> None:
     """Measures and prints."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("scenes", type=Path, nargs="*")
     parser.add_argument("--photos", type=Path, nargs="+", default=[])
     parser.add_argument("--data", type=Path, nargs="+", default=[])
@@ -75,7 +83,9 @@ def main() -> None:
     parser.add_argument("--lamps", type=Path, help="another network for several lamps")
     given = parser.parse_args()
     try:
-        appearance = shipped_appearance() if given.appearance is None else read_appearance(given.appearance)
+        appearance = (
+            shipped_appearance() if given.appearance is None else read_appearance(given.appearance)
+        )
         lamps = shipped_lamp_network() if given.lamps is None else read_lamp_network(given.lamps)
         report(list(_cases(given)), appearance, lamps)
     except InputError as error:
@@ -92,16 +102,34 @@ def _cases(given: argparse.Namespace) -> Iterator[Case]:
 
 
 def report(cases: list[Case], appearance: AppearanceNetwork, lamps: LampNetwork) -> None:
-    """Prints the table, and what is doubted of the photos. Raises `InputError` where there are none."""
+    """Prints the table, and what is doubted of the photos.
+
+    Raises `InputError` where there are none.
+    """
     if not cases:
         raise InputError("there is nothing to judge: name folders of scenes, --photos or --data")
-    found = [doubts_of(kinds_of(case.image, case.mask, appearance), glance_at(case.image, case.mask, lamps)) for case in cases]
-    lines = ["| photos | number | doubted | mirror or glass | several lights |", "|---|---:|---:|---:|---:|"]
+    found = [
+        doubts_of(
+            kinds_of(case.image, case.mask, appearance), glance_at(case.image, case.mask, lamps)
+        )
+        for case in cases
+    ]
+    lines = [
+        "| photos | number | doubted | mirror or glass | several lights |",
+        "|---|---:|---:|---:|---:|",
+    ]
     for group in sorted({case.group for case in cases}):
         rows = [doubts for doubts, case in zip(found, cases, strict=True) if case.group == group]
-        shares = [np.mean([bool(doubts) if kind is None else kind in doubts for doubts in rows]) for kind in (None, CLEAR, SEVERAL)]
-        lines.append(f"| {group} | {len(rows)} | " + " | ".join(f"{share:.1%}" for share in shares) + " |")
-    named = [(case, doubts) for case, doubts in zip(cases, found, strict=True) if case.name and doubts]
+        shares = [
+            np.mean([bool(doubts) if kind is None else kind in doubts for doubts in rows])
+            for kind in (None, CLEAR, SEVERAL)
+        ]
+        lines.append(
+            f"| {group} | {len(rows)} | " + " | ".join(f"{share:.1%}" for share in shares) + " |"
+        )
+    named = [
+        (case, doubts) for case, doubts in zip(cases, found, strict=True) if case.name and doubts
+    ]
     lines += ["", *(f"{case.group}: {case.name}: {'; '.join(doubts)}" for case, doubts in named)]
     sys.stdout.write("\n".join(lines) + "\n")
 

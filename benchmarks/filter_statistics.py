@@ -1,12 +1,15 @@
-"""Filter statistics as a prior of the separation (thesis, section 3.6.5.1): fitted, drawn as in figure 3.12, and measured by an ablation.
+"""Filter statistics as a prior of the separation (thesis, section 3.6.5.1): fitted, drawn as in
+figure 3.12, and measured by an ablation.
 
-  python -m benchmarks.filter_statistics fit SCENES -o FILE [--of seen|layers]    histograms and temperature from SCENES/train
-  python -m benchmarks.filter_statistics figure SCENES -o DIR                     diffuse against specular layers, one picture a filter
-  python -m benchmarks.filter_statistics ablation SCENES --data DATA -o FILE      `isc` with and without, a Markdown table
+  python -m benchmarks.filter_statistics fit SCENES -o FILE [--of seen|layers]    histograms and
+  temperature from SCENES/train python -m benchmarks.filter_statistics figure SCENES -o DIR
+  diffuse against specular layers, one picture a filter python -m benchmarks.filter_statistics
+  ablation SCENES --data DATA -o FILE      `isc` with and without, a Markdown table
 
-SCENES is a folder of `isc synth`. `layers` takes the statistics of true diffuse and true specular layers, as the thesis does; `seen` those
-of the photo where a highlight is a quarter of the light or more, and where it is a twentieth or less. The temperature is the one that five
-groups of objects, each left out in turn, find most probable, both kinds of pixel weighing the same.
+SCENES is a folder of `isc synth`. `layers` takes the statistics of true diffuse and true specular
+layers, as the thesis does; `seen` those of the photo where a highlight is a quarter of the light or
+more, and where it is a twentieth or less. The temperature is the one that five groups of objects,
+each left out in turn, find most probable, both kinds of pixel weighing the same.
 """
 
 import argparse
@@ -46,7 +49,9 @@ _TESTS = ("test_objects", "test_materials", "test_lights", "test")
 
 @dataclass(frozen=True)
 class Sample:
-    """A scene: intensity (H, W), mask, and the pixels that count as `highlight` or `without`; outputs (N, F, 2) of either kind."""
+    """A scene: intensity (H, W), mask, and the pixels that count as `highlight` or `without`;
+    outputs (N, F, 2) of either kind.
+    """
 
     thing: str
     intensity: np.ndarray
@@ -66,7 +71,9 @@ def scenes(folder: Path, splits: Sequence[str]) -> list[Path]:
 
 
 def sample(folder: Path, of: str) -> Sample:
-    """Outputs of a rendered photo (`of` "seen") or of its layers ("layers") in the pixels whose kind is clear."""
+    """Outputs of a rendered photo (`of` "seen") or of its layers ("layers") in the pixels whose
+    kind is clear.
+    """
     return sample_of(load_rendered(folder), of)
 
 
@@ -76,12 +83,23 @@ def sample_of(truth: SeparationTruth, of: str) -> Sample:
     share = specular / np.maximum(image, 1e-9)
     highlight, without = truth.mask & (share >= _SEEN), truth.mask & (share <= _NONE)
     if of == "layers":
-        kinds = (filter_outputs(specular, truth.mask), filter_outputs(truth.diffuse.mean(axis=2), truth.mask))
+        kinds = (
+            filter_outputs(specular, truth.mask),
+            filter_outputs(truth.diffuse.mean(axis=2), truth.mask),
+        )
         chosen = (highlight[truth.mask], slice(None))
     else:
         kinds = (filter_outputs(image, truth.mask),) * 2
         chosen = (highlight[truth.mask], without[truth.mask])
-    return Sample(truth.name.split("_")[0], image, truth.mask, highlight, without, kinds[0][chosen[0]], kinds[1][chosen[1]])
+    return Sample(
+        truth.name.split("_")[0],
+        image,
+        truth.mask,
+        highlight,
+        without,
+        kinds[0][chosen[0]],
+        kinds[1][chosen[1]],
+    )
 
 
 def fitted(samples: Sequence[Sample], temperature: float = 1.0) -> FilterTable:
@@ -99,14 +117,18 @@ def _histograms(outputs: np.ndarray, spread: np.ndarray) -> np.ndarray:
         values = outputs[:, f][np.isfinite(outputs[:, f])]
         counts = np.bincount(bins(values, spread[f]), minlength=BINS).astype(float)
         counts = (counts + counts[::-1]) / 2 if kind == "slope" else counts
-        counts = ndimage.gaussian_filter1d(counts, 0.7, mode="nearest") + _PRIOR_COUNT / 1000 * counts.sum()
+        counts = (
+            ndimage.gaussian_filter1d(counts, 0.7, mode="nearest")
+            + _PRIOR_COUNT / 1000 * counts.sum()
+        )
         rows.append(counts / counts.sum())
     return np.stack(rows)
 
 
 def calibrated(samples: Sequence[Sample]) -> tuple[FilterTable, float, float]:
-    """The table of all samples with the temperature of those left out, and what it does there: bits a pixel gained over knowing nothing,
-    and the area under the curve of hits against false alarms."""
+    """The table of all samples with the temperature of those left out, and what it does there: bits
+    a pixel gained over knowing nothing, and the area under the curve of hits against false alarms.
+    """
     things = sorted({one.thing for one in samples})
     high: list[np.ndarray] = []
     none: list[np.ndarray] = []
@@ -119,7 +141,10 @@ def calibrated(samples: Sequence[Sample]) -> tuple[FilterTable, float, float]:
                 high.append(evidence[one.highlight])
                 none.append(evidence[one.without])
     yes, no = np.concatenate(high), np.concatenate(none)
-    losses = [(np.logaddexp(0, -yes / t).mean() + np.logaddexp(0, no / t).mean()) / 2 for t in _TEMPERATURES]
+    losses = [
+        (np.logaddexp(0, -yes / t).mean() + np.logaddexp(0, no / t).mean()) / 2
+        for t in _TEMPERATURES
+    ]
     best = int(np.argmin(losses))
     return fitted(samples, float(_TEMPERATURES[best])), 1 - losses[best] / np.log(2), area(yes, no)
 
@@ -132,7 +157,9 @@ def area(yes: np.ndarray, no: np.ndarray) -> float:
 
 
 def judged(samples: Sequence[Sample], table: FilterTable) -> str:
-    """What the table says of photos that it was not fitted to: the area over all pixels, the mean area within one photo, bits a pixel."""
+    """What the table says of photos that it was not fitted to: the area over all pixels, the mean
+    area within one photo, bits a pixel.
+    """
     yes, no, within = [], [], []
     for one in samples:
         evidence = pooled_evidence(one.intensity, one.mask, table) / table.temperature
@@ -152,7 +179,13 @@ def figure(folder: Path, output: Path) -> None:
     top = float(max(table.without.max(), table.highlight.max()))
     for number, (kind, width) in enumerate(FILTERS):
         edges = bin_edges()
-        plot = Plot(f"{kind}, width {width:g} of the diagonal", "asinh(output / spread)", "share", (edges[0], edges[-1]), (0, 1.05 * top))
+        plot = Plot(
+            f"{kind}, width {width:g} of the diagonal",
+            "asinh(output / spread)",
+            "share",
+            (edges[0], edges[-1]),
+            (0, 1.05 * top),
+        )
         plot.bars(edges, table.without[number], COLOURS[0], "diffuse layers")
         plot.bars(edges, table.highlight[number], COLOURS[1], "specular layers")
         plot.save(output / f"{kind}-{WIDTH_NAMES[width]}.png")
@@ -176,24 +209,33 @@ def _main_fit(given: argparse.Namespace) -> str:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Of one photo: its group, and for each setting the squared error over that of doing nothing, or, without highlights, the change in
-    per cent of the photo's RMS."""
+    """Of one photo: its group, and for each setting the squared error over that of doing nothing,
+    or, without highlights, the change in per cent of the photo's RMS.
+    """
 
     group: str
     name: str
     figures: tuple[float, ...]
 
 
-def outcomes(data: Path, folder: Path, settings: Sequence[Callable[[SeparationTruth], np.ndarray]]) -> Iterator[Outcome]:
-    """Each test scene of `folder` and each photo of `data` whose layers are known, under each setting, a function to the diffuse layer."""
+def outcomes(
+    data: Path, folder: Path, settings: Sequence[Callable[[SeparationTruth], np.ndarray]]
+) -> Iterator[Outcome]:
+    """Each test scene of `folder` and each photo of `data` whose layers are known, under each
+    setting, a function to the diffuse layer.
+    """
     for path in scenes(folder, _TESTS):
         yield _outcome("rendered", load_rendered(path), settings)
     for case in cases(data, None):
         yield _outcome(case.group, case.load(), settings)
 
 
-def _outcome(group: str, truth: SeparationTruth, settings: Sequence[Callable[[SeparationTruth], np.ndarray]]) -> Outcome:
-    image, diffuse, mask = (np.asarray(layer, float) for layer in (truth.image, truth.diffuse, truth.mask))
+def _outcome(
+    group: str, truth: SeparationTruth, settings: Sequence[Callable[[SeparationTruth], np.ndarray]]
+) -> Outcome:
+    image, diffuse, mask = (
+        np.asarray(layer, float) for layer in (truth.image, truth.diffuse, truth.mask)
+    )
     inside = mask > 0
     highlight = np.square((image - diffuse)[inside]).sum()
     matt = highlight <= 1e-8 * np.square(image[inside]).sum()
@@ -201,8 +243,12 @@ def _outcome(group: str, truth: SeparationTruth, settings: Sequence[Callable[[Se
     for setting in settings:
         answer = setting(truth)
         off = np.square((answer - (image if matt else diffuse))[inside]).sum()
-        figures.append(float(100 * np.sqrt(off / np.square(image[inside]).sum()) if matt else off / highlight))
-    return Outcome(f"{group} matt" if matt and group == "rendered" else group, truth.name, tuple(figures))
+        figures.append(
+            float(100 * np.sqrt(off / np.square(image[inside]).sum()) if matt else off / highlight)
+        )
+    return Outcome(
+        f"{group} matt" if matt and group == "rendered" else group, truth.name, tuple(figures)
+    )
 
 
 def _setting(table: FilterTable | None) -> Callable[[SeparationTruth], np.ndarray]:
@@ -214,19 +260,27 @@ def _setting(table: FilterTable | None) -> Callable[[SeparationTruth], np.ndarra
 
 
 def markdown(found: Sequence[Outcome], names: Sequence[str]) -> str:
-    """The table: of groups with highlights the geometric mean of the error ratios, the worst, and how many got better or worse by 1 %; of
-    those without, the mean and the largest change."""
+    """The table: of groups with highlights the geometric mean of the error ratios, the worst, and
+    how many got better or worse by 1 %; of those without, the mean and the largest change.
+    """
     lines = ["| group | photos | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
     for group in dict.fromkeys(one.group for one in found):
         rows = np.array([one.figures for one in found if one.group == group])
         still = group.endswith(("clean", "matt"))
-        typical = rows.mean(axis=0) if still else np.exp(np.log(np.maximum(rows, 1e-3)).mean(axis=0))
+        typical = (
+            rows.mean(axis=0) if still else np.exp(np.log(np.maximum(rows, 1e-3)).mean(axis=0))
+        )
         unit, cells = (" %" if still else ""), []
         for column in range(rows.shape[1]):
             base = rows[:, 0]
-            better, worse = (rows[:, column] < 0.99 * base - 1e-9).sum(), (rows[:, column] > 1.01 * base + 1e-9).sum()
+            better, worse = (
+                (rows[:, column] < 0.99 * base - 1e-9).sum(),
+                (rows[:, column] > 1.01 * base + 1e-9).sum(),
+            )
             moved = "" if column == 0 else f"; {better} better, {worse} worse"
-            cells.append(f"{typical[column]:.3f}{unit} (at most {rows[:, column].max():.3f}{moved})")
+            cells.append(
+                f"{typical[column]:.3f}{unit} (at most {rows[:, column].max():.3f}{moved})"
+            )
         lines.append(f"| {group} | {len(rows)} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -237,7 +291,10 @@ def _main_ablation(given: argparse.Namespace) -> str:
     found = []
     for one in outcomes(given.data, given.scenes, settings):
         found.append(one)
-        print(f"{one.group:14s} {one.name:45s} " + "  ".join(f"{value:.4f}" for value in one.figures), flush=True)
+        print(
+            f"{one.group:14s} {one.name:45s} " + "  ".join(f"{value:.4f}" for value in one.figures),
+            flush=True,
+        )
     text = markdown(found, ["without", *tables])
     with new_file(given.output) as path:
         path.write_text(text, encoding="utf-8")
@@ -251,7 +308,9 @@ def _main_figure(given: argparse.Namespace) -> str:
 
 def main(words: Sequence[str] | None = None) -> None:
     """Runs, prints and writes."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     commands = parser.add_subparsers(required=True)
     for name, run in (("fit", _main_fit), ("figure", _main_figure), ("ablation", _main_ablation)):
         command = commands.add_parser(name)
@@ -260,7 +319,9 @@ def main(words: Sequence[str] | None = None) -> None:
         command.add_argument("-o", "--output", type=Path, required=True)
     commands.choices["fit"].add_argument("--of", choices=("seen", "layers"), default="seen")
     commands.choices["ablation"].add_argument("--data", type=Path, default=Path("../shared/data"))
-    commands.choices["ablation"].add_argument("--tables", nargs="+", type=Path, required=True, help="what `fit` wrote")
+    commands.choices["ablation"].add_argument(
+        "--tables", nargs="+", type=Path, required=True, help="what `fit` wrote"
+    )
     given = parser.parse_args(words)
     try:
         print(given.run(given))

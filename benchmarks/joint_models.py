@@ -1,13 +1,19 @@
-"""What each model makes of glossy photos, against SIRFS on the photo as it is and on the true diffuse image.
+"""What each model makes of glossy photos, against SIRFS on the photo as it is and on the true
+diffuse image.
 
-  python -m benchmarks.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural]
-                                    [--networks FOLDER] [--models plain,joint] [--roundings K] [--shape-prior seen]
+  python -m benchmarks.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT
+  [--objects a,b] [--sets level-25_natural]
+                                    [--networks FOLDER] [--models plain,joint] [--roundings K]
+                                    [--shape-prior seen]
 
-Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them. `--networks`: a network for each object that
-has not seen it, `OBJECT.npz` of `benchmarks.layer_network_training`; without it the shipped one, which has. `--roundings`: each photo is
-measured as often, its values changed by some 1e-7 of themselves but for the first time: SIRFS has many minima, and the last digit decides
-between them. Writes OUT/rows.jsonl, a row a run, which is not run again, and OUT/tables.md: geometric means of errors relative to plain
-SIRFS with the interval of resampled objects, and which share of the gain of the true diffuse image a model reaches.
+Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them.
+`--networks`: a network for each object that has not seen it, `OBJECT.npz` of
+`benchmarks.layer_network_training`; without it the shipped one, which has. `--roundings`: each
+photo is measured as often, its values changed by some 1e-7 of themselves but for the first time:
+SIRFS has many minima, and the last digit decides between them. Writes OUT/rows.jsonl, a row a run,
+which is not run again, and OUT/tables.md: geometric means of errors relative to plain SIRFS with
+the interval of resampled objects, and which share of the gain of the true diffuse image a model
+reaches.
 """
 
 import argparse
@@ -36,20 +42,31 @@ METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light", "ave
 
 
 def photo_of(folder: Path, name: str) -> tuple[MitBerkeleyObject, MitBerkeleyObject]:
-    """An object as it is photographed and its diffuse image, with the expectations of lights that its set asks for."""
+    """An object as it is photographed and its diffuse image, with the expectations of lights that
+    its set asks for.
+    """
     natural = "natural" in folder.name
     return tuple(  # type: ignore[return-value]
-        replace(load_object(folder, name, "laboratory", kind), illumination="natural" if natural else "laboratory")
+        replace(
+            load_object(folder, name, "laboratory", kind),
+            illumination="natural" if natural else "laboratory",
+        )
         for kind in ("original", "diffuse")
     )
 
 
 def run(
-    model: str, seen: MitBerkeleyObject, diffuse: MitBerkeleyObject, network: LayerNetwork | None, shape_prior: str = OUTLINE
+    model: str,
+    seen: MitBerkeleyObject,
+    diffuse: MitBerkeleyObject,
+    network: LayerNetwork | None,
+    shape_prior: str = OUTLINE,
 ) -> tuple[Estimate, float]:
     """A model's answer and its seconds."""
     truth = diffuse if model == "true diffuse" else seen
-    options = RunnerOptions("sirfs" if model in ("plain", "true diffuse") else model, shape_prior=shape_prior)
+    options = RunnerOptions(
+        "sirfs" if model in ("plain", "true diffuse") else model, shape_prior=shape_prior
+    )
     began = time.perf_counter()
     answer = make_runner(options, shipped_prior_set(), network)(truth, Monitor())
     return answer, time.perf_counter() - began
@@ -60,14 +77,23 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
     path = given.output / "rows.jsonl"
     rows = read_rows(path)
     done = {(row["set"], row["object"], row["model"], row.get("rounding", 0)) for row in rows}
-    folders = [given.data, *(sorted(p for p in given.glossy.iterdir() if p.is_dir()) if given.glossy else [])]
+    folders = [
+        given.data,
+        *(sorted(p for p in given.glossy.iterdir() if p.is_dir()) if given.glossy else []),
+    ]
     for folder in folders:
         label = "laboratory originals" if folder == given.data else folder.name
         if given.sets and label not in given.sets:
             continue
         for name in given.objects or list_objects(folder, "laboratory"):
-            wanted = [(rounding, model) for rounding in range(given.roundings) for model in given.models]
-            missing = [(rounding, model) for rounding, model in wanted if (label, name, model, rounding) not in done]
+            wanted = [
+                (rounding, model) for rounding in range(given.roundings) for model in given.models
+            ]
+            missing = [
+                (rounding, model)
+                for rounding, model in wanted
+                if (label, name, model, rounding) not in done
+            ]
             if not missing:
                 continue
             photos = photo_of(folder, name)
@@ -75,22 +101,36 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
             for rounding, model in missing:
                 seen, diffuse = (rounded(photo, rounding) for photo in photos)
                 answer, seconds = run(model, seen, diffuse, network, given.shape_prior)
-                rows.append(row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding})
+                rows.append(
+                    row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding}
+                )
                 append_row(path, rows[-1])
     return rows
 
 
-def row_of(label: str, name: str, model: str, seen: MitBerkeleyObject, answer: Estimate, seconds: float) -> dict[str, object]:
+def row_of(
+    label: str, name: str, model: str, seen: MitBerkeleyObject, answer: Estimate, seconds: float
+) -> dict[str, object]:
     """What is kept of an answer, printed."""
-    maps = {key: getattr(answer, key) for key in ("height", "normal", "shading", "reflectance", "light")}
+    maps = {
+        key: getattr(answer, key) for key in ("height", "normal", "shading", "reflectance", "light")
+    }
     scores = score(seen, **maps)
     print(label, name, model, f"{scores.average:.5f}", flush=True)
-    return {"set": label, "object": name, "model": model, "seconds": seconds, **asdict(scores), "average": scores.average}
+    return {
+        "set": label,
+        "object": name,
+        "model": model,
+        "seconds": seconds,
+        **asdict(scores),
+        "average": scores.average,
+    }
 
 
 def tables(rows: list[dict[str, object]], models: Sequence[str] = MODELS) -> str:
-    """Markdown: for the laboratory originals and all glossy sets, a row for each of `models` but the first; "plain" and "true diffuse" are
-    among them."""
+    """Markdown: for the laboratory originals and all glossy sets, a row for each of `models` but
+    the first; "plain" and "true diffuse" are among them.
+    """
     values: dict[tuple[str, str, int], dict[str, dict[str, float]]] = defaultdict(dict)
     for row in rows:
         key = str(row["set"]), str(row["object"]), int(row.get("rounding", 0))  # type: ignore[call-overload]
@@ -98,7 +138,10 @@ def tables(rows: list[dict[str, object]], models: Sequence[str] = MODELS) -> str
     whole = {key: found for key, found in values.items() if all(model in found for model in models)}
     text = []
     groups = sorted({key[0] for key in whole})
-    for title, members in [("all glossy sets", [g for g in groups if g.startswith("level")]), *((g, [g]) for g in groups)]:
+    for title, members in [
+        ("all glossy sets", [g for g in groups if g.startswith("level")]),
+        *((g, [g]) for g in groups),
+    ]:
         part = {key: found for key, found in whole.items() if key[0] in members}
         if len({name for _, name, _ in part}) < 2:
             continue
@@ -114,29 +157,46 @@ def tables(rows: list[dict[str, object]], models: Sequence[str] = MODELS) -> str
 def _line(model: str, part: dict[tuple[str, str, int], dict[str, dict[str, float]]]) -> str:
     cells = []
     for metric in (*METRICS, "seconds"):
-        logs: dict[str, dict[str, list[float]]] = {"plain": defaultdict(list), model: defaultdict(list), "true diffuse": defaultdict(list)}
+        logs: dict[str, dict[str, list[float]]] = {
+            "plain": defaultdict(list),
+            model: defaultdict(list),
+            "true diffuse": defaultdict(list),
+        }
         for (_, name, _), found in part.items():
             for who in logs:
                 logs[who][name].append(math.log(found[who][metric]))
         mean = {who: [float(np.mean(of[name])) for name in sorted(of)] for who, of in logs.items()}
         ratio = paired_bootstrap(mean[model], mean["plain"], 0)
         ceiling = 1 - paired_bootstrap(mean["true diffuse"], mean["plain"], 0).ratio
-        share = f"; {(1 - ratio.ratio) / ceiling:.0%}" if ceiling > 0.05 and model != "true diffuse" and metric != "seconds" else ""
+        share = (
+            f"; {(1 - ratio.ratio) / ceiling:.0%}"
+            if ceiling > 0.05 and model != "true diffuse" and metric != "seconds"
+            else ""
+        )
         cells.append(f"{ratio.ratio:.3f} ({ratio.low:.3f}-{ratio.high:.3f}{share})")
     return f"| {model} | " + " | ".join(cells) + " |"
 
 
 def main() -> None:
     """Runs, prints and writes."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--data", type=Path, required=True, help="the MIT-Berkeley set")
     parser.add_argument("--glossy", type=Path, help="what isc synth glossy-mit made of it")
-    parser.add_argument("--networks", type=Path, help="a network for each object that has not seen it")
+    parser.add_argument(
+        "--networks", type=Path, help="a network for each object that has not seen it"
+    )
     parser.add_argument("--objects", type=lambda text: text.split(","), default=[])
     parser.add_argument("--sets", type=lambda text: text.split(","), default=[])
     parser.add_argument("--models", type=lambda text: text.split(","), default=MODELS)
     parser.add_argument("--roundings", type=int, default=1)
-    parser.add_argument("--shape-prior", choices=SHAPE_PRIORS, default=RunnerOptions().shape_prior, help="as for isc evaluate")
+    parser.add_argument(
+        "--shape-prior",
+        choices=SHAPE_PRIORS,
+        default=RunnerOptions().shape_prior,
+        help="as for isc evaluate",
+    )
     parser.add_argument("-o", "--output", type=Path, required=True)
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)

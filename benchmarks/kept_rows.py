@@ -1,4 +1,6 @@
-"""Rows of a long measurement, kept as lines of JSON while it runs, so that it goes on where it was interrupted."""
+"""Rows of a long measurement, kept as lines of JSON while it runs, so that it goes on where it was
+interrupted.
+"""
 
 import json
 from collections.abc import Mapping
@@ -7,7 +9,9 @@ from typing import Any
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows kept in `path`, none where there is no such file; a last line that was cut short is taken out of the file, too."""
+    """The rows kept in `path`, none where there is no such file; a last line that was cut short is
+    taken out of the file, too.
+    """
     if not path.is_file():
         return []
     text = path.read_text(encoding="utf-8")

@@ -1,15 +1,20 @@
 """Fits the network of `isc_core.separation.layer_network`.
 
-  python -m benchmarks.layer_network_training --scenes DIR [--data ROOT --glossy DIR... [--leave a,b]] -o NETWORK.npz [--steps N]
+  python -m benchmarks.layer_network_training --scenes DIR [--data ROOT --glossy DIR... [--leave
+  a,b]] -o NETWORK.npz [--steps N]
 
-`--scenes`: a folder of `isc synth`. `--data`, `--glossy`: the MIT-Berkeley set and what `isc synth glossy-mit` made of it; `--leave`:
-objects that the network must not see, because it will be measured on them. Needs PyTorch (`pip install 'isc3d[training]'`), which nothing
-else of ISC does. With `--start STATE` the fit goes on from the state that an earlier run kept beside its network (NETWORK.pt).
+`--scenes`: a folder of `isc synth`. `--data`, `--glossy`: the MIT-Berkeley set and what `isc synth
+glossy-mit` made of it; `--leave`: objects that the network must not see, because it will be
+measured on them. Needs PyTorch (`pip install 'isc3d[training]'`), which nothing else of ISC does.
+With `--start STATE` the fit goes on from the state that an earlier run kept beside its network
+(NETWORK.pt).
 
-Loss, of y = log(image / diffuse): .3 |e| + .7 Huber(e) + .5 |gradient of e|, each pixel weighted by its light, each photo by 1 / (.1 + mean
-y), so that weak highlights count too; and the Laplace likelihood of |e| for the scale b. What all pixels have in common (the tenth
-percentile of each channel's y) is taken off: a veil cannot be told from brighter light. Adam with decoupled weight decay (I. Loshchilov and
-F. Hutter 2019, arXiv:1711.05101), a cosine of steps, averaged weights; He's initial weights (K. He et al. 2015, doi:10.1109/ICCV.2015.123).
+Loss, of y = log(image / diffuse): .3 |e| + .7 Huber(e) + .5 |gradient of e|, each pixel weighted by
+its light, each photo by 1 / (.1 + mean y), so that weak highlights count too; and the Laplace
+likelihood of |e| for the scale b. What all pixels have in common (the tenth percentile of each
+channel's y) is taken off: a veil cannot be told from brighter light. Adam with decoupled weight
+decay (I. Loshchilov and F. Hutter 2019, arXiv:1711.05101), a cosine of steps, averaged weights;
+He's initial weights (K. He et al. 2015, doi:10.1109/ICCV.2015.123).
 """
 
 import argparse
@@ -39,7 +44,10 @@ class Block(nn.Module):  # type: ignore[misc]
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
-        self.c1, self.c2 = nn.Conv2d(inputs, outputs, 3, padding=1), nn.Conv2d(outputs, outputs, 3, padding=1)
+        self.c1, self.c2 = (
+            nn.Conv2d(inputs, outputs, 3, padding=1),
+            nn.Conv2d(outputs, outputs, 3, padding=1),
+        )
 
     def forward(self, layer: torch.Tensor) -> torch.Tensor:
         """(B, inputs, H, W) to (B, outputs, H, W)."""
@@ -52,7 +60,9 @@ class Network(nn.Module):  # type: ignore[misc]
     def __init__(self) -> None:
         super().__init__()
         steps = list(zip(WIDTHS[:-1], WIDTHS[1:], strict=True))
-        self.down = nn.ModuleList([Block(16, WIDTHS[0]), *(Block(fine, coarse) for fine, coarse in steps)])
+        self.down = nn.ModuleList(
+            [Block(16, WIDTHS[0]), *(Block(fine, coarse) for fine, coarse in steps)]
+        )
         self.up = nn.ModuleList([Block(fine + coarse, fine) for fine, coarse in steps])
         self.out = nn.Conv2d(WIDTHS[0], 16, 3, padding=1)
         for module in self.modules():
@@ -68,7 +78,11 @@ class Network(nn.Module):  # type: ignore[misc]
             layer = block(layer if level == 0 else functional.avg_pool2d(layer, 2))
             kept.append(layer)
         for level in range(len(self.up) - 1, -1, -1):
-            layer = self.up[level](torch.cat([kept[level], functional.interpolate(layer, scale_factor=2, mode="nearest")], 1))
+            layer = self.up[level](
+                torch.cat(
+                    [kept[level], functional.interpolate(layer, scale_factor=2, mode="nearest")], 1
+                )
+            )
         raw = functional.pixel_shuffle(self.out(layer), 2)
         return functional.softplus(raw[:, :3] - _MARGIN), raw[:, 3:]
 
@@ -79,11 +93,15 @@ class Network(nn.Module):  # type: ignore[misc]
 
 
 def encoder_of(weights: Sequence[np.ndarray], biases: Sequence[np.ndarray]) -> nn.ModuleList:
-    """The convolutions of an encoder of `isc_core.separation.convolutions`, to begin another network with."""
+    """The convolutions of an encoder of `isc_core.separation.convolutions`, to begin another
+    network with.
+    """
     convolutions = nn.ModuleList()
     for weight, bias in zip(weights, biases, strict=True):
         one = nn.Conv2d(weight.shape[1], weight.shape[2], 3, padding=1)
-        one.weight.data.copy_(torch.from_numpy(weight.reshape(3, 3, *weight.shape[1:]).transpose(3, 2, 0, 1).copy()))
+        one.weight.data.copy_(
+            torch.from_numpy(weight.reshape(3, 3, *weight.shape[1:]).transpose(3, 2, 0, 1).copy())
+        )
         one.bias.data.copy_(torch.from_numpy(bias))
         convolutions.append(one)
     return convolutions
@@ -109,7 +127,14 @@ class Draws(torch.utils.data.IterableDataset[list[torch.Tensor]]):  # type: igno
         torch.set_num_threads(1)
         torch.manual_seed(self._seed)
         rng = np.random.default_rng(self._seed)
-        groups = [g for g in ([k for k, s in enumerate(self._subjects) if bool(s.name) == named] for named in (False, True)) if g]
+        groups = [
+            g
+            for g in (
+                [k for k, s in enumerate(self._subjects) if bool(s.name) == named]
+                for named in (False, True)
+            )
+            if g
+        ]
         while True:
             chosen = [groups[-1 if rng.random() < _SHARE else 0] for _ in range(self._batch)]
             photos = [draw(self._subjects, int(rng.choice(group)), rng) for group in chosen]
@@ -118,19 +143,32 @@ class Draws(torch.utils.data.IterableDataset[list[torch.Tensor]]):  # type: igno
 
 def inputs(image: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
     """(B, 4, H, W): log light over each object's mean, and the mask."""
-    mean = (image.mean(1, keepdim=True) * mask).sum((2, 3), keepdim=True) / mask.sum((2, 3), keepdim=True).clamp(min=1)
+    mean = (image.mean(1, keepdim=True) * mask).sum((2, 3), keepdim=True) / mask.sum(
+        (2, 3), keepdim=True
+    ).clamp(min=1)
     return torch.cat([torch.log(image / mean.clamp(min=1e-9) + _DARK) * mask, mask], 1)
 
 
 def wanted(image: torch.Tensor, diffuse: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
     """y (B, 3, H, W), without what all of an object's pixels have in common."""
     excess = (torch.log(image.clamp(min=1e-5)) - torch.log(diffuse.clamp(min=1e-5))).clamp(0, _MOST)
-    ordered = torch.where(mask.expand_as(excess) > 0, excess, torch.full_like(excess, 3 * _MOST)).flatten(2).sort(2).values
+    ordered = (
+        torch.where(mask.expand_as(excess) > 0, excess, torch.full_like(excess, 3 * _MOST))
+        .flatten(2)
+        .sort(2)
+        .values
+    )
     place = (_COMMON * mask.sum((2, 3))).long().clamp(min=1)[:, :, None].expand(-1, 3, 1)
     return (excess - ordered.gather(2, place)[..., None].clamp(max=_MOST)).clamp(min=0)
 
 
-def loss_of(found: torch.Tensor, log_scale: torch.Tensor, image: torch.Tensor, diffuse: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
+def loss_of(
+    found: torch.Tensor,
+    log_scale: torch.Tensor,
+    image: torch.Tensor,
+    diffuse: torch.Tensor,
+    mask: torch.Tensor,
+) -> torch.Tensor:
     """The loss of the module's docstring."""
     target = wanted(image, diffuse, mask)
     light = image.mean(1, keepdim=True)
@@ -163,10 +201,18 @@ def fit(subjects: list[Subject], given: argparse.Namespace) -> Network:
         network.load_state_dict(torch.load(given.start, weights_only=True))
     average = copy.deepcopy(network)
     optimizer = torch.optim.AdamW(network.parameters(), lr=_RATE, weight_decay=_DECAY)
-    batches: Any = torch.utils.data.DataLoader(Draws(subjects, given.batch, given.seed), batch_size=None, num_workers=1, prefetch_factor=4)
+    batches: Any = torch.utils.data.DataLoader(
+        Draws(subjects, given.batch, given.seed), batch_size=None, num_workers=1, prefetch_factor=4
+    )
     shown = 0.0
     for step, (image, diffuse, mask) in zip(range(given.steps), batches, strict=False):
-        rate = _RATE * min(1.0, (step + 1) / _WARM_UP) * 0.5 * (1 + math.cos(math.pi * step / given.steps)) + 1e-6
+        rate = (
+            _RATE
+            * min(1.0, (step + 1) / _WARM_UP)
+            * 0.5
+            * (1 + math.cos(math.pi * step / given.steps))
+            + 1e-6
+        )
         for group in optimizer.param_groups:
             group["lr"] = rate
         with torch.autocast("cpu", torch.bfloat16):
@@ -181,7 +227,10 @@ def fit(subjects: list[Subject], given: argparse.Namespace) -> Network:
                 kept.lerp_(new, 1 - min(0.999, (step + 1) / (step + 101)))
         shown = 0.99 * shown + 0.01 * float(loss.detach())
         if step % 100 == 99:
-            print(f"step {step + 1} of {given.steps}, loss {shown / (1 - 0.99 ** (step + 1)):.4f}", flush=True)
+            print(
+                f"step {step + 1} of {given.steps}, loss {shown / (1 - 0.99 ** (step + 1)):.4f}",
+                flush=True,
+            )
             write(average, given.output)
     return average
 
@@ -194,7 +243,9 @@ def write(network: Network, path: Path) -> None:
 
 def main() -> None:
     """Fits and writes."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--scenes", type=Path, required=True)
     parser.add_argument("--data", type=Path)
     parser.add_argument("--glossy", type=Path, nargs="+")

@@ -1,13 +1,17 @@
-"""How good are the priors on objects they have not seen? Each training object is solved with priors and lights fitted to the other nine.
+"""How good are the priors on objects they have not seen? Each training object is solved with priors
+and lights fitted to the other nine.
 
-  python -m benchmarks.leave_one_out --json loo.json        baseline B (the published recipe and weights) and ours, both lights
-  python -m benchmarks.leave_one_out --in-sample            the same with priors fitted to all ten
-  python -m benchmarks.leave_one_out --grey                 the photos without their colours; for grey ones in natural light no weights are
-                                                            published: those for laboratory light stand in
+  python -m benchmarks.leave_one_out --json loo.json        baseline B (the published recipe and
+  weights) and ours, both lights python -m benchmarks.leave_one_out --in-sample            the same
+  with priors fitted to all ten python -m benchmarks.leave_one_out --grey                 the photos
+  without their colours; for grey ones in natural light no weights are
+                                                            published: those for laboratory light
+                                                            stand in
 
-Both lights of the object are left out, so its shape, paint and lights are unknown to the priors. The statistics of the ten objects are
-condensed once; a fold is a fit to nine of them. The comparison is paired: the ratio of geometric means with a 95 % bootstrap interval
-over objects. Each is a family of its own: of the cups, frogs, papers and teabags these ten have one member each.
+Both lights of the object are left out, so its shape, paint and lights are unknown to the priors.
+The statistics of the ten objects are condensed once; a fold is a fit to nine of them. The
+comparison is paired: the ratio of geometric means with a 95 % bootstrap interval over objects. Each
+is a family of its own: of the cups, frogs, papers and teabags these ten have one member each.
 """
 
 from concurrent.futures import ProcessPoolExecutor
@@ -35,7 +39,9 @@ METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
 
 @dataclass(frozen=True)
 class Task:
-    """One solve: a method's priors without `name` (or with it) on `name` under `light`, in colour or `grey`."""
+    """One solve: a method's priors without `name` (or with it) on `name` under `light`, in colour
+    or `grey`.
+    """
 
     method: str
     name: str
@@ -46,23 +52,41 @@ class Task:
 
 
 def fit_options(method: str) -> FitOptions:
-    """How a method's priors are fitted. "B, lights scaled": the recipe with the natural lights' contrast fitted to the objects'."""
-    return {"B": RECIPE, "B, lights scaled": RECIPE.with_fitted_contrast(), "ours": FitOptions()}[method]
+    """How a method's priors are fitted. "B, lights scaled": the recipe with the natural lights'
+    contrast fitted to the objects'.
+    """
+    return {"B": RECIPE, "B, lights scaled": RECIPE.with_fitted_contrast(), "ours": FitOptions()}[
+        method
+    ]
 
 
 def run(task: Task) -> tuple[str, str, str, list[float], float]:
     """Six errors and the loss."""
     channels = 1 if task.grey else 3
-    weights = isc_weights(task.light, channels) if task.method == "ours" else published_weights(task.light, channels)
+    weights = (
+        isc_weights(task.light, channels)
+        if task.method == "ours"
+        else published_weights(task.light, channels)
+    )
     truth = training_object(task.shared, task.name, task.light)
     truth = greyed(truth) if task.grey else truth
     priors = task.priors.priors(task.light, channels)
     if task.method != "ours":
         priors = priors.without_silhouette()
-    options = SolverOptions(threads=1) if task.method == "ours" else SolverOptions(threads=1, lbfgs=LbfgsOptions())  # the published rule
+    options = (
+        SolverOptions(threads=1)
+        if task.method == "ours"
+        else SolverOptions(threads=1, lbfgs=LbfgsOptions())
+    )  # the published rule
     result = solve(problem(truth, priors, weights), options)
     errors = scores(truth, result)
-    return task.method, task.light, task.name, [getattr(errors, metric) for metric in METRICS], result.terms.total
+    return (
+        task.method,
+        task.light,
+        task.name,
+        [getattr(errors, metric) for metric in METRICS],
+        result.terms.total,
+    )
 
 
 def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool, grey: bool) -> list[Task]:
@@ -87,35 +111,58 @@ def without(statistics: dict[str, ObjectStatistics], name: str) -> dict[str, Obj
 def main() -> None:
     """Runs and prints."""
     options = parser(__doc__)
-    options.add_argument("--in-sample", action="store_true", help="priors fitted to all ten objects")
+    options.add_argument(
+        "--in-sample", action="store_true", help="priors fitted to all ten objects"
+    )
     options.add_argument("--grey", action="store_true", help="the photos without their colours")
-    options.add_argument("--methods", default=",".join(METHODS).replace("B, lights scaled", "scaled"), help="of B, scaled, ours")
+    options.add_argument(
+        "--methods",
+        default=",".join(METHODS).replace("B, lights scaled", "scaled"),
+        help="of B, scaled, ours",
+    )
     options.add_argument("--processes", type=int, default=2)
     given = options.parse_args()
     methods = tuple("B, lights scaled" if m == "scaled" else m for m in given.methods.split(","))
     results: dict[tuple[str, str], dict[str, list[float]]] = {}
     with ProcessPoolExecutor(given.processes) as pool:
-        for method, light, name, errors, loss in pool.map(run, tasks(given.shared, methods, given.in_sample, given.grey)):
+        for method, light, name, errors, loss in pool.map(
+            run, tasks(given.shared, methods, given.in_sample, given.grey)
+        ):
             results.setdefault((method, light), {})[name] = errors
-            print(f"{method:18s} {light:10s} {name:9s} avg {geometric_mean(errors):.5f}  loss {loss:.3f}", flush=True)
+            print(
+                f"{method:18s} {light:10s} {name:9s} avg {geometric_mean(errors):.5f}  loss {loss:.3f}",
+                flush=True,
+            )
     report(results)
     write_json(given.json, {f"{m}/{light}": found for (m, light), found in results.items()})
 
 
 def report(results: dict[tuple[str, str], dict[str, list[float]]]) -> None:
     """Geometric means a method and light, and each method against B."""
-    print("\n| light | priors | Z px | N rad | S-MSE | R-MSE | RS-MSE | L-MSE | avg |\n|---|---|---|---|---|---|---|---|---|")
+    print(
+        "\n| light | priors | Z px | N rad | S-MSE | R-MSE | RS-MSE | L-MSE | avg |\n|---|---|---|---|---|---|---|---|---|"
+    )
     for (method, light), found in sorted(results.items(), key=lambda item: item[0][1]):
         means = np.exp(np.mean([np.log(errors) for errors in found.values()], axis=0))
-        row = [f"{means[0]:.2f}", f"{means[1]:.4f}", *(f"{v:.5f}" for v in means[2:]), f"{geometric_mean(list(means)):.5f}"]
+        row = [
+            f"{means[0]:.2f}",
+            f"{means[1]:.4f}",
+            *(f"{v:.5f}" for v in means[2:]),
+            f"{geometric_mean(list(means)):.5f}",
+        ]
         print(f"| {light} | {method} | " + " | ".join(row) + " |")
     for light in LIGHTS:
         for baseline in METHODS[:2]:
             if (baseline, light) in results and ("ours", light) in results:
                 theirs, ours = results[baseline, light], results["ours", light]
-                logs = [[np.mean(np.log(found[name])) for name in sorted(ours)] for found in (ours, theirs)]
+                logs = [
+                    [np.mean(np.log(found[name])) for name in sorted(ours)]
+                    for found in (ours, theirs)
+                ]
                 ratio = paired_bootstrap(logs[0], logs[1], seed=0)
-                print(f"{light}: ours / {baseline} = {ratio.ratio:.3f}, 95 % interval {ratio.low:.3f} to {ratio.high:.3f}")
+                print(
+                    f"{light}: ours / {baseline} = {ratio.ratio:.3f}, 95 % interval {ratio.low:.3f} to {ratio.high:.3f}"
+                )
 
 
 if __name__ == "__main__":

@@ -13,7 +13,14 @@ _FINE = 2  # drawn this much larger, then shrunk: smooth edges
 class Plot:
     """One pair of axes, 640 by 400 pixels. x in [x0, x1] to the right, y in [y0, y1] upward."""
 
-    def __init__(self, title: str, x_name: str, y_name: str, x_range: tuple[float, float], y_range: tuple[float, float]) -> None:
+    def __init__(
+        self,
+        title: str,
+        x_name: str,
+        y_name: str,
+        x_range: tuple[float, float],
+        y_range: tuple[float, float],
+    ) -> None:
         self._x, self._y = x_range, y_range
         self._size = (640 * _FINE, 400 * _FINE)
         self._image = Image.new("RGB", self._size, "white")
@@ -34,16 +41,24 @@ class Plot:
 
     def bars(self, edges: np.ndarray, heights: np.ndarray, colour: str, label: str = "") -> None:
         """The outline of a histogram: `heights` (n,) between `edges` (n + 1,)."""
-        self.line(np.repeat(edges, 2), np.concatenate([[self._y[0]], np.repeat(heights, 2), [self._y[0]]]), colour, label)
+        self.line(
+            np.repeat(edges, 2),
+            np.concatenate([[self._y[0]], np.repeat(heights, 2), [self._y[0]]]),
+            colour,
+            label,
+        )
 
     def save(self, path: Path) -> None:
         """Writes the PNG."""
-        self._image.resize((self._size[0] // _FINE, self._size[1] // _FINE), Image.Resampling.LANCZOS).quantize(128).save(
-            path, optimize=True
-        )
+        self._image.resize(
+            (self._size[0] // _FINE, self._size[1] // _FINE), Image.Resampling.LANCZOS
+        ).quantize(128).save(path, optimize=True)
 
     def _pixels(self, x: np.ndarray, y: np.ndarray) -> list[tuple[float, float]]:
-        width, height = self._size[0] - (_LEFT + _RIGHT) * _FINE, self._size[1] - (_TOP + _BOTTOM) * _FINE
+        width, height = (
+            self._size[0] - (_LEFT + _RIGHT) * _FINE,
+            self._size[1] - (_TOP + _BOTTOM) * _FINE,
+        )
         across = (np.asarray(x) - self._x[0]) / (self._x[1] - self._x[0])
         up = np.clip((np.asarray(y) - self._y[0]) / (self._y[1] - self._y[0]), 0, 1)
         columns = _LEFT * _FINE + across * width
@@ -55,14 +70,24 @@ class Plot:
             x, y = (low + (high - low) * k / 5 for low, high in (self._x, self._y))
             (left, low), (right, high) = self._pixels(np.array(self._x), np.array(self._y))
             ((column, row),) = self._pixels(np.array([x]), np.array([y]))
-            self._draw.line([(column, low), (column, high)], fill="#e4e4e4" if k else "#444444", width=_FINE)
-            self._draw.line([(left, row), (right, row)], fill="#e4e4e4" if k else "#444444", width=_FINE)
+            self._draw.line(
+                [(column, low), (column, high)], fill="#e4e4e4" if k else "#444444", width=_FINE
+            )
+            self._draw.line(
+                [(left, row), (right, row)], fill="#e4e4e4" if k else "#444444", width=_FINE
+            )
             self._text((column, low + 6 * _FINE), f"{x:.5g}", "mt")
             self._text((left - 6 * _FINE, row), f"{y:.5g}", "rm")
         self._text((self._size[0] / 2, 10 * _FINE), title, "mt", 15)
         self._text((self._size[0] / 2, self._size[1] - 8 * _FINE), x_name, "mb")
         name = Image.new("L", (300 * _FINE, 16 * _FINE))
-        ImageDraw.Draw(name).text((150 * _FINE, 2 * _FINE), y_name, fill=255, font=ImageFont.load_default(12 * _FINE), anchor="mt")
+        ImageDraw.Draw(name).text(
+            (150 * _FINE, 2 * _FINE),
+            y_name,
+            fill=255,
+            font=ImageFont.load_default(12 * _FINE),
+            anchor="mt",
+        )
         turned = name.rotate(90, expand=True)
         self._image.paste("#222222", (2 * _FINE, (self._size[1] - turned.height) // 2), turned)
 
@@ -72,5 +97,14 @@ class Plot:
             self._text((self._size[0] - (_RIGHT + 8) * _FINE, row), label, "rm", 12, colour)
             self._entries += 1
 
-    def _text(self, at: tuple[float, float], text: str, anchor: str, size: int = 12, colour: str = "#222222") -> None:
-        self._draw.text(at, text, fill=colour, font=ImageFont.load_default(size * _FINE), anchor=anchor)
+    def _text(
+        self,
+        at: tuple[float, float],
+        text: str,
+        anchor: str,
+        size: int = 12,
+        colour: str = "#222222",
+    ) -> None:
+        self._draw.text(
+            at, text, fill=colour, font=ImageFont.load_default(size * _FINE), anchor=anchor
+        )

@@ -1,7 +1,9 @@
-"""Production (float32, compiled) against double precision and against the plain NumPy engine, with the shipped priors and weights.
+"""Production (float32, compiled) against double precision and against the plain NumPy engine, with
+the shipped priors and weights.
 
-python -m benchmarks.precision               production against float64: losses and scores of the ten objects, both lights
-python -m benchmarks.precision --numpy       ten fixed states and whole solves in both engines, with the ratio of their times
+python -m benchmarks.precision               production against float64: losses and scores of the
+ten objects, both lights python -m benchmarks.precision --numpy       ten fixed states and whole
+solves in both engines, with the ratio of their times
 """
 
 import time
@@ -42,7 +44,9 @@ def against_double(shared: Path, names: list[str]) -> None:
                 solve(made)  # compiles
             losses = {}
             for single in (True, False):
-                result, took = timed(lambda single=single, made=made: solve(made, SolverOptions(single=single)))  # type: ignore[misc]
+                result, took = timed(
+                    lambda single=single, made=made: solve(made, SolverOptions(single=single))
+                )  # type: ignore[misc]
                 losses[single] = result.terms.total
                 averages[single].append(scores(truth, result).average)
                 if single:
@@ -68,7 +72,12 @@ def states(made: Problem) -> list[tuple[np.ndarray, np.ndarray]]:
     found = []
     for k in range(10):
         a, b = rng.uniform(10, 40, 2)
-        found.append((2.0 * k * np.sin(i / a + k) * np.cos(j / b), 0.1 * k * rng.normal(size=(9, 3)) * (k > 0)))
+        found.append(
+            (
+                2.0 * k * np.sin(i / a + k) * np.cos(j / b),
+                0.1 * k * rng.normal(size=(9, 3)) * (k > 0),
+            )
+        )
     return found
 
 
@@ -83,11 +92,24 @@ def against_numpy(shared: Path, names: list[str]) -> None:
                 with Workers(2) as workers:
                     compiled, plain = NumbaEngine(made, dtype, workers), NumpyEngine(made, dtype)
                     for height, lit in states(made):
-                        a, b = compiled.evaluate(height.astype(dtype), lit), plain.evaluate(height.astype(dtype), lit)
-                        pairs = ((a.height_gradient, b.height_gradient), (a.light_gradient, b.light_gradient))
-                        differences = [float(np.linalg.norm(x - y) / np.linalg.norm(y)) for x, y in pairs]
-                        worst = np.maximum(worst, np.array([abs(a.terms.total / b.terms.total - 1), *differences]))
-                print(f"{light:10s} {name:9s} {dtype.__name__}: loss {worst[0]:.1e}, dZ {worst[1]:.1e}, dL {worst[2]:.1e}", flush=True)
+                        a, b = (
+                            compiled.evaluate(height.astype(dtype), lit),
+                            plain.evaluate(height.astype(dtype), lit),
+                        )
+                        pairs = (
+                            (a.height_gradient, b.height_gradient),
+                            (a.light_gradient, b.light_gradient),
+                        )
+                        differences = [
+                            float(np.linalg.norm(x - y) / np.linalg.norm(y)) for x, y in pairs
+                        ]
+                        worst = np.maximum(
+                            worst, np.array([abs(a.terms.total / b.terms.total - 1), *differences])
+                        )
+                print(
+                    f"{light:10s} {name:9s} {dtype.__name__}: loss {worst[0]:.1e}, dZ {worst[1]:.1e}, dL {worst[2]:.1e}",
+                    flush=True,
+                )
             fast, fast_s = timed(lambda made=made: solve(made, SolverOptions(engine="numba")))  # type: ignore[misc]
             slow, slow_s = timed(lambda made=made: solve(made, SolverOptions(engine="numpy")))  # type: ignore[misc]
             each = (slow_s / slow.evaluations) / (fast_s / fast.evaluations)
@@ -104,7 +126,11 @@ def main() -> None:
     options.add_argument("--numpy", action="store_true")
     options.add_argument("--objects", help="comma-separated; all training objects without it")
     given = options.parse_args()
-    names = given.objects.split(",") if given.objects else list(list_objects(given.shared / "data" / "mit_berkeley_train", "natural"))
+    names = (
+        given.objects.split(",")
+        if given.objects
+        else list(list_objects(given.shared / "data" / "mit_berkeley_train", "natural"))
+    )
     (against_numpy if given.numpy else against_double)(given.shared, names)
 
 

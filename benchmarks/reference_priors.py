@@ -1,4 +1,5 @@
-"""Reads the SIRFS reference release's trained constants (`sirfs_reference_priors.npz`), for comparison only.
+"""Reads the SIRFS reference release's trained constants (`sirfs_reference_priors.npz`), for
+comparison only.
 
 They are under research terms and never ship with the project.
 """
@@ -17,12 +18,28 @@ def reference_priors(path: Path, illumination: str, channels: int = 3) -> Priors
         d = {k: f[k] for k in f.files}
     kind = f"light_{'color' if channels == 3 else 'gray'}_{illumination}_"
     light = Light(d[kind + "mu"], d[kind + "Sigma"], d[kind + "inverse"], d[kind + "mean"])
-    curvature = CostTable(float(d["z_curv_lut_low"]), float(d["z_curv_lut_step"]), d["z_curv_lut_cost"])
+    curvature = CostTable(
+        float(d["z_curv_lut_low"]), float(d["z_curv_lut_step"]), d["z_curv_lut_cost"]
+    )
     if channels == 1:
         low, high = (float(v) for v in d["gray_a_abs_range"])
         values = d["gray_a_smooth_lut_cost"]
         smooth = CostTable(-3.925369950195567, 3.925566228506992e-04, values)
-        return Priors(1, curvature, smooth, np.eye(1), np.eye(1), AbsoluteTable(low, high, d["gray_a_abs_cost"]), light)
-    smooth = CostTable(float(d["a_smooth_lut_low"]), float(d["a_smooth_lut_step"]), float(d["a_smooth_LL_zero"]) - d["a_smooth_lut_loglik"])
-    table = AbsoluteTable(float(d["a_abs_low"][0]), float(d["a_abs_high"][0]), d["a_abs_cost_RETRAINED"])
+        return Priors(
+            1,
+            curvature,
+            smooth,
+            np.eye(1),
+            np.eye(1),
+            AbsoluteTable(low, high, d["gray_a_abs_cost"]),
+            light,
+        )
+    smooth = CostTable(
+        float(d["a_smooth_lut_low"]),
+        float(d["a_smooth_lut_step"]),
+        float(d["a_smooth_LL_zero"]) - d["a_smooth_lut_loglik"],
+    )
+    table = AbsoluteTable(
+        float(d["a_abs_low"][0]), float(d["a_abs_high"][0]), d["a_abs_cost_RETRAINED"]
+    )
     return Priors(3, curvature, smooth, d["a_smooth_whiten"], d["a_whiten"], table, light)

@@ -1,15 +1,18 @@
-"""`benchmarks.unlit_objects` under light that is drawn anew each time: gloss, lamps and smooth light, in a few milliseconds a picture.
+"""`benchmarks.unlit_objects` under light that is drawn anew each time: gloss, lamps and smooth
+light, in a few milliseconds a picture.
 
 Equation: of a far lamp toward l, with the half vector h between l and the viewer,
 
     I = V (albedo n.l (1 - F) + pi F D(n.h) G(n.l) G(n.v) / (4 n.v)),   F = f + (1 - f) (1 - v.h)^5,
 
-V whether it is seen, D and G those of a rough surface. The light from around is a random harmonic of low degree: paint gets of it what its
-normal and the object's own shadows let through (of the directions whose shadows are known), gloss mirrors it at 2 n.v n - v. Wide lamps
-shine from the known directions that are near, and on a rougher gloss.
+V whether it is seen, D and G those of a rough surface. The light from around is a random harmonic
+of low degree: paint gets of it what its normal and the object's own shadows let through (of the
+directions whose shadows are known), gloss mirrors it at 2 n.v n - v. Wide lamps shine from the
+known directions that are near, and on a rougher gloss.
 
-Citation: B. Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206 (D, G; D also P. Beckmann and A. Spizzichino's); C. Schlick 1994,
-doi:10.1111/1467-8659.1330233 (F); R. O. Dror, A. S. Willsky, E. H. Adelson 2004, doi:10.1167/4.9.11 (harmonics whose power falls).
+Citation: B. Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206 (D, G; D also P. Beckmann and A.
+Spizzichino's); C. Schlick 1994, doi:10.1111/1467-8659.1330233 (F); R. O. Dror, A. S. Willsky, E. H.
+Adelson 2004, doi:10.1167/4.9.11 (harmonics whose power falls).
 
 Limits: one bounce of light alone; no light from behind the object.
 """
@@ -37,8 +40,10 @@ _VIEW = np.array([0.0, 0.0, 1.0], np.float32)
 
 @dataclass(frozen=True)
 class Relit:
-    """An object prepared: of its N pixels `normals` (N, 3), `albedos` (PAINTS, N, 3), `mirrored` (N,), where in the light from around the
-    view is mirrored to; `toward` (LAMPS, 3), `reached` (LAMPS, N) bool; `mask` (SIZE, SIZE); `shape`, its family's name."""
+    """An object prepared: of its N pixels `normals` (N, 3), `albedos` (PAINTS, N, 3), `mirrored`
+    (N,), where in the light from around the view is mirrored to; `toward` (LAMPS, 3), `reached`
+    (LAMPS, N) bool; `mask` (SIZE, SIZE); `shape`, its family's name.
+    """
 
     normals: np.ndarray
     albedos: np.ndarray
@@ -54,19 +59,36 @@ class Relit:
         normals = unlit.normals[unlit.mask].astype(np.float32)
         reached = np.ascontiguousarray(unlit.reached[:, unlit.mask])
         albedos, mirrored = unlit.albedos[:, unlit.mask], _mirrored(normals)
-        return cls(normals.astype(np.float16), albedos, mirrored, unlit.toward, reached, unlit.mask, unlit.shape)
+        return cls(
+            normals.astype(np.float16),
+            albedos,
+            mirrored,
+            unlit.toward,
+            reached,
+            unlit.mask,
+            unlit.shape,
+        )
 
     def mapped(self, space: np.ndarray) -> "Relit":
-        """The object after a linear map of `space` (3, 3) that keeps the view: what sees what stays true, and its pixels are as they were,
-        to be moved by whoever shows them where the map moves them in the picture."""
+        """The object after a linear map of `space` (3, 3) that keeps the view: what sees what stays
+        true, and its pixels are as they were, to be moved by whoever shows them where the map moves
+        them in the picture.
+        """
         normals = _unit(self.normals.astype(np.float32) @ np.linalg.inv(space).astype(np.float32))
-        return replace(self, normals=normals, mirrored=_mirrored(normals), toward=_unit(self.toward @ space.T.astype(np.float32)))
+        return replace(
+            self,
+            normals=normals,
+            mirrored=_mirrored(normals),
+            toward=_unit(self.toward @ space.T.astype(np.float32)),
+        )
 
 
 @dataclass(frozen=True)
 class Lit:
-    """A photo (SIZE, SIZE, 3) float32 of mean 1 on the object; `lamps`: NONE, ONE or SEVERAL; `toward` (K, 3) and `shares` (K,) of their
-    light in the picture, adding up to 1; K = 0 for NONE; `shading` (N,): what white paint there would give back, in the photo's units."""
+    """A photo (SIZE, SIZE, 3) float32 of mean 1 on the object; `lamps`: NONE, ONE or SEVERAL;
+    `toward` (K, 3) and `shares` (K,) of their light in the picture, adding up to 1; K = 0 for NONE;
+    `shading` (N,): what white paint there would give back, in the photo's units.
+    """
 
     photo: np.ndarray
     lamps: int
@@ -77,7 +99,10 @@ class Lit:
 
 @dataclass(frozen=True)
 class Gloss:
-    """`alpha`: roughness, > 0; `front`: mirrored along the normal; `beckmann`: else GGX. None of it where `front` is 0."""
+    """`alpha`: roughness, > 0;
+
+    `front`: mirrored along the normal; `beckmann`: else GGX. None of it where `front` is 0.
+    """
 
     alpha: float
     front: float
@@ -85,12 +110,17 @@ class Gloss:
 
 
 def draw_photo(relit: Relit, rng: np.random.Generator, lamps: int) -> Lit:
-    """A photo under smooth light alone, or under one lamp or two to four besides, of which no second one goes unseen."""
+    """A photo under smooth light alone, or under one lamp or two to four besides, of which no
+    second one goes unseen.
+    """
     for _ in range(_TRIES):
         photo, toward, light, shading = _photo(relit, rng, lamps)
         total = float(np.minimum(photo, 3 * photo.mean()).mean())
         strongest = np.sort(light)[::-1]
-        if lamps == NONE or (strongest[0] > _FAINT * total and (lamps == ONE or (len(light) > 1 and strongest[1] > _SEEN * light.sum()))):
+        if lamps == NONE or (
+            strongest[0] > _FAINT * total
+            and (lamps == ONE or (len(light) > 1 and strongest[1] > _SEEN * light.sum()))
+        ):
             break
     picture = np.zeros((*relit.mask.shape, 3), np.float32)
     scale = max(float(photo.mean()), 1e-9)
@@ -98,19 +128,32 @@ def draw_photo(relit: Relit, rng: np.random.Generator, lamps: int) -> Lit:
     return Lit(picture, lamps, toward, light / max(float(light.sum()), 1e-9), shading / scale)
 
 
-def _photo(relit: Relit, rng: np.random.Generator, lamps: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The light (N, 3), the lamps' directions (K, 3) and their light in the picture (K,), and the shading (N,)."""
+def _photo(
+    relit: Relit, rng: np.random.Generator, lamps: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The light (N, 3), the lamps' directions (K, 3) and their light in the picture (K,), and the
+    shading (N,).
+    """
     normals, gloss = relit.normals.astype(np.float32), _gloss(rng)
     albedo = relit.albedos[int(rng.integers(len(relit.albedos)))].astype(np.float32)
     if rng.random() < 0.25:
         albedo = np.broadcast_to(rng.uniform(0.05, 0.8, 3).astype(np.float32), albedo.shape)
     facing = np.maximum(relit.toward @ normals.T, 0) * relit.reached
-    around, level = _around(rng), 1.0 if lamps == NONE else log_uniform(rng, 0.02, 0.5 if rng.random() < 0.3 else 0.25)
+    around, level = (
+        _around(rng),
+        1.0 if lamps == NONE else log_uniform(rng, 0.02, 0.5 if rng.random() < 0.3 else 0.25),
+    )
     arriving = (_SKY * around[_place_around(relit.toward)]) @ facing
     matt = albedo * arriving[:, None]
-    mirrored = _fresnel(gloss.front, normals[:, 2]) * around[relit.mirrored] if gloss.front else np.zeros_like(arriving)
+    mirrored = (
+        _fresnel(gloss.front, normals[:, 2]) * around[relit.mirrored]
+        if gloss.front
+        else np.zeros_like(arriving)
+    )
     photo = (matt + mirrored[:, None]) * level * _tint(rng, 0.08)
-    photo += rng.uniform(0, 0.07) * albedo.mean(0) * matt  # a little of what its own parts throw at each other
+    photo += (
+        rng.uniform(0, 0.07) * albedo.mean(0) * matt
+    )  # a little of what its own parts throw at each other
     shading = arriving * level
     if lamps == NONE:
         return photo, np.zeros((0, 3)), np.zeros(0), shading
@@ -120,23 +163,40 @@ def _photo(relit: Relit, rng: np.random.Generator, lamps: int) -> tuple[np.ndarr
     for k, place in enumerate(places):
         strength = rng.uniform(0.4, 1) if k else 1.0
         spread = _near(relit, place, wide) @ facing
-        one = _lamp_light(relit, normals, facing[place], spread, place, albedo, gloss, wide) * strength * _tint(rng, tint)
+        one = (
+            _lamp_light(relit, normals, facing[place], spread, place, albedo, gloss, wide)
+            * strength
+            * _tint(rng, tint)
+        )
         photo, shading = photo + one, shading + strength * spread
         light.append(float(np.minimum(one, 2).mean()))
     return photo, relit.toward[places], np.array(light), shading
 
 
 def _near(relit: Relit, place: int, wide: float) -> np.ndarray:
-    """How much of a lamp's light (LAMPS,) comes from each of the known directions; `wide`: half the angle that it is seen under."""
+    """How much of a lamp's light (LAMPS,) comes from each of the known directions;
+
+    `wide`: half the angle that it is seen under.
+    """
     near = np.exp(-(1 - relit.toward @ relit.toward[place]) / max(wide, 1e-3) ** 2)
     near = np.where(near > 0.05, near, 0)
     return np.asarray(near / near.sum(), np.float32)
 
 
 def _lamp_light(
-    relit: Relit, normals: np.ndarray, direct: np.ndarray, arriving: np.ndarray, place: int, albedo: np.ndarray, gloss: Gloss, wide: float
+    relit: Relit,
+    normals: np.ndarray,
+    direct: np.ndarray,
+    arriving: np.ndarray,
+    place: int,
+    albedo: np.ndarray,
+    gloss: Gloss,
+    wide: float,
 ) -> np.ndarray:
-    """The light (N, 3) of a lamp that gives white paint which faces it 1: `direct` (N,) as if it were small, `arriving` (N,) as it is."""
+    """The light (N, 3) of a lamp that gives white paint which faces it 1:
+
+    `direct` (N,) as if it were small, `arriving` (N,) as it is.
+    """
     toward = relit.toward[place]
     if not gloss.front:
         return np.asarray(albedo * arriving[:, None])
@@ -148,7 +208,14 @@ def _lamp_light(
         lobe = np.exp((1 - 1 / steep) / square) / (square * steep**2)
     else:
         lobe = square / (steep * (square - 1) + 1) ** 2
-    specular = fresnel * lobe * _masking(view, square) * _masking(np.maximum(direct, 0.02), square) / (4 * view) * (direct > 0)
+    specular = (
+        fresnel
+        * lobe
+        * _masking(view, square)
+        * _masking(np.maximum(direct, 0.02), square)
+        / (4 * view)
+        * (direct > 0)
+    )
     return np.asarray(albedo * (arriving * (1 - fresnel))[:, None] + specular[:, None])
 
 
@@ -175,10 +242,15 @@ def _around(rng: np.random.Generator) -> np.ndarray:
 
 
 def _place_around(towards: np.ndarray) -> np.ndarray:
-    """Where unit vectors (N, 3) are in `directions(_ROWS)`, as one row: (N,) int32, the nearest of a latitude and longitude."""
+    """Where unit vectors (N, 3) are in `directions(_ROWS)`, as one row:
+
+    (N,) int32, the nearest of a latitude and longitude.
+    """
     turn = np.float32(_ROWS / np.pi)
     rows = np.minimum((np.arccos(np.clip(towards[:, 1], -1, 1)) * turn).astype(np.int32), _ROWS - 1)
-    columns = np.floor(np.arctan2(towards[:, 0], -towards[:, 2]) * turn).astype(np.int32) % (2 * _ROWS)
+    columns = np.floor(np.arctan2(towards[:, 0], -towards[:, 2]) * turn).astype(np.int32) % (
+        2 * _ROWS
+    )
     return np.asarray(rows * 2 * _ROWS + columns, np.int32)
 
 
@@ -188,7 +260,9 @@ def _mirrored(normals: np.ndarray) -> np.ndarray:
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9), np.float32)
+    return np.asarray(
+        vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-9), np.float32
+    )
 
 
 def _tint(rng: np.random.Generator, strength: float) -> np.ndarray:
@@ -199,12 +273,21 @@ def _gloss(rng: np.random.Generator) -> Gloss:
     if rng.random() < 0.12:
         return Gloss(1, 0)
     alpha, ior = log_uniform(rng, 0.03, 0.2 if rng.random() < 0.5 else 0.45), rng.uniform(1.35, 1.8)
-    return Gloss(alpha, ((ior - 1) / (ior + 1)) ** 2 * (rng.uniform(1, 4) if rng.random() < 0.15 else 1), bool(rng.random() < 0.5))
+    return Gloss(
+        alpha,
+        ((ior - 1) / (ior + 1)) ** 2 * (rng.uniform(1, 4) if rng.random() < 0.15 else 1),
+        bool(rng.random() < 0.5),
+    )
 
 
 def _places(toward: np.ndarray, rng: np.random.Generator, count: int) -> list[int]:
-    """Lamps at least 30 or 40 degrees apart, the first of them not too far at the side; as many as there can be."""
-    apart, near = math.cos(math.radians(40 if rng.random() < 0.7 else 30)), np.flatnonzero(toward[:, 2] > math.cos(math.radians(75)))
+    """Lamps at least 30 or 40 degrees apart, the first of them not too far at the side; as many as
+    there can be.
+    """
+    apart, near = (
+        math.cos(math.radians(40 if rng.random() < 0.7 else 30)),
+        np.flatnonzero(toward[:, 2] > math.cos(math.radians(75))),
+    )
     likely = np.exp(_ABOVE * toward[near, 1])
     places = [int(rng.choice(near, p=likely / likely.sum()))]
     for lamp in rng.permutation(len(toward)):

@@ -1,10 +1,12 @@
-"""Does the answer depend on the photo's scale or on empty space around the object? And what does a larger photo cost?
+"""Does the answer depend on the photo's scale or on empty space around the object? And what does a
+larger photo cost?
 
   python -m benchmarks.scale [--photos DIR] [--cost]
 
-For each photo (enlarged, where its object is shorter than 512 pixels): normals at --max-size 192, 256 and 384 against those at 512,
-compared on the smaller grid, and the ratio of relative heights; normals with 16 and 64 pixels of padding against none. `--cost`: time and
-peak memory of the solve at full scale from 0.1 to 4 megapixels of valid pixels.
+For each photo (enlarged, where its object is shorter than 512 pixels): normals at --max-size 192,
+256 and 384 against those at 512, compared on the smaller grid, and the ratio of relative heights;
+normals with 16 and 64 pixels of padding against none. `--cost`: time and peak memory of the solve
+at full scale from 0.1 to 4 megapixels of valid pixels.
 """
 
 import argparse
@@ -42,17 +44,26 @@ def magnified(photo: Photo, least: int) -> Photo:
     factor = least / long + 1e-9
     image, _ = resample_inside(photo.image, np.ones_like(photo.mask), factor)
     mask = resample_inside(photo.mask.astype(float), np.ones_like(photo.mask), factor)[0] >= 0.5
-    return replace(photo, image=image.astype(np.float32), mask=mask, clipped=np.zeros_like(mask), scale=1.0)
+    return replace(
+        photo, image=image.astype(np.float32), mask=mask, clipped=np.zeros_like(mask), scale=1.0
+    )
 
 
 def padded(photo: Photo, by: int) -> Photo:
     """The photo with black space around it."""
     sides = [(by, by), (by, by)]
-    return replace(photo, image=np.pad(photo.image, [*sides, (0, 0)]), mask=np.pad(photo.mask, sides), clipped=np.pad(photo.clipped, sides))
+    return replace(
+        photo,
+        image=np.pad(photo.image, [*sides, (0, 0)]),
+        mask=np.pad(photo.mask, sides),
+        clipped=np.pad(photo.clipped, sides),
+    )
 
 
 def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
-    """For each size: median normal change against 512 on the smaller grid, and the ratio of height ranges for their sizes."""
+    """For each size: median normal change against 512 on the smaller grid, and the ratio of height
+    ranges for their sizes.
+    """
     results = {size: decompose(photo, Settings(max_size=size)) for size in SIZES}
     largest = results[SIZES[-1]]
     figures = []
@@ -64,8 +75,16 @@ def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
         normal, share = normal[:rows, :columns], share[:rows, :columns]
         normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
         both = small.mask[:rows, :columns] & (share > 0.99)
-        spread = [float(np.std(d.height[d.mask])) / max(mask_box(d.mask)[2:]) for d in (small, largest)]
-        figures.append((size, angle(normal, small.normal[:rows, :columns].astype(float), both), spread[0] / spread[1]))
+        spread = [
+            float(np.std(d.height[d.mask])) / max(mask_box(d.mask)[2:]) for d in (small, largest)
+        ]
+        figures.append(
+            (
+                size,
+                angle(normal, small.normal[:rows, :columns].astype(float), both),
+                spread[0] / spread[1],
+            )
+        )
     return figures
 
 
@@ -80,17 +99,34 @@ def padding_figures(photo: Photo) -> list[tuple[int, float]]:
 
 
 def cost_of(megapixels: float) -> None:
-    """One solve of a synthetic ball at full scale, in a process of its own; prints seconds and peak memory."""
+    """One solve of a synthetic ball at full scale, in a process of its own; prints seconds and peak
+    memory.
+    """
     radius = int(np.sqrt(megapixels * 1e6 / np.pi))
     i, j = np.mgrid[-radius - 2 : radius + 3, -radius - 2 : radius + 3] / radius
     mask = i**2 + j**2 < 1
     n3 = np.sqrt(np.maximum(1 - i**2 - j**2, 0))
     paint = np.where(((5 * i).astype(int) + (5 * j).astype(int)) % 2 == 0, 0.6, 0.3)
-    image = np.stack([paint * c * (0.2 + 0.8 * np.maximum(0.3 * -i - 0.4 * j + 0.85 * n3, 0)) for c in (1, 0.8, 0.6)], -1)
+    image = np.stack(
+        [
+            paint * c * (0.2 + 0.8 * np.maximum(0.3 * -i - 0.4 * j + 0.85 * n3, 0))
+            for c in (1, 0.8, 0.6)
+        ],
+        -1,
+    )
     priors = shipped_prior_set().priors("natural", 3)
-    options = RecoverOptions(solve_size=0, solver=SolverOptions(lbfgs=LbfgsOptions(iterations=30, loss_tolerance=0)))
+    options = RecoverOptions(
+        solve_size=0, solver=SolverOptions(lbfgs=LbfgsOptions(iterations=30, loss_tolerance=0))
+    )
     small = mask[:: max(1, radius // 60), :: max(1, radius // 60)]
-    recover(image[:: max(1, radius // 60), :: max(1, radius // 60)], small, 1e-5, priors, isc_weights("natural", 3), options)  # compiles
+    recover(
+        image[:: max(1, radius // 60), :: max(1, radius // 60)],
+        small,
+        1e-5,
+        priors,
+        isc_weights("natural", 3),
+        options,
+    )  # compiles
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     start = time.perf_counter()
     result = recover(image, mask, 1e-5, priors, isc_weights("natural", 3), options)
@@ -107,7 +143,9 @@ def cost_of(megapixels: float) -> None:
 
 def main() -> None:
     """Prints the figures."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     options.add_argument("--photos", type=Path, default=Path("../shared/data/photos"))
     options.add_argument("--cost", action="store_true")
     options.add_argument("--one", type=float, help=argparse.SUPPRESS)
@@ -117,11 +155,15 @@ def main() -> None:
         return
     if given.cost:
         for megapixels in (0.1, 0.25, 1.0, 4.0):
-            subprocess.run([sys.executable, "-m", "benchmarks.scale", "--one", str(megapixels)], check=True)
+            subprocess.run(
+                [sys.executable, "-m", "benchmarks.scale", "--one", str(megapixels)], check=True
+            )
         return
     for path in sorted(given.photos.glob("*.png")):
         photo = read_photo(path)
-        sizes = "  ".join(f"{s}: {a:.2f} deg, height x{r:.3f}" for s, a, r in scale_figures(magnified(photo, 512)))
+        sizes = "  ".join(
+            f"{s}: {a:.2f} deg, height x{r:.3f}" for s, a, r in scale_figures(magnified(photo, 512))
+        )
         pads = "  ".join(f"+{by}: {a:.2f} deg" for by, a in padding_figures(photo))
         print(f"{path.stem:12s} {sizes}   padding {pads}", flush=True)
 

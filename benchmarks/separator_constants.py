@@ -1,18 +1,21 @@
-"""How good is `--method isc` on photos without a say in its constants? These are chosen on all photos but one object's, which is measured.
+"""How good is `--method isc` on photos without a say in its constants? These are chosen on all
+photos but one object's, which is measured.
 
   python -m benchmarks.separator_constants --data ../shared/data -o constants.csv [--candidates 60]
 
-Candidates are the shipped constants and random changes of them (seeded): each number of a few chosen at random is scaled, ramps are moved
-and stretched. Each candidate is measured once on every photo whose layers are known and on every diffuse image. Then, for each object, the
-best candidate by all other objects' figures is the one whose figures count for it. The score that chooses is
+Candidates are the shipped constants and random changes of them (seeded): each number of a few
+chosen at random is scaled, ramps are moved and stretched. Each candidate is measured once on every
+photo whose layers are known and on every diffuse image. Then, for each object, the best candidate
+by all other objects' figures is the one whose figures count for it. The score that chooses is
 
     sum log max(ratio, .05) + 20 sum max(0, ratio - 1.0005) + 1.5 sum min(max(0, change - .5), 3),
 
-ratio being the squared error over that of doing nothing, and change the per cent of a diffuse image that is taken for highlight. A file
-keeps what was measured, so that a run can be stopped and taken up again.
+ratio being the squared error over that of doing nothing, and change the per cent of a diffuse image
+that is taken for highlight. A file keeps what was measured, so that a run can be stopped and taken
+up again.
 
-Limits: the shipped constants were found on these photos, so candidates lie around them: this measures how much the last choice overfits,
-not the design, which saw all of them.
+Limits: the shipped constants were found on these photos, so candidates lie around them: this
+measures how much the last choice overfits, not the design, which saw all of them.
 """
 
 import argparse
@@ -44,7 +47,11 @@ def candidates(count: int) -> list[IscOptions]:
 
 
 def _changed(options: IscOptions, random: np.random.Generator) -> IscOptions:
-    names = random.choice([field.name for field in fields(options) if field.type is not bool], size=_CHANGED, replace=False)
+    names = random.choice(
+        [field.name for field in fields(options) if field.type is not bool],
+        size=_CHANGED,
+        replace=False,
+    )
     changes: dict[str, Any] = {name: _moved(getattr(options, name), random) for name in names}
     return replace(options, **changes)
 
@@ -55,7 +62,11 @@ def _moved(value: Any, random: np.random.Generator) -> Any:
         middle = (value[0] + value[1]) / 2 * random.uniform(0.85, 1.15)
         return (middle - width / 2, middle + width / 2)
     scaled = value * float(np.exp(random.uniform(-0.5, 0.5)))
-    return max(6, round(scaled)) if isinstance(value, int) else min(scaled, 0.9 if scaled < 2 else scaled)
+    return (
+        max(6, round(scaled))
+        if isinstance(value, int)
+        else min(scaled, 0.9 if scaled < 2 else scaled)
+    )
 
 
 @cache
@@ -67,13 +78,16 @@ def _photos(data: Path) -> tuple[tuple[str, SeparationTruth], ...]:
 def _cut(truth: SeparationTruth) -> SeparationTruth:
     box = mask_slices(truth.mask)
     layers: dict[str, Any] = {
-        name: np.ascontiguousarray(getattr(truth, name)[box]) for name in ("image", "mask", "diffuse", "specular", "clipped")
+        name: np.ascontiguousarray(getattr(truth, name)[box])
+        for name in ("image", "mask", "diffuse", "specular", "clipped")
     }
     return replace(truth, **layers)
 
 
 def measure(data: Path, options: IscOptions) -> list[tuple[str, str, float]]:
-    """(group, name, value) of every photo: the error ratio, or the change in per cent for images without highlight."""
+    """(group, name, value) of every photo: the error ratio, or the change in per cent for images
+    without highlight.
+    """
     return [(group, truth.name, _value(truth, options)) for group, truth in _photos(data)]
 
 
@@ -82,7 +96,13 @@ def _value(truth: SeparationTruth, options: IscOptions) -> float:
     answer = separate(image, mask, options, clipped=truth.clipped).diffuse
     highlight = np.square((image - diffuse)[mask]).sum(dtype=float)
     if highlight == 0:
-        return float(100 * np.sqrt(np.square((answer - image)[mask]).sum(dtype=float) / np.square(image[mask]).sum(dtype=float)))
+        return float(
+            100
+            * np.sqrt(
+                np.square((answer - image)[mask]).sum(dtype=float)
+                / np.square(image[mask]).sum(dtype=float)
+            )
+        )
     return float(np.square((answer - diffuse)[mask]).sum(dtype=float) / highlight)
 
 
@@ -90,14 +110,23 @@ def score(figures: dict[tuple[str, str], float]) -> float:
     """What a candidate is chosen by; less is better."""
     clean = [value for (group, _), value in figures.items() if "clean" in group]
     ratios = np.array([value for (group, _), value in figures.items() if "clean" not in group])
-    harm = 20 * np.maximum(ratios - 1.0005, 0).sum() + 1.5 * np.clip(np.array(clean) - 0.5, 0, 3).sum()
+    harm = (
+        20 * np.maximum(ratios - 1.0005, 0).sum() + 1.5 * np.clip(np.array(clean) - 0.5, 0, 3).sum()
+    )
     return float(np.log(np.maximum(ratios, 0.05)).sum() + harm)
 
 
-def left_out(table: dict[int, dict[tuple[str, str], float]]) -> Iterator[tuple[str, str, float, float, int]]:
-    """Of each photo its group, name, figure with the shipped constants, figure with those chosen without its object, and their number."""
+def left_out(
+    table: dict[int, dict[tuple[str, str], float]],
+) -> Iterator[tuple[str, str, float, float, int]]:
+    """Of each photo its group, name, figure with the shipped constants, figure with those chosen
+    without its object, and their number.
+    """
     for thing in sorted({_object(name) for _, name in table[0]}):
-        others = {c: score({key: value for key, value in row.items() if _object(key[1]) != thing}) for c, row in table.items()}
+        others = {
+            c: score({key: value for key, value in row.items() if _object(key[1]) != thing})
+            for c, row in table.items()
+        }
         best = min(others, key=lambda c: others[c])
         for group, photo in table[0]:
             if _object(photo) == thing:
@@ -114,25 +143,38 @@ def _read(path: Path) -> dict[int, dict[tuple[str, str], float]]:
     if path.is_file():
         with path.open(newline="", encoding="utf-8") as file:
             for row in csv.DictReader(file):
-                table.setdefault(int(row["candidate"]), {})[row["group"], row["name"]] = float(row["value"])
+                table.setdefault(int(row["candidate"]), {})[row["group"], row["name"]] = float(
+                    row["value"]
+                )
     return table
 
 
 def main() -> None:
     """Measures what is missing, then prints the table."""
-    given = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    given.add_argument("--data", type=Path, required=True, help="folder with highlight/ and mit_berkeley_train/")
-    given.add_argument("-o", "--output", type=Path, required=True, help="the file of figures, kept between runs")
+    given = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    given.add_argument(
+        "--data", type=Path, required=True, help="folder with highlight/ and mit_berkeley_train/"
+    )
+    given.add_argument(
+        "-o", "--output", type=Path, required=True, help="the file of figures, kept between runs"
+    )
     given.add_argument("--candidates", type=int, default=60)
     given.add_argument("--processes", type=int, default=2)
     options = given.parse_args()
     table, wanted = _read(options.output), candidates(options.candidates)
     missing = [number for number in range(len(wanted)) if number not in table]
-    with ProcessPoolExecutor(options.processes) as pool, options.output.open("a", newline="", encoding="utf-8") as file:
+    with (
+        ProcessPoolExecutor(options.processes) as pool,
+        options.output.open("a", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.writer(file)
         if not table:
             writer.writerow(_COLUMNS)
-        found = pool.map(measure, [options.data] * len(missing), [wanted[number] for number in missing])
+        found = pool.map(
+            measure, [options.data] * len(missing), [wanted[number] for number in missing]
+        )
         for number, rows in zip(missing, found, strict=True):
             writer.writerows((number, *row) for row in rows)
             file.flush()

@@ -11,26 +11,47 @@ from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.settings import published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .berkeley import LIGHTS, parser, problem, reference_results, scores, training_object, write_json
+from .berkeley import (
+    LIGHTS,
+    parser,
+    problem,
+    reference_results,
+    scores,
+    training_object,
+    write_json,
+)
 from .reference_priors import reference_priors
 
 
 def main() -> None:
     """Runs the ten training objects under both lights and prints a table."""
     options = parser(__doc__)
-    options.add_argument("--float64", action="store_true", help="double precision instead of the production setting")
+    options.add_argument(
+        "--float64", action="store_true", help="double precision instead of the production setting"
+    )
     options.add_argument("--engine", default="auto")
     options.add_argument("--threads", type=int, default=0)
     options.add_argument("--objects", help="comma-separated; all training objects without it")
     given = options.parse_args()
-    solver = SolverOptions(engine=given.engine, single=not given.float64, threads=given.threads, lbfgs=LbfgsOptions())
+    solver = SolverOptions(
+        engine=given.engine, single=not given.float64, threads=given.threads, lbfgs=LbfgsOptions()
+    )
     figures: dict[str, object] = {}
     for light in LIGHTS:
         priors = reference_priors(given.shared / "anchors" / "sirfs_reference_priors.npz", light)
         theirs = reference_results(given.shared, light)
-        names = given.objects.split(",") if given.objects else list_objects(given.shared / "data" / "mit_berkeley_train", light)
+        names = (
+            given.objects.split(",")
+            if given.objects
+            else list_objects(given.shared / "data" / "mit_berkeley_train", light)
+        )
         averages, seconds, reference = [], [], []
-        solve(problem(training_object(given.shared, names[0], light), priors, published_weights(light, 3)), solver)  # compiles
+        solve(
+            problem(
+                training_object(given.shared, names[0], light), priors, published_weights(light, 3)
+            ),
+            solver,
+        )  # compiles
         for name in names:
             truth = training_object(given.shared, name, light)
             start = time.perf_counter()
@@ -49,8 +70,12 @@ def main() -> None:
                 flush=True,
             )
             figures[f"{light}/{name}"] = {
-                "loss": result.terms.total, "ratio": ratio, "avg": average, "evaluations": result.evaluations, "seconds": took,
-            }  # fmt: skip
+                "loss": result.terms.total,
+                "ratio": ratio,
+                "avg": average,
+                "evaluations": result.evaluations,
+                "seconds": took,
+            }
         print(
             f"{light:10s} geometric means: avg {geometric_mean(averages):.5f} ({geometric_mean(reference):.5f}), "
             f"time {geometric_mean(seconds):.2f} s"

@@ -1,14 +1,17 @@
 """Every separation method in every variant on every photo whose layers are known.
 
-  python -m benchmarks.specular_removal --data ../shared/data -o DIR                      tables and sheets
-  python -m benchmarks.specular_removal --data ../shared/data -o DIR --photos             every photo through `isc separate`, and sheets
-  python -m benchmarks.specular_removal --data ../shared/data -o DIR --speed              warm seconds and memory of one megapixel
-  python -m benchmarks.specular_removal --data ../shared/data -o DIR --rendered SCENES    also the rendered scenes in that folder
+  python -m benchmarks.specular_removal --data ../shared/data -o DIR                      tables and
+  sheets python -m benchmarks.specular_removal --data ../shared/data -o DIR --photos
+  every photo through `isc separate`, and sheets python -m benchmarks.specular_removal --data
+  ../shared/data -o DIR --speed              warm seconds and memory of one megapixel python -m
+  benchmarks.specular_removal --data ../shared/data -o DIR --rendered SCENES    also the rendered
+  scenes in that folder
 
-Photos: Shen & Zheng's (values as stored, whole frame), the laboratory objects of MIT-Berkeley (linear, inside the mask), rendered scenes;
-and for what must be left alone the diffuse images of MIT-Berkeley, in which no highlight is. `none`, diffuse = input, is always a row.
-Writes rows.csv, tables.md, sheets/*.png. A row is kept until its method's source changes, so that a run can be stopped and taken up again;
---fresh measures all anew.
+Photos: Shen & Zheng's (values as stored, whole frame), the laboratory objects of MIT-Berkeley
+(linear, inside the mask), rendered scenes; and for what must be left alone the diffuse images of
+MIT-Berkeley, in which no highlight is. `none`, diffuse = input, is always a row. Writes rows.csv,
+tables.md, sheets/*.png. A row is kept until its method's source changes, so that a run can be
+stopped and taken up again; --fresh measures all anew.
 """
 
 import argparse
@@ -24,7 +27,13 @@ from isc_core.datasets import list_objects
 from isc_core.decomposition import Separation
 from isc_core.errors import InputError
 from isc_core.exr import read_channels
-from isc_core.highlight_set import SeparationTruth, list_shen_zheng, load_laboratory, load_rendered, load_shen_zheng
+from isc_core.highlight_set import (
+    SeparationTruth,
+    list_shen_zheng,
+    load_laboratory,
+    load_rendered,
+    load_shen_zheng,
+)
 from isc_core.photo import read_linear, read_photo, srgb_to_linear
 from isc_core.report import Answer, comparison_sheet
 from isc_core.separation import IMPROVED, METHODS, variants
@@ -52,27 +61,45 @@ def cases(data: Path, rendered: Path | None) -> Iterator[Case]:
         yield Case("shen_zheng", name, lambda name=name: load_shen_zheng(highlight, name))  # type: ignore[misc]
     for name in list_objects(objects, "laboratory"):
         yield Case("laboratory", name, lambda name=name: load_laboratory(objects, name))  # type: ignore[misc]
-    for folder in sorted(path for path in rendered.iterdir() if path.is_dir()) if rendered is not None else ():
+    for folder in (
+        sorted(path for path in rendered.iterdir() if path.is_dir()) if rendered is not None else ()
+    ):
         yield Case("rendered", folder.name, lambda folder=folder: load_rendered(folder))  # type: ignore[misc]
     for light in ("laboratory", "natural"):
         for name in list_objects(objects, light):
-            yield Case("clean", f"{light} {name}", lambda light=light, name=name: _without_highlights(objects, light, name))  # type: ignore[misc]
+            yield Case(
+                "clean",
+                f"{light} {name}",
+                lambda light=light, name=name: _without_highlights(objects, light, name),
+            )  # type: ignore[misc]
 
 
 def _without_highlights(objects: Path, light: str, name: str) -> SeparationTruth:
     folder = objects / light / name
-    image, mask = read_linear(folder / "diffuse.png", "linear"), read_linear(folder / "mask.png", "linear")[..., 0] > 0
-    return SeparationTruth(f"{light} {name}", image, mask, image, np.zeros_like(image), np.zeros_like(mask))
+    image, mask = (
+        read_linear(folder / "diffuse.png", "linear"),
+        read_linear(folder / "mask.png", "linear")[..., 0] > 0,
+    )
+    return SeparationTruth(
+        f"{light} {name}", image, mask, image, np.zeros_like(image), np.zeros_like(mask)
+    )
 
 
 def measure_all(given: argparse.Namespace) -> list[Row]:
-    """Measures what is not in the table yet, writing the table after each row; a sheet for each photo with something new."""
+    """Measures what is not in the table yet, writing the table after each row; a sheet for each
+    photo with something new.
+    """
     table = given.output / "rows.csv"
     rows = {} if given.fresh else read_rows(table)
     for case in cases(given.data, given.rendered):
         if given.images and case.name not in given.images:
             continue
-        wanted = [(method, variant) for method in given.methods for variant in variants(method) if variant in given.variants]
+        wanted = [
+            (method, variant)
+            for method in given.methods
+            for variant in variants(method)
+            if variant in given.variants
+        ]
         new = [pair for pair in wanted if _stale(rows.get((case.group, case.name, *pair)), pair[0])]
         if not new:
             continue
@@ -94,29 +121,57 @@ def _stale(row: Row | None, method: str) -> bool:
 
 
 def _line(row: Row) -> str:
-    figures = [f"{name} {value:.4g}" for name in ("psnr", "mse_ratio", "change", "seconds") if (value := getattr(row, name)) is not None]
-    return f"{row.group:10s} {row.image:20s} {row.method:20s} {row.variant:8s} " + ("  ".join(figures) or f"refused: {row.refused}")
+    figures = [
+        f"{name} {value:.4g}"
+        for name in ("psnr", "mse_ratio", "change", "seconds")
+        if (value := getattr(row, name)) is not None
+    ]
+    return f"{row.group:10s} {row.image:20s} {row.method:20s} {row.variant:8s} " + (
+        "  ".join(figures) or f"refused: {row.refused}"
+    )
 
 
 def _keep(output: Path, case: Case, method: str, split: Separation) -> None:
     folder = output / "layers" / case.group / case.name
     folder.mkdir(parents=True, exist_ok=True)
-    layers = {name: getattr(split, name).astype(np.float16) for name in ("diffuse", "specular", "confidence")}
+    layers = {
+        name: getattr(split, name).astype(np.float16)
+        for name in ("diffuse", "specular", "confidence")
+    }
     np.savez_compressed(folder / f"{method}.npz", **layers)
 
 
-def _sheet(output: Path, case: Case, truth: SeparationTruth, rows: dict[tuple[str, str, str, str], Row]) -> None:
+def _sheet(
+    output: Path, case: Case, truth: SeparationTruth, rows: dict[tuple[str, str, str, str], Row]
+) -> None:
     decode = srgb_to_linear if truth.coded else np.asarray
     answers = []
     for method in METHODS:
-        path, row = output / "layers" / case.group / case.name / f"{method}.npz", rows.get((case.group, case.name, method, IMPROVED))
-        if path.is_file() and row is not None and row.psnr is not None and row.mse_ratio is not None:
+        path, row = (
+            output / "layers" / case.group / case.name / f"{method}.npz",
+            rows.get((case.group, case.name, method, IMPROVED)),
+        )
+        if (
+            path.is_file()
+            and row is not None
+            and row.psnr is not None
+            and row.mse_ratio is not None
+        ):
             with np.load(path) as layers:
-                diffuse, specular, confidence = (layers[name].astype(np.float32) for name in ("diffuse", "specular", "confidence"))
-            split = Separation(decode(diffuse), decode(specular), np.zeros_like(diffuse), confidence)
+                diffuse, specular, confidence = (
+                    layers[name].astype(np.float32)
+                    for name in ("diffuse", "specular", "confidence")
+                )
+            split = Separation(
+                decode(diffuse), decode(specular), np.zeros_like(diffuse), confidence
+            )
             answers.append(Answer(method, f"{row.psnr:.1f} dB, MSE x {row.mse_ratio:.2g}", split))
     sheet = comparison_sheet(
-        f"{case.group}: {case.name}", decode(truth.image), truth.mask, answers, (decode(truth.diffuse), decode(truth.specular))
+        f"{case.group}: {case.name}",
+        decode(truth.image),
+        truth.mask,
+        answers,
+        (decode(truth.diffuse), decode(truth.specular)),
     )
     _save(output / "sheets" / f"{case.group}-{case.name}.png", sheet)
 
@@ -127,23 +182,48 @@ def _save(path: Path, sheet: object) -> None:
 
 
 def photos(given: argparse.Namespace) -> str:
-    """Every file of highlight/ and photos/ through `isc separate` with every method; a sheet for each; the table of what ended how."""
-    lines = ["| photo | " + " | ".join(given.methods) + " |", "|---" * (len(given.methods) + 1) + "|"]
-    for path in sorted(p for folder in ("highlight", "photos") for p in (given.data / folder).iterdir() if p.suffix in _PHOTO_SUFFIXES):
+    """Every file of highlight/ and photos/ through `isc separate` with every method; a sheet for
+    each; the table of what ended how.
+    """
+    lines = [
+        "| photo | " + " | ".join(given.methods) + " |",
+        "|---" * (len(given.methods) + 1) + "|",
+    ]
+    for path in sorted(
+        p
+        for folder in ("highlight", "photos")
+        for p in (given.data / folder).iterdir()
+        if p.suffix in _PHOTO_SUFFIXES
+    ):
         if path.stem.endswith("_gt") or (given.images and path.stem not in given.images):
             continue
         transfer = "linear" if path.parent.name == "highlight" else "auto"
         answers, ends = [], []
         for method in given.methods:
             folder = given.output / "photos" / f"{path.stem}-{method}"
-            code = isc(["separate", str(path), "--transfer", transfer, "--method", method, "--quiet", "-o", str(folder)])
+            code = isc(
+                [
+                    "separate",
+                    str(path),
+                    "--transfer",
+                    transfer,
+                    "--method",
+                    method,
+                    "--quiet",
+                    "-o",
+                    str(folder),
+                ]
+            )
             ends.append({0: "done", 2: "refused"}.get(code, f"ended with {code}"))
             if code == 0:
                 answers.append(_answer(folder, method, coded=transfer == "linear"))
                 shutil.rmtree(folder)
         photo = read_photo(path, None, transfer, whole_frame=True)
         shown = srgb_to_linear(photo.image) if transfer == "linear" else photo.image
-        _save(given.output / "sheets" / f"photo-{path.stem}.png", comparison_sheet(path.name, shown, photo.mask, answers))
+        _save(
+            given.output / "sheets" / f"photo-{path.stem}.png",
+            comparison_sheet(path.name, shown, photo.mask, answers),
+        )
         lines.append(f"| {path.stem} | " + " | ".join(ends) + " |")
         print(lines[-1], flush=True)
     return "\n".join(lines) + "\n"
@@ -151,25 +231,56 @@ def photos(given: argparse.Namespace) -> str:
 
 def _answer(folder: Path, method: str, coded: bool) -> Answer:
     channels = read_channels(folder / "separation.exr")
-    diffuse, specular = (np.stack([channels[f"{layer}.{c}"] for c in "RGB"], -1) for layer in ("diffuse", "specular"))
+    diffuse, specular = (
+        np.stack([channels[f"{layer}.{c}"] for c in "RGB"], -1) for layer in ("diffuse", "specular")
+    )
     if coded:
         diffuse, specular = srgb_to_linear(diffuse), srgb_to_linear(specular)
-    return Answer(method, "", Separation(diffuse, specular, np.zeros_like(diffuse), channels["confidence.Y"]))
+    return Answer(
+        method, "", Separation(diffuse, specular, np.zeros_like(diffuse), channels["confidence.Y"])
+    )
 
 
 def parser() -> argparse.ArgumentParser:
     """The command's options."""
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument(
-        "--data", type=Path, default=Path("../shared/data"), help="folder with highlight/, photos/ and mit_berkeley_train/"
+    options = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument("-o", "--output", type=Path, required=True, help="folder for rows.csv, tables.md and sheets/")
+    options.add_argument(
+        "--data",
+        type=Path,
+        default=Path("../shared/data"),
+        help="folder with highlight/, photos/ and mit_berkeley_train/",
+    )
+    options.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        help="folder for rows.csv, tables.md and sheets/",
+    )
     options.add_argument("--rendered", type=Path, help="folder of rendered scenes, one a folder")
-    options.add_argument("--methods", type=lambda text: text.split(","), default=list(METHODS), help="names with commas between them")
-    options.add_argument("--variants", type=lambda text: text.split(","), default=["improved", "paper", "sihr"])
-    options.add_argument("--images", type=lambda text: text.split(","), default=[], help="names with commas between them; all without it")
+    options.add_argument(
+        "--methods",
+        type=lambda text: text.split(","),
+        default=list(METHODS),
+        help="names with commas between them",
+    )
+    options.add_argument(
+        "--variants", type=lambda text: text.split(","), default=["improved", "paper", "sihr"]
+    )
+    options.add_argument(
+        "--images",
+        type=lambda text: text.split(","),
+        default=[],
+        help="names with commas between them; all without it",
+    )
     options.add_argument("--fresh", action="store_true", help="measure all rows anew")
-    options.add_argument("--photos", action="store_true", help="run the command on all photos, with and without truth")
+    options.add_argument(
+        "--photos",
+        action="store_true",
+        help="run the command on all photos, with and without truth",
+    )
     options.add_argument("--speed", action="store_true", help="time one megapixel")
     return options
 

@@ -1,4 +1,6 @@
-"""What the benchmark of separations measures on one photo, and the table of rows that it keeps on disk."""
+"""What the benchmark of separations measures on one photo, and the table of rows that it keeps on
+disk.
+"""
 
 import csv
 import hashlib
@@ -14,7 +16,13 @@ from isc_core import separation
 from isc_core.decomposition import Separation
 from isc_core.errors import InputError
 from isc_core.highlight_set import SeparationTruth
-from isc_core.image_metrics import highlight_region, rank_correlation, sparsification, ssim, ssim_volume
+from isc_core.image_metrics import (
+    highlight_region,
+    rank_correlation,
+    sparsification,
+    ssim,
+    ssim_volume,
+)
 from isc_core.metrics import lmse, mse, psnr
 
 # Methods that read another method's file too.
@@ -25,13 +33,15 @@ _BUILT_ON = {"isc": ("sparse_coding",)}
 class Row:
     """One method in one variant on one photo; None: not measured, or not defined.
 
-    `group`: "shen_zheng", "laboratory", "rendered", or "clean" for photos without any highlight. `code`: of the method's source, so that
-    a row is measured anew once the method changes. `psnr`: dB, inside the mask, of values of range 1; `ssim` by channel, `ssim_volume` as
-    MATLAB. `mse_ratio`: the diffuse layer's mean square error over that of the untouched photo, inside the mask; `mse_inside`,
-    `mse_outside` the highlights; `specular_ratio`: the specular layer's over that of none. `lmse_*`: Grosse's local error. `removed`: share
-    of the squared error that leaves with the least confident fifth; `area` under the sparsification curve; `rank`: correlation of
-    confidence and squared error. `change`: RMS of what was removed over the photo's RMS. `seconds`: of this run; `megapixels` inside the
-    mask; `refused`: why there is no answer.
+    `group`: "shen_zheng", "laboratory", "rendered", or "clean" for photos without any highlight.
+    `code`: of the method's source, so that a row is measured anew once the method changes. `psnr`:
+    dB, inside the mask, of values of range 1; `ssim` by channel, `ssim_volume` as MATLAB.
+    `mse_ratio`: the diffuse layer's mean square error over that of the untouched photo, inside the
+    mask; `mse_inside`, `mse_outside` the highlights; `specular_ratio`: the specular layer's over
+    that of none. `lmse_*`: Grosse's local error. `removed`: share of the squared error that leaves
+    with the least confident fifth; `area` under the sparsification curve; `rank`: correlation of
+    confidence and squared error. `change`: RMS of what was removed over the photo's RMS. `seconds`:
+    of this run; `megapixels` inside the mask; `refused`: why there is no answer.
     """
 
     group: str
@@ -62,9 +72,18 @@ class Row:
         return self.group, self.image, self.method, self.variant
 
 
-def measure(group: str, truth: SeparationTruth, method: str, variant: str) -> tuple[Row, Separation | None]:
+def measure(
+    group: str, truth: SeparationTruth, method: str, variant: str
+) -> tuple[Row, Separation | None]:
     """Separates and scores; None where the method refuses the photo."""
-    row = Row(group, truth.name, method, variant, source_code(method), megapixels=float(truth.mask.sum()) / 1e6)
+    row = Row(
+        group,
+        truth.name,
+        method,
+        variant,
+        source_code(method),
+        megapixels=float(truth.mask.sum()) / 1e6,
+    )
     start = time.perf_counter()
     try:
         split = separation.separate(method, truth.image, truth.mask, truth.clipped, variant=variant)
@@ -76,7 +95,9 @@ def measure(group: str, truth: SeparationTruth, method: str, variant: str) -> tu
 
 
 def source_code(method: str) -> str:
-    """Eight digits that change with the method's source file, and with any that is not a method's own."""
+    """Eight digits that change with the method's source file, and with any that is not a method's
+    own.
+    """
     folder = Path(separation.__file__).parent
     others = set(separation.METHODS) - {method, *_BUILT_ON.get(method, ())}
     files = [path for path in sorted(folder.glob("*.py")) if path.stem not in others]
@@ -85,14 +106,19 @@ def source_code(method: str) -> str:
 
 
 def read_rows(path: Path) -> dict[tuple[str, str, str, str], Row]:
-    """The rows that an earlier run wrote; none where there is no such file or its columns have changed."""
+    """The rows that an earlier run wrote; none where there is no such file or its columns have
+    changed.
+    """
     if not path.is_file():
         return {}
     with path.open(newline="", encoding="utf-8") as file:
         table = csv.DictReader(file)
         if table.fieldnames != [field.name for field in fields(Row)]:
             return {}
-        rows = [Row(**{field.name: _cell(line[field.name], field.type) for field in fields(Row)}) for line in table]
+        rows = [
+            Row(**{field.name: _cell(line[field.name], field.type) for field in fields(Row)})
+            for line in table
+        ]
     return {row.key: row for row in rows}
 
 
@@ -116,7 +142,10 @@ def _text(value: object) -> object:
 
 def _against_truth(truth: SeparationTruth, split: Separation) -> dict[str, Any]:
     mask, inside = truth.mask, truth.mask[..., None]
-    image, diffuse, specular = (np.where(inside, layer, 0).astype(np.float64) for layer in (truth.image, truth.diffuse, truth.specular))
+    image, diffuse, specular = (
+        np.where(inside, layer, 0).astype(np.float64)
+        for layer in (truth.image, truth.diffuse, truth.specular)
+    )
     answer = np.where(inside, split.diffuse, 0).astype(np.float64)
     highlights = highlight_region(specular, mask)
     error = ((answer - diffuse)[mask] ** 2).mean(axis=1)
@@ -131,14 +160,18 @@ def _against_truth(truth: SeparationTruth, split: Separation) -> dict[str, Any]:
         "mse_outside": _ratio(diffuse, answer, image, mask & ~highlights),
         "specular_ratio": _ratio(specular, found, np.zeros_like(found), mask),
         "lmse_diffuse": lmse(diffuse, answer, mask),
-        "lmse_specular": lmse(specular, found, mask) if (specular[mask] > 0).any(axis=0).all() else None,
+        "lmse_specular": lmse(specular, found, mask)
+        if (specular[mask] > 0).any(axis=0).all()
+        else None,
         "removed": curve.removed(0.2),
         "area": curve.area,
         "rank": rank_correlation(split.confidence[mask], error),
     }
 
 
-def _ratio(diffuse: np.ndarray, answer: np.ndarray, image: np.ndarray, region: np.ndarray) -> float | None:
+def _ratio(
+    diffuse: np.ndarray, answer: np.ndarray, image: np.ndarray, region: np.ndarray
+) -> float | None:
     if not region.any() or (nothing := mse(diffuse, image, region)) == 0:
         return None
     return mse(diffuse, answer, region) / nothing

@@ -1,4 +1,6 @@
-"""Warm seconds and peak memory of every separation method on one megapixel, each in a process of its own."""
+"""Warm seconds and peak memory of every separation method on one megapixel, each in a process of
+its own.
+"""
 
 import multiprocessing
 import resource
@@ -32,8 +34,13 @@ def megapixel(folder: Path) -> np.ndarray:
 
 
 def speed_table(folder: Path, methods: Sequence[str]) -> str:
-    """Markdown: the best of three warm runs, its ratio to what is asked for and to `none`, and the process's peak memory."""
-    lines = ["| method | first run s | warm s | asked for s | ratio | peak memory MB |", "|---|---|---|---|---|---|"]
+    """Markdown: the best of three warm runs, its ratio to what is asked for and to `none`, and the
+    process's peak memory.
+    """
+    lines = [
+        "| method | first run s | warm s | asked for s | ratio | peak memory MB |",
+        "|---|---|---|---|---|---|",
+    ]
     image = megapixel(folder)
     context = multiprocessing.get_context("spawn")
     for method in methods:
@@ -41,13 +48,17 @@ def speed_table(folder: Path, methods: Sequence[str]) -> str:
             first, warm, memory = pool.apply(timed, (method, image))
         target = _TARGETS.get(method)
         asked = ("-", "-") if target is None else (f"{target:g}", f"{warm / target:.2f}")
-        lines.append(f"| {method} | {first:.2f} | {warm:.3f} | {asked[0]} | {asked[1]} | {memory:.0f} |")
+        lines.append(
+            f"| {method} | {first:.2f} | {warm:.3f} | {asked[0]} | {asked[1]} | {memory:.0f} |"
+        )
         print(lines[-1], flush=True)
     return "\n".join(lines) + "\n"
 
 
 def timed(method: str, image: np.ndarray) -> tuple[float, float, float]:
-    """Seconds of the first run (with compiling, or reading what was compiled), of the best warm one, and the peak memory in MB."""
+    """Seconds of the first run (with compiling, or reading what was compiled), of the best warm
+    one, and the peak memory in MB.
+    """
     mask = np.ones(image.shape[:2], bool)
     seconds = []
     for _ in range(1 + _REPEATS):
@@ -56,4 +67,8 @@ def timed(method: str, image: np.ndarray) -> tuple[float, float, float]:
         seconds.append(time.perf_counter() - start)
         if sum(seconds) > 60:
             break
-    return seconds[0], min(seconds[1:] or seconds), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    return (
+        seconds[0],
+        min(seconds[1:] or seconds),
+        resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024,
+    )

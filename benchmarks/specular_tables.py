@@ -21,7 +21,10 @@ _GROUPS = {
 
 def tables(rows: Sequence[Row]) -> str:
     """All tables that the rows allow."""
-    parts = ["# Separations against the truth\n", "`none` leaves the photo as it is: diffuse = input.\n"]
+    parts = [
+        "# Separations against the truth\n",
+        "`none` leaves the photo as it is: diffuse = input.\n",
+    ]
     for group, title in _GROUPS.items():
         found = [row for row in rows if row.group == group]
         if found:
@@ -42,16 +45,37 @@ def tables(rows: Sequence[Row]) -> str:
 
 
 def _claim(rows: Sequence[Row]) -> str:
-    """1 less the geometric mean of error ratios, per cent, as the thesis states its gain (7.6 diffuse, 53.5 specular); "" without rows."""
-    found = {(row.method, row.variant, row.group, row.image): row for row in rows if row.mse_ratio is not None}
+    """1 less the geometric mean of error ratios, per cent, as the thesis states its gain (7.6
+    diffuse, 53.5 specular); "" without rows.
+    """
+    found = {
+        (row.method, row.variant, row.group, row.image): row
+        for row in rows
+        if row.mse_ratio is not None
+    }
     ours = {key[2:]: row for key, row in found.items() if key[:2] == ("sparse_coding", IMPROVED)}
-    lines = ["| against | variant | photos | diffuse MSE | specular MSE | diffuse LMSE | specular LMSE |", "|---" * 7 + "|"]
+    lines = [
+        "| against | variant | photos | diffuse MSE | specular MSE | diffuse LMSE | specular LMSE |",
+        "|---" * 7 + "|",
+    ]
     for other, variant in product(("chaotic_segmentation", "tan_2005"), (IMPROVED, "paper")):
-        for title, chosen in ((", ".join(_CLAIMED), lambda key: key[1] in _CLAIMED), ("rendered", lambda key: key[0] == "rendered")):
-            pairs = [(row, found[other, variant, *key]) for key, row in ours.items() if chosen(key) and (other, variant, *key) in found]
+        for title, chosen in (
+            (", ".join(_CLAIMED), lambda key: key[1] in _CLAIMED),
+            ("rendered", lambda key: key[0] == "rendered"),
+        ):
+            pairs = [
+                (row, found[other, variant, *key])
+                for key, row in ours.items()
+                if chosen(key) and (other, variant, *key) in found
+            ]
             if pairs:
-                gains = [_gain(pairs, name) for name in ("mse_ratio", "specular_ratio", "lmse_diffuse", "lmse_specular")]
-                lines.append(f"| {other} | {variant} | {len(pairs)} ({title}) | " + " | ".join(gains) + " |")
+                gains = [
+                    _gain(pairs, name)
+                    for name in ("mse_ratio", "specular_ratio", "lmse_diffuse", "lmse_specular")
+                ]
+                lines.append(
+                    f"| {other} | {variant} | {len(pairs)} ({title}) | " + " | ".join(gains) + " |"
+                )
     return "\n".join(lines) + "\n" if len(lines) > 2 else ""
 
 
@@ -64,11 +88,18 @@ def _gain(pairs: list[tuple[Row, Row]], name: str) -> str:
 def _of_group(rows: list[Row]) -> list[str]:
     return [
         "PSNR of the diffuse layer, dB / SSIM (3-D) / SSIM (by channel)\n",
-        _table(rows, lambda r: f"{_number(r.psnr, '.2f')} / {_number(r.ssim_volume, '.3f')} / {_number(r.ssim, '.3f')}"),
+        _table(
+            rows,
+            lambda r: (
+                f"{_number(r.psnr, '.2f')} / {_number(r.ssim_volume, '.3f')} / {_number(r.ssim, '.3f')}"
+            ),
+        ),
         "Mean square error of the diffuse layer, relative to leaving the photo alone: everywhere (in the highlights, elsewhere)\n",
         _table(
             rows,
-            lambda r: f"{_number(r.mse_ratio, '.3f')} ({_number(r.mse_inside, '.2f')}, {_number(r.mse_outside, '.2f')})",
+            lambda r: (
+                f"{_number(r.mse_ratio, '.3f')} ({_number(r.mse_inside, '.2f')}, {_number(r.mse_outside, '.2f')})"
+            ),
             _geometric("mse_ratio"),
         ),
         "Mean square error of the specular layer, relative to finding none\n",
@@ -76,7 +107,9 @@ def _of_group(rows: list[Row]) -> list[str]:
         "Local error (LMSE) of the diffuse layer x 1000 / of the specular layer\n",
         _table(
             rows,
-            lambda r: f"{_number(None if r.lmse_diffuse is None else 1000 * r.lmse_diffuse, '.2f')} / {_number(r.lmse_specular, '.3f')}",
+            lambda r: (
+                f"{_number(None if r.lmse_diffuse is None else 1000 * r.lmse_diffuse, '.2f')} / {_number(r.lmse_specular, '.3f')}"
+            ),
             _geometric("lmse_specular"),
         ),
         "Confidence: share of the squared error that leaves with the least confident fifth, per cent / area under the sparsification "
@@ -92,7 +125,9 @@ def _of_group(rows: list[Row]) -> list[str]:
     ]
 
 
-def _table(rows: list[Row], cell: Cell, last: tuple[str, Callable[[list[Row]], str]] | None = None) -> str:
+def _table(
+    rows: list[Row], cell: Cell, last: tuple[str, Callable[[list[Row]], str]] | None = None
+) -> str:
     """Methods and variants down, photos across; `last` sums up each line."""
     images = list(dict.fromkeys(row.image for row in rows))
     known = {(row.method, row.variant, row.image): row for row in rows}
@@ -101,8 +136,18 @@ def _table(rows: list[Row], cell: Cell, last: tuple[str, Callable[[list[Row]], s
     for method in METHODS:
         for variant in dict.fromkeys(row.variant for row in rows if row.method == method):
             line = [known.get((method, variant, image)) for image in images]
-            cells = [method, variant, *("" if row is None else "refused" if row.refused else cell(row) for row in line)]
-            lines.append("| " + " | ".join([*cells, *([last[1]([row for row in line if row is not None])] if last else [])]) + " |")
+            cells = [
+                method,
+                variant,
+                *("" if row is None else "refused" if row.refused else cell(row) for row in line),
+            ]
+            lines.append(
+                "| "
+                + " | ".join(
+                    [*cells, *([last[1]([row for row in line if row is not None])] if last else [])]
+                )
+                + " |"
+            )
     return "\n".join(lines) + "\n"
 
 

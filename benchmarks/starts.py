@@ -1,15 +1,19 @@
-"""Where should SIRFS begin? Its objective has many minima, and the start decides into which it goes: several, on objects not seen.
+"""Where should SIRFS begin? Its objective has many minima, and the start decides into which it
+goes: several, on objects not seen.
 
-  python -m benchmarks.starts                                     the MIT-Berkeley objects as they are
-  python -m benchmarks.starts --others 0,2,4,6                    each under four of the other objects' lights
-  python -m benchmarks.starts --scenes FOLDER                     rendered scenes of `isc synth`
+  python -m benchmarks.starts                                     the MIT-Berkeley objects as they
+  are python -m benchmarks.starts --others 0,2,4,6                    each under four of the other
+  objects' lights python -m benchmarks.starts --scenes FOLDER                     rendered scenes of
+  `isc synth`
 
-A start is "dome:light", how much of the outline's dome and of the expected light (`sirfs.settings.Start`); "1:0.5+0:0.5" tries two.
-MIT-Berkeley objects are solved with priors fitted to the other nine; under another's light the picture is their paint times the shading of
-their shape. Of a rendered scene the true diffuse layer is solved with the priors that ship, at 256 pixels and as bright as photos are; its
-light is not compared. Errors are over the first start's, geometric means; a rounding changes the picture's last digits. Cases in which the
-starts' avg differs by more than half are printed, with each start's avg over the best and its final loss: whether the loss tells which
-minimum is the worse.
+A start is "dome:light", how much of the outline's dome and of the expected light
+(`sirfs.settings.Start`); "1:0.5+0:0.5" tries two. MIT-Berkeley objects are solved with priors
+fitted to the other nine; under another's light the picture is their paint times the shading of
+their shape. Of a rendered scene the true diffuse layer is solved with the priors that ship, at 256
+pixels and as bright as photos are; its light is not compared. Errors are over the first start's,
+geometric means; a rounding changes the picture's last digits. Cases in which the starts' avg
+differs by more than half are printed, with each start's avg over the best and its final loss:
+whether the loss tells which minimum is the worse.
 """
 
 import argparse
@@ -37,7 +41,16 @@ from synth.dataset.reading import list_scenes, read_truth
 from synth.validation.sirfs_stage import score_sirfs, with_normals
 from synth.validation.stages import BLACK, Inputs
 
-from .berkeley import LIGHTS, parser, problem, rounded, rounded_image, scores, training_object, write_json
+from .berkeley import (
+    LIGHTS,
+    parser,
+    problem,
+    rounded,
+    rounded_image,
+    scores,
+    training_object,
+    write_json,
+)
 from .leave_one_out import METRICS, without
 
 Starts = tuple[Start, ...]
@@ -46,7 +59,9 @@ _APART = 1.5
 
 @dataclass(frozen=True)
 class Task:
-    """One solve: of an object under its own light or, with `other`, under that object's, or of a scene's folder (`priors` then None)."""
+    """One solve: of an object under its own light or, with `other`, under that object's, or of a
+    scene's folder (`priors` then None).
+    """
 
     case: str
     starts: Starts
@@ -74,7 +89,9 @@ class Found:
 def run(task: Task) -> Found:
     """Solves from the task's start."""
     weights = replace(isc_weights(task.light, 3), starts=task.starts)
-    return _of_scene(task, weights) if task.priors is None else _of_object(task, task.priors, weights)
+    return (
+        _of_scene(task, weights) if task.priors is None else _of_object(task, task.priors, weights)
+    )
 
 
 def _of_object(task: Task, priors: PriorSet, weights: Weights) -> Found:
@@ -87,10 +104,14 @@ def _of_object(task: Task, priors: PriorSet, weights: Weights) -> Found:
 
 
 def _lit(truth: MitBerkeleyObject, light: np.ndarray) -> MitBerkeleyObject:
-    """The object under `light` (9, 3), reference convention: its paint times the shading of its shape."""
+    """The object under `light` (9, 3), reference convention: its paint times the shading of its
+    shape.
+    """
     normal = truth_normal(truth.height)
     known = np.isfinite(normal).all(axis=-1, keepdims=True) & truth.valid[..., None]
-    shading = np.where(known, np.exp(real_sh(np.where(known, normal, 0)) @ light_from_reference(light)), 0)
+    shading = np.where(
+        known, np.exp(real_sh(np.where(known, normal, 0)) @ light_from_reference(light)), 0
+    )
     image = truth.reflectance * shading
     return replace(truth, image=image, valid=(image > 0).all(axis=-1), shading=shading, light=light)
 
@@ -100,10 +121,19 @@ def _of_scene(task: Task, weights: Weights) -> Found:
     diffuse = rounded_image(np.maximum(truth.diffuse, 0).astype(float), task.rounding)
     gain = usual_gain(diffuse, truth.mask)
     options = RecoverOptions(solver=SolverOptions(threads=1))
-    result = recover(diffuse * gain, truth.mask, BLACK, shipped_prior_set().priors(task.light, 3), weights, options)
+    result = recover(
+        diffuse * gain,
+        truth.mask,
+        BLACK,
+        shipped_prior_set().priors(task.light, 3),
+        weights,
+        options,
+    )
     normal = normal_from_reference(normals(result.height))
     seen = Inputs(truth.image, truth.mask, np.zeros_like(truth.mask), diffuse)
-    errors = score_sirfs(truth, with_normals(seen, result.height, normal, light_from_reference(result.light)))
+    errors = score_sirfs(
+        truth, with_normals(seen, result.height, normal, light_from_reference(result.light))
+    )
     return _found(task, replace(errors, light=np.nan), result.terms.total)
 
 
@@ -120,45 +150,82 @@ def object_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[
         names = [other for other in list_objects(root, given.light) if other != name]
         for other in [names[k] for k in given.others] or [None]:
             for rounding in range(given.roundings):
-                yield from (Task(name, starts, rounding, given.light, given.shared, other, fold) for starts in ways)
+                yield from (
+                    Task(name, starts, rounding, given.light, given.shared, other, fold)
+                    for starts in ways
+                )
 
 
 def scene_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[Task]:
     """All solves of rendered scenes."""
     for folder in list_scenes(given.scenes):
         for rounding in range(given.roundings):
-            yield from (Task(str(folder), starts, rounding, given.light, given.shared) for starts in ways)
+            yield from (
+                Task(str(folder), starts, rounding, given.light, given.shared) for starts in ways
+            )
 
 
 def report(found: Sequence[Found], ways: Sequence[Starts]) -> None:
     """A row a start, and the cases in which the starts are far apart."""
     cases: dict[tuple[str, str | None, int], dict[Starts, Found]] = {}
     for one in found:
-        cases.setdefault((one.task.case, one.task.other, one.task.rounding), {})[one.task.starts] = one
-    print(f"\n{len(cases)} cases\n\n| start | " + " | ".join(METRICS) + " | avg | standard error |\n" + "|---" * 9 + "|")
+        cases.setdefault((one.task.case, one.task.other, one.task.rounding), {})[
+            one.task.starts
+        ] = one
+    print(
+        f"\n{len(cases)} cases\n\n| start | "
+        + " | ".join(METRICS)
+        + " | avg | standard error |\n"
+        + "|---" * 9
+        + "|"
+    )
     for starts in ways:
         ratios = np.log([[*by[starts].errors, by[starts].average] for by in cases.values()])
         ratios -= np.log([[*by[ways[0]].errors, by[ways[0]].average] for by in cases.values()])
-        cells = ["-" if np.isnan(value) else f"{value:.3f}" for value in np.exp(ratios.mean(axis=0))]
-        print(f"| {_words(starts)} | {' | '.join(cells)} | {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |")
+        cells = [
+            "-" if np.isnan(value) else f"{value:.3f}" for value in np.exp(ratios.mean(axis=0))
+        ]
+        print(
+            f"| {_words(starts)} | {' | '.join(cells)} | {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |"
+        )
     for (case, other, rounding), by in cases.items():
         best = min(one.average for one in by.values())
         if max(one.average for one in by.values()) > _APART * best:
-            each = (f"{_words(starts)} {one.average / best:.2f} at {one.loss:.2f}" for starts, one in by.items())
-            print(f"{Path(case).name}{f' under the light of {other}' if other else ''}, rounding {rounding}: " + ", ".join(each))
+            each = (
+                f"{_words(starts)} {one.average / best:.2f} at {one.loss:.2f}"
+                for starts, one in by.items()
+            )
+            print(
+                f"{Path(case).name}{f' under the light of {other}' if other else ''}, rounding {rounding}: "
+                + ", ".join(each)
+            )
 
 
 def main() -> None:
     """Runs and prints."""
     options = parser(__doc__)
-    options.add_argument("--starts", type=_ways, default=_ways("0:0,1:0,0:0.5,1:0.5,1:1,1:0.5+0:0.5"), help="dome:light, ...")
+    options.add_argument(
+        "--starts",
+        type=_ways,
+        default=_ways("0:0,1:0,0:0.5,1:0.5,1:1,1:0.5+0:0.5"),
+        help="dome:light, ...",
+    )
     options.add_argument("--light", choices=LIGHTS, default=LIGHTS[0])
-    options.add_argument("--others", type=lambda text: [int(k) for k in text.split(",")], default=[], help="of the nine other lights")
+    options.add_argument(
+        "--others",
+        type=lambda text: [int(k) for k in text.split(",")],
+        default=[],
+        help="of the nine other lights",
+    )
     options.add_argument("--scenes", type=Path, help="a folder of isc synth")
     options.add_argument("--roundings", type=int, default=1)
     options.add_argument("--processes", type=int, default=2)
     given = options.parse_args()
-    tasks = object_tasks(given.starts, given) if given.scenes is None else scene_tasks(given.starts, given)
+    tasks = (
+        object_tasks(given.starts, given)
+        if given.scenes is None
+        else scene_tasks(given.starts, given)
+    )
     with ProcessPoolExecutor(given.processes) as pool:
         found = list(pool.map(run, tasks))
     report(found, given.starts)
@@ -172,7 +239,10 @@ def _row(found: Found) -> tuple[object, ...]:
 
 
 def _ways(text: str) -> list[Starts]:
-    return [tuple(Start(*(float(part) for part in pair.split(":"))) for pair in way.split("+")) for way in text.split(",")]
+    return [
+        tuple(Start(*(float(part) for part in pair.split(":"))) for pair in way.split("+"))
+        for way in text.split(",")
+    ]
 
 
 def _words(starts: Starts) -> str:

@@ -1,11 +1,15 @@
-"""Invented surroundings, sharp enough to be seen in a mirror: rooms, places outdoors, studios, clutter; as environments (rows, 2 rows, 3).
+"""Invented surroundings, sharp enough to be seen in a mirror: rooms, places outdoors, studios,
+clutter; as environments (rows, 2 rows, 3).
 
-Equation: a room is a box around the object: each direction meets a wall at a point, whose paint and pictures are rectangles; radiance
-1 is about that of a white wall. Outdoors a sky brightens toward the horizon, below it lie houses or trees and a ground. A studio is a dark
-backdrop with softboxes. Clutter is made of dead leaves: discs and rectangles of all sizes, their number falling as size^-2, each before
-the last, which gives the statistics of natural pictures. The layout is that of `isc_core.environment`.
+Equation: a room is a box around the object: each direction meets a wall at a point, whose paint and
+pictures are rectangles; radiance 1 is about that of a white wall. Outdoors a sky brightens toward
+the horizon, below it lie houses or trees and a ground. A studio is a dark backdrop with softboxes.
+Clutter is made of dead leaves: discs and rectangles of all sizes, their number falling as size^-2,
+each before the last, which gives the statistics of natural pictures. The layout is that of
+`isc_core.environment`.
 
-Citation: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41 (2001), doi:10.1023/A:1011109015675.
+Citation: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41 (2001),
+doi:10.1023/A:1011109015675.
 
 Limits: flat: what stands in a room is painted on its walls. Nothing moves as one walks around.
 """
@@ -23,18 +27,32 @@ _TEXELS = 256
 
 def make_surroundings(name: str, rng: np.random.Generator) -> np.ndarray:
     """One draw of `PLACES`, (ROWS, 2 ROWS, 3) float32 radiance >= 0."""
-    radiance = {"room": _room, "outdoors": _outdoors, "studio": _studio, "clutter": _clutter}[name](rng, directions(ROWS))
+    radiance = {"room": _room, "outdoors": _outdoors, "studio": _studio, "clutter": _clutter}[name](
+        rng, directions(ROWS)
+    )
     return np.maximum(radiance, 1e-3).astype(np.float32)
 
 
 def _texture(rng: np.random.Generator, u: np.ndarray, v: np.ndarray, contrast: float) -> np.ndarray:
-    """A factor around 1 at places u, v (any shape, in units of the texture), cloudy, grainy, tiled or boarded."""
+    """A factor around 1 at places u, v (any shape, in units of the texture), cloudy, grainy, tiled
+    or boarded.
+    """
     kind = rng.integers(4)
     if kind < 2:
         field = fractal_noise(rng, _TEXELS, 3.0) if kind else smooth_noise(rng, _TEXELS, 8)
     else:
-        cells = np.floor(np.stack(np.meshgrid(np.arange(_TEXELS) / 32, np.arange(_TEXELS) / (32 if kind == 2 else 128))))
-        field = np.where((cells.sum(0) % 2) > 0, 1.0, -1.0) if rng.random() < 0.5 else rng.standard_normal((8, 8))[tuple(cells.astype(int))]
+        cells = np.floor(
+            np.stack(
+                np.meshgrid(
+                    np.arange(_TEXELS) / 32, np.arange(_TEXELS) / (32 if kind == 2 else 128)
+                )
+            )
+        )
+        field = (
+            np.where((cells.sum(0) % 2) > 0, 1.0, -1.0)
+            if rng.random() < 0.5
+            else rng.standard_normal((8, 8))[tuple(cells.astype(int))]
+        )
     rows, columns = (np.mod(np.floor(place * _TEXELS).astype(int), _TEXELS) for place in (v, u))
     return np.exp(contrast * field)[rows, columns][..., None]
 
@@ -45,8 +63,12 @@ def _colour(rng: np.random.Generator, strength: float) -> np.ndarray:
     return values / values.mean()
 
 
-def _rectangles(rng: np.random.Generator, u: np.ndarray, v: np.ndarray, count: int, low: float, high: float) -> list[np.ndarray]:
-    """Where (bool, as u and v) `count` upright rectangles lie whose sides are from `low` to `high`, u and v from -1 to 1."""
+def _rectangles(
+    rng: np.random.Generator, u: np.ndarray, v: np.ndarray, count: int, low: float, high: float
+) -> list[np.ndarray]:
+    """Where (bool, as u and v) `count` upright rectangles lie whose sides are from `low` to `high`,
+    u and v from -1 to 1.
+    """
     found = []
     for _ in range(count):
         middle, half = rng.uniform(-0.8, 0.8, 2), rng.uniform(low, high, 2) / 2
@@ -61,7 +83,9 @@ def _room(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
     axis = steps.argmin(-1)
     place = (eye + toward * steps.min(-1)[..., None]) / half
     out = np.zeros(toward.shape)
-    window_walls = rng.permutation([(0, -1), (0, 1), (2, -1), (2, 1)])[: rng.integers(1, 3)].tolist()
+    window_walls = rng.permutation([(0, -1), (0, 1), (2, -1), (2, 1)])[
+        : rng.integers(1, 3)
+    ].tolist()
     wall_paint = rng.uniform(0.2, 0.9) * _colour(rng, 0.15)
     for k in range(3):
         for side in (-1, 1):
@@ -91,17 +115,32 @@ def _floor(rng: np.random.Generator, u: np.ndarray, v: np.ndarray) -> np.ndarray
     return out
 
 
-def _wall(rng: np.random.Generator, u: np.ndarray, v: np.ndarray, paint: np.ndarray, windows: bool) -> np.ndarray:
-    out = rng.uniform(0.6, 1.2) * paint * _texture(rng, u, v, rng.uniform(0, 0.1)) * (1 + 0.2 * v[:, None])
+def _wall(
+    rng: np.random.Generator, u: np.ndarray, v: np.ndarray, paint: np.ndarray, windows: bool
+) -> np.ndarray:
+    out = (
+        rng.uniform(0.6, 1.2)
+        * paint
+        * _texture(rng, u, v, rng.uniform(0, 0.1))
+        * (1 + 0.2 * v[:, None])
+    )
     for thing in _rectangles(rng, u, v, rng.integers(1, 8), 0.1, 0.6):
-        out[thing] = (rng.uniform(0.05, 1.0) * _colour(rng, 0.5) * _texture(rng, 2 * u, 2 * v, rng.uniform(0, 0.5)))[thing]
+        out[thing] = (
+            rng.uniform(0.05, 1.0)
+            * _colour(rng, 0.5)
+            * _texture(rng, 2 * u, 2 * v, rng.uniform(0, 0.5))
+        )[thing]
     for _ in range(int(rng.integers(0, 4))):  # furniture
         middle, width, top = rng.uniform(-0.9, 0.9), rng.uniform(0.1, 0.5), rng.uniform(-0.7, 0.3)
         out[(np.abs(u - middle) < width) & (v < top)] = rng.uniform(0.05, 0.5) * _colour(rng, 0.4)
     if windows:
         bars, level = rng.uniform(0.1, 0.4), np.exp(rng.uniform(np.log(4), np.log(40)))
         for pane in _rectangles(rng, u, v, rng.integers(1, 4), 0.3, 0.9):
-            sky = level * _colour(rng, 0.1) * np.where(v > rng.uniform(-0.4, 0.2), 1.0, rng.uniform(0.1, 0.6))[:, None]
+            sky = (
+                level
+                * _colour(rng, 0.1)
+                * np.where(v > rng.uniform(-0.4, 0.2), 1.0, rng.uniform(0.1, 0.6))[:, None]
+            )
             frame = (np.mod(u / bars, 1) < 0.08) | (np.mod(v / bars, 1) < 0.08)
             out[pane] = np.where(frame[:, None], 0.4 * paint, sky)[pane]
     return out
@@ -111,8 +150,14 @@ def _outdoors(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
     columns = toward.shape[1]
     height, turn = toward[..., 1], np.arange(columns)
     overcast = rng.random() < 0.4
-    zenith = np.array([1.0, 1.0, 1.05]) if overcast else np.array([0.25, 0.5, 1.1]) * rng.uniform(0.7, 1.4)
-    horizon = rng.uniform(0.8, 1.6) * (np.ones(3) if rng.random() < 0.7 else np.array([1.5, 0.9, 0.5]))
+    zenith = (
+        np.array([1.0, 1.0, 1.05])
+        if overcast
+        else np.array([0.25, 0.5, 1.1]) * rng.uniform(0.7, 1.4)
+    )
+    horizon = rng.uniform(0.8, 1.6) * (
+        np.ones(3) if rng.random() < 0.7 else np.array([1.5, 0.9, 0.5])
+    )
     share = np.clip(height, 0, 1)[..., None] ** rng.uniform(0.3, 0.8)
     sky = horizon * (1 - share) + zenith * share
     clouds = np.clip(_texture_of_sky(rng, toward) - rng.uniform(-0.5, 1.5), 0, 1)[..., None]
@@ -121,11 +166,25 @@ def _outdoors(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
         sky = _with_sun(rng, sky, toward)
     profile = rng.uniform(0, 0.25) + 0.1 * rng.standard_normal(columns)
     blocky = rng.random() < 0.5
-    profile = np.repeat(profile[::12], 12)[:columns] if blocky else gaussian_filter1d(profile, rng.uniform(1, 4), mode="wrap")
-    near = rng.uniform(0.05, 0.4) * _colour(rng, 0.3) * _texture(rng, turn[None] / 40 + 0 * height, height, rng.uniform(0.1, 0.8))
+    profile = (
+        np.repeat(profile[::12], 12)[:columns]
+        if blocky
+        else gaussian_filter1d(profile, rng.uniform(1, 4), mode="wrap")
+    )
+    near = (
+        rng.uniform(0.05, 0.4)
+        * _colour(rng, 0.3)
+        * _texture(rng, turn[None] / 40 + 0 * height, height, rng.uniform(0.1, 0.8))
+    )
     flat = toward / np.minimum(height, -0.02)[..., None] / 4
-    ground = rng.uniform(0.1, 0.6) * _colour(rng, 0.3) * _texture(rng, flat[..., 0], flat[..., 2], rng.uniform(0.1, 0.5))
-    return np.where((height < 0)[..., None], ground, np.where((height < profile[None])[..., None], near, sky))
+    ground = (
+        rng.uniform(0.1, 0.6)
+        * _colour(rng, 0.3)
+        * _texture(rng, flat[..., 0], flat[..., 2], rng.uniform(0.1, 0.5))
+    )
+    return np.where(
+        (height < 0)[..., None], ground, np.where((height < profile[None])[..., None], near, sky)
+    )
 
 
 def _texture_of_sky(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
@@ -147,7 +206,11 @@ def _with_sun(rng: np.random.Generator, sky: np.ndarray, toward: np.ndarray) -> 
 
 def _studio(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
     height = toward[..., 1:2]
-    out = np.exp(rng.uniform(np.log(0.02), np.log(0.6))) * (1 + rng.uniform(0, 0.9) * height) * _colour(rng, 0.05)
+    out = (
+        np.exp(rng.uniform(np.log(0.02), np.log(0.6)))
+        * (1 + rng.uniform(0, 0.9) * height)
+        * _colour(rng, 0.05)
+    )
     if rng.random() < 0.6:  # a table
         table = rng.uniform(0.05, 0.8) * _colour(rng, 0.15)
         out = np.where(height < rng.uniform(-0.5, -0.1), table, out)
@@ -158,18 +221,28 @@ def _studio(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
         if rng.random() < 0.4:
             lit = before & (np.hypot(x, y) < rng.uniform(0.05, 0.5))
         else:
-            lit = before & (np.abs(x) < rng.uniform(0.05, 0.6)) & (np.abs(y) < rng.uniform(0.05, 0.6))
-        out = np.where(lit[..., None], np.exp(rng.uniform(np.log(2), np.log(40))) * _colour(rng, 0.05), out)
+            lit = (
+                before & (np.abs(x) < rng.uniform(0.05, 0.6)) & (np.abs(y) < rng.uniform(0.05, 0.6))
+            )
+        out = np.where(
+            lit[..., None], np.exp(rng.uniform(np.log(2), np.log(40))) * _colour(rng, 0.05), out
+        )
     return out
 
 
-def _on_plane(toward: np.ndarray, forward: np.ndarray, across: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where directions (..., 3) meet the plane at the distance 1 along the unit vector `forward`: whether they do, and the place there, x
-    along `across`, which is at right angles to it."""
+def _on_plane(
+    toward: np.ndarray, forward: np.ndarray, across: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where directions (..., 3) meet the plane at the distance 1 along the unit vector `forward`:
+    whether they do, and the place there, x along `across`, which is at right angles to it.
+    """
     across = across / np.linalg.norm(across)
     depth = toward @ forward
     before = depth > 0.05
-    x, y = (toward @ axis / np.where(before, depth, np.inf) for axis in (across, np.cross(forward, across)))
+    x, y = (
+        toward @ axis / np.where(before, depth, np.inf)
+        for axis in (across, np.cross(forward, across))
+    )
     return before, x, y
 
 
@@ -177,16 +250,32 @@ def _clutter(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
     """Brighter above than below, or the other way round; some of the leaves shine."""
     palette = rng.uniform(0.03, 1, (6, 3)) ** rng.uniform(0.8, 2)
     saturated = rng.uniform(0.05, 0.5)
-    palette = (saturated * palette + (1 - saturated) * palette.mean(1, keepdims=True)) * np.exp(rng.normal(0, 0.15, 3))
+    palette = (saturated * palette + (1 - saturated) * palette.mean(1, keepdims=True)) * np.exp(
+        rng.normal(0, 0.15, 3)
+    )
     out = palette[0] * np.ones(toward.shape)
     height, level = toward[..., 1:2], np.exp(rng.uniform(-0.5, 1.5))
     for size in np.sort(0.03 * rng.pareto(1.0, int(rng.integers(150, 500))) + 0.03)[::-1]:
         middle = rng.normal(size=3)
         middle /= np.linalg.norm(middle)
         before, x, y = _on_plane(toward, middle, np.cross(middle, rng.normal(size=3)))
-        there = (np.hypot(x, y) < size) if rng.random() < 0.5 else (np.abs(x) < size) & (np.abs(y) < size * rng.uniform(0.2, 1))
+        there = (
+            (np.hypot(x, y) < size)
+            if rng.random() < 0.5
+            else (np.abs(x) < size) & (np.abs(y) < size * rng.uniform(0.2, 1))
+        )
         colour = palette[rng.integers(6)] * np.exp(rng.normal(0, 0.25) + rng.normal(0, 0.07, 3))
-        ends = colour * (30 if size < 0.2 and rng.random() < 0.02 else 1) * rng.uniform(0.6, 1.4, 2)[:, None]
+        ends = (
+            colour
+            * (30 if size < 0.2 and rng.random() < 0.02 else 1)
+            * rng.uniform(0.6, 1.4, 2)[:, None]
+        )
         shade = np.clip(0.5 + x / (2 * size), 0, 1)[..., None]
         out = np.where((before & there)[..., None], ends[0] * shade + ends[1] * (1 - shade), out)
-    return np.asarray(gaussian_filter(out * level**height, (rng.uniform(0, 1.2),) * 2 + (0,), mode=("nearest", "wrap", "nearest")))
+    return np.asarray(
+        gaussian_filter(
+            out * level**height,
+            (rng.uniform(0, 1.2),) * 2 + (0,),
+            mode=("nearest", "wrap", "nearest"),
+        )
+    )

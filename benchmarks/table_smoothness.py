@@ -1,4 +1,5 @@
-"""The smoothness of the tables of absolute reflectance, cross-validated: log likelihood of each object under the others' table.
+"""The smoothness of the tables of absolute reflectance, cross-validated: log likelihood of each
+object under the others' table.
 
 python -m benchmarks.table_smoothness [--grey]
 """
@@ -18,14 +19,25 @@ def main() -> None:
     options = parser(__doc__)
     options.add_argument("--grey", action="store_true")
     given = options.parse_args()
-    statistics = collect_statistics(read_training_objects(given.shared / "data" / "mit_berkeley_train"))
+    statistics = collect_statistics(
+        read_training_objects(given.shared / "data" / "mit_berkeley_train")
+    )
     if given.grey:
         plain, constants, channels = FitOptions().grey_absolute, [6.0, 12.0, 24.0, 48.0, 96.0], 1
     else:
-        plain, constants, channels = FitOptions().absolute, [64.0, 128.0, 256.0, 512.0, 1024.0, 2048.0], 3
+        plain, constants, channels = (
+            FitOptions().absolute,
+            [64.0, 128.0, 256.0, 512.0, 1024.0, 2048.0],
+            3,
+        )
     for constant in constants:
-        likelihood = held_out_log_likelihood(statistics, replace(plain, smoothness=constant), channels)
-        print(f"{constant:7.0f}: mean {likelihood.mean():8.4f}   by object {likelihood.round(2)}", flush=True)
+        likelihood = held_out_log_likelihood(
+            statistics, replace(plain, smoothness=constant), channels
+        )
+        print(
+            f"{constant:7.0f}: mean {likelihood.mean():8.4f}   by object {likelihood.round(2)}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

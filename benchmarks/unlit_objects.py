@@ -1,13 +1,16 @@
-"""Objects of which it is known what each of many lamps would reach: to be lit anew, by any of them, whenever a network learns from one.
+"""Objects of which it is known what each of many lamps would reach: to be lit anew, by any of them,
+whenever a network learns from one.
 
   python -m benchmarks.unlit_objects -o DIR [--count N] [--first K] [--groups]
   python -m benchmarks.unlit_objects -o DIR --data ROOT
 
-DIR/NUMBER.npz: mask (SIZE, SIZE); normals (SIZE, SIZE, 3) and albedos (PAINTS, SIZE, SIZE, 3) float16; toward (LAMPS, 3) float32, unit
-vectors to far lamps before the object; reached (LAMPS, SIZE, SIZE) bool, packed along its last axis (`numpy.packbits`): which pixels see
-them; shape, its family's name. An object that is there is not made again. Shapes and paints are those of `isc synth`;
-with `--groups` mostly up to five bodies of them that have grown together, each turned anyhow. With `--data` the MIT-Berkeley objects that
-ROOT holds, each with three pairs of those paints: DIR/NAME-K.npz, shape its name.
+DIR/NUMBER.npz: mask (SIZE, SIZE); normals (SIZE, SIZE, 3) and albedos (PAINTS, SIZE, SIZE, 3)
+float16; toward (LAMPS, 3) float32, unit vectors to far lamps before the object; reached (LAMPS,
+SIZE, SIZE) bool, packed along its last axis (`numpy.packbits`): which pixels see them; shape, its
+family's name. An object that is there is not made again. Shapes and paints are those of `isc
+synth`; with `--groups` mostly up to five bodies of them that have grown together, each turned
+anyhow. With `--data` the MIT-Berkeley objects that ROOT holds, each with three pairs of those
+paints: DIR/NAME-K.npz, shape its name.
 
 Limits: light that goes from one part of the object to another is left to whoever lights it.
 """
@@ -37,7 +40,10 @@ _FILL = 0.9
 WIDEST = 80.0  # degrees from the viewer
 GROUP = "group"
 _TOGETHER, _COPIES = 0.75, 3
-_SIZES, _STRETCHED = (0.25, 0.8), 0.3  # of the smaller bodies of a group; how unequally, as a logarithm
+_SIZES, _STRETCHED = (
+    (0.25, 0.8),
+    0.3,
+)  # of the smaller bodies of a group; how unequally, as a logarithm
 
 
 @dataclass(frozen=True)
@@ -62,7 +68,11 @@ def make_object(number: int) -> dict[str, np.ndarray]:
 def make_group(number: int) -> dict[str, np.ndarray]:
     """Group `number`, always the same, as it is written; one in four is a single body."""
     rng = np.random.default_rng([18, number])
-    return traced(_grown_together(rng) if rng.random() < _TOGETHER else _turned(str(rng.choice(SHAPES)), rng), GROUP, rng)
+    return traced(
+        _grown_together(rng) if rng.random() < _TOGETHER else _turned(str(rng.choice(SHAPES)), rng),
+        GROUP,
+        rng,
+    )
 
 
 def measured_objects(root: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
@@ -76,7 +86,11 @@ def measured_objects(root: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
 
 def _turned(family: str, rng: np.random.Generator) -> Mesh:
     """A body of a family, seen from anywhere."""
-    return make_shape(family, rng).rotated(Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()).fitted()
+    return (
+        make_shape(family, rng)
+        .rotated(Rotation.random(random_state=int(rng.integers(2**31))).as_matrix())
+        .fitted()
+    )
 
 
 def _grown_together(rng: np.random.Generator) -> Mesh:
@@ -84,14 +98,22 @@ def _grown_together(rng: np.random.Generator) -> Mesh:
     bodies = [family for family in SHAPES if family != "height_field"]
     parts = [_turned(str(rng.choice(bodies)), rng)]
     for _ in range(int(rng.integers(1, 5))):
-        part, at = _turned(str(rng.choice(bodies)), rng), parts[0].vertices[int(rng.integers(len(parts[0].vertices)))]
+        part, at = (
+            _turned(str(rng.choice(bodies)), rng),
+            parts[0].vertices[int(rng.integers(len(parts[0].vertices)))],
+        )
         size = rng.uniform(*_SIZES) * np.exp(rng.normal(0, _STRETCHED, 3))
         normals = part.normals / size
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        parts.append(Mesh(part.vertices * size + at * rng.uniform(0.7, 1.05), normals, part.uv, part.faces))
+        parts.append(
+            Mesh(part.vertices * size + at * rng.uniform(0.7, 1.05), normals, part.uv, part.faces)
+        )
     first = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = np.concatenate([part.faces + k for part, k in zip(parts, first, strict=False)])
-    vertices, normals, uv = (np.concatenate([getattr(part, name) for part in parts]) for name in ("vertices", "normals", "uv"))
+    vertices, normals, uv = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("vertices", "normals", "uv")
+    )
     return Mesh(vertices, normals, uv, faces).fitted()
 
 
@@ -100,14 +122,27 @@ def traced(mesh: Mesh, shape: str, rng: np.random.Generator) -> dict[str, np.nda
     camera, tracer = camera_around(mesh, SIZE, _FILL), Tracer(mesh)
     hits = tracer.hits(*(part.reshape(-1, 3) for part in camera.rays()))
     mask = hits.valid.reshape(SIZE, SIZE)
-    lamps = np.stack([toward(float(angle), float(rng.uniform(0, 360))) for angle in np.degrees(np.arccos(_evenly(rng)))])
-    from_, reached = hits.position[hits.valid] + LIFT * hits.normal[hits.valid], np.zeros((LAMPS, SIZE, SIZE), bool)
+    lamps = np.stack(
+        [
+            toward(float(angle), float(rng.uniform(0, 360)))
+            for angle in np.degrees(np.arccos(_evenly(rng)))
+        ]
+    )
+    from_, reached = (
+        hits.position[hits.valid] + LIFT * hits.normal[hits.valid],
+        np.zeros((LAMPS, SIZE, SIZE), bool),
+    )
     for lamp, seen in zip(lamps, reached, strict=True):
         seen[mask] = ~tracer.blocked(from_, np.broadcast_to(lamp, from_.shape), np.inf)
-    normals, albedos = np.zeros((SIZE, SIZE, 3), np.float16), np.zeros((PAINTS, SIZE, SIZE, 3), np.float16)
+    normals, albedos = (
+        np.zeros((SIZE, SIZE, 3), np.float16),
+        np.zeros((PAINTS, SIZE, SIZE, 3), np.float16),
+    )
     normals[mask] = hits.normal[hits.valid]
     for paint in albedos:
-        paint[mask] = texture_at(make_albedo(str(rng.choice(ALBEDOS)), rng, 256), hits.uv[hits.valid])
+        paint[mask] = texture_at(
+            make_albedo(str(rng.choice(ALBEDOS)), rng, 256), hits.uv[hits.valid]
+        )
     packed = np.packbits(reached, axis=-1)
     return {
         "mask": mask,
@@ -120,8 +155,15 @@ def traced(mesh: Mesh, shape: str, rng: np.random.Generator) -> dict[str, np.nda
 
 
 def _evenly(rng: np.random.Generator) -> np.ndarray:
-    """The cosines (LAMPS,) of directions that lie evenly on the sky before the object, in any order."""
-    return np.asarray(1 - rng.permutation(np.arange(LAMPS) + rng.random(LAMPS)) / LAMPS * (1 - np.cos(np.radians(WIDEST))))
+    """The cosines (LAMPS,) of directions that lie evenly on the sky before the object, in any
+    order.
+    """
+    return np.asarray(
+        1
+        - rng.permutation(np.arange(LAMPS) + rng.random(LAMPS))
+        / LAMPS
+        * (1 - np.cos(np.radians(WIDEST)))
+    )
 
 
 def objects_in(folder: Path) -> Iterator[Unlit]:
@@ -129,17 +171,28 @@ def objects_in(folder: Path) -> Iterator[Unlit]:
     for path in sorted(folder.glob("*.npz")):
         with np.load(path, allow_pickle=False) as data:
             reached = np.unpackbits(data["reached"], axis=-1).astype(bool)
-            yield Unlit(data["mask"], data["normals"], data["albedos"], data["toward"], reached, str(data["shape"]))
+            yield Unlit(
+                data["mask"],
+                data["normals"],
+                data["albedos"],
+                data["toward"],
+                reached,
+                str(data["shape"]),
+            )
 
 
 def main() -> None:
     """Makes the objects that are not there yet."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
     parser.add_argument("--count", type=int, default=1000, metavar="N")
     parser.add_argument("--first", type=int, default=0, metavar="K", help="the first one's number")
     parser.add_argument("--groups", action="store_true", help="bodies that have grown together")
-    parser.add_argument("--data", type=Path, metavar="ROOT", help="the MIT-Berkeley objects that this folder holds")
+    parser.add_argument(
+        "--data", type=Path, metavar="ROOT", help="the MIT-Berkeley objects that this folder holds"
+    )
     wanted = parser.parse_args()
     wanted.output.mkdir(parents=True, exist_ok=True)
     if wanted.data is not None:

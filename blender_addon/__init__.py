@@ -1,6 +1,8 @@
-"""ISC in Blender: a photo of a glossy object becomes the object itself, its material, its light and the photo's camera.
+"""ISC in Blender: a photo of a glossy object becomes the object itself, its material, its light and
+the photo's camera.
 
-Blender calls `register` and `unregister`. Importing the package needs no Blender, so that its command line can say what it does without.
+Blender calls `register` and `unregister`. Importing the package needs no Blender, so that its
+command line can say what it does without.
 """
 
 

@@ -1,4 +1,6 @@
-"""Photos and results, one after the other, to objects in .blend files and renders of them; without a window."""
+"""Photos and results, one after the other, to objects in .blend files and renders of them; without
+a window.
+"""
 
 import argparse
 import tempfile
@@ -32,7 +34,10 @@ _FORMATS = {".png": ("PNG", "16"), ".exr": ("OPEN_EXR", "32")}
 
 @dataclass(frozen=True)
 class Plan:
-    """What is to be made of one source: `blend` and `picture` are the files to write, None for none."""
+    """What is to be made of one source:
+
+    `blend` and `picture` are the files to write, None for none.
+    """
 
     source: Source
     blend: Path | None
@@ -41,7 +46,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class Said:
-    """A line each. `notes`: what the work says of a source's result, such as why it is doubtful. `failures`: sources without a result."""
+    """A line each.
+
+    `notes`: what the work says of a source's result, such as why it is doubtful. `failures`:
+    sources without a result.
+    """
 
     notes: list[str] = field(default_factory=list)
     failures: list[str] = field(default_factory=list)
@@ -57,7 +66,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> Said:
         register()
     said = Said()
     with ExitStack() as stack:
-        results = options.results or Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="isc-results-")))
+        results = options.results or Path(
+            stack.enter_context(tempfile.TemporaryDirectory(prefix="isc-results-"))
+        )
         earlier: Path | None = None
         for number, plan in enumerate(plans):
             part = monitor.part(number / len(plans), (number + 1) / len(plans))
@@ -66,7 +77,13 @@ def run(options: argparse.Namespace, monitor: Monitor) -> Said:
                 if notes:
                     said.notes.append(f"{plan.source.path}: {notes}")
                 if options.output is not None or options.render is not None:
-                    _make(folder, plan, options, part.part(0.9, 1.0), empty=earlier is None or plan.blend != earlier)
+                    _make(
+                        folder,
+                        plan,
+                        options,
+                        part.part(0.9, 1.0),
+                        empty=earlier is None or plan.blend != earlier,
+                    )
                     earlier = plan.blend
             except InputError as error:
                 said.failures.append(f"{plan.source.path}: {error}")
@@ -90,11 +107,15 @@ def make_plan(options: argparse.Namespace) -> list[Plan]:
     return [Plan(*three) for three in zip(sources, blends, pictures, strict=True)]
 
 
-# --- the work of the core -------------------------------------------------------------------------------------------------------------
+# --- the work of the core -------------------------------------------------------------------------
 
 
-def _result_of(source: Source, results: Path, options: argparse.Namespace, monitor: Monitor) -> tuple[Path, str]:
-    """The folder of the source's result, with its arrays, and what the work said of it, "" for nothing."""
+def _result_of(
+    source: Source, results: Path, options: argparse.Namespace, monitor: Monitor
+) -> tuple[Path, str]:
+    """The folder of the source's result, with its arrays, and what the work said of it, "" for
+    nothing.
+    """
     environment = worker_environment(choices(bpy.context))
     if not source.is_result:
         folder = results / source.name
@@ -135,11 +156,16 @@ def _wait(worker: Worker, monitor: Monitor) -> str:
     return update.message
 
 
-# --- the work of Blender --------------------------------------------------------------------------------------------------------------
+# --- the work of Blender --------------------------------------------------------------------------
 
 
-def _make(folder: Path, plan: Plan, options: argparse.Namespace, monitor: Monitor, *, empty: bool) -> None:
-    """Builds the object of a result, in a new file where `empty`; saves and renders it. Raises `InputError`, `Cancelled`."""
+def _make(
+    folder: Path, plan: Plan, options: argparse.Namespace, monitor: Monitor, *, empty: bool
+) -> None:
+    """Builds the object of a result, in a new file where `empty`; saves and renders it.
+
+    Raises `InputError`, `Cancelled`.
+    """
     name = plan.source.name
     monitor.report(f"building {name}", 0.0)
     leftover = new_blend() if empty else []
@@ -156,8 +182,12 @@ def _make(folder: Path, plan: Plan, options: argparse.Namespace, monitor: Monito
 
 
 def _request(source: Source, options: argparse.Namespace) -> Request:
-    """What the add-on's panel would ask for, so that the object can be edited and decomposed again there."""
-    method = Method(options.model, options.separator, options.illumination, options.max_size, options.samples)
+    """What the add-on's panel would ask for, so that the object can be edited and decomposed again
+    there.
+    """
+    method = Method(
+        options.model, options.separator, options.illumination, options.max_size, options.samples
+    )
     build = BuildOptions(
         size_metres=options.size,
         sun=options.sun,
@@ -173,7 +203,9 @@ def _request(source: Source, options: argparse.Namespace) -> Request:
 
 
 def _loaded(path: Path) -> str:
-    """The name of the image that shows the file, packed; nothing where Blender cannot read the file."""
+    """The name of the image that shows the file, packed; nothing where Blender cannot read the
+    file.
+    """
     try:
         image = bpy.data.images.load(str(path.resolve()), check_existing=True)
         image.pack()
@@ -183,7 +215,10 @@ def _loaded(path: Path) -> str:
 
 
 def new_blend() -> list[Any]:
-    """A file with nothing in it; add-ons and preferences stay as they are. Returns the scenes that Blender insists on."""
+    """A file with nothing in it; add-ons and preferences stay as they are.
+
+    Returns the scenes that Blender insists on.
+    """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     return list(bpy.data.scenes)
 
@@ -198,7 +233,10 @@ def save_blend(path: Path) -> None:
 
 
 def render(scene: Any, path: Path) -> None:
-    """Renders the scene: .png of 16 bits in the scene's view transform, or .exr of 32 bits, linear. Raises `InputError`."""
+    """Renders the scene: .png of 16 bits in the scene's view transform, or .exr of 32 bits, linear.
+
+    Raises `InputError`.
+    """
     settings = scene.render.image_settings
     settings.file_format, settings.color_depth = _FORMATS[path.suffix.lower()]
     settings.color_mode = "RGBA"

@@ -1,12 +1,14 @@
 """Photos become .blend files and renders without a window.
 
-    blender -b -P blender_addon/headless.py -- photo.png --mask mask.png -o out.blend --render out.png
-    python -m blender_addon.headless photo.png --mask mask.png -o out.blend --render out.png
+    blender -b -P blender_addon/headless.py -- photo.png --mask mask.png -o out.blend --render
+    out.png python -m blender_addon.headless photo.png --mask mask.png -o out.blend --render out.png
 
-The first form works with this file in the source tree and in an installed extension; the second wants the `bpy` module. What stands behind
-`--` is read by `command_line`; exit codes are those of `isc`: 0, 2 for bad input, 130 when cancelled.
+The first form works with this file in the source tree and in an installed extension; the second
+wants the `bpy` module. What stands behind `--` is read by `command_line`; exit codes are those of
+`isc`: 0, 2 for bad input, 130 when cancelled.
 
-Limits: in the source tree, the Python that runs this has to have the packages that `isc_core` needs.
+Limits: in the source tree, the Python that runs this has to have the packages that `isc_core`
+needs.
 """
 
 import importlib
@@ -26,7 +28,10 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _own_arguments() -> list[str]:
-    """What Blender leaves to scripts: everything behind `--`. Without Blender around it, everything."""
+    """What Blender leaves to scripts: everything behind `--`.
+
+    Without Blender around it, everything.
+    """
     given = sys.argv[1:]
     if "--" in given:
         return given[given.index("--") + 1 :]
@@ -34,7 +39,10 @@ def _own_arguments() -> list[str]:
 
 
 def _package() -> str:
-    """The name of the package that this file is a module of. Blender runs the file by itself: then the package may have to be loaded."""
+    """The name of the package that this file is a module of.
+
+    Blender runs the file by itself: then the package may have to be loaded.
+    """
     if __package__:
         return __package__
     folder = Path(__file__).resolve().parent
@@ -55,8 +63,12 @@ def _enabled(extension: str) -> str:
 
 
 def _load(folder: Path) -> str:
-    """Imports the package in `folder` under the folder's name, wherever it lies: the search path stays as it is."""
-    place = importlib.util.spec_from_file_location(folder.name, folder / "__init__.py", submodule_search_locations=[str(folder)])
+    """Imports the package in `folder` under the folder's name, wherever it lies: the search path
+    stays as it is.
+    """
+    place = importlib.util.spec_from_file_location(
+        folder.name, folder / "__init__.py", submodule_search_locations=[str(folder)]
+    )
     if place is None or place.loader is None:
         raise ImportError(f"{folder} is not a package")
     module = importlib.util.module_from_spec(place)
@@ -66,7 +78,10 @@ def _load(folder: Path) -> str:
 
 
 def _run() -> NoReturn:
-    """Ends the process with the command's exit code; Blender by itself ends with 0 after a script that raised."""
+    """Ends the process with the command's exit code;
+
+    Blender by itself ends with 0 after a script that raised.
+    """
     code = FAULT
     try:
         code = main()

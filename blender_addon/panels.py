@@ -123,7 +123,11 @@ class _Edit(_Panel):
         self._draw_material(built)
         column = self.layout.column(align=True)
         column.label(text="Light", icon="LIGHT_SUN")
-        for light, text in (("OPTIMAL", "Sun, Best Direction"), ("CHOSEN", "Sun from the Side"), ("RECOVERED", "As in the Photo")):
+        for light, text in (
+            ("OPTIMAL", "Sun, Best Direction"),
+            ("CHOSEN", "Sun from the Side"),
+            ("RECOVERED", "As in the Photo"),
+        ):
             column.operator("isc.relight", text=text).light = light
         column = self.columns()
         column.prop(context.scene.isc, "max_size")
@@ -135,7 +139,9 @@ class _Edit(_Panel):
         if node is None:
             self.layout.label(text="The material's nodes were replaced", icon="INFO")
             return
-        if sharers(built.object, built.material):  # sliders would change them all, and drawing may change nothing
+        if sharers(
+            built.object, built.material
+        ):  # sliders would change them all, and drawing may change nothing
             self.layout.label(text="Its copies share paint and gloss", icon="INFO")
             self.layout.operator("isc.own_material", icon="MATERIAL")
             return
@@ -146,7 +152,9 @@ class _Edit(_Panel):
         column.label(text="Gloss", icon="MATERIAL")
         for name in ("Specular Level", "Roughness"):
             column.prop(node.inputs[name], "default_value", text=name)
-        column.operator("isc.dichromatic", text=f"Gloss Gain {node.inputs['Specular Gain'].default_value:.2f}")
+        column.operator(
+            "isc.dichromatic", text=f"Gloss Gain {node.inputs['Specular Gain'].default_value:.2f}"
+        )
 
 
 def draw_progress(layout: Any, context: Any) -> None:
@@ -168,7 +176,9 @@ def _draw_end(layout: Any, context: Any) -> None:
 
 
 def wrapped(text: str, width: int) -> list[str]:
-    """The words of a text in lines of at most `width` letters, where words are not longer than that."""
+    """The words of a text in lines of at most `width` letters, where words are not longer than
+    that.
+    """
     lines = [""]
     for word in text.split():
         if lines[-1] and len(lines[-1]) + 1 + len(word) > width:
@@ -178,9 +188,16 @@ def wrapped(text: str, width: int) -> list[str]:
 
 
 def _placed(panel: Any, number: int, place: str) -> type:
-    """The panel's class for one editor. Editing is for objects, so it stands in the 3D view alone."""
+    """The panel's class for one editor.
+
+    Editing is for objects, so it stands in the 3D view alone.
+    """
     name = f"ISC_PT_{panel.__name__.strip('_').lower()}_{place.lower()}"
-    return type(name, (panel, bpy.types.Panel), {"bl_space_type": place, "bl_idname": name, "bl_order": number, "__doc__": panel.bl_label})
+    return type(
+        name,
+        (panel, bpy.types.Panel),
+        {"bl_space_type": place, "bl_idname": name, "bl_order": number, "__doc__": panel.bl_label},
+    )
 
 
 _ORDER = (_Main, _Mask, _Method, _Build)

@@ -1,13 +1,16 @@
-"""Images of Blender as files that the worker reads, without losing bits and without holding the window up.
+"""Images of Blender as files that the worker reads, without losing bits and without holding the
+window up.
 
-Problem: an image datablock may be a file, packed, generated, painted and never saved; 8 bits or float; of any colour space. The worker
-reads files. So an image that is just its file is handed over as that file, which keeps 16 bits and what the file says of its coding; all
-others leave Blender as pixels.
-Equation: byte images hold codes q / 255, handed over as an array of the codes q (a clipped pixel stays known as clipped). Float images hold
-scene-linear light, multiplied by alpha unless that is channel-packed or ignored: (r, g, b) = M (r', g', b') / alpha, with M from Blender's
-working space to linear Rec.709, handed over as an array of float32.
-Limits: byte images in a colour space other than sRGB and linear Rec.709 are refused (Non-Color counts as linear). Blender does not turn
-photos by their rotation flag and the worker does: files that have one are handed over as pixels, so that masks painted on them fit.
+Problem: an image datablock may be a file, packed, generated, painted and never saved; 8 bits or
+float; of any colour space. The worker reads files. So an image that is just its file is handed over
+as that file, which keeps 16 bits and what the file says of its coding; all others leave Blender as
+pixels. Equation: byte images hold codes q / 255, handed over as an array of the codes q (a clipped
+pixel stays known as clipped). Float images hold scene-linear light, multiplied by alpha unless that
+is channel-packed or ignored: (r, g, b) = M (r', g', b') / alpha, with M from Blender's working
+space to linear Rec.709, handed over as an array of float32. Limits: byte images in a colour space
+other than sRGB and linear Rec.709 are refused (Non-Color counts as linear). Blender does not turn
+photos by their rotation flag and the worker does: files that have one are handed over as pixels, so
+that masks painted on them fit.
 """
 
 import mmap
@@ -52,10 +55,12 @@ Steps = Generator[None, None, T]
 class Picture:
     """How an image leaves Blender, known before any of its pixels are touched.
 
-    `name`: of the datablock, with its library. `path`: the file that shows exactly what Blender shows, or None. `data`: the packed bytes of
-    such a file, or None. `transfer`: "srgb" or "linear", how the file's or the pixels' numbers are coded. `size`: (width, height), (0, 0)
-    where the file speaks for itself. `channels`: of the pixels. `is_float`: light, not codes. `associated`: light multiplied by alpha.
-    `covers`: alpha says what belongs to the object. `to_rec709`: (3, 3), from Blender's working space.
+    `name`: of the datablock, with its library. `path`: the file that shows exactly what Blender
+    shows, or None. `data`: the packed bytes of such a file, or None. `transfer`: "srgb" or
+    "linear", how the file's or the pixels' numbers are coded. `size`: (width, height), (0, 0) where
+    the file speaks for itself. `channels`: of the pixels. `is_float`: light, not codes.
+    `associated`: light multiplied by alpha. `covers`: alpha says what belongs to the object.
+    `to_rec709`: (3, 3), from Blender's working space.
     """
 
     name: str
@@ -71,35 +76,56 @@ class Picture:
 
 
 def examine(image: Any, *, as_pixels: bool = False) -> Picture:
-    """How `image` can be handed over; `as_pixels`: not as its file. Raises `InputError` for one that is no picture or has no data."""
+    """How `image` can be handed over;
+
+    `as_pixels`: not as its file. Raises `InputError` for one that is no picture or has no data.
+    """
     if image.source in _NO_PICTURE:
         raise InputError(f"the image {image.name} {_NO_PICTURE[image.source]}")
     if image.type == "RENDER_RESULT":
-        raise InputError("the render result cannot be read: save it (Image, Save As) and open the file")
+        raise InputError(
+            "the render result cannot be read: save it (Image, Save As) and open the file"
+        )
     if not as_pixels and (unchanged := _as_file(image)) is not None:
         return unchanged
     size = (int(image.size[0]), int(image.size[1]))
     if 0 in size or len(image.pixels) != size[0] * size[1] * image.channels:
         raise InputError(_why_empty(image))
     if min(size) < LEAST_SIDE:
-        raise InputError(f"the image {image.name} is {size[0]} x {size[1]} pixels: choose a larger one")
+        raise InputError(
+            f"the image {image.name} is {size[0]} x {size[1]} pixels: choose a larger one"
+        )
     if size[0] * size[1] > MOST_PIXELS:
-        raise InputError(f"the image {image.name} has {size[0] * size[1] / 1e6:.0f} million pixels: scale it down (Image, Resize)")
+        raise InputError(
+            f"the image {image.name} has {size[0] * size[1] / 1e6:.0f} million pixels: scale it down (Image, Resize)"
+        )
     transfer = "linear" if image.is_float else _coding(image)
     if not transfer:
         space = image.colorspace_settings.name
-        raise InputError(f"the image {image.name} has the colour space {space}: choose sRGB, Linear Rec.709 or Non-Color for it")
+        raise InputError(
+            f"the image {image.name} has the colour space {space}: choose sRGB, Linear Rec.709 or Non-Color for it"
+        )
     straight = image.alpha_mode in {"STRAIGHT", "PREMUL"}
     return Picture(
-        image.name_full, None, None, transfer, size, int(image.channels), bool(image.is_float), image.is_float and straight, straight,
+        image.name_full,
+        None,
+        None,
+        transfer,
+        size,
+        int(image.channels),
+        bool(image.is_float),
+        image.is_float and straight,
+        straight,
         working_to_rec709(),
-    )  # fmt: skip
+    )
 
 
 def hand_over(picture: Picture, stem: Path) -> Steps[Path]:
-    """Writes the picture as a file named `stem` with a suffix that fits, in steps of a few milliseconds; returns the file's path.
+    """Writes the picture as a file named `stem` with a suffix that fits, in steps of a few
+    milliseconds; returns the file's path.
 
-    Each `next()` is one step. Raises `InputError` where the image has gone or the file cannot be written.
+    Each `next()` is one step. Raises `InputError` where the image has gone or the file cannot be
+    written.
     """
     if picture.path is not None:
         return picture.path
@@ -109,11 +135,19 @@ def hand_over(picture: Picture, stem: Path) -> Steps[Path]:
         yield from in_background(lambda: _write(path, data))
         return path
     pixels = yield from _taken(picture)
-    return (yield from in_background(lambda: _write_picture(picture, pixels, stem.with_suffix(".npy"))))
+    return (
+        yield from in_background(lambda: _write_picture(picture, pixels, stem.with_suffix(".npy")))
+    )
 
 
-def hand_over_mask(picture: Picture, stem: Path, size: tuple[int, int] | None = None) -> Steps[Path]:
-    """The same for a mask: (H, W) bool as `.npy`, or its own file. `size`: (width, height) to scale it to; needs pixels then."""
+def hand_over_mask(
+    picture: Picture, stem: Path, size: tuple[int, int] | None = None
+) -> Steps[Path]:
+    """The same for a mask:
+
+    (H, W) bool as `.npy`, or its own file. `size`: (width, height) to scale it to; needs pixels
+    then.
+    """
     if picture.path is not None or picture.data is not None:
         return (yield from hand_over(picture, stem))
     pixels = yield from _taken(picture)
@@ -121,7 +155,10 @@ def hand_over_mask(picture: Picture, stem: Path, size: tuple[int, int] | None = 
 
 
 def in_background(work: Callable[[], T]) -> Steps[T]:
-    """Does `work`, which must not touch Blender, in a thread; yields until it is done. Raises what it raises."""
+    """Does `work`, which must not touch Blender, in a thread; yields until it is done.
+
+    Raises what it raises.
+    """
     pool = ThreadPoolExecutor(1)
     try:
         future = pool.submit(work)
@@ -129,33 +166,49 @@ def in_background(work: Callable[[], T]) -> Steps[T]:
             yield
         return future.result()
     except MemoryError as error:
-        raise InputError("there is not enough memory for this image: scale it down (Image, Resize)") from error
+        raise InputError(
+            "there is not enough memory for this image: scale it down (Image, Resize)"
+        ) from error
     finally:
         pool.shutdown(wait=False)
 
 
-# --- what Blender shows -----------------------------------------------------------------------------------------------------------------
+# --- what Blender shows ---------------------------------------------------------------------------
 
 
 def _as_file(image: Any) -> Picture | None:
-    """The image as its file, packed or on disk, if the worker would read from it what Blender shows; else None."""
+    """The image as its file, packed or on disk, if the worker would read from it what Blender
+    shows; else None.
+    """
     transfer = _coding(image)
     if image.source != "FILE" or image.is_dirty or not transfer:
         return None
     if image.packed_file is not None:
         data = bytes(image.packed_file.data)
-        return Picture(image.name_full, None, data, transfer) if _speaks_for_itself(data, image.alpha_mode) else None
+        return (
+            Picture(image.name_full, None, data, transfer)
+            if _speaks_for_itself(data, image.alpha_mode)
+            else None
+        )
     path = Path(image.filepath_from_user())
     try:
-        with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
+        with (
+            path.open("rb") as file,
+            mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content,
+        ):
             fits = _speaks_for_itself(content[:_HEAD], image.alpha_mode)
-    except (OSError, ValueError):  # a missing, forbidden or empty file: what Blender still holds of it counts
+    except (
+        OSError,
+        ValueError,
+    ):  # a missing, forbidden or empty file: what Blender still holds of it counts
         return None
     return Picture(image.name_full, path, None, transfer) if fits else None
 
 
 def _coding(image: Any) -> str:
-    """How the numbers of an image's file are coded: "srgb", "linear", or "" for what the worker does not know."""
+    """How the numbers of an image's file are coded: "srgb", "linear", or "" for what the worker
+    does not know.
+    """
     space = image.colorspace_settings
     if space.name == "sRGB":
         return "srgb"
@@ -163,7 +216,9 @@ def _coding(image: Any) -> str:
 
 
 def _speaks_for_itself(head: bytes, alpha_mode: str) -> bool:
-    """Whether the worker knows files that begin so, reads their alpha as Blender was told to, and does not turn them."""
+    """Whether the worker knows files that begin so, reads their alpha as Blender was told to, and
+    does not turn them.
+    """
     suffix = _suffix(head)
     usual = "PREMUL" if suffix == ".exr" else "STRAIGHT"
     return suffix != "" and alpha_mode == usual and orientation(head) == 1
@@ -174,9 +229,15 @@ def _suffix(head: bytes) -> str:
 
 
 def orientation(head: bytes) -> int:
-    """The rotation flag of a JPEG, PNG or TIFF file that begins with `head`: 1 (upright, or not said) to 8."""
+    """The rotation flag of a JPEG, PNG or TIFF file that begins with `head`: 1 (upright, or not
+    said) to 8.
+    """
     marks = ((b"Exif\0\0", 6), (b"eXIf", 4))
-    start = 0 if _suffix(head) == ".tif" else next((at + skip for mark, skip in marks if (at := head.find(mark, 0, _HEAD)) >= 0), -1)
+    start = (
+        0
+        if _suffix(head) == ".tif"
+        else next((at + skip for mark, skip in marks if (at := head.find(mark, 0, _HEAD)) >= 0), -1)
+    )
     if start < 0:
         return 1
     order = "<" if head[start : start + 2] == b"II" else ">"
@@ -184,7 +245,9 @@ def orientation(head: bytes) -> int:
         (first,) = struct.unpack_from(f"{order}I", head, start + 4)
         (count,) = struct.unpack_from(f"{order}H", head, start + first)
         for entry in range(count):
-            tag, _, _, value = struct.unpack_from(f"{order}HHIH", head, start + first + 2 + 12 * entry)
+            tag, _, _, value = struct.unpack_from(
+                f"{order}HHIH", head, start + first + 2 + 12 * entry
+            )
             if tag == _ORIENTATION:
                 return int(value)
     except struct.error:
@@ -200,20 +263,30 @@ def _why_empty(image: Any) -> str:
 
 
 def working_to_rec709() -> np.ndarray:
-    """(3, 3) float32: from Blender's scene-linear working space, which may be wider, to linear Rec.709."""
+    """(3, 3) float32: from Blender's scene-linear working space, which may be wider, to linear
+    Rec.709.
+    """
     axes = [mathutils.Color(axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
-    if not hasattr(axes[0], "from_scene_linear_to_rec709_linear"):  # before 5.0 it is linear Rec.709
+    if not hasattr(
+        axes[0], "from_scene_linear_to_rec709_linear"
+    ):  # before 5.0 it is linear Rec.709
         return np.eye(3, dtype=np.float32)
-    return np.array([tuple(axis.from_scene_linear_to_rec709_linear()) for axis in axes], np.float32).T
+    return np.array(
+        [tuple(axis.from_scene_linear_to_rec709_linear()) for axis in axes], np.float32
+    ).T
 
 
-# --- pixels -----------------------------------------------------------------------------------------------------------------------------
+# --- pixels ---------------------------------------------------------------------------------------
 
 
 def _taken(picture: Picture) -> Steps[np.ndarray]:
-    """(H, W, channels) float32, row 0 at the top, as Blender holds them. Only the copying itself is done where the window waits."""
+    """(H, W, channels) float32, row 0 at the top, as Blender holds them.
+
+    Only the copying itself is done where the window waits.
+    """
     count = picture.size[0] * picture.size[1] * picture.channels
-    # Getting fresh memory from the system takes far longer than copying into it: it is touched in the background.
+    # Getting fresh memory from the system takes far longer than copying into it: it is touched in
+    # the background.
     buffer = yield from in_background(lambda: np.full(count, 0, np.float32))
     image = next((image for image in bpy.data.images if image.name_full == picture.name), None)
     if image is None or len(image.pixels) != count:
@@ -228,13 +301,21 @@ def _write_picture(picture: Picture, pixels: np.ndarray, path: Path) -> Path:
 
 
 def codes(picture: Picture, pixels: np.ndarray) -> np.ndarray:
-    """(H, W, 3), or (H, W, 4) with alpha where that says anything: the uint8 codes of a byte image's pixels (H, W, 4)."""
+    """(H, W, 3), or (H, W, 4) with alpha where that says anything: the uint8 codes of a byte
+    image's pixels (H, W, 4).
+    """
     stored = np.rint(255 * pixels).astype(np.uint8)
-    return stored if picture.covers and (stored[..., 3] < 255).any() else np.ascontiguousarray(stored[..., :3])
+    return (
+        stored
+        if picture.covers and (stored[..., 3] < 255).any()
+        else np.ascontiguousarray(stored[..., :3])
+    )
 
 
 def light(picture: Picture, pixels: np.ndarray) -> np.ndarray:
-    """(H, W, 3), or (H, W, 4) with straight alpha where that says anything: linear Rec.709 of a float image's pixels (H, W, channels)."""
+    """(H, W, 3), or (H, W, 4) with straight alpha where that says anything: linear Rec.709 of a
+    float image's pixels (H, W, channels).
+    """
     color = pixels[..., :3] if picture.channels >= 3 else np.repeat(pixels[..., :1], 3, axis=2)
     alpha = pixels[..., 3:4] if picture.channels == 4 else np.ones_like(pixels[..., :1])
     if picture.associated:
@@ -246,7 +327,9 @@ def light(picture: Picture, pixels: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(color, np.float32)
 
 
-def _write_mask(picture: Picture, pixels: np.ndarray, size: tuple[int, int] | None, stem: Path) -> Path:
+def _write_mask(
+    picture: Picture, pixels: np.ndarray, size: tuple[int, int] | None, stem: Path
+) -> Path:
     mask = mask_of(picture, pixels)
     path = stem.with_suffix(".npy")
     _write(path, mask if size is None else scaled(mask, size))
@@ -254,7 +337,8 @@ def _write_mask(picture: Picture, pixels: np.ndarray, size: tuple[int, int] | No
 
 
 def mask_of(picture: Picture, pixels: np.ndarray) -> np.ndarray:
-    """(H, W) bool of pixels (H, W, channels): alpha from one half on where it is not opaque, else above half of the largest value.
+    """(H, W) bool of pixels (H, W, channels): alpha from one half on where it is not opaque, else
+    above half of the largest value.
 
     Raises `InputError` if that is empty.
     """
@@ -271,12 +355,13 @@ def mask_of(picture: Picture, pixels: np.ndarray) -> np.ndarray:
 def scaled(mask: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """An (H, W) mask brought to (width, height) pixels: each takes what lies under its centre."""
     rows, columns = (
-        np.minimum((np.arange(new) + 0.5) * old / new, old - 1).astype(int) for new, old in zip(size[::-1], mask.shape, strict=True)
+        np.minimum((np.arange(new) + 0.5) * old / new, old - 1).astype(int)
+        for new, old in zip(size[::-1], mask.shape, strict=True)
     )
     return mask[np.ix_(rows, columns)]
 
 
-# --- files ------------------------------------------------------------------------------------------------------------------------------
+# --- files ----------------------------------------------------------------------------------------
 
 
 def _write(path: Path, content: bytes | np.ndarray) -> None:
@@ -286,4 +371,6 @@ def _write(path: Path, content: bytes | np.ndarray) -> None:
         else:
             np.save(path, content, allow_pickle=False)
     except OSError as error:
-        raise InputError(f"cannot write {path}: {error.strerror or error}; choose another cache folder in the preferences") from error
+        raise InputError(
+            f"cannot write {path}: {error.strerror or error}; choose another cache folder in the preferences"
+        ) from error

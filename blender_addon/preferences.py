@@ -20,8 +20,9 @@ ADDON = __package__ or ""
 
 @dataclass(frozen=True)
 class Choices:
-    """The preferences as they hold now. `threads`: 0 for one each core. `cache`: folder of compiled kernels. `results`: folder of results
-    that are kept, or None."""
+    """The preferences as they hold now. `threads`: 0 for one each core. `cache`: folder of compiled
+    kernels. `results`: folder of results that are kept, or None.
+    """
 
     threads: int
     cache: Path
@@ -34,7 +35,11 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
     bl_idname = ADDON
 
     threads: IntProperty(
-        name="Threads", description="How many threads the work may use; 0 takes one for each core", default=0, min=0, max=256
+        name="Threads",
+        description="How many threads the work may use; 0 takes one for each core",
+        default=0,
+        min=0,
+        max=256,
     )
     cache_folder: StringProperty(
         name="Cache Folder",
@@ -56,17 +61,23 @@ class ISC_AP_preferences(bpy.types.AddonPreferences):
         layout.prop(self, "cache_folder")
         layout.prop(self, "keep_results")
         if self.keep_results:
-            layout.label(text=f"Results: {_base(self.cache_folder) / 'results'}", icon="FILE_FOLDER")
+            layout.label(
+                text=f"Results: {_base(self.cache_folder) / 'results'}", icon="FILE_FOLDER"
+            )
 
 
 def choices(context: Any) -> Choices:
-    """The preferences in use, the usual ones where the add-on was registered without being installed."""
+    """The preferences in use, the usual ones where the add-on was registered without being
+    installed.
+    """
     addon = context.preferences.addons.get(ADDON)
     stored = None if addon is None else addon.preferences
     if stored is None:
         return Choices(0, _base("") / "kernels", None)
     base = _base(stored.cache_folder)
-    return Choices(stored.threads, base / "kernels", base / "results" if stored.keep_results else None)
+    return Choices(
+        stored.threads, base / "kernels", base / "results" if stored.keep_results else None
+    )
 
 
 def _base(chosen: str) -> Path:
@@ -79,7 +90,8 @@ def _base(chosen: str) -> Path:
 
 
 def worker_environment(chosen: Choices) -> WorkerEnvironment:
-    """Blender's own Python, where the worker finds `isc_core` and the packages it needs, and where it keeps compiled kernels.
+    """Blender's own Python, where the worker finds `isc_core` and the packages it needs, and where
+    it keeps compiled kernels.
 
     Raises `InputError` if `isc_core` is not there.
     """
@@ -88,22 +100,35 @@ def worker_environment(chosen: Choices) -> WorkerEnvironment:
     if place is not None and place.submodule_search_locations:
         inside = Path(place.submodule_search_locations[0]).resolve().parent
     if not (inside / "isc_core" / "__main__.py").is_file():
-        raise InputError("the worker is missing (isc_core is not in the extension): install the extension again")
+        raise InputError(
+            "the worker is missing (isc_core is not in the extension): install the extension again"
+        )
     extensions = Path(bpy.utils.user_resource("EXTENSIONS")).resolve()
-    wheels = (Path(path) for path in sys.path if path and Path(path).resolve().is_relative_to(extensions))
-    return WorkerEnvironment(python=Path(sys.executable), search=(inside, *wheels), cache=chosen.cache)
+    wheels = (
+        Path(path) for path in sys.path if path and Path(path).resolve().is_relative_to(extensions)
+    )
+    return WorkerEnvironment(
+        python=Path(sys.executable), search=(inside, *wheels), cache=chosen.cache
+    )
 
 
 def new_folder(choice: Path | None, name: str) -> Path:
-    """A new, empty folder of one run: in `choice`, or in Blender's temporary folder, which is removed when Blender ends.
+    """A new, empty folder of one run: in `choice`, or in Blender's temporary folder, which is
+    removed when Blender ends.
 
-    `name`: anything; what file systems refuse is left out. Raises `InputError` where it cannot be made.
+    `name`: anything; what file systems refuse is left out. Raises `InputError` where it cannot be
+    made.
     """
-    plain = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)[:60] or "photo"
+    plain = (
+        "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)[:60]
+        or "photo"
+    )
     try:
         if choice is not None:
             choice.mkdir(parents=True, exist_ok=True)
         return Path(tempfile.mkdtemp(prefix=f"isc_{plain}_", dir=choice or bpy.app.tempdir))
     except OSError as error:
         place = choice or bpy.app.tempdir
-        raise InputError(f"cannot write to {place} ({error.strerror}): choose another folder in the add-on's preferences") from error
+        raise InputError(
+            f"cannot write to {place} ({error.strerror}): choose another folder in the add-on's preferences"
+        ) from error

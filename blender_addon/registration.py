@@ -10,11 +10,18 @@ from . import operators, panels, preferences, properties
 from .operators.modal import show
 from .operators.run import active, end_active
 
-_CLASSES = (preferences.ISC_AP_preferences, *properties.CLASSES, *operators.CLASSES, *panels.CLASSES)
+_CLASSES = (
+    preferences.ISC_AP_preferences,
+    *properties.CLASSES,
+    *operators.CLASSES,
+    *panels.CLASSES,
+)
 
 
 def register() -> None:
-    """Registers all classes, the properties of scenes, and what has to be known of loading and closing."""
+    """Registers all classes, the properties of scenes, and what has to be known of loading and
+    closing.
+    """
     for kind in _CLASSES:
         bpy.utils.register_class(kind)
     properties.attach()

@@ -1,11 +1,14 @@
-"""The process that does the work, seen from Blender: started, followed, cancelled; no call here ever waits for it.
+"""The process that does the work, seen from Blender: started, followed, cancelled; no call here
+ever waits for it.
 
-Problem: a decomposition takes from seconds to minutes, needs packages that Blender's process must not load, and may crash; Blender's window
-has to go on. `python -m isc_core ... --progress json` runs in a process of its own, with an environment that names everything it needs; a
-thread reads its lines, and `Worker.poll` returns what the last one said.
+Problem: a decomposition takes from seconds to minutes, needs packages that Blender's process must
+not load, and may crash; Blender's window has to go on. `python -m isc_core ... --progress json`
+runs in a process of its own, with an environment that names everything it needs; a thread reads its
+lines, and `Worker.poll` returns what the last one said.
 
-However it ends, nothing of it is left but a result that is complete: asked to cancel, the worker tidies up itself; killed, its traces are
-removed here; and when Blender dies, the end of its standard input tells the worker to stop.
+However it ends, nothing of it is left but a result that is complete: asked to cancel, the worker
+tidies up itself; killed, its traces are removed here; and when Blender dies, the end of its
+standard input tells the worker to stop.
 
 Citation: process groups, IEEE Std 1003.1-2017, setsid and kill.
 
@@ -31,23 +34,44 @@ from isc_core.errors import InputError
 Box = tuple[int, int, int, int]
 
 _PATIENCE_SECONDS = 2.0  # from the wish to cancel to the kill
-_TIDYING_SECONDS = 5.0  # how long Blender's own end waits for the traces of a killed worker to be removed
+_TIDYING_SECONDS = (
+    5.0  # how long Blender's own end waits for the traces of a killed worker to be removed
+)
 _NICENESS = 5  # the window comes first where both want the processor
 _REPORT_BYTES = 8000
 _KEPT = (
-    "PATH", "HOME", "USER", "LOGNAME", "LANG", "LC_ALL", "LC_CTYPE", "TMPDIR", "TEMP", "TMP",
-    "SYSTEMROOT", "SYSTEMDRIVE", "WINDIR", "COMSPEC", "PATHEXT", "USERPROFILE", "APPDATA", "LOCALAPPDATA", "PROGRAMDATA",
-    "NUMBER_OF_PROCESSORS", "PROCESSOR_ARCHITECTURE", "PROCESSOR_IDENTIFIER",
-)  # fmt: skip
+    "PATH",
+    "HOME",
+    "USER",
+    "LOGNAME",
+    "LANG",
+    "LC_ALL",
+    "LC_CTYPE",
+    "TMPDIR",
+    "TEMP",
+    "TMP",
+    "SYSTEMROOT",
+    "SYSTEMDRIVE",
+    "WINDIR",
+    "COMSPEC",
+    "PATHEXT",
+    "USERPROFILE",
+    "APPDATA",
+    "LOCALAPPDATA",
+    "PROGRAMDATA",
+    "NUMBER_OF_PROCESSORS",
+    "PROCESSOR_ARCHITECTURE",
+    "PROCESSOR_IDENTIFIER",
+)
 
 
 @dataclass(frozen=True)
 class Job:
     """What `isc decompose` is asked for; see its help.
 
-    `photo`, `mask`: image files or NumPy arrays (`.npy`). `output`: the result's folder; an earlier result there is replaced.
-    `model`, `separator`, `illumination`, `transfer`: names it knows. `max_size`: the object's long side in pixels, 0 the photo's.
-    `threads`: 0 for one each core.
+    `photo`, `mask`: image files or NumPy arrays (`.npy`). `output`: the result's folder; an earlier
+    result there is replaced. `model`, `separator`, `illumination`, `transfer`: names it knows.
+    `max_size`: the object's long side in pixels, 0 the photo's. `threads`: 0 for one each core.
     """
 
     photo: Path
@@ -63,8 +87,10 @@ class Job:
 
 @dataclass(frozen=True)
 class WorkerEnvironment:
-    """What a worker is run with. `python`: the interpreter. `search`: folders where it finds `isc_core` and the packages that this needs.
-    `cache`: the folder where compiled code is kept between runs; made if it lacks."""
+    """What a worker is run with. `python`: the interpreter. `search`: folders where it finds
+    `isc_core` and the packages that this needs. `cache`: the folder where compiled code is kept
+    between runs; made if it lacks.
+    """
 
     python: Path
     search: tuple[Path, ...]
@@ -80,15 +106,21 @@ class WorkerEnvironment:
             "PYTHONPYCACHEPREFIX": str(self.cache / "bytecode"),
             "NUMBA_CACHE_DIR": str(self.cache),
         }
-        limits = {name: str(threads) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS") if threads > 0}
+        limits = {
+            name: str(threads)
+            for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+            if threads > 0
+        }
         return {name: os.environ[name] for name in _KEPT if name in os.environ} | own | limits
 
 
 @dataclass(frozen=True)
 class Update:
-    """How far the work is. `stage`: for people. `fraction`: of all of it, in [0, 1]. `state`: "running", "done", "failed" or "cancelled".
-    `message`: when done, the lines that the command would print; when failed, one line that says why. `report`: the tail of the worker's
-    log once it has ended."""
+    """How far the work is. `stage`: for people. `fraction`: of all of it, in [0, 1]. `state`:
+    "running", "done", "failed" or "cancelled". `message`: when done, the lines that the command
+    would print; when failed, one line that says why. `report`: the tail of the worker's log once it
+    has ended.
+    """
 
     stage: str = ""
     fraction: float = 0.0
@@ -98,7 +130,10 @@ class Update:
 
 
 class Worker:
-    """A process at work, made by `start` and its sisters. All methods return at once and may be called at any time."""
+    """A process at work, made by `start` and its sisters.
+
+    All methods return at once and may be called at any time.
+    """
 
     def __init__(self, command: Sequence[str], output: Path, variables: Mapping[str, str]) -> None:
         """Runs `command`, which writes `output`. Raises `OSError` where it cannot be run."""
@@ -130,7 +165,10 @@ class Worker:
         return self._update
 
     def cancel(self) -> None:
-        """Asks the worker to stop; it is killed if it has not done so after two seconds. Without effect once it has ended."""
+        """Asks the worker to stop; it is killed if it has not done so after two seconds.
+
+        Without effect once it has ended.
+        """
         if not self._ended.is_set():
             self._stopped = True
             with contextlib.suppress(OSError, ValueError):  # it has just ended
@@ -146,7 +184,9 @@ class Worker:
 
     def _see_to_the_end(self, patience: float) -> None:
         """A thread that Blender's own end waits for, so that nothing is left behind then either."""
-        threading.Thread(target=self._end, args=(patience,), name="isc-worker-end", daemon=False).start()
+        threading.Thread(
+            target=self._end, args=(patience,), name="isc-worker-end", daemon=False
+        ).start()
 
     def _end(self, patience: float) -> None:
         if not self._ended.wait(patience):
@@ -161,7 +201,9 @@ class Worker:
             for line in process.stdout:
                 event = _event(line)
                 if event.get("event") == "progress":
-                    self._update = Update(str(event.get("stage", "")), float(event.get("fraction", 0.0)))
+                    self._update = Update(
+                        str(event.get("stage", "")), float(event.get("fraction", 0.0))
+                    )
                 elif event:
                     last = event
         final = self._outcome(last, process.returncode)
@@ -185,13 +227,18 @@ class Worker:
         """Removes what a killed worker could not."""
         with contextlib.suppress(OSError):
             remove_unfinished(self._output, self._spared)
-        for parent in self._made:  # the innermost first; one that somebody else has filled meanwhile stays
+        for (
+            parent
+        ) in self._made:  # the innermost first; one that somebody else has filled meanwhile stays
             with contextlib.suppress(OSError):
                 parent.rmdir()
 
 
 def start(job: Job, environment: WorkerEnvironment) -> Worker:
-    """Decomposes a photo into a result folder with arrays. Raises `InputError` where the worker cannot be started."""
+    """Decomposes a photo into a result folder with arrays.
+
+    Raises `InputError` where the worker cannot be started.
+    """
     words = ["decompose", _full(job.photo), "--arrays", "-o", _full(job.output)]
     for name in ("model", "separator", "illumination", "max_size", "threads", "transfer"):
         words += [f"--{name.replace('_', '-')}", str(getattr(job, name))]
@@ -201,7 +248,8 @@ def start(job: Job, environment: WorkerEnvironment) -> Worker:
 
 
 def start_edit(result: Path, arguments: Sequence[str], environment: WorkerEnvironment) -> Worker:
-    """Edits a result. `arguments`: those of `isc edit` after RESULT: the action, its options and `-o DIR` with a full path.
+    """Edits a result. `arguments`: those of `isc edit` after RESULT: the action, its options and
+    `-o DIR` with a full path.
 
     Raises `InputError` where the worker cannot be started, or `-o` lacks.
     """
@@ -212,21 +260,33 @@ def start_edit(result: Path, arguments: Sequence[str], environment: WorkerEnviro
 
 
 def start_arrays(result: Path, environment: WorkerEnvironment) -> Worker:
-    """Adds `arrays.npz` to a result folder without it. Raises `InputError` where the worker cannot be started."""
+    """Adds `arrays.npz` to a result folder without it.
+
+    Raises `InputError` where the worker cannot be started.
+    """
     return _begin(["arrays", _full(result)], result / "arrays.npz", environment)
 
 
-def box_mask(photo: Path, box: Box, output: Path, environment: WorkerEnvironment, transfer: str = "auto") -> Worker:
-    """Cuts the object inside `box` (left, top, width, height in pixels) out of a photo; `output`: the mask, a PNG.
+def box_mask(
+    photo: Path, box: Box, output: Path, environment: WorkerEnvironment, transfer: str = "auto"
+) -> Worker:
+    """Cuts the object inside `box` (left, top, width, height in pixels) out of a photo; `output`:
+    the mask, a PNG.
 
     Raises `InputError` where the worker cannot be started.
     """
     numbers = ",".join(map(str, box))
     # The equals sign keeps a negative number from being read as an option.
-    return _begin(["mask", _full(photo), f"--box={numbers}", "--transfer", transfer, "-o", _full(output)], output, environment)
+    return _begin(
+        ["mask", _full(photo), f"--box={numbers}", "--transfer", transfer, "-o", _full(output)],
+        output,
+        environment,
+    )
 
 
-def _begin(words: Sequence[str], output: Path, environment: WorkerEnvironment, threads: int = 0) -> Worker:
+def _begin(
+    words: Sequence[str], output: Path, environment: WorkerEnvironment, threads: int = 0
+) -> Worker:
     with contextlib.suppress(OSError):  # without it the worker compiles anew each time
         environment.cache.mkdir(parents=True, exist_ok=True)
     command = [str(environment.python), "-m", "isc_core", *words, "--progress", "json"]
@@ -234,7 +294,9 @@ def _begin(words: Sequence[str], output: Path, environment: WorkerEnvironment, t
         return Worker(command, Path(_full(output)), environment.variables(threads))
     except OSError as error:
         reason = error.strerror or str(error)
-        raise InputError(f"the worker cannot be started with {environment.python} ({reason}): install the extension again") from error
+        raise InputError(
+            f"the worker cannot be started with {environment.python} ({reason}): install the extension again"
+        ) from error
 
 
 def _full(path: Path) -> str:
@@ -245,14 +307,20 @@ def _full(path: Path) -> str:
 def _apart() -> dict[str, Any]:
     """A process group of its own, no console window, and on Windows already the lower priority."""
     if sys.platform == "win32":
-        return {"creationflags": subprocess.CREATE_NO_WINDOW | subprocess.CREATE_NEW_PROCESS_GROUP | subprocess.BELOW_NORMAL_PRIORITY_CLASS}
+        return {
+            "creationflags": subprocess.CREATE_NO_WINDOW
+            | subprocess.CREATE_NEW_PROCESS_GROUP
+            | subprocess.BELOW_NORMAL_PRIORITY_CLASS
+        }
     return {"start_new_session": True}
 
 
 def _lower_priority(process: "subprocess.Popen[str]") -> None:
     if sys.platform != "win32":
         with contextlib.suppress(OSError):  # it has ended already, and `poll` will say why
-            os.setpriority(os.PRIO_PROCESS, process.pid, os.getpriority(os.PRIO_PROCESS, 0) + _NICENESS)
+            os.setpriority(
+                os.PRIO_PROCESS, process.pid, os.getpriority(os.PRIO_PROCESS, 0) + _NICENESS
+            )
 
 
 def _kill_group(process: "subprocess.Popen[str]") -> None:
@@ -261,7 +329,9 @@ def _kill_group(process: "subprocess.Popen[str]") -> None:
     with contextlib.suppress(OSError):  # it has just ended
         if sys.platform == "win32":
             tree = ["taskkill", "/F", "/T", "/PID", str(process.pid)]
-            subprocess.run(tree, capture_output=True, check=False, creationflags=subprocess.CREATE_NO_WINDOW)
+            subprocess.run(
+                tree, capture_output=True, check=False, creationflags=subprocess.CREATE_NO_WINDOW
+            )
             process.kill()
         else:
             os.killpg(process.pid, signal.SIGKILL)

@@ -4,6 +4,8 @@ import numpy as np
 
 
 def mask_slices(mask: np.ndarray) -> tuple[slice, slice]:
-    """Rows and columns of `mask` (H, W) bool, of which some pixel must be set, from the first to the last that has one."""
+    """Rows and columns of `mask` (H, W) bool, of which some pixel must be set, from the first to
+    the last that has one.
+    """
     rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
     return slice(rows[0], rows[-1] + 1), slice(columns[0], columns[-1] + 1)

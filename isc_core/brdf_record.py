@@ -13,7 +13,8 @@ _LENGTH = 1e-3  # that a direction's may differ from 1
 
 
 def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> LobeFit:
-    """The fit that wrote `record`; `predicted` (H, W, 3): its specular image, which is not part of it.
+    """The fit that wrote `record`; `predicted` (H, W, 3): its specular image, which is not part of
+    it.
 
     Raises `KeyError`, `TypeError` or `ValueError` where the record is not one of a fit.
     """
@@ -43,14 +44,23 @@ def _light(record: Mapping[str, Any]) -> LobeLight:
     direction = _numbers(record["direction"], (3,))
     if abs(float(np.linalg.norm(direction)) - 1) > _LENGTH:
         raise ValueError("the direction of a light is not of length 1")
-    return LobeLight(direction, _number(record["cone_68_degrees"]), _numbers(record["strength_light"], (3,)), interval)
+    return LobeLight(
+        direction,
+        _number(record["cone_68_degrees"]),
+        _numbers(record["strength_light"], (3,)),
+        interval,
+    )
 
 
 def _interval(record: Any, shape: tuple[int, ...]) -> Interval | None:
     if record is None:
         return None
     low, high = record
-    return Interval(_number(low), _number(high)) if shape == () else Interval(_numbers(low, shape), _numbers(high, shape))
+    return (
+        Interval(_number(low), _number(high))
+        if shape == ()
+        else Interval(_numbers(low, shape), _numbers(high, shape))
+    )
 
 
 def _numbers(values: Any, shape: tuple[int, ...]) -> np.ndarray:
@@ -61,7 +71,11 @@ def _numbers(values: Any, shape: tuple[int, ...]) -> np.ndarray:
 
 
 def _number(value: Any) -> float:
-    number = None if isinstance(value, bool) or not isinstance(value, int | float) else numbers(value, ())
+    number = (
+        None
+        if isinstance(value, bool) or not isinstance(value, int | float)
+        else numbers(value, ())
+    )
     if number is None:
         raise ValueError(f"{str(value)[:80]} instead of a number")
     return float(number)

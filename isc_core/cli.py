@@ -1,8 +1,11 @@
-"""The command `isc`: runs a sub-command and turns how it ended into an exit code and at most one line.
+"""The command `isc`: runs a sub-command and turns how it ended into an exit code and at most one
+line.
 
-0: done. 1: done, but what was measured breaks a bound; stderr says which. 2: something given cannot be used, or the machine has no room
-for it; one line on stderr says what to do. 130: cancelled by Ctrl-C (the first lets the work stop at its next step, the second stops it
-at once). Nothing half-written is left in any case. With `--progress json` a program is told instead of a person, see `json_progress`.
+0: done. 1: done, but what was measured breaks a bound; stderr says which. 2: something given cannot
+be used, or the machine has no room for it; one line on stderr says what to do. 130: cancelled by
+Ctrl-C (the first lets the work stop at its next step, the second stops it at once). Nothing
+half-written is left in any case. With `--progress json` a program is told instead of a person, see
+`json_progress`.
 """
 
 import re
@@ -20,7 +23,9 @@ _Speaker = TerminalSpeaker | JsonSpeaker
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs `isc` with `arguments`, those of the process if None, and returns its exit code; never raises for a user's mistake."""
+    """Runs `isc` with `arguments`, those of the process if None, and returns its exit code; never
+    raises for a user's mistake.
+    """
     words = list(sys.argv[1:] if arguments is None else arguments)
     # Looked for here, so that complaints about the other options are told to a program, too.
     for_program = "--progress=json" in words or ("--progress", "json") in pairwise(words)
@@ -43,7 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         discard_output()
         return BROKEN_PIPE
     except MemoryError:
-        return _refused(speaker, "there is not enough memory for this: give a smaller image or a smaller --max-size")
+        return _refused(
+            speaker,
+            "there is not enough memory for this: give a smaller image or a smaller --max-size",
+        )
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         return _refused(speaker, f"{where}{error.strerror or error}")
@@ -51,7 +59,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: list[str], speaker: _Speaker) -> tuple[str, list[str]]:
     """Where the result was written, and the lines to print."""
-    # Numerical libraries take a second to load: inside `main`, so that Ctrl-C is answered during that second too.
+    # Numerical libraries take a second to load: inside `main`, so that Ctrl-C is answered during
+    # that second too.
     from .commands import build_parser
 
     try:

@@ -1,7 +1,9 @@
-"""Loops over pixels that NumPy cannot express, compiled where Numba is there and plain Python, slower but alike, where it is not.
+"""Loops over pixels that NumPy cannot express, compiled where Numba is there and plain Python,
+slower but alike, where it is not.
 
-Compiled code is kept between runs: beside the source where that can be written, else in the user's cache folder, or where
-NUMBA_CACHE_DIR says; where none of them can be written, in a folder that lasts as long as the process.
+Compiled code is kept between runs: beside the source where that can be written, else in the user's
+cache folder, or where NUMBA_CACHE_DIR says; where none of them can be written, in a folder that
+lasts as long as the process.
 """
 
 import atexit
@@ -17,7 +19,9 @@ Loop = TypeVar("Loop", bound=Callable[..., object])
 
 
 def compiled(loop: Loop) -> Loop:
-    """`loop`, a function on numbers and arrays that Numba can compile, made fast if possible; it releases the interpreter's lock."""
+    """`loop`, a function on numbers and arrays that Numba can compile, made fast if possible; it
+    releases the interpreter's lock.
+    """
     try:
         import numba
     except ImportError:
@@ -30,8 +34,9 @@ def compiled(loop: Loop) -> Loop:
 
 @cache
 def drop_broken(folder: Path) -> None:
-    """Removes what a loss of power, or a full disk, cut short of the compiled code that is kept in `folder`: Numba would fail on it, at
-    every start."""
+    """Removes what a loss of power, or a full disk, cut short of the compiled code that is kept in
+    `folder`: Numba would fail on it, at every start.
+    """
     for kept in folder.glob("*.nb[ic]"):
         with contextlib.suppress(OSError):  # another process replaced it, or it cannot be removed
             if not kept.read_bytes().endswith(b"."):  # as all that `pickle` writes does
@@ -39,7 +44,9 @@ def drop_broken(folder: Path) -> None:
 
 
 def ensure_cache_folder() -> None:
-    """Gives Numba a folder that lasts as long as this process, where it finds none to write to: it would refuse to work."""
+    """Gives Numba a folder that lasts as long as this process, where it finds none to write to: it
+    would refuse to work.
+    """
     try:
         import numba
     except ImportError:
@@ -53,4 +60,6 @@ def ensure_cache_folder() -> None:
 
 
 def _probe() -> None:
-    """Lies among the package's modules, so that Numba looks for a cache where it will look for theirs."""
+    """Lies among the package's modules, so that Numba looks for a cache where it will look for
+    theirs.
+    """

@@ -1,7 +1,8 @@
 """The results of the core, as typed frozen objects, and the identities that they keep.
 
-Identities, inside the mask: `image = diffuse + specular + residual`, `diffuse = reflectance * shading` (both to 1e-5 of the image's
-maximum), `shading = exp(SH(normal))` (to 1e-4 relative), unit normals. Their files are written and read by `result_folder`.
+Identities, inside the mask: `image = diffuse + specular + residual`, `diffuse = reflectance *
+shading` (both to 1e-5 of the image's maximum), `shading = exp(SH(normal))` (to 1e-4 relative), unit
+normals. Their files are written and read by `result_folder`.
 """
 
 from dataclasses import dataclass, field
@@ -17,8 +18,9 @@ from .sirfs.frames import real_sh
 class Separation:
     """One photo split into its layers: `image = diffuse + specular + residual` inside the mask.
 
-    `diffuse`, `specular`, `residual`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and specular >= 0.
-    `confidence`: (H, W) float32 in [0, 1], how far the split can be trusted at each pixel; 0 outside the mask.
+    `diffuse`, `specular`, `residual`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and
+    specular >= 0. `confidence`: (H, W) float32 in [0, 1], how far the split can be trusted at each
+    pixel; 0 outside the mask.
     """
 
     diffuse: np.ndarray
@@ -29,7 +31,9 @@ class Separation:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result comes from: everything of `decomposition.json` that is not the scene itself (JSON-ready values)."""
+    """Where a result comes from: everything of `decomposition.json` that is not the scene itself
+    (JSON-ready values).
+    """
 
     settings: dict[str, Any] = field(default_factory=dict)
     seed: int = 0
@@ -43,8 +47,8 @@ class Provenance:
 class IdentityErrors:
     """The worst violation of each identity inside the mask, and what is tolerated.
 
-    `image`, `shading_product`: largest absolute error over the image's maximum. `sh`: largest relative error of the shading.
-    `normal_length`: largest deviation of a normal's length from 1.
+    `image`, `shading_product`: largest absolute error over the image's maximum. `sh`: largest
+    relative error of the shading. `normal_length`: largest deviation of a normal's length from 1.
     """
 
     image: float
@@ -60,18 +64,24 @@ class IdentityErrors:
             (self.sh, 1e-4, "shading = exp(SH(normal))"),
             (self.normal_length, 1e-4, "normals of length 1"),
         )
-        return tuple(f"{name} (error {error:.2g})" for error, tolerance, name in tests if not error <= tolerance)
+        return tuple(
+            f"{name} (error {error:.2g})"
+            for error, tolerance, name in tests
+            if not error <= tolerance
+        )
 
 
 @dataclass(frozen=True)
 class Decomposition:
-    """The intrinsic scene characteristics of one photo. Maps cover the whole frame at the scale used.
+    """The intrinsic scene characteristics of one photo. Maps cover the whole frame at the scale
+    used.
 
-    `image, diffuse, specular, residual, reflectance, shading`: (H, W, 3) float32, linear Rec.709, 0 outside the mask.
-    `normal`: (H, W, 3) float32 unit vectors, x right, y up, z toward the viewer; (0, 0, 1) outside the mask.
-    `height`: (H, W) float32, pixels, toward the viewer; 0 outside. `mask`: (H, W) bool. `confidence`: (H, W) in [0, 1].
-    `illumination`: (9, 3) float64; log shading_c(n) = sum_k illumination[k, c] Y_k(n), orthonormal real spherical harmonics.
-    `brdf`: the lobe fitted to the specular layer; None where no fit was tried.
+    `image, diffuse, specular, residual, reflectance, shading`: (H, W, 3) float32, linear Rec.709, 0
+    outside the mask. `normal`: (H, W, 3) float32 unit vectors, x right, y up, z toward the viewer;
+    (0, 0, 1) outside the mask. `height`: (H, W) float32, pixels, toward the viewer; 0 outside.
+    `mask`: (H, W) bool. `confidence`: (H, W) in [0, 1]. `illumination`: (9, 3) float64; log
+    shading_c(n) = sum_k illumination[k, c] Y_k(n), orthonormal real spherical harmonics. `brdf`:
+    the lobe fitted to the specular layer; None where no fit was tried.
     """
 
     image: np.ndarray
@@ -89,17 +99,26 @@ class Decomposition:
     brdf: LobeFit | None = None
 
     def identity_errors(self) -> IdentityErrors:
-        """How well the maps fit each other inside the mask. Raises `ValueError` for an empty mask."""
+        """How well the maps fit each other inside the mask.
+
+        Raises `ValueError` for an empty mask.
+        """
         if not self.mask.any():
             raise ValueError("the mask is empty: there is nothing to check")
-        inside = {name: getattr(self, name)[self.mask].astype(np.float64) for name in COLOR_MAPS + ("normal",)}
+        inside = {
+            name: getattr(self, name)[self.mask].astype(np.float64)
+            for name in COLOR_MAPS + ("normal",)
+        }
         scale = max(float(np.abs(inside["image"]).max()), 1e-6)
         layers = inside["diffuse"] + inside["specular"] + inside["residual"]
-        with np.errstate(over="ignore"):  # of a light that none of the photos has: then the shading is not that
+        with np.errstate(
+            over="ignore"
+        ):  # of a light that none of the photos has: then the shading is not that
             expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
         return IdentityErrors(
             image=_worst(inside["image"] - layers) / scale,
-            shading_product=_worst(inside["diffuse"] - inside["reflectance"] * inside["shading"]) / scale,
+            shading_product=_worst(inside["diffuse"] - inside["reflectance"] * inside["shading"])
+            / scale,
             sh=_worst(expected / np.maximum(inside["shading"], 1e-9) - 1),
             normal_length=_worst(np.linalg.norm(inside["normal"], axis=-1) - 1),
         )

@@ -1,18 +1,26 @@
-"""What was found on averages of a photo's pixels, at the pixels themselves: linear between the centres of the averages.
+"""What was found on averages of a photo's pixels, at the pixels themselves: linear between the
+centres of the averages.
 
-Equation: pixel k of a row lies at (k + 1/2) / f - 1/2 of the averages, f pixels wide each; beyond the outermost centres their value holds.
-Citation: P. Heckbert, "What are the coordinates of a pixel?", Graphics Gems (1990), 246-248.
+Equation: pixel k of a row lies at (k + 1/2) / f - 1/2 of the averages, f pixels wide each; beyond
+the outermost centres their value holds. Citation: P. Heckbert, "What are the coordinates of a
+pixel?", Graphics Gems (1990), 246-248.
 """
 
 import numpy as np
 
 
 def enlarged(layer: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
-    """A map (h, w) or (h, w, C) of averages, `factor` >= 1 pixels wide and high, at the pixels of a picture of `shape` (H, W)."""
+    """A map (h, w) or (h, w, C) of averages, `factor` >= 1 pixels wide and high, at the pixels of a
+    picture of `shape` (H, W).
+    """
     for axis, size in enumerate(shape):
         at = np.clip((np.arange(size) + 0.5) / factor - 0.5, 0, layer.shape[axis] - 1)
         first = np.minimum(at.astype(np.int64), max(layer.shape[axis] - 2, 0))
-        beyond = (at - first).astype(np.float32).reshape([-1 if k == axis else 1 for k in range(layer.ndim)])
+        beyond = (
+            (at - first)
+            .astype(np.float32)
+            .reshape([-1 if k == axis else 1 for k in range(layer.ndim)])
+        )
         after = np.minimum(first + 1, layer.shape[axis] - 1)
         layer = (1 - beyond) * np.take(layer, first, axis) + beyond * np.take(layer, after, axis)
     return layer

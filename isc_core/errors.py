@@ -4,8 +4,9 @@
 class InputError(ValueError):
     """Something the user gave cannot be used.
 
-    The message is one line: what is wrong and what to do about it. The command line prints it and exits with 2. Names that files bring
-    along may stand in it: what would break the line or steer a terminal (line ends, escapes, marks of direction) is written as its code.
+    The message is one line: what is wrong and what to do about it. The command line prints it and
+    exits with 2. Names that files bring along may stand in it: what would break the line or steer a
+    terminal (line ends, escapes, marks of direction) is written as its code.
     """
 
     def __init__(self, message: str) -> None:

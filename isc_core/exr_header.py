@@ -1,11 +1,13 @@
 """What an OpenEXR file claims, read before the library sees it.
 
-Problem: the library allocates what a header asks for, for every channel, before it looks whether the file holds it; and its bindings read
-whatever a header names. Here windows, channels and chunks are held against `Limits` and against the size of the file first.
-Layout: a mark, the version with its flags, one header a part (name, type, size, value; ended by an empty name), then for each part a table
-of 8 bytes a chunk: a block of lines or a tile.
-Citation: OpenEXR, "OpenEXR File Layout" (Academy Software Foundation, 2023), https://openexr.com/en/latest/OpenEXRFileLayout.html.
-Limits: flat images of full resolution; deep ones are refused, and channels that are sampled more coarsely than the pixels.
+Problem: the library allocates what a header asks for, for every channel, before it looks whether
+the file holds it; and its bindings read whatever a header names. Here windows, channels and chunks
+are held against `Limits` and against the size of the file first. Layout: a mark, the version with
+its flags, one header a part (name, type, size, value; ended by an empty name), then for each part a
+table of 8 bytes a chunk: a block of lines or a tile. Citation: OpenEXR, "OpenEXR File Layout"
+(Academy Software Foundation, 2023), https://openexr.com/en/latest/OpenEXRFileLayout.html. Limits:
+flat images of full resolution; deep ones are refused, and channels that are sampled more coarsely
+than the pixels.
 """
 
 import math
@@ -25,7 +27,10 @@ _MOST_CHANNELS, _MOST_PARTS, _MOST_HEADER, _LONGEST, _LARGEST_TILE = 1024, 64, 1
 
 @dataclass(frozen=True)
 class ExrPart:
-    """`data`, `display`: windows, (left, top, right, bottom), the last two inside. `channels`: names."""
+    """`data`, `display`: windows, (left, top, right, bottom), the last two inside.
+
+    `channels`: names.
+    """
 
     data: tuple[int, int, int, int]
     display: tuple[int, int, int, int]
@@ -38,10 +43,14 @@ def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
     return right - left + 1, bottom - top + 1
 
 
-def check_exr(data: bytes, path: Path, limits: Limits, stored: int | None = None) -> tuple[ExrPart, ...]:
-    """The parts of a file that begins with `data` (all of it, or a MiB) and has `stored` bytes (None: those of `data`).
+def check_exr(
+    data: bytes, path: Path, limits: Limits, stored: int | None = None
+) -> tuple[ExrPart, ...]:
+    """The parts of a file that begins with `data` (all of it, or a MiB) and has `stored` bytes
+    (None: those of `data`).
 
-    Raises `InputError` for one that claims more than `limits` allows, and `ValueError` or `struct.error` for a damaged one.
+    Raises `InputError` for one that claims more than `limits` allows, and `ValueError` or
+    `struct.error` for a damaged one.
     """
     stored = len(data) if stored is None else stored
     mark, version = struct.unpack_from("<4sI", data)
@@ -79,8 +88,13 @@ def _attributes(data: bytes, at: int) -> tuple[dict[bytes, bytes], int]:
     return found, at + 1
 
 
-def _part(path: Path, header: dict[bytes, bytes], tiled: bool, limits: Limits) -> tuple[ExrPart, int, int]:
-    """A part, the bytes that it unpacks to, and how many chunks it has. Raises `KeyError` as a `ValueError` where something is missing."""
+def _part(
+    path: Path, header: dict[bytes, bytes], tiled: bool, limits: Limits
+) -> tuple[ExrPart, int, int]:
+    """A part, the bytes that it unpacks to, and how many chunks it has.
+
+    Raises `KeyError` as a `ValueError` where something is missing.
+    """
     if missing := {b"channels", b"compression", b"dataWindow", b"displayWindow"} - header.keys():
         raise ValueError(f"lacks {sorted(missing)[0]!r}")
     if header.get(b"type", b"").startswith(b"deep"):
@@ -116,7 +130,9 @@ def _channels(path: Path, value: bytes) -> tuple[tuple[str, ...], int]:
     while (end := value.index(b"\0", at, at + _LONGEST + 1)) > at:
         kind, _, across, down = struct.unpack_from("<iB3xii", value, end + 1)
         if (across, down) != (1, 1):
-            raise InputError(f"{path}: a channel is stored more coarsely than the pixels: save it as a plain RGB EXR")
+            raise InputError(
+                f"{path}: a channel is stored more coarsely than the pixels: save it as a plain RGB EXR"
+            )
         if kind not in _BYTES:
             raise ValueError("a channel of an unknown kind")
         names.append(value[at:end].decode("utf-8"))

@@ -1,7 +1,9 @@
-"""How the light of a photo looks: whether there is a lamp, or several, where the strongest stands, and what the light is like as a whole.
+"""How the light of a photo looks: whether there is a lamp, or several, where the strongest stands,
+and what the light is like as a whole.
 
-`PLACES`, where a lamp may stand, are directions evenly over what is before the object and a little behind it, on a spiral: R. Swinbank and
-R. J. Purser 2006, doi:10.1256/qj.05.227. `lamp_network` finds all this.
+`PLACES`, where a lamp may stand, are directions evenly over what is before the object and a little
+behind it, on a spiral: R. Swinbank and R. J. Purser 2006, doi:10.1256/qj.05.227. `lamp_network`
+finds all this.
 """
 
 from dataclasses import dataclass
@@ -10,7 +12,10 @@ import numpy as np
 
 _COUNT, _BEHIND = 256, -0.2  # directions; the least of their parts toward the viewer
 _HELD = 0.68
-_BLUR, _NARROWEST = 12.1, 4.0  # degrees: what the network's places were blurred over, 68 % of it; a cone, at least
+_BLUR, _NARROWEST = (
+    12.1,
+    4.0,
+)  # degrees: what the network's places were blurred over, 68 % of it; a cone, at least
 _WIDEST_CONE, _LIKELY_NONE = 30.0, 0.5
 
 
@@ -27,8 +32,10 @@ PLACES = _spiral()
 
 @dataclass(frozen=True)
 class Glance:
-    """`none`, `one`, `several`: probabilities, together 1; `places` (256,): of `PLACES`, for the strongest lamp, if there is any. `light`
-    (8,): what the log shading is like, see `sirfs.seen_light`, `deviations` (8,): how uncertain that is."""
+    """`none`, `one`, `several`: probabilities, together 1; `places` (256,): of `PLACES`, for the
+    strongest lamp, if there is any. `light` (8,): what the log shading is like, see
+    `sirfs.seen_light`, `deviations` (8,): how uncertain that is.
+    """
 
     none: float
     one: float
@@ -45,7 +52,10 @@ class Glance:
 
     @property
     def cone(self) -> float:
-        """Degrees: the lamp lies so near `direction` with a probability of 68 %; `places` without what they were blurred over."""
+        """Degrees: the lamp lies so near `direction` with a probability of 68 %;
+
+        `places` without what they were blurred over.
+        """
         off = np.degrees(np.arccos(np.clip(PLACES @ self.direction, -1, 1)))
         order = np.argsort(off)
         wide = float(np.interp(_HELD, np.cumsum(self.places[order]), off[order]))

@@ -1,22 +1,26 @@
 """The fitted lobe as renderers want it: roughness, specular level, and where the level varies.
 
-Problem: a photo tells the product of a lobe's strength and its light. The diffuse shading has the same lamp in it: what it gives to the
-shading tells how bright it is, and the strength remains.
+Problem: a photo tells the product of a lobe's strength and its light. The diffuse shading has the
+same lamp in it: what it gives to the shading tells how bright it is, and the strength remains.
 
-Equation: S(n) = a max(0, n . l) + b is fitted to the shading, l being the fit's brightest light, a, b >= 0. A lamp of irradiance E gives
-matt white E / pi max(0, n . l): E = pi a, level = strength x light / E, for a base colour equal to the reflectance. 1 is the gloss of
-plastic, f0 = .04; Blinn-Phong's strength, which has f0 in it, is divided by .04. Where a is less than a third of the brightest shading, the
-lamp is not to be seen in it (recovered lights are smooth, and directions wrong by tens of degrees): that brightest shading stands for a.
+Equation: S(n) = a max(0, n . l) + b is fitted to the shading, l being the fit's brightest light, a,
+b >= 0. A lamp of irradiance E gives matt white E / pi max(0, n . l): E = pi a, level = strength x
+light / E, for a base colour equal to the reflectance. 1 is the gloss of plastic, f0 = .04;
+Blinn-Phong's strength, which has f0 in it, is divided by .04. Where a is less than a third of the
+brightest shading, the lamp is not to be seen in it (recovered lights are smooth, and directions
+wrong by tens of degrees): that brightest shading stands for a.
 
-Variation: t(x) = sum w p s / sum w p^2 around x, s the specular image, p the predicted one. It is believed where the fit explains most of
-the specular image, p is bright on a quarter of the object, and t found on every second block of pixels explains the other ones clearly
-better than one level does.
+Variation: t(x) = sum w p s / sum w p^2 around x, s the specular image, p the predicted one. It is
+believed where the fit explains most of the specular image, p is bright on a quarter of the object,
+and t found on every second block of pixels explains the other ones clearly better than one level
+does.
 
-Citation: glTF's extension KHR_materials_specular, Khronos Group 2021 (no DOI). M. Stone, "Cross-validatory choice and assessment of
-statistical predictions", JRSS B 36 (1974), doi:10.1111/j.2517-6161.1974.tb00994.x.
+Citation: glTF's extension KHR_materials_specular, Khronos Group 2021 (no DOI). M. Stone,
+"Cross-validatory choice and assessment of statistical predictions", JRSS B 36 (1974),
+doi:10.1111/j.2517-6161.1974.tb00994.x.
 
-Limits: a lamp that the shading does not show leaves the level uncertain by a factor of 3. A lobe of the wrong form, or wrong normals,
-varies too.
+Limits: a lamp that the shading does not show leaves the level uncertain by a factor of 3. A lobe of
+the wrong form, or wrong normals, varies too.
 """
 
 from dataclasses import dataclass
@@ -42,9 +46,10 @@ _EVEN = 0.01  # of the specular light's squares: what one level leaves less of i
 
 @dataclass(frozen=True)
 class Gloss:
-    """`roughness` of glTF and Blender in [0, 1], `specular` >= 0 the level for a base colour equal to the reflectance, 1 is plastic; None
-    where it is not known. `source`: of each, in words: `FITTED`, `LOWERED`, `BOUND`, `NONE_FOUND`, `NOT_FITTED`.
-    `variation`: (H, W) >= 0, a factor of `specular`; None where one level explains the photo as well.
+    """`roughness` of glTF and Blender in [0, 1], `specular` >= 0 the level for a base colour equal
+    to the reflectance, 1 is plastic; None where it is not known. `source`: of each, in words:
+    `FITTED`, `LOWERED`, `BOUND`, `NONE_FOUND`, `NOT_FITTED`. `variation`: (H, W) >= 0, a factor of
+    `specular`; None where one level explains the photo as well.
     """
 
     roughness: float | None = None
@@ -67,11 +72,20 @@ def gloss_of(d: Decomposition) -> Gloss:
     source = NOT_FITTED if level is None else FITTED
     if not fit.determined:
         return Gloss(fit.blender_roughness, level, BOUND, source)
-    return Gloss(fit.blender_roughness, level, FITTED, source, None if level is None else specular_variation(d))
+    return Gloss(
+        fit.blender_roughness,
+        level,
+        FITTED,
+        source,
+        None if level is None else specular_variation(d),
+    )
 
 
 def specular_variation(d: Decomposition) -> np.ndarray | None:
-    """t (H, W) >= 0, 1 where nothing is known; None where the data do not ask for it, see the module."""
+    """t (H, W) >= 0, 1 where nothing is known;
+
+    None where the data do not ask for it, see the module.
+    """
     if d.brdf is None or d.brdf.explained < _EXPLAINED:
         return None
     predicted, seen = (layer.mean(-1, dtype=float) for layer in (d.brdf.predicted, d.specular))
@@ -104,13 +118,16 @@ def _level(d: Decomposition, fit: LobeFit) -> float | None:
 
 
 def _constant(seen: np.ndarray, predicted: np.ndarray, known: np.ndarray) -> float:
-    return float(seen[known] @ predicted[known] / max(float(np.square(predicted[known]).sum()), 1e-30))
+    return float(
+        seen[known] @ predicted[known] / max(float(np.square(predicted[known]).sum()), 1e-30)
+    )
 
 
 def _ratio(seen: np.ndarray, predicted: np.ndarray, known: np.ndarray, block: int) -> np.ndarray:
     """t (H, W) from the `known` pixels around, drawn toward 1 where they say little."""
     common, square = (
-        ndimage.gaussian_filter(np.where(known, part, 0.0), 0.5 * block, mode="constant") for part in (seen * predicted, predicted**2)
+        ndimage.gaussian_filter(np.where(known, part, 0.0), 0.5 * block, mode="constant")
+        for part in (seen * predicted, predicted**2)
     )
     doubt = 0.02 * float(square.max())
     return (common + doubt) / (square + doubt) if doubt > 0 else np.ones(seen.shape)

@@ -1,15 +1,18 @@
-"""How `isc --progress json` speaks to a program that runs it: one JSON object a line on standard output.
+"""How `isc --progress json` speaks to a program that runs it: one JSON object a line on standard
+output.
 
-    {"event": "progress", "stage": "shape and light", "fraction": 0.42}     any number; the fraction, of the whole job, never falls
-    {"event": "done", "output": "cup", "lines": ["look at cup/preview.png"]}
-    {"event": "failed", "message": "one line for people", "code": 2}
-    {"event": "cancelled"}                                                  one of these three comes last
+    {"event": "progress", "stage": "shape and light", "fraction": 0.42}     any number; the
+    fraction, of the whole job, never falls {"event": "done", "output": "cup", "lines": ["look at
+    cup/preview.png"]} {"event": "failed", "message": "one line for people", "code": 2} {"event":
+    "cancelled"}                                                  one of these three comes last
 
-The program holds the other end of standard input: the line `cancel`, or its end because that program is no more, acts as Ctrl-C. The work
-is asked to stop, after a second it is interrupted wherever it is, both tidying up; ten seconds later the process ends in any case.
-Notes for people, and the trace of a fault, go to standard error.
+The program holds the other end of standard input: the line `cancel`, or its end because that
+program is no more, acts as Ctrl-C. The work is asked to stop, after a second it is interrupted
+wherever it is, both tidying up; ten seconds later the process ends in any case. Notes for people,
+and the trace of a fault, go to standard error.
 
-Limits: a process without standard input is not watched. Lines of standard output that are not JSON are not ours: ignore them.
+Limits: a process without standard input is not watched. Lines of standard output that are not JSON
+are not ours: ignore them.
 """
 
 import _thread
@@ -32,7 +35,11 @@ _CANCELLED = 130
 
 
 class JsonSpeaker:
-    """Reports to a program. As a context manager, in the process's main thread, it lets the program cancel: `KeyboardInterrupt`."""
+    """Reports to a program.
+
+    As a context manager, in the process's main thread, it lets the program cancel:
+    `KeyboardInterrupt`.
+    """
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
@@ -74,19 +81,32 @@ class JsonSpeaker:
         try:
             self._stream.write(json.dumps({"event": event, **content}) + "\n")
             self._stream.flush()
-        except OSError:  # nobody listens any more: the end of standard input says so too, and stops the work
+        except (
+            OSError
+        ):  # nobody listens any more: the end of standard input says so too, and stops the work
             discard_output()
 
     def __enter__(self) -> "JsonSpeaker":
-        if threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
-            # A program in the background hands on that Ctrl-C is ignored, but here no terminal asks.
+        if (
+            threading.current_thread() is threading.main_thread()
+            and signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+        ):
+            # A program in the background hands on that Ctrl-C is ignored, but here no terminal
+            # asks.
             self._before = signal.signal(signal.SIGINT, signal.default_int_handler)
         if (descriptor := _standard_input()) is not None:
-            threading.Thread(target=self._watch, args=(descriptor,), name="isc-cancel", daemon=True).start()
+            threading.Thread(
+                target=self._watch, args=(descriptor,), name="isc-cancel", daemon=True
+            ).start()
         self._step("starting", 0.0)
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         with self._turn:  # from here on nothing is interrupted, so that the last word is heard
             self._ended.set()
         if self._before is not None:
@@ -112,7 +132,9 @@ def _standard_input() -> int | None:
 
 
 def _await_cancel(descriptor: int) -> None:
-    """Returns once the line `cancel` or the end of the file was read, past Python's buffer: its lock would outlive this thread."""
+    """Returns once the line `cancel` or the end of the file was read, past Python's buffer: its
+    lock would outlive this thread.
+    """
     text = b""
     while b"cancel" not in (line.strip() for line in text.split(b"\n")[:-1]):
         try:

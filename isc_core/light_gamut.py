@@ -1,42 +1,56 @@
-"""Is there white among an object's colours, as there is under any lamp? Where not, the light is strongly coloured, or all of the paint is.
+"""Is there white among an object's colours, as there is under any lamp? Where not, the light is
+strongly coloured, or all of the paint is.
 
-Problem: a separation takes the light for white. Under red light everything is red, its highlights too; no constraint on one highlight shows
-that, if its colour is looked for near white only.
+Problem: a separation takes the light for white. Under red light everything is red, its highlights
+too; no constraint on one highlight shows that, if its colour is looked for near white only.
 
-Equation: the colours c of an object under light of the colour l are c = l r, r those under white light, so that the whole gamut moves with
-l (Forsyth 1990). With chromaticities p(c) of all but the darkest, in the plane of colours of mean 1 with white at 0, white's distance from
-their hull, but for a twentieth of them, is
+Equation: the colours c of an object under light of the colour l are c = l r, r those under white
+light, so that the whole gamut moves with l (Forsyth 1990). With chromaticities p(c) of all but the
+darkest, in the plane of colours of mean 1 with white at 0, white's distance from their hull, but
+for a twentieth of them, is
 
     max over unit u of the 5 % quantile of u . p.
 
-A gamut may also lie off white because paint does. Then highlights bring it back: their flanks' chromaticities move on lines toward the
-light's (Lehmann & Palm 2001), here toward white: a change dI of a colour I counts by its |I x dI|, and by how well white, or the best of
-the colours near it, lies in its plane and ahead of it.
+A gamut may also lie off white because paint does. Then highlights bring it back: their flanks'
+chromaticities move on lines toward the light's (Lehmann & Palm 2001), here toward white: a change
+dI of a colour I counts by its |I x dI|, and by how well white, or the best of the colours near it,
+lies in its plane and ahead of it.
 
-Citation: D. A. Forsyth 1990, doi:10.1007/BF00056770; T. M. Lehmann, C. Palm 2001, doi:10.1364/JOSAA.18.002679.
+Citation: D. A. Forsyth 1990, doi:10.1007/BF00056770; T. M. Lehmann, C. Palm 2001,
+doi:10.1364/JOSAA.18.002679.
 
-Limits: matt paint of one strong colour cannot be told from grey paint under light of that colour, and is called the same. Light that
-takes grey no farther than .3 from white, such as (1.2, 1, .8), is not told; nor is stronger light on paint of many strong colours, or of
-one that makes up for it.
+Limits: matt paint of one strong colour cannot be told from grey paint under light of that colour,
+and is called the same. Light that takes grey no farther than .3 from white, such as (1.2, 1, .8),
+is not told; nor is stronger light on paint of many strong colours, or of one that makes up for it.
 """
 
 import numpy as np
 
 # An orthonormal basis of the colours with sum 0, (3, 2).
 PLANE = np.array([[1, -1, 0], [1, 1, -2]]).T / np.sqrt([2.0, 6.0])
-_DARK, _STRAY = 0.3, 0.05  # quantiles: of the intensity, below which colours do not count; of those beyond the hull
+_DARK, _STRAY = (
+    0.3,
+    0.05,
+)  # quantiles: of the intensity, below which colours do not count; of those beyond the hull
 _FARTHEST = 0.3  # of white from the hull
 _DIRECTIONS = 72  # a multiple of 12 makes the channels alike
-_RISE, _TURN = 0.03, 0.05  # of a flank: of the intensity, over the bright pixels'; of the chromaticity
+_RISE, _TURN = (
+    0.03,
+    0.05,
+)  # of a flank: of the intensity, over the bright pixels'; of the chromaticity
 _TOWARD, _TOLERANCE = 0.7, 0.04  # the cosine of the turn's direction to the light; n . L / |n|
 _NEAR, _STEP = 0.25, 0.1  # the colours that count as white, and their grid
-_FEW, _FAINT = 20, 1e-4  # flanks, and their mean weight over all changes, below which they say nothing
+_FEW, _FAINT = (
+    20,
+    1e-4,
+)  # flanks, and their mean weight over all changes, below which they say nothing
 _ENOUGH = 20_000  # colours or flanks: more say the same
 _SHARE = 0.2  # of the flanks that move toward white
 
 
 def without_white(colour: np.ndarray, change: np.ndarray) -> bool:
-    """Whether white is neither among the colours nor where highlights lead. `colour`, `change` (N, 3) >= 0 in units of the bright pixels'.
+    """Whether white is neither among the colours nor where highlights lead. `colour`, `change` (N,
+    3) >= 0 in units of the bright pixels'.
 
     `change` is that of the colour over a short way, upward.
     """
@@ -54,11 +68,15 @@ def distance_of_white(colour: np.ndarray) -> float:
     places = 3 * colour[bright] / intensity[bright, None] @ PLANE
     places = places[_thinned(len(places))]
     angle = np.arange(_DIRECTIONS) * (2 * np.pi / _DIRECTIONS)
-    return float(np.quantile(places @ np.stack([np.cos(angle), np.sin(angle)]), _STRAY, axis=0).max())
+    return float(
+        np.quantile(places @ np.stack([np.cos(angle), np.sin(angle)]), _STRAY, axis=0).max()
+    )
 
 
 def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
-    """How much of what may be highlights' flanks leads to a colour near white, in [0, 1]; 0 where there is nothing."""
+    """How much of what may be highlights' flanks leads to a colour near white, in [0, 1]; 0 where
+    there is nothing.
+    """
     here, turn, rising = turns(colour, change)
     flanks = np.flatnonzero(rising)
     normal = np.cross(colour[flanks], change[flanks])
@@ -70,25 +88,40 @@ def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
     end = colour[flanks] + change[flanks] / 2
     end /= end.sum(axis=1, keepdims=True)
     return max(
-        float(weight @ _agreement(white, normal / weight[:, None], here[flanks], end, turn[flanks]) / weight.sum()) for white in _whites()
+        float(
+            weight
+            @ _agreement(white, normal / weight[:, None], here[flanks], end, turn[flanks])
+            / weight.sum()
+        )
+        for white in _whites()
     )
 
 
 def turns(colour: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of colours and their changes (N, 3): the chromaticity, the way from it to the change's, and (N,) which may be highlights' flanks.
+    """Of colours and their changes (N, 3): the chromaticity, the way from it to the change's, and
+    (N,) which may be highlights' flanks.
 
     Those rise in all channels, and their chromaticity turns.
     """
     rise = change.sum(axis=1)
     here = colour / np.maximum(colour.sum(axis=1), 1e-12)[:, None]
     turn = change / np.maximum(rise, 1e-12)[:, None] - here
-    return here, turn, (rise > _RISE) & (change.min(axis=1) > 0) & (np.linalg.norm(turn, axis=1) > _TURN)
+    return (
+        here,
+        turn,
+        (rise > _RISE) & (change.min(axis=1) > 0) & (np.linalg.norm(turn, axis=1) > _TURN),
+    )
 
 
 def leads_to(light: np.ndarray, here: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Which turns (N, 3) of chromaticities `here` (N, 3) go toward that of `light` (3,): (N,) bool."""
+    """Which turns (N, 3) of chromaticities `here` (N, 3) go toward that of `light` (3,):
+
+    (N,) bool.
+    """
     way = light / light.sum() - here
-    cosine = (turn * way).sum(axis=1) / np.maximum(np.linalg.norm(turn, axis=1) * np.linalg.norm(way, axis=1), 1e-12)
+    cosine = (turn * way).sum(axis=1) / np.maximum(
+        np.linalg.norm(turn, axis=1) * np.linalg.norm(way, axis=1), 1e-12
+    )
     return cosine > _TOWARD
 
 
@@ -103,8 +136,13 @@ def _whites() -> np.ndarray:
     return np.ones(3) + places[np.linalg.norm(places, axis=1) < _NEAR] @ PLANE.T
 
 
-def _agreement(white: np.ndarray, normal: np.ndarray, here: np.ndarray, end: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """How well that light (3,) explains flanks (N, 3): in [0, 1], (N,). `end`: the chromaticity to which they have come."""
+def _agreement(
+    white: np.ndarray, normal: np.ndarray, here: np.ndarray, end: np.ndarray, turn: np.ndarray
+) -> np.ndarray:
+    """How well that light (3,) explains flanks (N, 3): in [0, 1], (N,).
+
+    `end`: the chromaticity to which they have come.
+    """
     off = normal @ (white / np.linalg.norm(white))
     ahead = ((white / white.sum() - end) * turn).sum(axis=1) > 0
     return np.where(ahead & leads_to(white, here, turn), 1 / (1 + np.square(off / _TOLERANCE)), 0.0)

@@ -1,7 +1,8 @@
 """Bytes under a name, for libraries that can only open names.
 
-Problem: a library that opens a file by itself may find other bytes than those that were checked and whose sum was taken, since files
-change; and some take no names but UTF-8. Here it gets a name of its own in ASCII, and nobody else writes there.
+Problem: a library that opens a file by itself may find other bytes than those that were checked and
+whose sum was taken, since files change; and some take no names but UTF-8. Here it gets a name of
+its own in ASCII, and nobody else writes there.
 
 Limits: in memory on Linux; elsewhere in the folder for temporary files.
 """

@@ -1,12 +1,16 @@
-"""How far an answer is from the truth: the MIT-Berkeley errors of shape, light, shading and reflectance, and image errors.
+"""How far an answer is from the truth: the MIT-Berkeley errors of shape, light, shading and
+reflectance, and image errors.
 
-The six errors of one object and their geometric mean `avg` follow J. T. Barron, J. Malik (2015), "Shape, illumination, and
-reflectance from shading", doi:10.1109/TPAMI.2014.2377712: what the image cannot tell (the offset of the height, one scale of
-each of shading, reflectance and light) is free, everything else counts. The local error is that of R. Grosse, M. K. Johnson,
-E. H. Adelson, W. T. Freeman (2009), doi:10.1109/ICCV.2009.5459428: sum |t - a_b u|^2 / sum |t|^2 over windows b that overlap
-by half, each with its own best scale a_b. It forgives slow drifts, and an estimate of zero scores 1.
+The six errors of one object and their geometric mean `avg` follow J. T. Barron, J. Malik (2015),
+"Shape, illumination, and reflectance from shading", doi:10.1109/TPAMI.2014.2377712: what the image
+cannot tell (the offset of the height, one scale of each of shading, reflectance and light) is free,
+everything else counts. The local error is that of R. Grosse, M. K. Johnson, E. H. Adelson, W. T.
+Freeman (2009), doi:10.1109/ICCV.2009.5459428: sum |t - a_b u|^2 / sum |t|^2 over windows b that
+overlap by half, each with its own best scale a_b. It forgives slow drifts, and an estimate of zero
+scores 1.
 
-Limits: all errors need the truth; none is a perceptual distance. Images are compared at the scale of their stored values.
+Limits: all errors need the truth; none is a perceptual distance. Images are compared at the scale
+of their stored values.
 """
 
 import math
@@ -19,7 +23,8 @@ from .datasets import MitBerkeleyObject
 from .sirfs.frames import light_from_reference, normal_from_reference, real_sh
 from .sirfs.stencils import normals
 
-# Windows of the local error: 20 pixels; the reference's second tiling begins at the tenth pixel, not the eleventh.
+# Windows of the local error: 20 pixels; the reference's second tiling begins at the tenth pixel,
+# not the eleventh.
 _WINDOW, _SECOND_TILING = 20, 9
 _LIGHT_PROBE = 256
 _TINY = float(np.finfo(np.float64).eps)
@@ -29,9 +34,10 @@ _TINY = float(np.finfo(np.float64).eps)
 class Scores:
     """The six errors of one object; 0 is perfect.
 
-    `height`: mean absolute, pixels, after the best offset. `normal`: mean angle, radians. `shading`, `reflectance`: mean
-    square after one scale for all channels. `rs_mse`: Grosse's local error, the mean of shading's and reflectance's.
-    `light`: mean square of the rendered light probe after one scale for all channels.
+    `height`: mean absolute, pixels, after the best offset. `normal`: mean angle, radians.
+    `shading`, `reflectance`: mean square after one scale for all channels. `rs_mse`: Grosse's local
+    error, the mean of shading's and reflectance's. `light`: mean square of the rendered light probe
+    after one scale for all channels.
     """
 
     height: float
@@ -58,9 +64,10 @@ def score(
 ) -> Scores:
     """The errors of an answer for `truth`, on the truth's crop (h, w).
 
-    `height`: (h, w) pixels toward the viewer. `normal`: (h, w, 3) unit vectors, x right, y up, z toward the viewer.
-    `shading`, `reflectance`: (h, w, 3) linear, read where the truth's input is valid. `light`: (9, 3) coefficients of
-    `sirfs.frames.real_sh`. Raises `ValueError` for a wrong shape, and where an answer is not finite although it is needed.
+    `height`: (h, w) pixels toward the viewer. `normal`: (h, w, 3) unit vectors, x right, y up, z
+    toward the viewer. `shading`, `reflectance`: (h, w, 3) linear, read where the truth's input is
+    valid. `light`: (9, 3) coefficients of `sirfs.frames.real_sh`. Raises `ValueError` for a wrong
+    shape, and where an answer is not finite although it is needed.
     """
     if light.shape != truth.light.shape or not np.isfinite(light).all():
         raise ValueError(f"{truth.name}: the light must be {truth.light.shape} finite coefficients")
@@ -77,7 +84,10 @@ def score(
         normal=angular_error(true_normal[known], normal[known]),
         shading=scaled_mse(truth.shading[compared], shading[compared]),
         reflectance=scaled_mse(truth.reflectance[compared], reflectance[compared]),
-        rs_mse=(lmse(truth.shading, shading, compared) + lmse(truth.reflectance, reflectance, compared)) / 2,
+        rs_mse=(
+            lmse(truth.shading, shading, compared) + lmse(truth.reflectance, reflectance, compared)
+        )
+        / 2,
         light=light_error(light_from_reference(truth.light), light),
     )
 
@@ -98,7 +108,9 @@ def truth_normal(height: np.ndarray) -> np.ndarray:
 
 
 def height_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Mean absolute difference, pixels, after the best constant offset, over the finite pixels of `truth`. Its scale counts."""
+    """Mean absolute difference, pixels, after the best constant offset, over the finite pixels of
+    `truth`. Its scale counts.
+    """
     difference = (estimate - truth)[np.isfinite(truth)]
     return float(np.abs(difference - np.median(difference)).mean())
 
@@ -115,7 +127,9 @@ def scaled_mse(truth: np.ndarray, estimate: np.ndarray) -> float:
 
 
 def light_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Mean square difference of two lights (9, C) of our convention, seen on a front hemisphere, after one common scale."""
+    """Mean square difference of two lights (9, C) of our convention, seen on a front hemisphere,
+    after one common scale.
+    """
     axis = (np.arange(1, _LIGHT_PROBE + 1) - _LIGHT_PROBE / 2) / (_LIGHT_PROBE / 2)
     down, right = np.meshgrid(axis, axis, indexing="ij")
     squared = 1 - down * down - right * right
@@ -126,25 +140,37 @@ def light_error(truth: np.ndarray, estimate: np.ndarray) -> float:
 
 
 def mse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None) -> float:
-    """Mean square difference of two images (h, w[, C]) over all channels, inside `mask` (h, w) if one is given."""
+    """Mean square difference of two images (h, w[, C]) over all channels, inside `mask` (h, w) if
+    one is given.
+    """
     _same_shape(truth, estimate, mask)
     difference = np.asarray(truth, float) - estimate
     return float(np.square(difference if mask is None else difference[mask]).mean())
 
 
-def psnr(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None, *, peak: float = 1.0) -> float:
-    """10 log10(peak^2 / MSE), dB, values not clipped; infinite for equal images. Images and mask as in `mse`."""
+def psnr(
+    truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None, *, peak: float = 1.0
+) -> float:
+    """10 log10(peak^2 / MSE), dB, values not clipped; infinite for equal images.
+
+    Images and mask as in `mse`.
+    """
     error = mse(truth, estimate, mask)
     return math.inf if error == 0 else 10 * math.log10(peak * peak / error)
 
 
 def lmse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray) -> float:
-    """Grosse's local error of images (h, w[, C]) inside `mask` (h, w): each channel by itself, then their mean. 0 is perfect.
+    """Grosse's local error of images (h, w[, C]) inside `mask` (h, w): each channel by itself, then
+    their mean. 0 is perfect.
 
-    An estimate of zero scores 1. NaN outside the mask is never read. Raises `ValueError` where the truth is zero everywhere.
+    An estimate of zero scores 1. NaN outside the mask is never read. Raises `ValueError` where the
+    truth is zero everywhere.
     """
     _same_shape(truth, estimate, mask)
-    t, u = (np.where(mask[..., None], image.reshape(*mask.shape, -1), 0.0) for image in (truth, estimate))
+    t, u = (
+        np.where(mask[..., None], image.reshape(*mask.shape, -1), 0.0)
+        for image in (truth, estimate)
+    )
     error, total = np.zeros(t.shape[2]), np.zeros(t.shape[2])
     for row in (0, _SECOND_TILING):
         for column in (0, _SECOND_TILING):
@@ -158,7 +184,10 @@ def lmse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray) -> float:
 
 
 def geometric_mean(values: Iterable[float]) -> float:
-    """The geometric mean of numbers >= 0; 0 if one of them is 0. Raises `ValueError` where there are none, or one is negative."""
+    """The geometric mean of numbers >= 0; 0 if one of them is 0.
+
+    Raises `ValueError` where there are none, or one is negative.
+    """
     numbers = list(values)
     if not numbers or min(numbers) < 0:
         raise ValueError("a geometric mean needs at least one number, and none below 0")
@@ -166,7 +195,10 @@ def geometric_mean(values: Iterable[float]) -> float:
 
 
 def _window_sums(image: np.ndarray) -> np.ndarray:
-    """Sums over the windows that tile an image (h, w, C), zero beyond its end: (windows down, windows right, C)."""
+    """Sums over the windows that tile an image (h, w, C), zero beyond its end:
+
+    (windows down, windows right, C).
+    """
     down, right = (np.arange(0, size, _WINDOW) for size in image.shape[:2])
     if not (len(down) and len(right)):
         return np.zeros((0, 0, image.shape[2]))
@@ -175,7 +207,9 @@ def _window_sums(image: np.ndarray) -> np.ndarray:
 
 def _same_shape(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None) -> None:
     if truth.shape != estimate.shape or (mask is not None and mask.shape != truth.shape[:2]):
-        raise ValueError(f"cannot compare images of shapes {truth.shape} and {estimate.shape} in a mask of {getattr(mask, 'shape', None)}")
+        raise ValueError(
+            f"cannot compare images of shapes {truth.shape} and {estimate.shape} in a mask of {getattr(mask, 'shape', None)}"
+        )
     if mask is not None and not mask.any():
         raise ValueError("the mask is empty")
 
@@ -186,6 +220,8 @@ def _require(truth: MitBerkeleyObject, **answer: np.ndarray) -> None:
     for name, value in answer.items():
         shape = truth.height.shape if name == "height" else truth.image.shape
         if value.shape != shape:
-            raise ValueError(f"{truth.name}: {name} has shape {value.shape} where {shape} was expected")
+            raise ValueError(
+                f"{truth.name}: {name} has shape {value.shape} where {shape} was expected"
+            )
         if not np.isfinite(value[needed.get(name, np.isfinite(truth.height))]).all():
             raise ValueError(f"{truth.name}: {name} is not finite everywhere inside the object")

@@ -1,7 +1,8 @@
 """File names as people and other programs can read them.
 
-Problem: on Linux a file's name is any bytes but `/` and zero. Python carries bytes that are not UTF-8 as lone surrogates, which no text
-file, terminal or font takes; and a name may hold line breaks, or characters that move the cursor or turn the direction of writing.
+Problem: on Linux a file's name is any bytes but `/` and zero. Python carries bytes that are not
+UTF-8 as lone surrogates, which no text file, terminal or font takes; and a name may hold line
+breaks, or characters that move the cursor or turn the direction of writing.
 """
 
 import unicodedata
@@ -11,13 +12,18 @@ _TURNING = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
 
 
 def readable(text: str) -> str:
-    """`text` on one line, in characters that can be seen and coded as UTF-8: all others are escaped as in Python, `\\n`, `\\xe9`."""
+    """`text` on one line, in characters that can be seen and coded as UTF-8: all others are escaped
+    as in Python, `\\n`, `\\xe9`.
+    """
     return "".join(map(_readable, text))
 
 
 def _readable(character: str) -> str:
     if 0xDC80 <= ord(character) <= 0xDCFF:  # a byte of a name that is not UTF-8
         return f"\\x{ord(character) - 0xDC00:02x}"
-    if unicodedata.category(character) in _UNSEEN or unicodedata.bidirectional(character) in _TURNING:
+    if (
+        unicodedata.category(character) in _UNSEEN
+        or unicodedata.bidirectional(character) in _TURNING
+    ):
         return character.encode("unicode_escape").decode("ascii")
     return character

@@ -1,6 +1,7 @@
 """The main job: from one photo of a masked object to its intrinsic scene characteristics.
 
-The photo is brought to the scale of the work, one of the `models` explains it, and its answer becomes maps that keep the identities.
+The photo is brought to the scale of the work, one of the `models` explains it, and its answer
+becomes maps that keep the identities.
 """
 
 import platform
@@ -26,15 +27,25 @@ from .sirfs.problem import DepthObservation
 from .sirfs.recover import Known
 from .sirfs.resampling import nearest_samples
 
-__all__ = ["BASELINE_MODELS", "ILLUMINATIONS", "MODELS", "SIRFS_MODELS", "Evidence", "Settings", "assemble", "decompose"]
+__all__ = [
+    "BASELINE_MODELS",
+    "ILLUMINATIONS",
+    "MODELS",
+    "SIRFS_MODELS",
+    "Evidence",
+    "Settings",
+    "assemble",
+    "decompose",
+]
 
 _PACKAGES = ("numpy", "scipy", "numba")
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What else is known of the scene, at the photo's full size: `height` the exact shape, `depth` an observation of it with holes
-    (NaN), both (H, W) in photo pixels toward the viewer; `light` the exact illumination (9, 3), ISC's convention.
+    """What else is known of the scene, at the photo's full size: `height` the exact shape, `depth`
+    an observation of it with holes (NaN), both (H, W) in photo pixels toward the viewer; `light`
+    the exact illumination (9, 3), ISC's convention.
 
     `depth_sigma`: the observation's standard error in photo pixels; `depth_weight`: of its term.
     """
@@ -57,23 +68,39 @@ def decompose(
 ) -> Decomposition:
     """Decomposes `photo`; maps are at the working scale (see `Settings.max_size`).
 
-    `name` of the photo, for people. `prior_set`: the shipped one if None. Raises `InputError`, `Cancelled`.
+    `name` of the photo, for people. `prior_set`: the shipped one if None. Raises `InputError`,
+    `Cancelled`.
     """
-    settings, evidence, monitor = settings or Settings(), evidence or Evidence(), monitor or Monitor()
+    settings, evidence, monitor = (
+        settings or Settings(),
+        evidence or Evidence(),
+        monitor or Monitor(),
+    )
     settings.check()
     _check_used(settings, evidence, prior_set)
     if not photo.image[photo.mask].any():
-        raise InputError("the photo is black inside the mask: there is nothing to recover; use another photo")
+        raise InputError(
+            "the photo is black inside the mask: there is nothing to recover; use another photo"
+        )
     clock = Clock()
     with clock.stage("prepare"):
         working = photo.resized_to_object(settings.max_size)
         maps = photo if settings.full_size else working
         known = _at_scale(evidence, photo, working)
         if not share_in_blocks(maps.mask):
-            raise InputError("the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region or use a larger photo")
+            raise InputError(
+                "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region or use a larger photo"
+            )
     answer = solve(Task(working, maps, settings, known, prior_set, monitor, clock))
     monitor.report("maps", 0.96)
-    provenance = Provenance(_settings_json(settings), settings.seed, _versions(), clock.seconds, _input_json(maps, name), answer.status)
+    provenance = Provenance(
+        _settings_json(settings),
+        settings.seed,
+        _versions(),
+        clock.seconds,
+        _input_json(maps, name),
+        answer.status,
+    )
     with clock.stage("maps"):
         return assemble(maps, answer, provenance)
 
@@ -85,28 +112,48 @@ def _check_used(settings: Settings, evidence: Evidence, prior_set: PriorSet | No
     given = (evidence.height, evidence.light, evidence.depth, prior_set)
     if settings.shading_only or any(thing is not None for thing in given):
         models = " or ".join(SIRFS_MODELS)
-        raise InputError(f"--shape, --light, --depth, --priors and --shading-only mean nothing to {settings.model}: use --model {models}")
+        raise InputError(
+            f"--shape, --light, --depth, --priors and --shading-only mean nothing to {settings.model}: use --model {models}"
+        )
 
 
 def assemble(photo: Photo, answer: Answer, provenance: Provenance) -> Decomposition:
-    """Normals, shading and reflectance that follow from the answer's height and light; `photo` is the one of its maps.
+    """Normals, shading and reflectance that follow from the answer's height and light; `photo` is
+    the one of its maps.
 
-    The identities hold by construction: shading = exp(SH(normal)) and reflectance = diffuse / shading, inside the mask.
+    The identities hold by construction: shading = exp(SH(normal)) and reflectance = diffuse /
+    shading, inside the mask.
     """
     mask, split, height = photo.mask, answer.split, answer.height
     normal, shading = shaded(height, answer.light, mask)
-    reflectance = np.where(mask[..., None], split.diffuse / np.where(mask[..., None], shading, 1), 0).astype(np.float32)
+    reflectance = np.where(
+        mask[..., None], split.diffuse / np.where(mask[..., None], shading, 1), 0
+    ).astype(np.float32)
     image = np.where(mask[..., None], photo.image, 0).astype(np.float32)
     return Decomposition(
-        image, split.diffuse, split.specular, split.residual, reflectance, shading, normal,
-        np.where(mask, height - height[mask].min(), 0).astype(np.float32), mask, _confidence(split, normal, mask),
-        light_from_reference(answer.light), provenance, answer.brdf,
-    )  # fmt: skip
+        image,
+        split.diffuse,
+        split.specular,
+        split.residual,
+        reflectance,
+        shading,
+        normal,
+        np.where(mask, height - height[mask].min(), 0).astype(np.float32),
+        mask,
+        _confidence(split, normal, mask),
+        light_from_reference(answer.light),
+        provenance,
+        answer.brdf,
+    )
 
 
 def _confidence(split: Separation, normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """How far a pixel can be trusted: the separation's own confidence, less where the surface turns away and little is seen of it."""
-    return np.where(mask, split.confidence * np.sqrt(np.clip(normal[..., 2], 0, 1)), 0).astype(np.float32)
+    """How far a pixel can be trusted: the separation's own confidence, less where the surface turns
+    away and little is seen of it.
+    """
+    return np.where(mask, split.confidence * np.sqrt(np.clip(normal[..., 2], 0, 1)), 0).astype(
+        np.float32
+    )
 
 
 def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
@@ -115,18 +162,32 @@ def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
     for what, values in (("shape", evidence.height), ("depth", evidence.depth)):
         if values is not None and values.shape != photo.mask.shape:
             (rows, columns), (h, w) = values.shape, photo.mask.shape
-            raise InputError(f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the photo's full size")
-    light = None if evidence.light is None else light_to_reference(np.asarray(evidence.light, float))
-    height = None if evidence.height is None else nearest_samples(evidence.height, working.mask.shape, factor) * factor
+            raise InputError(
+                f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the photo's full size"
+            )
+    light = (
+        None if evidence.light is None else light_to_reference(np.asarray(evidence.light, float))
+    )
+    height = (
+        None
+        if evidence.height is None
+        else nearest_samples(evidence.height, working.mask.shape, factor) * factor
+    )
     if height is not None and not np.isfinite(height[working.mask]).all():
-        raise InputError("the known shape has holes inside the mask: give it as --depth, which may have holes")
+        raise InputError(
+            "the known shape has holes inside the mask: give it as --depth, which may have holes"
+        )
     height = None if height is None else continued_height(height, working.mask)
     if evidence.depth is None:
         return Known(height, light)
     seen = nearest_samples(evidence.depth, working.mask.shape, factor) * factor
     if not np.isfinite(seen[working.mask]).any():
-        raise InputError("the depth map has no value inside the mask, only holes: is it a map of this photo?")
-    return Known(height, light, DepthObservation(seen, evidence.depth_sigma * factor, evidence.depth_weight))
+        raise InputError(
+            "the depth map has no value inside the mask, only holes: is it a map of this photo?"
+        )
+    return Known(
+        height, light, DepthObservation(seen, evidence.depth_sigma * factor, evidence.depth_weight)
+    )
 
 
 def _settings_json(settings: Settings) -> dict[str, object]:

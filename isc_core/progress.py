@@ -1,6 +1,7 @@
 """How long work reports its progress and learns that it should stop.
 
-The core receives one `progress(stage, fraction)` and one `cancelled()`; terminals, panels and batch runners adapt them.
+The core receives one `progress(stage, fraction)` and one `cancelled()`; terminals, panels and batch
+runners adapt them.
 """
 
 from collections.abc import Callable
@@ -21,8 +22,8 @@ def _never() -> bool:
 class Monitor:
     """The pair of callbacks that goes through the core.
 
-    `progress(stage, fraction)`: a stage's text for people, and how much of the whole job is done, in [0, 1].
-    `cancelled()`: true once the user wants to stop.
+    `progress(stage, fraction)`: a stage's text for people, and how much of the whole job is done,
+    in [0, 1]. `cancelled()`: true once the user wants to stop.
     """
 
     progress: Callable[[str, float], None] = _ignore
@@ -36,4 +37,6 @@ class Monitor:
 
     def part(self, start: float, end: float) -> "Monitor":
         """A monitor whose [0, 1] is the range [start, end] of this one."""
-        return Monitor(lambda stage, f: self.progress(stage, start + (end - start) * f), self.cancelled)
+        return Monitor(
+            lambda stage, f: self.progress(stage, start + (end - start) * f), self.cancelled
+        )

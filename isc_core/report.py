@@ -1,11 +1,13 @@
 """The contact sheet: one picture that shows a person what came out, before anything else is opened.
 
-Tones: input, diffuse and specular share one exposure, so that they can be compared; reflectance has its own, and so has shading, which
-the light shares unless it would be too bright. An exposure puts the 99.5th percentile of the brightest channel inside the mask at 0.95.
-Everything is blended in linear light and coded as sRGB at the end. Maps are cropped to the object and scaled with their mask as weight,
-so that no black creeps in at the edge.
+Tones: input, diffuse and specular share one exposure, so that they can be compared; reflectance has
+its own, and so has shading, which the light shares unless it would be too bright. An exposure puts
+the 99.5th percentile of the brightest channel inside the mask at 0.95. Everything is blended in
+linear light and coded as sRGB at the end. Maps are cropped to the object and scaled with their mask
+as weight, so that no black creeps in at the edge.
 
-The height is drawn as a relief under a lamp at the upper left, with contour lines at round distances; the light as a white ball in it.
+The height is drawn as a relief under a lamp at the upper left, with contour lines at round
+distances; the light as a white ball in it.
 """
 
 from collections.abc import Sequence
@@ -28,13 +30,20 @@ _PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
 _PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
 _SMALL = 480  # pixels: long side of a sheet's thumbnail
 _MARGIN = 0.06  # room around the object, of the panel's side
-_TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (1.0, 0.42, 0.04), (0.06, 0.3, 1.0), (0.06, 0.06, 0.06)  # linear
+_TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (
+    (1.0, 0.42, 0.04),
+    (0.06, 0.3, 1.0),
+    (0.06, 0.06, 0.06),
+)  # linear
 _FULL_ERROR = 0.1  # of the photo's white: errors from here on have the full colour
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One picture of a sheet: `color` (N, N, 3) linear, `coverage` (N, N) in [0, 1], a label and a faint remark."""
+    """One picture of a sheet:
+
+    `color` (N, N, 3) linear, `coverage` (N, N) in [0, 1], a label and a faint remark.
+    """
 
     color: np.ndarray
     coverage: np.ndarray
@@ -45,30 +54,53 @@ class Panel:
 def contact_sheet(decomposition: Decomposition) -> Image.Image:
     """The sheet of a decomposition: eight panels, 4 x 2, with a title taken from its provenance.
 
-    The title reads `input["name"]`, `settings["model"]`, `settings["separator"]`, `settings["illumination"]`, `status["loss"]`,
-    `status["converged"]`, as far as they are there, and the fitted gloss.
+    The title reads `input["name"]`, `settings["model"]`, `settings["separator"]`,
+    `settings["illumination"]`, `status["loss"]`, `status["converged"]`, as far as they are there,
+    and the fitted gloss.
     """
     d = decomposition
     frame = _Frame.around(d.mask)
-    photo, paint, light = (_exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading))
+    photo, paint, light = (
+        _exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading)
+    )
     ball, coverage = _ball(d.illumination)
-    ball_light = min(light, _exposure(ball[coverage > 0.5]))  # the ball also shows directions that the object does not
+    ball_light = min(
+        light, _exposure(ball[coverage > 0.5])
+    )  # the ball also shows directions that the object does not
     colors = [
         (d.image, photo, "Input", ""),
         (d.diffuse, photo, "Diffuse", ""),
-        (d.specular, photo, "Specular", f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light"),
+        (
+            d.specular,
+            photo,
+            "Specular",
+            f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light",
+        ),
         (d.reflectance, paint, "Reflectance", ""),
         (d.shading, light, "Shading", ""),
     ]
-    panels = [Panel(gain * frame.scaled(values), frame.coverage, label, remark) for values, gain, label, remark in colors]
-    panels.append(Panel(srgb_to_linear(0.5 + 0.5 * frame.scaled(d.normal)), frame.coverage, "Normals", "x right, y up, z to viewer"))
+    panels = [
+        Panel(gain * frame.scaled(values), frame.coverage, label, remark)
+        for values, gain, label, remark in colors
+    ]
+    panels.append(
+        Panel(
+            srgb_to_linear(0.5 + 0.5 * frame.scaled(d.normal)),
+            frame.coverage,
+            "Normals",
+            "x right, y up, z to viewer",
+        )
+    )
     panels.append(_relief(d, frame))
     panels.append(Panel(ball_light * ball, coverage, "Light", "on a white ball"))
     return _sheet(*_title(d), panels, columns=4)
 
 
 def thumbnail(sheet: Path, target: Path) -> None:
-    """Writes a small JPEG of a sheet's picture, for pages that show many. Raises `InputError` where it cannot be read or written."""
+    """Writes a small JPEG of a sheet's picture, for pages that show many.
+
+    Raises `InputError` where it cannot be read or written.
+    """
     try:
         with Image.open(sheet) as picture:
             small = picture.convert("RGB")
@@ -79,12 +111,24 @@ def thumbnail(sheet: Path, target: Path) -> None:
         small.save(partial, "JPEG", quality=85)
 
 
-def separation_sheet(separation: Separation, image: np.ndarray, mask: np.ndarray, title: str = "") -> Image.Image:
-    """The sheet of a separation, 3 x 1: input, diffuse, specular. `image`: (H, W, 3) linear. `mask`: (H, W) bool."""
+def separation_sheet(
+    separation: Separation, image: np.ndarray, mask: np.ndarray, title: str = ""
+) -> Image.Image:
+    """The sheet of a separation, 3 x 1: input, diffuse, specular.
+
+    `image`: (H, W, 3) linear. `mask`: (H, W) bool.
+    """
     frame, gain = _Frame.around(mask), _exposure(image[mask])
     share = f"{100 * _share(separation.specular, image, mask):.1f} % of the light"
-    maps = [(image, "Input", ""), (separation.diffuse, "Diffuse", ""), (separation.specular, "Specular", share)]
-    panels = [Panel(gain * frame.scaled(values), frame.coverage, label, remark) for values, label, remark in maps]
+    maps = [
+        (image, "Input", ""),
+        (separation.diffuse, "Diffuse", ""),
+        (separation.specular, "Specular", share),
+    ]
+    panels = [
+        Panel(gain * frame.scaled(values), frame.coverage, label, remark)
+        for values, label, remark in maps
+    ]
     return _sheet(title or "Separation", f"{mask.shape[1]} x {mask.shape[0]} px", panels, columns=3)
 
 
@@ -98,14 +142,21 @@ class Answer:
 
 
 def comparison_sheet(
-    title: str, image: np.ndarray, mask: np.ndarray, answers: Sequence[Answer], truth: tuple[np.ndarray, np.ndarray] | None = None
+    title: str,
+    image: np.ndarray,
+    mask: np.ndarray,
+    answers: Sequence[Answer],
+    truth: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Image.Image:
-    """Many separations of one photo, two in a row of six panels: each its diffuse layer, its specular layer and its error.
+    """Many separations of one photo, two in a row of six panels: each its diffuse layer, its
+    specular layer and its error.
 
-    `image`, and the true (diffuse, specular) if they are known: (H, W, 3) linear; `mask`: (H, W) bool. Errors of the diffuse layer are
-    orange where too much light was left and blue where too much was taken, in full colour from a tenth of the photo's white on. Without
-    a truth the confidence stands there, white where it is 1. The first three panels are the photo and the truth, or the photo, its
-    smallest channel and its chromaticity, which is all that methods by colour see.
+    `image`, and the true (diffuse, specular) if they are known: (H, W, 3) linear; `mask`: (H, W)
+    bool. Errors of the diffuse layer are orange where too much light was left and blue where too
+    much was taken, in full colour from a tenth of the photo's white on. Without a truth the
+    confidence stands there, white where it is 1. The first three panels are the photo and the
+    truth, or the photo, its smallest channel and its chromaticity, which is all that methods by
+    colour see.
     """
     frame, gain = _Frame.around(mask), _exposure(image[mask])
 
@@ -114,26 +165,51 @@ def comparison_sheet(
 
     if truth is None:
         low, total = image.min(axis=2, keepdims=True), image.sum(axis=2, keepdims=True)
-        second = panel(gain * np.repeat(low, 3, axis=2), "Smallest channel"), panel(image / np.maximum(total, 1e-9), "Chromaticity")
+        second = (
+            panel(gain * np.repeat(low, 3, axis=2), "Smallest channel"),
+            panel(image / np.maximum(total, 1e-9), "Chromaticity"),
+        )
     else:
         share = f"{100 * _share(truth[1], image, mask):.1f} % of the light"
-        second = panel(gain * truth[0], "True diffuse"), panel(gain * truth[1], "True specular", share)
+        second = (
+            panel(gain * truth[0], "True diffuse"),
+            panel(gain * truth[1], "True specular", share),
+        )
     panels = [panel(gain * image, "Input"), *second]
     for answer in answers:
         split = answer.split
         share = f"{100 * _share(split.specular, image, mask):.1f} % of the light"
-        panels += [panel(gain * split.diffuse, answer.label, answer.remark), panel(gain * split.specular, "Specular", share)]
+        panels += [
+            panel(gain * split.diffuse, answer.label, answer.remark),
+            panel(gain * split.specular, "Specular", share),
+        ]
         if truth is None:
-            panels.append(panel(np.repeat(srgb_to_linear(split.confidence)[..., None], 3, axis=2), "Confidence"))
+            panels.append(
+                panel(
+                    np.repeat(srgb_to_linear(split.confidence)[..., None], 3, axis=2), "Confidence"
+                )
+            )
         else:
-            panels.append(panel(_error_colors(gain * (split.diffuse - truth[0])), "Error", "orange: left over, blue: overdone"))
-    return _sheet(title, f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(answers)} separations", panels, columns=6)
+            panels.append(
+                panel(
+                    _error_colors(gain * (split.diffuse - truth[0])),
+                    "Error",
+                    "orange: left over, blue: overdone",
+                )
+            )
+    return _sheet(
+        title,
+        f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(answers)} separations",
+        panels,
+        columns=6,
+    )
 
 
 @dataclass(frozen=True)
 class Shown:
-    """A map of the object on a sheet: `values` (H, W, 3) linear, `mask` (H, W) bool, a label, a faint remark. `own`: in an exposure of its
-    own."""
+    """A map of the object on a sheet: `values` (H, W, 3) linear, `mask` (H, W) bool, a label, a
+    faint remark. `own`: in an exposure of its own.
+    """
 
     values: np.ndarray
     mask: np.ndarray
@@ -142,13 +218,24 @@ class Shown:
     own: bool = False
 
 
-def edit_sheet(title: str, subtitle: str, maps: Sequence[Shown], others: Sequence[Panel] = (), columns: int = 4) -> Image.Image:
-    """What an edit did: `maps`, in the exposure of the first of them, then `others`, (320, 320) pixels each, as they are."""
+def edit_sheet(
+    title: str, subtitle: str, maps: Sequence[Shown], others: Sequence[Panel] = (), columns: int = 4
+) -> Image.Image:
+    """What an edit did:
+
+    `maps`, in the exposure of the first of them, then `others`, (320, 320) pixels each, as they
+    are.
+    """
     first = _exposure(maps[0].values[maps[0].mask])
     panels = []
     for shown in maps:
-        frame, gain = _Frame.around(shown.mask), _exposure(shown.values[shown.mask]) if shown.own else first
-        panels.append(Panel(gain * frame.scaled(shown.values), frame.coverage, shown.label, shown.remark))
+        frame, gain = (
+            _Frame.around(shown.mask),
+            _exposure(shown.values[shown.mask]) if shown.own else first,
+        )
+        panels.append(
+            Panel(gain * frame.scaled(shown.values), frame.coverage, shown.label, shown.remark)
+        )
     panels += others
     return _sheet(title, subtitle, panels, min(columns, len(panels)))
 
@@ -157,12 +244,16 @@ def _error_colors(error: np.ndarray) -> np.ndarray:
     """Errors (H, W, 3), 1 being the photo's white, as colours (H, W, 3), linear."""
     mean = error.mean(axis=2, keepdims=True)
     weight = np.clip(np.abs(mean) / _FULL_ERROR, 0, 1)
-    return (1 - weight) * np.array(_NO_ERROR) + weight * np.where(mean > 0, np.array(_TOO_BRIGHT), np.array(_TOO_DARK))
+    return (1 - weight) * np.array(_NO_ERROR) + weight * np.where(
+        mean > 0, np.array(_TOO_BRIGHT), np.array(_TOO_DARK)
+    )
 
 
 @dataclass(frozen=True)
 class _Frame:
-    """How a map gets into a panel: the object's box, (first row, end row, first column, end column), is scaled by `zoom` to its middle."""
+    """How a map gets into a panel: the object's box, (first row, end row, first column, end
+    column), is scaled by `zoom` to its middle.
+    """
 
     mask: np.ndarray
     box: tuple[int, int, int, int]
@@ -176,7 +267,9 @@ class _Frame:
 
     @property
     def coverage(self) -> np.ndarray:
-        """How much of each pixel of the panel, (N, N), the object covers; a small object's outline is rounded, not shown in steps."""
+        """How much of each pixel of the panel, (N, N), the object covers; a small object's outline
+        is rounded, not shown in steps.
+        """
         zoom = max(1.0, self.zoom)
         soft = Image.fromarray(np.rint(255 * self._resized(self.mask)).astype(np.uint8))
         if zoom > 1:
@@ -184,11 +277,17 @@ class _Frame:
         return np.clip((np.asarray(soft) / 255.0 - 0.5) * zoom + 0.5, 0, 1)
 
     def scaled(self, values: np.ndarray) -> np.ndarray:
-        """A map, (H, W) or (H, W, C), as it appears in the panel, (N, N) or (N, N, C); 0 where the mask is not."""
+        """A map, (H, W) or (H, W, C), as it appears in the panel, (N, N) or (N, N, C); 0 where the
+        mask is not.
+        """
         if values.ndim == 3:
             return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
         weight = self._resized(self.mask)
-        return np.where(weight > 1e-3, self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3), 0)
+        return np.where(
+            weight > 1e-3,
+            self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3),
+            0,
+        )
 
     def _resized(self, plane: np.ndarray) -> np.ndarray:
         first_row, end_row, first_column, end_column = self.box
@@ -197,7 +296,9 @@ class _Frame:
         height, width = (min(_PANEL, max(1, round(self.zoom * n))) for n in window.shape)
         panel = np.zeros((_PANEL, _PANEL))
         top, left = (_PANEL - height) // 2, (_PANEL - width) // 2
-        panel[top : top + height, left : left + width] = Image.fromarray(window).resize((width, height), Image.Resampling.BILINEAR)
+        panel[top : top + height, left : left + width] = Image.fromarray(window).resize(
+            (width, height), Image.Resampling.BILINEAR
+        )
         return panel
 
 
@@ -207,7 +308,9 @@ def _exposure(inside: np.ndarray) -> float:
 
 
 def _share(part: np.ndarray, whole: np.ndarray, mask: np.ndarray) -> float:
-    return float(part[mask].sum(dtype=np.float64) / max(float(whole[mask].sum(dtype=np.float64)), 1e-9))
+    return float(
+        part[mask].sum(dtype=np.float64) / max(float(whole[mask].sum(dtype=np.float64)), 1e-9)
+    )
 
 
 def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -216,7 +319,9 @@ def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     axis = (np.arange(_PANEL) + 0.5 - _PANEL / 2) / radius
     x, y = np.meshgrid(axis, -axis)
     distance = np.hypot(x, y)
-    shrink = np.minimum(1, 1 / np.maximum(distance, 1e-9))  # beyond the outline: its normal, for the pixels it crosses
+    shrink = np.minimum(
+        1, 1 / np.maximum(distance, 1e-9)
+    )  # beyond the outline: its normal, for the pixels it crosses
     normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
     return np.exp(real_sh(normal) @ illumination), np.clip((1 - distance) * radius + 0.5, 0, 1)
 
@@ -229,17 +334,27 @@ def _relief(d: Decomposition, frame: _Frame) -> Panel:
     normal = frame.scaled(d.normal)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
     lamp = np.array([-0.52, 0.58, 0.63])
-    key, sky = np.clip((normal @ lamp + 0.3) / 1.3, 0, 1) ** 1.5, 0.6 + 0.4 * normal[..., 1]  # a large lamp: a soft edge of shadow
+    key, sky = (
+        np.clip((normal @ lamp + 0.3) / 1.3, 0, 1) ** 1.5,
+        0.6 + 0.4 * normal[..., 1],
+    )  # a large lamp: a soft edge of shadow
     height = frame.scaled(d.height)
     tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
     clay = (1 - tint) * np.array([0.36, 0.44, 0.52]) + tint * np.array([0.86, 0.78, 0.66])
-    color = clay * (0.95 * key[..., None] * np.array([1.0, 0.97, 0.9]) + 0.16 * sky[..., None] * np.array([0.75, 0.88, 1.0]))
+    color = clay * (
+        0.95 * key[..., None] * np.array([1.0, 0.97, 0.9])
+        + 0.16 * sky[..., None] * np.array([0.75, 0.88, 1.0])
+    )
     color *= 1 - 0.55 * _contours(height / spacing, frame.coverage)[..., None]
-    return Panel(color, frame.coverage, "Height", f"range {high - low:.0f} px, lines every {spacing:g}")
+    return Panel(
+        color, frame.coverage, "Height", f"range {high - low:.0f} px, lines every {spacing:g}"
+    )
 
 
 def _contours(level: np.ndarray, coverage: np.ndarray) -> np.ndarray:
-    """How much of a contour line, [0, 1], lies on each pixel: at whole numbers of `level`, faded where the lines run together."""
+    """How much of a contour line, [0, 1], lies on each pixel: at whole numbers of `level`, faded
+    where the lines run together.
+    """
     slope = np.hypot(*np.gradient(level))
     distance = np.abs(level - np.rint(level)) / np.maximum(slope, 1e-6)  # pixels to the line
     fade = np.clip((0.25 - slope) / 0.15, 0, 1) * (coverage > 0.99)
@@ -258,7 +373,9 @@ def _title(d: Decomposition) -> tuple[str, str]:
     given, settings, status = d.provenance.input, d.provenance.settings, d.provenance.status
     name = PurePath(str(given.get("name", ""))).name or "Decomposition"
     words = [f"{d.mask.shape[1]} x {d.mask.shape[0]} px"]
-    words += [str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)]
+    words += [
+        str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)
+    ]
     if isinstance(loss := status.get("loss"), int | float):
         words.append(f"loss {loss:.2f}")
     if isinstance(converged := status.get("converged"), bool):
@@ -290,7 +407,15 @@ def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> 
         x, y = _EDGE + column * (_PANEL + _GAP), _HEAD + row * (_PANEL + _LABEL + _GAP)
         sheet.paste(_picture(panel), (x, y), _rounded())
         end = _write(draw, (x + 2, y + _PANEL + 27), panel.label, 18, _TEXT, _PANEL)
-        _write(draw, (x + _PANEL - 2, y + _PANEL + 27), panel.remark, 14, _FAINT, x + _PANEL - end - 12, right=True)
+        _write(
+            draw,
+            (x + _PANEL - 2, y + _PANEL + 27),
+            panel.remark,
+            14,
+            _FAINT,
+            x + _PANEL - end - 12,
+            right=True,
+        )
     return sheet
 
 

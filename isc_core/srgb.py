@@ -1,8 +1,10 @@
-"""The curve by which sRGB codes linear light, in NumPy alone, so that Blender's own process can use it too.
+"""The curve by which sRGB codes linear light, in NumPy alone, so that Blender's own process can use
+it too.
 
 Equation: coded = 12.92 L for L <= 0.0031308, else 1.055 L^(1/2.4) - 0.055.
 
-Citation: IEC 61966-2-1:1999, Multimedia systems and equipment - Colour measurement and management - Part 2-1: sRGB (no DOI).
+Citation: IEC 61966-2-1:1999, Multimedia systems and equipment - Colour measurement and management -
+Part 2-1: sRGB (no DOI).
 
 Limits: nominally [0, 1]; other values follow the curve's two branches.
 """
@@ -11,12 +13,18 @@ import numpy as np
 
 
 def srgb_to_linear(coded: np.ndarray | float) -> np.ndarray:
-    """Linear light of sRGB-coded values (any shape, nominally [0, 1]; larger and negative values follow the curve's two branches)."""
+    """Linear light of sRGB-coded values (any shape, nominally [0, 1]; larger and negative values
+    follow the curve's two branches).
+    """
     x = np.asarray(coded)
     return np.where(x <= 0.04045, x / 12.92, ((np.maximum(x, 0.0) + 0.055) / 1.055) ** 2.4)
 
 
 def linear_to_srgb(linear: np.ndarray | float) -> np.ndarray:
-    """sRGB-coded values of linear light (any shape, nominally [0, 1]); the inverse of `srgb_to_linear`."""
+    """sRGB-coded values of linear light (any shape, nominally [0, 1]); the inverse of
+    `srgb_to_linear`.
+    """
     x = np.asarray(linear)
-    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1.0 / 2.4) - 0.055)
+    return np.where(
+        x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1.0 / 2.4) - 0.055
+    )

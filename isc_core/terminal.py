@@ -1,4 +1,6 @@
-"""What a person at a terminal sees and presses: the progress bar, results and complaints, and Ctrl-C."""
+"""What a person at a terminal sees and presses: the progress bar, results and complaints, and
+Ctrl-C.
+"""
 
 import contextlib
 import os
@@ -27,7 +29,9 @@ def stage_name(stage: str) -> str:
 
 
 def discard_output() -> None:
-    """Points standard output at nothing, so that what is still buffered does not fail once more when Python ends."""
+    """Points standard output at nothing, so that what is still buffered does not fail once more
+    when Python ends.
+    """
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
@@ -35,7 +39,9 @@ def discard_output() -> None:
 def printable(text: str, stream: TextIO) -> str:
     """`text`, which may have several lines, in characters that `stream` can write."""
     coding = getattr(stream, "encoding", None) or "utf-8"
-    return "\n".join(map(readable, text.split("\n"))).encode(coding, "backslashreplace").decode(coding)
+    return (
+        "\n".join(map(readable, text.split("\n"))).encode(coding, "backslashreplace").decode(coding)
+    )
 
 
 class TerminalSpeaker:
@@ -50,7 +56,12 @@ class TerminalSpeaker:
     def __enter__(self) -> "TerminalSpeaker":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         pass
 
     def done(self, output: str, lines: Sequence[str]) -> None:
@@ -76,10 +87,11 @@ class TerminalSpeaker:
 
 
 class ProgressBar:
-    """Shows `progress(stage, fraction)` on `stream`: one line that is redrawn on a terminal, else a line for each new stage.
+    """Shows `progress(stage, fraction)` on `stream`: one line that is redrawn on a terminal, else a
+    line for each new stage.
 
-    A stage's text may end in a changing part after a comma ("shape and light, loss 46.1"; "images, done 7"). Use as a context manager: the
-    line is wiped at the end, however the work ends.
+    A stage's text may end in a changing part after a comma ("shape and light, loss 46.1"; "images,
+    done 7"). Use as a context manager: the line is wiped at the end, however the work ends.
     """
 
     def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
@@ -115,7 +127,12 @@ class ProgressBar:
     def __enter__(self) -> "ProgressBar":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         if self._drawn > 0:
             with contextlib.suppress(OSError):
                 self._stream.write("\r\x1b[K")
@@ -123,9 +140,11 @@ class ProgressBar:
 
 
 class Interrupts:
-    """While in use: the first Ctrl-C asks the work to stop, a second one raises `KeyboardInterrupt`; SIGTERM ends the process with 143.
+    """While in use: the first Ctrl-C asks the work to stop, a second one raises
+    `KeyboardInterrupt`; SIGTERM ends the process with 143.
 
-    All three let the work tidy up. Outside the main thread, and where Ctrl-C is ignored (`nohup`), nothing is changed.
+    All three let the work tidy up. Outside the main thread, and where Ctrl-C is ignored (`nohup`),
+    nothing is changed.
     """
 
     def __init__(self) -> None:
@@ -151,7 +170,12 @@ class Interrupts:
         if signal.getsignal(number) != signal.SIG_IGN:
             self._before[number] = signal.signal(number, handler)
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         for number, handler in self._before.items():
             # None: a program around this Python had set it, which cannot be set again from here.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)  # type: ignore[arg-type]

@@ -1,7 +1,7 @@
 """A few threads for kernels that release the interpreter lock.
 
-Which thread runs which task never changes a result: tasks write to places of their own, and sums over tasks are taken in
-the tasks' order.
+Which thread runs which task never changes a result: tasks write to places of their own, and sums
+over tasks are taken in the tasks' order.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -10,7 +10,10 @@ from types import TracebackType
 
 
 class Workers:
-    """Runs lists of tasks on `threads` threads, the calling one included. Use as a context manager, or call `close`."""
+    """Runs lists of tasks on `threads` threads, the calling one included.
+
+    Use as a context manager, or call `close`.
+    """
 
     def __init__(self, threads: int) -> None:
         self.threads = max(1, threads)
@@ -23,7 +26,9 @@ class Workers:
                 task()
             return
         waiting = iter(tasks)
-        others = [self._pool.submit(_drain, waiting) for _ in range(min(self.threads, len(tasks)) - 1)]
+        others = [
+            self._pool.submit(_drain, waiting) for _ in range(min(self.threads, len(tasks)) - 1)
+        ]
         _drain(waiting)
         for other in others:
             other.result()
@@ -36,7 +41,12 @@ class Workers:
     def __enter__(self) -> "Workers":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
 

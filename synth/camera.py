@@ -1,13 +1,16 @@
 """The camera that all maps are made with.
 
-World and camera share one frame: x right, y up, z toward the viewer, the origin in the middle of the picture. Lengths are object units,
-`pixels_per_unit` pixels each at the origin, so height in pixels = z * pixels_per_unit. Pixel (row, column) covers
-[column, column + 1] x [row, row + 1]; its centre is at (column + .5, row + .5), row 0 at the top.
+World and camera share one frame: x right, y up, z toward the viewer, the origin in the middle of
+the picture. Lengths are object units, `pixels_per_unit` pixels each at the origin, so height in
+pixels = z * pixels_per_unit. Pixel (row, column) covers [column, column + 1] x [row, row + 1]; its
+centre is at (column + .5, row + .5), row 0 at the top.
 
-Equation: orthographic, x = (column + .5 - width / 2) / pixels_per_unit, y = (height / 2 - row - .5) / pixels_per_unit, looking along -z.
-Perspective: a pinhole at z = `distance`, scaled so that the plane z = 0 appears just as large.
+Equation: orthographic, x = (column + .5 - width / 2) / pixels_per_unit, y = (height / 2 - row - .5)
+/ pixels_per_unit, looking along -z. Perspective: a pinhole at z = `distance`, scaled so that the
+plane z = 0 appears just as large.
 
-Citation: R. Hartley and A. Zisserman, "Multiple view geometry in computer vision", 2nd edition (2004), doi:10.1017/CBO9780511811685.
+Citation: R. Hartley and A. Zisserman, "Multiple view geometry in computer vision", 2nd edition
+(2004), doi:10.1017/CBO9780511811685.
 
 Limits: no lens: no distortion, no depth of field.
 """
@@ -26,9 +29,10 @@ SMALLEST, LARGEST = 8, 4096
 
 @dataclass(frozen=True)
 class Camera:
-    """`width`, `height`: of the picture in pixels, 8 to 4096. `pixels_per_unit`: > 0, of the object at the origin.
-    `distance`: of a pinhole from the origin in object units, > 1.5; infinite for an orthographic camera.
-    Raises `InputError` outside these ranges."""
+    """`width`, `height`: of the picture in pixels, 8 to 4096. `pixels_per_unit`: > 0, of the object
+    at the origin. `distance`: of a pinhole from the origin in object units, > 1.5; infinite for an
+    orthographic camera. Raises `InputError` outside these ranges.
+    """
 
     width: int
     height: int
@@ -37,11 +41,15 @@ class Camera:
 
     def __post_init__(self) -> None:
         if not (SMALLEST <= self.width <= LARGEST and SMALLEST <= self.height <= LARGEST):
-            raise InputError(f"a picture of {self.width} x {self.height} pixels cannot be made: choose {SMALLEST} to {LARGEST} a side")
+            raise InputError(
+                f"a picture of {self.width} x {self.height} pixels cannot be made: choose {SMALLEST} to {LARGEST} a side"
+            )
         if not (math.isfinite(self.pixels_per_unit) and self.pixels_per_unit > 0):
             raise InputError("pixels_per_unit has to be finite and above 0")
         if not self.distance > 1.5:
-            raise InputError("the camera is inside the object: its distance has to be above 1.5 object units")
+            raise InputError(
+                "the camera is inside the object: its distance has to be above 1.5 object units"
+            )
 
     @property
     def perspective(self) -> bool:
@@ -49,20 +57,28 @@ class Camera:
         return math.isfinite(self.distance)
 
     def rays(self, across: float = 0.5, down: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-        """Origins and unit directions (H, W, 3) of the rays through the point (across, down) in [0, 1]^2 of each pixel."""
+        """Origins and unit directions (H, W, 3) of the rays through the point (across, down) in [0,
+        1]^2 of each pixel.
+        """
         x = (np.arange(self.width) + across - self.width / 2) / self.pixels_per_unit
         y = (self.height / 2 - np.arange(self.height) - down) / self.pixels_per_unit
         x, y = np.meshgrid(x, y)
         plane = np.stack([x, y, np.zeros_like(x)], -1)
         if not self.perspective:
-            return plane + (0.0, 0.0, FAR), np.broadcast_to(np.array([0.0, 0.0, -1.0]), plane.shape).copy()
+            return plane + (0.0, 0.0, FAR), np.broadcast_to(
+                np.array([0.0, 0.0, -1.0]), plane.shape
+            ).copy()
         eye = np.array([0.0, 0.0, self.distance])
         toward = plane - eye
-        return np.broadcast_to(eye, plane.shape).copy(), toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+        return np.broadcast_to(eye, plane.shape).copy(), toward / np.linalg.norm(
+            toward, axis=-1, keepdims=True
+        )
 
     def matrices(self) -> dict[str, list[list[float]]]:
-        """World to camera, 4 x 4 each: "opencv" (x right, y down, z away from the viewer) and "blender" (x right, y up, z toward the
-        viewer, the camera's own place as origin). An orthographic camera stands at z = `FAR`."""
+        """World to camera, 4 x 4 each: "opencv" (x right, y down, z away from the viewer) and
+        "blender" (x right, y up, z toward the viewer, the camera's own place as origin). An
+        orthographic camera stands at z = `FAR`.
+        """
         back = self.distance if self.perspective else FAR
         blender = np.eye(4)
         blender[2, 3] = -back

@@ -1,6 +1,8 @@
-"""The demo's photo: `python -m synth.demo_scene -o DIR` renders a glazed gourd under a soft sky and two softboxes.
+"""The demo's photo: `python -m synth.demo_scene -o DIR` renders a glazed gourd under a soft sky and
+two softboxes.
 
-Writes `photo.png` (sRGB, 16 bits, with alpha: what a person would take) and `truth.exr` (what a decomposition should find).
+Writes `photo.png` (sRGB, 16 bits, with alpha: what a person would take) and `truth.exr` (what a
+decomposition should find).
 """
 
 import argparse
@@ -29,7 +31,10 @@ _LAYERS = ("image", "diffuse", "specular", "reflectance", "shading")
 
 
 def demo_scene(size: int = SIZE) -> Scene:
-    """The gourd, tipped toward the viewer, in a picture of `size` x `size` pixels. Raises `InputError` for an impossible size."""
+    """The gourd, tipped toward the viewer, in a picture of `size` x `size` pixels.
+
+    Raises `InputError` for an impossible size.
+    """
     return Scene(
         gourd().turned(14),
         Material(painted_skin(), "ggx", gloss=0.1, strength=1.0, ior=1.5),
@@ -48,27 +53,44 @@ def demo_lights() -> tuple[Light, ...]:
 
 
 def demo_object(size: int = SIZE, samples: int = SAMPLES) -> GroundTruth:
-    """Renders the demo's object, exposed so that only its highlights reach 1. Raises `InputError` where Mitsuba is not installed."""
+    """Renders the demo's object, exposed so that only its highlights reach 1.
+
+    Raises `InputError` where Mitsuba is not installed.
+    """
     scene = demo_scene(size)
-    return exposed(scene, render_truth(scene, RenderOptions(samples=samples)), level=0.9, layer="image")[1]
+    return exposed(
+        scene, render_truth(scene, RenderOptions(samples=samples)), level=0.9, layer="image"
+    )[1]
 
 
 def soft_sky(rows: int = 64) -> np.ndarray:
-    """An environment of low frequencies, (rows, 2 rows, 3) float32, linear radiance, row 0 straight up: sky, horizon, ground, a window."""
+    """An environment of low frequencies, (rows, 2 rows, 3) float32, linear radiance, row 0 straight
+    up: sky, horizon, ground, a window.
+    """
     polar = (np.arange(rows) + 0.5) * np.pi / rows
     turn = (np.arange(2 * rows) + 0.5) * np.pi / rows
     up = np.cos(polar)[:, None, None]
-    sky, horizon, ground = np.array([0.30, 0.42, 0.62]), np.array([0.62, 0.55, 0.46]), np.array([0.20, 0.15, 0.11])
+    sky, horizon, ground = (
+        np.array([0.30, 0.42, 0.62]),
+        np.array([0.62, 0.55, 0.46]),
+        np.array([0.20, 0.15, 0.11]),
+    )
     height = np.clip(up, 0, 1) ** 0.6
     below = np.clip(-up, 0, 1) ** 0.5
-    gradient = np.where(up >= 0, horizon + (sky - horizon) * height, horizon + (ground - horizon) * below)
-    window = np.exp(3 * (np.sin(polar)[:, None] * np.cos(turn - 0.5 * np.pi)[None] - 1))[..., None] * np.array([0.75, 0.55, 0.35])
+    gradient = np.where(
+        up >= 0, horizon + (sky - horizon) * height, horizon + (ground - horizon) * below
+    )
+    window = np.exp(3 * (np.sin(polar)[:, None] * np.cos(turn - 0.5 * np.pi)[None] - 1))[
+        ..., None
+    ] * np.array([0.75, 0.55, 0.35])
     return np.ascontiguousarray(gradient + window, np.float32)
 
 
 def write_truth(path: Path, truth: GroundTruth) -> None:
     """Writes the ground truth as one multilayer EXR file, with the channel names of `maps.exr`."""
-    channels = {f"{name}.{c}": getattr(truth, name)[..., i] for name in _LAYERS for i, c in enumerate("RGB")}
+    channels = {
+        f"{name}.{c}": getattr(truth, name)[..., i] for name in _LAYERS for i, c in enumerate("RGB")
+    }
     channels |= {f"normal.{c}": truth.normal[..., i] for i, c in enumerate("XYZ")}
     channels |= {"height.Z": truth.height, "mask.A": truth.mask.astype(np.float32)}
     write_channels(path, channels)
@@ -76,10 +98,19 @@ def write_truth(path: Path, truth: GroundTruth) -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command. Returns 0, or 2 after one line about what was wrong."""
-    parser = argparse.ArgumentParser(prog="python -m synth.demo_scene", description="Render a glossy object with its ground truth.")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="folder for photo.png and truth.exr")
-    parser.add_argument("--size", type=int, default=SIZE, help="side of the image in pixels (default: %(default)s)")
-    parser.add_argument("--samples", type=int, default=SAMPLES, help="rays per pixel (default: %(default)s)")
+    parser = argparse.ArgumentParser(
+        prog="python -m synth.demo_scene",
+        description="Render a glossy object with its ground truth.",
+    )
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, help="folder for photo.png and truth.exr"
+    )
+    parser.add_argument(
+        "--size", type=int, default=SIZE, help="side of the image in pixels (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--samples", type=int, default=SAMPLES, help="rays per pixel (default: %(default)s)"
+    )
     options = parser.parse_args(arguments)
     try:
         if options.size < SMALLEST or options.samples < 2:

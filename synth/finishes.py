@@ -1,16 +1,18 @@
 """How glossy an object is: materials drawn at random, from eggshell paint to a glaze.
 
-Equation: the exponent p is log-uniform over `EXPONENTS`; alpha of facets is that whose lobe is nearest (`isc_core.brdf.roughness`): .028 to
-.44. Strength of blinn_phong: log-uniform over `STRENGTHS`, about the share of light that the gloss mirrors; insulators have .02 to .08
-along the normal and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to 1.5 (coated twice), ior 1.3
-to 1.8.
-A varying gloss is one of: worn (matt where it was touched), smudged (broader within smudges), striped (matt bands).
+Equation: the exponent p is log-uniform over `EXPONENTS`; alpha of facets is that whose lobe is
+nearest (`isc_core.brdf.roughness`): .028 to .44. Strength of blinn_phong: log-uniform over
+`STRENGTHS`, about the share of light that the gloss mirrors; insulators have .02 to .08 along the
+normal and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to
+1.5 (coated twice), ior 1.3 to 1.8. A varying gloss is one of: worn (matt where it was touched),
+smudged (broader within smudges), striped (matt bands).
 
-Citation: A. Ngan, F. Durand, W. Matusik, "Experimental analysis of BRDF models", EGSR 2005, 117-126, doi:10.2312/EGWR/EGSR05/117-126
-(measured materials fitted with such lobes).
+Citation: A. Ngan, F. Durand, W. Matusik, "Experimental analysis of BRDF models", EGSR 2005,
+117-126, doi:10.2312/EGWR/EGSR05/117-126 (measured materials fitted with such lobes).
 
-Limits: gloss varies without regard to the albedo's own pattern. On a white albedo the strongest draws reflect more light than they get, by
-up to a tenth (blinn_phong) or toward grazing angles (ggx), as the sums of lobes in `materials` may.
+Limits: gloss varies without regard to the albedo's own pattern. On a white albedo the strongest
+draws reflect more light than they get, by up to a tenth (blinn_phong) or toward grazing angles
+(ggx), as the sums of lobes in `materials` may.
 """
 
 from dataclasses import replace
@@ -35,16 +37,22 @@ _TEXELS = 256
 _WIDEST = 0.5  # the largest alpha that has an exponent
 
 
-def make_material(model: str, albedo: np.ndarray, rng: np.random.Generator, varying: bool | None = None) -> Material:
-    """A material of `model`, one of `FINISHES`, with this albedo (h, w, 3); its gloss is drawn, see the module.
+def make_material(
+    model: str, albedo: np.ndarray, rng: np.random.Generator, varying: bool | None = None
+) -> Material:
+    """A material of `model`, one of `FINISHES`, with this albedo (h, w, 3); its gloss is drawn, see
+    the module.
 
-    `varying`: whether gloss and strength are (256, 256) textures; None: one time in four, where the model can (`VARYING`).
-    Raises `InputError` for an unknown model, an albedo outside [0, 1], and for varying gloss of a model that has none.
+    `varying`: whether gloss and strength are (256, 256) textures; None: one time in four, where the
+    model can (`VARYING`). Raises `InputError` for an unknown model, an albedo outside [0, 1], and
+    for varying gloss of a model that has none.
     """
     if model not in FINISHES:
         raise InputError(f"unknown material {model!r}: choose {', '.join(FINISHES)}")
     if varying and model not in VARYING:
-        raise InputError(f"the gloss of {model} cannot vary over the object: choose {' or '.join(VARYING)}")
+        raise InputError(
+            f"the gloss of {model} cannot vary over the object: choose {' or '.join(VARYING)}"
+        )
     varied_by_chance = bool(rng.random() < _CHANCE)
     exponent = _log_uniform(rng, *EXPONENTS)
     if model in MATT:
@@ -53,18 +61,28 @@ def make_material(model: str, albedo: np.ndarray, rng: np.random.Generator, vary
         material = Material(albedo, "blinn_phong", exponent, _log_uniform(rng, *STRENGTHS))
     else:
         strength = float(rng.uniform(*FACET_STRENGTHS)) if model == "ggx" else 1.0
-        material = Material(albedo, cast(Model, model), float(fitted_alpha(exponent)), strength, float(rng.uniform(1.3, 1.8)))
+        material = Material(
+            albedo,
+            cast(Model, model),
+            float(fitted_alpha(exponent)),
+            strength,
+            float(rng.uniform(1.3, 1.8)),
+        )
     if model in VARYING and (varied_by_chance if varying is None else varying):
         return _varied(material, exponent, rng)
     return material
 
 
 def gloss_class(material: Material) -> str:
-    """ "matt", "broad" (exponent below 30), "medium" or "sharp" (above 300), by the median over the texture."""
+    """ "matt", "broad" (exponent below 30), "medium" or "sharp" (above 300), by the median over the
+    texture.
+    """
     if material.matt or not np.any(material.strength):
         return "matt"
     gloss = float(np.median(material.gloss))
-    exponent = gloss if material.model == "blinn_phong" else float(fitted_exponent(min(gloss, _WIDEST)))
+    exponent = (
+        gloss if material.model == "blinn_phong" else float(fitted_exponent(min(gloss, _WIDEST)))
+    )
     return "broad" if exponent < BROAD_BELOW else "sharp" if exponent > SHARP_ABOVE else "medium"
 
 
@@ -73,7 +91,9 @@ def _log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 
 
 def _varied(material: Material, exponent: float, rng: np.random.Generator) -> Material:
-    """The material with textures: its own gloss where the pattern is 0, a broader and weaker one where it is 1."""
+    """The material with textures: its own gloss where the pattern is 0, a broader and weaker one
+    where it is 1.
+    """
     pattern = (_worn, _smudged, _striped)[rng.integers(3)](rng)
     broader, weaker = rng.uniform(3, 12), rng.uniform(0.1, 0.6)
     exponents = np.maximum(exponent * broader**-pattern, EXPONENTS[0])

@@ -1,15 +1,18 @@
 """Lights, as plain numbers; every renderer here makes of them what it needs.
 
-Directions point from the object toward the light, in the camera's frame (x right, y up, z toward the viewer), lengths are object units.
-All radiometric values are linear Rec.709 triples >= 0. Environments are pictures laid out as `isc_core.environment` says.
+Directions point from the object toward the light, in the camera's frame (x right, y up, z toward
+the viewer), lengths are object units. All radiometric values are linear Rec.709 triples >= 0.
+Environments are pictures laid out as `isc_core.environment` says.
 
-Equation: the irradiance of a surface with the normal n: directional, E max(0, n . d); point, I max(0, n . d) / r^2; panel and environment,
-the integral of L max(0, n . w) over the solid angle that they fill.
+Equation: the irradiance of a surface with the normal n: directional, E max(0, n . d); point, I
+max(0, n . d) / r^2; panel and environment, the integral of L max(0, n . w) over the solid angle
+that they fill.
 
-Citation: F. E. Nicodemus et al., "Geometrical considerations and nomenclature for reflectance", NBS Monograph 160 (1977),
-doi:10.6028/NBS.MONO.160.
+Citation: F. E. Nicodemus et al., "Geometrical considerations and nomenclature for reflectance", NBS
+Monograph 160 (1977), doi:10.6028/NBS.MONO.160.
 
-Limits: no light has a size smaller than its samples tell, none is seen by the camera, panels shine to their front only.
+Limits: no light has a size smaller than its samples tell, none is seen by the camera, panels shine
+to their front only.
 """
 
 from collections.abc import Sequence
@@ -23,7 +26,10 @@ from isc_core.errors import InputError
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """From far away. `direction` (3,): unit, toward the light. `irradiance` (3,): on a plane across the beam."""
+    """From far away.
+
+    `direction` (3,): unit, toward the light. `irradiance` (3,): on a plane across the beam.
+    """
 
     direction: np.ndarray
     irradiance: np.ndarray
@@ -47,8 +53,10 @@ class PointLight:
 
 @dataclass(frozen=True)
 class PanelLight:
-    """A rectangular area light. `centre` (3,); `right`, `up` (3,): half its sides, at right angles to each other; it shines toward
-    right x up. `radiance` (3,): alike everywhere on it and toward all sides in front."""
+    """A rectangular area light. `centre` (3,); `right`, `up` (3,): half its sides, at right angles
+    to each other; it shines toward right x up. `radiance` (3,): alike everywhere on it and toward
+    all sides in front.
+    """
 
     centre: np.ndarray
     right: np.ndarray
@@ -60,7 +68,9 @@ class PanelLight:
             _check(name, getattr(self, name), (3,))
         _check("radiance", self.radiance, (3,), light=True)
         if self.area <= 0 or abs(float(np.dot(self.right, self.up))) > 1e-6 * self.area:
-            raise InputError("a panel's sides have to be at right angles to each other, and longer than 0")
+            raise InputError(
+                "a panel's sides have to be at right angles to each other, and longer than 0"
+            )
 
     @property
     def normal(self) -> np.ndarray:
@@ -76,7 +86,10 @@ class PanelLight:
 
 @dataclass(frozen=True)
 class EnvironmentLight:
-    """From all around, infinitely far. `radiance`: (rows, 2 rows, 3), rows >= 4, laid out as `isc_core.environment.directions` says."""
+    """From all around, infinitely far.
+
+    `radiance`: (rows, 2 rows, 3), rows >= 4, laid out as `isc_core.environment.directions` says.
+    """
 
     radiance: np.ndarray
 
@@ -91,8 +104,13 @@ Light = DirectionalLight | PointLight | PanelLight | EnvironmentLight
 Lights = Sequence[Light]
 
 
-def panel_toward_origin(centre: Sequence[float], size: tuple[float, float], radiance: Sequence[float]) -> PanelLight:
-    """A panel at `centre` that faces the origin; `size`: width and height in object units, the height as upright as it can be."""
+def panel_toward_origin(
+    centre: Sequence[float], size: tuple[float, float], radiance: Sequence[float]
+) -> PanelLight:
+    """A panel at `centre` that faces the origin;
+
+    `size`: width and height in object units, the height as upright as it can be.
+    """
     place = np.asarray(centre, float)
     forward = -place / np.linalg.norm(place)
     pole = np.array([0.0, 1.0, 0.0]) if abs(forward[1]) < 0.999 else np.array([0.0, 0.0, -1.0])
@@ -114,9 +132,11 @@ def scaled(light: Light, gain: float) -> Light:
 
 
 def lights_as_environment(lights: Lights, rows: int) -> np.ndarray:
-    """All lights as seen from the origin: (rows, 2 rows, 3) float32 radiance. Point and directional lights fill one pixel.
+    """All lights as seen from the origin: (rows, 2 rows, 3) float32 radiance. Point and directional
+    lights fill one pixel.
 
-    Panels are painted on the pixels whose centres they cover, so that their radiance is kept; one too small for any keeps its irradiance.
+    Panels are painted on the pixels whose centres they cover, so that their radiance is kept; one
+    too small for any keeps its irradiance.
     """
     towards, solid = directions(rows), solid_angles(rows)
     total = np.zeros((rows, 2 * rows, 3))
@@ -144,7 +164,9 @@ def _beam(light: DirectionalLight | PointLight | PanelLight) -> tuple[np.ndarray
     toward = place / np.sqrt(square)
     if isinstance(light, PointLight):
         return toward, np.asarray(light.intensity) / square
-    return toward, np.asarray(light.radiance) * light.area * max(0.0, float(-light.normal @ toward)) / square
+    return toward, np.asarray(light.radiance) * light.area * max(
+        0.0, float(-light.normal @ toward)
+    ) / square
 
 
 def _seen_through(panel: PanelLight, towards: np.ndarray) -> np.ndarray:
@@ -157,7 +179,9 @@ def _seen_through(panel: PanelLight, towards: np.ndarray) -> np.ndarray:
     return facing & (distance > 0) & inside[0] & inside[1]
 
 
-def _check(name: str, value: np.ndarray, shape: tuple[int, ...], *, unit: bool = False, light: bool = False) -> None:
+def _check(
+    name: str, value: np.ndarray, shape: tuple[int, ...], *, unit: bool = False, light: bool = False
+) -> None:
     value = np.asarray(value)
     if value.shape != shape or not np.isfinite(value).all():
         raise InputError(f"a light's {name} has to be finite numbers of shape {shape}")

@@ -1,4 +1,6 @@
-"""Triangle meshes with smooth normals and texture coordinates; among them closed surfaces swept around the y axis."""
+"""Triangle meshes with smooth normals and texture coordinates; among them closed surfaces swept
+around the y axis.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +10,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Mesh:
-    """`vertices`, `normals`: (N, 3) float, object units, y up, normals outward. `uv`: (N, 2) in [0, 1]. `faces`: (M, 3) int."""
+    """`vertices`, `normals`:
+
+    (N, 3) float, object units, y up, normals outward. `uv`: (N, 2) in [0, 1]. `faces`: (M, 3) int.
+    """
 
     vertices: np.ndarray
     normals: np.ndarray
@@ -25,7 +30,9 @@ class Mesh:
         return Mesh(self.vertices @ rotation.T, self.normals @ rotation.T, self.uv, self.faces)
 
     def fitted(self) -> "Mesh":
-        """The mesh moved so that the middle of its box is the origin, and scaled so that the larger of its x and y extents is 2."""
+        """The mesh moved so that the middle of its box is the origin, and scaled so that the larger
+        of its x and y extents is 2.
+        """
         low, high = self.vertices.min(0), self.vertices.max(0)
         scale = 2 / (high - low)[:2].max()
         return Mesh((self.vertices - (low + high) / 2) * scale, self.normals, self.uv, self.faces)
@@ -34,43 +41,61 @@ class Mesh:
 def swept(points: np.ndarray) -> Mesh:
     """The mesh of a closed surface given on a grid.
 
-    `points`: (rows, columns, 3), row 0 at the top pole and the last at the bottom one; the columns go around once, counter-clockwise
-    seen from above, and the last repeats the first. `u` runs with the columns, `v` from 0 at the top to 1, as a
-    texture's rows do.
+    `points`: (rows, columns, 3), row 0 at the top pole and the last at the bottom one; the columns
+    go around once, counter-clockwise seen from above, and the last repeats the first. `u` runs with
+    the columns, `v` from 0 at the top to 1, as a texture's rows do.
     """
     rows, columns = points.shape[:2]
     u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
     uv = np.stack([u.ravel(), v.ravel()], -1)
-    return Mesh(points.reshape(-1, 3), _grid_normals(points).reshape(-1, 3), uv, grid_faces(rows, columns))
+    return Mesh(
+        points.reshape(-1, 3), _grid_normals(points).reshape(-1, 3), uv, grid_faces(rows, columns)
+    )
 
 
 def grid_faces(rows: int, columns: int) -> np.ndarray:
-    """The triangles (M, 3) of a grid of vertices in row order; counter-clockwise where rows run down and columns to the right."""
+    """The triangles (M, 3) of a grid of vertices in row order; counter-clockwise where rows run
+    down and columns to the right.
+    """
     corner = np.arange(rows * columns).reshape(rows, columns)
-    a, b, c, d = corner[:-1, :-1].ravel(), corner[1:, :-1].ravel(), corner[1:, 1:].ravel(), corner[:-1, 1:].ravel()
+    a, b, c, d = (
+        corner[:-1, :-1].ravel(),
+        corner[1:, :-1].ravel(),
+        corner[1:, 1:].ravel(),
+        corner[:-1, 1:].ravel(),
+    )
     return np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit normals (N, 3): the mean of those of the faces around each vertex, by sin(angle) / (product of the sides) there, which is exact
-    where the vertices lie on a sphere (N. Max 1999, doi:10.1080/10867651.1999.10487501); (0, 0, 1) where there are none.
+    """Unit normals (N, 3): the mean of those of the faces around each vertex, by sin(angle) /
+    (product of the sides) there, which is exact where the vertices lie on a sphere (N. Max 1999,
+    doi:10.1080/10867651.1999.10487501); (0, 0, 1) where there are none.
 
-    Vertices that lie in one place have to be one vertex, or they make a crease."""
+    Vertices that lie in one place have to be one vertex, or they make a crease.
+    """
     corner = vertices[faces]
     sides = corner - np.roll(corner, 1, axis=1)
     square = (sides**2).sum(-1)
     across = np.cross(sides[:, 1], sides[:, 2])
     product = square * np.roll(square, -1, axis=1)  # of the two sides that meet at each corner
     weights = (across[:, None] / np.where(product > 0, product, np.inf)[..., None]).reshape(-1, 3)
-    total = np.stack([np.bincount(faces.ravel(), weights[:, i], len(vertices)) for i in range(3)], -1)
+    total = np.stack(
+        [np.bincount(faces.ravel(), weights[:, i], len(vertices)) for i in range(3)], -1
+    )
     length = np.linalg.norm(total, axis=1, keepdims=True)
     return np.where(length > 0, total / np.where(length > 0, length, 1), (0.0, 0.0, 1.0))
 
 
 def joined(first: Mesh, second: Mesh) -> Mesh:
     """Two meshes as one; where they overlap, both surfaces stay."""
-    vertices, normals, uv = (np.concatenate([getattr(mesh, part) for mesh in (first, second)]) for part in ("vertices", "normals", "uv"))
-    return Mesh(vertices, normals, uv, np.concatenate([first.faces, second.faces + len(first.vertices)]))
+    vertices, normals, uv = (
+        np.concatenate([getattr(mesh, part) for mesh in (first, second)])
+        for part in ("vertices", "normals", "uv")
+    )
+    return Mesh(
+        vertices, normals, uv, np.concatenate([first.faces, second.faces + len(first.vertices)])
+    )
 
 
 def _grid_normals(points: np.ndarray) -> np.ndarray:
@@ -90,6 +115,16 @@ def write_ply(path: Path, mesh: Mesh) -> None:
     triangles = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])
     triangles["count"] = 3
     triangles["corners"] = mesh.faces
-    header = ["ply", "format binary_little_endian 1.0", f"element vertex {len(table)}", *(f"property float {n}" for n in names)]
-    header += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header", ""]
+    header = [
+        "ply",
+        "format binary_little_endian 1.0",
+        f"element vertex {len(table)}",
+        *(f"property float {n}" for n in names),
+    ]
+    header += [
+        f"element face {len(triangles)}",
+        "property list uchar int vertex_indices",
+        "end_header",
+        "",
+    ]
     path.write_bytes("\n".join(header).encode() + table.tobytes() + triangles.tobytes())

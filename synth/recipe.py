@@ -1,16 +1,19 @@
 """What a scene is made of, as a few words and numbers, and how they become that scene.
 
-An object, a material and a light are members of families: the object "lathe03" is the fourth of the lathe's, the same one in every scene,
-under whatever material and light. So that this holds, each member draws from random numbers of its own, seeded by what it is called; what
-belongs to one scene alone (framing, exposure, samples, noise) draws from streams of the scene's seed.
+An object, a material and a light are members of families: the object "lathe03" is the fourth of the
+lathe's, the same one in every scene, under whatever material and light. So that this holds, each
+member draws from random numbers of its own, seeded by what it is called; what belongs to one scene
+alone (framing, exposure, samples, noise) draws from streams of the scene's seed.
 
-Equation: member (aspect, family, number): SeedSequence((crc32 aspect, crc32 family, number)); scene: SeedSequence(seed, spawn_key=(k,)).
-The camera: pixels_per_unit = fill * size / extent, the extent being the wider side of the object's outline.
+Equation: member (aspect, family, number): SeedSequence((crc32 aspect, crc32 family, number));
+scene: SeedSequence(seed, spawn_key=(k,)). The camera: pixels_per_unit = fill * size / extent, the
+extent being the wider side of the object's outline.
 
-Citation: M. E. O'Neill, "PCG: a family of simple fast space-efficient statistically good algorithms for random number generation",
-Harvey Mudd College HMC-CS-2014-0905 (2014) (NumPy's generator).
+Citation: M. E. O'Neill, "PCG: a family of simple fast space-efficient statistically good algorithms
+for random number generation", Harvey Mudd College HMC-CS-2014-0905 (2014) (NumPy's generator).
 
-Limits: members are the same only as long as the code that draws them is: `scene.json` therefore names the version.
+Limits: members are the same only as long as the code that draws them is: `scene.json` therefore
+names the version.
 """
 
 from dataclasses import dataclass, field, replace
@@ -42,7 +45,8 @@ from .shapes.height_field import mesh_of_height, read_height
 from .shapes.mesh_file import read_mesh_file
 from .truth import GroundTruth, exposed, render_truth
 
-# Families that are read from a user's file instead of drawn; "mesh" is also the paint that a mesh brings along.
+# Families that are read from a user's file instead of drawn; "mesh" is also the paint that a mesh
+# brings along.
 MESH_FILE, HEIGHT_FILE, IMAGE_FILE = "mesh", "height", "image"
 _DISTANCE = 5.0  # of a pinhole, object units: as one photographs things on a table
 _FILL = (0.85, 0.90)  # of the picture's side, by the object
@@ -53,7 +57,9 @@ _FRAMING, _EXPOSURE, _SAMPLES, _NOISE = range(4)  # streams of a scene's seed
 
 @dataclass(frozen=True)
 class Part:
-    """A member of a family of objects, materials or lights: the `family`'s name and its `number`, from 0 on."""
+    """A member of a family of objects, materials or lights: the `family`'s name and its `number`,
+    from 0 on.
+    """
 
     family: str
     number: int
@@ -64,15 +70,19 @@ class Part:
         return f"{self.family}{self.number:02d}"
 
     def generator(self, aspect: str) -> np.random.Generator:
-        """The random numbers that make one aspect ("shape", "albedo", "gloss", "light") of this member, from their beginning."""
+        """The random numbers that make one aspect ("shape", "albedo", "gloss", "light") of this
+        member, from their beginning.
+        """
         words = (crc32(text.encode()) for text in (aspect, self.family))
         return np.random.default_rng(np.random.SeedSequence([*words, self.number]))
 
 
 @dataclass(frozen=True)
 class Sources:
-    """Files that a user brings along, None where none: `mesh` and `height` of objects, `albedo_image`, `natural_lights` (the folder of
-    natural_lights.mat), `hdr` (the environments, one light each, in alphabetical order)."""
+    """Files that a user brings along, None where none: `mesh` and `height` of objects,
+    `albedo_image`, `natural_lights` (the folder of natural_lights.mat), `hdr` (the environments,
+    one light each, in alphabetical order).
+    """
 
     mesh: Path | None = None
     height: Path | None = None
@@ -81,7 +91,10 @@ class Sources:
     hdr: tuple[Path, ...] = ()
 
     def check(self) -> bool:
-        """Reads the files once, before any work, and says whether the mesh has colours. Raises `InputError`."""
+        """Reads the files once, before any work, and says whether the mesh has colours.
+
+        Raises `InputError`.
+        """
         if self.height is not None:
             read_height(self.height)
         if self.albedo_image is not None:
@@ -93,10 +106,12 @@ class Sources:
 
 @dataclass(frozen=True)
 class Picture:
-    """How scenes are taken. `size`: of the square picture's side, pixels. `samples`, `bounces`, `renderer`: see `RenderOptions`.
-    `perspective`: a pinhole instead of an orthographic camera. `exposure`: what 99.5 % of the diffuse layer's values stay below, > 0;
-    None draws it for each scene from .5 to .75, and takes less where more than a tenth of the image would be above 1. `sensor`: what
-    becomes of the light. Raises `InputError` for impossible values."""
+    """How scenes are taken. `size`: of the square picture's side, pixels. `samples`, `bounces`,
+    `renderer`: see `RenderOptions`. `perspective`: a pinhole instead of an orthographic camera.
+    `exposure`: what 99.5 % of the diffuse layer's values stay below, > 0; None draws it for each
+    scene from .5 to .75, and takes less where more than a tenth of the image would be above 1.
+    `sensor`: what becomes of the light. Raises `InputError` for impossible values.
+    """
 
     size: int = 256
     samples: int = 64
@@ -115,8 +130,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class Recipe:
-    """One scene. `seed` >= 0. `shape`, `material`, `light`: the members. `model`: the material's reflectance, of `MODELS`; `albedo`: the
-    family of its paint, of `ALBEDOS`, "image" or "mesh". `picture`, `sources`: shared by all scenes of a run."""
+    """One scene. `seed` >= 0. `shape`, `material`, `light`: the members. `model`: the material's
+    reflectance, of `MODELS`; `albedo`: the family of its paint, of `ALBEDOS`, "image" or "mesh".
+    `picture`, `sources`: shared by all scenes of a run.
+    """
 
     seed: int
     shape: Part
@@ -139,18 +156,31 @@ class Recipe:
     def render_options(self) -> RenderOptions:
         """What `render_truth` takes."""
         seed = int(self.stream(_SAMPLES).generate_state(1)[0] & 0x7FFFFFFF)
-        return RenderOptions(self.picture.samples, seed, self.picture.bounces, self.picture.renderer)
+        return RenderOptions(
+            self.picture.samples, seed, self.picture.bounces, self.picture.renderer
+        )
 
 
 def build(recipe: Recipe) -> Scene:
-    """The scene, its lights as bright as they come. Raises `InputError` for unknown names and files that cannot be used."""
+    """The scene, its lights as bright as they come.
+
+    Raises `InputError` for unknown names and files that cannot be used.
+    """
     mesh = _mesh(recipe)
     fill = float(np.random.default_rng(recipe.stream(_FRAMING)).uniform(*_FILL))
-    return Scene(mesh, _material(recipe), _lights(recipe), camera_around(mesh, recipe.picture.size, fill, recipe.picture.perspective))
+    return Scene(
+        mesh,
+        _material(recipe),
+        _lights(recipe),
+        camera_around(mesh, recipe.picture.size, fill, recipe.picture.perspective),
+    )
 
 
 def photograph(recipe: Recipe, monitor: Monitor | None = None) -> tuple[Scene, GroundTruth]:
-    """The scene with its lights set, and its truth as the sensor sees it. Raises `InputError`, `Cancelled`."""
+    """The scene with its lights set, and its truth as the sensor sees it.
+
+    Raises `InputError`, `Cancelled`.
+    """
     scene = build(recipe)
     truth = render_truth(scene, recipe.render_options(), monitor)
     drawn = float(np.random.default_rng(recipe.stream(_EXPOSURE)).uniform(*_LEVEL))
@@ -158,11 +188,15 @@ def photograph(recipe: Recipe, monitor: Monitor | None = None) -> tuple[Scene, G
     scene, truth = exposed(scene, truth, drawn if wanted is None else wanted)
     if wanted is None and (truth.image[truth.mask] > 1).mean() > _MOST_CLIPPED:
         scene, truth = exposed(scene, truth, 1.0, 1 - _MOST_CLIPPED, "image")
-    return scene, observe(truth, recipe.picture.sensor, np.random.default_rng(recipe.stream(_NOISE)))
+    return scene, observe(
+        truth, recipe.picture.sensor, np.random.default_rng(recipe.stream(_NOISE))
+    )
 
 
 def camera_around(mesh: Mesh, size: int, fill: float, perspective: bool = False) -> Camera:
-    """The camera in whose picture of `size` x `size` pixels the mesh, centred in x and y, reaches `fill` of the wider side."""
+    """The camera in whose picture of `size` x `size` pixels the mesh, centred in x and y, reaches
+    `fill` of the wider side.
+    """
     distance = _DISTANCE if perspective else np.inf
     nearer = 1 - mesh.vertices[:, 2:] / distance
     reach = float(np.abs(mesh.vertices[:, :2] / np.maximum(nearer, 0.1)).max())
@@ -191,7 +225,9 @@ def _material(recipe: Recipe) -> Material:
     elif recipe.albedo == MESH_FILE:
         albedo = read_mesh_file(_given(recipe.sources.mesh, "--mesh")).albedo
         if albedo is None:
-            raise InputError(f"{recipe.sources.mesh} has no colours of its own: name other --albedos")
+            raise InputError(
+                f"{recipe.sources.mesh} has no colours of its own: name other --albedos"
+            )
     else:
         albedo = make_albedo(recipe.albedo, recipe.material.generator("albedo"))
     return make_material(cast(Model, recipe.model), albedo, recipe.material.generator("gloss"))
@@ -199,10 +235,20 @@ def _material(recipe: Recipe) -> Material:
 
 def _lights(recipe: Recipe) -> tuple[Light, ...]:
     light, sources = recipe.light, recipe.sources
-    if light.family == "natural":  # by its number in the file, so that no two members are the same light
+    if (
+        light.family == "natural"
+    ):  # by its number in the file, so that no two members are the same light
         found = load_natural_lights(_given(sources.natural_lights, "--natural-lights"))
-        return (EnvironmentLight(environment_from_shading(light_from_reference(found[..., light.number]))),)
-    source = sources.hdr[light.number] if light.family == "hdr" and light.number < len(sources.hdr) else None
+        return (
+            EnvironmentLight(
+                environment_from_shading(light_from_reference(found[..., light.number]))
+            ),
+        )
+    source = (
+        sources.hdr[light.number]
+        if light.family == "hdr" and light.number < len(sources.hdr)
+        else None
+    )
     return make_lights(light.family, light.generator("light"), source)
 
 

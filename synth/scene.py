@@ -1,4 +1,6 @@
-"""A scene: one object of one material under some lights before one camera; everything as plain numbers."""
+"""A scene: one object of one material under some lights before one camera; everything as plain
+numbers.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +12,10 @@ from .meshes import Mesh
 
 @dataclass(frozen=True)
 class Scene:
-    """`mesh`: the object, object units, in the camera's frame, within about 1 of the origin. `lights`: one or more."""
+    """`mesh`: the object, object units, in the camera's frame, within about 1 of the origin.
+
+    `lights`: one or more.
+    """
 
     mesh: Mesh
     material: Material

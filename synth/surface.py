@@ -1,7 +1,9 @@
-"""What the camera sees of an object before any light is on: a point, a normal and a paint for each pixel.
+"""What the camera sees of an object before any light is on: a point, a normal and a paint for each
+pixel.
 
-Place and normal come from the one ray through each pixel's centre, so that nothing is averaged over an edge and truth is exact. Paint is
-averaged over the pixel's footprint, as a camera does, so that prints have no jagged edges.
+Place and normal come from the one ray through each pixel's centre, so that nothing is averaged over
+an edge and truth is exact. Paint is averaged over the pixel's footprint, as a camera does, so that
+prints have no jagged edges.
 
 Limits: what lies before what is decided by the centre alone: outlines are not smoothed.
 """
@@ -17,15 +19,18 @@ from .scene import Scene
 from .tracing import Tracer
 
 _FOOTPRINT = 3  # rays a side of a pixel, for its paint
-_SAME_PLACE = 3.0  # a ray of the footprint counts where it hits within so many pixels of the centre's hit
+_SAME_PLACE = (
+    3.0  # a ray of the footprint counts where it hits within so many pixels of the centre's hit
+)
 
 
 @dataclass(frozen=True)
 class Surface:
     """The N visible points, in row order of `mask`.
 
-    `mask`: (H, W) bool. `position`: (N, 3) object units; `normal`: (N, 3) unit, toward the viewer; `view`: (N, 3) unit, toward the camera;
-    `uv`: (N, 2). `paint`: the material there, `albedo` and `strength` averaged over the pixel, `gloss` at its centre.
+    `mask`: (H, W) bool. `position`: (N, 3) object units; `normal`: (N, 3) unit, toward the viewer;
+    `view`: (N, 3) unit, toward the camera; `uv`: (N, 2). `paint`: the material there, `albedo` and
+    `strength` averaged over the pixel, `gloss` at its centre.
     """
 
     mask: np.ndarray
@@ -36,7 +41,9 @@ class Surface:
     paint: Paint
 
     def image(self, values: np.ndarray, outside: tuple[float, ...] | float = 0.0) -> np.ndarray:
-        """Values (N[, C]) of the points as a picture (H, W[, C]) float32 that is `outside` elsewhere."""
+        """Values (N[, C]) of the points as a picture (H, W[, C]) float32 that is `outside`
+        elsewhere.
+        """
         picture = np.empty((*self.mask.shape, *values.shape[1:]), np.float32)
         picture[...] = outside
         picture[self.mask] = values
@@ -55,7 +62,9 @@ def find_surface(scene: Scene, tracer: Tracer) -> Surface:
     return Surface(mask, position, hits.normal[hits.valid], -directions[hits.valid], uv, paint)
 
 
-def _footprint_paint(scene: Scene, tracer: Tracer, mask: np.ndarray, position: np.ndarray, uv: np.ndarray) -> Paint:
+def _footprint_paint(
+    scene: Scene, tracer: Tracer, mask: np.ndarray, position: np.ndarray, uv: np.ndarray
+) -> Paint:
     centre = scene.material.at(uv)
     if scene.material.albedo.shape[:2] == (1, 1) and np.ndim(scene.material.strength) == 0:
         return centre

@@ -1,8 +1,10 @@
 """Rays against one mesh, in whichever variant Mitsuba runs: what is hit, and what is in the way.
 
-The LLVM variants trace whole arrays of rays at once; `scalar_rgb` traces them one by one, at some millions a second.
+The LLVM variants trace whole arrays of rays at once; `scalar_rgb` traces them one by one, at some
+millions a second.
 
-Limits: positions are found in float32, to about 1e-6 of the object. Rays that start on the surface are lifted off it by `LIFT`.
+Limits: positions are found in float32, to about 1e-6 of the object. Rays that start on the surface
+are lifted off it by `LIFT`.
 """
 
 from collections.abc import Iterator
@@ -23,8 +25,10 @@ _VECTOR = 64  # bytes
 
 @dataclass(frozen=True)
 class Hits:
-    """The nearest hit of each of M rays. `valid`: (M,) bool. `position`: (M, 3); `normal`: (M, 3) unit, interpolated between vertices,
-    turned toward the ray's origin; `uv`: (M, 2). All 0 where nothing is hit."""
+    """The nearest hit of each of M rays. `valid`: (M,) bool. `position`: (M, 3); `normal`: (M, 3)
+    unit, interpolated between vertices, turned toward the ray's origin; `uv`: (M, 2). All 0 where
+    nothing is hit.
+    """
 
     valid: np.ndarray
     position: np.ndarray
@@ -48,7 +52,11 @@ class Tracer:
         """The nearest hits of rays (M, 3), (M, 3)."""
         if not len(origins):  # Dr.Jit ends the process over arrays without entries
             return Hits(np.zeros(0, bool), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
-        columns = self._scalar_hits(origins, directions) if self._scalar else self._array_hits(origins, directions)
+        columns = (
+            self._scalar_hits(origins, directions)
+            if self._scalar
+            else self._array_hits(origins, directions)
+        )
         valid = columns[:, 0] > 0
         normal = columns[:, 4:7]
         length = np.linalg.norm(normal, axis=1, keepdims=True)
@@ -56,8 +64,12 @@ class Tracer:
         normal = np.where((normal * directions).sum(1, keepdims=True) > 0, -normal, normal)
         return Hits(valid, columns[:, 1:4], normal, columns[:, 7:9])
 
-    def blocked(self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray | float) -> np.ndarray:
-        """(M,) bool: whether something stands within `distances` (M,) or one number (infinite for far lights) along the rays (M, 3)."""
+    def blocked(
+        self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray | float
+    ) -> np.ndarray:
+        """(M,) bool: whether something stands within `distances` (M,) or one number (infinite for
+        far lights) along the rays (M, 3).
+        """
         if not len(origins):
             return np.zeros(0, bool)
         mi = load_mitsuba()
@@ -65,7 +77,9 @@ class Tracer:
         if self._scalar:
             test, ray = self.scene.ray_test, mi.Ray3f
             rays = zip(_rows(origins), _rows(directions), reach.tolist(), strict=True)
-            return np.fromiter((test(ray(o, d, r, 0.0, [])) for o, d, r in rays), bool, len(origins))
+            return np.fromiter(
+                (test(ray(o, d, r, 0.0, [])) for o, d, r in rays), bool, len(origins)
+            )
         rays = mi.Ray3f(_points(origins), _vectors(directions))
         rays.maxt = mi.Float(reach)
         return np.array(self.scene.ray_test(rays), dtype=bool)
@@ -75,7 +89,8 @@ class Tracer:
         import drjit
 
         hit = self.scene.ray_intersect(mi.Ray3f(_points(origins), _vectors(directions)))
-        # Part by part: a whole vector becomes an array by a kernel that is compiled anew for every number of rays.
+        # Part by part: a whole vector becomes an array by a kernel that is compiled anew for every
+        # number of rays.
         parts = [hit.is_valid(), *hit.p, *hit.sh_frame.n, *hit.uv]
         drjit.eval(parts)
         columns = np.stack([np.array(part, dtype=float) for part in parts], axis=1)
@@ -84,7 +99,9 @@ class Tracer:
     def _scalar_hits(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         mi = load_mitsuba()
         columns = np.zeros((len(origins), 9))
-        for row, (origin, direction) in enumerate(zip(_rows(origins), _rows(directions), strict=True)):
+        for row, (origin, direction) in enumerate(
+            zip(_rows(origins), _rows(directions), strict=True)
+        ):
             hit = self.scene.ray_intersect(mi.Ray3f(origin, direction))
             if hit.is_valid():
                 columns[row] = (1, *hit.p, *hit.sh_frame.n, *hit.uv)
@@ -92,7 +109,9 @@ class Tracer:
 
 
 def _rows(values: np.ndarray) -> Iterator[tuple[float, ...]]:
-    """The rows of (M, 3) one by one; as tuples, for as many lists would keep the garbage collector busy."""
+    """The rows of (M, 3) one by one; as tuples, for as many lists would keep the garbage collector
+    busy.
+    """
     return zip(*values.T.tolist(), strict=True)
 
 
@@ -109,8 +128,10 @@ def _parts(values: np.ndarray) -> list[object]:
 
 
 def lanes(values: np.ndarray) -> Any:
-    """Numbers (N,) as an array of Dr.Jit, in an LLVM variant. Dr.Jit reads them where they lie, and its kernels have it in them whether
-    that is a multiple of a vector's length: here it always is, so that no kernel is compiled twice."""
+    """Numbers (N,) as an array of Dr.Jit, in an LLVM variant. Dr.Jit reads them where they lie, and
+    its kernels have it in them whether that is a multiple of a vector's length: here it always is,
+    so that no kernel is compiled twice.
+    """
     room = np.empty(values.size + _VECTOR // 4, np.float32)
     start = -room.ctypes.data % _VECTOR // 4
     aligned = room[start : start + values.size]

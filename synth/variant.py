@@ -1,9 +1,11 @@
 """Mitsuba 3, in the fastest variant that this machine can run.
 
-The LLVM variants compile their kernels with the system's libLLVM. An old one does not make them fail, it aborts the whole process, and
-Dr.Jit lists the backend all the same; its version is therefore asked before the first kernel.
+The LLVM variants compile their kernels with the system's libLLVM. An old one does not make them
+fail, it aborts the whole process, and Dr.Jit lists the backend all the same; its version is
+therefore asked before the first kernel.
 
-Reference: W. Jakob et al., Dr.Jit: a just-in-time compiler for differentiable rendering, 2022, doi:10.1145/3528223.3530099.
+Reference: W. Jakob et al., Dr.Jit: a just-in-time compiler for differentiable rendering, 2022,
+doi:10.1145/3528223.3530099.
 """
 
 from types import ModuleType
@@ -20,7 +22,10 @@ def llvm_is_usable(major: int) -> bool:
 
 
 def newest_llvm() -> int:
-    """The major version of the libLLVM that Dr.Jit finds, -1 for none; loads no kernel. Raises `InputError` without Dr.Jit."""
+    """The major version of the libLLVM that Dr.Jit finds, -1 for none; loads no kernel.
+
+    Raises `InputError` without Dr.Jit.
+    """
     try:
         import drjit
     except ImportError as error:
@@ -29,7 +34,8 @@ def newest_llvm() -> int:
 
 
 def load_mitsuba() -> ModuleType:
-    """The `mitsuba` module, with the variant chosen: `llvm_ad_rgb`, or `scalar_rgb` where there is no libLLVM of version 19 or later.
+    """The `mitsuba` module, with the variant chosen: `llvm_ad_rgb`, or `scalar_rgb` where there is
+    no libLLVM of version 19 or later.
 
     Raises `InputError` where Mitsuba is not installed.
     """
@@ -50,7 +56,10 @@ def has_llvm() -> bool:
 
 
 def slower_without() -> str:
-    """One line that says what would make rendering faster here; empty where nothing is amiss. Raises `InputError` without Mitsuba."""
+    """One line that says what would make rendering faster here; empty where nothing is amiss.
+
+    Raises `InputError` without Mitsuba.
+    """
     if has_llvm():
         return ""
     found = newest_llvm()

@@ -1,4 +1,6 @@
-"""The rules of the house, proven on the source itself: which way the imports point, what no module does, what no file says."""
+"""The rules of the house, proven on the source itself: which way the imports point, what no module
+does, what no file says.
+"""
 
 import ast
 import re
@@ -14,7 +16,8 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("isc_core", "synth", "blender_addon", "benchmarks")
 
-# Where image, EXR and mesh libraries may be imported: where files become arrays and arrays become files.
+# Where image, EXR and mesh libraries may be imported: where files become arrays and arrays become
+# files.
 IMAGE_LIBRARIES = {"cv2", "PIL", "OpenEXR", "trimesh", "imageio", "skimage", "png"}
 EDGES = {"photo", "mask", "exr", "decomposition", "result_folder", "mesh", "report", "datasets"}
 RENDERERS = {"mitsuba", "drjit"}
@@ -50,8 +53,13 @@ def absolute_imports(tree: ast.Module) -> Iterator[tuple[ast.AST, str]]:
         elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
             yield node, node.module.split(".")[0]
         elif isinstance(node, ast.Call) and called(node) in {"__import__", "import_module"}:
-            # A name that is put together while the program runs cannot be checked; one that is written out can.
-            yield from ((node, str(name.value).split(".")[0]) for name in node.args[:1] if isinstance(name, ast.Constant))
+            # A name that is put together while the program runs cannot be checked; one that is
+            # written out can.
+            yield from (
+                (node, str(name.value).split(".")[0])
+                for name in node.args[:1]
+                if isinstance(name, ast.Constant)
+            )
 
 
 def called(node: ast.Call) -> str:
@@ -60,7 +68,11 @@ def called(node: ast.Call) -> str:
 
 
 def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
-    return (node for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
+    return (
+        node
+        for node in ast.walk(parsed(path))
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
+    )
 
 
 def lines_of(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
@@ -91,7 +103,9 @@ def test_the_core_touches_files_only_at_its_edges() -> None:
 
 
 def test_relative_imports_stay_inside_their_package() -> None:
-    """The extension ships the core under another name: an import that climbs out of it would end somewhere else."""
+    """The extension ships the core under another name: an import that climbs out of it would end
+    somewhere else.
+    """
     wrong = [
         where(path, node)
         for package in PACKAGES
@@ -109,7 +123,11 @@ def test_errors_are_caught_by_name() -> None:
         for node in ast.walk(parsed(path)):
             if isinstance(node, ast.ExceptHandler):
                 caught = node.type.elts if isinstance(node.type, ast.Tuple) else [node.type]
-                wrong += [where(path, node) for kind in caught if kind is None or getattr(kind, "id", "") in broad]
+                wrong += [
+                    where(path, node)
+                    for kind in caught
+                    if kind is None or getattr(kind, "id", "") in broad
+                ]
     assert not wrong, "\n".join(wrong)
 
 
@@ -117,24 +135,46 @@ def test_nothing_runs_or_unpacks_what_it_reads() -> None:
     wrong = []
     for path in sources(*PACKAGES):
         tree = parsed(path)
-        wrong += [f"{where(path, node)} imports {name}" for node, name in absolute_imports(tree) if name in UNSAFE_MODULES]
+        wrong += [
+            f"{where(path, node)} imports {name}"
+            for node, name in absolute_imports(tree)
+            if name in UNSAFE_MODULES
+        ]
         for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
             if isinstance(call.func, ast.Name) and call.func.id in {"eval", "exec"}:
                 wrong.append(f"{where(path, call)} calls {call.func.id}")
-            loose = {k.arg for k in call.keywords if isinstance(k.value, ast.Constant) and k.value.value is True}
-            wrong += [f"{where(path, call)} passes {name}=True" for name in ("shell", "allow_pickle") if name in loose]
+            loose = {
+                k.arg
+                for k in call.keywords
+                if isinstance(k.value, ast.Constant) and k.value.value is True
+            }
+            wrong += [
+                f"{where(path, call)} passes {name}=True"
+                for name in ("shell", "allow_pickle")
+                if name in loose
+            ]
     assert not wrong, "\n".join(wrong)
 
 
 def test_functions_are_short() -> None:
-    lengths = {where(path, function): lines_of(function) for path in sources(*PACKAGES) for function in functions(path)}
-    long = [f"{place}: {length} lines" for place, length in lengths.items() if length > LONGEST_FUNCTION]
+    lengths = {
+        where(path, function): lines_of(function)
+        for path in sources(*PACKAGES)
+        for function in functions(path)
+    }
+    long = [
+        f"{place}: {length} lines" for place, length in lengths.items() if length > LONGEST_FUNCTION
+    ]
     assert not long, "\n".join(long)
     assert np.percentile(list(lengths.values()), 90) <= USUAL_FUNCTION
 
 
 def test_every_module_says_what_it_is() -> None:
-    silent = [str(path.relative_to(ROOT)) for path in sources(*PACKAGES) if parsed(path).body and not ast.get_docstring(parsed(path))]
+    silent = [
+        str(path.relative_to(ROOT))
+        for path in sources(*PACKAGES)
+        if parsed(path).body and not ast.get_docstring(parsed(path))
+    ]
     assert not silent, "\n".join(silent)
 
 
@@ -143,7 +183,9 @@ def test_every_public_function_says_what_it_does() -> None:
         f"{where(path, node)} {node.name}"
         for path in sources(*PACKAGES)
         for node in parsed(path).body
-        if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_") and not ast.get_docstring(node)
+        if isinstance(node, ast.FunctionDef | ast.ClassDef)
+        and not node.name.startswith("_")
+        and not ast.get_docstring(node)
     ]
     assert not silent, "\n".join(silent)
 
@@ -151,19 +193,25 @@ def test_every_public_function_says_what_it_does() -> None:
 def test_the_command_starts_without_numba() -> None:
     """Some machines have no build of Numba: the plain NumPy engine must do there."""
     code = "import sys; sys.modules['numba'] = None; sys.modules['llvmlite'] = None; import isc_core.cli, isc_core.sirfs.numpy_engine"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
 def test_the_command_starts_without_a_renderer_or_blender() -> None:
     code = f"import sys; sys.modules.update(dict.fromkeys({sorted(RENDERERS | BLENDER)})); import isc_core.cli"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
 def tracked_texts() -> list[Path]:
     """The files under version control that are text."""
-    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False)
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     if listed.returncode:
         pytest.skip("not a git checkout: the list of tracked files is not known")
     binary = {".png", ".exr", ".npz", ".npy", ".glb", ".jpg", ".tiff", ".zip"}
@@ -174,9 +222,20 @@ def tracked_texts() -> list[Path]:
 def test_no_file_names_a_machine_or_a_registry() -> None:
     # Written in parts, so that this file does not hold what it looks for.
     homes = [f"/{folder}/" for folder in ("work", "root", "home", "Users", "opt/py" + "pi")]
-    options = ["--" + name for name in ("index-url", "extra-index-url", "find-links", "trusted-host")]
-    hosts = ["py" + "pi.org", "python" + "hosted.org", "deb." + "debian.org", "conda." + "anaconda.org"]
-    pattern = re.compile("|".join(rf"(?<![\w.}}-]){re.escape(path)}" for path in homes) + "|" + "|".join(map(re.escape, options + hosts)))
+    options = [
+        "--" + name for name in ("index-url", "extra-index-url", "find-links", "trusted-host")
+    ]
+    hosts = [
+        "py" + "pi.org",
+        "python" + "hosted.org",
+        "deb." + "debian.org",
+        "conda." + "anaconda.org",
+    ]
+    pattern = re.compile(
+        "|".join(rf"(?<![\w.}}-]){re.escape(path)}" for path in homes)
+        + "|"
+        + "|".join(map(re.escape, options + hosts))
+    )
     found = [
         f"{path.relative_to(ROOT)}:{number}: {line.strip()[:80]}"
         for path in tracked_texts()
@@ -188,12 +247,16 @@ def test_no_file_names_a_machine_or_a_registry() -> None:
 
 
 def test_every_dependency_is_pinned_exactly() -> None:
-    lines = [line.split("#")[0].strip() for line in (ROOT / "constraints.txt").read_text().splitlines()]
+    lines = [
+        line.split("#")[0].strip() for line in (ROOT / "constraints.txt").read_text().splitlines()
+    ]
     pins = [line for line in lines if line]
     assert all(re.fullmatch(r"[A-Za-z0-9_.\-]+==[0-9][\w.]*(; .+)?", pin) for pin in pins), pins
     pinned = {plain(re.split("==", pin)[0]) for pin in pins}
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    wanted = project["dependencies"] + [entry for extra in project["optional-dependencies"].values() for entry in extra]
+    wanted = project["dependencies"] + [
+        entry for extra in project["optional-dependencies"].values() for entry in extra
+    ]
     missing = {plain(re.match(r"[A-Za-z0-9_.\-]+", entry).group()) for entry in wanted} - pinned  # type: ignore[union-attr]
     assert not missing
 
@@ -210,12 +273,20 @@ def test_the_readme_names_commands_and_options_that_exist() -> None:
     start = "import sys; from isc_core.cli import main; sys.exit(main())"
     known = {}
     for command in commands:
-        done = subprocess.run([sys.executable, "-c", start, command, "--help"], cwd=ROOT, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, "-c", start, command, "--help"],
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert done.returncode == 0, f"isc {command}: {done.stderr}"
         known[command] = set(re.findall(r"--[a-z][a-z-]+", done.stdout))
     assert {"decompose", "separate", "mask", "evaluate", "fit-priors"} <= set(commands)
     for command in commands:
         section = re.search(rf"### `isc {command}`\n(.*?)(?=\n##)", readme, re.DOTALL)
         lines = [line for line in readme.splitlines() if re.search(rf"\bisc {command} ", line)]
-        wanted = set(re.findall(r"--[a-z][a-z-]+", "\n".join([*lines, section.group(1) if section else ""])))
+        wanted = set(
+            re.findall(r"--[a-z][a-z-]+", "\n".join([*lines, section.group(1) if section else ""]))
+        )
         assert wanted <= known[command], f"isc {command} lacks {sorted(wanted - known[command])}"

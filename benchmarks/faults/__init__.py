@@ -1,1 +1,4 @@
-"""What becomes of results when disks, files, clocks and processes fail. `python -m benchmarks.faults --help`; docs/faults.md."""
+"""What becomes of results when disks, files, clocks and processes fail.
+
+`python -m benchmarks.faults --help`; docs/faults.md.
+"""

@@ -1,9 +1,10 @@
-"""Makes disks, files, clocks and processes fail under the commands, and prints a Markdown table of what became of their outputs.
+"""Makes disks, files, clocks and processes fail under the commands, and prints a Markdown table of
+what became of their outputs.
 
   nice python -m benchmarks.faults -o DIR [--kills 100] [--only WORD]
 
-DIR/rows.jsonl keeps what was run: the same command goes on after it was stopped. What needs rights that this user lacks is skipped, and
-the table says so. Exit 1 if an output was wrong. On Linux.
+DIR/rows.jsonl keeps what was run: the same command goes on after it was stopped. What needs rights
+that this user lacks is skipped, and the table says so. Exit 1 if an output was wrong. On Linux.
 """
 
 import argparse
@@ -26,10 +27,20 @@ Work = Callable[[], Row]
 
 def main() -> int:
     """Runs the command."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    parser.add_argument("--kills", type=int, default=100, metavar="N", help="processes killed, over all commands (default %(default)s)")
-    parser.add_argument("--only", default="", metavar="WORD", help="only faults whose name holds this word")
+    parser.add_argument(
+        "--kills",
+        type=int,
+        default=100,
+        metavar="N",
+        help="processes killed, over all commands (default %(default)s)",
+    )
+    parser.add_argument(
+        "--only", default="", metavar="WORD", help="only faults whose name holds this word"
+    )
     given = parser.parse_args()
     folder = given.output.resolve()
     folder.mkdir(parents=True, exist_ok=True)
@@ -42,7 +53,10 @@ def main() -> int:
         row = {"key": key, **work()}
         rows.append(row)
         append_row(path, row)
-        print(f"{key}: {row['runs']} runs, {len(row['wrong'])} wrong {row['wrong'][:2] or row['note']}", flush=True)
+        print(
+            f"{key}: {row['runs']} runs, {len(row['wrong'])} wrong {row['wrong'][:2] or row['note']}",
+            flush=True,
+        )
     text = table(rows)
     (folder / "table.md").write_text(text + "\n", encoding="utf-8")
     print(text)
@@ -67,28 +81,53 @@ def _works(folder: Path, kills: int) -> Iterator[tuple[str, Work]]:
 
     for number in range(kills):
         command = COMMANDS[number % len(COMMANDS)]
-        yield f"kill -9 | {command.name} | {number}", partial(_killed, command, inputs, place, of, number)
+        yield (
+            f"kill -9 | {command.name} | {number}",
+            partial(_killed, command, inputs, place, of, number),
+        )
     for command in COMMANDS:
-        yield f"two runs into one folder | {command.name}", partial(_repeated, at_once, command, inputs, place, of)
+        yield (
+            f"two runs into one folder | {command.name}",
+            partial(_repeated, at_once, command, inputs, place, of),
+        )
     for kind in ("png", "exr", "npy"):
-        yield f"a photo that changes while it is read | {kind}", partial(_changing, inputs, place, kind)
+        yield (
+            f"a photo that changes while it is read | {kind}",
+            partial(_changing, inputs, place, kind),
+        )
     for command in COMMANDS:
-        yield f"the clock goes back | {command.name}", partial(_repeated, wrong_clock, command, inputs, place, of)
+        yield (
+            f"the clock goes back | {command.name}",
+            partial(_repeated, wrong_clock, command, inputs, place, of),
+        )
     yield "10,000 images in one folder | batch", lambda: _row(*many_images(place, 10_000))
     for name, fault in FAULTS.items():
         for command in COMMANDS[::-1]:
-            yield f"{name} | {command.name}", partial(_with_output, fault, command, inputs, place, of)
+            yield (
+                f"{name} | {command.name}",
+                partial(_with_output, fault, command, inputs, place, of),
+            )
 
 
-def _killed(command: Command, inputs: Path, place: Path, of: Callable[[Command], Digests], number: int) -> Row:
+def _killed(
+    command: Command, inputs: Path, place: Path, of: Callable[[Command], Digests], number: int
+) -> Row:
     return _row([kill(command, inputs, place, of(command), number)])
 
 
-def _repeated(fault: Callable[..., str], command: Command, inputs: Path, place: Path, of: Callable[[Command], Digests]) -> Row:
+def _repeated(
+    fault: Callable[..., str],
+    command: Command,
+    inputs: Path,
+    place: Path,
+    of: Callable[[Command], Digests],
+) -> Row:
     return _row([fault(command, inputs, place, of(command), number) for number in range(4)])
 
 
-def _with_output(fault: Faults, command: Command, inputs: Path, place: Path, of: Callable[[Command], Digests]) -> Row:
+def _with_output(
+    fault: Faults, command: Command, inputs: Path, place: Path, of: Callable[[Command], Digests]
+) -> Row:
     whole = of(command)
     reference(command, inputs, place)
     return _row(fault(command, inputs, place, whole))
@@ -96,7 +135,11 @@ def _with_output(fault: Faults, command: Command, inputs: Path, place: Path, of:
 
 def _changing(inputs: Path, place: Path, kind: str) -> Row:
     read_well, refused, wrong = changing(inputs, place, kind, 30.0)
-    return {"runs": read_well + refused, "wrong": wrong, "note": f"{read_well} read whole, {refused} refused in one line"}
+    return {
+        "runs": read_well + refused,
+        "wrong": wrong,
+        "note": f"{read_well} read whole, {refused} refused in one line",
+    }
 
 
 def table(rows: list[Row]) -> str:
@@ -109,7 +152,9 @@ def table(rows: list[Row]) -> str:
         one["wrong"] = [*one["wrong"], *row["wrong"]]
     lines = ["| fault | command | runs | wrong outputs | remark |", "|---|---|---:|---:|---|"]
     for (fault, command), row in merged.items():
-        lines.append(f"| {fault} | {command} | {row['runs']} | {len(row['wrong'])} | {row['note']} |")
+        lines.append(
+            f"| {fault} | {command} | {row['runs']} | {len(row['wrong'])} | {row['note']} |"
+        )
     troubles = [f"- {row['key']}: {trouble}" for row in rows for trouble in row["wrong"]]
     return "\n".join([*lines, "", *(troubles or ["No output was wrong."])])
 

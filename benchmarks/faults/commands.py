@@ -18,13 +18,20 @@ from isc_core.photo import Raster, linear_to_srgb, write_png
 
 from ..properties.pictures import Picture
 
-_PASSING = ("timings", "seconds", "created", "parameters")  # what differs between runs that are alike
+_PASSING = (
+    "timings",
+    "seconds",
+    "created",
+    "parameters",
+)  # what differs between runs that are alike
 
 
 @dataclass(frozen=True)
 class Command:
-    """`name`; `words` of the command line, `{in}` standing for the folder of inputs and `{out}` for the output; `output`: its name below
-    the folder of outputs. `resumes`: what a killed run has finished stays, one folder a scene."""
+    """`name`; `words` of the command line, `{in}` standing for the folder of inputs and `{out}` for
+    the output; `output`: its name below the folder of outputs. `resumes`: what a killed run has
+    finished stays, one folder a scene.
+    """
 
     name: str
     words: tuple[str, ...]
@@ -33,7 +40,9 @@ class Command:
 
     def line(self, inputs: Path, output: Path) -> list[str]:
         """The words with their places filled in."""
-        return [word.replace("{in}", str(inputs)).replace("{out}", str(output)) for word in self.words]
+        return [
+            word.replace("{in}", str(inputs)).replace("{out}", str(output)) for word in self.words
+        ]
 
     def process(self, inputs: Path, output: Path) -> list[str]:
         """The command line of a process of its own."""
@@ -42,20 +51,51 @@ class Command:
 
 _PHOTO = ("{in}/photo.png", "--mask", "{in}/mask.png")
 COMMANDS = (
-    Command("decompose", ("decompose", *_PHOTO, "--model", "naive", "--quiet", "-o", "{out}"), "result"),
-    Command("separate", ("separate", *_PHOTO, "--method", "shen_2013", "--quiet", "-o", "{out}"), "layers"),
-    Command("edit", ("edit", "{in}/result", "relight", "--yaw", "40", "--quiet", "-o", "{out}"), "edit"),
-    Command("mask", ("mask", "{in}/photo.png", "--box", "3,3,58,58", "--quiet", "-o", "{out}"), "found.png"),
+    Command(
+        "decompose", ("decompose", *_PHOTO, "--model", "naive", "--quiet", "-o", "{out}"), "result"
+    ),
+    Command(
+        "separate",
+        ("separate", *_PHOTO, "--method", "shen_2013", "--quiet", "-o", "{out}"),
+        "layers",
+    ),
+    Command(
+        "edit", ("edit", "{in}/result", "relight", "--yaw", "40", "--quiet", "-o", "{out}"), "edit"
+    ),
+    Command(
+        "mask",
+        ("mask", "{in}/photo.png", "--box", "3,3,58,58", "--quiet", "-o", "{out}"),
+        "found.png",
+    ),
     Command(
         "synth",
-        ("synth", "--count", "2", "--size", "24", "--samples", "2", "--bounces", "1", "--renderer", "arrays", "--quiet", "-o", "{out}"),
-        "scenes", resumes=True,
+        (
+            "synth",
+            "--count",
+            "2",
+            "--size",
+            "24",
+            "--samples",
+            "2",
+            "--bounces",
+            "1",
+            "--renderer",
+            "arrays",
+            "--quiet",
+            "-o",
+            "{out}",
+        ),
+        "scenes",
+        resumes=True,
     ),
-)  # fmt: skip
+)
 
 
 def prepared(folder: Path) -> Path:
-    """The folder of inputs: a photo, its mask, another photo of the same size, a result. Made once."""
+    """The folder of inputs: a photo, its mask, another photo of the same size, a result.
+
+    Made once.
+    """
     inputs = folder / "in"
     if (inputs / "result" / "decomposition.json").is_file():
         return inputs
@@ -81,10 +121,16 @@ def run(words: Sequence[str]) -> tuple[int, str, str]:
 
 
 def digests(output: Path) -> dict[str, str]:
-    """The sum of each file of an output, without what differs between runs that are alike; without temporary siblings."""
+    """The sum of each file of an output, without what differs between runs that are alike; without
+    temporary siblings.
+    """
     if output.is_file():
         return {output.name: _digest(output)}
-    files = [path for path in output.rglob("*") if path.is_file() and "/." not in f"/{path.relative_to(output).as_posix()}"]
+    files = [
+        path
+        for path in output.rglob("*")
+        if path.is_file() and "/." not in f"/{path.relative_to(output).as_posix()}"
+    ]
     return {path.relative_to(output).as_posix(): _digest(path) for path in sorted(files)}
 
 
@@ -92,7 +138,9 @@ def _digest(path: Path) -> str:
     data = path.read_bytes()
     if path.suffix == ".json":
         content = json.loads(data)
-        data = json.dumps({key: value for key, value in content.items() if key not in _PASSING}, sort_keys=True).encode()
+        data = json.dumps(
+            {key: value for key, value in content.items() if key not in _PASSING}, sort_keys=True
+        ).encode()
     return hashlib.sha256(data).hexdigest()
 
 
@@ -110,7 +158,10 @@ def state(command: Command, output: Path, whole: dict[str, str]) -> str:
             name in scenes for name in whole if name.rpartition("/")[0] in folders
         ):
             return "some scenes, each whole"
-    lacking, other = sorted(whole.keys() - found.keys()), sorted(n for n in found if found[n] != whole.get(n))
+    lacking, other = (
+        sorted(whole.keys() - found.keys()),
+        sorted(n for n in found if found[n] != whole.get(n)),
+    )
     return f"WRONG: lacks {lacking[:3]}, differs in {other[:3]}"
 
 

@@ -11,7 +11,9 @@ from .disk import fresh
 
 
 def many_images(place: Path, count: int) -> tuple[list[str], str]:
-    """Lists and names `count` images of one folder, hidden and other files among them: what was wrong, and how long it took."""
+    """Lists and names `count` images of one folder, hidden and other files among them: what was
+    wrong, and how long it took.
+    """
     fresh(place)
     for number in range(count):
         (place / f"image {number:06}.png").touch()
@@ -22,6 +24,12 @@ def many_images(place: Path, count: int) -> tuple[list[str], str]:
     names = Names(items)
     given = [names.name(item) for item in items]
     seconds = time.monotonic() - start
-    wrong = [] if len(given) == len(set(given)) == count and None not in given else [f"WRONG: {len(set(given))} names of {len(given)}"]
+    wrong = (
+        []
+        if len(given) == len(set(given)) == count and None not in given
+        else [f"WRONG: {len(set(given))} names of {len(given)}"]
+    )
     masks = [item.mask for item in items if item.mask]
-    return wrong or ["" if len(masks) == 1 else f"WRONG: masks {masks[:3]}"], f"listed and named in {seconds:.2f} s"
+    return wrong or [
+        "" if len(masks) == 1 else f"WRONG: masks {masks[:3]}"
+    ], f"listed and named in {seconds:.2f} s"

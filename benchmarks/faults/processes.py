@@ -1,4 +1,6 @@
-"""Processes that are killed, that run at once, that read files while these change, whose clock goes wrong."""
+"""Processes that are killed, that run at once, that read files while these change, whose clock goes
+wrong.
+"""
 
 import contextlib
 import os
@@ -26,15 +28,19 @@ _SAFE = ("whole", "nothing", "some scenes, each whole")
 
 
 def kill(command: Command, inputs: Path, place: Path, whole: dict[str, str], seed: int) -> str:
-    """Kills the command by force at a random moment, in every other round while it writes, over an earlier output in every third; then
-    runs it once more. "" if nothing was wrong, else what was."""
+    """Kills the command by force at a random moment, in every other round while it writes, over an
+    earlier output in every third; then runs it once more. "" if nothing was wrong, else what was.
+    """
     rng = random.Random(f"{command.name} {seed}")
     output, earlier = place / command.output, seed % 3 == 0
     fresh(place)
     if earlier:
         run(command.line(inputs, output))
     process = subprocess.Popen(
-        [*command.process(inputs, output), "--progress", "json"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        [*command.process(inputs, output), "--progress", "json"],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
     )
     try:
         _await(process, rng, writing=seed % 2 == 0)
@@ -63,13 +69,20 @@ def _await(process: "subprocess.Popen[bytes]", rng: random.Random, writing: bool
 
 
 def at_once(command: Command, inputs: Path, place: Path, whole: dict[str, str], number: int) -> str:
-    """Two processes write one output at the same time, whose parents lack or where an earlier one stands: both succeed."""
+    """Two processes write one output at the same time, whose parents lack or where an earlier one
+    stands: both succeed.
+    """
     fresh(place)
     output = place / "a" / "b" / command.output
     if number % 2:
         run(command.line(inputs, output))
     both = [
-        subprocess.Popen(command.process(inputs, output), stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+        subprocess.Popen(
+            command.process(inputs, output),
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+        )
         for _ in range(2)
     ]
     said = [process.communicate(timeout=_SECONDS)[1].decode() for process in both]
@@ -93,8 +106,12 @@ def _wrong_clock(seed: int) -> Iterator[None]:
         yield
 
 
-def wrong_clock(command: Command, inputs: Path, place: Path, whole: dict[str, str], seed: int) -> str:
-    """The clock goes back while the command works, and the inputs' times lie in the past or in the future: the same output."""
+def wrong_clock(
+    command: Command, inputs: Path, place: Path, whole: dict[str, str], seed: int
+) -> str:
+    """The clock goes back while the command works, and the inputs' times lie in the past or in the
+    future: the same output.
+    """
     fresh(place)
     copy, output = place / "in", place / "out" / command.output
     shutil.copytree(inputs, copy)
@@ -104,14 +121,20 @@ def wrong_clock(command: Command, inputs: Path, place: Path, whole: dict[str, st
         code, _, text = run(command.line(copy, output))
     if code or state(command, output, whole) != "whole":
         return f"WRONG: exit {code}, {state(command, output, whole)}, {text[-200:]!r}"
-    times = [] if command.name != "decompose" else [v for v in load(output).provenance.timings.values() if v < 0]
+    times = (
+        []
+        if command.name != "decompose"
+        else [v for v in load(output).provenance.timings.values() if v < 0]
+    )
     return f"WRONG: seconds below 0: {times}" if times else ""
 
 
 def changing(inputs: Path, place: Path, kind: str, seconds: float) -> tuple[int, int, list[str]]:
-    """A photo is exchanged for another, rewritten in place and cut short all the while it is read, as `kind` of file ("png", "exr",
-    "npy"): how often it was read, how often refused, and what was wrong. A reading is right if its sum is that of one of the two files
-    and its pixels are that file's."""
+    """A photo is exchanged for another, rewritten in place and cut short all the while it is read,
+    as `kind` of file ("png", "exr", "npy"): how often it was read, how often refused, and what was
+    wrong. A reading is right if its sum is that of one of the two files and its pixels are that
+    file's.
+    """
     fresh(place)
     files = _versions(inputs, place, kind)
     known = {photo.original.sha256: photo.image for photo in map(read_photo, files)}
@@ -140,7 +163,9 @@ def changing(inputs: Path, place: Path, kind: str, seconds: float) -> tuple[int,
     end = time.monotonic() + seconds
     try:
         while time.monotonic() < end:
-            code, _, text = run(["separate", str(target), "--method", "none", "--quiet", "-o", str(place / "out")])
+            code, _, text = run(
+                ["separate", str(target), "--method", "none", "--quiet", "-o", str(place / "out")]
+            )
             if code:
                 refused += 1
                 wrong += [trouble] if (trouble := one_line(code, text)) else []
@@ -154,7 +179,9 @@ def changing(inputs: Path, place: Path, kind: str, seconds: float) -> tuple[int,
                 photo = read_photo(target)
             except ValueError:
                 continue
-            if photo.original.sha256 not in known or not np.array_equal(photo.image, known[photo.original.sha256]):
+            if photo.original.sha256 not in known or not np.array_equal(
+                photo.image, known[photo.original.sha256]
+            ):
                 wrong.append("WRONG: the sum recorded is not that of the pixels")
     finally:
         done.set()

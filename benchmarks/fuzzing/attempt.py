@@ -1,7 +1,8 @@
 """One damaged file and one reader: what came of it, and what is wrong with that.
 
-A reader may return or raise `InputError` with one line. Everything else is a finding: another exception, a line with something in it that
-steers a terminal, anything printed, memory that ran out under the limit of the process (even where the reader says so politely).
+A reader may return or raise `InputError` with one line. Everything else is a finding: another
+exception, a line with something in it that steers a terminal, anything printed, memory that ran out
+under the limit of the process (even where the reader says so politely).
 """
 
 import os
@@ -24,7 +25,10 @@ _NO_MEMORY = ("nsufficient memory", "bad_alloc", "bad alloc", "Cannot allocate")
 
 @dataclass(frozen=True)
 class Finding:
-    """`kind`: "exception", "crash", "hang", "memory", "noise" or "text". `place`: where, the same for the same fault. `detail`: a line."""
+    """`kind`: "exception", "crash", "hang", "memory", "noise" or "text".
+
+    `place`: where, the same for the same fault. `detail`: a line.
+    """
 
     kind: str
     place: str
@@ -45,13 +49,20 @@ class _Caught:
     def __enter__(self) -> "_Caught":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> bool:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> bool:
         del kind, trace
         self.error = error
         return not isinstance(error, KeyboardInterrupt)
 
 
-def case_and_data(target: Target, cases: Sequence[Case], seed: int, number: int) -> tuple[Case, bytes]:
+def case_and_data(
+    target: Target, cases: Sequence[Case], seed: int, number: int
+) -> tuple[Case, bytes]:
     """The input of that number: always the same for the same seed. `cases`: those of the target."""
     rng = random.Random(f"{seed}/{target.name}/{number}")
     case = rng.choice(cases)
@@ -70,7 +81,10 @@ def put(case: Case, folder: Path, data: bytes) -> Path:
 
 
 def attempt(case: Case, path: Path, printed: int) -> tuple[bool, Finding | None]:
-    """Reads the file; whether it was refused, and what is wrong. `printed`: the descriptor that holds what is printed; it is emptied."""
+    """Reads the file; whether it was refused, and what is wrong.
+
+    `printed`: the descriptor that holds what is printed; it is emptied.
+    """
     with _Caught() as caught:
         case.read(path)
     error = caught.error
@@ -90,8 +104,13 @@ def attempt(case: Case, path: Path, printed: int) -> tuple[bool, Finding | None]
     return refused, None
 
 
-def minimised(data: bytes, finds: Finding, again: Callable[[bytes], Finding | None], tries: int) -> bytes:
-    """Smaller data with the same finding: parts are taken out while it stays. `again(data)` gives the finding of other data, or None."""
+def minimised(
+    data: bytes, finds: Finding, again: Callable[[bytes], Finding | None], tries: int
+) -> bytes:
+    """Smaller data with the same finding: parts are taken out while it stays.
+
+    `again(data)` gives the finding of other data, or None.
+    """
     size = max(len(data) // 2, 1)
     while tries > 0 and size >= 1:
         at = 0
@@ -112,8 +131,14 @@ def _place(error: BaseException) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     if not frames:
         return "nowhere"
-    ours = [frame for frame in frames if any(f"/{package}/" in frame.filename for package in _OURS)] or frames
-    return " < ".join(dict.fromkeys(f"{Path(frame.filename).name}:{frame.name}" for frame in (frames[-1], ours[-1])))
+    ours = [
+        frame for frame in frames if any(f"/{package}/" in frame.filename for package in _OURS)
+    ] or frames
+    return " < ".join(
+        dict.fromkeys(
+            f"{Path(frame.filename).name}:{frame.name}" for frame in (frames[-1], ours[-1])
+        )
+    )
 
 
 def _out_of_memory(error: BaseException) -> BaseException | None:

@@ -14,8 +14,9 @@ def unchanged(data: bytes) -> bytes:
 class Case:
     """One sound file and its reader.
 
-    `name`: of the file, as the reader wants it. `data`: what is damaged. `read`: the reader, given the file's path. `wrap`: makes the file
-    of the damaged data (mends checksums, packs), so that damage gets behind them. `beside`: sound files in the same folder.
+    `name`: of the file, as the reader wants it. `data`: what is damaged. `read`: the reader, given
+    the file's path. `wrap`: makes the file of the damaged data (mends checksums, packs), so that
+    damage gets behind them. `beside`: sound files in the same folder.
     """
 
     name: str
@@ -27,7 +28,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Target:
-    """A kind of file. `cases`: makes them, when they are wanted. `words`: what stands in such files."""
+    """A kind of file.
+
+    `cases`: makes them, when they are wanted. `words`: what stands in such files.
+    """
 
     name: str
     cases: Callable[[], tuple[Case, ...]]

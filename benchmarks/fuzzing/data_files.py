@@ -115,7 +115,7 @@ _LIST_WORDS = (
 )
 
 
-# --- MAT --------------------------------------------------------------------------------------------------------------------------------
+# --- MAT ------------------------------------------------------------------------------------------
 
 
 def matlab(variables: dict[str, Any], *, packed: bool) -> bytes:
@@ -135,12 +135,30 @@ def _mat() -> tuple[Case, ...]:
     height = np.where(ball().max(2) > 0, 9 * ball()[..., 0], np.nan)
     lights = {"Ls": np.zeros((9, 3, 2))}
     cases = []
-    for values in (height, (2 * height).astype(np.float32), np.nan_to_num(9 * height).astype(np.int16)):
-        cases += [Case("Z.mat", matlab({"depth": values}, packed=packed), read_height) for packed in (False, True)]
+    for values in (
+        height,
+        (2 * height).astype(np.float32),
+        np.nan_to_num(9 * height).astype(np.int16),
+    ):
+        cases += [
+            Case("Z.mat", matlab({"depth": values}, packed=packed), read_height)
+            for packed in (False, True)
+        ]
         cases += [Case("Z.mat", matlab({"depth": values}, packed=False), read_height, deflated)]
-    cases += [Case("natural_lights.mat", matlab(lights, packed=False), lambda path: load_natural_lights(path.parent), deflated)]
+    cases += [
+        Case(
+            "natural_lights.mat",
+            matlab(lights, packed=False),
+            lambda path: load_natural_lights(path.parent),
+            deflated,
+        )
+    ]
     beside = _object()
-    for name, wraps in (("L.mat", (bytes, deflated)), ("Z.mat", (bytes, deflated)), ("crop_idx.mat", (bytes,))):
+    for name, wraps in (
+        ("L.mat", (bytes, deflated)),
+        ("Z.mat", (bytes, deflated)),
+        ("crop_idx.mat", (bytes,)),
+    ):
         path = f"laboratory/nut/{name}"
         own = {other: data for other, data in beside.items() if other != path}
         cases += [Case(path, beside[path], _laboratory, wrap, own) for wrap in wraps]
@@ -153,8 +171,16 @@ def _laboratory(path: Path) -> object:
 
 def _object() -> dict[str, bytes]:
     """The files of one object of the MIT-Berkeley set, by their names below its folder."""
-    picture, mask = coded(".png", codes(16)), coded(".png", (ball().max(2) > 0).astype(np.uint8) * 255)
-    files = {"diffuse.png": picture, "original.png": picture, "reflectance.png": picture, "mask.png": mask}
+    picture, mask = (
+        coded(".png", codes(16)),
+        coded(".png", (ball().max(2) > 0).astype(np.uint8) * 255),
+    )
+    files = {
+        "diffuse.png": picture,
+        "original.png": picture,
+        "reflectance.png": picture,
+        "mask.png": mask,
+    }
     tables: dict[str, dict[str, Any]] = {
         "Z.mat": {"depth": 9 * ball()[..., 0]},
         "L.mat": {"color_lights": {"diffuse": np.zeros((9, 3)), "name": "x"}},
@@ -165,7 +191,7 @@ def _object() -> dict[str, bytes]:
     return {f"laboratory/nut/{name}": data for name, data in files.items()}
 
 
-# --- NPZ --------------------------------------------------------------------------------------------------------------------------------
+# --- NPZ ------------------------------------------------------------------------------------------
 
 
 def _archive(members: dict[str, bytes]) -> bytes:
@@ -180,7 +206,9 @@ def _repacked(members: dict[str, bytes], name: str, damaged: bytes) -> bytes:
     return _archive({**members, name: damaged})
 
 
-def _npz_cases(name: str, data: bytes, read: Callable[[Path], object], beside: dict[str, bytes] | None = None) -> list[Case]:
+def _npz_cases(
+    name: str, data: bytes, read: Callable[[Path], object], beside: dict[str, bytes] | None = None
+) -> list[Case]:
     """The archive damaged as it is, and damaged in one of its members."""
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         members = {member: archive.read(member) for member in archive.namelist()}
@@ -193,7 +221,11 @@ def _npz_cases(name: str, data: bytes, read: Callable[[Path], object], beside: d
 
 
 def _npz() -> tuple[Case, ...]:
-    small = {f"{kind}{k:02d}": np.ones(shape, np.float16) for k in range(2) for kind, shape in (("weight", (9, 4, 4)), ("bias", (4,)))}
+    small = {
+        f"{kind}{k:02d}": np.ones(shape, np.float16)
+        for k in range(2)
+        for kind, shape in (("weight", (9, 4, 4)), ("bias", (4,)))
+    }
     stream = io.BytesIO()
     np.savez(stream, **small)
     result = _result()
@@ -204,11 +236,13 @@ def _npz() -> tuple[Case, ...]:
         *_npz_cases("network.npz", stream.getvalue(), read_network),
         *_npz_cases("appearance.npz", stream.getvalue(), read_appearance),
         *_npz_cases("lamps.npz", stream.getvalue(), read_lamp_network),
-        *_npz_cases("arrays.npz", result["arrays.npz"], lambda path: read_result(path.parent), description),
+        *_npz_cases(
+            "arrays.npz", result["arrays.npz"], lambda path: read_result(path.parent), description
+        ),
     )
 
 
-# --- JSON -------------------------------------------------------------------------------------------------------------------------------
+# --- JSON -----------------------------------------------------------------------------------------
 
 
 @cache
@@ -220,13 +254,21 @@ def _result() -> dict[str, bytes]:
         found = decompose(read_photo(folder / "ball.png"), Settings(model="naive"), name="ball.png")
         interval, spread = Interval(0.2, 0.3), Interval(np.full(3, 0.5), np.full(3, 2.0))
         light = LobeLight(np.array([0.0, 0.6, 0.8]), 4.0, np.ones(3), spread)
-        lobe = LobeFit("ggx", True, "", 0.25, interval, (light,), np.ones(3), spread, 0.5, found.specular)
+        lobe = LobeFit(
+            "ggx", True, "", 0.25, interval, (light,), np.ones(3), spread, 0.5, found.specular
+        )
         save(replace(found, brdf=lobe), folder / "result", arrays=True)
-        return {path.name: path.read_bytes() for path in (folder / "result").iterdir() if path.suffix in (".json", ".exr", ".npz")}
+        return {
+            path.name: path.read_bytes()
+            for path in (folder / "result").iterdir()
+            if path.suffix in (".json", ".exr", ".npz")
+        }
 
 
 def _scene() -> dict[str, bytes]:
-    """The description of a rendered scene; its maps are not there, so that truth is refused at the latest then."""
+    """The description of a rendered scene; its maps are not there, so that truth is refused at the
+    latest then.
+    """
     content = {
         "schema_version": 1,
         "kind": "isc synth scene",
@@ -251,11 +293,20 @@ def _json() -> tuple[Case, ...]:
     result, scene = _result(), _scene()
     description = result["decomposition.json"]
     beside = {name: data for name, data in result.items() if name != "decomposition.json"}
-    bounds = {"schema_version": 1, "bounds": [{"stage": "separation", "metric": "psnr", "kind": "all", "value": "all", "limit": 20.5}]}
-    own = {f"set/train/a/{name}": data for name, data in scene.items() if name != "scene.json"} | {"set/manifest.json": b"{}"}
+    bounds = {
+        "schema_version": 1,
+        "bounds": [
+            {"stage": "separation", "metric": "psnr", "kind": "all", "value": "all", "limit": 20.5}
+        ],
+    }
+    own = {f"set/train/a/{name}": data for name, data in scene.items() if name != "scene.json"} | {
+        "set/manifest.json": b"{}"
+    }
     return (
         Case("decomposition.json", description, lambda path: load(path.parent), beside=beside),
-        Case("decomposition.json", description, lambda path: read_result(path.parent), beside=beside),
+        Case(
+            "decomposition.json", description, lambda path: read_result(path.parent), beside=beside
+        ),
         Case("decomposition.json", description, read_light),
         Case("light.json", json.dumps([[0.1, 0.2, 0.3]] * 9).encode(), read_light),
         Case(
@@ -264,12 +315,17 @@ def _json() -> tuple[Case, ...]:
             _facts,
             beside=own,
         ),
-        Case("set/train/a/scene.json", scene["scene.json"], lambda path: read_truth(path.parent), beside=own),
+        Case(
+            "set/train/a/scene.json",
+            scene["scene.json"],
+            lambda path: read_truth(path.parent),
+            beside=own,
+        ),
         Case("bounds.json", json.dumps(bounds).encode(), read_bounds),
     )
 
 
-# --- lists of images --------------------------------------------------------------------------------------------------------------------
+# --- lists of images ------------------------------------------------------------------------------
 
 
 def _list(path: Path) -> object:
@@ -277,8 +333,14 @@ def _list(path: Path) -> object:
 
 
 def _lists() -> tuple[Case, ...]:
-    rows = [{"image": "cup.png", "mask": "cup_mask.png", "name": "cup", "options": {"max_size": 256}}, {"image": "s3://photos/jug.png"}]
-    lines = "\n".join(json.dumps(row) for row in [*rows, {"image": "a.png", "transfer": "linear", "full_size": True}])
+    rows = [
+        {"image": "cup.png", "mask": "cup_mask.png", "name": "cup", "options": {"max_size": 256}},
+        {"image": "s3://photos/jug.png"},
+    ]
+    lines = "\n".join(
+        json.dumps(row)
+        for row in [*rows, {"image": "a.png", "transfer": "linear", "full_size": True}]
+    )
     table = 'image,mask,name,max_size,transfer\ncup.png,cup_mask.png,cup,256,srgb\n"a, b.png",,,,\njug.png,,jug,,linear\n'
     packed = 'image,options\ncup.png,"{""max_size"": 64, ""model"": ""mdr""}"\n'
     return (

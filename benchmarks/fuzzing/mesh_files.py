@@ -113,8 +113,15 @@ def _exported(mesh: trimesh.Trimesh, kind: str, **options: Any) -> bytes:
 
 def glb(tree: bytes, content: bytes) -> bytes:
     """The binary glTF file of a JSON text and its buffer: lengths as they have to be."""
-    tree, content = (part + fill * (-len(part) % 4) for part, fill in ((tree, b" "), (content, b"\0")))
-    chunks = struct.pack("<II", len(tree), 0x4E4F534A) + tree + struct.pack("<II", len(content), 0x004E4942) + content
+    tree, content = (
+        part + fill * (-len(part) % 4) for part, fill in ((tree, b" "), (content, b"\0"))
+    )
+    chunks = (
+        struct.pack("<II", len(tree), 0x4E4F534A)
+        + tree
+        + struct.pack("<II", len(content), 0x004E4942)
+        + content
+    )
     return struct.pack("<III", 0x46546C67, 2, 12 + len(chunks)) + chunks
 
 
@@ -128,16 +135,32 @@ def _with_buffer(content: bytes, tree: bytes) -> bytes:
 
 
 def _glb() -> tuple[Case, ...]:
-    ours = build_mesh(12 * ball()[..., 0], np.tile([0.0, 0, 1], (24, 20, 1)), ball().max(2) > 0, ball().astype(np.float32)).glb()
+    ours = build_mesh(
+        12 * ball()[..., 0],
+        np.tile([0.0, 0, 1], (24, 20, 1)),
+        ball().max(2) > 0,
+        ball().astype(np.float32),
+    ).glb()
     cases = []
-    for data in (_exported(_solid(), "glb"), _exported(_textured(), "glb"), _exported(_solid(colours=True), "glb"), ours):
+    for data in (
+        _exported(_solid(), "glb"),
+        _exported(_textured(), "glb"),
+        _exported(_solid(colours=True), "glb"),
+        ours,
+    ):
         tree, content = _glb_parts(data)
-        cases += [Case("a.glb", data, _read), *[Case("a.glb", tree, _read, functools.partial(_with_buffer, content))] * 2]
+        cases += [
+            Case("a.glb", data, _read),
+            *[Case("a.glb", tree, _read, functools.partial(_with_buffer, content))] * 2,
+        ]
         cases += [Case("a.glb", content, _read, functools.partial(glb, tree))]
     tree, content = _glb_parts(_exported(_textured(), "glb"))
     described = json.loads(tree)
     described["buffers"][0]["uri"] = "a.bin"
-    return (*cases, Case("a.gltf", json.dumps(described).encode(), _read, beside={"a.bin": content}))
+    return (
+        *cases,
+        Case("a.gltf", json.dumps(described).encode(), _read, beside={"a.bin": content}),
+    )
 
 
 def _obj() -> tuple[Case, ...]:
@@ -148,14 +171,28 @@ def _obj() -> tuple[Case, ...]:
         Case("a.obj", plain, _read),
         Case("a.obj", _exported(_solid(colours=True), "obj"), _read),
         Case("a.obj", wavy, _read, beside=beside),
-        Case("a.mtl", material, lambda path: _read(path.with_name("a.obj")), beside={"a.obj": wavy, "a.png": beside["a.png"]}),
-        Case("a.png", beside["a.png"], lambda path: _read(path.with_name("a.obj")), beside={"a.obj": wavy, "a.mtl": material}),
+        Case(
+            "a.mtl",
+            material,
+            lambda path: _read(path.with_name("a.obj")),
+            beside={"a.obj": wavy, "a.png": beside["a.png"]},
+        ),
+        Case(
+            "a.png",
+            beside["a.png"],
+            lambda path: _read(path.with_name("a.obj")),
+            beside={"a.obj": wavy, "a.mtl": material},
+        ),
     )
 
 
 def _ply() -> tuple[Case, ...]:
-    kinds = [(_solid(colours), encoding) for colours in (False, True) for encoding in ("ascii", "binary")]
-    return tuple(Case("a.ply", _exported(mesh, "ply", encoding=encoding), _read) for mesh, encoding in kinds)
+    kinds = [
+        (_solid(colours), encoding) for colours in (False, True) for encoding in ("ascii", "binary")
+    ]
+    return tuple(
+        Case("a.ply", _exported(mesh, "ply", encoding=encoding), _read) for mesh, encoding in kinds
+    )
 
 
 def _stl() -> tuple[Case, ...]:
@@ -171,5 +208,7 @@ MESHES = (
     Target("obj", _obj, _OBJ_WORDS),
     Target("ply", _ply, _PLY_WORDS),
     Target("stl", _stl, _STL_WORDS),
-    Target("off", _off, (b"OFF\n", b"8 12 0\n", b"3 0 1 2\n", b"COFF", b"nan", b"-1", b"99999999999 ")),
+    Target(
+        "off", _off, (b"OFF\n", b"8 12 0\n", b"3 0 1 2\n", b"COFF", b"nan", b"-1", b"99999999999 ")
+    ),
 )

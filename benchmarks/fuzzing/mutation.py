@@ -1,13 +1,14 @@
 """Damaging a file the way that finds faults in readers.
 
-Problem: readers fail where a field says something else than what follows it. Random bytes are refused at the first of them; a sound file
-with few changes goes far.
-Method: one to six of: flipped bits, interesting values in place of 1, 2, 4 or 8 bytes in either order, parts removed, repeated, exchanged,
-cut off, words of the format put in, numbers of a text replaced, and the rest of another seed file behind this one's start. Everything hangs
-on the generator that is given, so that any input can be made again from its number.
-Citation: B. P. Miller, L. Fredriksen, B. So (1990), "An Empirical Study of the Reliability of UNIX Utilities", doi:10.1145/96267.96279;
-the mutations are those that M. Zalewski's american fuzzy lop made usual (2013).
-Limits: no coverage guides it: what is not near a seed file is not found.
+Problem: readers fail where a field says something else than what follows it. Random bytes are
+refused at the first of them; a sound file with few changes goes far. Method: one to six of: flipped
+bits, interesting values in place of 1, 2, 4 or 8 bytes in either order, parts removed, repeated,
+exchanged, cut off, words of the format put in, numbers of a text replaced, and the rest of another
+seed file behind this one's start. Everything hangs on the generator that is given, so that any
+input can be made again from its number. Citation: B. P. Miller, L. Fredriksen, B. So (1990), "An
+Empirical Study of the Reliability of UNIX Utilities", doi:10.1145/96267.96279; the mutations are
+those that M. Zalewski's american fuzzy lop made usual (2013). Limits: no coverage guides it: what
+is not near a seed file is not found.
 """
 
 import random
@@ -16,15 +17,65 @@ import struct
 from collections.abc import Callable, Sequence
 
 MOST_BYTES = 1 << 18
-_EDGES = (0, 1, 2, 3, 7, 8, 9, 16, 127, 128, 255, 256, 4096, 32767, 32768, 65535, 65536, 100_000, 2**24, 2**31 - 1, 2**31, 2**32 - 1,
-          2**40, 2**63 - 1, 2**63, 2**64 - 1)  # fmt: skip
-_NUMBERS = (b"0", b"-1", b"1e999", b"-1e308", b"1e-320", b"NaN", b"-Infinity", b"2147483648", b"99999999999999999999", b"1" * 5000, b"true",
-            b"null", b'""', b"[]", b"{}", b"0.1", b"-0", b'"\\ud800"', b"0x10")  # fmt: skip
+_EDGES = (
+    0,
+    1,
+    2,
+    3,
+    7,
+    8,
+    9,
+    16,
+    127,
+    128,
+    255,
+    256,
+    4096,
+    32767,
+    32768,
+    65535,
+    65536,
+    100_000,
+    2**24,
+    2**31 - 1,
+    2**31,
+    2**32 - 1,
+    2**40,
+    2**63 - 1,
+    2**63,
+    2**64 - 1,
+)
+_NUMBERS = (
+    b"0",
+    b"-1",
+    b"1e999",
+    b"-1e308",
+    b"1e-320",
+    b"NaN",
+    b"-Infinity",
+    b"2147483648",
+    b"99999999999999999999",
+    b"1" * 5000,
+    b"true",
+    b"null",
+    b'""',
+    b"[]",
+    b"{}",
+    b"0.1",
+    b"-0",
+    b'"\\ud800"',
+    b"0x10",
+)
 _NUMBER = re.compile(rb"-?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
 
 
-def mutated(rng: random.Random, data: bytes, others: Sequence[bytes], words: Sequence[bytes]) -> bytes:
-    """`data` with a few changes. `others`: further files of the format; `words`: what its fields hold. At most 256 KiB come out."""
+def mutated(
+    rng: random.Random, data: bytes, others: Sequence[bytes], words: Sequence[bytes]
+) -> bytes:
+    """`data` with a few changes.
+
+    `others`: further files of the format; `words`: what its fields hold. At most 256 KiB come out.
+    """
     content = bytearray(data)
     for _ in range(rng.choice((1, 1, 1, 1, 1, 2, 2, 3, 6))):
         rng.choice(_CHANGES)(rng, content)
@@ -122,6 +173,20 @@ def _spliced(rng: random.Random, content: bytearray, other: bytes) -> bytearray:
 
 
 _CHANGES: tuple[Callable[[random.Random, bytearray], None], ...] = (
-    _flip, _flip, _set_number, _set_number, _set_number, _add_to_number, _add_to_number, _remove, _repeat, _exchange, _cut, _noise, _fill,
-    _replace_number, _replace_number, _nest,
-)  # fmt: skip
+    _flip,
+    _flip,
+    _set_number,
+    _set_number,
+    _set_number,
+    _add_to_number,
+    _add_to_number,
+    _remove,
+    _repeat,
+    _exchange,
+    _cut,
+    _noise,
+    _fill,
+    _replace_number,
+    _replace_number,
+    _nest,
+)

@@ -1,4 +1,6 @@
-"""Sound pictures of a small glossy ball, in the formats that photos come in; 24 x 20 pixels, so that a reader is done in a millisecond."""
+"""Sound pictures of a small glossy ball, in the formats that photos come in; 24 x 20 pixels, so
+that a reader is done in a millisecond.
+"""
 
 import io
 import struct
@@ -131,7 +133,9 @@ def codes(bits: int = 8) -> np.ndarray:
 def coded(suffix: str, pixels: np.ndarray, *options: int) -> bytes:
     """The file that OpenCV makes of (H, W) or (H, W, C) values in RGB(A) order."""
     order = {3: [2, 1, 0], 4: [2, 1, 0, 3]}.get(pixels.shape[2] if pixels.ndim == 3 else 0)
-    done, data = cv2.imencode(suffix, pixels if order is None else np.ascontiguousarray(pixels[..., order]), list(options))
+    done, data = cv2.imencode(
+        suffix, pixels if order is None else np.ascontiguousarray(pixels[..., order]), list(options)
+    )
     assert done
     return data.tobytes()
 
@@ -148,7 +152,10 @@ def exr(channels: dict[str, np.ndarray], **header: object) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.exr"
         pixels = {name: np.ascontiguousarray(values) for name, values in channels.items()}
-        with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header}, pixels) as file:
+        with OpenEXR.File(
+            {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage, **header},
+            pixels,
+        ) as file:
             file.write(str(path))
         return path.read_bytes()
 
@@ -203,8 +210,14 @@ def _png() -> tuple[Case, ...]:
         saved("png", "LA"),
         saved("png", exif=exif),
     ]
-    cases = [Case("a.png", data, _photo, wrap) for data in files for wrap in (with_checksums, with_checksums, bytes)]
-    cases += [Case("a.png", coded(".png", grey), read, with_checksums) for read in (_height, _photo)]
+    cases = [
+        Case("a.png", data, _photo, wrap)
+        for data in files
+        for wrap in (with_checksums, with_checksums, bytes)
+    ]
+    cases += [
+        Case("a.png", coded(".png", grey), read, with_checksums) for read in (_height, _photo)
+    ]
     mask = coded(".png", (ball().max(2) > 0).astype(np.uint8) * 255)
     return (*cases, Case("mask.png", mask, _mask, with_checksums, {"photo.png": files[0]}))
 
@@ -228,32 +241,77 @@ def _tiled() -> bytes:
     padded = np.zeros((32, 32, 3), "<u2")
     padded[:24, :20] = codes(16)
     tiles = [padded[y : y + 16, x : x + 16].tobytes() for y in (0, 16) for x in (0, 16)]
-    behind = 8 + 2 + 12 * 11 + 4  # where what fits in no entry begins: three numbers, two lists of four
+    behind = (
+        8 + 2 + 12 * 11 + 4
+    )  # where what fits in no entry begins: three numbers, two lists of four
     start = behind + 6 + 32
     places = struct.pack("<4I", *(start + k * len(tiles[0]) for k in range(4)))
-    entries = ((256, 4, 1, 20), (257, 4, 1, 24), (258, 3, 3, behind), (259, 3, 1, 1), (262, 3, 1, 2), (277, 3, 1, 3), (284, 3, 1, 1),
-               (322, 4, 1, 16), (323, 4, 1, 16), (324, 4, 4, behind + 6), (325, 4, 4, behind + 22))  # fmt: skip
-    directory = struct.pack("<H", len(entries)) + b"".join(struct.pack("<HHII", *entry) for entry in entries) + bytes(4)
+    entries = (
+        (256, 4, 1, 20),
+        (257, 4, 1, 24),
+        (258, 3, 3, behind),
+        (259, 3, 1, 1),
+        (262, 3, 1, 2),
+        (277, 3, 1, 3),
+        (284, 3, 1, 1),
+        (322, 4, 1, 16),
+        (323, 4, 1, 16),
+        (324, 4, 4, behind + 6),
+        (325, 4, 4, behind + 22),
+    )
+    directory = (
+        struct.pack("<H", len(entries))
+        + b"".join(struct.pack("<HHII", *entry) for entry in entries)
+        + bytes(4)
+    )
     lengths = struct.pack("<4I", *(len(tile) for tile in tiles))
-    return b"II*\0\x08\0\0\0" + directory + struct.pack("<3H", 16, 16, 16) + places + lengths + b"".join(tiles)
+    return (
+        b"II*\0\x08\0\0\0"
+        + directory
+        + struct.pack("<3H", 16, 16, 16)
+        + places
+        + lengths
+        + b"".join(tiles)
+    )
 
 
 def _tiff() -> tuple[Case, ...]:
     grey = np.rint(ball()[..., 0] * 65535).astype(np.uint16)
     compressions = (1, 5, 8, 32773)
     files = [coded(".tiff", codes(16), cv2.IMWRITE_TIFF_COMPRESSION, n) for n in compressions]
-    files += [coded(".tiff", ball().astype(np.float32), cv2.IMWRITE_TIFF_COMPRESSION, n) for n in (1, 5)]
-    files += [coded(".tiff", _with_alpha(16)), coded(".tiff", codes(16), cv2.IMWRITE_TIFF_ROWSPERSTRIP, 3)]
-    files += [saved("tiff", compression=name) for name in (None, "tiff_lzw", "tiff_adobe_deflate", "packbits", "jpeg")]
-    files += [saved("tiff", "P"), saved("tiff", "1", compression="group4"), saved("tiff", "LAB"), saved("tiff", big_tiff=True), _tiled()]
-    return (*(Case("a.tif", data, _photo) for data in files), Case("a.tif", coded(".tiff", grey), _height))
+    files += [
+        coded(".tiff", ball().astype(np.float32), cv2.IMWRITE_TIFF_COMPRESSION, n) for n in (1, 5)
+    ]
+    files += [
+        coded(".tiff", _with_alpha(16)),
+        coded(".tiff", codes(16), cv2.IMWRITE_TIFF_ROWSPERSTRIP, 3),
+    ]
+    files += [
+        saved("tiff", compression=name)
+        for name in (None, "tiff_lzw", "tiff_adobe_deflate", "packbits", "jpeg")
+    ]
+    files += [
+        saved("tiff", "P"),
+        saved("tiff", "1", compression="group4"),
+        saved("tiff", "LAB"),
+        saved("tiff", big_tiff=True),
+        _tiled(),
+    ]
+    return (
+        *(Case("a.tif", data, _photo) for data in files),
+        Case("a.tif", coded(".tiff", grey), _height),
+    )
 
 
 def _exr() -> tuple[Case, ...]:
     light = ball().astype(np.float32)
     planes = {name: light[..., k] for k, name in enumerate("RGB")}
     alpha = (light.max(2) > 0).astype(np.float32)
-    layers = {f"{layer}.{name}": values for layer in ("diffuse", "specular") for name, values in planes.items()}
+    layers = {
+        f"{layer}.{name}": values
+        for layer in ("diffuse", "specular")
+        for name, values in planes.items()
+    }
     window = (np.array([2, 3], np.int32), np.array([29, 30], np.int32))
     files = [exr(planes, compression=kind) for kind in _EXR_KINDS.values()]
     files += [
@@ -264,16 +322,30 @@ def _exr() -> tuple[Case, ...]:
         exr(planes, type=OpenEXR.tiledimage, tiles=OpenEXR.TileDescription()),
     ]
     cases = [Case("a.exr", data, read) for data in files for read in (_photo, read_channels)]
-    return (*cases, Case("a.exr", exr(layers), read_channels), Case("a.exr", exr({"height.Z": alpha, "mask.A": alpha}), _height))
+    return (
+        *cases,
+        Case("a.exr", exr(layers), read_channels),
+        Case("a.exr", exr({"height.Z": alpha, "mask.A": alpha}), _height),
+    )
 
 
 def _hdr() -> tuple[Case, ...]:
     light = ball().astype(np.float32)
     wide = np.concatenate([light, light[:, ::-1]], axis=1)
     return (
-        Case("a.hdr", coded(".hdr", light, cv2.IMWRITE_HDR_COMPRESSION, cv2.IMWRITE_HDR_COMPRESSION_NONE), _photo),
+        Case(
+            "a.hdr",
+            coded(".hdr", light, cv2.IMWRITE_HDR_COMPRESSION, cv2.IMWRITE_HDR_COMPRESSION_NONE),
+            _photo,
+        ),
         *(
-            Case("a.hdr", coded(".hdr", picture, cv2.IMWRITE_HDR_COMPRESSION, cv2.IMWRITE_HDR_COMPRESSION_RLE), _photo)
+            Case(
+                "a.hdr",
+                coded(
+                    ".hdr", picture, cv2.IMWRITE_HDR_COMPRESSION, cv2.IMWRITE_HDR_COMPRESSION_RLE
+                ),
+                _photo,
+            )
             for picture in (light, wide)
         ),
     )
@@ -296,7 +368,10 @@ def _plain() -> tuple[Case, ...]:
 
 def _npy() -> tuple[Case, ...]:
     light, height = ball().astype(np.float32), np.where(ball().max(2) > 0, ball()[..., 0], np.nan)
-    cases = [Case("a.npy", array(values), _photo) for values in (light, codes(), codes(16), np.asfortranarray(light), _with_alpha(8))]
+    cases = [
+        Case("a.npy", array(values), _photo)
+        for values in (light, codes(), codes(16), np.asfortranarray(light), _with_alpha(8))
+    ]
     return (
         *cases,
         Case("a.npy", array(height), _height),
@@ -310,6 +385,10 @@ PICTURES = (
     Target("tiff", _tiff, _TIFF_WORDS),
     Target("exr", _exr, _EXR_WORDS),
     Target("hdr", _hdr, _HDR_WORDS),
-    Target("bmp-ppm", _plain, (b"BM", b"P5", b"P6", b"P3", b"#", b"65535 ", b"\x28\0\0\0", b"\x01\0\0\0")),
+    Target(
+        "bmp-ppm",
+        _plain,
+        (b"BM", b"P5", b"P6", b"P3", b"#", b"65535 ", b"\x28\0\0\0", b"\x01\0\0\0"),
+    ),
     Target("npy", _npy, _NPY_WORDS),
 )

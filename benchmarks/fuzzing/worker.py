@@ -1,10 +1,12 @@
 """The process that reads: it may crash, hang or eat memory without taking the campaign along.
 
-    python -m benchmarks.fuzzing.worker FOLDER SEED TARGET:FIRST:LAST ...     reads inputs FIRST to LAST - 1 of each target
-    python -m benchmarks.fuzzing.worker FOLDER --probe TARGET CASE FILE       reads FILE as the case of that number
+    python -m benchmarks.fuzzing.worker FOLDER SEED TARGET:FIRST:LAST ...     reads inputs FIRST to
+    LAST - 1 of each target python -m benchmarks.fuzzing.worker FOLDER --probe TARGET CASE FILE
+    reads FILE as the case of that number
 
-Where it is stands in FOLDER/at (target, number, seconds of the processor when it began); findings and sums go to FOLDER/log.jsonl. The
-process gets 2 GB of addresses and one thread a library; what it prints goes to FOLDER/printed and is a finding.
+Where it is stands in FOLDER/at (target, number, seconds of the processor when it began); findings
+and sums go to FOLDER/log.jsonl. The process gets 2 GB of addresses and one thread a library; what
+it prints goes to FOLDER/printed and is a finding.
 """
 
 import faulthandler
@@ -90,11 +92,30 @@ def _read_all(folder: Path, seed: int, jobs: list[str], printed: int) -> None:
 
                 place[:] = AT.pack(index, -1, time.process_time())
                 small = minimised(data, found, functools.partial(again, case, work), _TRIES)
-                tell(target=name, number=number, finding=asdict(found), case=cases.index(case), data=data.hex(), small=small.hex())
+                tell(
+                    target=name,
+                    number=number,
+                    finding=asdict(found),
+                    case=cases.index(case),
+                    data=data.hex(),
+                    small=small.hex(),
+                )
             if (number + 1) % 500 == 0:
-                tell(target=name, done=number + 1, refused=refused, most=most, seconds=time.process_time() - started)
+                tell(
+                    target=name,
+                    done=number + 1,
+                    refused=refused,
+                    most=most,
+                    seconds=time.process_time() - started,
+                )
                 refused, started = 0, time.process_time()
-        tell(target=name, done=int(last), refused=refused, most=most, seconds=time.process_time() - started)
+        tell(
+            target=name,
+            done=int(last),
+            refused=refused,
+            most=most,
+            seconds=time.process_time() - started,
+        )
 
 
 def _probe(folder: Path, name: str, case: int, file: Path, printed: int) -> None:

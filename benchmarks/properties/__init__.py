@@ -1,1 +1,4 @@
-"""What holds for any photo, mask and options: laws, tried on drawn cases. `python -m benchmarks.properties --help`; docs/properties.md."""
+"""What holds for any photo, mask and options: laws, tried on drawn cases.
+
+`python -m benchmarks.properties --help`; docs/properties.md.
+"""

@@ -1,6 +1,7 @@
 """Laws of whole decompositions and of SIRFS' objective.
 
-Shape and light are solved at `SIDE` pixels with few steps: what is tried are the paths through the program, not how good the answer is.
+Shape and light are solved at `SIDE` pixels with few steps: what is tried are the paths through the
+program, not how good the answer is.
 """
 
 import contextlib
@@ -28,7 +29,17 @@ from .separation_laws import MOVES
 
 SIDE = 24
 _STEPS = LbfgsOptions(iterations=10, evaluations=25, loss_tolerance=1e-4)
-_MAPS = ("image", "diffuse", "specular", "residual", "reflectance", "shading", "normal", "height", "confidence")
+_MAPS = (
+    "image",
+    "diffuse",
+    "specular",
+    "residual",
+    "reflectance",
+    "shading",
+    "normal",
+    "height",
+    "confidence",
+)
 _CHEAP = tuple(method for method in METHODS if method not in ("akashi_2016", "sparse_coding"))
 
 
@@ -46,7 +57,13 @@ class Job:
     def settings(self, count: int = 1) -> Settings:
         """On so many threads."""
         return Settings(
-            self.model, self.separator, self.illumination, max_size=0, engine=self.engine, threads=count, shading_only=self.shading_only
+            self.model,
+            self.separator,
+            self.illumination,
+            max_size=0,
+            engine=self.engine,
+            threads=count,
+            shading_only=self.shading_only,
         )
 
 
@@ -63,15 +80,27 @@ def small_solves() -> Iterator[None]:
 
 
 def jobs(
-    drawn: st.SearchStrategy[Picture], models: tuple[str, ...] = MODELS, separators: tuple[str, ...] = _CHEAP
+    drawn: st.SearchStrategy[Picture],
+    models: tuple[str, ...] = MODELS,
+    separators: tuple[str, ...] = _CHEAP,
 ) -> st.SearchStrategy[Job]:
     """Pictures with settings of every kind."""
     model, separator = st.sampled_from(models), st.sampled_from(separators)
     engine = st.sampled_from(("auto", "auto", "auto", "numpy"))
-    return st.builds(Job, drawn, model, separator, st.sampled_from(("natural", "laboratory")), engine, st.just(False))
+    return st.builds(
+        Job,
+        drawn,
+        model,
+        separator,
+        st.sampled_from(("natural", "laboratory")),
+        engine,
+        st.just(False),
+    )
 
 
-def decomposed(job: Job, photo: Photo | None = None, monitor: Monitor | None = None, count: int = 1) -> Decomposition:
+def decomposed(
+    job: Job, photo: Photo | None = None, monitor: Monitor | None = None, count: int = 1
+) -> Decomposition:
     """The decomposition, refused where reading the photo would refuse it."""
     photo = photo or job.picture.photo()
     check_mask(photo.mask, "the mask")
@@ -127,13 +156,17 @@ def _monotone(job: Job, notes: Notes) -> None:
 
     decomposed(job, monitor=Monitor(told))
     for before, after in zip(losses[:-1], losses[1:], strict=True):
-        assert after <= before + 0.06 + 1e-3 * abs(before), f"the loss rises from {before} to {after}"
+        assert after <= before + 0.06 + 1e-3 * abs(before), (
+            f"the loss rises from {before} to {after}"
+        )
 
 
 def _same_maps(a: Decomposition, b: Decomposition, why: str) -> None:
     for name in _MAPS:
         assert np.array_equal(getattr(a, name), getattr(b, name)), f"{name} depends on {why}"
-    assert np.allclose(a.illumination, b.illumination, rtol=1e-9, atol=1e-12), f"the light depends on {why}"
+    assert np.allclose(a.illumination, b.illumination, rtol=1e-9, atol=1e-12), (
+        f"the light depends on {why}"
+    )
 
 
 def _threads(job: Job, notes: Notes) -> None:
@@ -148,18 +181,35 @@ def _padding(job: Job, notes: Notes) -> None:
     del notes
     photo = job.picture.photo()
     sides = [(job.picture.seed % 6 + 1, 3), (2, job.picture.seed % 9 + 1)]
-    wide = replace(photo, image=np.pad(photo.image, [*sides, (0, 0)]), mask=np.pad(photo.mask, sides), clipped=np.pad(photo.clipped, sides))
-    if photo.mask[0].any() or photo.mask[-1].any() or photo.mask[:, 0].any() or photo.mask[:, -1].any():
+    wide = replace(
+        photo,
+        image=np.pad(photo.image, [*sides, (0, 0)]),
+        mask=np.pad(photo.mask, sides),
+        clipped=np.pad(photo.clipped, sides),
+    )
+    if (
+        photo.mask[0].any()
+        or photo.mask[-1].any()
+        or photo.mask[:, 0].any()
+        or photo.mask[:, -1].any()
+    ):
         return  # where the frame cuts the object, room around it says that it ends there
     plain, padded = decomposed(job, photo), decomposed(job, wide)
-    inner = np.s_[sides[0][0] : sides[0][0] + photo.mask.shape[0], sides[1][0] : sides[1][0] + photo.mask.shape[1]]
+    inner = np.s_[
+        sides[0][0] : sides[0][0] + photo.mask.shape[0],
+        sides[1][0] : sides[1][0] + photo.mask.shape[1],
+    ]
     for name in _MAPS:
-        assert np.array_equal(getattr(plain, name), getattr(padded, name)[inner]), f"{name} depends on the room around the object"
+        assert np.array_equal(getattr(plain, name), getattr(padded, name)[inner]), (
+            f"{name} depends on the room around the object"
+        )
 
 
 def _angle(a: np.ndarray, b: np.ndarray, mask: np.ndarray) -> float:
     """Median angle in degrees between two normal maps."""
-    return float(np.degrees(np.median(np.arccos(np.clip((a.astype(float) * b).sum(-1)[mask], -1, 1)))))
+    return float(
+        np.degrees(np.median(np.arccos(np.clip((a.astype(float) * b).sum(-1)[mask], -1, 1))))
+    )
 
 
 def _turned(job: Job, notes: Notes) -> None:
@@ -167,29 +217,47 @@ def _turned(job: Job, notes: Notes) -> None:
     photo = job.picture.photo()
     plain = decomposed(job, photo)
     for name, move in MOVES.items():
-        image, mask, clipped = (np.ascontiguousarray(move(values)) for values in (photo.image, photo.mask, photo.clipped))
+        image, mask, clipped = (
+            np.ascontiguousarray(move(values))
+            for values in (photo.image, photo.mask, photo.clipped)
+        )
         other = decomposed(job, replace(photo, image=image, mask=mask, clipped=clipped))
         n = move(plain.normal)
-        expected = n * [-1, 1, 1] if name == "flip" else np.stack([-n[..., 1], n[..., 0], n[..., 2]], -1)
-        angle = notes.measure(f"{name} {job.model}: degrees of the median normal", _angle(expected, other.normal, other.mask))
+        expected = (
+            n * [-1, 1, 1] if name == "flip" else np.stack([-n[..., 1], n[..., 0], n[..., 2]], -1)
+        )
+        angle = notes.measure(
+            f"{name} {job.model}: degrees of the median normal",
+            _angle(expected, other.normal, other.mask),
+        )
         mean = float(photo.image[photo.mask].mean())
         change = float(np.abs(move(plain.diffuse) - other.diffuse)[other.mask].mean()) / mean
         notes.measure(f"{name} {job.model}: share of the light that changes its layer", change)
-        assert angle <= TURN_DEGREES and change <= TURN_SHARE, f"{name}: normals by {angle:.3g} degrees, layers by {change:.3g}"
+        assert angle <= TURN_DEGREES and change <= TURN_SHARE, (
+            f"{name}: normals by {angle:.3g} degrees, layers by {change:.3g}"
+        )
 
 
 def _scale(job: Job, notes: Notes) -> None:
     photo = job.picture.photo()
     plain = decomposed(job, photo)
     for factor in (2.0, 3.7):
-        brighter = replace(photo, image=(np.float32(factor) * photo.image).astype(np.float32), code_value=factor * photo.code_value)
+        brighter = replace(
+            photo,
+            image=(np.float32(factor) * photo.image).astype(np.float32),
+            code_value=factor * photo.code_value,
+        )
         other = decomposed(job, brighter)
         mean = float(photo.image[photo.mask].mean())
         change = float(np.abs(other.diffuse / factor - plain.diffuse)[plain.mask].mean()) / mean
         angle = _angle(plain.normal, other.normal, plain.mask)
-        notes.measure(f"x {factor:g} {job.model}: share of the light that changes its layer", change)
+        notes.measure(
+            f"x {factor:g} {job.model}: share of the light that changes its layer", change
+        )
         notes.measure(f"x {factor:g} {job.model}: degrees of the median normal", angle)
-        assert change <= SCALE_SHARE and angle <= SCALE_DEGREES, f"x {factor:g}: normals by {angle:.3g} degrees, layers by {change:.3g}"
+        assert change <= SCALE_SHARE and angle <= SCALE_DEGREES, (
+            f"x {factor:g}: normals by {angle:.3g} degrees, layers by {change:.3g}"
+        )
 
 
 # Largest changes measured over many ordinary photos, with room to spare: docs/properties.md.
@@ -214,15 +282,31 @@ LAWS = (
         0.3,
     ),
     Law(
-        "decomposition threads", "the same bytes on one thread and on three",
-        jobs(pictures(12, 28, _WIDE, _WHOLE)), _threads, 0.7),
+        "decomposition threads",
+        "the same bytes on one thread and on three",
+        jobs(pictures(12, 28, _WIDE, _WHOLE)),
+        _threads,
+        0.7,
+    ),
     Law(
-        "decomposition padding", "the same bytes with room around the object",
-        jobs(ordinary()), _padding, 0.7),
+        "decomposition padding",
+        "the same bytes with room around the object",
+        jobs(ordinary()),
+        _padding,
+        0.7,
+    ),
     Law(
-        "decomposition turned", "flips and 90-degree rotations, to a bound",
-        jobs(ordinary()), _turned, 1.0),
+        "decomposition turned",
+        "flips and 90-degree rotations, to a bound",
+        jobs(ordinary()),
+        _turned,
+        1.0,
+    ),
     Law(
-        "decomposition scale", "the image times a constant, to a bound",
-        jobs(ordinary()), _scale, 1.0),
-)  # fmt: skip
+        "decomposition scale",
+        "the image times a constant, to a bound",
+        jobs(ordinary()),
+        _scale,
+        1.0,
+    ),
+)

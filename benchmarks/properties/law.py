@@ -16,7 +16,9 @@ from isc_core.errors import InputError
 
 @dataclass
 class Notes:
-    """What checks tell besides that they hold: how many cases were `refused`, and the largest value of each quantity in `measured`."""
+    """What checks tell besides that they hold: how many cases were `refused`, and the largest value
+    of each quantity in `measured`.
+    """
 
     refused: int = 0
     measured: dict[str, float] = field(default_factory=dict)
@@ -29,8 +31,10 @@ class Notes:
 
 @dataclass(frozen=True)
 class Law:
-    """`name`; `says`: what holds, in words; `cases`: what it is tried on; `check(case, notes)` raises `AssertionError` where it does not
-    hold. `cost`: seconds of a case on a quiet core, roughly, by which examples are shared out."""
+    """`name`; `says`: what holds, in words; `cases`: what it is tried on; `check(case, notes)`
+    raises `AssertionError` where it does not hold. `cost`: seconds of a case on a quiet core,
+    roughly, by which examples are shared out.
+    """
 
     name: str
     says: str
@@ -39,7 +43,10 @@ class Law:
     cost: float = 0.02
 
     def try_on(self, case: Any, notes: Notes) -> None:
-        """Checks one case. Warnings of numbers count as failures; a refusal in one clear line is an answer."""
+        """Checks one case.
+
+        Warnings of numbers count as failures; a refusal in one clear line is an answer.
+        """
         with warnings.catch_warnings():
             warnings.simplefilter("error", RuntimeWarning)
             try:
@@ -59,7 +66,9 @@ def finite(**arrays: np.ndarray) -> None:
 def between(low: float, high: float, **values: float | np.ndarray) -> None:
     """Every number lies within [low, high]."""
     for name, numbers in values.items():
-        assert np.all((np.asarray(numbers) >= low) & (np.asarray(numbers) <= high)), f"{name} leaves [{low}, {high}]: {numbers}"
+        assert np.all((np.asarray(numbers) >= low) & (np.asarray(numbers) <= high)), (
+            f"{name} leaves [{low}, {high}]: {numbers}"
+        )
 
 
 @contextlib.contextmanager
@@ -70,7 +79,9 @@ def threads(count: int) -> Iterator[None]:
     try:
         with contextlib.ExitStack() as stack:
             with contextlib.suppress(ImportError):
-                stack.enter_context(importlib.import_module("threadpoolctl").threadpool_limits(count))
+                stack.enter_context(
+                    importlib.import_module("threadpoolctl").threadpool_limits(count)
+                )
             yield
     finally:
         cv2.setNumThreads(before)

@@ -1,4 +1,6 @@
-"""Pictures and masks of every kind, drawn from a few numbers, so that a failing case can be told and made again."""
+"""Pictures and masks of every kind, drawn from a few numbers, so that a failing case can be told
+and made again.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -8,17 +10,43 @@ from hypothesis import strategies as st
 from isc_core.photo import FLOAT_STEP, Photo, PhotoSource
 
 KINDS = (
-    "glossy", "gradient", "noise", "constant", "black", "saturated", "denormal", "wide", "huge", "dead channel", "grey", "codes", "spark",
+    "glossy",
+    "gradient",
+    "noise",
+    "constant",
+    "black",
+    "saturated",
+    "denormal",
+    "wide",
+    "huge",
+    "dead channel",
+    "grey",
+    "codes",
+    "spark",
     "stripes",
-)  # fmt: skip
+)
 ORDINARY = ("glossy",)
-MASKS = ("disc", "full", "pixel", "row", "diagonal", "parts", "holes", "cut", "checkerboard", "specks", "ring")
+MASKS = (
+    "disc",
+    "full",
+    "pixel",
+    "row",
+    "diagonal",
+    "parts",
+    "holes",
+    "cut",
+    "checkerboard",
+    "specks",
+    "ring",
+)
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture of `rows` x `columns` pixels. `kind`, `mask`: of `KINDS`, `MASKS`; `seed` of what is random in both; `gain`: factor of its
-    light; `clips`: what is above .8 of its light counts as clipped."""
+    """A picture of `rows` x `columns` pixels. `kind`, `mask`: of `KINDS`, `MASKS`; `seed` of what
+    is random in both; `gain`: factor of its light; `clips`: what is above .8 of its light counts as
+    clipped.
+    """
 
     kind: str
     mask: str
@@ -46,14 +74,31 @@ class Picture:
         light, inside = self.light(), self.inside()
         bright = light.max(axis=2)[inside]
         step = FLOAT_STEP * float(np.percentile(bright, 99.9) or bright.max())
-        return Photo(light, inside, step, self.clipped(), PhotoSource("", (self.columns, self.rows), 32, "linear", "file"))
+        return Photo(
+            light,
+            inside,
+            step,
+            self.clipped(),
+            PhotoSource("", (self.columns, self.rows), 32, "linear", "file"),
+        )
 
 
-def pictures(least: int = 1, most: int = 40, kinds: tuple[str, ...] = KINDS, masks: tuple[str, ...] = MASKS) -> st.SearchStrategy[Picture]:
+def pictures(
+    least: int = 1, most: int = 40, kinds: tuple[str, ...] = KINDS, masks: tuple[str, ...] = MASKS
+) -> st.SearchStrategy[Picture]:
     """Pictures with sides from `least` to `most` pixels."""
     side = st.integers(least, most)
     gains = st.sampled_from((1.0, 1.0, 1.0, 1e-3, 1e4))
-    return st.builds(Picture, st.sampled_from(kinds), st.sampled_from(masks), side, side, st.integers(0, 9999), gains, st.booleans())
+    return st.builds(
+        Picture,
+        st.sampled_from(kinds),
+        st.sampled_from(masks),
+        side,
+        side,
+        st.integers(0, 9999),
+        gains,
+        st.booleans(),
+    )
 
 
 def ordinary(least: int = 24, most: int = 40) -> st.SearchStrategy[Picture]:
@@ -77,7 +122,10 @@ def _light(p: Picture) -> np.ndarray:
         "huge": lambda: 1e12 * rng.random(shape),
         "gradient": lambda: np.clip((x + y + 2)[..., None] / 4 * rng.random(3), 0, 1),
         "grey": lambda: np.repeat(_glossy(rng, x, y).mean(axis=2, keepdims=True), 3, axis=2),
-        "stripes": lambda: np.where((np.arange(p.columns) % 2 > 0)[None, :, None], rng.random(3), rng.random(3)) * np.ones(shape),
+        "stripes": lambda: (
+            np.where((np.arange(p.columns) % 2 > 0)[None, :, None], rng.random(3), rng.random(3))
+            * np.ones(shape)
+        ),
     }
     if p.kind in plain:
         return plain[p.kind]()
@@ -92,13 +140,17 @@ def _light(p: Picture) -> np.ndarray:
 
 def _glossy(rng: np.random.Generator, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """A shaded disc of two or three paints with two highlights and a little noise."""
-    shading = 0.2 + 0.7 * np.sqrt(np.clip(1.05 - x**2 - y**2, 0, 1)) * (1 + 0.3 * x * rng.uniform(-1, 1))
+    shading = 0.2 + 0.7 * np.sqrt(np.clip(1.05 - x**2 - y**2, 0, 1)) * (
+        1 + 0.3 * x * rng.uniform(-1, 1)
+    )
     paints = rng.uniform(0.05, 0.7, (3, 3))
     which = (x > 0.4 * np.sin(5 * y + rng.uniform(0, 6))).astype(int) + (y > rng.uniform(0.2, 0.9))
     specular = np.zeros_like(x)
     for _ in range(2):
         a, b = rng.uniform(-0.6, 0.6, 2)
-        specular += rng.uniform(0.1, 0.6) * np.exp(-((x - a) ** 2 + (y - b) ** 2) / rng.uniform(0.01, 0.08))
+        specular += rng.uniform(0.1, 0.6) * np.exp(
+            -((x - a) ** 2 + (y - b) ** 2) / rng.uniform(0.01, 0.08)
+        )
     noise = 0.004 * rng.random((*x.shape, 3))
     return np.asarray(paints[which] * shading[..., None] + specular[..., None] + noise)
 
@@ -115,7 +167,9 @@ def _inside(p: Picture) -> np.ndarray:
         "row": row == p.seed % p.rows,
         "diagonal": np.abs(row - column) < 2,
         "parts": rng.random((3, 3))[3 * row // p.rows, 3 * column // p.columns] > 0.5,
-        "holes": disc & ~((np.abs(x - 0.2) < 0.15) & (np.abs(y) < 0.15)) & (rng.random(x.shape) > 0.03),
+        "holes": disc
+        & ~((np.abs(x - 0.2) < 0.15) & (np.abs(y) < 0.15))
+        & (rng.random(x.shape) > 0.03),
         "cut": (x - 0.5) ** 2 + (y - 0.4) ** 2 < 0.9,
         "checkerboard": (row + column) % 2 == 0,
         "specks": rng.random(x.shape) > 0.6,

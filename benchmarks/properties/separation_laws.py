@@ -1,6 +1,7 @@
 """Laws of every separation method and variant.
 
-Equations, inside the mask: image = diffuse + specular + residual; 0 <= diffuse <= image; specular >= 0; residual = 0 but where clipped.
+Equations, inside the mask: image = diffuse + specular + residual; 0 <= diffuse <= image; specular
+>= 0; residual = 0 but where clipped.
 """
 
 from collections.abc import Callable
@@ -31,31 +32,53 @@ class Task:
     method: str
     variant: str
 
-    def split(self, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None) -> Separation:
+    def split(
+        self, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None
+    ) -> Separation:
         """The separation of another image in this task's place."""
-        return separate(self.method, image, mask, clipped, variant=self.variant, changes=SHORTER.get(self.method))
+        return separate(
+            self.method,
+            image,
+            mask,
+            clipped,
+            variant=self.variant,
+            changes=SHORTER.get(self.method),
+        )
 
 
-def tasks(drawn: st.SearchStrategy[Picture], methods: tuple[tuple[str, str], ...]) -> st.SearchStrategy[Task]:
+def tasks(
+    drawn: st.SearchStrategy[Picture], methods: tuple[tuple[str, str], ...]
+) -> st.SearchStrategy[Task]:
     """Pictures with one of the (method, variant) pairs."""
     return st.builds(lambda picture, pair: Task(picture, *pair), drawn, st.sampled_from(methods))
 
 
-def sound(split: Separation, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None) -> None:
+def sound(
+    split: Separation, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None
+) -> None:
     """Asserts the identities of a separation of `image` (H, W, 3) inside `mask` (H, W)."""
     peak = max(float(image[mask].max()), 1e-30)
-    finite(diffuse=split.diffuse, specular=split.specular, residual=split.residual, confidence=split.confidence)
+    finite(
+        diffuse=split.diffuse,
+        specular=split.specular,
+        residual=split.residual,
+        confidence=split.confidence,
+    )
     for name in _LAYERS:
         layer = getattr(split, name)
         assert layer.dtype == np.float32 and layer.shape[:2] == mask.shape, name
         assert not layer[~mask].any(), f"{name} outside the mask"
     total = split.diffuse.astype(float) + split.specular + split.residual
     assert np.abs(total - image)[mask].max() <= 1e-5 * peak, "the layers do not add up"
-    assert (split.diffuse >= 0).all() and (split.diffuse[mask] <= image[mask] + 1e-6 * peak).all(), "diffuse leaves [0, image]"
+    assert (split.diffuse >= 0).all() and (
+        split.diffuse[mask] <= image[mask] + 1e-6 * peak
+    ).all(), "diffuse leaves [0, image]"
     assert (split.specular >= 0).all(), "negative specular light"
     between(0, 1, confidence=split.confidence)
     explained = mask if clipped is None else mask & ~clipped
-    assert np.abs(split.residual[explained]).max(initial=0) <= 1e-6 * peak, "a residual that is not explained"
+    assert np.abs(split.residual[explained]).max(initial=0) <= 1e-6 * peak, (
+        "a residual that is not explained"
+    )
 
 
 def _sound(task: Task, notes: Notes) -> None:
@@ -76,7 +99,9 @@ def _threads(task: Task, notes: Notes) -> None:
     with threads(2):
         two = task.split(image, mask)
     for name in _LAYERS:
-        assert np.array_equal(getattr(one, name), getattr(two, name)), f"{name} depends on the number of threads"
+        assert np.array_equal(getattr(one, name), getattr(two, name)), (
+            f"{name} depends on the number of threads"
+        )
 
 
 def _padding(task: Task, notes: Notes) -> None:
@@ -88,19 +113,27 @@ def _padding(task: Task, notes: Notes) -> None:
     inner = np.s_[sides[0][0] : sides[0][0] + p.rows, sides[1][0] : sides[1][0] + p.columns]
     peak = max(float(image[mask].max()), 1e-30)
     change = np.abs(wide.diffuse[inner] - plain.diffuse).max() / peak
-    assert notes.measure(f"padding {task.method}", change) <= 1e-5, f"padding changes the diffuse layer by {change:.2g} of the peak"
+    assert notes.measure(f"padding {task.method}", change) <= 1e-5, (
+        f"padding changes the diffuse layer by {change:.2g} of the peak"
+    )
 
 
 def _turned(task: Task, notes: Notes) -> None:
-    """How much of the photo's light goes to the other layer, in the mean over the pixels, as a share of the mean light."""
+    """How much of the photo's light goes to the other layer, in the mean over the pixels, as a
+    share of the mean light.
+    """
     image, mask = task.picture.light(), task.picture.inside()
     plain = task.split(image, mask).diffuse
     mean = float(image[mask].mean())
     for name, move in MOVES.items():
-        other = task.split(np.ascontiguousarray(move(image)), np.ascontiguousarray(move(mask))).diffuse
+        other = task.split(
+            np.ascontiguousarray(move(image)), np.ascontiguousarray(move(mask))
+        ).diffuse
         change = float(np.abs(other - move(plain))[move(mask)].mean()) / mean
         bound = TURN_BOUNDS.get(task.method, 0.0)
-        assert notes.measure(f"{name} {task.method}", change) <= bound, f"{name}: {change:.2g} of the mean light changes its layer"
+        assert notes.measure(f"{name} {task.method}", change) <= bound, (
+            f"{name}: {change:.2g} of the mean light changes its layer"
+        )
 
 
 def _scale(task: Task, notes: Notes) -> None:
@@ -110,10 +143,13 @@ def _scale(task: Task, notes: Notes) -> None:
         other = task.split((np.float32(factor) * image).astype(np.float32), mask).diffuse / factor
         change = float(np.abs(other - plain)[mask].mean()) / float(image[mask].mean())
         bound = SCALE_BOUNDS.get(task.method, 1e-6)
-        assert notes.measure(f"{name} {task.method}", change) <= bound, f"{name}: {change:.2g} of the mean light changes its layer"
+        assert notes.measure(f"{name} {task.method}", change) <= bound, (
+            f"{name}: {change:.2g} of the mean light changes its layer"
+        )
 
 
-# Of the mean light, what may change its layer: measured over many ordinary photos (docs/properties.md), with room to spare.
+# Of the mean light, what may change its layer: measured over many ordinary photos
+# (docs/properties.md), with room to spare.
 TURN_BOUNDS: dict[str, float] = dict.fromkeys(METHODS, 0.05) | {"network": 0.2}
 SCALE_BOUNDS: dict[str, float] = dict.fromkeys(METHODS, 0.01)
 

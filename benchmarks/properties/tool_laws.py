@@ -1,4 +1,6 @@
-"""Laws of what works on images and results besides: thresholds, filling, edits, lobes, metrics, photos."""
+"""Laws of what works on images and results besides: thresholds, filling, edits, lobes, metrics,
+photos.
+"""
 
 from dataclasses import dataclass
 
@@ -33,7 +35,17 @@ from isc_core.thresholding import OPTIMISERS, OtsuObjective, exact, maximise, qu
 from .law import Law, Notes, between, finite
 from .pictures import Picture, pictures
 
-_EDITS = ("nothing", "gloss", "metal", "render", "layers", "recolour", "relight", "sun", "highlight")
+_EDITS = (
+    "nothing",
+    "gloss",
+    "metal",
+    "render",
+    "layers",
+    "recolour",
+    "relight",
+    "sun",
+    "highlight",
+)
 
 
 @dataclass(frozen=True)
@@ -52,7 +64,9 @@ def _numbers(drawn: st.SearchStrategy[Picture]) -> st.SearchStrategy[Numbers]:
 
 
 def _result(p: Picture) -> Decomposition:
-    """A decomposition whose identities hold by construction: half of the smallest channel is specular, the object a bump."""
+    """A decomposition whose identities hold by construction: half of the smallest channel is
+    specular, the object a bump.
+    """
     image, mask = p.light(), p.inside()
     y, x = np.mgrid[-1 : 1 : p.rows * 1j, -1 : 1 : p.columns * 1j]
     z = np.sqrt(np.maximum(1.2 - x**2 - y**2, 0.05))
@@ -61,14 +75,29 @@ def _result(p: Picture) -> Decomposition:
     light = np.random.default_rng(p.seed).normal(0, 0.3, (9, 3))
     inside = mask[..., None]
     shading = np.where(inside, np.exp(real_sh(normal.astype(float)) @ light), 0).astype(np.float32)
-    specular = np.where(inside, 0.5 * image.min(axis=2, keepdims=True) * np.ones(3), 0).astype(np.float32)
+    specular = np.where(inside, 0.5 * image.min(axis=2, keepdims=True) * np.ones(3), 0).astype(
+        np.float32
+    )
     image = np.where(inside, image, 0).astype(np.float32)
     diffuse = image - specular
     reflectance = np.where(inside, diffuse / np.where(inside, shading, 1), 0).astype(np.float32)
     height = np.where(mask, p.columns * z / 2, 0).astype(np.float32)
     confidence = mask.astype(np.float32)
     residual = np.zeros_like(image)
-    return Decomposition(image, diffuse, specular, residual, reflectance, shading, normal, height, mask, confidence, light, Provenance())
+    return Decomposition(
+        image,
+        diffuse,
+        specular,
+        residual,
+        reflectance,
+        shading,
+        normal,
+        height,
+        mask,
+        confidence,
+        light,
+        Provenance(),
+    )
 
 
 def _edit(d: Decomposition, case: Numbers, kind: str) -> Edited:
@@ -79,9 +108,20 @@ def _edit(d: Decomposition, case: Numbers, kind: str) -> Edited:
         "gloss": lambda: change_gloss(d, Gloss(exponent=1 + 500 * a, gain=2 * b)),
         "metal": lambda: change_gloss(d, Gloss(metal=a)),
         "render": lambda: change_gloss(d, Gloss(exponent=1 + 500 * a, method="render")),
-        "layers": lambda: edit_layers(d, DichromaticEdit(LayerEdit(2 * a, 0.3 + 3 * b, 2 * c - 1), LayerEdit(a, 1, b, 0.5 + 3 * c))),
-        "recolour": lambda: recolour(d, Paint(360 * a, 2 * b, 2 * c), find_clusters(d, 1 + int(5 * a), 3).weight(1)),
-        "relight": lambda: relight(d, NewLight(turned_light(d.illumination, turn(360 * a, 90 * b, 90 * c))), Relighting(exposure=0.2 + b)),
+        "layers": lambda: edit_layers(
+            d,
+            DichromaticEdit(
+                LayerEdit(2 * a, 0.3 + 3 * b, 2 * c - 1), LayerEdit(a, 1, b, 0.5 + 3 * c)
+            ),
+        ),
+        "recolour": lambda: recolour(
+            d, Paint(360 * a, 2 * b, 2 * c), find_clusters(d, 1 + int(5 * a), 3).weight(1)
+        ),
+        "relight": lambda: relight(
+            d,
+            NewLight(turned_light(d.illumination, turn(360 * a, 90 * b, 90 * c))),
+            Relighting(exposure=0.2 + b),
+        ),
         "sun": lambda: relight(d, NewLight(sun=sun)),
         "highlight": lambda: add_highlight(d, sun, level=a, replacing=b > 0.5),
     }
@@ -106,7 +146,11 @@ def _light_direction(p: Picture, notes: Notes) -> None:
     del notes
     d = _result(p)
     for found in (explain_shading(d), explain_specular(d)):
-        finite(direction=found.light.direction, irradiance=found.light.irradiance, ambient=found.light.ambient)
+        finite(
+            direction=found.light.direction,
+            irradiance=found.light.irradiance,
+            ambient=found.light.ambient,
+        )
         between(0, 1 + 1e-9, explained=found.explained)
         between(0, 180, cone=found.cone)
         between(1 - 1e-6, 1 + 1e-6, length=float(np.linalg.norm(found.light.direction)))
@@ -122,8 +166,12 @@ def _light_direction(p: Picture, notes: Notes) -> None:
 def _lobe_fit(case: Numbers, notes: Notes) -> None:
     del notes
     d = _result(case.picture)
-    options = LobeFitOptions(most_pixels=200, most_lights=1, recovered=case.a > 0.5, normal_error=15 * case.b)
-    fit = fit_lobe(d.specular, d.normal.astype(float), d.mask, d.confidence, options=options, shading=d.shading)
+    options = LobeFitOptions(
+        most_pixels=200, most_lights=1, recovered=case.a > 0.5, normal_error=15 * case.b
+    )
+    fit = fit_lobe(
+        d.specular, d.normal.astype(float), d.mask, d.confidence, options=options, shading=d.shading
+    )
     finite(predicted=fit.predicted)
     assert (fit.predicted >= 0).all() and not fit.predicted[~d.mask].any()
     between(0, 1, explained=fit.explained)
@@ -161,22 +209,31 @@ def _filling(p: Picture, notes: Notes) -> None:
     finite(filled=filled)
     low, high = image[known].min(axis=0), image[known].max(axis=0)
     room = 1e-5 * float(high.max())
-    assert (filled >= low - room).all() and (filled <= high + room).all(), "filled beyond what is known"
+    assert (filled >= low - room).all() and (filled <= high + room).all(), (
+        "filled beyond what is known"
+    )
     assert np.array_equal(filled[known], image[known]), "known pixels changed"
     patched = fill_patches(image, known, ~known)
     finite(patched=patched)
     assert np.array_equal(patched[known], image[known]), "known pixels changed"
     room = 1e-4 * float(high.max())
-    assert (patched >= low - room).all() and (patched <= high + room).all(), "patches beyond what is known"
+    assert (patched >= low - room).all() and (patched <= high + room).all(), (
+        "patches beyond what is known"
+    )
 
 
 def _metrics(case: tuple[Picture, Picture], notes: Notes) -> None:
     del notes
     one, other = case
     a, mask = one.light().astype(float), one.inside()
-    b = np.random.default_rng(other.seed).permutation(a.reshape(-1, 3)).reshape(a.shape) * other.gain
+    b = (
+        np.random.default_rng(other.seed).permutation(a.reshape(-1, 3)).reshape(a.shape)
+        * other.gain
+    )
     between(0, np.inf, mse=mse(a, b, mask), scaled=scaled_mse(a[mask], b[mask]))
-    assert scaled_mse(a[mask], b[mask]) <= float(np.square(a[mask]).mean()) * (1 + 1e-9), "a scale of 0 would be better"
+    assert scaled_mse(a[mask], b[mask]) <= float(np.square(a[mask]).mean()) * (1 + 1e-9), (
+        "a scale of 0 would be better"
+    )
     assert mse(a, a) == 0 and psnr(a, a) == np.inf
     peak = max(float(a.max()), 1e-30)
     for similarity in (ssim, ssim_volume):
@@ -205,13 +262,22 @@ def _photos(case: Numbers, notes: Notes) -> None:
     small, inside, factor = averaged(image, mask, 0.2 + 0.8 * case.a)
     finite(small=small)
     assert inside.any() and 0 < factor <= 1 and not small[~inside].any()
-    room = 1e-5 * float(image.max()) + float(np.finfo(np.float32).tiny)  # below it a mean has hardly any digits
-    assert (small[inside] >= image[mask].min(axis=0) - room).all() and (small[inside] <= image[mask].max(axis=0) + room).all()
+    room = 1e-5 * float(image.max()) + float(
+        np.finfo(np.float32).tiny
+    )  # below it a mean has hardly any digits
+    assert (small[inside] >= image[mask].min(axis=0) - room).all() and (
+        small[inside] <= image[mask].max(axis=0) + room
+    ).all()
 
 
 def _models(case: tuple[float, float, float], notes: Notes) -> None:
     rough, strong, seed = case
-    models = (Lambert(strong), OrenNayar(strong, rough), BlinnPhong(1 + 2000 * rough), Ggx(0.02 + 0.9 * rough))
+    models = (
+        Lambert(strong),
+        OrenNayar(strong, rough),
+        BlinnPhong(1 + 2000 * rough),
+        Ggx(0.02 + 0.9 * rough),
+    )
     rng = np.random.default_rng(int(1000 * seed))
     vectors = rng.normal(size=(3, 200, 3))
     normal, view, light = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
@@ -225,30 +291,61 @@ def _models(case: tuple[float, float, float], notes: Notes) -> None:
 
 
 _UNIT = st.integers(0, 100).map(lambda n: n / 100)
-_THRESHOLD_CASES = st.tuples(pictures(2, 24), st.integers(1, 5), st.sampled_from(OPTIMISERS), st.integers(0, 99))
+_THRESHOLD_CASES = st.tuples(
+    pictures(2, 24), st.integers(1, 5), st.sampled_from(OPTIMISERS), st.integers(0, 99)
+)
 LAWS = (
     Law(
-        "edits", "every edit of any result: finite, >= 0, 0 outside; an edit of nothing is the image",
-        st.tuples(_numbers(pictures(3, 28)), st.sampled_from(_EDITS)), _edits, 0.05),
+        "edits",
+        "every edit of any result: finite, >= 0, 0 outside; an edit of nothing is the image",
+        st.tuples(_numbers(pictures(3, 28)), st.sampled_from(_EDITS)),
+        _edits,
+        0.05,
+    ),
     Law(
-        "light", "light directions and the light's colour: finite, unit, shares in [0, 1]",
-        pictures(6, 28), _light_direction, 0.1),
+        "light",
+        "light directions and the light's colour: finite, unit, shares in [0, 1]",
+        pictures(6, 28),
+        _light_direction,
+        0.1,
+    ),
     Law(
-        "lobe fit", "any specular layer: a finite lobe, or a reason why there is none",
-        _numbers(pictures(8, 20)), _lobe_fit, 0.5),
+        "lobe fit",
+        "any specular layer: a finite lobe, or a reason why there is none",
+        _numbers(pictures(8, 20)),
+        _lobe_fit,
+        0.5,
+    ),
     Law(
-        "thresholds", "nothing beats the exact maximum; one threshold more never loses; the same seed, the same answer",
-        _THRESHOLD_CASES, _thresholds, 0.05),
+        "thresholds",
+        "nothing beats the exact maximum; one threshold more never loses; the same seed, the same answer",
+        _THRESHOLD_CASES,
+        _thresholds,
+        0.05,
+    ),
     Law(
-        "filling", "known pixels stay, filled ones lie between the known",
-        pictures(3, 28), _filling, 0.1),
+        "filling",
+        "known pixels stay, filled ones lie between the known",
+        pictures(3, 28),
+        _filling,
+        0.1,
+    ),
     Law(
-        "metrics", "in their ranges, best for equal images",
-        st.tuples(pictures(4, 24), pictures(4, 24)), _metrics),
+        "metrics",
+        "in their ranges, best for equal images",
+        st.tuples(pictures(4, 24), pictures(4, 24)),
+        _metrics,
+    ),
     Law(
-        "photos", "curves there and back, masks tidied once, means between their values",
-        _numbers(pictures(3, 40)), _photos),
+        "photos",
+        "curves there and back, masks tidied once, means between their values",
+        _numbers(pictures(3, 40)),
+        _photos,
+    ),
     Law(
-        "reflectance models", "finite, >= 0, dark below the horizon",
-        st.tuples(_UNIT, _UNIT, _UNIT), _models),
-)  # fmt: skip
+        "reflectance models",
+        "finite, >= 0, dark below the horizon",
+        st.tuples(_UNIT, _UNIT, _UNIT),
+        _models,
+    ),
+)

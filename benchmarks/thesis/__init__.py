@@ -1,4 +1,6 @@
-"""Every table and figure of the thesis, regenerated on open data, beside what the thesis claims: `isc thesis`.
+"""Every table and figure of the thesis, regenerated on open data, beside what the thesis claims:
+`isc thesis`.
 
-Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016).
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image",
+thesis (2016).
 """

@@ -1,15 +1,19 @@
-"""Figures of the applications: highlights on a sphere and where their light is, dichromatic editing, reflectance editing.
+"""Figures of the applications: highlights on a sphere and where their light is, dichromatic
+editing, reflectance editing.
 
-The sphere is a painted ball under one lamp with a little ambient light and a Blinn-Phong gloss of a known exponent. Its light is looked for
-five times: by the shading and by the highlight when shape and layers are the true ones, by the highlight when the layers are separated by
-`isc` from the picture, and by both when nothing but the picture is known (model MDR). Errors are angles between directions.
+The sphere is a painted ball under one lamp with a little ambient light and a Blinn-Phong gloss of a
+known exponent. Its light is looked for five times: by the shading and by the highlight when shape
+and layers are the true ones, by the highlight when the layers are separated by `isc` from the
+picture, and by both when nothing but the picture is known (model MDR). Errors are angles between
+directions.
 
 The edits are those of `isc edit`, on photos where data are given, else on rendered things.
 
-Citation: J. F. Blinn (1977), doi:10.1145/563858.563893; S. A. Shafer (1985), doi:10.1002/col.5080100409; H. Akbar, thesis (2016).
+Citation: J. F. Blinn (1977), doi:10.1145/563858.563893; S. A. Shafer (1985),
+doi:10.1002/col.5080100409; H. Akbar, thesis (2016).
 
-Limits: a convex ball without shadows is the easiest object there is. How good an edit looks is not measured, only that it does what was
-asked for and nothing else.
+Limits: a convex ball without shadows is the easiest object there is. How good an edit looks is not
+measured, only that it does what was asked for and nothing else.
 """
 
 from collections.abc import Callable
@@ -38,11 +42,19 @@ from .subjects import Subject
 
 PAINT = np.array([0.62, 0.18, 0.10])
 EXPONENT, _GLOSS, _AMBIENT = 60.0, 0.06, 0.08
-DIRECTIONS = ((-0.6, 0.6, 1.0), (0.7, 0.5, 1.0), (0.0, 0.9, 0.8), (-0.9, 0.1, 0.7), (0.9, -0.4, 0.8), (0.2, 0.2, 1.0))
+DIRECTIONS = (
+    (-0.6, 0.6, 1.0),
+    (0.7, 0.5, 1.0),
+    (0.0, 0.9, 0.8),
+    (-0.9, 0.1, 0.7),
+    (0.9, -0.4, 0.8),
+    (0.2, 0.2, 1.0),
+)
 
 
 def lit_ball(direction: np.ndarray, size: int) -> Decomposition:
-    """A glossy ball under a light from the unit vector `direction` (3,): the truth of every layer, in a picture of `size` pixels a side.
+    """A glossy ball under a light from the unit vector `direction` (3,): the truth of every layer,
+    in a picture of `size` pixels a side.
 
     Its `illumination` is the smooth light that is nearest to the lamp; `shading` is the lamp's own.
     """
@@ -56,9 +68,16 @@ def lit_ball(direction: np.ndarray, size: int) -> Decomposition:
     def inside(values: np.ndarray) -> np.ndarray:
         return np.where(mask[..., None], values, 0).astype(np.float32)
 
-    diffuse, gloss, paint = inside(PAINT * shading), inside(specular), inside(np.broadcast_to(PAINT, shading.shape))
+    diffuse, gloss, paint = (
+        inside(PAINT * shading),
+        inside(specular),
+        inside(np.broadcast_to(PAINT, shading.shape)),
+    )
     facing = np.where(mask[..., None], normal, [0.0, 0, 1]).astype(np.float32)
-    height, sure = np.where(mask, 0.45 * size * normal[..., 2], 0).astype(np.float32), mask.astype(np.float32)
+    height, sure = (
+        np.where(mask, 0.45 * size * normal[..., 2], 0).astype(np.float32),
+        mask.astype(np.float32),
+    )
     layers = (diffuse + gloss, diffuse, gloss, np.zeros_like(diffuse), paint, inside(shading))
     return Decomposition(*layers, facing, height, mask, sure, illumination, Provenance())
 
@@ -74,28 +93,46 @@ def degrees_between(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)))
 
 
-def found_lights(ball: Decomposition, picture_only: Decomposition | None = None) -> dict[str, np.ndarray]:
-    """Directions (3,) of the light by each way of finding it; `picture_only`: what a model makes of the ball's image, or None."""
+def found_lights(
+    ball: Decomposition, picture_only: Decomposition | None = None
+) -> dict[str, np.ndarray]:
+    """Directions (3,) of the light by each way of finding it;
+
+    `picture_only`: what a model makes of the ball's image, or None.
+    """
     ways = {
         "shading, true shape": explain_shading(ball),
         "highlight, true layers": explain_specular(ball),
         "highlight, layers by isc": explain_specular(separated(ball)),
     }
     if picture_only is not None:
-        ways |= {"shading, all by MDR": explain_shading(picture_only), "highlight, all by MDR": explain_specular(picture_only)}
+        ways |= {
+            "shading, all by MDR": explain_shading(picture_only),
+            "highlight, all by MDR": explain_specular(picture_only),
+        }
     return {name: way.light.direction for name, way in ways.items()}
 
 
-_WAYS = ("shading, true shape", "highlight, true layers", "highlight, layers by isc", "shading, all by MDR", "highlight, all by MDR")
+_WAYS = (
+    "shading, true shape",
+    "highlight, true layers",
+    "highlight, layers by isc",
+    "shading, all by MDR",
+    "highlight, all by MDR",
+)
 
 
 def _spheres(context: Context) -> Made:
     size = 64 if context.quick else 128
     shown, rows, errors = [], [], []
-    for number, direction in enumerate([toward(*one) for one in (DIRECTIONS[:3] if context.quick else DIRECTIONS)]):
+    for number, direction in enumerate(
+        [toward(*one) for one in (DIRECTIONS[:3] if context.quick else DIRECTIONS)]
+    ):
         ball = lit_ball(direction, size)
         kept = context.rows(f"light on ball {number}", partial(_found_rows, context, ball, number))
-        found = {str(row["way"]): np.array([float(row[axis] or 0) for axis in "xyz"]) for row in kept}
+        found = {
+            str(row["way"]): np.array([float(row[axis] or 0) for axis in "xyz"]) for row in kept
+        }
         off = {name: round(degrees_between(way, direction), 4) for name, way in found.items()}
         errors.append(off)
         rows.append((_word(direction), *(off.get(name, "") for name in _WAYS)))
@@ -103,7 +140,11 @@ def _spheres(context: Context) -> Made:
     means = [[off[name] for off in errors if name in off] for name in _WAYS]
     rows.append(("mean", *(float(np.mean(values)) for values in means)))
     header = ("light (x, y, z)", *_WAYS)
-    table = Table(header, tuple(rows), "Degrees between the true direction and the one found; x right, y up, z toward the viewer.")
+    table = Table(
+        header,
+        tuple(rows),
+        "Degrees between the true direction and the one found; x right, y up, z toward the viewer.",
+    )
     text = (
         "Each row: the ball under one lamp, its highlight as `isc` finds it, and balls lit from the directions that the separated "
         "highlight, the true shading and the shading by MDR tell. With the true shape both tell the light; from the picture alone they are "
@@ -117,18 +158,36 @@ def _spheres(context: Context) -> Made:
 def _found_rows(context: Context, ball: Decomposition, number: int) -> list[JsonRow]:
     picture_only = None
     if number == 0 or not context.quick:
-        picture_only = decomposed(context, Subject(f"ball{number}", "sphere", ball.image, ball.mask), illumination="laboratory")
+        picture_only = decomposed(
+            context,
+            Subject(f"ball{number}", "sphere", ball.image, ball.mask),
+            illumination="laboratory",
+        )
     found = found_lights(ball, picture_only)
-    return [{"way": name, **dict(zip("xyz", map(float, direction), strict=True))} for name, direction in found.items()]
+    return [
+        {"way": name, **dict(zip("xyz", map(float, direction), strict=True))}
+        for name, direction in found.items()
+    ]
 
 
-def _ball_panels(ball: Decomposition, found: dict[str, np.ndarray], off: dict[str, float], size: int, quick: bool) -> list[Panel]:
+def _ball_panels(
+    ball: Decomposition, found: dict[str, np.ndarray], off: dict[str, float], size: int, quick: bool
+) -> list[Panel]:
     gain = exposure(ball.image, ball.mask)
     parted = separated(ball)
-    shown = [Panel("image", ball.image, ball.mask, gain=gain), Panel("specular, by isc", parted.specular, ball.mask, gain=gain)]
-    ways = (("lit as the highlight tells", _WAYS[2]), ("as the shading tells", _WAYS[0]), ("by MDR", _WAYS[3]))
+    shown = [
+        Panel("image", ball.image, ball.mask, gain=gain),
+        Panel("specular, by isc", parted.specular, ball.mask, gain=gain),
+    ]
+    ways = (
+        ("lit as the highlight tells", _WAYS[2]),
+        ("as the shading tells", _WAYS[0]),
+        ("by MDR", _WAYS[3]),
+    )
     for title, name in ways if _WAYS[3] in found and not quick else ways[:2]:
-        lit, coverage = render_sphere(DirectionalLight(found[name], ambient=np.full(3, _AMBIENT)), size, EXPONENT, _GLOSS)
+        lit, coverage = render_sphere(
+            DirectionalLight(found[name], ambient=np.full(3, _AMBIENT)), size, EXPONENT, _GLOSS
+        )
         shown.append(Panel(f"{title}: {off[name]:.2f}° off", lit, coverage > 0.5, gain=0.6))
     return shown
 
@@ -137,7 +196,9 @@ def _word(direction: np.ndarray) -> str:
     return " ".join(f"{value:.2f}" for value in direction)
 
 
-def _photographed(context: Context, best: Callable[[Subject], float]) -> tuple[Subject, Decomposition]:
+def _photographed(
+    context: Context, best: Callable[[Subject], float]
+) -> tuple[Subject, Decomposition]:
     """The masked photo with the most of what an edit needs; SIRFS needs an outline."""
     photos = context.photos()
     chosen = max([one for one in photos if not one.mask.all()] or photos, key=best)
@@ -147,7 +208,9 @@ def _photographed(context: Context, best: Callable[[Subject], float]) -> tuple[S
 def _glossy(subject: Subject) -> float:
     """The share of its light that `isc` takes for specular."""
     split = separate("isc", subject.image, subject.mask, photo_of(subject).clipped)
-    return float(split.specular[subject.mask].sum(dtype=float) / subject.image[subject.mask].sum(dtype=float))
+    return float(
+        split.specular[subject.mask].sum(dtype=float) / subject.image[subject.mask].sum(dtype=float)
+    )
 
 
 def _colourful(subject: Subject) -> float:
@@ -179,10 +242,13 @@ def _dichromatic(context: Context) -> Made:
         after = edit_layers(d, edit)
         shown.append(Panel(name, after.image, d.mask, gain=gain))
         rows.append(_change(name, d, after))
-    header = ("edit", "change of the image (%)", "of the diffuse layer (%)", "of the specular layer (%)")
-    caption = (
-        f"{subject.name}: RMS of the change, of the layer's or the image's own RMS. A layer that an edit leaves alone changes by nothing."
+    header = (
+        "edit",
+        "change of the image (%)",
+        "of the diffuse layer (%)",
+        "of the specular layer (%)",
     )
+    caption = f"{subject.name}: RMS of the change, of the layer's or the image's own RMS. A layer that an edit leaves alone changes by nothing."
     text = f"{subject.name}: each layer edited by itself, then added up again; one exposure for all. A layer's removal shows the other one."
     return Made((Table(header, tuple(rows), caption),), (panels(shown, 4),), text)
 
@@ -191,7 +257,12 @@ def _change(name: str, d: Decomposition, after: Edited) -> tuple[str, float, flo
     def moved(before: np.ndarray, now: np.ndarray) -> float:
         return 100 * _moved(before[d.mask], now[d.mask])
 
-    return name, moved(d.image, after.image), moved(d.diffuse, after.diffuse), moved(d.specular, after.specular)
+    return (
+        name,
+        moved(d.image, after.image),
+        moved(d.diffuse, after.diffuse),
+        moved(d.specular, after.specular),
+    )
 
 
 def _moved(before: np.ndarray, after: np.ndarray) -> float:
@@ -200,7 +271,9 @@ def _moved(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def painted_region(d: Decomposition) -> np.ndarray:
-    """A mask (H, W) in [0, 1] as a person might paint it: a soft disc on the object's middle, a quarter of its size."""
+    """A mask (H, W) in [0, 1] as a person might paint it: a soft disc on the object's middle, a
+    quarter of its size.
+    """
     rows, columns = np.nonzero(d.mask)
     y, x = np.mgrid[: d.mask.shape[0], : d.mask.shape[1]]
     radius = 0.5 * np.sqrt(d.mask.sum() / np.pi)
@@ -219,8 +292,14 @@ def _recolouring(context: Context) -> Made:
         ("less saturation, everywhere", Paint(saturation=0.3), None),
         ("blue in a painted mask", Paint(target=target), painted_region(d)),
     ]
-    asked += [(f"blue in cluster {number}", Paint(target=target), clusters.weight(number)) for number in numbers]
-    shown = [Panel("photo", d.image, d.mask, gain=gain), Panel("clusters of paint", _cluster_picture(clusters), d.mask)]
+    asked += [
+        (f"blue in cluster {number}", Paint(target=target), clusters.weight(number))
+        for number in numbers
+    ]
+    shown = [
+        Panel("photo", d.image, d.mask, gain=gain),
+        Panel("clusters of paint", _cluster_picture(clusters), d.mask),
+    ]
     shown.append(Panel("painted mask", painted_region(d), d.mask, (0, 1)))
     rows: list[tuple[str | float, ...]] = []
     for name, paint, region in asked:

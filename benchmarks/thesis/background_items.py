@@ -1,13 +1,18 @@
-"""Figures of the background: lobes of reflectance, Phong's components, shading and its model, intrinsic images, specular-free images.
+"""Figures of the background: lobes of reflectance, Phong's components, shading and its model,
+intrinsic images, specular-free images.
 
-Lobes are drawn in the plane of incidence as the code has them: f_r(view) cos(view) for light from 0, 30 and 60 degrees. The sphere is lit
-as Phong did: ambient + diffuse + strength cos^n of the mirrored view.
+Lobes are drawn in the plane of incidence as the code has them: f_r(view) cos(view) for light from
+0, 30 and 60 degrees. The sphere is lit as Phong did: ambient + diffuse + strength cos^n of the
+mirrored view.
 
-Citation: B. T. Phong (1975), doi:10.1145/360825.360839; J. F. Blinn (1977), doi:10.1145/563858.563893; M. Oren and S. K. Nayar (1994),
-doi:10.1145/192161.192213; B. Walter et al. (2007), doi:10.2312/EGWR/EGSR07/195-206; H. G. Barrow and J. M. Tenenbaum, "Recovering intrinsic
-scene characteristics from images", Computer Vision Systems (1978), which has no DOI (intrinsic images).
+Citation: B. T. Phong (1975), doi:10.1145/360825.360839; J. F. Blinn (1977),
+doi:10.1145/563858.563893; M. Oren and S. K. Nayar (1994), doi:10.1145/192161.192213; B. Walter et
+al. (2007), doi:10.2312/EGWR/EGSR07/195-206; H. G. Barrow and J. M. Tenenbaum, "Recovering intrinsic
+scene characteristics from images", Computer Vision Systems (1978), which has no DOI (intrinsic
+images).
 
-Limits: what exactly the thesis draws at each number is not known to us; the choice within the titles is ours.
+Limits: what exactly the thesis draws at each number is not known to us; the choice within the
+titles is ours.
 """
 
 from functools import partial
@@ -47,16 +52,23 @@ LOBES: tuple[tuple[str, Model], ...] = (
     ("Phong, exponent 20", Phong(exponent=20.0)),
     ("Blinn-Phong, exponent 80", BlinnPhong(exponent=80.0)),
     ("GGX, alpha .25, f0 .04", Ggx(0.25)),
-    ("Dichromatic: paint .5, gloss .2", Dichromatic(np.full(3, 0.5), Lambert(), BlinnPhong(0.2, 80.0))),
+    (
+        "Dichromatic: paint .5, gloss .2",
+        Dichromatic(np.full(3, 0.5), Lambert(), BlinnPhong(0.2, 80.0)),
+    ),
 )
 
 
 def lobe(model: Model, incident: float, views: np.ndarray) -> np.ndarray:
-    """f_r cos(view) (n,) in 1/sr toward `views` (n,), degrees from the normal in the plane of incidence, positive on the side that light is
-    mirrored to; light comes from `incident` degrees on the other side."""
+    """f_r cos(view) (n,) in 1/sr toward `views` (n,), degrees from the normal in the plane of
+    incidence, positive on the side that light is mirrored to; light comes from `incident` degrees
+    on the other side.
+    """
     light = np.array([-np.sin(np.deg2rad(incident)), 0, np.cos(np.deg2rad(incident))])
     angle = np.deg2rad(views)
-    value = model.value(_NORMAL, np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], -1), light)
+    value = model.value(
+        _NORMAL, np.stack([np.sin(angle), np.zeros_like(angle), np.cos(angle)], -1), light
+    )
     return np.cos(angle) * (value if value.ndim == 1 else value[:, 0])
 
 
@@ -72,8 +84,21 @@ def _lobes(context: Context) -> Made:
             kept = float(np.max(directional_albedo(model, float(np.cos(np.deg2rad(incident))))))
             rows.append((name, incident, float(views[np.argmax(curve)]), float(curve.max()), kept))
     names = [f"light from {incident}°" for incident in INCIDENT]
-    made.legend(axes[0, 0].get_lines()[-len(names) :], names, loc="outside lower center", ncols=3, fontsize=LETTERS, frameon=False)
-    header = ("model", "light from (degrees)", "largest at (degrees)", "largest f_r cos (1/sr)", "share of the light that leaves")
+    made.legend(
+        axes[0, 0].get_lines()[-len(names) :],
+        names,
+        loc="outside lower center",
+        ncols=3,
+        fontsize=LETTERS,
+        frameon=False,
+    )
+    header = (
+        "model",
+        "light from (degrees)",
+        "largest at (degrees)",
+        "largest f_r cos (1/sr)",
+        "share of the light that leaves",
+    )
     text = (
         "f_r cos, the intensity that a small patch sends each way, in the plane of incidence; each half circle at a scale of its own (the "
         "number at its rim, 1/sr); dashed: where the light comes from. A Lambertian patch sends most along its normal wherever light comes "
@@ -91,7 +116,15 @@ def _polar(place: Axes, views: np.ndarray, curves: list[np.ndarray], title: str)
     for degrees in (-60, -30, 0, 30, 60):
         x, y = np.sin(np.deg2rad(degrees)), np.cos(np.deg2rad(degrees))
         place.plot([0, x], [0, y], color="0.9", linewidth=0.6)
-        place.text(1.08 * x, 1.08 * y, f"{abs(degrees)}°", ha="center", va="center", fontsize=LETTERS - 2, color="0.4")
+        place.text(
+            1.08 * x,
+            1.08 * y,
+            f"{abs(degrees)}°",
+            ha="center",
+            va="center",
+            fontsize=LETTERS - 2,
+            color="0.4",
+        )
     place.text(1.02, -0.04, f"{reach:.2g}", ha="center", va="top", fontsize=LETTERS - 1)
     place.plot([-1, 1], [0, 0], color="0.4", linewidth=0.8)
     for incident, colour in zip(INCIDENT, OKABE_ITO, strict=False):
@@ -99,14 +132,21 @@ def _polar(place: Axes, views: np.ndarray, curves: list[np.ndarray], title: str)
         place.plot([0, x], [0, y], color=colour, linewidth=0.8, linestyle="--")
     angle = np.deg2rad(views)
     for curve, colour in zip(curves, OKABE_ITO, strict=False):
-        place.plot(curve / reach * np.sin(angle), curve / reach * np.cos(angle), color=colour, linewidth=1.2)
+        place.plot(
+            curve / reach * np.sin(angle),
+            curve / reach * np.cos(angle),
+            color=colour,
+            linewidth=1.2,
+        )
     place.set(xlim=(-1.2, 1.2), ylim=(-0.16, 1.18), aspect="equal")
     place.set_axis_off()
     place.set_title(title, fontsize=LETTERS)
 
 
 def phong_sphere(size: int, exponent: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Phong's ambient, diffuse and specular light and their sum on a ball, each (size, size, 3), and the ball's mask."""
+    """Phong's ambient, diffuse and specular light and their sum on a ball, each (size, size, 3),
+    and the ball's mask.
+    """
     normal, coverage = sphere_normals(size)
     mask = coverage > 0.5
     light = DirectionalLight(toward(-0.5, 0.6, 0.8), ambient=np.full(3, 0.12))
@@ -115,7 +155,12 @@ def phong_sphere(size: int, exponent: float) -> tuple[dict[str, np.ndarray], np.
     ambient = np.broadcast_to(paint * light.ambient, normal.shape)
     diffuse = radiance(Dichromatic(paint, Lambert(), Lambert(0.0)), normal, VIEW, source)
     specular = radiance(Phong(0.6 / np.pi, exponent, normalised=False), normal, VIEW, source)
-    layers = {"ambient": ambient, "diffuse": diffuse, "specular": specular, "sum": ambient + diffuse + specular}
+    layers = {
+        "ambient": ambient,
+        "diffuse": diffuse,
+        "specular": specular,
+        "sum": ambient + diffuse + specular,
+    }
     return {name: np.where(mask[..., None], layer, 1) for name, layer in layers.items()}, mask
 
 
@@ -128,13 +173,19 @@ def _phong(context: Context) -> Made:
         cells.append((exponent, float(level.max()), 100 * float((level > level.max() / 2).mean())))
     header = ("exponent", "brightest specular light", "share of the ball above half of it (%)")
     text = "Ambient, diffuse and specular light of one lamp on a ball, and their sum; the higher the exponent, the smaller the highlight."
-    return Made((Table(header, tuple(cells)),), (sheet(("ambient", "diffuse", "specular", "sum"), rows, expose=False),), text)
+    return Made(
+        (Table(header, tuple(cells)),),
+        (sheet(("ambient", "diffuse", "specular", "sum"), rows, expose=False),),
+        text,
+    )
 
 
 def shading_models(subject: Subject) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
-    """The true shading (H, W, 3) of a subject whose truth is known; what models of it make of the true normals, by name; and the normals.
+    """The true shading (H, W, 3) of a subject whose truth is known; what models of it make of the
+    true normals, by name; and the normals.
 
-    The models: exp of nine spherical harmonics, one distant light with an ambient rest, and a constant. 0 where nothing is known.
+    The models: exp of nine spherical harmonics, one distant light with an ambient rest, and a
+    constant. 0 where nothing is known.
     """
     truth = subject.truth
     assert truth is not None
@@ -143,7 +194,10 @@ def shading_models(subject: Subject) -> tuple[np.ndarray, dict[str, np.ndarray],
     shading = np.where(known[..., None], truth.shading, 0)
     found, inside = normal[known], shading[known]
     light, _ = fit_light(found, inside)
-    fits = {"exp(SH), nine coefficients": np.exp(real_sh(found) @ light), "one distant light + ambient": _one_light(found, inside)}
+    fits = {
+        "exp(SH), nine coefficients": np.exp(real_sh(found) @ light),
+        "one distant light + ambient": _one_light(found, inside),
+    }
     fits["constant"] = np.broadcast_to(inside.mean(axis=0), inside.shape)
     models = {}
     for name, values in fits.items():
@@ -157,7 +211,9 @@ def _one_light(normal: np.ndarray, shading: np.ndarray) -> np.ndarray:
     best, least = shading, np.inf
     for azimuth in np.deg2rad(np.arange(0, 360, 15)):
         for tilt in np.deg2rad(np.arange(0, 100, 10)):
-            light = np.array([np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)])
+            light = np.array(
+                [np.sin(tilt) * np.cos(azimuth), np.sin(tilt) * np.sin(azimuth), np.cos(tilt)]
+            )
             design = np.stack([np.maximum(normal @ light, 0), np.ones(len(normal))], axis=1)
             fit = design @ np.linalg.lstsq(design, shading, rcond=None)[0]
             if (error := float(np.square(fit - shading).sum())) < least:
@@ -175,13 +231,19 @@ def _shading(context: Context) -> Made:
         inside = true.any(axis=2)
         gain = exposure(true, inside)
         size = float(np.sqrt(np.square(true[inside]).mean()))
-        shown += [normals_panel(f"{subject.name}: true normals", normal, inside), Panel("true shading", true, inside, gain=gain)]
+        shown += [
+            normals_panel(f"{subject.name}: true normals", normal, inside),
+            Panel("true shading", true, inside, gain=gain),
+        ]
         for name, model in models.items():
             left = float(np.sqrt(np.square((model - true)[inside]).mean())) / size
             cells.append((titled(subject), name, 100 * left))
             if name != "constant":
                 error = np.abs(model - true).mean(axis=2) / size
-                shown += [Panel(name, model, inside, gain=gain), Panel("its error, of the RMS", error, inside, (0, 0.5))]
+                shown += [
+                    Panel(name, model, inside, gain=gain),
+                    Panel("its error, of the RMS", error, inside, (0, 0.5)),
+                ]
     header = ("subject", "model of the shading", "RMS error (% of the shading's RMS)")
     text = (
         "Shading is what a white object would show. The models see the true normals only: shadows that parts of the object cast on "
@@ -201,7 +263,17 @@ def _intrinsic(context: Context) -> Made:
     assert subject.specular is not None
     d = decomposed(context, subject)
     true = dict(
-        zip(_LAYERS, (subject.image, subject.diffuse, subject.specular, subject.truth.reflectance, subject.truth.shading), strict=True)
+        zip(
+            _LAYERS,
+            (
+                subject.image,
+                subject.diffuse,
+                subject.specular,
+                subject.truth.reflectance,
+                subject.truth.shading,
+            ),
+            strict=True,
+        )
     )
     found = {name: getattr(d, name) for name in _LAYERS}
     gain = exposure(subject.image, subject.mask)
@@ -209,10 +281,21 @@ def _intrinsic(context: Context) -> Made:
     for title, mask, layers in (("true", subject.mask, true), ("found", d.mask, found)):
         for name, layer in layers.items():
             own = name in ("reflectance", "shading")
-            shown.append(Panel(name if name == "image" else f"{title} {name}", layer, mask, gain=None if own else gain))
+            shown.append(
+                Panel(
+                    name if name == "image" else f"{title} {name}",
+                    layer,
+                    mask,
+                    gain=None if own else gain,
+                )
+            )
     both = d.mask & subject.mask & np.isfinite(subject.truth.shading).all(-1)
     cells = tuple((name, 100 * _error(true[name][both], found[name][both])) for name in _LAYERS[1:])
-    table = Table(("intrinsic image", "RMS error after the best scale (% of its RMS)"), cells, f"{subject.name}: found by `--model mdr`.")
+    table = Table(
+        ("intrinsic image", "RMS error after the best scale (% of its RMS)"),
+        cells,
+        f"{subject.name}: found by `--model mdr`.",
+    )
     text = (
         "image = reflectance × shading + specular; above the true layers, below what was found. Reflectance and shading are in exposures "
         "of their own, since one photo leaves their scale open."
@@ -228,7 +311,9 @@ def _error(true: np.ndarray, found: np.ndarray) -> float:
 def _specular_free(context: Context) -> Made:
     subjects = with_layers((*context.subjects("specular"), *context.subjects("synthetic")))
     kinds = (PHOTO, *KINDS, DARK)
-    cells: list[tuple[str | int | float, ...]] = [(titled(one), *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects]
+    cells: list[tuple[str | int | float, ...]] = [
+        (titled(one), *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects
+    ]
     table = Table(("subject", *(kind.name for kind in kinds)), tuple(cells), _LEFT)
     chosen = subjects[0]
     assert chosen.diffuse is not None
@@ -239,7 +324,10 @@ def _specular_free(context: Context) -> Made:
         made = [kind.make(image, chosen.mask) for kind in kinds]
         gains = gains or [exposure(one, chosen.mask) for one in made]
         names = ["diffuse layer" if name and kind is PHOTO else kind.name + name for kind in kinds]
-        shown += [Panel(title, one, chosen.mask, gain=gain) for title, one, gain in zip(names, made, gains, strict=True)]
+        shown += [
+            Panel(title, one, chosen.mask, gain=gain)
+            for title, one, gain in zip(names, made, gains, strict=True)
+        ]
     text = (
         f"{chosen.name}: each image made of the photo (above) and of its diffuse layer (below), in one exposure per column. Where both "
         "rows look alike, highlights do not reach the image. The dark channel is the opposite: mostly highlight, and what is left of pale "

@@ -1,16 +1,20 @@
-"""Tables of the background as documentation of what the code has: constraints of reflectance models, specular-free images, characteristics.
+"""Tables of the background as documentation of what the code has: constraints of reflectance
+models, specular-free images, characteristics.
 
 Table 2.1 measures what a reflectance model has to obey, on the models as they are called:
 
     positivity    f_r(v, l) >= 0 for all v, l;      reciprocity    f_r(v, l) = f_r(l, v);
     energy        a(l) = integral of f_r(v, l) cos(v) over the hemisphere of views <= 1 for all l.
 
-Table 2.3 is held against a result that was saved: a characteristic without its channels, or a channel without a characteristic, is wrong.
+Table 2.3 is held against a result that was saved: a characteristic without its channels, or a
+channel without a characteristic, is wrong.
 
-Citation: F. E. Nicodemus et al., "Geometrical considerations and nomenclature for reflectance" (1977), doi:10.6028/NBS.MONO.160;
-E. Veach, "Robust Monte Carlo methods for light transport simulation", thesis, Stanford (1997), which has no DOI (the constraints).
+Citation: F. E. Nicodemus et al., "Geometrical considerations and nomenclature for reflectance"
+(1977), doi:10.6028/NBS.MONO.160; E. Veach, "Robust Monte Carlo methods for light transport
+simulation", thesis, Stanford (1997), which has no DOI (the constraints).
 
-Limits: numbers are the worst over random pairs of directions and over twelve angles; a violation between them is not seen.
+Limits: numbers are the worst over random pairs of directions and over twelve angles; a violation
+between them is not seen.
 """
 
 import tempfile
@@ -39,7 +43,10 @@ from .item import Item, Made, Table
 from .specular_free_images import KINDS, highlight_left, titled, with_layers
 
 _PAIRS = 4000
-_RECIPROCAL, _KEPT = 1e-9, 1e-3  # what counts as equal, and how much more than all light the integrals' own error may give
+_RECIPROCAL, _KEPT = (
+    1e-9,
+    1e-3,
+)  # what counts as equal, and how much more than all light the integrals' own error may give
 MODELS: tuple[tuple[str, Model], ...] = (
     ("Lambert, albedo 1", Lambert()),
     ("Oren-Nayar, albedo 1, sigma .2", OrenNayar(sigma=0.2)),
@@ -52,15 +59,23 @@ MODELS: tuple[tuple[str, Model], ...] = (
     ("Blinn-Phong, conserving, exponent 50", BlinnPhong(scale="conserving")),
     ("GGX, alpha .1, f0 1", Ggx(0.1, 1.0)),
     ("GGX, alpha .5, f0 1", Ggx(0.5, 1.0)),
-    ("Dichromatic, white Lambert + GGX alpha .3, f0 .04", Dichromatic(np.ones(3), Lambert(), Ggx(0.3))),
-    ("Dichromatic, Lambert .9 + GGX alpha .3, f0 .04", Dichromatic(np.full(3, 0.9), Lambert(), Ggx(0.3))),
+    (
+        "Dichromatic, white Lambert + GGX alpha .3, f0 .04",
+        Dichromatic(np.ones(3), Lambert(), Ggx(0.3)),
+    ),
+    (
+        "Dichromatic, Lambert .9 + GGX alpha .3, f0 .04",
+        Dichromatic(np.full(3, 0.9), Lambert(), Ggx(0.3)),
+    ),
 )
 
 
 @dataclass(frozen=True)
 class Constraints:
-    """What was measured of a model. `least`: the smallest f_r (1/sr). `asymmetry`: the largest |f_r(v, l) - f_r(l, v)| over the largest
-    f_r. `most`: the largest share of the light that leaves, and `at`, for light from how many degrees."""
+    """What was measured of a model. `least`: the smallest f_r (1/sr). `asymmetry`: the largest
+    |f_r(v, l) - f_r(l, v)| over the largest f_r. `most`: the largest share of the light that
+    leaves, and `at`, for light from how many degrees.
+    """
 
     least: float
     asymmetry: float
@@ -80,9 +95,14 @@ def measure(model: Model, seed: int = 0) -> Constraints:
     view, light = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     least = float(model.value(np.array([0.0, 0, 1]), view, light).min())
     angles = np.append(np.arange(0.0, 81.0, 7.5), 85.0)
-    shares = [float(np.max(directional_albedo(model, float(np.cos(np.deg2rad(angle)))))) for angle in angles]
+    shares = [
+        float(np.max(directional_albedo(model, float(np.cos(np.deg2rad(angle))))))
+        for angle in angles
+    ]
     worst = int(np.argmax(shares))
-    return Constraints(least, reciprocity_error(model, _PAIRS, seed), shares[worst], float(angles[worst]))
+    return Constraints(
+        least, reciprocity_error(model, _PAIRS, seed), shares[worst], float(angles[worst])
+    )
 
 
 def _constraints(context: Context) -> Made:
@@ -90,7 +110,9 @@ def _constraints(context: Context) -> Made:
     for name, model in MODELS:
         found = measure(model, context.seed)
         words = ["yes" if obeyed else "no" for obeyed in found.obeyed]
-        rows.append((name, found.least, words[0], found.asymmetry, words[1], found.most, found.at, words[2]))
+        rows.append(
+            (name, found.least, words[0], found.asymmetry, words[1], found.most, found.at, words[2])
+        )
     header = (
         "model",
         "least f_r (1/sr)",
@@ -108,7 +130,16 @@ def _constraints(context: Context) -> Made:
         "7.5 % too much, which the conserving one mends; Oren-Nayar's short form up to 1.5 % at grazing light. A body under a gloss can "
         "give back more than it gets, since the gloss takes nothing from the body: the dichromatic model is one of images, not of energy."
     )
-    return Made((Table(header, tuple(rows), f"Measured on {_PAIRS} pairs of directions and 12 angles of the light."),), text=text)
+    return Made(
+        (
+            Table(
+                header,
+                tuple(rows),
+                f"Measured on {_PAIRS} pairs of directions and 12 angles of the light.",
+            ),
+        ),
+        text=text,
+    )
 
 
 def _specular_free(context: Context) -> Made:
@@ -117,9 +148,25 @@ def _specular_free(context: Context) -> Made:
     for kind in KINDS:
         left = [highlight_left(kind, subject) for subject in subjects]
         rows.append(
-            (kind.name, kind.formula, kind.citation, f"`{kind.function}`", kind.methods, 100 * float(np.mean(left)), 100 * max(left))
+            (
+                kind.name,
+                kind.formula,
+                kind.citation,
+                f"`{kind.function}`",
+                kind.methods,
+                100 * float(np.mean(left)),
+                100 * max(left),
+            )
         )
-    header = ("image", "formula", "citation", "function", "used by", "highlight left (%), mean", "largest")
+    header = (
+        "image",
+        "formula",
+        "citation",
+        "function",
+        "used by",
+        "highlight left (%), mean",
+        "largest",
+    )
     text = (
         "min and max are over the channels of a pixel, Σ their sum. What is left of the highlights is measured on "
         f"{', '.join(map(titled, subjects))}, without what lies evenly on the whole object. Two methods have "
@@ -130,8 +177,10 @@ def _specular_free(context: Context) -> Made:
 
 @dataclass(frozen=True)
 class Characteristic:
-    """What a decomposition holds. `symbol`, `unit`, `frame`: as one writes them; `field`: of `Decomposition`; `shape`: of the array, H and
-    W being the picture's; `stored`: under which keys of `decomposition.json`, for what has no channels."""
+    """What a decomposition holds. `symbol`, `unit`, `frame`: as one writes them; `field`: of
+    `Decomposition`; `shape`: of the array, H and W being the picture's; `stored`: under which keys
+    of `decomposition.json`, for what has no channels.
+    """
 
     name: str
     symbol: str
@@ -148,30 +197,83 @@ CHARACTERISTICS = (
     Characteristic("diffuse light", "D", _LINEAR, "image", "diffuse", "H, W, 3"),
     Characteristic("specular light", "s", _LINEAR, "image", "specular", "H, W, 3"),
     Characteristic("residual", "I − D − s", _LINEAR, "image", "residual", "H, W, 3"),
-    Characteristic("reflectance", "R = D / S", "none, up to one scale", "image", "reflectance", "H, W, 3"),
-    Characteristic("shading", "S = exp Σ L_k Y_k(n)", "the photo's unit, up to one scale", "image", "shading", "H, W, 3"),
-    Characteristic("normal", "n", "none, length 1", "camera: x right, y up, z to the viewer", "normal", "H, W, 3"),
-    Characteristic("height", "z", "pixels, from the object's lowest point", "camera: toward the viewer", "height", "H, W"),
+    Characteristic(
+        "reflectance", "R = D / S", "none, up to one scale", "image", "reflectance", "H, W, 3"
+    ),
+    Characteristic(
+        "shading",
+        "S = exp Σ L_k Y_k(n)",
+        "the photo's unit, up to one scale",
+        "image",
+        "shading",
+        "H, W, 3",
+    ),
+    Characteristic(
+        "normal",
+        "n",
+        "none, length 1",
+        "camera: x right, y up, z to the viewer",
+        "normal",
+        "H, W, 3",
+    ),
+    Characteristic(
+        "height",
+        "z",
+        "pixels, from the object's lowest point",
+        "camera: toward the viewer",
+        "height",
+        "H, W",
+    ),
     Characteristic("mask", "Ω", "object or not", "image", "mask", "H, W"),
     Characteristic("confidence", "c", "none, 0 to 1", "image", "confidence", "H, W"),
-    Characteristic("light", "L", "none: of log shading", "camera, spherical harmonics", "illumination", "9, 3", "illumination"),
-    Characteristic("gloss", "α, f0, lights", "none; strength in the photo's unit", "camera", "brdf", "one lobe", "brdf"),
-    Characteristic("origin", "", "", "", "provenance", "text and numbers", "settings, seed, versions, timings, input, status"),
-)  # fmt: skip
+    Characteristic(
+        "light",
+        "L",
+        "none: of log shading",
+        "camera, spherical harmonics",
+        "illumination",
+        "9, 3",
+        "illumination",
+    ),
+    Characteristic(
+        "gloss",
+        "α, f0, lights",
+        "none; strength in the photo's unit",
+        "camera",
+        "brdf",
+        "one lobe",
+        "brdf",
+    ),
+    Characteristic(
+        "origin",
+        "",
+        "",
+        "",
+        "provenance",
+        "text and numbers",
+        "settings, seed, versions, timings, input, status",
+    ),
+)
 
 
 def channels_of(characteristic: Characteristic) -> tuple[str, ...]:
     """Its channels in `maps.exr`; none for what is stored elsewhere."""
-    return tuple(f"{characteristic.field}.{letter}" for letter in LAYERS.get(characteristic.field, ""))
+    return tuple(
+        f"{characteristic.field}.{letter}" for letter in LAYERS.get(characteristic.field, "")
+    )
 
 
 def check_characteristics(d: Decomposition, folder: Path) -> tuple[str, ...]:
-    """What differs between the list and a result, saved in `folder`: fields, shapes and channels; empty where all agree."""
+    """What differs between the list and a result, saved in `folder`: fields, shapes and channels;
+    empty where all agree.
+    """
     save(d, folder)
     channels = read_channels(folder / "maps.exr")
     height, width = d.mask.shape
     listed = {one.field for one in CHARACTERISTICS}
-    wrong = [f"{one.name} is no longer a field" for one in CHARACTERISTICS if not hasattr(d, one.field)]
+    wrong = [
+        f"{one.name} is no longer a field" for one in CHARACTERISTICS if not hasattr(d, one.field)
+    ]
     wrong += [f"{field.name} is not listed" for field in fields(d) if field.name not in listed]
     for one in CHARACTERISTICS:
         wrong += [f"{name} is not in the file" for name in channels_of(one) if name not in channels]
@@ -179,8 +281,13 @@ def check_characteristics(d: Decomposition, folder: Path) -> tuple[str, ...]:
         shape = one.shape.replace("H", str(height)).replace("W", str(width))
         if isinstance(value, np.ndarray) and ", ".join(map(str, value.shape)) != shape:
             wrong.append(f"{one.name} has shape {value.shape}")
-    known = {name for one in CHARACTERISTICS for name in channels_of(one)} | {f"lobe.{letter}" for letter in "RGB"}
-    return (*wrong, *(f"{name} is in the file but not listed" for name in channels if name not in known))
+    known = {name for one in CHARACTERISTICS for name in channels_of(one)} | {
+        f"lobe.{letter}" for letter in "RGB"
+    }
+    return (
+        *wrong,
+        *(f"{name} is in the file but not listed" for name in channels if name not in known),
+    )
 
 
 def _characteristics(context: Context) -> Made:
@@ -191,8 +298,26 @@ def _characteristics(context: Context) -> Made:
     for one in CHARACTERISTICS:
         value = getattr(d, one.field)
         kept = str(value.dtype) if isinstance(value, np.ndarray) else ""
-        rows.append((one.name, one.symbol, one.unit, one.frame, one.shape, kept, ", ".join(channels_of(one)) or f"JSON: {one.stored}"))
-    header = ("characteristic", "symbol", "unit", "frame", "shape", "numbers", "in the result folder")
+        rows.append(
+            (
+                one.name,
+                one.symbol,
+                one.unit,
+                one.frame,
+                one.shape,
+                kept,
+                ", ".join(channels_of(one)) or f"JSON: {one.stored}",
+            )
+        )
+    header = (
+        "characteristic",
+        "symbol",
+        "unit",
+        "frame",
+        "shape",
+        "numbers",
+        "in the result folder",
+    )
     text = (
         "Y_k are orthonormal real spherical harmonics in the order (0,0) (1,-1) (1,0) (1,1) (2,-2) (2,-1) (2,0) (2,1) (2,2). Maps are 0 "
         "outside the mask, normals (0, 0, 1). Where a lobe was fitted, `lobe.R .G .B` is the specular light that it predicts. "
@@ -202,7 +327,16 @@ def _characteristics(context: Context) -> Made:
             else f"NOT as listed: {'; '.join(wrong)}."
         )
     )
-    return Made((Table(header, tuple(rows), "Channels are those of `maps.exr`, JSON is `decomposition.json`."),), text=text)
+    return Made(
+        (
+            Table(
+                header,
+                tuple(rows),
+                "Channels are those of `maps.exr`, JSON is `decomposition.json`.",
+            ),
+        ),
+        text=text,
+    )
 
 
 _table: Callable[..., Item] = partial(Item, "table")

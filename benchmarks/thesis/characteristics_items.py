@@ -1,15 +1,20 @@
-"""Tables 4.19 to 4.22: shape, light, shading and reflectance by the frameworks, relative to SIRFS on the photo as it is.
+"""Tables 4.19 to 4.22: shape, light, shading and reflectance by the frameworks, relative to SIRFS
+on the photo as it is.
 
-4.19 and 4.20: SIRFS first, separation of its reflectance afterwards; errors, and time. 4.21 and 4.22: separation first; errors, and time.
-Subjects: the glossy photos and rendered scenes whose shape and light are known. `joint`, ours, and SIRFS on the true diffuse image, which
-is what a perfect separation would give, stand beside them.
+4.19 and 4.20: SIRFS first, separation of its reflectance afterwards; errors, and time. 4.21 and
+4.22: separation first; errors, and time. Subjects: the glossy photos and rendered scenes whose
+shape and light are known. `joint`, ours, and SIRFS on the true diffuse image, which is what a
+perfect separation would give, stand beside them.
 
-Equation: errors as in `isc_core.metrics.Scores`; the ratio of geometric means over the subjects, with the interval of resampled subjects.
+Equation: errors as in `isc_core.metrics.Scores`; the ratio of geometric means over the subjects,
+with the interval of resampled subjects.
 
-Citation: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712; B. Efron (1979), doi:10.1214/aos/1176344552.
+Citation: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712; B. Efron (1979),
+doi:10.1214/aos/1176344552.
 
-Limits: how the thesis splits its figures over the two tables of each pair is not known; errors and time is our choice. Its
-MIT-Berkeley-UTeM set is not public: glossy-mit stands in for it. On a few subjects the intervals are wide.
+Limits: how the thesis splits its figures over the two tables of each pair is not known; errors and
+time is our choice. Its MIT-Berkeley-UTeM set is not public: glossy-mit stands in for it. On a few
+subjects the intervals are wide.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,13 +29,21 @@ from .item import Cell, Item, Made, Table, Verdict
 
 KINDS = {"specular": "photos with significant specularity", "synthetic": "synthetic images"}
 _NAMES = {
-    "height": "height, px", "normal": "normals, rad", "light": "light", "shading": "shading", "reflectance": "reflectance",
-    "rs_mse": "RS-MSE", "average": "all six",
-}  # fmt: skip
+    "height": "height, px",
+    "normal": "normals, rad",
+    "light": "light",
+    "shading": "shading",
+    "reflectance": "reflectance",
+    "rs_mse": "RS-MSE",
+    "average": "all six",
+}
 _CLAIMED = (
-    (claims.MDR_HEIGHT, "height", 0.114), (claims.MDR_NORMALS, "normal", 0.065), (claims.MDR_LIGHT, "light", 0.505),
-    (claims.MDR_SHADING, "shading", 0.352), (claims.MDR_REFLECTANCE, "reflectance", 0.051),
-)  # fmt: skip
+    (claims.MDR_HEIGHT, "height", 0.114),
+    (claims.MDR_NORMALS, "normal", 0.065),
+    (claims.MDR_LIGHT, "light", 0.505),
+    (claims.MDR_SHADING, "shading", 0.352),
+    (claims.MDR_REFLECTANCE, "reflectance", 0.051),
+)
 _JUDGED = "MDR-SIRFS"
 _MODELS_AFTER, _MODELS_BEFORE = (SIRFS, *AFTER), (SIRFS, *BEFORE, BOUND)
 
@@ -38,8 +51,14 @@ _MODELS_AFTER, _MODELS_BEFORE = (SIRFS, *AFTER), (SIRFS, *BEFORE, BOUND)
 def _errors(frameworks: Sequence[Framework], text: str, judged: bool) -> Callable[[Context], Made]:
     def make(context: Context) -> Made:
         rows = measured(context, known(context, tuple(KINDS)), frameworks)
-        tables = [relative_errors(_of_kind(rows, kind), words, context.seed) for kind, words in KINDS.items()]
-        tables = [relative_errors(rows, "all of them", context.seed), *(table for table in tables if table.rows)]
+        tables = [
+            relative_errors(_of_kind(rows, kind), words, context.seed)
+            for kind, words in KINDS.items()
+        ]
+        tables = [
+            relative_errors(rows, "all of them", context.seed),
+            *(table for table in tables if table.rows),
+        ]
         verdicts = _verdicts(rows, context.seed) if judged else ()
         return Made((*tables, absolute(rows)), text=text, verdicts=verdicts)
 
@@ -49,7 +68,11 @@ def _errors(frameworks: Sequence[Framework], text: str, judged: bool) -> Callabl
 def _times(frameworks: Sequence[Framework], text: str, judged: bool) -> Callable[[Context], Made]:
     def make(context: Context) -> Made:
         rows = measured(context, known(context, tuple(KINDS)), frameworks)
-        return Made((_speed(rows, context.seed),), text=text, verdicts=(_time_verdict(rows, context.seed),) if judged else ())
+        return Made(
+            (_speed(rows, context.seed),),
+            text=text,
+            verdicts=(_time_verdict(rows, context.seed),) if judged else (),
+        )
 
     return make
 
@@ -58,17 +81,30 @@ def relative_errors(rows: Sequence[Row], words: str, seed: int) -> Table:
     """Each framework's errors over those of SIRFS, with their intervals; a line a framework."""
     lines: list[tuple[str, ...]] = []
     for label in dict.fromkeys(row.framework for row in rows):
-        cells = [in_words(ratio(_of(rows, label, name), _of(rows, SIRFS.label, name), seed)) for name in METRICS]
+        cells = [
+            in_words(ratio(_of(rows, label, name), _of(rows, SIRFS.label, name), seed))
+            for name in METRICS
+        ]
         lines.append((label, *(["1"] * len(METRICS) if label == SIRFS.label else cells)))
     count = len({row.subject for row in rows})
     header = ("framework", *(_NAMES[name].partition(",")[0] for name in METRICS))
-    return Table(header, tuple(lines), f"Errors relative to SIRFS, geometric means (95 %): {words}, {count} subjects")
+    return Table(
+        header,
+        tuple(lines),
+        f"Errors relative to SIRFS, geometric means (95 %): {words}, {count} subjects",
+    )
 
 
 def absolute(rows: Sequence[Row]) -> Table:
     """Each run's errors as they are."""
-    lines: list[tuple[Cell, ...]] = [(row.subject, row.framework, *(row.errors[name] for name in METRICS)) for row in rows]
-    return Table(("subject", "framework", *(_NAMES[name] for name in METRICS)), tuple(lines), "Errors by subject")
+    lines: list[tuple[Cell, ...]] = [
+        (row.subject, row.framework, *(row.errors[name] for name in METRICS)) for row in rows
+    ]
+    return Table(
+        ("subject", "framework", *(_NAMES[name] for name in METRICS)),
+        tuple(lines),
+        "Errors by subject",
+    )
 
 
 def _speed(rows: Sequence[Row], seed: int) -> Table:
@@ -81,24 +117,47 @@ def _speed(rows: Sequence[Row], seed: int) -> Table:
             "1" if plain else in_words(ratio(seconds, _seconds(rows, SIRFS.label), seed)),
             "1" if plain else in_words(ratio(evaluations, _evaluations(rows, SIRFS.label), seed)),
         ))  # fmt: skip
-    header = ("framework", "seconds", "evaluations", "seconds over SIRFS (95 %)", "evaluations over SIRFS (95 %)")
-    return Table(header, tuple(lines), "Geometric means over the subjects, warm, two threads; evaluations of the energy by the solver")
+    header = (
+        "framework",
+        "seconds",
+        "evaluations",
+        "seconds over SIRFS (95 %)",
+        "evaluations over SIRFS (95 %)",
+    )
+    return Table(
+        header,
+        tuple(lines),
+        "Geometric means over the subjects, warm, two threads; evaluations of the energy by the solver",
+    )
 
 
 def _verdicts(rows: Sequence[Row], seed: int) -> tuple[Verdict, ...]:
     return tuple(
         gain(
-            claim, share, ratio(_of(rows, _JUDGED, name), _of(rows, SIRFS.label, name), seed), f"error of {_NAMES[name].partition(',')[0]}"
+            claim,
+            share,
+            ratio(_of(rows, _JUDGED, name), _of(rows, SIRFS.label, name), seed),
+            f"error of {_NAMES[name].partition(',')[0]}",
         )
         for claim, name, share in _CLAIMED
     )
 
 
 def _time_verdict(rows: Sequence[Row], seed: int) -> Verdict:
-    judged = gain(claims.MDR_TIME, 0.192, ratio(_seconds(rows, _JUDGED), _seconds(rows, SIRFS.label), seed), "time")
+    judged = gain(
+        claims.MDR_TIME,
+        0.192,
+        ratio(_seconds(rows, _JUDGED), _seconds(rows, SIRFS.label), seed),
+        "time",
+    )
     found = in_words(ratio(_evaluations(rows, _JUDGED), _evaluations(rows, SIRFS.label), seed))
     why = f"{judged.why}; " if judged.why else ""
-    return Verdict(judged.claim, judged.here, judged.holds, f"{why}evaluations, which no load of the machine changes: {found} of SIRFS'")
+    return Verdict(
+        judged.claim,
+        judged.here,
+        judged.holds,
+        f"{why}evaluations, which no load of the machine changes: {found} of SIRFS'",
+    )
 
 
 def _of(rows: Sequence[Row], label: str, name: str) -> dict[str, float]:
@@ -129,8 +188,28 @@ _BEFORE_TEXT = (
 _TIME_TEXT = "Seconds hold the separation as well as SIRFS; they are worth no more than the quiet of the machine they were taken on."
 
 ITEMS: tuple[Item, ...] = (
-    Item("table", "4.19", "SIRFS, SIRFS-MZK06, SIRFS-YCK06, SIRFS-MBP: errors", _errors(_MODELS_AFTER, _AFTER_TEXT, False)),
-    Item("table", "4.20", "SIRFS, SIRFS-MZK06, SIRFS-YCK06, SIRFS-MBP: time", _times(_MODELS_AFTER, _TIME_TEXT, False)),
-    Item("table", "4.21", "SIRFS, MZK06-SIRFS, YCK06-SIRFS, MDR-SIRFS: errors", _errors(_MODELS_BEFORE, _BEFORE_TEXT, True)),
-    Item("table", "4.22", "SIRFS, MZK06-SIRFS, YCK06-SIRFS, MDR-SIRFS: time", _times(_MODELS_BEFORE, _TIME_TEXT, True)),
+    Item(
+        "table",
+        "4.19",
+        "SIRFS, SIRFS-MZK06, SIRFS-YCK06, SIRFS-MBP: errors",
+        _errors(_MODELS_AFTER, _AFTER_TEXT, False),
+    ),
+    Item(
+        "table",
+        "4.20",
+        "SIRFS, SIRFS-MZK06, SIRFS-YCK06, SIRFS-MBP: time",
+        _times(_MODELS_AFTER, _TIME_TEXT, False),
+    ),
+    Item(
+        "table",
+        "4.21",
+        "SIRFS, MZK06-SIRFS, YCK06-SIRFS, MDR-SIRFS: errors",
+        _errors(_MODELS_BEFORE, _BEFORE_TEXT, True),
+    ),
+    Item(
+        "table",
+        "4.22",
+        "SIRFS, MZK06-SIRFS, YCK06-SIRFS, MDR-SIRFS: time",
+        _times(_MODELS_BEFORE, _TIME_TEXT, True),
+    ),
 )

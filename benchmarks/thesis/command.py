@@ -28,12 +28,17 @@ Without --data everything is made on images that the project renders itself. An 
 def declare(commands: Commands) -> None:
     """Adds the command, and those below it, to the parser."""
     parser = add_command(
-        commands, "thesis", _nothing, "the thesis' tables and figures, made again",
+        commands,
+        "thesis",
+        _nothing,
+        "the thesis' tables and figures, made again",
         "Makes the tables and figures of the thesis again on open data, beside what it claims: Markdown, CSV and PNG files with an index.",
         _EXAMPLES,
-    )  # fmt: skip
+    )
     below = parser.add_subparsers(title="commands", metavar="list | table N | figure N | all")
-    listing = below.add_parser("list", help="every table and figure, and what is made of it", parents=[_common()])
+    listing = below.add_parser(
+        "list", help="every table and figure, and what is made of it", parents=[_common()]
+    )
     listing.set_defaults(run=run_list)
     for kind in ("table", "figure"):
         one = below.add_parser(kind, help=f"one {kind}", parents=[_common()])
@@ -46,24 +51,53 @@ def declare(commands: Commands) -> None:
 def _common() -> argparse.ArgumentParser:
     """The options that all of them have."""
     parser = argparse.ArgumentParser(add_help=False)
-    parser.add_argument("-o", "--output", type=Path, default=_DEFAULT, metavar="DIR", help="the folder to write (default: %(default)s)")
     parser.add_argument(
-        "--data", type=Path, metavar="ROOT", help="a folder of public data sets (default: the project's own rendered images)"
+        "-o",
+        "--output",
+        type=Path,
+        default=_DEFAULT,
+        metavar="DIR",
+        help="the folder to write (default: %(default)s)",
     )
-    parser.add_argument("--quick", action="store_true", help="small images and few repetitions: minutes instead of hours")
-    parser.add_argument("--seed", type=count, default=0, metavar="S", help="of all random numbers (default: %(default)s)")
-    parser.add_argument("--again", action="store_true", help="make what is complete once more, and compute kept rows anew")
+    parser.add_argument(
+        "--data",
+        type=Path,
+        metavar="ROOT",
+        help="a folder of public data sets (default: the project's own rendered images)",
+    )
+    parser.add_argument(
+        "--quick",
+        action="store_true",
+        help="small images and few repetitions: minutes instead of hours",
+    )
+    parser.add_argument(
+        "--seed",
+        type=count,
+        default=0,
+        metavar="S",
+        help="of all random numbers (default: %(default)s)",
+    )
+    parser.add_argument(
+        "--again",
+        action="store_true",
+        help="make what is complete once more, and compute kept rows anew",
+    )
     add_speech(parser)
     return parser
 
 
 def _nothing(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     del options, monitor
-    raise InputError("say what to make: isc thesis list, table N, figure N or all (see `isc thesis --help`)")
+    raise InputError(
+        "say what to make: isc thesis list, table N, figure N or all (see `isc thesis --help`)"
+    )
 
 
 def run_list(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """A line for each item: number, title, state, claims. Raises `InputError` where a library is missing."""
+    """A line for each item: number, title, state, claims.
+
+    Raises `InputError` where a library is missing.
+    """
     _require_libraries()
     from .registry import items
     from .run import states
@@ -73,7 +107,10 @@ def run_list(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Makes one item. Raises `InputError` for an unknown number and what cannot be made; `Cancelled`."""
+    """Makes one item.
+
+    Raises `InputError` for an unknown number and what cannot be made; `Cancelled`.
+    """
     _require_libraries()
     from .registry import find
 
@@ -84,7 +121,10 @@ def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Makes all items that can be made. Raises `InputError` for data and folders that cannot be used; `Cancelled`."""
+    """Makes all items that can be made.
+
+    Raises `InputError` for data and folders that cannot be used; `Cancelled`.
+    """
     _require_libraries()
     from .registry import items
 
@@ -92,9 +132,14 @@ def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def _require_libraries() -> None:
-    """What draws and what brings the nine images; Mitsuba is asked for where something has to be rendered."""
+    """What draws and what brings the nine images;
+
+    Mitsuba is asked for where something has to be rendered.
+    """
     if missing := [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]:
-        raise InputError(f"isc thesis needs {' and '.join(missing)}: install them with `pip install 'isc3d[thesis]'`")
+        raise InputError(
+            f"isc thesis needs {' and '.join(missing)}: install them with `pip install 'isc3d[thesis]'`"
+        )
 
 
 def _made(options: argparse.Namespace, wanted: "Sequence[Item]", monitor: Monitor) -> list[str]:
@@ -105,5 +150,9 @@ def _made(options: argparse.Namespace, wanted: "Sequence[Item]", monitor: Monito
     if options.again:
         context = replace(context, fresh_since=time.time())
     outcome = make_items(wanted, context, again=options.again)
-    lines = [f"{outcome.made} made, {outcome.kept} were complete already: {options.output / 'README.md'} lists them"]
-    return hints(options, *lines, *(f"not made: {name}: {reason}" for name, reason in outcome.failed))
+    lines = [
+        f"{outcome.made} made, {outcome.kept} were complete already: {options.output / 'README.md'} lists them"
+    ]
+    return hints(
+        options, *lines, *(f"not made: {name}: {reason}" for name, reason in outcome.failed)
+    )

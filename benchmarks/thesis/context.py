@@ -1,9 +1,12 @@
-"""What every item works with: where results go, which data there is, how much is wanted; and rows that are computed once.
+"""What every item works with: where results go, which data there is, how much is wanted; and rows
+that are computed once.
 
-Rows are JSON objects. Those of a key are kept below `output/.work/rows`, so that an interrupted run goes on where it stopped and items
-share what is expensive. They are taken up again only under the same seed, size of run, data and version of the program.
+Rows are JSON objects. Those of a key are kept below `output/.work/rows`, so that an interrupted run
+goes on where it stopped and items share what is expensive. They are taken up again only under the
+same seed, size of run, data and version of the program.
 
-Limits: a row that was kept does not know that the code behind it changed within one version: `--again` computes it anew.
+Limits: a row that was kept does not know that the code behind it changed within one version:
+`--again` computes it anew.
 """
 
 import hashlib
@@ -27,9 +30,10 @@ WORK = ".work"
 
 @dataclass(frozen=True)
 class Context:
-    """One run. `output`: the folder of the results. `data`: a folder of public data, or None. `quick`: small images, few repetitions.
-    `seed`: of all random numbers. `monitor`: progress and cancel. `fresh_since`: rows kept before this time (seconds, as of files) are
-    computed anew."""
+    """One run. `output`: the folder of the results. `data`: a folder of public data, or None.
+    `quick`: small images, few repetitions. `seed`: of all random numbers. `monitor`: progress and
+    cancel. `fresh_since`: rows kept before this time (seconds, as of files) are computed anew.
+    """
 
     output: Path
     data: Path | None = None
@@ -39,7 +43,8 @@ class Context:
     fresh_since: float = 0.0
 
     def subjects(self, kind: str) -> tuple[Subject, ...]:
-        """The images of a kind: "specular" (significant specularity), "synthetic" (rendered scenes), "matt" (without highlights).
+        """The images of a kind: "specular" (significant specularity), "synthetic" (rendered
+        scenes), "matt" (without highlights).
 
         Raises `InputError` where data are damaged or nothing can be rendered here.
         """
@@ -55,9 +60,16 @@ class Context:
         return bool(self._library.photo_paths)
 
     def rows(self, key: str, compute: Callable[[], Sequence[JsonRow]]) -> list[JsonRow]:
-        """The rows of `key`, computed only if they are not kept. Raises `Cancelled` before it computes, where the user asked to stop."""
+        """The rows of `key`, computed only if they are not kept.
+
+        Raises `Cancelled` before it computes, where the user asked to stop.
+        """
         path = self._path(key)
-        if path.is_file() and path.stat().st_mtime >= self.fresh_since and (kept := _read(path)) is not None:
+        if (
+            path.is_file()
+            and path.stat().st_mtime >= self.fresh_since
+            and (kept := _read(path)) is not None
+        ):
             return kept
         if self.monitor.cancelled():
             self.monitor.report(key, 0.0)

@@ -1,6 +1,8 @@
-"""Real runs of the models on subjects, kept as result folders below the output, so that items share them and a run resumes.
+"""Real runs of the models on subjects, kept as result folders below the output, so that items share
+them and a run resumes.
 
-Limits: photos without a known coding count as linear floats; where nothing exceeds 1, values of 1 are taken for clipped.
+Limits: photos without a known coding count as linear floats; where nothing exceeds 1, values of 1
+are taken for clipped.
 """
 
 import numpy as np
@@ -20,14 +22,29 @@ def photo_of(subject: Subject) -> Photo:
     height, width = subject.mask.shape
     clipped = subject.mask & (subject.image.max(axis=2) >= 1) & (float(bright.max()) <= 1)
     source = PhotoSource("", (width, height), 32, "linear", "file")
-    return Photo(subject.image.astype(np.float32), subject.mask, FLOAT_STEP * float(np.quantile(bright, 0.999)), clipped, source)
+    return Photo(
+        subject.image.astype(np.float32),
+        subject.mask,
+        FLOAT_STEP * float(np.quantile(bright, 0.999)),
+        clipped,
+        source,
+    )
 
 
-def decomposed(context: Context, subject: Subject, model: str = "mdr", illumination: str | None = None) -> Decomposition:
-    """What a model of `pipeline.MODELS` makes of the subject, pixel by pixel. `illumination`: which lights to expect; None for those of
-    the subject's truth, or natural ones. Raises `InputError`, `Cancelled`."""
+def decomposed(
+    context: Context, subject: Subject, model: str = "mdr", illumination: str | None = None
+) -> Decomposition:
+    """What a model of `pipeline.MODELS` makes of the subject, pixel by pixel. `illumination`: which
+    lights to expect; None for those of the subject's truth, or natural ones. Raises `InputError`,
+    `Cancelled`.
+    """
     lit = illumination or ("natural" if subject.truth is None else subject.truth.illumination)
-    folder = context.output / WORK / "decompositions" / f"{subject.kind}-{subject.name}-{model}-{lit}-{context.fingerprint}"
+    folder = (
+        context.output
+        / WORK
+        / "decompositions"
+        / f"{subject.kind}-{subject.name}-{model}-{lit}-{context.fingerprint}"
+    )
     record = folder / "decomposition.json"
     if record.is_file() and record.stat().st_mtime >= context.fresh_since:
         return load(folder)

@@ -1,12 +1,15 @@
-"""What the frameworks make of subjects whose shape and light are known: run and timed once, kept with their maps for tables and figures.
+"""What the frameworks make of subjects whose shape and light are known: run and timed once, kept
+with their maps for tables and figures.
 
-SIRFS-X takes what SIRFS found and separates its reflectance by X (the model mbp); X-SIRFS separates first and gives SIRFS the diffuse image
-(the model mdr). SIRFS-MBP and MDR-SIRFS are these with the separator that ISC uses.
+SIRFS-X takes what SIRFS found and separates its reflectance by X (the model mbp); X-SIRFS separates
+first and gives SIRFS the diffuse image (the model mdr). SIRFS-MBP and MDR-SIRFS are these with the
+separator that ISC uses.
 
 Citation: H. Akbar, thesis (2016); J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
 
-Limits: the priors were fitted to objects of MIT-Berkeley, and the joint model's network has seen them: on these objects all are somewhat
-better than elsewhere. Seconds are of the machine as it was; evaluations of the energy do not depend on it.
+Limits: the priors were fitted to objects of MIT-Berkeley, and the joint model's network has seen
+them: on these objects all are somewhat better than elsewhere. Seconds are of the machine as it was;
+evaluations of the energy do not depend on it.
 """
 
 import time
@@ -37,7 +40,10 @@ _QUICK = 64  # longest side, pixels
 
 @dataclass(frozen=True)
 class Framework:
-    """A framework under the name that the thesis has for it. `on_truth`: SIRFS is given the true diffuse image, as a bound."""
+    """A framework under the name that the thesis has for it.
+
+    `on_truth`: SIRFS is given the true diffuse image, as a bound.
+    """
 
     label: str
     model: str
@@ -47,7 +53,11 @@ class Framework:
 
 SIRFS = Framework("SIRFS", "sirfs")
 BOUND = Framework("SIRFS on the true diffuse image", "sirfs", on_truth=True)
-AFTER = (Framework("SIRFS-MZK06", "mbp", "mallick_2006"), Framework("SIRFS-YCK06", "mbp", "yoon_2006"), Framework("SIRFS-MBP", "mbp"))
+AFTER = (
+    Framework("SIRFS-MZK06", "mbp", "mallick_2006"),
+    Framework("SIRFS-YCK06", "mbp", "yoon_2006"),
+    Framework("SIRFS-MBP", "mbp"),
+)
 BEFORE = (
     Framework("MZK06-SIRFS", "mdr", "mallick_2006"),
     Framework("YCK06-SIRFS", "mdr", "yoon_2006"),
@@ -59,7 +69,10 @@ BEFORE = (
 
 @dataclass(frozen=True)
 class Run:
-    """One framework on one subject: its answer, and how long it took. `answer` is None where the photo was refused."""
+    """One framework on one subject: its answer, and how long it took.
+
+    `answer` is None where the photo was refused.
+    """
 
     answer: Estimate | None
     seconds: float
@@ -77,12 +90,18 @@ class Row:
 
 
 def known(context: Context, kinds: Sequence[str]) -> list[Subject]:
-    """The subjects of some kinds whose shape and light are known; smaller still, if it must be quick."""
-    found = [subject for kind in kinds for subject in context.subjects(kind) if subject.truth is not None]
+    """The subjects of some kinds whose shape and light are known; smaller still, if it must be
+    quick.
+    """
+    found = [
+        subject for kind in kinds for subject in context.subjects(kind) if subject.truth is not None
+    ]
     return [shrunk(subject, _QUICK) for subject in found] if context.quick else found
 
 
-def measured(context: Context, subjects: Sequence[Subject], frameworks: Sequence[Framework]) -> list[Row]:
+def measured(
+    context: Context, subjects: Sequence[Subject], frameworks: Sequence[Framework]
+) -> list[Row]:
     """A row for each framework on each subject, without those that a framework refuses."""
     rows = []
     for subject in subjects:
@@ -92,13 +111,26 @@ def measured(context: Context, subjects: Sequence[Subject], frameworks: Sequence
             if run.answer is not None:
                 scores = score(subject.truth, **{name: getattr(run.answer, name) for name in _MAPS})
                 errors = asdict(scores) | {"average": scores.average}
-                rows.append(Row(f"{subject.kind} {subject.name}", framework.label, errors, run.seconds, run.answer.evaluations or 0))
+                rows.append(
+                    Row(
+                        f"{subject.kind} {subject.name}",
+                        framework.label,
+                        errors,
+                        run.seconds,
+                        run.answer.evaluations or 0,
+                    )
+                )
     return rows
 
 
 def estimated(context: Context, subject: Subject, framework: Framework) -> Run:
-    """What a framework answers, kept below the output. Raises `InputError` for a subject without a truth; `Cancelled`."""
-    name = f"{subject.kind}-{subject.name}-{framework.label}-{context.fingerprint}.npz".replace(" ", "-")
+    """What a framework answers, kept below the output.
+
+    Raises `InputError` for a subject without a truth; `Cancelled`.
+    """
+    name = f"{subject.kind}-{subject.name}-{framework.label}-{context.fingerprint}.npz".replace(
+        " ", "-"
+    )
     path = context.output / WORK / "estimates" / name
     if path.is_file() and path.stat().st_mtime >= context.fresh_since:
         with np.load(path, allow_pickle=False) as kept:
@@ -112,7 +144,9 @@ def estimated(context: Context, subject: Subject, framework: Framework) -> Run:
 
 def _timed(context: Context, subject: Subject, framework: Framework) -> Run:
     _warm(framework.model, framework.separator)
-    runner = make_runner(RunnerOptions(framework.model, framework.separator, threads=2), shipped_prior_set())
+    runner = make_runner(
+        RunnerOptions(framework.model, framework.separator, threads=2), shipped_prior_set()
+    )
     begun = time.perf_counter()
     try:
         answer = runner(_seen(subject, framework), context.monitor)
@@ -123,12 +157,18 @@ def _timed(context: Context, subject: Subject, framework: Framework) -> Run:
 
 @cache
 def _warm(model: str, separator: str) -> None:
-    """Runs a framework on a small ball, so that what is compiled or read at the first call is not on the clock of the second."""
+    """Runs a framework on a small ball, so that what is compiled or read at the first call is not
+    on the clock of the second.
+    """
     axis = np.linspace(-1.2, 1.2, _WARM)
     distance = np.hypot(axis, axis[:, None])
     mask, height = distance < 1, np.sqrt(np.maximum(0, 1 - distance**2)) * _WARM / 2.4
-    image = np.where(mask[..., None], (0.2 + 0.4 * height[..., None] / height.max()) * [1, 0.4, 0.2], 0)
-    ball = MitBerkeleyObject("ball", "natural", image, mask, mask, height, image, image, np.zeros((9, 3)))
+    image = np.where(
+        mask[..., None], (0.2 + 0.4 * height[..., None] / height.max()) * [1, 0.4, 0.2], 0
+    )
+    ball = MitBerkeleyObject(
+        "ball", "natural", image, mask, mask, height, image, image, np.zeros((9, 3))
+    )
     make_runner(RunnerOptions(model, separator, threads=2), shipped_prior_set())(ball, Monitor())
 
 
@@ -148,12 +188,17 @@ def _arrays(run: Run) -> dict[str, np.ndarray]:
     if run.answer is None:
         return {"seconds": np.array(run.seconds)}
     maps = {name: np.asarray(getattr(run.answer, name), np.float32) for name in _MAPS}
-    return maps | {"seconds": np.array(run.seconds), "evaluations": np.array(run.answer.evaluations or 0)}
+    return maps | {
+        "seconds": np.array(run.seconds),
+        "evaluations": np.array(run.answer.evaluations or 0),
+    }
 
 
 def _restored(kept: dict[str, np.ndarray]) -> Run:
     if "height" not in kept:
         return Run(None, float(kept["seconds"]))
     height, normal, shading, reflectance, light = (kept[name].astype(float) for name in _MAPS)
-    answer = Estimate(height, normal, shading, reflectance, light, evaluations=int(kept["evaluations"]))
+    answer = Estimate(
+        height, normal, shading, reflectance, light, evaluations=int(kept["evaluations"])
+    )
     return Run(answer, float(kept["seconds"]))

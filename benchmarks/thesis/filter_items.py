@@ -1,15 +1,20 @@
-"""Figure 3.12: histograms of filter outputs on diffuse and on specular layers, how far apart they are, and whether that is chance.
+"""Figure 3.12: histograms of filter outputs on diffuse and on specular layers, how far apart they
+are, and whether that is chance.
 
-Equation: with h_s,f and g_s,f the histograms of filter f on the specular and the diffuse layer of subject s, means over the subjects h_f,
-g_f, the distance is the total variation 1/2 sum |h_f - g_f|, in [0, 1]. If layers did not matter, h_s and g_s could be exchanged in any
-subject: p is the share of all exchanges (of up to 4096 of them, at random) that give no smaller distance. Neighbouring pixels are alike,
-so that tests which count pixels would promise far too much; subjects are counted. The nine p are corrected by Holm's rule.
+Equation: with h_s,f and g_s,f the histograms of filter f on the specular and the diffuse layer of
+subject s, means over the subjects h_f, g_f, the distance is the total variation 1/2 sum |h_f -
+g_f|, in [0, 1]. If layers did not matter, h_s and g_s could be exchanged in any subject: p is the
+share of all exchanges (of up to 4096 of them, at random) that give no smaller distance.
+Neighbouring pixels are alike, so that tests which count pixels would promise far too much; subjects
+are counted. The nine p are corrected by Holm's rule.
 
-The area is that under the curve of hits against false alarms, of single pixels of a subject judged by the histograms of the others.
+The area is that under the curve of hits against false alarms, of single pixels of a subject judged
+by the histograms of the others.
 
-Citation: H. Akbar (2016), section 3.6.5.1; E. J. G. Pitman, "Significance tests which may be applied to samples from any populations",
-Supplement to the Journal of the Royal Statistical Society 4(1), 119-130 (1937), doi:10.2307/2984124 (exchanges); S. Holm, "A simple
-sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 6(2), 65-70 (1979), which has no DOI.
+Citation: H. Akbar (2016), section 3.6.5.1; E. J. G. Pitman, "Significance tests which may be
+applied to samples from any populations", Supplement to the Journal of the Royal Statistical Society
+4(1), 119-130 (1937), doi:10.2307/2984124 (exchanges); S. Holm, "A simple sequentially rejective
+multiple test procedure", Scandinavian Journal of Statistics 6(2), 65-70 (1979), which has no DOI.
 
 Limits: n subjects cannot give a p below 2 / 2^n.
 """
@@ -39,7 +44,9 @@ def samples_of(subjects: list[Subject]) -> list[Sample]:
     for one in subjects:
         assert one.diffuse is not None
         assert one.specular is not None
-        truth = SeparationTruth(titled(one), one.image, one.mask, one.diffuse, one.specular, np.zeros_like(one.mask))
+        truth = SeparationTruth(
+            titled(one), one.image, one.mask, one.diffuse, one.specular, np.zeros_like(one.mask)
+        )
         sample = sample_of(truth, "layers")
         if min(len(sample.of_highlight), len(sample.of_without)) >= _LEAST:
             found.append(sample)
@@ -63,7 +70,10 @@ def distances(pairs: np.ndarray) -> np.ndarray:
 
 
 def chance(pairs: np.ndarray, seed: int) -> np.ndarray:
-    """p (F,): the share of exchanges of layers within subjects that give no smaller distance; `pairs` (S, 2, F, BINS)."""
+    """p (F,): the share of exchanges of layers within subjects that give no smaller distance;
+
+    `pairs` (S, 2, F, BINS).
+    """
     count = len(pairs)
     if 2**count <= _EXCHANGES:
         flips = (np.arange(2**count)[:, None] >> np.arange(count)) & 1
@@ -87,7 +97,9 @@ def holm(p: np.ndarray) -> np.ndarray:
 
 
 def left_out_area(samples: list[Sample]) -> float:
-    """The mean over the subjects of the area for single pixels, judged by histograms of the other subjects."""
+    """The mean over the subjects of the area for single pixels, judged by histograms of the other
+    subjects.
+    """
     areas = []
     for number, one in enumerate(samples):
         table = fitted([other for k, other in enumerate(samples) if k != number])
@@ -96,15 +108,22 @@ def left_out_area(samples: list[Sample]) -> float:
 
 
 def _filters(context: Context) -> Made:
-    samples = samples_of(with_layers([*context.subjects("specular"), *context.subjects("synthetic")]))
+    samples = samples_of(
+        with_layers([*context.subjects("specular"), *context.subjects("synthetic")])
+    )
     if len(samples) < 2:
-        return Made(text="Fewer than two subjects here have enough of both layers: nothing can be compared.")
+        return Made(
+            text="Fewer than two subjects here have enough of both layers: nothing can be compared."
+        )
     spread = fitted(samples).spread
     pairs = np.stack([histograms(sample, spread) for sample in samples])
 
     p = chance(pairs, context.seed)
     columns = zip(FILTERS, distances(pairs), p, holm(p), strict=True)
-    cells = tuple((kind, 100 * width, float(distance), float(one), float(raised)) for (kind, width), distance, one, raised in columns)
+    cells = tuple(
+        (kind, 100 * width, float(distance), float(one), float(raised))
+        for (kind, width), distance, one, raised in columns
+    )
     header = ("filter", "width (% of the diagonal)", "total variation", "p", "p after Holm")
     names = ", ".join(sample.thing for sample in samples)
     nearest, furthest = min(cell[2] for cell in cells), max(cell[2] for cell in cells)
@@ -118,12 +137,16 @@ def _filters(context: Context) -> Made:
     return Made((Table(header, cells),), (_picture(pairs, cells),), text)
 
 
-def _picture(pairs: np.ndarray, cells: tuple[tuple[str, float, float, float, float], ...]) -> Figure:
+def _picture(
+    pairs: np.ndarray, cells: tuple[tuple[str, float, float, float, float], ...]
+) -> Figure:
     made, axes = figure(len(WIDTHS), len(KINDS), height=5.6, sharex=True, sharey=True)
     edges = bin_edges()
     for number, (place, cell) in enumerate(zip(axes.flat, cells, strict=True)):
         for kind, name, colour in ((1, "diffuse", OKABE_ITO[0]), (0, "specular", OKABE_ITO[1])):
-            place.stairs(pairs[:, kind, number].mean(axis=0), edges, color=colour, linewidth=1.1, label=name)
+            place.stairs(
+                pairs[:, kind, number].mean(axis=0), edges, color=colour, linewidth=1.1, label=name
+            )
         place.set_title(f"{cell[0]} {cell[1]:g} %: distance {cell[2]:.2f}", fontsize=LETTERS)
     for place in axes[-1]:
         place.set_xlabel("asinh(output / spread)")
@@ -133,4 +156,8 @@ def _picture(pairs: np.ndarray, cells: tuple[tuple[str, float, float, float, flo
     return made
 
 
-ITEMS: tuple[Item, ...] = (partial(Item, "figure")("3.12", "Histograms of filter outputs on diffuse and specular layers", _filters),)
+ITEMS: tuple[Item, ...] = (
+    partial(Item, "figure")(
+        "3.12", "Histograms of filter outputs on diffuse and specular layers", _filters
+    ),
+)

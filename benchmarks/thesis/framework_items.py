@@ -1,11 +1,14 @@
-"""Figures of the framework: its stages, those of Chaotic Segmentation, Sparse Coding, MBP and MDR, as sheets of real runs.
+"""Figures of the framework: its stages, those of Chaotic Segmentation, Sparse Coding, MBP and MDR,
+as sheets of real runs.
 
-Every picture is an intermediate result of the functions that separate and decompose, on the subject with the most specular light; nothing
-is drawn by hand. Specular layers have the photo's exposure.
+Every picture is an intermediate result of the functions that separate and decompose, on the subject
+with the most specular light; nothing is drawn by hand. Specular layers have the photo's exposure.
 
-Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016).
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image",
+thesis (2016).
 
-Limits: the thesis' own drawings are not public; which stages belong to which of the numbers 3.2 to 3.4 and 3.9 to 3.11 is our reading.
+Limits: the thesis' own drawings are not public; which stages belong to which of the numbers 3.2 to
+3.4 and 3.9 to 3.11 is our reading.
 """
 
 from dataclasses import replace
@@ -21,7 +24,11 @@ from isc_core.editing.relight import NewLight, relight
 from isc_core.models.mbp import split_reflectance
 from isc_core.separation import separate
 from isc_core.separation.channels import smallest
-from isc_core.separation.chaotic_segmentation import VARIANTS, ChaoticSegmentationOptions, find_specular
+from isc_core.separation.chaotic_segmentation import (
+    VARIANTS,
+    ChaoticSegmentationOptions,
+    find_specular,
+)
 from isc_core.separation.sparse_coding import stages
 from isc_core.separation.specular_free import fixed_chromaticity, two_band
 from isc_core.thresholding import OtsuObjective, exact, maximise, quantise
@@ -38,7 +45,9 @@ _LEAST_EXPLAINED = 0.1  # share of the specular layer, below which a lobe's pict
 
 
 def _subject(context: Context) -> Subject:
-    """The one with the most specular light of those with significant specularity and an outline: of it the stages have most to show."""
+    """The one with the most specular light of those with significant specularity and an outline: of
+    it the stages have most to show.
+    """
 
     def share(subject: Subject) -> float:
         specular = np.zeros(1) if subject.specular is None else subject.specular[subject.mask]
@@ -90,14 +99,18 @@ def _segmentation(context: Context) -> Made:
     for name, variant in (("as published", "paper"), ("ours", "improved")):
         options = replace(VARIANTS[variant], seed=context.seed)
         found = find_specular(image / float(image.max()), mask, options)
-        split = separate("chaotic_segmentation", image, mask, variant=variant, changes={"seed": context.seed})
+        split = separate(
+            "chaotic_segmentation", image, mask, variant=variant, changes={"seed": context.seed}
+        )
         hole = np.where(found[..., None], 0, image)
         shown += [
             Panel(f"{name}: specular pixels cut out", hole, mask, gain=gain),
             Panel(f"{name}: repainted, diffuse", split.diffuse, mask, gain=gain),
             Panel(f"{name}: specular", split.specular, mask, gain=gain),
         ]
-        rows.append((name, options.levels, 100 * float(found[mask].mean()), *_left(subject, split.diffuse)))
+        rows.append(
+            (name, options.levels, 100 * float(found[mask].mean()), *_left(subject, split.diffuse))
+        )
     header = ("variant", "thresholds K", "specular pixels (%)", "diffuse error / doing nothing")
     text = (
         f"{subject.name}. As published: pixels above the highest of three thresholds are replaced as a whole, from patches of the rest. "
@@ -119,17 +132,42 @@ def _search(context: Context) -> Made:
     _histogram(axes[0, 0], levels[mask], thresholds)
     place = axes[0, 1]
     budget = 2_000 if context.quick else published.evaluations
-    for name, colour in zip(("chaotic_clonal", "clonal_selection", "particle_swarm"), OKABE_ITO, strict=False):
+    for name, colour in zip(
+        ("chaotic_clonal", "clonal_selection", "particle_swarm"), OKABE_ITO, strict=False
+    ):
         found = maximise(name, objective, published.levels, evaluations=budget, seed=context.seed)
         place.step(
-            found.history[:, 0], 1 - found.history[:, 1] / best.value + 1e-7, where="post", color=colour, label=name.replace("_", " ")
+            found.history[:, 0],
+            1 - found.history[:, 1] / best.value + 1e-7,
+            where="post",
+            color=colour,
+            label=name.replace("_", " "),
         )
         needed = found.history[np.argmax(found.history[:, 1]), 0]
-        rows.append((name.replace("_", " "), " ".join(map(str, found.thresholds)), found.value / best.value, int(needed)))
+        rows.append(
+            (
+                name.replace("_", " "),
+                " ".join(map(str, found.thresholds)),
+                found.value / best.value,
+                int(needed),
+            )
+        )
     rows.append(("exact", " ".join(map(str, best.thresholds)), 1.0, ""))
-    place.set(xscale="log", yscale="log", xlabel="evaluations", ylabel="share below the optimum, + 1e-7", xlim=(30, None))
+    place.set(
+        xscale="log",
+        yscale="log",
+        xlabel="evaluations",
+        ylabel="share below the optimum, + 1e-7",
+        xlim=(30, None),
+    )
     place.set_title("the search", fontsize=LETTERS)
-    made.legend(*place.get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=LETTERS - 1, frameon=False)
+    made.legend(
+        *place.get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=3,
+        fontsize=LETTERS - 1,
+        frameon=False,
+    )
     box = np.where(mask, np.digitize(levels, thresholds, right=True), np.nan)
     show_map(axes[0, 2], box, "classes of the thresholds found")
     header = ("search", "thresholds", "objective / optimum", "evaluations until then")
@@ -141,17 +179,34 @@ def _histogram(place: Axes, levels: np.ndarray, thresholds: np.ndarray) -> None:
     counts = np.bincount(levels, minlength=_LEVELS + 1)
     place.fill_between(np.arange(_LEVELS + 1), counts / counts.sum(), step="mid", color="0.7")
     for number, threshold in enumerate(thresholds):
-        place.axvline(threshold, color=OKABE_ITO[1], linewidth=1, label="thresholds" if number == 0 else None)
-    place.set(xlabel="level of the smallest channel", ylabel="share of the object", xlim=(0, _LEVELS), yscale="log")
+        place.axvline(
+            threshold, color=OKABE_ITO[1], linewidth=1, label="thresholds" if number == 0 else None
+        )
+    place.set(
+        xlabel="level of the smallest channel",
+        ylabel="share of the object",
+        xlim=(0, _LEVELS),
+        yscale="log",
+    )
     place.set_title("histogram and thresholds", fontsize=LETTERS)
     legend(place, "upper right")
 
 
-def _thresholds(image: np.ndarray, mask: np.ndarray, options: ChaoticSegmentationOptions, seed: int) -> tuple[np.ndarray, np.ndarray]:
-    """The smallest channel in levels (H, W), as the method quantises it, and the thresholds that its search finds."""
+def _thresholds(
+    image: np.ndarray, mask: np.ndarray, options: ChaoticSegmentationOptions, seed: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The smallest channel in levels (H, W), as the method quantises it, and the thresholds that
+    its search finds.
+    """
     low = smallest(image)
     levels = quantise(low, float(low.max()))
-    found = maximise(options.optimiser, OtsuObjective.of(levels[mask]), options.levels, evaluations=options.evaluations, seed=seed)
+    found = maximise(
+        options.optimiser,
+        OtsuObjective.of(levels[mask]),
+        options.levels,
+        evaluations=options.evaluations,
+        seed=seed,
+    )
     return levels, found.thresholds
 
 
@@ -172,7 +227,12 @@ def _sparse(context: Context) -> Made:
         Panel("along it: t", s.brightness / unit, mask),
         Panel("code of each pixel alone: beta", s.beta / unit, mask),
         Panel("groups that switch the atom on", groups, mask, (0, 10), bar=False),
-        Panel("code that the groups keep", s.code / unit, mask, (0, max(float((s.beta[mask] / unit).max()), 1e-9))),
+        Panel(
+            "code that the groups keep",
+            s.code / unit,
+            mask,
+            (0, max(float((s.beta[mask] / unit).max()), 1e-9)),
+        ),
         Panel("diffuse", split.diffuse, mask, gain=gain),
         Panel("specular", split.specular, mask, gain=gain),
     ]
@@ -196,7 +256,9 @@ def _mbp(context: Context) -> Made:
     subject = _subject(context)
     plain, d = decomposed(context, subject, "sirfs"), decomposed(context, subject, "mbp")
     gain, paint = exposure(d.image, d.mask), exposure(plain.reflectance, d.mask)
-    again = split_reflectance(plain.image, plain.shading, plain.mask, photo_of(subject).clipped, "isc")
+    again = split_reflectance(
+        plain.image, plain.shading, plain.mask, photo_of(subject).clipped, "isc"
+    )
     shown = [
         Panel("photo", plain.image, plain.mask, gain=gain),
         normals_panel("1. SIRFS: normals", plain.normal, plain.mask),
@@ -209,7 +271,11 @@ def _mbp(context: Context) -> Made:
     ]
     shown += _lobe_panel(d, "3. Blinn-Phong lobe", gain)
     same = float(np.abs(again.diffuse - d.diffuse)[d.mask].max() / d.image.max())
-    rows = (("specular light (%)", _specular_share(d)), ("largest difference, stage 2 run by itself", same), *_lobe_rows(d))
+    rows = (
+        ("specular light (%)", _specular_share(d)),
+        ("largest difference, stage 2 run by itself", same),
+        *_lobe_rows(d),
+    )
     text = (
         f"{subject.name}: SIRFS explains the photo as it is; highlights are then pale paint on evenly lit paint, and taken off there."
         f"{_lobe_words(d)}"
@@ -236,13 +302,21 @@ def _mdr(context: Context) -> Made:
     ]
     shown += _lobe_panel(d, "3. GGX lobe", gain)
     same = float(np.abs(alone.diffuse - d.diffuse)[d.mask].max() / d.image.max())
-    rows = (("specular light (%)", _specular_share(d)), ("largest difference, stage 1 run by itself", same), *_lobe_rows(d))
+    rows = (
+        ("specular light (%)", _specular_share(d)),
+        ("largest difference, stage 1 run by itself", same),
+        *_lobe_rows(d),
+    )
     text = f"{subject.name}: highlights are taken off the photo; shape, light and paint are those of the diffuse image.{_lobe_words(d)}"
     return Made((Table(("measure", "value"), rows),), (panels(shown, 5),), text)
 
 
 def _lobe_panel(d: Decomposition, title: str, gain: float) -> list[Panel]:
-    return [] if d.brdf is None else [Panel(f"{title}: its highlights", d.brdf.predicted, d.mask, gain=gain)]
+    return (
+        []
+        if d.brdf is None
+        else [Panel(f"{title}: its highlights", d.brdf.predicted, d.mask, gain=gain)]
+    )
 
 
 def _lobe_rows(d: Decomposition) -> tuple[tuple[str, str | float], ...]:
@@ -250,7 +324,10 @@ def _lobe_rows(d: Decomposition) -> tuple[tuple[str, str | float], ...]:
         return (("lobe", "none was fitted"),)
     alpha = "" if d.brdf.alpha is None else f"alpha {d.brdf.alpha:.2f}, "
     state = "determined" if d.brdf.determined else d.brdf.reason or "undetermined"
-    return (("lobe", f"{alpha}{state}"), ("share of the specular layer that it explains", d.brdf.explained))
+    return (
+        ("lobe", f"{alpha}{state}"),
+        ("share of the specular layer that it explains", d.brdf.explained),
+    )
 
 
 def _lobe_words(d: Decomposition) -> str:
@@ -274,12 +351,20 @@ def _left(subject: Subject, diffuse: np.ndarray) -> tuple[float | str]:
     if subject.diffuse is None:
         return ("",)
     nothing = float(np.square((subject.image - subject.diffuse)[subject.mask]).sum())
-    return (float(np.square((diffuse - subject.diffuse)[subject.mask]).sum()) / max(nothing, 1e-30),)
+    return (
+        float(np.square((diffuse - subject.diffuse)[subject.mask]).sum()) / max(nothing, 1e-30),
+    )
 
 
 _figure = partial(Item, "figure")
 ITEMS: tuple[Item, ...] = (
-    Item("figure", "3.1", "Diagram of the research", None, "a diagram of how the research went: there is no computation behind it"),
+    Item(
+        "figure",
+        "3.1",
+        "Diagram of the research",
+        None,
+        "a diagram of how the research went: there is no computation behind it",
+    ),
     _figure("3.2", "The stages of the framework", _framework),
     _figure("3.3", "The stages of Chaotic Segmentation", _segmentation),
     _figure("3.4", "How Chaotic Segmentation searches its thresholds", _search),

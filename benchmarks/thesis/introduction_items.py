@@ -1,13 +1,15 @@
-"""Figures of the introduction: shape from shading by the two classical methods, and images with their characteristics.
+"""Figures of the introduction: shape from shading by the two classical methods, and images with
+their characteristics.
 
-The sphere and the vase are closed forms, lit by one distant light as both methods assume: brightness = max(0, n . l). The vase is
-z = sqrt(f(y)^2 - x^2) with f(y) = .15 - .1 y (6 y + 1)^2 (y - 1)^2 (3 y - 2), the one on which such methods are usually compared. Of the
-third object the true height is known, and its paint and light are what they are. Both methods are the models of `isc_core.baselines`, which
-also estimate the light.
+The sphere and the vase are closed forms, lit by one distant light as both methods assume:
+brightness = max(0, n . l). The vase is z = sqrt(f(y)^2 - x^2) with f(y) = .15 - .1 y (6 y + 1)^2 (y
+- 1)^2 (3 y - 2), the one on which such methods are usually compared. Of the third object the true
+height is known, and its paint and light are what they are. Both methods are the models of
+`isc_core.baselines`, which also estimate the light.
 
-Citation: P.-S. Tsai and M. Shah (1994), doi:10.1016/0262-8856(94)90002-7; K. Ikeuchi and B. K. P. Horn (1981),
-doi:10.1016/0004-3702(81)90023-0; the vase: R. Zhang, P.-S. Tsai, J. E. Cryer and M. Shah, "Shape from shading: a survey" (1999),
-doi:10.1109/34.784284.
+Citation: P.-S. Tsai and M. Shah (1994), doi:10.1016/0262-8856(94)90002-7; K. Ikeuchi and B. K. P.
+Horn (1981), doi:10.1016/0004-3702(81)90023-0; the vase: R. Zhang, P.-S. Tsai, J. E. Cryer and M.
+Shah, "Shape from shading: a survey" (1999), doi:10.1109/34.784284.
 
 Limits: which methods and objects the thesis shows in 1.2 and 1.3 is not known to us.
 """
@@ -30,12 +32,19 @@ from .subjects import Subject
 
 LIGHT = toward(-0.4, 0.5, 1.0)
 _ALBEDO, _DARKEST = 0.8, 1e-3
-_NAMES = {"sfs-tsai-shah": "Tsai & Shah 1994", "sfs-ikeuchi-horn": "Ikeuchi & Horn 1981", "naive": "flat (doing nothing)"}
+_NAMES = {
+    "sfs-tsai-shah": "Tsai & Shah 1994",
+    "sfs-ikeuchi-horn": "Ikeuchi & Horn 1981",
+    "naive": "flat (doing nothing)",
+}
 
 
 @dataclass(frozen=True)
 class Shaded:
-    """An object whose shape is known. `image`: (H, W, 3) linear; `mask`: (H, W) bool; `height`: (H, W) pixels, NaN where unknown."""
+    """An object whose shape is known.
+
+    `image`: (H, W, 3) linear; `mask`: (H, W) bool; `height`: (H, W) pixels, NaN where unknown.
+    """
 
     name: str
     image: np.ndarray
@@ -64,12 +73,19 @@ def vase(size: int) -> Shaded:
     z = np.sqrt(np.maximum(square, 0))
     # The gradient of x^2 + z^2 - f(y)^2, which needs no division where the vase turns away.
     normal = np.stack([x, -f * slope, z], -1)
-    return _lit("vase", normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12), mask, size * z)
+    return _lit(
+        "vase",
+        normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12),
+        mask,
+        size * z,
+    )
 
 
 def _lit(name: str, normal: np.ndarray, mask: np.ndarray, height: np.ndarray) -> Shaded:
     shade = np.where(mask, np.maximum(normal @ LIGHT, 0), 0)
-    return Shaded(name, _ALBEDO * np.repeat(shade[..., None], 3, axis=2), mask, np.where(mask, height, np.nan))
+    return Shaded(
+        name, _ALBEDO * np.repeat(shade[..., None], 3, axis=2), mask, np.where(mask, height, np.nan)
+    )
 
 
 def shaded_objects(context: Context) -> tuple[Shaded, ...]:
@@ -85,8 +101,10 @@ def shaded_objects(context: Context) -> tuple[Shaded, ...]:
 
 @dataclass(frozen=True)
 class Recovered:
-    """A method's answer. `height`: (H, W) pixels. `angle`: (H, W) degrees between true and found normals, NaN where unknown.
-    `height_share`: mean error of the height after the best offset, of the true height's range."""
+    """A method's answer. `height`: (H, W) pixels. `angle`: (H, W) degrees between true and found
+    normals, NaN where unknown. `height_share`: mean error of the height after the best offset, of
+    the true height's range.
+    """
 
     height: np.ndarray
     angle: np.ndarray
@@ -99,14 +117,26 @@ class Recovered:
 
 
 def recover(shaded: Shaded, method: str) -> Recovered:
-    """What a method of `baselines.METHODS` makes of the image. Raises `InputError` for an unknown one."""
-    log_image = np.log(np.maximum(np.where(shaded.mask[..., None], shaded.image, 1), _DARKEST * float(shaded.image.max())))
+    """What a method of `baselines.METHODS` makes of the image.
+
+    Raises `InputError` for an unknown one.
+    """
+    log_image = np.log(
+        np.maximum(
+            np.where(shaded.mask[..., None], shaded.image, 1), _DARKEST * float(shaded.image.max())
+        )
+    )
     height = baselines.estimate(method, log_image, shaded.mask).height
     true, found = truth_normal(shaded.height), truth_normal(height)
     known = shaded.mask & np.isfinite(true[..., 2])
     angle = np.full(shaded.mask.shape, np.nan)
-    angle[known] = [np.degrees(angular_error(one, other)) for one, other in zip(true[known], found[known], strict=True)]
-    share = height_error(shaded.height, height) / max(float(np.ptp(shaded.height[np.isfinite(shaded.height)])), 1e-9)
+    angle[known] = [
+        np.degrees(angular_error(one, other))
+        for one, other in zip(true[known], found[known], strict=True)
+    ]
+    share = height_error(shaded.height, height) / max(
+        float(np.ptp(shaded.height[np.isfinite(shaded.height)])), 1e-9
+    )
     return Recovered(height, angle, share)
 
 
@@ -116,7 +146,14 @@ def _errors(context: Context) -> list[JsonRow]:
         for shaded in shaded_objects(context):
             for method in _NAMES:
                 found = recover(shaded, method)
-                rows.append({"object": shaded.name, "method": method, "height": found.height_share, "angle": found.mean_angle})
+                rows.append(
+                    {
+                        "object": shaded.name,
+                        "method": method,
+                        "height": found.height_share,
+                        "angle": found.mean_angle,
+                    }
+                )
         return rows
 
     return context.rows("shape from shading", compute)
@@ -131,13 +168,30 @@ def _shape_from_shading(method: str, context: Context) -> Made:
         shown += [
             Panel(f"{shaded.name}: image", shaded.image, shaded.mask),
             Panel("true height (pixels)", true, shaded.mask, ends),
-            Panel("found height (pixels)", found.height + np.nanmedian((true - found.height)[shaded.mask]), shaded.mask, ends),
+            Panel(
+                "found height (pixels)",
+                found.height + np.nanmedian((true - found.height)[shaded.mask]),
+                shaded.mask,
+                ends,
+            ),
             Panel("error of the normals (degrees)", found.angle, shaded.mask, (0, 60)),
         ]
     rows = _errors(context)
-    cells = [(str(r["object"]), _NAMES[str(r["method"])], float(r["height"] or 0), float(r["angle"] or 0)) for r in rows]
+    cells = [
+        (
+            str(r["object"]),
+            _NAMES[str(r["method"])],
+            float(r["height"] or 0),
+            float(r["angle"] or 0),
+        )
+        for r in rows
+    ]
     header = ("object", "method", "height error / range", "normal error (degrees)")
-    table = Table(header, tuple(cells), "Mean errors inside the mask; heights after the best offset. The light is estimated, too.")
+    table = Table(
+        header,
+        tuple(cells),
+        "Mean errors inside the mask; heights after the best offset. The light is estimated, too.",
+    )
     own = [float(r["angle"] or 0) for r in rows if r["method"] == method]
     flat = [float(r["angle"] or 0) for r in rows if r["method"] == "naive"]
     better = sum(a < b for a, b in zip(own, flat, strict=True))
@@ -166,7 +220,9 @@ def _characteristics(kind: str, context: Context) -> Made:
         "shading is relative.",
     )
     share = float(d.specular[d.mask].sum() / d.image[d.mask].sum())
-    state = "all identities hold" if not errors.broken() else f"broken: {'; '.join(errors.broken())}"
+    state = (
+        "all identities hold" if not errors.broken() else f"broken: {'; '.join(errors.broken())}"
+    )
     text = (
         f"{subject.name}, the first subject of its kind, in a real run of `isc decompose --model mdr`: {100 * share:.1f} % of its "
         f"light was found to be specular; {state}. {COLOURS}"
@@ -179,9 +235,29 @@ def _item(number: str, title: str, make: Callable[[Context], Made]) -> Item:
 
 
 ITEMS: tuple[Item, ...] = (
-    Item("figure", "1.1", "Illustration of the introduction", None, "an illustration: nothing is computed or measured in it"),
-    _item("1.2", "Shape from shading: Tsai & Shah against the truth", partial(_shape_from_shading, "sfs-tsai-shah")),
-    _item("1.3", "Shape from shading: Ikeuchi & Horn against the truth", partial(_shape_from_shading, "sfs-ikeuchi-horn")),
-    _item("1.4", "An image with significant specularity and its characteristics", partial(_characteristics, "specular")),
-    _item("1.5", "A synthetic image and its characteristics", partial(_characteristics, "synthetic")),
+    Item(
+        "figure",
+        "1.1",
+        "Illustration of the introduction",
+        None,
+        "an illustration: nothing is computed or measured in it",
+    ),
+    _item(
+        "1.2",
+        "Shape from shading: Tsai & Shah against the truth",
+        partial(_shape_from_shading, "sfs-tsai-shah"),
+    ),
+    _item(
+        "1.3",
+        "Shape from shading: Ikeuchi & Horn against the truth",
+        partial(_shape_from_shading, "sfs-ikeuchi-horn"),
+    ),
+    _item(
+        "1.4",
+        "An image with significant specularity and its characteristics",
+        partial(_characteristics, "specular"),
+    ),
+    _item(
+        "1.5", "A synthetic image and its characteristics", partial(_characteristics, "synthetic")
+    ),
 )

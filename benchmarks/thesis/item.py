@@ -20,8 +20,9 @@ Cell = str | int | float
 
 @dataclass(frozen=True)
 class Table:
-    """One table. `header`: column names. `rows`: as many cells each; numbers are shown with four digits in Markdown and in full in the CSV
-    file. `caption`: one line."""
+    """One table. `header`: column names. `rows`: as many cells each; numbers are shown with four
+    digits in Markdown and in full in the CSV file. `caption`: one line.
+    """
 
     header: tuple[str, ...]
     rows: tuple[tuple[Cell, ...], ...]
@@ -29,14 +30,17 @@ class Table:
 
     def __post_init__(self) -> None:
         if any(len(row) != len(self.header) for row in self.rows):
-            raise ValueError(f"each row of {self.caption or 'a table'} must have {len(self.header)} cells")
+            raise ValueError(
+                f"each row of {self.caption or 'a table'} must have {len(self.header)} cells"
+            )
 
 
 @dataclass(frozen=True)
 class Verdict:
     """A claim of the thesis beside what was measured.
 
-    `claim`: what the thesis says, with its figure (see `claims`). `here`: what was measured. `holds`: of `HOLDS`. `why`: one line.
+    `claim`: what the thesis says, with its figure (see `claims`). `here`: what was measured.
+    `holds`: of `HOLDS`. `why`: one line.
     """
 
     claim: str
@@ -51,7 +55,9 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Made:
-    """What an item is made of: tables, figures (written and closed by `written`), `text` in Markdown (what one sees), and verdicts."""
+    """What an item is made of: tables, figures (written and closed by `written`), `text` in
+    Markdown (what one sees), and verdicts.
+    """
 
     tables: tuple[Table, ...] = ()
     figures: tuple[Figure, ...] = ()
@@ -61,8 +67,9 @@ class Made:
 
 @dataclass(frozen=True)
 class Item:
-    """A table or figure of the thesis. `kind`: "table" or "figure". `number`: as "4.5". `title`: in our words. `make`: computes it; None
-    where it cannot be regenerated, which `reason` explains."""
+    """A table or figure of the thesis. `kind`: "table" or "figure". `number`: as "4.5". `title`: in
+    our words. `make`: computes it; None where it cannot be regenerated, which `reason` explains.
+    """
 
     kind: str
     number: str

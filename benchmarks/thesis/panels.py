@@ -1,6 +1,7 @@
 """Pictures of what a model finds, each with its name, as figures of labelled panels.
 
-Limits: an image is shown in an exposure of its own unless a gain is given; the light is shown as a white ball in it.
+Limits: an image is shown in an exposure of its own unless a gain is given; the light is shown as a
+white ball in it.
 """
 
 import textwrap
@@ -27,9 +28,10 @@ COLOURS = (
 
 @dataclass(frozen=True)
 class Panel:
-    """One picture. `values`: (H, W, 3) an image of linear light, or (H, W) numbers; `mask` (H, W) bool or None;
-    `limits`: the ends of the numbers' colours; `gain`: of an image, None for one of its own; `bar`: whether the
-    numbers have a bar of colours."""
+    """One picture. `values`: (H, W, 3) an image of linear light, or (H, W) numbers; `mask` (H, W)
+    bool or None; `limits`: the ends of the numbers' colours; `gain`: of an image, None for one of
+    its own; `bar`: whether the numbers have a bar of colours.
+    """
 
     title: str
     values: np.ndarray
@@ -44,13 +46,17 @@ def panels(shown: Sequence[Panel], columns: int, *, width: float = WIDTH) -> Fig
     rows = -(-len(shown) // columns)
     cut = [_cut(panel) for panel in shown]
     cell = width / columns
-    titles = ["\n".join(textwrap.wrap(panel.title, int(cell * _LETTERS_AN_INCH))) for panel in shown]
+    titles = [
+        "\n".join(textwrap.wrap(panel.title, int(cell * _LETTERS_AN_INCH))) for panel in shown
+    ]
     heights = []
     for row in range(rows):
         part = slice(columns * row, columns * (row + 1))
         pictures = max(panel.values.shape[0] / panel.values.shape[1] for panel in cut[part]) * cell
         bars = 2.2 if any(panel.values.ndim == 2 and panel.bar for panel in cut[part]) else 0.4
-        heights.append(pictures + _LINE * (1 + bars + max(title.count("\n") for title in titles[part])))
+        heights.append(
+            pictures + _LINE * (1 + bars + max(title.count("\n") for title in titles[part]))
+        )
     made, axes = figure(rows, columns, width=width, height=sum(heights))
     axes[0, 0].get_gridspec().set_height_ratios(heights)
     for place, panel, title in zip(axes.flat, cut, titles, strict=False):
@@ -70,7 +76,9 @@ def _draw(place: Axes, panel: Panel, title: str) -> None:
     if not panel.bar:
         return
     # Below the picture, where it takes none of the width that the pictures beside it have.
-    bar = place.figure.colorbar(place.images[-1], cax=place.inset_axes((0.1, -0.1, 0.8, 0.04)), orientation="horizontal")
+    bar = place.figure.colorbar(
+        place.images[-1], cax=place.inset_axes((0.1, -0.1, 0.8, 0.04)), orientation="horizontal"
+    )
     bar.ax.tick_params(labelsize=LETTERS - 1, width=0.6, length=2, pad=1)
     bar.ax.locator_params(nbins=3)
     bar.outline.set_linewidth(0.6)
@@ -80,7 +88,9 @@ def _cut(panel: Panel) -> Panel:
     if panel.mask is None:
         return panel
     box = mask_slices(panel.mask)
-    return Panel(panel.title, panel.values[box], panel.mask[box], panel.limits, panel.gain, panel.bar)
+    return Panel(
+        panel.title, panel.values[box], panel.mask[box], panel.limits, panel.gain, panel.bar
+    )
 
 
 def normals_panel(title: str, normal: np.ndarray, mask: np.ndarray) -> Panel:
@@ -94,7 +104,9 @@ def light_panel(title: str, illumination: np.ndarray) -> Panel:
 
 
 def characteristics(d: Decomposition) -> list[Panel]:
-    """Everything that a decomposition holds: photo and layers in one exposure, the rest each in its own."""
+    """Everything that a decomposition holds: photo and layers in one exposure, the rest each in its
+    own.
+    """
     gain = exposure(d.image, d.mask)
     return [
         Panel("photo", d.image, d.mask, gain=gain),

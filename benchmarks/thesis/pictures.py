@@ -1,10 +1,12 @@
-"""Maps as pictures of linear light on white paper, cut to the object, all at exposures that can be compared.
+"""Maps as pictures of linear light on white paper, cut to the object, all at exposures that can be
+compared.
 
-Equation: errors of a layer are drawn between two colours that colour-blind people tell apart: orange where light was left over, blue where
-paint was taken for light, in full colour from a tenth of the photo's white on.
+Equation: errors of a layer are drawn between two colours that colour-blind people tell apart:
+orange where light was left over, blue where paint was taken for light, in full colour from a tenth
+of the photo's white on.
 
-Limits: what a map cannot tell (the offset of heights, the scale of shading, reflectance and light) is fitted to the truth before it is
-drawn, as the errors do.
+Limits: what a map cannot tell (the offset of heights, the scale of shading, reflectance and light)
+is fitted to the truth before it is drawn, as the errors do.
 """
 
 import matplotlib
@@ -22,8 +24,12 @@ _PAPER = 1.0
 _BALL = 160  # pixels
 
 
-def lit(values: np.ndarray, mask: np.ndarray, gain: float = 1.0, frame: np.ndarray | None = None) -> np.ndarray:
-    """An image (H, W, 3) inside `mask` (H, W), white outside; cut to the box of `frame` (H, W) bool, the mask's own without it."""
+def lit(
+    values: np.ndarray, mask: np.ndarray, gain: float = 1.0, frame: np.ndarray | None = None
+) -> np.ndarray:
+    """An image (H, W, 3) inside `mask` (H, W), white outside; cut to the box of `frame` (H, W)
+    bool, the mask's own without it.
+    """
     box = mask_slices(mask if frame is None else frame)
     return np.where(mask[box][..., None], np.clip(np.nan_to_num(values[box]) * gain, 0, 1), _PAPER)
 
@@ -43,7 +49,9 @@ def signed(error: np.ndarray, mask: np.ndarray, gain: float) -> np.ndarray:
 
 
 def relief(height: np.ndarray, mask: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    """Heights (H, W) in the colours of viridis between `limits`; white outside the mask and where unknown."""
+    """Heights (H, W) in the colours of viridis between `limits`; white outside the mask and where
+    unknown.
+    """
     share = np.clip((np.nan_to_num(height) - limits[0]) / max(limits[1] - limits[0], 1e-9), 0, 1)
     colours = np.asarray(matplotlib.colormaps["viridis"](share))[..., :3]
     shown = np.where(np.isfinite(height)[..., None], srgb_to_linear(colours), _PAPER)
@@ -57,13 +65,17 @@ def directions(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def ball(light: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """A white ball under a light of coefficients (9, 3), (160, 160, 3) linear, and which pixels it covers."""
+    """A white ball under a light of coefficients (9, 3), (160, 160, 3) linear, and which pixels it
+    covers.
+    """
     normal, coverage = sphere_normals(_BALL)
     return np.exp(real_sh(normal) @ light), coverage > 0.5
 
 
 def beside(picture: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """A square picture with white around it, in the proportions of the box of `mask` (H, W), so that a row of a sheet is of one height."""
+    """A square picture with white around it, in the proportions of the box of `mask` (H, W), so
+    that a row of a sheet is of one height.
+    """
     rows, columns = (part.stop - part.start for part in mask_slices(mask))
     side = len(picture)
     more = [max(0, round(side * (ratio - 1) / 2)) for ratio in (rows / columns, columns / rows)]

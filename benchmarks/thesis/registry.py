@@ -8,17 +8,29 @@ from isc_core.errors import InputError
 from .item import Item
 
 _MODULES = (
-    "introduction_items", "background_items", "framework_items", "filter_items", "application_items", "catalogue_items",
-    "thresholding_items", "thresholding_figures",
-    "segmentation_items", "removal_items", "sparse_coding_items", "characteristics_items", "sheets_items",
-)  # fmt: skip
+    "introduction_items",
+    "background_items",
+    "framework_items",
+    "filter_items",
+    "application_items",
+    "catalogue_items",
+    "thresholding_items",
+    "thresholding_figures",
+    "segmentation_items",
+    "removal_items",
+    "sparse_coding_items",
+    "characteristics_items",
+    "sheets_items",
+)
 
 
 @cache
 def items() -> tuple[Item, ...]:
     """Every item. matplotlib and scikit-image have to be installed."""
     modules = [importlib.import_module(f".{name}", __package__) for name in _MODULES]
-    found: list[Item] = sorted((item for module in modules for item in module.ITEMS), key=lambda item: item.order)
+    found: list[Item] = sorted(
+        (item for module in modules for item in module.ITEMS), key=lambda item: item.order
+    )
     names = [item.name for item in found]
     if twice := {name for name in names if names.count(name) > 1}:
         raise ValueError(f"listed twice: {', '.join(sorted(twice))}")
@@ -30,12 +42,16 @@ def find(kind: str, number: str) -> Item:
     known = {item.number: item for item in items() if item.kind == kind}
     if number not in known:
         near = sorted(known, key=lambda other: _distance(number, other))[:3]
-        raise InputError(f"there is no {kind} {number!r}: the nearest are {', '.join(near)} (`isc thesis list` shows all)")
+        raise InputError(
+            f"there is no {kind} {number!r}: the nearest are {', '.join(near)} (`isc thesis list` shows all)"
+        )
     return known[number]
 
 
 def _distance(asked: str, known: str) -> tuple[float, float]:
-    """How far apart two numbers like "4.5" are: by chapter, then by what follows; words are infinitely far."""
+    """How far apart two numbers like "4.5" are: by chapter, then by what follows; words are
+    infinitely far.
+    """
     try:
         chapter, _, place = asked.partition(".")
         wanted = float(chapter), float(place or 0)

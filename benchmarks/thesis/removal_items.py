@@ -1,11 +1,13 @@
-"""Tables 4.11 and 4.12: accuracy and speed of four published separations, MZK06, YCK06, YWA10 and SC09.
+"""Tables 4.11 and 4.12: accuracy and speed of four published separations, MZK06, YCK06, YWA10 and
+SC09.
 
-Each as published, as the public toolbox has it where there is one, and improved (ours: statistics inside the mask, guards for pale
-objects).
+Each as published, as the public toolbox has it where there is one, and improved (ours: statistics
+inside the mask, guards for pale objects).
 
-Citation: S. P. Mallick, T. Zickler, D. J. Kriegman, P. N. Belhumeur (2006), doi:10.1007/11744023_43; K.-J. Yoon, Y. Choi,
-I. S. Kweon (2006), doi:10.1109/ICIP.2006.312650; Q. Yang, S. Wang, N. Ahuja (2010), doi:10.1007/978-3-642-15561-1_7; H.-L. Shen,
-Q.-Y. Cai (2009), doi:10.1364/AO.48.002711.
+Citation: S. P. Mallick, T. Zickler, D. J. Kriegman, P. N. Belhumeur (2006),
+doi:10.1007/11744023_43; K.-J. Yoon, Y. Choi, I. S. Kweon (2006), doi:10.1109/ICIP.2006.312650; Q.
+Yang, S. Wang, N. Ahuja (2010), doi:10.1007/978-3-642-15561-1_7; H.-L. Shen, Q.-Y. Cai (2009),
+doi:10.1364/AO.48.002711.
 
 Limits: which images the thesis' own tables are made on is not known.
 """
@@ -34,14 +36,19 @@ def ways() -> tuple[Way, ...]:
 def _accuracy(context: Context) -> Made:
     found = {kind: run_all(context, kind, ways()) for kind in KINDS}
     overall = [summary(runs, kind, DIFFUSE, context.seed) for kind, runs in found.items()]
-    return Made((*overall, *(by_subject(runs, kind, DIFFUSE) for kind, runs in found.items())), text=_ACCURACY)
+    return Made(
+        (*overall, *(by_subject(runs, kind, DIFFUSE) for kind, runs in found.items())),
+        text=_ACCURACY,
+    )
 
 
 def _speed(context: Context) -> Made:
     whole: Runs = {}
     for kind in KINDS:
         for label, found in run_all(context, kind, ways()).items():
-            whole.setdefault(label, {}).update({f"{kind} {name}": runs for name, runs in found.items()})
+            whole.setdefault(label, {}).update(
+                {f"{kind} {name}": runs for name, runs in found.items()}
+            )
     return Made((speed(whole, _quickest, context.seed, "SC09, as published"),), text=_SPEED)
 
 

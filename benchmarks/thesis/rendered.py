@@ -1,10 +1,12 @@
 """The project's own images, rendered on first use, so that everything runs without anybody's data.
 
-"scene": glossy things under softboxes, as a photographer would take them. "glossy": the arithmetic of `isc synth glossy-mit`, on objects
-of MIT-Berkeley where a copy is given, else on our own shapes and paints: shading is exp(SH(normal)) exactly. "synth": scenes as `isc synth`
-draws them. All have the truth of every layer, laid out as that of MIT-Berkeley.
+"scene": glossy things under softboxes, as a photographer would take them. "glossy": the arithmetic
+of `isc synth glossy-mit`, on objects of MIT-Berkeley where a copy is given, else on our own shapes
+and paints: shading is exp(SH(normal)) exactly. "synth": scenes as `isc synth` draws them. All have
+the truth of every layer, laid out as that of MIT-Berkeley.
 
-Citation: H. Akbar (2016), thesis, whose MIT-Berkeley-UTeM set is not public: "glossy" stands in for it.
+Citation: H. Akbar (2016), thesis, whose MIT-Berkeley-UTeM set is not public: "glossy" stands in for
+it.
 
 Limits: what is kept in the folder is found by its name: it belongs to one version of the program.
 """
@@ -50,7 +52,10 @@ _ARRAYS = ("image", "valid", "mask", "height", "shading", "reflectance", "light"
 
 @dataclass(frozen=True)
 class _Thing:
-    """An object of ours: a member of a family of shapes, painted from a family of albedos. `exponent`, `strength`: of its gloss."""
+    """An object of ours: a member of a family of shapes, painted from a family of albedos.
+
+    `exponent`, `strength`: of its gloss.
+    """
 
     name: str
     shape: str
@@ -70,18 +75,30 @@ _SCENES = (
     _Thing("soap", "superquadric", 11, "noise", 80.0),
     _Thing("tin", "lathe", 7, "print", 120.0),
 )
-_GLOSSY = (_Thing("bowl", "lathe", 6, "patches"), _Thing("stone", "displaced", 3, "uniform"), _Thing("seal", "blobby", 11, "patches"))
+_GLOSSY = (
+    _Thing("bowl", "lathe", 6, "patches"),
+    _Thing("stone", "displaced", 3, "uniform"),
+    _Thing("seal", "blobby", 11, "patches"),
+)
 
 Layers = tuple[MitBerkeleyObject, np.ndarray]  # the truth, and the diffuse layer (H, W, 3)
 
 
 def rendered(
-    family: str, folder: Path, root: Path | None, objects: Sequence[str], size: int, seed: int, monitor: Monitor
+    family: str,
+    folder: Path,
+    root: Path | None,
+    objects: Sequence[str],
+    size: int,
+    seed: int,
+    monitor: Monitor,
 ) -> Iterator[Subject]:
-    """The subjects of a family, "scene", "glossy" or "synth", one by one, from `folder` where they are kept.
+    """The subjects of a family, "scene", "glossy" or "synth", one by one, from `folder` where they
+    are kept.
 
-    `root`, `objects`: the folder of MIT-Berkeley and which of its objects "glossy" takes; None for our own. `size`: of the square
-    pictures, pixels. Raises `InputError` where Mitsuba is not installed; `Cancelled`.
+    `root`, `objects`: the folder of MIT-Berkeley and which of its objects "glossy" takes; None for
+    our own. `size`: of the square pictures, pixels. Raises `InputError` where Mitsuba is not
+    installed; `Cancelled`.
     """
     origin = "-data" if root is not None and family == "glossy" else ""
     for name, make in _plans(family, root, objects, size, seed):
@@ -93,16 +110,31 @@ def rendered(
         yield _kept(path, name, "specular" if family == "scene" else "synthetic")
 
 
-def _plans(family: str, root: Path | None, objects: Sequence[str], size: int, seed: int) -> list[tuple[str, Callable[[Monitor], Layers]]]:
+def _plans(
+    family: str, root: Path | None, objects: Sequence[str], size: int, seed: int
+) -> list[tuple[str, Callable[[Monitor], Layers]]]:
     """Names, and what makes them."""
     if family == "scene":
         gourd = ("gourd", partial(_of_scene, demo_scene, size, seed))
-        return [gourd, *((thing.name, partial(_of_scene, partial(_scene, thing, seed), size, seed)) for thing in _SCENES)]
+        return [
+            gourd,
+            *(
+                (thing.name, partial(_of_scene, partial(_scene, thing, seed), size, seed))
+                for thing in _SCENES
+            ),
+        ]
     if family == "synth":
-        return [(f"scene{number}", partial(_of_synth, number + seed, size)) for number in _SYNTH_SEEDS]
+        return [
+            (f"scene{number}", partial(_of_synth, number + seed, size)) for number in _SYNTH_SEEDS
+        ]
     if root is not None:
-        return [(name, partial(_of_glossy, partial(load_source, root, name), seed)) for name in objects]
-    return [(thing.name, partial(_of_glossy, partial(_own_source, thing, size, seed), seed)) for thing in _GLOSSY]
+        return [
+            (name, partial(_of_glossy, partial(load_source, root, name), seed)) for name in objects
+        ]
+    return [
+        (thing.name, partial(_of_glossy, partial(_own_source, thing, size, seed), seed))
+        for thing in _GLOSSY
+    ]
 
 
 def _scene(thing: _Thing, seed: int, size: int) -> Scene:
@@ -111,7 +143,12 @@ def _scene(thing: _Thing, seed: int, size: int) -> Scene:
     albedo = make_albedo(thing.paint, shape.generator("albedo"))
     mesh = make_shape(thing.shape, shape.generator("shape"))
     material = Material(albedo, "blinn_phong", thing.exponent, thing.strength)
-    return Scene(mesh, material, make_lights("area", shape.generator("light")), camera_around(mesh, size, 0.92))
+    return Scene(
+        mesh,
+        material,
+        make_lights("area", shape.generator("light")),
+        camera_around(mesh, size, 0.92),
+    )
 
 
 def _of_scene(make: Callable[[int], Scene], size: int, seed: int, monitor: Monitor) -> Layers:
@@ -136,13 +173,24 @@ def _layers(truth: GroundTruth, name: str) -> Layers:
     seen = truth.mask & (truth.diffuse > 0).all(-1)
     layers = (truth.shading.astype(float), truth.reflectance.astype(float))
     return (
-        MitBerkeleyObject(name, "laboratory", image, seen, truth.mask, height, *layers, light_to_reference(truth.illumination)),
+        MitBerkeleyObject(
+            name,
+            "laboratory",
+            image,
+            seen,
+            truth.mask,
+            height,
+            *layers,
+            light_to_reference(truth.illumination),
+        ),
         np.minimum(truth.diffuse, 1),
     )
 
 
 def _own_source(thing: _Thing, size: int, seed: int) -> Source:
-    """An object of ours as the glossy set's arithmetic takes one of MIT-Berkeley: shape, paint and a light of its own."""
+    """An object of ours as the glossy set's arithmetic takes one of MIT-Berkeley: shape, paint and
+    a light of its own.
+    """
     shape = thing.part(seed)
     mesh = make_shape(thing.shape, shape.generator("shape"))
     material = Material(make_albedo(thing.paint, shape.generator("albedo")), "lambert")
@@ -157,7 +205,16 @@ def _own_source(thing: _Thing, size: int, seed: int) -> Source:
     rows, columns = (np.arange(side) for side in mask.shape)
     known = np.where(mask, height, np.nan)
     return Source(
-        thing.name, mask.shape, rows, columns, mask, known, truth.reflectance[mask].astype(float), normal[mask], {"natural": light}, b""
+        thing.name,
+        mask.shape,
+        rows,
+        columns,
+        mask,
+        known,
+        truth.reflectance[mask].astype(float),
+        normal[mask],
+        {"natural": light},
+        b"",
     )
 
 
@@ -166,18 +223,30 @@ def _of_glossy(find: Callable[[], Source], seed: int, monitor: Monitor) -> Layer
     source = find()
     settings = GlossySettings(levels=(_LEVEL,), seed=seed)
     made = make_layers(source, settings, monitor)
-    picture = exposed_layers(source, made["laboratory-area" if "laboratory" in made else "natural-area"], _LEVEL)
+    picture = exposed_layers(
+        source, made["laboratory-area" if "laboratory" in made else "natural-area"], _LEVEL
+    )
 
     def crop(values: np.ndarray) -> np.ndarray:
         image = np.zeros((*source.mask.shape, 3))
         image[source.mask] = values
         return image
 
-    image, diffuse = (crop(np.minimum(values, 1)) for values in (picture.diffuse + picture.specular(_LEVEL), picture.diffuse))
+    image, diffuse = (
+        crop(np.minimum(values, 1))
+        for values in (picture.diffuse + picture.specular(_LEVEL), picture.diffuse)
+    )
     layers = (crop(picture.shading), crop(source.reflectance))
     seen = source.mask & (image > 0).all(-1)
     truth = MitBerkeleyObject(
-        source.name, "laboratory", image, seen, source.mask, source.height, *layers, light_to_reference(picture.light)
+        source.name,
+        "laboratory",
+        image,
+        seen,
+        source.mask,
+        source.height,
+        *layers,
+        light_to_reference(picture.light),
     )
     return truth, diffuse
 

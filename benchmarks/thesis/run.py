@@ -1,6 +1,8 @@
-"""Making items one after the other: what is complete is kept, what fails is named at the end, and a person sees how long it takes.
+"""Making items one after the other: what is complete is kept, what fails is named at the end, and a
+person sees how long it takes.
 
-Equation: time left = time so far * (1 - f) / f, f the share of the items' expected seconds: those that a record names, else their median.
+Equation: time left = time so far * (1 - f) / f, f the share of the items' expected seconds: those
+that a record names, else their median.
 """
 
 import statistics
@@ -33,11 +35,16 @@ class Outcome:
 def make_items(wanted: Sequence[Item], context: Context, *, again: bool = False) -> Outcome:
     """Makes the items that are not complete, or all of them `again`, and the index.
 
-    Raises `InputError` where data or folder cannot be used, or where a single item was wanted and fails; `Cancelled`.
+    Raises `InputError` where data or folder cannot be used, or where a single item was wanted and
+    fails; `Cancelled`.
     """
     context.check()
     require_writable_file(context.output / "README.md")
-    missing = [item for item in wanted if again or not is_complete(context.output, item.name, context.fingerprint)]
+    missing = [
+        item
+        for item in wanted
+        if again or not is_complete(context.output, item.name, context.fingerprint)
+    ]
     failed: list[tuple[str, str]] = []
     for item, part in _watched(missing, context):
         try:
@@ -47,7 +54,8 @@ def make_items(wanted: Sequence[Item], context: Context, *, again: bool = False)
                 raise
             failed.append((f"{item.kind} {item.number}", str(error)))
         else:
-            # After each item, so that the index of a long run, or an interrupted one, is never behind.
+            # After each item, so that the index of a long run, or an interrupted one, is never
+            # behind.
             write_index(context.output, all_items())
     return Outcome(len(missing) - len(failed), len(wanted) - len(missing), tuple(failed))
 
@@ -56,8 +64,14 @@ def states(items: Sequence[Item], folder: Path) -> Iterator[str]:
     """A line for each item: what it is, whether it is made, and which claims it has a verdict on."""
     for item in items:
         record = read_record(folder, item.name)
-        state = "not regenerable" if item.make is None else "made" if record is not None else "not made"
-        said = "".join(f"\n    {verdict.holds}: {verdict.claim}" for verdict in record.verdicts) if record is not None else ""
+        state = (
+            "not regenerable" if item.make is None else "made" if record is not None else "not made"
+        )
+        said = (
+            "".join(f"\n    {verdict.holds}: {verdict.claim}" for verdict in record.verdicts)
+            if record is not None
+            else ""
+        )
         reason = f" ({item.reason})" if item.make is None else ""
         yield f"{item.kind:6s} {item.number:5s} {state:15s} {item.title}{reason}{said}"
 
@@ -70,19 +84,28 @@ def _make(item: Item, context: Context) -> None:
 
 def _watched(missing: Sequence[Item], context: Context) -> Iterator[tuple[Item, Monitor]]:
     """The items, each with the monitor of its part of the whole."""
-    known = {item.name: record.seconds for item in missing if (record := read_record(context.output, item.name)) is not None}
+    known = {
+        item.name: record.seconds
+        for item in missing
+        if (record := read_record(context.output, item.name)) is not None
+    }
     usual = statistics.median(known.values()) if known else _USUAL
     costs = [max(known.get(item.name, usual), 0.1) for item in missing]
     begin, done, total = time.monotonic(), 0.0, sum(costs)
     for number, (item, cost) in enumerate(zip(missing, costs, strict=True)):
         name = f"{item.kind} {item.number} ({number + 1} of {len(missing)})"
-        part = Monitor(_speaking(name, context.monitor, begin, done / total, (done + cost) / total), context.monitor.cancelled)
+        part = Monitor(
+            _speaking(name, context.monitor, begin, done / total, (done + cost) / total),
+            context.monitor.cancelled,
+        )
         part.report("", 0.0)
         yield item, part
         done += cost
 
 
-def _speaking(name: str, monitor: Monitor, begin: float, start: float, end: float) -> Callable[[str, float], None]:
+def _speaking(
+    name: str, monitor: Monitor, begin: float, start: float, end: float
+) -> Callable[[str, float], None]:
     """Progress inside an item, with the item's name before the stage and the time left behind it."""
 
     def progress(stage: str, fraction: float) -> None:

@@ -1,12 +1,16 @@
-"""Tables 4.5 to 4.10: highlights found by multilevel thresholds and painted over, the thresholds searched by PSO, ClonalG and CS.
+"""Tables 4.5 to 4.10: highlights found by multilevel thresholds and painted over, the thresholds
+searched by PSO, ClonalG and CS.
 
-For each kind of images, with significant specularity, synthetic, and without, an accuracy and a speed table. "As published": three
-thresholds, pixels painted over in colour; "improved": ours, one threshold, white light taken off. `exact search` finds the thresholds
-without any random number, and `doing nothing` leaves the photo as it is: what does not beat that does harm.
+For each kind of images, with significant specularity, synthetic, and without, an accuracy and a
+speed table. "As published": three thresholds, pixels painted over in colour; "improved": ours, one
+threshold, white light taken off. `exact search` finds the thresholds without any random number, and
+`doing nothing` leaves the photo as it is: what does not beat that does harm.
 
-Citation: H. Akbar, thesis (2016); see `isc_core.separation.chaotic_segmentation` and `isc_core.thresholding`.
+Citation: H. Akbar, thesis (2016); see `isc_core.separation.chaotic_segmentation` and
+`isc_core.thresholding`.
 
-Limits: which images the thesis' own tables are made on is not known beyond their kind. Seconds depend on what else the machine does.
+Limits: which images the thesis' own tables are made on is not known beyond their kind. Seconds
+depend on what else the machine does.
 """
 
 import functools
@@ -19,7 +23,12 @@ from .item import Item, Made, Table, Verdict
 from .layer_tables import DIFFUSE, KINDS, Runs, by_subject, means, run_all, speed, summary
 from .separations import NOTHING, SEGMENTATION, Way
 
-OPTIMISERS = {"PSO": "particle_swarm", "ClonalG": "clonal_selection", "CS": "chaotic_clonal", "exact search": "exact"}
+OPTIMISERS = {
+    "PSO": "particle_swarm",
+    "ClonalG": "clonal_selection",
+    "CS": "chaotic_clonal",
+    "exact search": "exact",
+}
 RUNS, QUICK_RUNS = 5, 2
 _SETTINGS = {"paper": "as published", "improved": "improved"}
 WAYS = tuple(
@@ -32,24 +41,39 @@ _CHAOS, _RIVALS = "CS, as published", ("PSO, as published", "ClonalG, as publish
 
 def _accuracy(kind: str, context: Context) -> Made:
     runs = _runs(kind, context)
-    tables = summary(runs, kind, DIFFUSE, context.seed, _chaos_of, "CS"), by_subject(runs, kind, DIFFUSE, _chaos_of, "CS")
-    return Made((tables[0], hits(runs), tables[1]), text=_ACCURACY, verdicts=(verdict(runs, "mse", "MSE", _SAME, context.seed),))
+    tables = (
+        summary(runs, kind, DIFFUSE, context.seed, _chaos_of, "CS"),
+        by_subject(runs, kind, DIFFUSE, _chaos_of, "CS"),
+    )
+    return Made(
+        (tables[0], hits(runs), tables[1]),
+        text=_ACCURACY,
+        verdicts=(verdict(runs, "mse", "MSE", _SAME, context.seed),),
+    )
 
 
 def hits(runs: Runs) -> Table:
     """How often each search marked the very pixels that the exact one marks."""
     lines = []
     for label, of_subjects in runs.items():
-        ends = [run.exact for found in of_subjects.values() for run in found if run.exact is not None]
+        ends = [
+            run.exact for found in of_subjects.values() for run in found if run.exact is not None
+        ]
         if ends:
             lines.append((label, len(ends), f"{100 * sum(ends) / len(ends):.0f} %"))
-    return Table(("method", "runs", "as the exact search"), tuple(lines), "Runs that marked the pixels which the exact search marks")
+    return Table(
+        ("method", "runs", "as the exact search"),
+        tuple(lines),
+        "Runs that marked the pixels which the exact search marks",
+    )
 
 
 def _speed(kind: str, context: Context) -> Made:
     runs = _runs(kind, context)
     return Made(
-        (speed(runs, _chaos_of, context.seed, "CS"),), text=_SPEED, verdicts=(verdict(runs, "search", "search time", _DEAR, context.seed),)
+        (speed(runs, _chaos_of, context.seed, "CS"),),
+        text=_SPEED,
+        verdicts=(verdict(runs, "search", "search time", _DEAR, context.seed),),
     )
 
 
@@ -58,15 +82,26 @@ def _runs(kind: str, context: Context) -> Runs:
 
 
 def verdict(runs: Runs, name: str, what: str, why: str, seed: int) -> Verdict:
-    """Whether CS has less of a score, `what`, than both rivals; `why`: what explains that it has not."""
+    """Whether CS has less of a score, `what`, than both rivals;
+
+    `why`: what explains that it has not.
+    """
     found = [ratio(means(runs[_CHAOS], name), means(runs[label], name), seed) for label in _RIVALS]
     here = f"{what} of CS over that of " + "; of ".join(
-        f"{label.split(',')[0]} {in_words(each)}" for label, each in zip(_RIVALS, found, strict=True)
+        f"{label.split(',')[0]} {in_words(each)}"
+        for label, each in zip(_RIVALS, found, strict=True)
     )
     if any(each is None for each in found):
-        return Verdict(CHAOS_HELPS, here, "cannot be told", "fewer than two subjects with a value above 0")
+        return Verdict(
+            CHAOS_HELPS, here, "cannot be told", "fewer than two subjects with a value above 0"
+        )
     surely = [each is not None and each.high < 1 for each in found]
-    return Verdict(CHAOS_HELPS, here, "yes" if all(surely) else "partly" if any(surely) else "no", "" if all(surely) else why)
+    return Verdict(
+        CHAOS_HELPS,
+        here,
+        "yes" if all(surely) else "partly" if any(surely) else "no",
+        "" if all(surely) else why,
+    )
 
 
 def _chaos_of(label: str) -> str | None:
@@ -86,7 +121,10 @@ _SPEED = (
     "Search: finding the thresholds, 20,000 evaluations at most, and marking the pixels above them, in processor time. Whole: the search, "
     "matching and filling. Seconds are worth no more than the quiet of the machine they were taken on."
 )
-_PARTS: tuple[tuple[str, Callable[[str, Context], Made]], ...] = (("accuracy", _accuracy), ("speed", _speed))
+_PARTS: tuple[tuple[str, Callable[[str, Context], Made]], ...] = (
+    ("accuracy", _accuracy),
+    ("speed", _speed),
+)
 
 ITEMS: tuple[Item, ...] = tuple(
     Item(

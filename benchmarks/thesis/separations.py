@@ -1,13 +1,17 @@
-"""What separations make of subjects whose layers are known: run, timed and scored once, for all tables and figures that need them.
+"""What separations make of subjects whose layers are known: run, timed and scored once, for all
+tables and figures that need them.
 
-Errors are those of `isc_core.metrics` and `isc_core.image_metrics`, inside the mask, of linear values; the peak of PSNR and SSIM is 1. A
-method that draws random numbers is run with several seeds, the others once.
+Errors are those of `isc_core.metrics` and `isc_core.image_metrics`, inside the mask, of linear
+values; the peak of PSNR and SSIM is 1. A method that draws random numbers is run with several
+seeds, the others once.
 
-Citation: LMSE: R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman (2009), doi:10.1109/ICCV.2009.5459428; SSIM: Z. Wang, A. C. Bovik,
-H. R. Sheikh, E. P. Simoncelli (2004), doi:10.1109/TIP.2003.819861.
+Citation: LMSE: R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman (2009),
+doi:10.1109/ICCV.2009.5459428; SSIM: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli (2004),
+doi:10.1109/TIP.2003.819861.
 
-Limits: of a subject without highlights no ratio to doing nothing exists, since doing nothing is right; its error is given as such. Seconds
-are of the machine as it was: compare those of one run of a table only.
+Limits: of a subject without highlights no ratio to doing nothing exists, since doing nothing is
+right; its error is given as such. Seconds are of the machine as it was: compare those of one run of
+a table only.
 """
 
 import math
@@ -32,7 +36,10 @@ SEGMENTATION = "chaotic_segmentation"
 
 @dataclass(frozen=True)
 class Way:
-    """A separation under the name that the thesis has for it: `label`; `method`, `variant` and the options that differ from it."""
+    """A separation under the name that the thesis has for it:
+
+    `label`; `method`, `variant` and the options that differ from it.
+    """
 
     label: str
     method: str
@@ -42,7 +49,9 @@ class Way:
     @property
     def key(self) -> str:
         """A name that differs from that of every other way."""
-        return "-".join([self.method, self.variant, *(f"{name}={value}" for name, value in self.changes)])
+        return "-".join(
+            [self.method, self.variant, *(f"{name}={value}" for name, value in self.changes)]
+        )
 
     def options(self, seed: int) -> dict[str, object]:
         """The options by name; the seed goes to the method that draws random numbers."""
@@ -56,9 +65,10 @@ NOTHING = Way("doing nothing", "none")
 class Scores:
     """One run of a way on one subject; None: not defined, or not measured.
 
-    `mse`, `lmse`, `ssim` of the diffuse layer; `specular_*` of the specular one. `removed`: RMS of what was taken off over the photo's
-    RMS. `seconds` of the whole; `search`: processor seconds of finding the highlights' mask by thresholds; `exact`: whether those are
-    the pixels that the exact search marks; `megapixels` inside the mask; `refused`: why there is no answer.
+    `mse`, `lmse`, `ssim` of the diffuse layer; `specular_*` of the specular one. `removed`: RMS of
+    what was taken off over the photo's RMS. `seconds` of the whole; `search`: processor seconds of
+    finding the highlights' mask by thresholds; `exact`: whether those are the pixels that the exact
+    search marks; `megapixels` inside the mask; `refused`: why there is no answer.
     """
 
     subject: str
@@ -81,13 +91,17 @@ class Scores:
 def measured(context: Context, subject: Subject, way: Way, runs: int = 1) -> list[Scores]:
     """The scores of `runs` runs, seeds counting on from the context's. Kept, see `Context.rows`."""
     key = f"separation-{subject.kind}-{subject.name}-{way.key}-{runs}"
-    rows: list[dict[str, Any]] = context.rows(key, lambda: [asdict(_run(context, subject, way, run)) for run in range(runs)])
+    rows: list[dict[str, Any]] = context.rows(
+        key, lambda: [asdict(_run(context, subject, way, run)) for run in range(runs)]
+    )
     return [Scores(**row) for row in rows]
 
 
 def split(subject: Subject, way: Way, seed: int) -> Separation:
     """The layers that a way finds. Raises `InputError` where the method refuses the photo."""
-    return separate(way.method, subject.image, subject.mask, variant=way.variant, changes=way.options(seed))
+    return separate(
+        way.method, subject.image, subject.mask, variant=way.variant, changes=way.options(seed)
+    )
 
 
 def layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
@@ -96,11 +110,17 @@ def layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     Raises `InputError` for a subject whose layers nobody knows.
     """
     if subject.diffuse is not None:
-        specular = np.maximum(subject.image - subject.diffuse, 0) if subject.specular is None else subject.specular
+        specular = (
+            np.maximum(subject.image - subject.diffuse, 0)
+            if subject.specular is None
+            else subject.specular
+        )
         return subject.diffuse, specular
     if subject.kind == "matt":
         return subject.image, np.zeros_like(subject.image)
-    raise InputError(f"{subject.name} has no true diffuse layer: choose a subject whose layers are known")
+    raise InputError(
+        f"{subject.name} has no true diffuse layer: choose a subject whose layers are known"
+    )
 
 
 def highlights(subject: Subject, way: Way, seed: int) -> np.ndarray:
@@ -116,7 +136,9 @@ def scored(subject: Subject, found: Separation) -> dict[str, Any]:
     """The errors of an answer, by the names of `Scores`."""
     mask, inside = subject.mask, subject.mask[..., None]
     diffuse, specular = (np.where(inside, layer, 0).astype(np.float64) for layer in layers(subject))
-    answer, light = (np.where(inside, layer, 0).astype(np.float64) for layer in (found.diffuse, found.specular))
+    answer, light = (
+        np.where(inside, layer, 0).astype(np.float64) for layer in (found.diffuse, found.specular)
+    )
     photo = np.where(inside, subject.image, 0).astype(np.float64)
     glossy = bool((specular[mask] > 0).any(axis=0).all())
     return {
@@ -126,7 +148,9 @@ def scored(subject: Subject, found: Separation) -> dict[str, Any]:
         "specular_mse": mse(specular, light, mask),
         "specular_lmse": lmse(specular, light, mask) if glossy else None,
         "specular_ssim": ssim(specular, light, mask),
-        "removed": math.sqrt(mse(photo, answer, mask) / max(mse(photo, np.zeros_like(photo), mask), 1e-30)),
+        "removed": math.sqrt(
+            mse(photo, answer, mask) / max(mse(photo, np.zeros_like(photo), mask), 1e-30)
+        ),
     }
 
 
@@ -148,7 +172,8 @@ def _run(context: Context, subject: Subject, way: Way, run: int) -> Scores:
 def _searched(subject: Subject, way: Way, seed: int) -> dict[str, Any]:
     """How long the search for thresholds takes, and whether it ends where the exact one does.
 
-    The least processor time of three runs: a search runs on one thread, so that what else the machine does hardly counts.
+    The least processor time of three runs: a search runs on one thread, so that what else the
+    machine does hardly counts.
     """
     times = []
     for _ in range(3):

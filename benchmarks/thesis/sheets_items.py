@@ -1,11 +1,12 @@
 """Figures 4.10 to 4.48: what every method makes of single images, as sheets to look at.
 
-4.10-4.15 segmentation and inpainting, 4.16-4.24 published separations, 4.25-4.28 Sparse Coding with SF1, SF2 and both, 4.29-4.31 the
-thesis' methods beside the iterative one and ours, 4.32-4.34 SIRFS before and 4.35-4.40 after a separation, 4.41-4.48 photos of real
-objects.
+4.10-4.15 segmentation and inpainting, 4.16-4.24 published separations, 4.25-4.28 Sparse Coding with
+SF1, SF2 and both, 4.29-4.31 the thesis' methods beside the iterative one and ours, 4.32-4.34 SIRFS
+before and 4.35-4.40 after a separation, 4.41-4.48 photos of real objects.
 
-Limits: what the thesis shows under each number of this range is not known: the order within it is ours. Where there are fewer subjects
-than numbers, the next ones show the first subjects in other settings, or by other models, so that no two figures are the same.
+Limits: what the thesis shows under each number of this range is not known: the order within it is
+ours. Where there are fewer subjects than numbers, the next ones show the first subjects in other
+settings, or by other models, so that no two figures are the same.
 """
 
 import functools
@@ -40,11 +41,18 @@ from .subjects import Subject
 Rows = list[tuple[str, Sequence[np.ndarray | None]]]
 _OPTIMISERS = SEGMENTATIONS[:3]
 _PAINTED = (*_OPTIMISERS, Way("CS, improved", SEGMENTATION))
-_PUBLISHED = tuple(Way(f"{label}, as published", method, "paper") for label, method in METHODS.items())
+_PUBLISHED = tuple(
+    Way(f"{label}, as published", method, "paper") for label, method in METHODS.items()
+)
 _IMPROVED = tuple(Way(f"{label}, improved", method) for label, method in METHODS.items())
 _OWN = {"iterative": "tan_2005", "CS": SEGMENTATION, "SC": SPARSE_CODING}
-_THESIS = (*(Way(f"{label}, improved", method) for label, method in _OWN.items()), Way("ISC", "isc"))
-_THESIS_PUBLISHED = tuple(Way(f"{label}, as published", method, "paper") for label, method in _OWN.items())
+_THESIS = (
+    *(Way(f"{label}, improved", method) for label, method in _OWN.items()),
+    Way("ISC", "isc"),
+)
+_THESIS_PUBLISHED = tuple(
+    Way(f"{label}, as published", method, "paper") for label, method in _OWN.items()
+)
 _FREE_OTHERS = (Way("SC, as published", SPARSE_CODING, "paper"), *SPECULAR_FREE[2:])
 _LATER = (SIRFS, *(one for one in BEFORE if one.label in ("SC-SIRFS", "MDR-SIRFS")), BOUND)
 _FIRST = (SIRFS, *(one for one in BEFORE if one.label != "SC-SIRFS"))
@@ -53,9 +61,14 @@ _PREFERRED = ("Cup", "Helmet", "Basketball", "Goldfish", "Hydrant", "Bag", "Guit
 
 
 def turn(index: int, subjects: Sequence[Subject], rounds: int) -> tuple[Subject, int]:
-    """The subject of the `index`-th figure of a family, and in which of its rounds. Raises `InputError` where there are too few."""
+    """The subject of the `index`-th figure of a family, and in which of its rounds.
+
+    Raises `InputError` where there are too few.
+    """
     if not subjects or index >= rounds * len(subjects):
-        raise InputError(f"{len(subjects)} images of this kind are too few for so many figures: give more with --data")
+        raise InputError(
+            f"{len(subjects)} images of this kind are too few for so many figures: give more with --data"
+        )
     return subjects[index % len(subjects)], index // len(subjects)
 
 
@@ -63,7 +76,12 @@ def separation_rows(subject: Subject, ways: Sequence[Way], seed: int) -> tuple[R
     """The truth and the photo, then each way's layers and its error; and the errors as numbers."""
     diffuse, specular = layers(subject)
     mask, gain = subject.mask, exposure(subject.image, subject.mask)
-    rows: Rows = [("truth", [lit(diffuse, mask, gain), lit(specular, mask, gain), lit(subject.image, mask, gain)])]
+    rows: Rows = [
+        (
+            "truth",
+            [lit(diffuse, mask, gain), lit(specular, mask, gain), lit(subject.image, mask, gain)],
+        )
+    ]
     nothing, lines = mse(diffuse, subject.image, mask), []
     for way in ways:
         try:
@@ -75,29 +93,61 @@ def separation_rows(subject: Subject, ways: Sequence[Way], seed: int) -> tuple[R
         error = mse(diffuse, found.diffuse, mask)
         words = f"MSE × {_short(error / nothing)}" if nothing > 0 else f"RMS {error**0.5:.2g}"
         wrong = signed(found.diffuse - diffuse, mask, gain)
-        rows.append((f"{_wrapped(way.label)}\n{words}", [lit(found.diffuse, mask, gain), lit(found.specular, mask, gain), wrong]))
-        lines.append((way.label, f"{error:.3g}", _short(error / nothing) if nothing > 0 else "-", _share(found.specular, subject)))
+        rows.append(
+            (
+                f"{_wrapped(way.label)}\n{words}",
+                [lit(found.diffuse, mask, gain), lit(found.specular, mask, gain), wrong],
+            )
+        )
+        lines.append(
+            (
+                way.label,
+                f"{error:.3g}",
+                _short(error / nothing) if nothing > 0 else "-",
+                _share(found.specular, subject),
+            )
+        )
     header = ("method", "MSE of the diffuse layer", "over doing nothing", "light taken off, %")
-    return rows, Table(header, tuple(lines), f"{subject.name}: {_share(specular, subject)} % of the light is specular")
+    return rows, Table(
+        header,
+        tuple(lines),
+        f"{subject.name}: {_share(specular, subject)} % of the light is specular",
+    )
 
 
-def characteristics_rows(context: Context, subject: Subject, frameworks: Sequence[Framework]) -> Rows:
+def characteristics_rows(
+    context: Context, subject: Subject, frameworks: Sequence[Framework]
+) -> Rows:
     """The truth and each framework's height, normals, shading, reflectance and light."""
     truth = subject.truth
     assert truth is not None
-    errors = {row.framework: row.errors["average"] for row in measured(context, [subject], frameworks)}
+    errors = {
+        row.framework: row.errors["average"] for row in measured(context, [subject], frameworks)
+    }
     shown: list[tuple[str, Estimate | None]] = [("truth", _known(truth))]
     for framework in frameworks:
         answer = estimated(context, subject, framework).answer
         words = "refuses" if answer is None else f"error {errors[framework.label]:.3f}"
-        shown.append((f"{_wrapped(framework.label)}\n{words}", None if answer is None else _levelled(answer, truth)))
+        shown.append(
+            (
+                f"{_wrapped(framework.label)}\n{words}",
+                None if answer is None else _levelled(answer, truth),
+            )
+        )
     known_heights = np.isfinite(truth.height)
-    heights = np.concatenate([answer.height[known_heights] for _, answer in shown if answer is not None])
+    heights = np.concatenate(
+        [answer.height[known_heights] for _, answer in shown if answer is not None]
+    )
     limits = float(heights.min()), float(heights.max())
-    return [(label, [None] * 5 if answer is None else _maps(answer, truth, limits)) for label, answer in shown]
+    return [
+        (label, [None] * 5 if answer is None else _maps(answer, truth, limits))
+        for label, answer in shown
+    ]
 
 
-def _maps(answer: Estimate, truth: MitBerkeleyObject, limits: tuple[float, float]) -> list[np.ndarray]:
+def _maps(
+    answer: Estimate, truth: MitBerkeleyObject, limits: tuple[float, float]
+) -> list[np.ndarray]:
     """One row of a sheet: an answer's maps, those of free scale in the truth's scale and exposure."""
     seen, mask = truth.valid & np.isfinite(truth.height), truth.mask
     colours = [
@@ -107,19 +157,28 @@ def _maps(answer: Estimate, truth: MitBerkeleyObject, limits: tuple[float, float
     (true_lamp, covered), (lamp, _) = ball(light_from_reference(truth.light)), ball(answer.light)
     light = lit(fitted(lamp, true_lamp, covered), covered, exposure(true_lamp, covered))
     height = np.where(np.isfinite(truth.height), answer.height, np.nan)
-    return [relief(height, mask, limits), directions(answer.normal, mask), *colours, beside(light, mask)]
+    return [
+        relief(height, mask, limits),
+        directions(answer.normal, mask),
+        *colours,
+        beside(light, mask),
+    ]
 
 
 def _known(truth: MitBerkeleyObject) -> Estimate:
     """The truth as if it were an answer."""
     light = light_from_reference(truth.light)
-    answer = Estimate(truth.height, truth_normal(truth.height), truth.shading, truth.reflectance, light)
+    answer = Estimate(
+        truth.height, truth_normal(truth.height), truth.shading, truth.reflectance, light
+    )
     return _levelled(answer, truth)
 
 
 def _levelled(answer: Estimate, truth: MitBerkeleyObject) -> Estimate:
     """The answer with its median height at 0: the offset is not known."""
-    return replace(answer, height=answer.height - np.median(answer.height[np.isfinite(truth.height)]))
+    return replace(
+        answer, height=answer.height - np.median(answer.height[np.isfinite(truth.height)])
+    )
 
 
 def _masks(kind: str, context: Context) -> Made:
@@ -134,8 +193,19 @@ def _masks(kind: str, context: Context) -> Made:
         rows.append((subject.name, [lit(subject.image, subject.mask, gain), *pictures]))
         for name, pixels in zip(names, found, strict=True):
             both = int((pixels & true).sum())
-            lines.append((subject.name, name, int(pixels.sum()), _percent(both, int(pixels.sum())), _percent(both, int(true.sum()))))
-    table = Table(("image", "search", "pixels marked", "of them highlights, %", "of the highlights, %"), tuple(lines))
+            lines.append(
+                (
+                    subject.name,
+                    name,
+                    int(pixels.sum()),
+                    _percent(both, int(pixels.sum())),
+                    _percent(both, int(true.sum())),
+                )
+            )
+    table = Table(
+        ("image", "search", "pixels marked", "of them highlights, %", "of the highlights, %"),
+        tuple(lines),
+    )
     text = (
         "Orange: the pixels above the highest of three thresholds of the smallest channel, as each search finds them; in the last column, "
         "those where the true specular layer has at least a tenth of its strongest light."
@@ -151,7 +221,9 @@ def _layers(kind: str, rounds: Sequence[Sequence[Way]], index: int, context: Con
         "highlight, its RMS error. Errors: orange is light left over, blue is paint taken for light, in full colour from a tenth of the "
         "photo's white on."
     )
-    return Made((table,), (sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),), text)
+    return Made(
+        (table,), (sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),), text
+    )
 
 
 def _characteristics(rounds: Sequence[Sequence[Framework]], index: int, context: Context) -> Made:
@@ -170,18 +242,27 @@ def _photo(index: int, context: Context) -> Made:
     subjects = sorted(context.photos(), key=lambda subject: order.get(subject.name, len(order)))
     subject, which = turn(index, subjects, len(_MODELS))
     model = list(_MODELS)[which]
-    source = "its truth is not known" if context.has_photos else "no photos were given, a rendered object stands in for one"
+    source = (
+        "its truth is not known"
+        if context.has_photos
+        else "no photos were given, a rendered object stands in for one"
+    )
     text = f"{subject.name}, by {_MODELS[model]}; {source}. Photo, diffuse and specular share an exposure, the rest has its own. {COLOURS}"
     found = decomposed(context, subject, model)
     heights = found.height[found.mask]
-    lines = (("light taken off, %", _share(found.specular, subject)), ("range of heights, pixels", f"{np.ptp(heights):.0f}"))
+    lines = (
+        ("light taken off, %", _share(found.specular, subject)),
+        ("range of heights, pixels", f"{np.ptp(heights):.0f}"),
+    )
     return Made((Table(("what", "here"), lines),), (panels(characteristics(found), 4),), text)
 
 
 def _share(specular: np.ndarray, subject: Subject) -> str:
     """How much of the subject's light a layer holds, per cent; a model may work at another size."""
     layer = specular.astype(float).sum() / specular.shape[0] / specular.shape[1]
-    photo = np.where(subject.mask[..., None], subject.image, 0).astype(float).mean(axis=(0, 1)).sum()
+    photo = (
+        np.where(subject.mask[..., None], subject.image, 0).astype(float).mean(axis=(0, 1)).sum()
+    )
     return f"{100 * layer / max(photo, 1e-30):.2f}"
 
 
@@ -195,33 +276,74 @@ def _short(value: float) -> str:
 
 def _wrapped(label: str) -> str:
     """A label of a row in lines that fit beside the sheet."""
-    return label.replace(", ", ",\n").replace(" with ", "\nwith ").replace(" on the true ", "\non the true\n")
+    return (
+        label.replace(", ", ",\n")
+        .replace(" with ", "\nwith ")
+        .replace(" on the true ", "\non the true\n")
+    )
 
 
-_KINDS = {"specular": "significant specularity", "synthetic": "a synthetic image", "matt": "an image without specularity"}
+_KINDS = {
+    "specular": "significant specularity",
+    "synthetic": "a synthetic image",
+    "matt": "an image without specularity",
+}
 _Plan = tuple[str, Callable[[Context], Made]]
 
 
 def _family(words: str, kind: str, rounds: Sequence[Sequence[Way]], count: int) -> list[_Plan]:
-    return [(f"{words}: {_KINDS[kind]} ({index + 1})", functools.partial(_layers, kind, rounds, index)) for index in range(count)]
+    return [
+        (f"{words}: {_KINDS[kind]} ({index + 1})", functools.partial(_layers, kind, rounds, index))
+        for index in range(count)
+    ]
 
 
 def _plans() -> list[_Plan]:
     plans: list[_Plan] = [
-        (f"Highlights found by PSO, ClonalG and CS: {words}", functools.partial(_masks, kind)) for kind, words in KINDS.items()
+        (f"Highlights found by PSO, ClonalG and CS: {words}", functools.partial(_masks, kind))
+        for kind, words in KINDS.items()
     ]
     for kind in _KINDS:
         plans += _family("Highlights painted over after PSO, ClonalG and CS", kind, (_PAINTED,), 1)
     for kind, count in (("specular", 4), ("synthetic", 3), ("matt", 2)):
-        plans += _family("Layers by MZK06, YCK06, YWA10 and SC09", kind, (_PUBLISHED, _IMPROVED), count)
+        plans += _family(
+            "Layers by MZK06, YCK06, YWA10 and SC09", kind, (_PUBLISHED, _IMPROVED), count
+        )
     for kind, count in (("specular", 2), ("synthetic", 1), ("matt", 1)):
-        plans += _family("Layers by Sparse Coding with SF1, SF2 and both", kind, (SPECULAR_FREE, _FREE_OTHERS), count)
+        plans += _family(
+            "Layers by Sparse Coding with SF1, SF2 and both",
+            kind,
+            (SPECULAR_FREE, _FREE_OTHERS),
+            count,
+        )
     for kind, count in (("specular", 2), ("synthetic", 1)):
-        plans += _family("Layers by the iterative method, CS, SC and ISC", kind, (_THESIS, _THESIS_PUBLISHED), count)
+        plans += _family(
+            "Layers by the iterative method, CS, SC and ISC",
+            kind,
+            (_THESIS, _THESIS_PUBLISHED),
+            count,
+        )
     after, before = ((SIRFS, *AFTER), (SIRFS, AFTER[-1], BOUND)), (_FIRST, _LATER)
-    plans += [(f"Characteristics by SIRFS before a separation ({i + 1})", functools.partial(_characteristics, after, i)) for i in range(3)]
-    plans += [(f"Characteristics by SIRFS after a separation ({i + 1})", functools.partial(_characteristics, before, i)) for i in range(6)]
-    return plans + [(f"Characteristics of a real object's photo ({i + 1})", functools.partial(_photo, i)) for i in range(8)]
+    plans += [
+        (
+            f"Characteristics by SIRFS before a separation ({i + 1})",
+            functools.partial(_characteristics, after, i),
+        )
+        for i in range(3)
+    ]
+    plans += [
+        (
+            f"Characteristics by SIRFS after a separation ({i + 1})",
+            functools.partial(_characteristics, before, i),
+        )
+        for i in range(6)
+    ]
+    return plans + [
+        (f"Characteristics of a real object's photo ({i + 1})", functools.partial(_photo, i))
+        for i in range(8)
+    ]
 
 
-ITEMS: tuple[Item, ...] = tuple(Item("figure", f"4.{10 + place}", title, make) for place, (title, make) in enumerate(_plans()))
+ITEMS: tuple[Item, ...] = tuple(
+    Item("figure", f"4.{10 + place}", title, make) for place, (title, make) in enumerate(_plans())
+)

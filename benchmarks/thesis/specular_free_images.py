@@ -1,4 +1,5 @@
-"""The specular-free images that the code has, and how much of a highlight is left in each: measured where the diffuse layer is known.
+"""The specular-free images that the code has, and how much of a highlight is left in each: measured
+where the diffuse layer is known.
 
 Equation: with P(I) an image made of the photo I and P(D) the same made of its diffuse layer,
 
@@ -7,7 +8,8 @@ Equation: with P(I) an image made of the photo I and P(D) the same made of its d
 m being the median of P(I) - P(D), since an image that is brighter everywhere shows no highlight:
 0 where highlights do not reach it at all, 1 where all of their light is in it.
 
-Limits: of images that have a unit of their own (chromaticities, angles) no such share exists; they are not listed.
+Limits: of images that have a unit of their own (chromaticities, angles) no such share exists; they
+are not listed.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,8 +27,9 @@ Images = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class SpecularFree:
-    """A kind of them. `formula`: in words of mathematics; `citation`: with DOI; `function`: where it is; `methods`: which separations
-    compare with it; `make(image, mask)`: (H, W, 3)."""
+    """A kind of them. `formula`: in words of mathematics; `citation`: with DOI; `function`: where
+    it is; `methods`: which separations compare with it; `make(image, mask)`: (H, W, 3).
+    """
 
     name: str
     formula: str
@@ -44,35 +47,66 @@ def _dark(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 _HOME = "isc_core.separation.specular_free"
 KINDS = (
     SpecularFree(
-        "fixed chromaticity (SF1)", "I − w, w = (max I − c ΣI) / (1 − 3c), c = .6", "Tan & Ikeuchi 2005, doi:10.1109/TPAMI.2005.36",
-        f"{_HOME}.fixed_chromaticity", "tan_2005, sparse_coding", lambda image, mask: specular_free.fixed_chromaticity(image),
+        "fixed chromaticity (SF1)",
+        "I − w, w = (max I − c ΣI) / (1 − 3c), c = .6",
+        "Tan & Ikeuchi 2005, doi:10.1109/TPAMI.2005.36",
+        f"{_HOME}.fixed_chromaticity",
+        "tan_2005, sparse_coding",
+        lambda image, mask: specular_free.fixed_chromaticity(image),
     ),
     SpecularFree(
-        "two-band (SF2)", "I − min I", "Yoon, Choi & Kweon 2006, doi:10.1109/ICIP.2006.312650",
-        f"{_HOME}.two_band", "yoon_2006, sparse_coding, chaotic_segmentation", lambda image, mask: specular_free.two_band(image),
+        "two-band (SF2)",
+        "I − min I",
+        "Yoon, Choi & Kweon 2006, doi:10.1109/ICIP.2006.312650",
+        f"{_HOME}.two_band",
+        "yoon_2006, sparse_coding, chaotic_segmentation",
+        lambda image, mask: specular_free.two_band(image),
     ),
     SpecularFree(
-        "lifted two-band", "I − min I + u, u = mean of min I", "Shen & Zheng 2013, doi:10.1364/AO.52.004483",
-        f"{_HOME}.lifted_two_band", "shen_2013", specular_free.lifted_two_band,
+        "lifted two-band",
+        "I − min I + u, u = mean of min I",
+        "Shen & Zheng 2013, doi:10.1364/AO.52.004483",
+        f"{_HOME}.lifted_two_band",
+        "shen_2013",
+        specular_free.lifted_two_band,
     ),
     SpecularFree(
-        "modified", "I − max(min I − T, 0), T = mean + ½ deviation of min I", "Shen & Cai 2009, doi:10.1364/AO.48.002711",
-        f"{_HOME}.modified", "shen_2009", specular_free.modified,
+        "modified",
+        "I − max(min I − T, 0), T = mean + ½ deviation of min I",
+        "Shen & Cai 2009, doi:10.1364/AO.48.002711",
+        f"{_HOME}.modified",
+        "shen_2009",
+        specular_free.modified,
     ),
     SpecularFree(
-        "less the dark channel", "I − min of all channels in 7 × 7 pixels", "Kim, Jin, Hadap & Kweon 2013, doi:10.1109/CVPR.2013.192",
-        f"{_HOME}.less_dark_channel", "kim_2013", specular_free.less_dark_channel,
+        "less the dark channel",
+        "I − min of all channels in 7 × 7 pixels",
+        "Kim, Jin, Hadap & Kweon 2013, doi:10.1109/CVPR.2013.192",
+        f"{_HOME}.less_dark_channel",
+        "kim_2013",
+        specular_free.less_dark_channel,
     ),
-)  # fmt: skip
+)
 PHOTO = SpecularFree("photo", "I", "", "", "none", lambda image, mask: image)
-DARK = SpecularFree("dark channel", "min of all channels in 7 × 7 pixels", KINDS[-1].citation, f"{_HOME}.dark_channel", "kim_2013", _dark)
+DARK = SpecularFree(
+    "dark channel",
+    "min of all channels in 7 × 7 pixels",
+    KINDS[-1].citation,
+    f"{_HOME}.dark_channel",
+    "kim_2013",
+    _dark,
+)
 
 
 def highlight_left(kind: SpecularFree, subject: Subject) -> float:
-    """The share of the highlights' light that is left in the image. `subject` has a diffuse layer, and highlights."""
+    """The share of the highlights' light that is left in the image.
+
+    `subject` has a diffuse layer, and highlights.
+    """
     assert subject.diffuse is not None
     made, bare = (
-        kind.make(np.where(subject.mask[..., None], of, 0).astype(float), subject.mask) for of in (subject.image, subject.diffuse)
+        kind.make(np.where(subject.mask[..., None], of, 0).astype(float), subject.mask)
+        for of in (subject.image, subject.diffuse)
     )
     light = np.abs(subject.image - subject.diffuse)[subject.mask].sum(dtype=float)
     change = (made - bare)[subject.mask]
@@ -81,7 +115,11 @@ def highlight_left(kind: SpecularFree, subject: Subject) -> float:
 
 def with_layers(subjects: Sequence[Subject]) -> list[Subject]:
     """Those whose diffuse layer is known and differs from the image."""
-    return [one for one in subjects if one.diffuse is not None and np.abs(one.image - one.diffuse)[one.mask].sum() > 0]
+    return [
+        one
+        for one in subjects
+        if one.diffuse is not None and np.abs(one.image - one.diffuse)[one.mask].sum() > 0
+    ]
 
 
 def titled(subject: Subject) -> str:

@@ -1,9 +1,11 @@
-"""How every figure looks: one size of letters, colours that colour-blind people tell apart, images in sRGB.
+"""How every figure looks: one size of letters, colours that colour-blind people tell apart, images
+in sRGB.
 
-matplotlib's objects are used directly, without its global state, so that nothing has to be closed or reset.
+matplotlib's objects are used directly, without its global state, so that nothing has to be closed
+or reset.
 
-Citation: M. Okabe, K. Ito, "Color universal design" (2008) (the eight colours); the maps viridis and cividis: J. R. Nuñez,
-C. R. Anderton, R. S. Renslow (2018), doi:10.1371/journal.pone.0199239.
+Citation: M. Okabe, K. Ito, "Color universal design" (2008) (the eight colours); the maps viridis
+and cividis: J. R. Nuñez, C. R. Anderton, R. S. Renslow (2018), doi:10.1371/journal.pone.0199239.
 
 Limits: values above 1 are shown as 1.
 """
@@ -30,11 +32,22 @@ _GAP = 0.03  # inches between the rows of a sheet
 
 
 def figure(
-    rows: int, columns: int, *, width: float = WIDTH, height: float | None = None, sharex: bool = False, sharey: bool = False
+    rows: int,
+    columns: int,
+    *,
+    width: float = WIDTH,
+    height: float | None = None,
+    sharex: bool = False,
+    sharey: bool = False,
 ) -> tuple[Figure, np.ndarray]:
-    """A figure and its axes (rows, columns). `width`, `height`: inches; without a height, rows get three quarters of a column's width."""
+    """A figure and its axes (rows, columns).
+
+    `width`, `height`: inches; without a height, rows get three quarters of a column's width.
+    """
     tall = height if height is not None else max(2.2, 0.75 * width * rows / columns)
-    with matplotlib.rc_context({"font.size": LETTERS, "axes.titlesize": LETTERS, "axes.linewidth": 0.6}):
+    with matplotlib.rc_context(
+        {"font.size": LETTERS, "axes.titlesize": LETTERS, "axes.linewidth": 0.6}
+    ):
         made = Figure(figsize=(width, tall), dpi=DPI, layout="constrained")
         axes = made.subplots(rows, columns, squeeze=False, sharex=sharex, sharey=sharey)
     for each in axes.flat:
@@ -52,10 +65,15 @@ def finish(made: Figure) -> None:
 
 
 def tabulated(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Figure:
-    """A picture of a table, for where Markdown is not shown: columns as wide as their longest cell, every second row shaded."""
+    """A picture of a table, for where Markdown is not shown: columns as wide as their longest cell,
+    every second row shaded.
+    """
     columns = zip(header, *rows, strict=True)
     lengths = [max([round(_BOLD * len(head)), *map(len, cells)]) + 2 for head, *cells in columns]
-    width, height = max(4.0, _LETTER * sum(lengths)), _LINE * 1.15 * (len(rows) + 1) + (_LINE * 1.6 if caption else 0.05)
+    width, height = (
+        max(4.0, _LETTER * sum(lengths)),
+        _LINE * 1.15 * (len(rows) + 1) + (_LINE * 1.6 if caption else 0.05),
+    )
     made = Figure(figsize=(width, height), dpi=DPI)
     axes = made.add_axes((0, 0, 1, (height - (_LINE * 1.5 if caption else 0)) / height))
     axes.set(xlim=(0, sum(lengths)), ylim=(len(rows) + 1, 0))
@@ -75,7 +93,14 @@ def tabulated(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str
             )
     axes.axhline(1, color="0", linewidth=0.6)
     if caption:
-        made.text(0.01, 1 - _LINE * 0.75 / height, caption.replace("`", ""), fontsize=LETTERS, va="center", parse_math=False)
+        made.text(
+            0.01,
+            1 - _LINE * 0.75 / height,
+            caption.replace("`", ""),
+            fontsize=LETTERS,
+            va="center",
+            parse_math=False,
+        )
     return made
 
 
@@ -84,13 +109,20 @@ def legend(axes: Axes, where: str = "best", columns: int = 1) -> None:
     axes.legend(fontsize=LETTERS - 1, frameon=False, loc=where, ncols=columns)
 
 
-def show(axes: Axes, image_linear: np.ndarray, title: str = "", mask: np.ndarray | None = None) -> None:
-    """Draws an image (H, W, 3), or (H, W) as grey, of linear light in sRGB, white outside `mask` (H, W), without ticks."""
+def show(
+    axes: Axes, image_linear: np.ndarray, title: str = "", mask: np.ndarray | None = None
+) -> None:
+    """Draws an image (H, W, 3), or (H, W) as grey, of linear light in sRGB, white outside `mask`
+    (H, W), without ticks.
+    """
     image = np.asarray(image_linear, float)
     image = np.repeat(image[..., None], 3, -1) if image.ndim == 2 else image
     # Rounded here: matplotlib cuts off, which leaves white a shade darker than the paper around it.
     coded = np.round(255 * linear_to_srgb(np.clip(np.nan_to_num(image), 0, 1))).astype(np.uint8)
-    axes.imshow(coded if mask is None else np.where(mask[..., None], coded, np.uint8(255)), interpolation="antialiased")
+    axes.imshow(
+        coded if mask is None else np.where(mask[..., None], coded, np.uint8(255)),
+        interpolation="antialiased",
+    )
     _bare(axes, title)
 
 
@@ -98,7 +130,9 @@ def show_map(
     axes: Axes, values: np.ndarray, title: str = "", mask: np.ndarray | None = None, *, limits: tuple[float, float] | None = None,
     colours: str = "viridis", label: str = "",
 ) -> None:  # fmt: skip
-    """Draws a map of numbers (H, W) in the colours of "viridis" or "cividis", white outside `mask`; a `label` adds a bar of colours."""
+    """Draws a map of numbers (H, W) in the colours of "viridis" or "cividis", white outside `mask`;
+    a `label` adds a bar of colours.
+    """
     shown = np.ma.masked_invalid(values if mask is None else np.where(mask, values, np.nan))
     low, high = limits if limits is not None else (None, None)
     picture = axes.imshow(shown, cmap=colours, vmin=low, vmax=high, interpolation="nearest")
@@ -110,15 +144,27 @@ def show_map(
 
 
 def normal_colours(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Unit normals (H, W, 3) as an image of linear light that `show` draws in the usual colours, (n + 1) / 2; white outside the mask."""
+    """Unit normals (H, W, 3) as an image of linear light that `show` draws in the usual colours, (n
+    + 1) / 2; white outside the mask.
+    """
     coded = np.where(mask[..., None], (np.asarray(normal, float) + 1) / 2, 1.0)
-    return np.where(coded <= 0.04045, coded / 12.92, ((np.maximum(coded, 0) + 0.055) / 1.055) ** 2.4)
+    return np.where(
+        coded <= 0.04045, coded / 12.92, ((np.maximum(coded, 0) + 0.055) / 1.055) ** 2.4
+    )
 
 
 def exposure(image_linear: np.ndarray, mask: np.ndarray | None = None) -> float:
     """The gain with which an image is shown: all but its brightest hundredth stays below .9."""
-    inside = image_linear[mask] if mask is not None else image_linear.reshape(-1, *image_linear.shape[2:])
-    peak = float(np.quantile(inside.max(-1) if inside.ndim > 1 else inside, 0.99)) if inside.size else 0.0
+    inside = (
+        image_linear[mask]
+        if mask is not None
+        else image_linear.reshape(-1, *image_linear.shape[2:])
+    )
+    peak = (
+        float(np.quantile(inside.max(-1) if inside.ndim > 1 else inside, 0.99))
+        if inside.size
+        else 0.0
+    )
     return _BRIGHT / peak if peak > 0 else 1.0
 
 
@@ -129,19 +175,41 @@ def sheet(
     width: float = WIDTH,
     expose: bool | Sequence[bool] = True,
 ) -> Figure:
-    """A labelled contact sheet of linear images, (H, W, 3) or (H, W) each; None leaves a cell empty.
+    """A labelled contact sheet of linear images, (H, W, 3) or (H, W) each; None leaves a cell
+    empty.
 
-    `expose`: whether the images of a row are brightened together, by what its first image needs; one answer for each column, or for all.
+    `expose`: whether the images of a row are brightened together, by what its first image needs;
+    one answer for each column, or for all.
     """
     exposed = [expose] * len(columns) if isinstance(expose, bool) else list(expose)
     cell = (width - _LABEL) / len(columns)
-    heights = [max([image.shape[0] / image.shape[1] for image in images if image is not None] or [1.0]) * cell for _, images in rows]
-    made, axes = figure(len(rows), len(columns), width=width, height=sum(heights) + _LINE * 1.5 + _GAP * len(rows))
-    made.set_layout_engine("constrained", w_pad=_GAP / 2, h_pad=_GAP / 2, wspace=0.0, hspace=0.0, rect=(0.01, 0, 0.99, 1))
+    heights = [
+        max([image.shape[0] / image.shape[1] for image in images if image is not None] or [1.0])
+        * cell
+        for _, images in rows
+    ]
+    made, axes = figure(
+        len(rows), len(columns), width=width, height=sum(heights) + _LINE * 1.5 + _GAP * len(rows)
+    )
+    made.set_layout_engine(
+        "constrained",
+        w_pad=_GAP / 2,
+        h_pad=_GAP / 2,
+        wspace=0.0,
+        hspace=0.0,
+        rect=(0.01, 0, 0.99, 1),
+    )
     grid = axes[0, 0].get_gridspec()
     grid.set_height_ratios(heights)
     for line, (name, images) in enumerate(rows):
-        first = next((image for image, brighten in zip(images, exposed, strict=True) if image is not None and brighten), None)
+        first = next(
+            (
+                image
+                for image, brighten in zip(images, exposed, strict=True)
+                if image is not None and brighten
+            ),
+            None,
+        )
         gain = 1.0 if first is None else exposure(first)
         for column, image in enumerate(images):
             place = axes[line, column]

@@ -1,8 +1,11 @@
-"""Figures 3.5 to 3.8, the mutation rate and the chaotic numbers, and 4.1 to 4.9, nine images with their thresholds.
+"""Figures 3.5 to 3.8, the mutation rate and the chaotic numbers, and 4.1 to 4.9, nine images with
+their thresholds.
 
-Citation: those of `isc_core.thresholding.clonal_selection` and `isc_core.thresholding.logistic_map`.
+Citation: those of `isc_core.thresholding.clonal_selection` and
+`isc_core.thresholding.logistic_map`.
 
-Limits: the images are scikit-image's, the thesis' own nine are not freely packaged; their order is ours.
+Limits: the images are scikit-image's, the thesis' own nine are not freely packaged; their order is
+ours.
 """
 
 from functools import partial
@@ -12,7 +15,13 @@ import numpy as np
 from isc_core.photo import srgb_to_linear
 from isc_core.thresholding import exact
 from isc_core.thresholding.clonal_selection import mutation_rate
-from isc_core.thresholding.logistic_map import ChaoticNumbers, bifurcation, density, orbit, uniformised
+from isc_core.thresholding.logistic_map import (
+    ChaoticNumbers,
+    bifurcation,
+    density,
+    orbit,
+    uniformised,
+)
 
 from ..thresholding import COUNTS, IMAGES, levels
 from .context import Context
@@ -32,14 +41,28 @@ def mutation(context: Context) -> Made:
     affinity = np.linspace(0, 1, 201)
     made, axes = figure(1, 1, width=4.5, height=3.0)
     for decay, line in zip(_DECAYS, _LINES, strict=True):
-        axes[0, 0].plot(affinity, mutation_rate(affinity, decay), line, label=rf"$\rho$ = {decay:g}")
-    axes[0, 0].set(xlabel="affinity f", ylabel=r"mutation rate $e^{-\rho f}$", xlim=(0, 1), ylim=(0, 1))
+        axes[0, 0].plot(
+            affinity, mutation_rate(affinity, decay), line, label=rf"$\rho$ = {decay:g}"
+        )
+    axes[0, 0].set(
+        xlabel="affinity f", ylabel=r"mutation rate $e^{-\rho f}$", xlim=(0, 1), ylim=(0, 1)
+    )
     legend(axes[0, 0])
     at = np.linspace(0, 1, 5)
     rates = [mutation_rate(at, decay).tolist() for decay in _DECAYS]
-    rows: tuple[tuple[Cell, ...], ...] = tuple((float(f), *row) for f, row in zip(at, zip(*rates, strict=True), strict=True))
-    table = Table(("affinity", *(f"rho = {decay:g}" for decay in _DECAYS)), rows, "The mutation rate exp(-rho f).")
-    return Made((table,), (made,), "The better an antibody, the smaller the steps of its clones. The searches here use rho = 5.")
+    rows: tuple[tuple[Cell, ...], ...] = tuple(
+        (float(f), *row) for f, row in zip(at, zip(*rates, strict=True), strict=True)
+    )
+    table = Table(
+        ("affinity", *(f"rho = {decay:g}" for decay in _DECAYS)),
+        rows,
+        "The mutation rate exp(-rho f).",
+    )
+    return Made(
+        (table,),
+        (made,),
+        "The better an antibody, the smaller the steps of its clones. The searches here use rho = 5.",
+    )
 
 
 def branching(context: Context) -> Made:
@@ -50,10 +73,26 @@ def branching(context: Context) -> Made:
     places = np.broadcast_to(rates, ends.shape).ravel()
     axes[0, 0].plot(places, ends.ravel(), ",", color=OKABE_ITO[0], alpha=0.25, rasterized=True)
     axes[0, 0].set(xlabel="r", ylabel="values that the map ends in", xlim=(2.8, 4), ylim=(0, 1))
-    known = ((2.9, "a fixed point"), (3.2, "period 2"), (3.5, "period 4"), (3.83, "period 3"), (4.0, "chaos on [0, 1]"))
-    rows = tuple((rate, what, _distinct(bifurcation(np.array([rate]))[:, 0])) for rate, what in known)
-    table = Table(("r", "what is known", "distinct values of 200"), rows, "The logistic map x <- r x (1 - x) at some rates.")
-    return Made((table,), (made,), "Only at r = 4 does the orbit fill the whole interval: that is where chaotic numbers are taken from.")
+    known = (
+        (2.9, "a fixed point"),
+        (3.2, "period 2"),
+        (3.5, "period 4"),
+        (3.83, "period 3"),
+        (4.0, "chaos on [0, 1]"),
+    )
+    rows = tuple(
+        (rate, what, _distinct(bifurcation(np.array([rate]))[:, 0])) for rate, what in known
+    )
+    table = Table(
+        ("r", "what is known", "distinct values of 200"),
+        rows,
+        "The logistic map x <- r x (1 - x) at some rates.",
+    )
+    return Made(
+        (table,),
+        (made,),
+        "Only at r = 4 does the orbit fill the whole interval: that is where chaotic numbers are taken from.",
+    )
 
 
 def distribution(context: Context) -> Made:
@@ -62,7 +101,11 @@ def distribution(context: Context) -> Made:
     edges = np.linspace(0, 1, 51)
     made, axes = figure(1, 1, width=4.5, height=3.0)
     axes[0, 0].stairs(
-        np.histogram(values, edges, density=True)[0], edges, fill=True, color=OKABE_ITO[5], label=f"orbit of {_NUMBERS:,} values"
+        np.histogram(values, edges, density=True)[0],
+        edges,
+        fill=True,
+        color=OKABE_ITO[5],
+        label=f"orbit of {_NUMBERS:,} values",
     )
     inner = np.linspace(0.002, 0.998, 500)
     axes[0, 0].plot(inner, density(inner), color=OKABE_ITO[1], label=r"$1\,/\,(\pi\sqrt{x(1-x)})$")
@@ -77,8 +120,14 @@ def distribution(context: Context) -> Made:
         ("within .06 of an end", ends, float(2 * law[3])),
         ("largest error of a bin's share", float(np.abs(counted - np.diff(law)).max()), 0.0),
     )
-    table = Table(("of the orbit", "measured", "by the law"), rows, "The orbit at r = 4 against its law.")
-    return Made((table,), (made,), "An orbit stays near the ends of the interval: used as it is, it is far from uniform.")
+    table = Table(
+        ("of the orbit", "measured", "by the law"), rows, "The orbit at r = 4 against its law."
+    )
+    return Made(
+        (table,),
+        (made,),
+        "An orbit stays near the ends of the interval: used as it is, it is far from uniform.",
+    )
 
 
 def generators(context: Context) -> Made:
@@ -96,20 +145,41 @@ def generators(context: Context) -> Made:
         shares = np.histogram(numbers, edges, density=True)[0]
         axes[0, column].stairs(shares, edges, fill=True, color=OKABE_ITO[column])
         axes[0, column].set(title=name, ylim=(0, 1.3))
-        axes[1, column].plot(numbers[:4000], numbers[1:4001], ".", markersize=1, color=OKABE_ITO[column], rasterized=True)
+        axes[1, column].plot(
+            numbers[:4000],
+            numbers[1:4001],
+            ".",
+            markersize=1,
+            color=OKABE_ITO[column],
+            rasterized=True,
+        )
         axes[1, column].set(xlabel="u", xlim=(0, 1), ylim=(0, 1))
         expected = _NUMBERS / 50
         chi = float(np.square(np.histogram(numbers, edges)[0] - expected).sum() / expected)
         joint = np.histogram2d(numbers[:-1], numbers[1:], bins=10)[0]
-        rows.append((name, chi, float(np.corrcoef(numbers[:-1], numbers[1:])[0, 1]), int((joint == 0).sum())))
+        rows.append(
+            (
+                name,
+                chi,
+                float(np.corrcoef(numbers[:-1], numbers[1:])[0, 1]),
+                int((joint == 0).sum()),
+            )
+        )
     axes[0, 0].set_ylabel("density")
     axes[1, 0].set_ylabel("next u")
-    header = ("numbers", "chi square of 50 bins (49 expected)", "correlation with the next", "empty cells of 10 x 10 pairs")
+    header = (
+        "numbers",
+        "chi square of 50 bins (49 expected)",
+        "correlation with the next",
+        "empty cells of 10 x 10 pairs",
+    )
     text = (
         "All three are close to uniform. Below, each number against the next: in one orbit, each is a function of the one before, which "
         "correlation does not see and pairs do. With many orbits, and every eighth value of them, nothing of it is left."
     )
-    return Made((Table(header, tuple(rows), f"{_NUMBERS:,} numbers of each source."),), (made,), text)
+    return Made(
+        (Table(header, tuple(rows), f"{_NUMBERS:,} numbers of each source."),), (made,), text
+    )
 
 
 def thresholded(context: Context, name: str) -> Made:
@@ -126,14 +196,36 @@ def thresholded(context: Context, name: str) -> Made:
         searched = runs(context, "CS", name, count).thresholds[0]
         show(axes[0, column], srgb_to_linear(_classes(image, found) / 255), f"{count} thresholds")
         for number, level in enumerate(found):
-            axes[1, column].axvline(level, color=OKABE_ITO[1], linewidth=0.9, label="exact" if number == 0 else None)
-        axes[1, column].plot(searched, np.full(count, top * 0.94), "v", color=OKABE_ITO[0], markersize=4, label="CS, one run")
-        rows.append((count, " ".join(map(str, found)), " ".join(map(str, searched)), float(exact(of, count).value)))
+            axes[1, column].axvline(
+                level, color=OKABE_ITO[1], linewidth=0.9, label="exact" if number == 0 else None
+            )
+        axes[1, column].plot(
+            searched,
+            np.full(count, top * 0.94),
+            "v",
+            color=OKABE_ITO[0],
+            markersize=4,
+            label="CS, one run",
+        )
+        rows.append(
+            (
+                count,
+                " ".join(map(str, found)),
+                " ".join(map(str, searched)),
+                float(exact(of, count).value),
+            )
+        )
     for place in axes[1]:
         # Not snapped to pixels: bars narrower than one would come and go from panel to panel.
         place.stairs(shares, np.arange(_LEVELS + 1) - 0.5, fill=True, color="0.6", snap=False)
         place.set(xlim=(0, 255), ylim=(0, top), xlabel="level", xticks=(0, 128, 255))
-    made.legend(*axes[1, 1].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize=7)
+    made.legend(
+        *axes[1, 1].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=2,
+        frameon=False,
+        fontsize=7,
+    )
     header = ("K", "exact thresholds", "CS, first run", "objective")
     high = [f"{level} ({share:.1f} %)" for level, share in enumerate(shares) if share > top]
     cut = f" Bars that the histogram cuts off: level {', '.join(high)}." if high else ""
@@ -144,7 +236,10 @@ def thresholded(context: Context, name: str) -> Made:
 def _classes(image: np.ndarray, thresholds: np.ndarray) -> np.ndarray:
     """The image (H, W) with every pixel at the mean level of its class."""
     labels = np.searchsorted(thresholds, image, side="left")
-    sums, counts = (np.bincount(labels.ravel(), weights, len(thresholds) + 1) for weights in (image.ravel().astype(float), None))
+    sums, counts = (
+        np.bincount(labels.ravel(), weights, len(thresholds) + 1)
+        for weights in (image.ravel().astype(float), None)
+    )
     return (sums / np.maximum(counts, 1))[labels]
 
 
@@ -161,9 +256,19 @@ ITEMS: tuple[Item, ...] = (
     Item("figure", "3.5", "The mutation rate by affinity", mutation),
     Item("figure", "3.6", "Bifurcation of the logistic map", branching),
     Item("figure", "3.7", "Distribution of the logistic map's values", distribution),
-    Item("figure", "3.8", "Histogram of chaotic numbers against a pseudo-random generator", generators),
+    Item(
+        "figure",
+        "3.8",
+        "Histogram of chaotic numbers against a pseudo-random generator",
+        generators,
+    ),
     *(
-        Item("figure", f"4.{number}", f"Histogram, thresholds and thresholded images of {name}", partial(thresholded, name=name))
+        Item(
+            "figure",
+            f"4.{number}",
+            f"Histogram, thresholds and thresholded images of {name}",
+            partial(thresholded, name=name),
+        )
         for number, name in enumerate(IMAGES, 1)
     ),
 )

@@ -1,11 +1,14 @@
-"""Tables 4.1 to 4.4: exact multilevel thresholds of nine images, and what three optimisers make of them in repeated runs.
+"""Tables 4.1 to 4.4: exact multilevel thresholds of nine images, and what three optimisers make of
+them in repeated runs.
 
-Problem: Otsu's criterion for K = 3, 4 and 5 thresholds. The exact optimum comes from dynamic programming, held against all candidates one
-by one for K = 3. PSO, clonal selection (ClonalG) and its chaotic form (CS) get equal budgets of evaluations.
+Problem: Otsu's criterion for K = 3, 4 and 5 thresholds. The exact optimum comes from dynamic
+programming, held against all candidates one by one for K = 3. PSO, clonal selection (ClonalG) and
+its chaotic form (CS) get equal budgets of evaluations.
 
 Citation: those of `isc_core.thresholding` and of `thresholding_runs`.
 
-Limits: another set of images than the thesis'; the operators of ClonalG and CS are ours where the thesis leaves them open.
+Limits: another set of images than the thesis'; the operators of ClonalG and CS are ours where the
+thesis leaves them open.
 """
 
 import time
@@ -51,7 +54,8 @@ def exhaustive(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
     """The best three thresholds by looking at each of the 2.7 million sets, and the value there."""
     best, where = -np.inf, (0, 0, 0)
     for first in range(_LEVELS - 2):
-        # All second and third thresholds at once: rows are ends of the second class, columns of the third.
+        # All second and third thresholds at once: rows are ends of the second class, columns of the
+        # third.
         rest = of.terms[first + 1, :, None] + of.terms + of.terms[:, _LEVELS][None]
         second, third = np.unravel_index(int(np.argmax(rest)), rest.shape)
         value = float(of.terms[0, first + 1] + rest[second, third])
@@ -73,9 +77,20 @@ def ground_truth(context: Context) -> Made:
         for count in COUNTS:
             found = exact(of, count)
             total = float(of.terms[np.arange(_LEVELS), np.arange(1, _LEVELS + 1)].sum())
-            rows.append((name, count, _listed(found.thresholds), found.value, 100 * found.value / total, _milliseconds(of, count)))
+            rows.append(
+                (
+                    name,
+                    count,
+                    _listed(found.thresholds),
+                    found.value,
+                    100 * found.value / total,
+                    _milliseconds(of, count),
+                )
+            )
         agrees = abs(one_by_one[1] - exact(of, 3).value) <= HIT * one_by_one[1]
-        checks.append((name, _listed(one_by_one[0]), one_by_one[1], "yes" if agrees else "NO", 1e3 * seconds))
+        checks.append(
+            (name, _listed(one_by_one[0]), one_by_one[1], "yes" if agrees else "NO", 1e3 * seconds)
+        )
     header = ("image", "K", "thresholds", "objective", "% of the variance", "ms")
     caption = f"Three thresholds by trying all {comb(_LEVELS, 3):,} sets: the same optimum?"
     tables = (
@@ -85,7 +100,15 @@ def ground_truth(context: Context) -> Made:
     made, axes = figure(1, 1, height=2.8)
     for count, colour, mark in zip(COUNTS, OKABE_ITO, _MARKS, strict=False):
         shares = [row[4] for row in rows if row[1] == count]
-        axes[0, 0].plot(names, shares, color=colour, marker=mark, markersize=4, linestyle="none", label=f"K = {count}")
+        axes[0, 0].plot(
+            names,
+            shares,
+            color=colour,
+            marker=mark,
+            markersize=4,
+            linestyle="none",
+            label=f"K = {count}",
+        )
     axes[0, 0].set_ylabel("variance between classes, % of all")
     legend(axes[0, 0])
     text = (
@@ -100,8 +123,20 @@ def objectives(context: Context) -> Made:
     found = all_runs(context, tuple(SEARCHES))
     names = images(context)
     shares = tuple(_shares(found, search, names) for search in SEARCHES)
-    p_swarm = holm([rank_sum(found["CS", i, k].values, found["PSO", i, k].values)[1] for i in names for k in COUNTS])
-    p_clonal = holm([rank_sum(found["CS", i, k].values, found["ClonalG", i, k].values)[1] for i in names for k in COUNTS])
+    p_swarm = holm(
+        [
+            rank_sum(found["CS", i, k].values, found["PSO", i, k].values)[1]
+            for i in names
+            for k in COUNTS
+        ]
+    )
+    p_clonal = holm(
+        [
+            rank_sum(found["CS", i, k].values, found["ClonalG", i, k].values)[1]
+            for i in names
+            for k in COUNTS
+        ]
+    )
     rows = []
     for place, (name, count) in enumerate((i, k) for i in names for k in COUNTS):
         cells: list[Cell] = [name, count, f"{exact(objective(name), count).value:.3f}"]
@@ -120,11 +155,19 @@ def objectives(context: Context) -> Made:
     runs = len(next(iter(found.values())).values)
     tables = (
         Table(
-            ("search", *(f"K = {k}" for k in COUNTS), "all", "95 % interval"), shares, f"Runs of {runs} an image that found the optimum."
+            ("search", *(f"K = {k}" for k in COUNTS), "all", "95 % interval"),
+            shares,
+            f"Runs of {runs} an image that found the optimum.",
         ),
-        Table(header, tuple(rows), f"Objective over {runs} runs; p: rank-sum test, corrected for {len(rows)} cases (Holm)."),
+        Table(
+            header,
+            tuple(rows),
+            f"Objective over {runs} runs; p: rank-sum test, corrected for {len(rows)} cases (Holm).",
+        ),
     )
-    return Made(tables, (_hit_figure(found, names),), _OBJECTIVES_TEXT, _objective_verdicts(found, names))
+    return Made(
+        tables, (_hit_figure(found, names),), _OBJECTIVES_TEXT, _objective_verdicts(found, names)
+    )
 
 
 _OBJECTIVES_TEXT = (
@@ -141,8 +184,12 @@ def thresholds(context: Context) -> Made:
         for count in COUNTS:
             cells: list[Cell] = [name, count, _listed(exact(objective(name), count).thresholds)]
             for search in COMPARED:
-                usual, many = Counter(map(tuple, found[search, name, count].thresholds.tolist())).most_common(1)[0]
-                cells.append(f"{_listed(usual)} ({100 * many / len(found[search, name, count].values):.0f} %)")
+                usual, many = Counter(
+                    map(tuple, found[search, name, count].thresholds.tolist())
+                ).most_common(1)[0]
+                cells.append(
+                    f"{_listed(usual)} ({100 * many / len(found[search, name, count].values):.0f} %)"
+                )
             rows.append(tuple(cells))
     header = ("image", "K", "exact", *(f"{search} (share of runs)" for search in COMPARED))
     made, axes = figure(1, len(COUNTS), height=0.9 + 0.35 * len(names), sharey=True)
@@ -151,12 +198,33 @@ def thresholds(context: Context) -> Made:
             for step, (search, colour) in enumerate(zip(COMPARED, OKABE_ITO, strict=False)):
                 levels = found[search, name, count].thresholds
                 label = search if line == 0 else None
-                place.plot(levels.ravel(), np.full(levels.size, line + 0.22 * (step - 1)), "|", color=colour, markersize=5, label=label)
-        place.set(title=f"K = {count}", xlabel="level", xlim=(0, 255), yticks=range(len(names)), yticklabels=names)
+                place.plot(
+                    levels.ravel(),
+                    np.full(levels.size, line + 0.22 * (step - 1)),
+                    "|",
+                    color=colour,
+                    markersize=5,
+                    label=label,
+                )
+        place.set(
+            title=f"K = {count}",
+            xlabel="level",
+            xlim=(0, 255),
+            yticks=range(len(names)),
+            yticklabels=names,
+        )
     axes[0, 0].invert_yaxis()
-    made.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize=7)
+    made.legend(
+        *axes[0, 0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=3,
+        frameon=False,
+        fontsize=7,
+    )
     text = "In the picture each stroke is a threshold of one run: where a search is sure, its strokes lie on each other."
-    return Made((Table(header, tuple(rows), "The thresholds that most runs found."),), (made,), text)
+    return Made(
+        (Table(header, tuple(rows), "The thresholds that most runs found."),), (made,), text
+    )
 
 
 def times(context: Context) -> Made:
@@ -164,29 +232,55 @@ def times(context: Context) -> Made:
     found = all_runs(replace(context, monitor=context.monitor.part(0.0, 0.5)), COMPARED)
     names = images(context)
     cases = [(name, count) for name in names for count in COUNTS]
-    p_values = holm([rank_sum(found["CS", *case].needed, found["ClonalG", *case].needed)[1] for case in cases])
+    p_values = holm(
+        [rank_sum(found["CS", *case].needed, found["ClonalG", *case].needed)[1] for case in cases]
+    )
     rows: list[tuple[Cell, ...]] = []
     for case, p in zip(cases, p_values, strict=True):
         cells: list[Cell] = [*case]
         for search in COMPARED:
-            context.monitor.report(f"timing {search} on {case[0]}", 0.5 + 0.5 * len(rows) / len(cases))
-            cells += [float(np.median(milliseconds(context, search, *case))), _median_iterations(search, found[search, *case])]
+            context.monitor.report(
+                f"timing {search} on {case[0]}", 0.5 + 0.5 * len(rows) / len(cases)
+            )
+            cells += [
+                float(np.median(milliseconds(context, search, *case))),
+                _median_iterations(search, found[search, *case]),
+            ]
         rows.append((*cells, float(p)))
-    header = ("image", "K", *(f"{s}: {w}" for s in COMPARED for w in ("ms a run", "iterations to the optimum")), "p, CS and ClonalG")
-    caption = (
-        "Median over runs; iterations of the runs that found the optimum. p: rank-sum test of the evaluations needed, corrected (Holm)."
+    header = (
+        "image",
+        "K",
+        *(f"{s}: {w}" for s in COMPARED for w in ("ms a run", "iterations to the optimum")),
+        "p, CS and ClonalG",
     )
+    caption = "Median over runs; iterations of the runs that found the optimum. p: rank-sum test of the evaluations needed, corrected (Holm)."
     made, axes = figure(1, len(COUNTS), height=2.6, sharey=True)
     for place, count in zip(axes[0], COUNTS, strict=True):
         for search, colour in zip(COMPARED, OKABE_ITO, strict=False):
             needed = np.sort(np.concatenate([found[search, name, count].needed for name in names]))
             reached = needed[np.isfinite(needed)]
             shares = 100 * np.append(np.arange(1, len(reached) + 1), len(reached)) / len(needed)
-            place.step(np.append(reached, EVALUATIONS) / 1e3, shares, where="post", color=colour, label=search)
-        place.set(title=f"K = {count}", xlabel="evaluations, thousands", xlim=(0, EVALUATIONS / 1e3), ylim=(0, 102))
+            place.step(
+                np.append(reached, EVALUATIONS) / 1e3,
+                shares,
+                where="post",
+                color=colour,
+                label=search,
+            )
+        place.set(
+            title=f"K = {count}",
+            xlabel="evaluations, thousands",
+            xlim=(0, EVALUATIONS / 1e3),
+            ylim=(0, 102),
+        )
     axes[0, 0].set_ylabel("runs at the optimum, %")
     legend(axes[0, -1], "lower right")
-    return Made((Table(header, tuple(rows), caption),), (made,), _TIMES_TEXT, (_speed_verdict(found, cases, p_values),))
+    return Made(
+        (Table(header, tuple(rows), caption),),
+        (made,),
+        _TIMES_TEXT,
+        (_speed_verdict(found, cases, p_values),),
+    )
 
 
 _TIMES_TEXT = (
@@ -195,17 +289,33 @@ _TIMES_TEXT = (
 )
 
 
-def _objective_verdicts(found: dict[tuple[str, str, int], Runs], names: tuple[str, ...]) -> tuple[Verdict, ...]:
-    hits = {search: sum(found[search, i, k].hits for i in names for k in COUNTS) for search in SEARCHES}
+def _objective_verdicts(
+    found: dict[tuple[str, str, int], Runs], names: tuple[str, ...]
+) -> tuple[Verdict, ...]:
+    hits = {
+        search: sum(found[search, i, k].hits for i in names for k in COUNTS) for search in SEARCHES
+    }
     total = sum(len(found["CS", i, k].values) for i in names for k in COUNTS)
     low, _ = share_interval(hits["CS"], total)
     share = {search: f"{100 * many / total:.1f} %" for search, many in hits.items()}
     best = "yes" if hits["CS"] == total else "partly" if hits["CS"] > 0.95 * total else "no"
     over_swarm = share_interval(hits["CS"], total)[0] > share_interval(hits["PSO"], total)[1]
     over_clonal = share_interval(hits["CS"], total)[0] > share_interval(hits["ClonalG"], total)[1]
-    holds = "yes" if over_swarm and over_clonal else "partly" if over_swarm else "cannot be told" if hits["CS"] > hits["PSO"] else "no"
+    holds = (
+        "yes"
+        if over_swarm and over_clonal
+        else "partly"
+        if over_swarm
+        else "cannot be told"
+        if hits["CS"] > hits["PSO"]
+        else "no"
+    )
     return (
-        Verdict(CHAOS_FINDS_OPTIMUM, f"{hits['CS']} of {total} runs ({share['CS']}, at least {100 * low:.1f} % at 95 %).", best),
+        Verdict(
+            CHAOS_FINDS_OPTIMUM,
+            f"{hits['CS']} of {total} runs ({share['CS']}, at least {100 * low:.1f} % at 95 %).",
+            best,
+        ),
         Verdict(
             CHAOS_HELPS,
             f"Optimum found in {share['CS']} of runs by CS, {share['ClonalG']} by ClonalG, {share['PSO']} by PSO; {share['CS, one orbit']} "
@@ -218,8 +328,13 @@ def _objective_verdicts(found: dict[tuple[str, str, int], Runs], names: tuple[st
     )
 
 
-def _speed_verdict(found: dict[tuple[str, str, int], Runs], cases: list[tuple[str, int]], p_values: np.ndarray) -> Verdict:
-    chaotic, plain, swarm = (np.concatenate([found[search, *case].needed for case in cases]) for search in ("CS", "ClonalG", "PSO"))
+def _speed_verdict(
+    found: dict[tuple[str, str, int], Runs], cases: list[tuple[str, int]], p_values: np.ndarray
+) -> Verdict:
+    chaotic, plain, swarm = (
+        np.concatenate([found[search, *case].needed for case in cases])
+        for search in ("CS", "ClonalG", "PSO")
+    )
     more, p = rank_sum(chaotic, plain)
     faster = p < _SIGNIFICANT and more < 0.5
     different = int((p_values < _SIGNIFICANT).sum())
@@ -229,31 +344,66 @@ def _speed_verdict(found: dict[tuple[str, str, int], Runs], cases: list[tuple[st
         f"CS needs {medians[0]:.0f} evaluations, ClonalG {medians[1]:.0f}, PSO {medians[2]:.0f} where it arrives (medians). CS needs more "
         f"than ClonalG in {100 * more:.0f} % of pairs of runs (p = {p:.2g}); {different} of {len(cases)} cases differ.",
         "yes" if faster else "no",
-        "" if faster else "Chaotic and pseudo-random numbers cannot be told apart by the speed of the search.",
+        ""
+        if faster
+        else "Chaotic and pseudo-random numbers cannot be told apart by the speed of the search.",
     )
 
 
-def _shares(found: dict[tuple[str, str, int], Runs], search: str, names: tuple[str, ...]) -> tuple[Cell, ...]:
+def _shares(
+    found: dict[tuple[str, str, int], Runs], search: str, names: tuple[str, ...]
+) -> tuple[Cell, ...]:
     """A row: the share of runs that found the optimum by K, of all, and its interval."""
     hits = [sum(found[search, name, count].hits for name in names) for count in COUNTS]
     total = len(names) * len(found[search, names[0], COUNTS[0]].values)
     low, high = share_interval(sum(hits), total * len(COUNTS))
     cells = [f"{100 * many / total:.1f} %" for many in hits]
-    return (search, *cells, f"{100 * sum(hits) / (total * len(COUNTS)):.1f} %", f"{100 * low:.1f} to {100 * high:.1f} %")
+    return (
+        search,
+        *cells,
+        f"{100 * sum(hits) / (total * len(COUNTS)):.1f} %",
+        f"{100 * low:.1f} to {100 * high:.1f} %",
+    )
 
 
 def _hit_figure(found: dict[tuple[str, str, int], Runs], names: tuple[str, ...]) -> "Figure":
     """The share of runs that found the optimum, by image and K."""
     made, axes = figure(1, len(COUNTS), height=0.9 + 0.25 * len(names), sharey=True)
     for place, count in zip(axes[0], COUNTS, strict=True):
-        for step, (search, colour, mark) in enumerate(zip(SEARCHES, OKABE_ITO, _MARKS, strict=False)):
-            shares = [100 * found[search, name, count].hits / len(found[search, name, count].values) for name in names]
+        for step, (search, colour, mark) in enumerate(
+            zip(SEARCHES, OKABE_ITO, _MARKS, strict=False)
+        ):
+            shares = [
+                100 * found[search, name, count].hits / len(found[search, name, count].values)
+                for name in names
+            ]
             lines = np.arange(len(names)) + 0.18 * (step - 1.5)
-            place.plot(shares, lines, marker=mark, color=colour, linestyle="none", markersize=3.5, label=search, clip_on=False)
-        place.set(title=f"K = {count}", xlabel="runs at the optimum, %", xlim=(0, 102), yticks=range(len(names)), yticklabels=names)
+            place.plot(
+                shares,
+                lines,
+                marker=mark,
+                color=colour,
+                linestyle="none",
+                markersize=3.5,
+                label=search,
+                clip_on=False,
+            )
+        place.set(
+            title=f"K = {count}",
+            xlabel="runs at the optimum, %",
+            xlim=(0, 102),
+            yticks=range(len(names)),
+            yticklabels=names,
+        )
         place.grid(axis="x", linewidth=0.4, color="0.85")
     axes[0, 0].invert_yaxis()
-    made.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize=7)
+    made.legend(
+        *axes[0, 0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=4,
+        frameon=False,
+        fontsize=7,
+    )
     return made
 
 
@@ -278,7 +428,12 @@ def _listed(found: "np.ndarray | tuple[int, ...]") -> str:
 
 ITEMS: tuple[Item, ...] = (
     Item("table", "4.1", "Exact Otsu thresholds of nine images", ground_truth),
-    Item("table", "4.2", "Objective of PSO, ClonalG and CS: mean and deviation over repeated runs", objectives),
+    Item(
+        "table",
+        "4.2",
+        "Objective of PSO, ClonalG and CS: mean and deviation over repeated runs",
+        objectives,
+    ),
     Item("table", "4.3", "Thresholds that PSO, ClonalG and CS find", thresholds),
     Item("table", "4.4", "Time and iterations of PSO, ClonalG and CS", times),
 )

@@ -1,15 +1,19 @@
-"""Repeated searches for the thresholds of nine images: what tables 4.1 to 4.4 and figures 4.1 to 4.9 have in common.
+"""Repeated searches for the thresholds of nine images: what tables 4.1 to 4.4 and figures 4.1 to
+4.9 have in common.
 
-Problem: 50 runs of each optimiser on nine images with 3, 4 and 5 thresholds, each run from another seed, with one budget of evaluations.
+Problem: 50 runs of each optimiser on nine images with 3, 4 and 5 thresholds, each run from another
+seed, with one budget of evaluations.
 
-Equation: a share of k of n runs has the 95 % interval of Wilson, (p + z^2 / 2n ± z sqrt(p (1 - p) / n + z^2 / 4n^2)) / (1 + z^2 / n); two
-samples of runs are compared by the rank-sum test, several tests at once by Holm's correction.
+Equation: a share of k of n runs has the 95 % interval of Wilson, (p + z^2 / 2n ± z sqrt(p (1 - p) /
+n + z^2 / 4n^2)) / (1 + z^2 / n); two samples of runs are compared by the rank-sum test, several
+tests at once by Holm's correction.
 
-Citation: E. B. Wilson (1927), doi:10.1080/01621459.1927.10502953; H. B. Mann, D. R. Whitney (1947), doi:10.1214/aoms/1177730491;
-S. Holm, "A simple sequentially rejective multiple test procedure", Scandinavian Journal of Statistics 6(2), 65-70 (1979).
+Citation: E. B. Wilson (1927), doi:10.1080/01621459.1927.10502953; H. B. Mann, D. R. Whitney (1947),
+doi:10.1214/aoms/1177730491; S. Holm, "A simple sequentially rejective multiple test procedure",
+Scandinavian Journal of Statistics 6(2), 65-70 (1979).
 
-Limits: the images are scikit-image's: the thesis' own nine are not freely packaged. A run that misses the optimum counts as one that would
-need more evaluations than any other.
+Limits: the images are scikit-image's: the thesis' own nine are not freely packaged. A run that
+misses the optimum counts as one that would need more evaluations than any other.
 """
 
 import time
@@ -26,7 +30,12 @@ from isc_core.thresholding.clonal_selection import ClonalOptions
 from ..thresholding import COUNTS, IMAGES, OPTIMISERS, levels, to_optimum
 from .context import Context, JsonRow
 
-SEARCHES = {"PSO": "particle_swarm", "ClonalG": "clonal_selection", "CS": "chaotic_clonal", "CS, one orbit": "chaotic, one orbit"}
+SEARCHES = {
+    "PSO": "particle_swarm",
+    "ClonalG": "clonal_selection",
+    "CS": "chaotic_clonal",
+    "CS, one orbit": "chaotic, one orbit",
+}
 COMPARED = ("PSO", "ClonalG", "CS")
 _RUNS, _QUICK_RUNS, _TIMED_RUNS = 50, 3, 10
 EVALUATIONS = 20_000
@@ -36,8 +45,9 @@ _SURE = 1.959964  # standard deviations, of 95 %
 
 @dataclass(frozen=True)
 class Runs:
-    """The n runs of one optimiser on one image. `values` (n,): the objective found. `needed` (n,): evaluations until the optimum, infinite
-    where it was missed. `thresholds` (n, K)."""
+    """The n runs of one optimiser on one image. `values` (n,): the objective found. `needed` (n,):
+    evaluations until the optimum, infinite where it was missed. `thresholds` (n, K).
+    """
 
     values: np.ndarray
     needed: np.ndarray
@@ -62,14 +72,18 @@ def objective(image: str) -> OtsuObjective:
 
 def runs(context: Context, search: str, image: str, count: int) -> Runs:
     """The runs of one of `SEARCHES`, computed once. Raises `Cancelled`."""
-    rows = context.rows(f"thresholds {search} {image} {count}", lambda: _searched(context, search, image, count))
+    rows = context.rows(
+        f"thresholds {search} {image} {count}", lambda: _searched(context, search, image, count)
+    )
     thresholds = [[int(level) for level in str(row["thresholds"]).split()] for row in rows]
     needed = np.array([np.inf if row["needed"] is None else row["needed"] for row in rows], float)
     return Runs(np.array([row["value"] for row in rows], float), needed, np.array(thresholds))
 
 
 def milliseconds(context: Context, search: str, image: str, count: int) -> np.ndarray:
-    """(n,) milliseconds of whole runs, on the processor's clock, which other programs do not slow down. Raises `Cancelled`."""
+    """(n,) milliseconds of whole runs, on the processor's clock, which other programs do not slow
+    down. Raises `Cancelled`.
+    """
 
     def timed() -> list[JsonRow]:
         rows: list[JsonRow] = []
@@ -79,12 +93,26 @@ def milliseconds(context: Context, search: str, image: str, count: int) -> np.nd
             rows.append({"milliseconds": 1e3 * (time.process_time() - begin)})
         return rows
 
-    return np.array([row["milliseconds"] for row in context.rows(f"thresholds time {search} {image} {count}", timed)], float)
+    return np.array(
+        [
+            row["milliseconds"]
+            for row in context.rows(f"thresholds time {search} {image} {count}", timed)
+        ],
+        float,
+    )
 
 
 def all_runs(context: Context, searches: Sequence[str]) -> dict[tuple[str, str, int], Runs]:
-    """The runs of several searches on all images, by search, image and number of thresholds. Raises `Cancelled`."""
-    cases = [(search, image, count) for search in searches for image in images(context) for count in COUNTS]
+    """The runs of several searches on all images, by search, image and number of thresholds.
+
+    Raises `Cancelled`.
+    """
+    cases = [
+        (search, image, count)
+        for search in searches
+        for image in images(context)
+        for count in COUNTS
+    ]
     found = {}
     for number, case in enumerate(cases):
         context.monitor.report(f"{case[0]} on {case[1]}, {case[2]} thresholds", number / len(cases))
@@ -99,7 +127,9 @@ def iterations(search: str, evaluations: np.ndarray) -> np.ndarray:
     else:
         options = ClonalOptions()
         first = options.population
-        each = first * max(1, round(options.clone_share * first)) + round(options.replaced_share * first)
+        each = first * max(1, round(options.clone_share * first)) + round(
+            options.replaced_share * first
+        )
     return np.ceil(np.maximum(evaluations - first, 0) / each)
 
 
@@ -107,13 +137,21 @@ def share_interval(hits: int, total: int) -> tuple[float, float]:
     """The 95 % interval of a share, by Wilson."""
     share, square = hits / total, _SURE**2
     middle = (share + square / (2 * total)) / (1 + square / total)
-    half = _SURE * np.sqrt(share * (1 - share) / total + square / (4 * total**2)) / (1 + square / total)
+    half = (
+        _SURE
+        * np.sqrt(share * (1 - share) / total + square / (4 * total**2))
+        / (1 + square / total)
+    )
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def rank_sum(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
-    """In which share of pairs the first sample (n,) is larger than the second (m,), ties counting half; and p that they are alike."""
-    top = 2 * max(1.0, *(float(values[np.isfinite(values)].max(initial=0.0)) for values in (first, second)))
+    """In which share of pairs the first sample (n,) is larger than the second (m,), ties counting
+    half; and p that they are alike.
+    """
+    top = 2 * max(
+        1.0, *(float(values[np.isfinite(values)].max(initial=0.0)) for values in (first, second))
+    )
     pair = [np.where(np.isfinite(values), values, top) for values in (first, second)]
     if np.ptp(np.concatenate(pair)) == 0:
         return 0.5, 1.0
@@ -135,7 +173,9 @@ def _searched(context: Context, search: str, image: str, count: int) -> list[Jso
     best = exact(objective(image), count).value
     rows: list[JsonRow] = []
     for run in range(_QUICK_RUNS if context.quick else _RUNS):
-        found = OPTIMISERS[SEARCHES[search]](objective(image), count, EVALUATIONS, context.seed + run)
+        found = OPTIMISERS[SEARCHES[search]](
+            objective(image), count, EVALUATIONS, context.seed + run
+        )
         needed = to_optimum(found, best)
         rows.append(
             {

@@ -1,7 +1,8 @@
-"""What an item leaves behind: NAME.md, NAME.csv, NAME.png, and a record for programs, each whole or not at all.
+"""What an item leaves behind: NAME.md, NAME.csv, NAME.png, and a record for programs, each whole or
+not at all.
 
-The record, `records/NAME.json`, is written last: an item is complete when it is there and says the same fingerprint. The index `README.md`
-is made of the records.
+The record, `records/NAME.json`, is written last: an item is complete when it is there and says the
+same fingerprint. The index `README.md` is made of the records.
 """
 
 import csv
@@ -37,19 +38,40 @@ _INTRODUCTION = (
     "",
 )
 _SHORT_NAMES = (
-    ("PSO, ClonalG, CS", "searches for thresholds: a particle swarm, clonal selection, and clonal selection with chaotic numbers"),
+    (
+        "PSO, ClonalG, CS",
+        "searches for thresholds: a particle swarm, clonal selection, and clonal selection with chaotic numbers",
+    ),
     ("CS of layers", "Chaotic Segmentation: highlights found by such thresholds and painted over"),
-    ("SC", "Sparse Coding of specular-free images: SF1, of a fixed chromaticity; SF2, of two bands"),
-    ("MZK06, YCK06, YWA10, SC09", "separations by Mallick et al., Yoon et al. (both 2006), Yang et al. (2010), Shen & Cai (2009)"),
+    (
+        "SC",
+        "Sparse Coding of specular-free images: SF1, of a fixed chromaticity; SF2, of two bands",
+    ),
+    (
+        "MZK06, YCK06, YWA10, SC09",
+        "separations by Mallick et al., Yoon et al. (both 2006), Yang et al. (2010), Shen & Cai (2009)",
+    ),
     ("iterative, ISC", "the separation by Tan & Ikeuchi (2005), and `isc`, this project's own"),
-    ("as published, improved", "a method as its authors describe it, and with this project's changes"),
-    ("doing nothing", "the photo itself taken for the diffuse layer: what does no better is of no use"),
+    (
+        "as published, improved",
+        "a method as its authors describe it, and with this project's changes",
+    ),
+    (
+        "doing nothing",
+        "the photo itself taken for the diffuse layer: what does no better is of no use",
+    ),
     ("SIRFS", "shape, light and reflectance from one image's shading (Barron & Malik 2015)"),
     ("X-SIRFS, MDR-SIRFS", "SIRFS on the diffuse layer that the separation X, or `isc`, finds"),
-    ("SIRFS-X, SIRFS-MBP", "SIRFS on the photo; highlights are then taken off the reflectance that it finds, by X or by `isc`"),
+    (
+        "SIRFS-X, SIRFS-MBP",
+        "SIRFS on the photo; highlights are then taken off the reflectance that it finds, by X or by `isc`",
+    ),
     ("joint", "MDR-SIRFS, whose shape and light then improve the separation"),
     ("MSE, RMS", "the mean square error, and its root"),
-    ("LMSE", "the local error: in small windows, each at its best scale; 0 is perfect, 1 is an empty layer"),
+    (
+        "LMSE",
+        "the local error: in small windows, each at its best scale; 0 is perfect, 1 is an empty layer",
+    ),
     ("RS-MSE", "the mean of the local errors of reflectance and shading"),
     ("K", "the number of thresholds"),
 )
@@ -57,8 +79,10 @@ _SHORT_NAMES = (
 
 @dataclass(frozen=True)
 class Record:
-    """What is known of a written item. `fingerprint`: of the run (see `Context.fingerprint`). `files`: names beside the index, the
-    Markdown file first. `seconds`: that it took. `machine`: in words. `verdicts`: its claims."""
+    """What is known of a written item. `fingerprint`: of the run (see `Context.fingerprint`).
+    `files`: names beside the index, the Markdown file first. `seconds`: that it took. `machine`: in
+    words. `verdicts`: its claims.
+    """
 
     name: str
     fingerprint: str
@@ -72,12 +96,15 @@ class Record:
 
 
 def write_item(item: Item, made: Made, context: Context, seconds: float) -> Record:
-    """Writes the files of an item and its record; files that an earlier run left beside them are removed.
+    """Writes the files of an item and its record; files that an earlier run left beside them are
+    removed.
 
     Raises `InputError` where the folder cannot be written.
     """
     folder, name = context.output, item.name
-    drawings = made.figures or tuple(tabulated(table.header, _cells(table), table.caption) for table in made.tables[:1])
+    drawings = made.figures or tuple(
+        tabulated(table.header, _cells(table), table.caption) for table in made.tables[:1]
+    )
     pictures = [_numbered(name, number, "png") for number in range(len(drawings))]
     lists = [_numbered(name, number, "csv") for number in range(len(made.tables))]
     before = read_record(folder, name)
@@ -85,20 +112,35 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     for file, figure in zip(pictures, drawings, strict=True):
         with new_file(folder / file) as partial:
             finish(figure)
-            figure.savefig(partial, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True})
+            figure.savefig(
+                partial, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True}
+            )
     for file, table in zip(lists, made.tables, strict=True):
-        with new_file(folder / file) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
+        with (
+            new_file(folder / file) as partial,
+            partial.open("w", newline="", encoding="utf-8") as stream,
+        ):
             csv.writer(stream, lineterminator="\n").writerows([table.header, *table.rows])
     record = Record(
-        name, context.fingerprint, command_of(item, context), context.seed, __version__, machine(), round(seconds, 1),
-        (f"{name}.md", *lists, *pictures), made.verdicts,
-    )  # fmt: skip
+        name,
+        context.fingerprint,
+        command_of(item, context),
+        context.seed,
+        __version__,
+        machine(),
+        round(seconds, 1),
+        (f"{name}.md", *lists, *pictures),
+        made.verdicts,
+    )
     with new_file(folder / f"{name}.md") as partial:
         partial.write_text(page(item, made, record, pictures, lists), encoding="utf-8")
     for file in set(before.files if before is not None else ()) - set(record.files):
         (folder / file).unlink(missing_ok=True)
     with new_file(_record_path(folder, name)) as partial:
-        partial.write_text(json.dumps({"schema_version": _SCHEMA, **asdict(record)}, indent=1) + "\n", encoding="utf-8")
+        partial.write_text(
+            json.dumps({"schema_version": _SCHEMA, **asdict(record)}, indent=1) + "\n",
+            encoding="utf-8",
+        )
     return record
 
 
@@ -120,20 +162,32 @@ def read_record(folder: Path, name: str) -> Record | None:
 def is_complete(folder: Path, name: str, fingerprint: str) -> bool:
     """Whether all files of the item are there, made by a run with this fingerprint."""
     record = read_record(folder, name)
-    return record is not None and record.fingerprint == fingerprint and all((folder / file).is_file() for file in record.files)
+    return (
+        record is not None
+        and record.fingerprint == fingerprint
+        and all((folder / file).is_file() for file in record.files)
+    )
 
 
-def page(item: Item, made: Made, record: Record, pictures: Sequence[str], lists: Sequence[str]) -> str:
+def page(
+    item: Item, made: Made, record: Record, pictures: Sequence[str], lists: Sequence[str]
+) -> str:
     """The item's Markdown."""
     title = f"{item.kind.capitalize()} {item.number}: {item.title}"
     parts = [f"# {title}", *(verdict_lines(verdict) for verdict in made.verdicts)]
     if not made.verdicts:
         parts.append("The thesis' abstract gives no claim for this.")
     parts += [f"![{title}]({picture})" for picture in pictures if made.figures]
-    parts += [part for table in made.tables for part in ((table.caption, markdown(table)) if table.caption else (markdown(table),))]
+    parts += [
+        part
+        for table in made.tables
+        for part in ((table.caption, markdown(table)) if table.caption else (markdown(table),))
+    ]
     if made.text:
         parts.append(made.text.strip())
-    files = ", ".join(f"[{file}]({file})" for file in (*lists, *(pictures if not made.figures else ())))
+    files = ", ".join(
+        f"[{file}]({file})" for file in (*lists, *(pictures if not made.figures else ()))
+    )
     parts.append(
         f"Made by `{record.command}` (seed {record.seed}, ISC {record.version}, {record.machine}, {record.seconds:g} s)."
         + (f" Files: {files}." if files else "")
@@ -145,7 +199,15 @@ def page(item: Item, made: Made, record: Record, pictures: Sequence[str], lists:
 def markdown(table: Table) -> str:
     """A table in Markdown, numbers with four digits."""
     lines = ["| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
-    return "\n".join([*lines, *("| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in _cells(table))])
+    return "\n".join(
+        [
+            *lines,
+            *(
+                "| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |"
+                for row in _cells(table)
+            ),
+        ]
+    )
 
 
 def verdict_lines(verdict: Verdict) -> str:
@@ -156,7 +218,11 @@ def verdict_lines(verdict: Verdict) -> str:
 
 def write_index(folder: Path, items: Sequence[Item]) -> None:
     """Writes README.md: what there is, the verdict of every claim of the abstract, and every item."""
-    records = {item.name: record for item in items if (record := read_record(folder, item.name)) is not None}
+    records = {
+        item.name: record
+        for item in items
+        if (record := read_record(folder, item.name)) is not None
+    }
     with new_file(folder / "README.md") as partial:
         partial.write_text(index(items, records), encoding="utf-8")
 
@@ -170,20 +236,44 @@ def index(items: Sequence[Item], records: dict[str, Record]) -> str:
         "## What the abstract claims", "", "| claim | here | holds | where |", "|---|---|---|---|",
     ]  # fmt: skip
     for claim in ABSTRACT:
-        said = [(name, verdict) for name, record in records.items() for verdict in record.verdicts if verdict.claim == claim]
-        lines += [f"| {claim} | {_sentence(v.here)} | {v.holds} | [{_spoken(name)}]({name}.md) |" for name, v in said] or [
-            f"| {claim} | | not measured | |"
+        said = [
+            (name, verdict)
+            for name, record in records.items()
+            for verdict in record.verdicts
+            if verdict.claim == claim
         ]
+        lines += [
+            f"| {claim} | {_sentence(v.here)} | {v.holds} | [{_spoken(name)}]({name}.md) |"
+            for name, v in said
+        ] or [f"| {claim} | | not measured | |"]
     for kind in ("table", "figure"):
-        lines += ["", f"## {kind.capitalize()}s", "", "| | what | do its claims hold? |", "|---|---|---|"]
+        lines += [
+            "",
+            f"## {kind.capitalize()}s",
+            "",
+            "| | what | do its claims hold? |",
+            "|---|---|---|",
+        ]
         lines += [_index_row(item, records.get(item.name)) for item in items if item.kind == kind]
-    lines += ["", "## Short names", "", "| name | meaning |", "|---|---|", *(f"| {name} | {words} |" for name, words in _SHORT_NAMES)]
+    lines += [
+        "",
+        "## Short names",
+        "",
+        "| name | meaning |",
+        "|---|---|",
+        *(f"| {name} | {words} |" for name, words in _SHORT_NAMES),
+    ]
     return "\n".join(lines) + "\n"
 
 
 def command_of(item: Item, context: Context) -> str:
     """What makes the item again; folders stand there by name only."""
-    words = ["isc thesis", item.kind, item.number, *(["--data ROOT"] if context.data is not None else [])]
+    words = [
+        "isc thesis",
+        item.kind,
+        item.number,
+        *(["--data ROOT"] if context.data is not None else []),
+    ]
     words += ["--quick"] if context.quick else []
     return " ".join([*words, *([f"--seed {context.seed}"] if context.seed else [])])
 
@@ -196,11 +286,15 @@ def machine() -> str:
 def _processor() -> str:
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-        return next(line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+        return next(
+            line.partition(":")[2].strip() for line in lines if line.startswith("model name")
+        )
     except (OSError, StopIteration):
         pass
     try:
-        done = subprocess.run(["sysctl", "-n", "machdep.cpu.brand_string"], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            ["sysctl", "-n", "machdep.cpu.brand_string"], capture_output=True, text=True, check=True
+        )
         return done.stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return platform.machine()
@@ -216,17 +310,33 @@ def _index_row(item: Item, record: Record | None) -> str:
 def _settings(records: dict[str, Record]) -> str:
     """What kind of runs made them, in words."""
     commands = [record.command for record in records.values()]
-    quick, own = (sum((word in command) == wanted for command in commands) for word, wanted in (("--quick", True), ("--data", False)))
-    parts = [f", {own} of them without public data: images are the project's own rendered ones, or come with scikit-image"] if own else []
+    quick, own = (
+        sum((word in command) == wanted for command in commands)
+        for word, wanted in (("--quick", True), ("--data", False))
+    )
+    parts = (
+        [
+            f", {own} of them without public data: images are the project's own rendered ones, or come with scikit-image"
+        ]
+        if own
+        else []
+    )
     return "".join(
-        [*parts, f", {quick} of them by a quick run: small images and few repetitions, whose verdicts tell little"] if quick else parts
+        [
+            *parts,
+            f", {quick} of them by a quick run: small images and few repetitions, whose verdicts tell little",
+        ]
+        if quick
+        else parts
     )
 
 
 def _counted(verdicts: Sequence[Verdict]) -> str:
     """How many claims hold, in words: "no, cannot be told (3)"."""
     many = Counter(verdict.holds for verdict in verdicts)
-    return ", ".join(f"{holds} ({many[holds]})" if many[holds] > 1 else holds for holds in HOLDS if many[holds])
+    return ", ".join(
+        f"{holds} ({many[holds]})" if many[holds] > 1 else holds for holds in HOLDS if many[holds]
+    )
 
 
 def _sentence(text: str) -> str:
@@ -240,7 +350,10 @@ def _spoken(name: str) -> str:
 
 def _cells(table: Table) -> list[list[str]]:
     """The rows as they are shown, numbers with four digits."""
-    return [[f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row] for row in table.rows]
+    return [
+        [f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row]
+        for row in table.rows
+    ]
 
 
 def _numbered(name: str, number: int, suffix: str) -> str:

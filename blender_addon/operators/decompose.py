@@ -1,4 +1,6 @@
-"""The main button: the photo of the panel becomes an object; and the same once more for an object that is there, at another size."""
+"""The main button: the photo of the panel becomes an object; and the same once more for an object
+that is there, at another size.
+"""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender wants its options as sets)
 
@@ -22,7 +24,10 @@ from .tasks import decompose
 
 
 def run_of(context: Any, request: Request) -> Run:
-    """The run that decomposes the request's photo and builds the result. Raises `InputError` before anything is begun."""
+    """The run that decomposes the request's photo and builds the result.
+
+    Raises `InputError` before anything is begun.
+    """
     require_idle()
     photo, mask, mask_size = pictures_of(request)
     chosen = choices(context)
@@ -32,7 +37,9 @@ def run_of(context: Any, request: Request) -> Run:
 
     def finish(now: Any, result: Path) -> str:
         said = build_in_one_step(now, result, request)
-        (result / ARRAYS).unlink(missing_ok=True)  # by far the largest file; what it holds is in the scene now
+        (result / ARRAYS).unlink(
+            missing_ok=True
+        )  # by far the largest file; what it holds is in the scene now
         return said
 
     return Run(f"Decompose {request.build.name}", script, finish, folder)
@@ -87,7 +94,9 @@ class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
         if is_copy(built.object):
             original = original_of(built.object)
             instead = "press Decompose" if original is None else f"choose {original.name}"
-            raise InputError(f"{built.object.name} is a copy, and only the original is updated: {instead}")
+            raise InputError(
+                f"{built.object.name} is a copy, and only the original is updated: {instead}"
+            )
         return run_of(context, remembered(built.object, built.scene, self.max_size))
 
 

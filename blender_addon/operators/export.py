@@ -1,7 +1,8 @@
 """Files for other programs: the mesh as GLB, the maps as OpenEXR.
 
-Where the result's folder is still there, its own files are copied: mesh.glb and the multilayer maps.exr, as recovered. Later, or in another
-file, they come from the scene: the mesh as Blender's exporter writes it, with a plain material that has the paint as it was recoloured
+Where the result's folder is still there, its own files are copied: mesh.glb and the multilayer
+maps.exr, as recovered. Later, or in another file, they come from the scene: the mesh as Blender's
+exporter writes it, with a plain material that has the paint as it was recoloured
 (`scene.stand_in`), and each packed map as an EXR of its own.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
@@ -33,7 +34,9 @@ class ISC_OT_export(bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     directory: StringProperty(
-        name="Folder", description="Where to write: a folder with the object's name is made there", subtype="DIR_PATH"
+        name="Folder",
+        description="Where to write: a folder with the object's name is made there",
+        subtype="DIR_PATH",
     )
     filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
     from_scene: BoolProperty(
@@ -71,13 +74,16 @@ class ISC_OT_export(bpy.types.Operator):
 
 
 def write(built: Built, place: Path, *, from_scene: bool = False) -> list[str]:
-    """Writes the files of an object into a folder of its own in `place`; their names. A copy's folder has the copy's name.
+    """Writes the files of an object into a folder of its own in `place`; their names. A copy's
+    folder has the copy's name.
 
     Raises `InputError` where that cannot be done.
     """
     key = str(built.object[KEY])
     name = built.object.name if is_copy(built.object) else key
-    folder = place / "".join(letter if letter.isalnum() or letter in " -_." else "_" for letter in name).strip(" .")
+    folder = place / "".join(
+        letter if letter.isalnum() or letter in " -_." else "_" for letter in name
+    ).strip(" .")
     recovered = Path(str(built.object.get("isc_folder", "")))
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -90,14 +96,20 @@ def write(built: Built, place: Path, *, from_scene: bool = False) -> list[str]:
     except shutil.SameFileError as error:
         raise InputError(f"{folder} is the result's own folder: choose another") from error
     except OSError as error:
-        raise InputError(f"cannot write to {folder} ({error.strerror or error}): choose another folder") from error
+        raise InputError(
+            f"cannot write to {folder} ({error.strerror or error}): choose another folder"
+        ) from error
 
 
 def _write_maps(key: str, folder: Path) -> list[str]:
     """Each map that is packed in this file; they are OpenEXR files already."""
     names = []
     for image in bpy.data.images:
-        data = image.packed_file.data if image.get(KEY) == key and image.packed_file is not None else b""
+        data = (
+            image.packed_file.data
+            if image.get(KEY) == key and image.packed_file is not None
+            else b""
+        )
         if data[:4] == b"v/1\x01":
             names.append(f"{image[ROLE]}.exr")
             (folder / names[-1]).write_bytes(data)
@@ -105,17 +117,30 @@ def _write_maps(key: str, folder: Path) -> list[str]:
 
 
 def _write_mesh(built: Built, path: Path) -> str:
-    """The object by Blender's exporter, which knows no node groups: a plain material stands in while it writes."""
-    selected, layer = [thing for thing in bpy.context.selected_objects if thing != built.object], bpy.context.view_layer
+    """The object by Blender's exporter, which knows no node groups: a plain material stands in
+    while it writes.
+    """
+    selected, layer = (
+        [thing for thing in bpy.context.selected_objects if thing != built.object],
+        bpy.context.view_layer,
+    )
     with stand_in(built.object, built.material):
         try:
             for thing in selected:
                 thing.select_set(False)
             built.object.select_set(True, view_layer=layer)
-            bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", use_selection=True, use_active_scene=True, export_apply=True)
+            bpy.ops.export_scene.gltf(
+                filepath=str(path),
+                export_format="GLB",
+                use_selection=True,
+                use_active_scene=True,
+                export_apply=True,
+            )
         except (RuntimeError, AttributeError) as error:
             said = str(error).strip().splitlines()[-1]
-            raise InputError(f"Blender's glTF exporter failed ({said}): enable it in the preferences") from error
+            raise InputError(
+                f"Blender's glTF exporter failed ({said}): enable it in the preferences"
+            ) from error
         finally:
             for thing in selected:
                 thing.select_set(True)

@@ -1,4 +1,6 @@
-"""Masks: cut out of a box that is drawn in the image editor or typed, or painted on a black image of the photo's size."""
+"""Masks: cut out of a box that is drawn in the image editor or typed, or painted on a black image
+of the photo's size.
+"""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 # ruff: noqa: RUF012 (Blender wants its options as sets)
 
@@ -42,10 +44,14 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
         require_idle()
         settings = context.scene.isc
         if settings.image is None:
-            raise InputError("there is no photo: open a file, or choose an image that is in Blender already")
+            raise InputError(
+                "there is no photo: open a file, or choose an image that is in Blender already"
+            )
         box = tuple(int(number) for number in settings.box)
         if min(box[2:]) < _LEAST:
-            raise InputError(f"the box is less than {_LEAST} pixels wide or high: draw it around the object in the image editor")
+            raise InputError(
+                f"the box is less than {_LEAST} pixels wide or high: draw it around the object in the image editor"
+            )
         photo, scene = examine(settings.image), context.scene.name_full
         folder = new_folder(None, "mask")
 
@@ -55,7 +61,9 @@ class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
             remove(folder)
             return "the mask is cut out: look at it before you use it"
 
-        script = cut_out(photo, (box[0], box[1], box[2], box[3]), folder, worker_environment(choices(context)))
+        script = cut_out(
+            photo, (box[0], box[1], box[2], box[3]), folder, worker_environment(choices(context))
+        )
         return Run("Cut Out", script, finish, folder)
 
 
@@ -69,11 +77,16 @@ class ISC_OT_take_mask(bpy.types.Operator):
 
     filepath: StringProperty(name="File", description="The mask's file", subtype="FILE_PATH")
     image: StringProperty(name="Photo", description="The photo's full name")
-    scene: StringProperty(name="Scene", description="The full name of the scene whose mask it becomes")
+    scene: StringProperty(
+        name="Scene", description="The full name of the scene whose mask it becomes"
+    )
 
     def execute(self, context: Any) -> set[str]:
         """Loads it; a mask that was cut out before is replaced."""
-        scene, photo = named(bpy.data.scenes, self.scene) or context.scene, named(bpy.data.images, self.image)
+        scene, photo = (
+            named(bpy.data.scenes, self.scene) or context.scene,
+            named(bpy.data.images, self.image),
+        )
         try:
             mask = bpy.data.images.load(self.filepath)
         except RuntimeError:
@@ -93,7 +106,9 @@ class ISC_OT_new_mask(bpy.types.Operator):
 
     bl_idname = "isc.new_mask"
     bl_label = "New Mask to Paint"
-    bl_description = "A black image of the photo's size: paint the object on it in white (image editor, Paint)"
+    bl_description = (
+        "A black image of the photo's size: paint the object on it in white (image editor, Paint)"
+    )
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: Any) -> set[str]:
@@ -116,7 +131,9 @@ class ISC_OT_draw_box(bpy.types.Operator):
 
     bl_idname = "isc.draw_box"
     bl_label = "Draw Box"
-    bl_description = "Draw a box around the object, with some background in it, and cut the object out of it"
+    bl_description = (
+        "Draw a box around the object, with some background in it, and cut the object out of it"
+    )
 
     _start: tuple[int, int] | None = None
     _end: tuple[int, int] = (0, 0)
@@ -125,7 +142,11 @@ class ISC_OT_draw_box(bpy.types.Operator):
     @classmethod
     def poll(cls, context: Any) -> bool:
         """In an image editor that shows the photo, while no run goes on."""
-        if context.area is None or context.area.type != "IMAGE_EDITOR" or context.space_data.image is None:
+        if (
+            context.area is None
+            or context.area.type != "IMAGE_EDITOR"
+            or context.space_data.image is None
+        ):
             cls.poll_message_set("Show the photo in an image editor")
             return False
         return active() is None
@@ -135,8 +156,12 @@ class ISC_OT_draw_box(bpy.types.Operator):
         del event
         context.scene.isc.image = context.space_data.image
         context.window.cursor_modal_set("CROSSHAIR")
-        context.workspace.status_text_set("Draw a box around the object; Esc or right button: leave it")
-        self._handler = bpy.types.SpaceImageEditor.draw_handler_add(self._draw, (), "WINDOW", "POST_PIXEL")
+        context.workspace.status_text_set(
+            "Draw a box around the object; Esc or right button: leave it"
+        )
+        self._handler = bpy.types.SpaceImageEditor.draw_handler_add(
+            self._draw, (), "WINDOW", "POST_PIXEL"
+        )
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
@@ -163,11 +188,16 @@ class ISC_OT_draw_box(bpy.types.Operator):
         self._leave(context, set())
 
     def _finish(self, context: Any, region: Any) -> set[str]:
-        corners = [region.view2d.region_to_view(*place) for place in (self._start or self._end, self._end)]
+        corners = [
+            region.view2d.region_to_view(*place) for place in (self._start or self._end, self._end)
+        ]
         box = box_of(corners[0], corners[1], tuple(context.space_data.image.size))
         self._leave(context, set())
         if box is None:
-            self.report({"WARNING"}, f"the box is less than {_LEAST} pixels wide or high: draw it around the object")
+            self.report(
+                {"WARNING"},
+                f"the box is less than {_LEAST} pixels wide or high: draw it around the object",
+            )
             return {"CANCELLED"}
         context.scene.isc.box = box
         bpy.ops.isc.cut_mask("INVOKE_DEFAULT")
@@ -189,12 +219,18 @@ class ISC_OT_draw_box(bpy.types.Operator):
         shader = gpu.shader.from_builtin("UNIFORM_COLOR")
         shader.uniform_float("color", (1.0, 0.6, 0.1, 1.0))
         corners = ((left, bottom), (right, bottom), (right, top), (left, top), (left, bottom))
-        batch_for_shader(shader, "LINE_STRIP", {"pos": [(x, y, 0.0) for x, y in corners]}).draw(shader)
+        batch_for_shader(shader, "LINE_STRIP", {"pos": [(x, y, 0.0) for x, y in corners]}).draw(
+            shader
+        )
 
 
-def box_of(first: tuple[float, float], second: tuple[float, float], size: tuple[int, ...]) -> Box | None:
-    """(left, top, width, height) in pixels, from the top, of two corners in the image editor's view: (0, 0) is the image's lower left
-    corner, (1, 1) its upper right one. Cut to the image of `size` (width, height); None if less than 8 pixels are left."""
+def box_of(
+    first: tuple[float, float], second: tuple[float, float], size: tuple[int, ...]
+) -> Box | None:
+    """(left, top, width, height) in pixels, from the top, of two corners in the image editor's
+    view: (0, 0) is the image's lower left corner, (1, 1) its upper right one. Cut to the image of
+    `size` (width, height); None if less than 8 pixels are left.
+    """
     width, height = size
     across = sorted(min(max(u * width, 0), width) for u in (first[0], second[0]))
     down = sorted(min(max((1 - v) * height, 0), height) for v in (first[1], second[1]))
@@ -211,8 +247,17 @@ def _take_mask(path: Path, image: str, scene: str) -> None:
 
 
 def _replace_mask(mask: Any, name: str) -> None:
-    """Gives the mask its name; one that was cut out before under that name hands its users over and goes."""
-    old = next((image for image in bpy.data.images if image.get(_MASK_OF) == name and image.library is None), None)
+    """Gives the mask its name; one that was cut out before under that name hands its users over and
+    goes.
+    """
+    old = next(
+        (
+            image
+            for image in bpy.data.images
+            if image.get(_MASK_OF) == name and image.library is None
+        ),
+        None,
+    )
     if old is not None:
         old.user_remap(mask)
         bpy.data.images.remove(old)

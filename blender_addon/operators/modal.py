@@ -1,7 +1,9 @@
-"""How a run lives in a window: a timer that only polls, progress in the panels and the status bar, Esc.
+"""How a run lives in a window: a timer that only polls, progress in the panels and the status bar,
+Esc.
 
-The operators here have no UNDO of their own: Blender would push an undo step for them while they go on. What is built is built by an
-operator of its own that has it, called when the work is done: one step, whatever the user did meanwhile.
+The operators here have no UNDO of their own: Blender would push an undo step for them while they go
+on. What is built is built by an operator of its own that has it, called when the work is done: one
+step, whatever the user did meanwhile.
 """
 # mypy: allow-subclassing-any
 # ruff: noqa: RUF012 (Blender wants its options as sets)
@@ -23,7 +25,8 @@ _PANELS = {"VIEW_3D", "IMAGE_EDITOR"}
 class WorkerOperator:
     """A mixin for operators whose work is a run: `prepare` makes it.
 
-    From a panel it goes on while the user works; without a window, or from a script that does not ask for more, it is waited for.
+    From a panel it goes on while the user works; without a window, or from a script that does not
+    ask for more, it is waited for.
     """
 
     report: Any  # Blender's own
@@ -102,10 +105,14 @@ class WorkerOperator:
 
 
 def advance(context: Any, run: Run) -> bool:
-    """One tick of a run; whether it has ended. Its result is taken in as soon as the user is not in the middle of editing something."""
+    """One tick of a run; whether it has ended.
+
+    Its result is taken in as soon as the user is not in the middle of editing something.
+    """
     began = time.perf_counter()
     state = run.step().state
-    # Undo within a mode of editing knows that mode alone: what is built then could not be undone by one step.
+    # Undo within a mode of editing knows that mode alone: what is built then could not be undone by
+    # one step.
     editing = context.mode.startswith("EDIT")
     show(context, run, "leave Edit Mode to see the result" if state == "ready" and editing else "")
     run.count(time.perf_counter() - began)
@@ -125,12 +132,18 @@ def show(context: Any, run: Run, remark: str = "") -> None:
     if now == (shown.title, shown.state, shown.stage, round(shown.fraction, 2), shown.message):
         return
     shown.title, shown.state, shown.stage, shown.fraction, shown.message = now
-    _say(context, None if run.ended else f"{run.title}: {stage} ({100 * status.fraction:.0f} %), Esc cancels")
+    _say(
+        context,
+        None if run.ended else f"{run.title}: {stage} ({100 * status.fraction:.0f} %), Esc cancels",
+    )
     redraw(context)
 
 
 def _say(context: Any, text: str | None) -> None:
-    """Shows the text in the status bar; None takes it away from wherever it was shown, as the user may have changed the workspace."""
+    """Shows the text in the status bar;
+
+    None takes it away from wherever it was shown, as the user may have changed the workspace.
+    """
     for workspace in [context.workspace] if text else bpy.data.workspaces:
         if workspace is not None:
             workspace.status_text_set(text)

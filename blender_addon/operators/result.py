@@ -20,7 +20,8 @@ from .tasks import complete
 
 
 def build_in_one_step(context: Any, folder: Path, request: Request | None = None) -> str:
-    """Builds the result in `folder` and makes one undo step of it; a line that says where it stands. Raises `InputError`.
+    """Builds the result in `folder` and makes one undo step of it; a line that says where it
+    stands. Raises `InputError`.
 
     `request`: what was asked for; None takes the panel's choices.
     """
@@ -32,7 +33,11 @@ def build_in_one_step(context: Any, folder: Path, request: Request | None = None
     except RuntimeError as error:
         raise InputError(str(error).strip().splitlines()[0].removeprefix("Error: ")) from error
     built = find(bpy.context.object)
-    return "the result is in the scene" if built is None else f"{built.object.name}: built in the scene {built.scene.name}"
+    return (
+        "the result is in the scene"
+        if built is None
+        else f"{built.object.name}: built in the scene {built.scene.name}"
+    )
 
 
 class ISC_OT_build_result(bpy.types.Operator):
@@ -43,16 +48,24 @@ class ISC_OT_build_result(bpy.types.Operator):
     bl_description = "Build the object of a result's folder, or update the one that was built from the same photo"
     bl_options = {"UNDO", "INTERNAL"}
 
-    directory: StringProperty(name="Folder", description="The result's folder, arrays.npz in it", subtype="DIR_PATH")
-    request: StringProperty(name="Request", description="What was asked for, as JSON; empty: what the panel says")
+    directory: StringProperty(
+        name="Folder", description="The result's folder, arrays.npz in it", subtype="DIR_PATH"
+    )
+    request: StringProperty(
+        name="Request", description="What was asked for, as JSON; empty: what the panel says"
+    )
 
     def execute(self, context: Any) -> set[str]:
         """Builds it; the scene is as before if it cannot be."""
         try:
-            request = request_from_json(self.request) if self.request else _asked_by_panel(context.scene)
+            request = (
+                request_from_json(self.request) if self.request else _asked_by_panel(context.scene)
+            )
             result = read_result(Path(self.directory))
             scene = named(bpy.data.scenes, request.scene) or context.scene
-            built = build(result, request.build, scene=scene, photo=named(bpy.data.images, request.image))
+            built = build(
+                result, request.build, scene=scene, photo=named(bpy.data.images, request.image)
+            )
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -69,8 +82,12 @@ class ISC_OT_import_result(bpy.types.Operator):
     bl_description = "Build the object of a folder that isc decompose wrote"
     bl_options = {"REGISTER"}
 
-    directory: StringProperty(name="Folder", description="The folder that isc decompose wrote", subtype="DIR_PATH")
-    filter_folder: bpy.props.BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
+    directory: StringProperty(
+        name="Folder", description="The folder that isc decompose wrote", subtype="DIR_PATH"
+    )
+    filter_folder: bpy.props.BoolProperty(
+        default=True, options={"HIDDEN"}, description="Show folders"
+    )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
         """Asks for the folder."""
@@ -82,7 +99,9 @@ class ISC_OT_import_result(bpy.types.Operator):
         """Builds it; a folder without arrays is given them first, by a worker."""
         folder = Path(bpy.path.abspath(self.directory))
         if not self.directory or not (folder / "decomposition.json").is_file():
-            self.report({"ERROR"}, f"{folder} is no result: give the folder that isc decompose wrote")
+            self.report(
+                {"ERROR"}, f"{folder} is no result: give the folder that isc decompose wrote"
+            )
             return {"CANCELLED"}
         if not (folder / ARRAYS).is_file():
             return set(bpy.ops.isc.complete_result("INVOKE_DEFAULT", directory=str(folder)))
@@ -109,7 +128,12 @@ class ISC_OT_complete_result(WorkerOperator, bpy.types.Operator):
         require_idle()
         folder = Path(self.directory)
         environment = worker_environment(choices(context))
-        return Run(f"Import {folder.name}", complete(folder, environment), build_in_one_step, new_folder(None, "import"))
+        return Run(
+            f"Import {folder.name}",
+            complete(folder, environment),
+            build_in_one_step,
+            new_folder(None, "import"),
+        )
 
 
 def _asked_by_panel(scene: Any) -> Request:
@@ -133,7 +157,9 @@ def _copy_settings(source: Any, target: Any) -> None:
 
 
 def _show(context: Any, built: Built) -> None:
-    """Makes the object the active one, where the user looks; its own scene is looked at through the photo's camera."""
+    """Makes the object the active one, where the user looks; its own scene is looked at through the
+    photo's camera.
+    """
     if context.window is not None and context.window.scene != built.scene:
         context.window.scene = built.scene
         for area in context.window.screen.areas:

@@ -1,8 +1,10 @@
-"""One run: hand the images over, let a worker process do the work, take its result in; in steps that never keep the window waiting.
+"""One run: hand the images over, let a worker process do the work, take its result in; in steps
+that never keep the window waiting.
 
-A run is a generator ("script") whose every `next()` is one short call; `Run.step()` makes one such call, measures it, and turns whatever
-happens into a `Status`. Nothing here knows windows or operators, so it runs without either. The script owns the worker and closes it
-when it is closed itself, which is all that cancelling takes; the run's own folder then goes, the result with it.
+A run is a generator ("script") whose every `next()` is one short call; `Run.step()` makes one such
+call, measures it, and turns whatever happens into a `Status`. Nothing here knows windows or
+operators, so it runs without either. The script owns the worker and closes it when it is closed
+itself, which is all that cancelling takes; the run's own folder then goes, the result with it.
 """
 
 import contextlib
@@ -22,7 +24,9 @@ from ..worker import Update, Worker
 
 @dataclass(frozen=True)
 class Made:
-    """What a script has made: a folder or a file, and what the worker had to say of it, one line or nothing."""
+    """What a script has made: a folder or a file, and what the worker had to say of it, one line or
+    nothing.
+    """
 
     path: Path
     notes: str = ""
@@ -37,8 +41,10 @@ _REMOVE_SECONDS = 5.0
 
 @dataclass(frozen=True)
 class Status:
-    """How a run stands. `state`: "ready" means that the result can be taken in. `stage`: for people. `fraction`: of the work, in [0, 1].
-    `message`: how it ended, one line. `report`: the tail of the worker's log, if it failed."""
+    """How a run stands. `state`: "ready" means that the result can be taken in. `stage`: for
+    people. `fraction`: of the work, in [0, 1]. `message`: how it ended, one line. `report`: the
+    tail of the worker's log, if it failed.
+    """
 
     state: State = "running"
     stage: str = "starting"
@@ -48,7 +54,10 @@ class Status:
 
 
 class WorkFailed(Exception):
-    """The worker gave up. `args[0]`: one line for people. `report`: the tail of its log, or nothing."""
+    """The worker gave up.
+
+    `args[0]`: one line for people. `report`: the tail of its log, or nothing.
+    """
 
     def __init__(self, message: str, report: str = "") -> None:
         super().__init__(message)
@@ -58,12 +67,15 @@ class WorkFailed(Exception):
 class Run:
     """One piece of work and the folder it may write to.
 
-    `title`: what is being done. `folder`: the run's own, removed if the run does not end well; what is to be kept of it is the business of
-    `finish`, which puts the result into the scene and returns a line for people. `status`: as it stands. `longest_call_ms`: of all calls
-    but the one of `finish`; `import_ms`: of that one.
+    `title`: what is being done. `folder`: the run's own, removed if the run does not end well; what
+    is to be kept of it is the business of `finish`, which puts the result into the scene and
+    returns a line for people. `status`: as it stands. `longest_call_ms`: of all calls but the one
+    of `finish`; `import_ms`: of that one.
     """
 
-    def __init__(self, title: str, script: Script, finish: Callable[[Any, Path], str], folder: Path) -> None:
+    def __init__(
+        self, title: str, script: Script, finish: Callable[[Any, Path], str], folder: Path
+    ) -> None:
         self.title = title
         self.folder = folder
         self.status = Status()
@@ -79,7 +91,10 @@ class Run:
         return self.status.state in ("done", "failed", "cancelled")
 
     def step(self) -> Status:
-        """Does what can be done at once and tells how far the run is. Never waits, never raises for what the work met."""
+        """Does what can be done at once and tells how far the run is.
+
+        Never waits, never raises for what the work met.
+        """
         if self.status.state == "running":
             began = time.perf_counter()
             self._advance()
@@ -102,7 +117,10 @@ class Run:
         return self.status
 
     def cancel(self) -> Status:
-        """Ends the run at once: the worker dies, its files go. Without effect on a run that has ended."""
+        """Ends the run at once: the worker dies, its files go.
+
+        Without effect on a run that has ended.
+        """
         if not self.ended:
             self._end("cancelled", f"{self.title}: cancelled")
         return self.status
@@ -118,7 +136,9 @@ class Run:
 
     @contextlib.contextmanager
     def _ended_by_errors(self) -> Iterator[None]:
-        """Ends the run with what went wrong; errors that nobody foresaw go on to Blender's console, but the run must not stay."""
+        """Ends the run with what went wrong; errors that nobody foresaw go on to Blender's console,
+        but the run must not stay.
+        """
         foreseen = False
         try:
             yield
@@ -131,7 +151,9 @@ class Run:
             self._end("failed", str(failure), failure.report)
         finally:
             if not foreseen:
-                self._end("failed", f"an error of the extension, see the console: {sys.exception()}")
+                self._end(
+                    "failed", f"an error of the extension, see the console: {sys.exception()}"
+                )
 
     def _end(self, state: State, message: str, report: str = "") -> None:
         self._script.close()
@@ -141,7 +163,10 @@ class Run:
 
 
 def follow(worker: Worker) -> Generator[Update, None, Update]:
-    """Passes on what a worker says until it is done; returns its last update. Ends the worker when closed. Raises `WorkFailed`."""
+    """Passes on what a worker says until it is done; returns its last update.
+
+    Ends the worker when closed. Raises `WorkFailed`.
+    """
     try:
         while (update := worker.poll()).state == "running":
             yield update
@@ -166,7 +191,11 @@ def during(stage: str, steps: Generator[None, None, Any]) -> Generator[Update, N
 
 
 def remove(folder: Path) -> None:
-    """Removes a run's folder. A worker that was killed just now may still write to it, so a thread tries again for some seconds."""
+    """Removes a run's folder.
+
+    A worker that was killed just now may still write to it, so a thread tries again for some
+    seconds.
+    """
     shutil.rmtree(folder, ignore_errors=True)
     if folder.exists():
         threading.Thread(target=_keep_removing, args=(folder,)).start()
@@ -179,9 +208,10 @@ def _keep_removing(folder: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-# --- the run that goes on ---------------------------------------------------------------------------------------------------------------
+# --- the run that goes on -------------------------------------------------------------------------
 
-# There is one worker at most, as there is one machine: the process holds it, whichever window or file began it.
+# There is one worker at most, as there is one machine: the process holds it, whichever window or
+# file began it.
 _going_on: list[Run] = []
 
 
@@ -191,7 +221,10 @@ def active() -> Run | None:
 
 
 def begin(run: Run) -> Run:
-    """Makes this the run that goes on. Raises `InputError`, and removes its folder, if there is one already."""
+    """Makes this the run that goes on.
+
+    Raises `InputError`, and removes its folder, if there is one already.
+    """
     present = active()
     if present is not None:
         run.cancel()

@@ -1,4 +1,6 @@
-"""What workers are asked to do, as scripts for `run.Run`: decompose a photo, cut a mask out of a box, complete a result's arrays."""
+"""What workers are asked to do, as scripts for `run.Run`: decompose a photo, cut a mask out of a
+box, complete a result's arrays.
+"""
 
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -24,11 +26,15 @@ def decompose(
     threads: int,
     environment: WorkerEnvironment,
 ) -> Script:
-    """Decomposes a photo into the folder `RESULT` within the run's own `folder`; returns that one, its arrays included."""
+    """Decomposes a photo into the folder `RESULT` within the run's own `folder`; returns that one,
+    its arrays included.
+    """
     photo_path = yield from during(_HANDING_OVER, hand_over(photo, folder / "photo"))
     mask_path = None
     if mask is not None:
-        mask_path = yield from during(_HANDING_OVER, hand_over_mask(mask, folder / "mask", mask_size))
+        mask_path = yield from during(
+            _HANDING_OVER, hand_over_mask(mask, folder / "mask", mask_size)
+        )
     job = Job(
         photo=photo_path,
         output=folder / RESULT,
@@ -49,11 +55,17 @@ def decompose(
     return Made(folder / RESULT, notes_of(done.message))
 
 
-def cut_out(photo: Picture, box: tuple[int, int, int, int], folder: Path, environment: WorkerEnvironment) -> Script:
-    """Cuts the object inside `box` (left, top, width, height in pixels) out of a photo; returns the mask's PNG."""
+def cut_out(
+    photo: Picture, box: tuple[int, int, int, int], folder: Path, environment: WorkerEnvironment
+) -> Script:
+    """Cuts the object inside `box` (left, top, width, height in pixels) out of a photo; returns the
+    mask's PNG.
+    """
     path = yield from during(_HANDING_OVER, hand_over(photo, folder / "photo"))
     mask = folder / "mask.png"
-    yield from _worked(lambda: box_mask(path, box, mask, environment, photo.transfer), {str(path): photo.name})
+    yield from _worked(
+        lambda: box_mask(path, box, mask, environment, photo.transfer), {str(path): photo.name}
+    )
     return Made(mask)
 
 
@@ -64,8 +76,13 @@ def complete(result: Path, environment: WorkerEnvironment) -> Script:
     return Made(result)
 
 
-def _worked(begin: Callable[[], Worker], names: Mapping[str, str]) -> Generator[Update, None, Update]:
-    """Starts a worker and follows it to its end; what it says is said in the window's words. `names`: of images, by path."""
+def _worked(
+    begin: Callable[[], Worker], names: Mapping[str, str]
+) -> Generator[Update, None, Update]:
+    """Starts a worker and follows it to its end; what it says is said in the window's words.
+
+    `names`: of images, by path.
+    """
     worker = yield from _begun(begin)
     try:
         return (yield from follow(worker))
@@ -74,7 +91,9 @@ def _worked(begin: Callable[[], Worker], names: Mapping[str, str]) -> Generator[
 
 
 def _begun(begin: Callable[[], Worker]) -> Generator[Update, None, Worker]:
-    """Starts a worker in a thread: on a busy machine a new process of a large program takes longer than a window may wait."""
+    """Starts a worker in a thread: on a busy machine a new process of a large program takes longer
+    than a window may wait.
+    """
     pool = ThreadPoolExecutor(1)
     starting = pool.submit(begin)
     pool.shutdown(wait=False)

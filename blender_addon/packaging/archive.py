@@ -1,6 +1,7 @@
 """One zip: the files that go in, and bytes that depend on nothing but them.
 
-Entries are sorted, dated 1980 and stored as they are: wheels are compressed already, and the rest is small beside them.
+Entries are sorted, dated 1980 and stored as they are: wheels are compressed already, and the rest
+is small beside them.
 """
 
 import json
@@ -28,8 +29,14 @@ def archive_name(target: Target) -> str:
 
 
 def contents(target: Target, wheels: Sequence[Path]) -> dict[str, bytes | Path]:
-    """What the zip holds, by the path inside it: bytes, or the file to copy. Raises `InputError` as `installed_source` does."""
-    entries: dict[str, bytes | Path] = {"LICENSE": ROOT / "LICENSE", _MANIFEST: manifest(target, wheels).encode()}
+    """What the zip holds, by the path inside it: bytes, or the file to copy.
+
+    Raises `InputError` as `installed_source` does.
+    """
+    entries: dict[str, bytes | Path] = {
+        "LICENSE": ROOT / "LICENSE",
+        _MANIFEST: manifest(target, wheels).encode(),
+    }
     for path in sorted(_ADDON.rglob("*.py")):
         name = path.relative_to(_ADDON).as_posix()
         if not name.startswith("packaging/"):
@@ -67,7 +74,16 @@ def listing(path: Path) -> list[str]:
     with zipfile.ZipFile(path) as archive:
         for entry in archive.infolist():
             top, _, rest = entry.filename.partition("/")
-            part = f"wheels/{rest}" if top == "wheels" else "isc_core" if top == "isc_core" else "the add-on"
+            part = (
+                f"wheels/{rest}"
+                if top == "wheels"
+                else "isc_core"
+                if top == "isc_core"
+                else "the add-on"
+            )
             sizes[part] = sizes.get(part, 0) + entry.file_size
     lines = [f"{path.name}: {path.stat().st_size / 1e6:.1f} MB"]
-    return lines + [f"  {size / 1e6:7.2f} MB  {part}" for part, size in sorted(sizes.items(), key=lambda item: -item[1])]
+    return lines + [
+        f"  {size / 1e6:7.2f} MB  {part}"
+        for part, size in sorted(sizes.items(), key=lambda item: -item[1])
+    ]

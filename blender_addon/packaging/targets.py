@@ -6,18 +6,31 @@ from dataclasses import dataclass
 
 from isc_core.errors import InputError
 
-# Wheels for macOS are made for 13 and later, as OpenCV's are; those for Linux need glibc 2.28, as Blender does.
+# Wheels for macOS are made for 13 and later, as OpenCV's are; those for Linux need glibc 2.28, as
+# Blender does.
 _PIP_PLATFORMS = {
-    "linux-x64": ("manylinux_2_28_x86_64", "manylinux_2_27_x86_64", "manylinux_2_17_x86_64", "manylinux2014_x86_64"),
+    "linux-x64": (
+        "manylinux_2_28_x86_64",
+        "manylinux_2_27_x86_64",
+        "manylinux_2_17_x86_64",
+        "manylinux2014_x86_64",
+    ),
     "windows-x64": ("win_amd64",),
     "macos-arm64": ("macosx_13_0_arm64", "macosx_12_0_arm64", "macosx_11_0_arm64"),
 }
-_HERE = {("Linux", "x86_64"): "linux-x64", ("Windows", "AMD64"): "windows-x64", ("Darwin", "arm64"): "macos-arm64"}
+_HERE = {
+    ("Linux", "x86_64"): "linux-x64",
+    ("Windows", "AMD64"): "windows-x64",
+    ("Darwin", "arm64"): "macos-arm64",
+}
 
 
 @dataclass(frozen=True)
 class Target:
-    """`platform`: as Blender names it. `python`: (major, minor). `blender_min` <= Blender < `blender_max` (empty: no end)."""
+    """`platform`: as Blender names it.
+
+    `python`: (major, minor). `blender_min` <= Blender < `blender_max` (empty: no end).
+    """
 
     platform: str
     python: tuple[int, int]
@@ -42,8 +55,14 @@ class Target:
     def runs(self, wheel: str) -> bool:
         """Whether the wheel of this file name is for this target."""
         python, abi, platforms = wheel.removesuffix(".whl").split("-")[-3:]
-        fits_python = python == "py3" or python == abi == self.abi or (abi == "abi3" and _version(python) <= self.python)
-        return fits_python and (platforms == "any" or not set(platforms.split(".")).isdisjoint(self.pip_platforms))
+        fits_python = (
+            python == "py3"
+            or python == abi == self.abi
+            or (abi == "abi3" and _version(python) <= self.python)
+        )
+        return fits_python and (
+            platforms == "any" or not set(platforms.split(".")).isdisjoint(self.pip_platforms)
+        )
 
 
 def _version(tag: str) -> tuple[int, int]:
@@ -54,7 +73,8 @@ def _version(tag: str) -> tuple[int, int]:
 
 _PLATFORMS = ("linux-x64", "windows-x64", "macos-arm64")
 
-# Blender 4.5 and 5.0 run Python 3.11, blender.org's later ones 3.13; a distribution's Blender runs that distribution's Python.
+# Blender 4.5 and 5.0 run Python 3.11, blender.org's later ones 3.13; a distribution's Blender runs
+# that distribution's Python.
 TARGETS = (
     *(Target(name, (3, 11), "4.5.0", "5.1.0") for name in _PLATFORMS),
     *(Target(name, (3, 13), "5.1.0") for name in _PLATFORMS),
@@ -63,16 +83,22 @@ TARGETS = (
 
 
 def chosen(name: str) -> tuple[Target, ...]:
-    """The targets called `name`: one's name, "all", or "here" for the machine and Python that this runs on. Raises `InputError`."""
+    """The targets called `name`: one's name, "all", or "here" for the machine and Python that this
+    runs on. Raises `InputError`.
+    """
     if name == "all":
         return TARGETS
     wanted = _here() if name == "here" else name
     found = tuple(target for target in TARGETS if target.name == wanted)
     if not found:
-        raise InputError(f"no extension is built for {wanted}: choose all, here, {', '.join(target.name for target in TARGETS)}")
+        raise InputError(
+            f"no extension is built for {wanted}: choose all, here, {', '.join(target.name for target in TARGETS)}"
+        )
     return found
 
 
 def _here() -> str:
-    machine = _HERE.get((platform.system(), platform.machine()), f"{platform.system()} {platform.machine()}")
+    machine = _HERE.get(
+        (platform.system(), platform.machine()), f"{platform.system()} {platform.machine()}"
+    )
     return f"{machine}-cp{sys.version_info[0]}{sys.version_info[1]}"

@@ -1,4 +1,6 @@
-"""Blender's own strict check of a zip, as its `blender --command extension validate` does it; run in the bpy module, in a process apart."""
+"""Blender's own strict check of a zip, as its `blender --command extension validate` does it; run
+in the bpy module, in a process apart.
+"""
 
 import importlib.util
 import subprocess
@@ -16,7 +18,10 @@ sys.exit(cli_extension_handler(["validate", sys.argv[1]]))
 
 
 def validate(archive: Path) -> bool:
-    """Whether the check was made: it needs the bpy module. Raises `InputError` with Blender's words if the zip does not pass."""
+    """Whether the check was made: it needs the bpy module.
+
+    Raises `InputError` with Blender's words if the zip does not pass.
+    """
     if importlib.util.find_spec("bpy") is None:
         return False
     command = [sys.executable, "-c", _CODE, str(archive.resolve())]

@@ -1,7 +1,8 @@
 """The wheels that a zip carries: which, where they are kept, and that they are what they should be.
 
-`wheels.sha256` names every wheel of every target with the hash of its bytes, in the form that `sha256sum --check` reads. pip fetches
-what the cache folder lacks; with all of them there, nothing is fetched and no network is needed.
+`wheels.sha256` names every wheel of every target with the hash of its bytes, in the form that
+`sha256sum --check` reads. pip fetches what the cache folder lacks; with all of them there, nothing
+is fetched and no network is needed.
 """
 
 import hashlib
@@ -18,18 +19,24 @@ LOCK = Path(__file__).with_name("wheels.sha256")
 
 
 def locked(lock: Path = LOCK) -> dict[str, str]:
-    """The hash of each wheel by its file name. Raises `InputError` for a line that is not of the form `HASH  NAME.whl`."""
+    """The hash of each wheel by its file name.
+
+    Raises `InputError` for a line that is not of the form `HASH  NAME.whl`.
+    """
     found = {}
     for line in lock.read_text(encoding="utf-8").splitlines():
         digest, _, name = line.partition("  ")
         if len(digest) != 64 or not name.endswith(".whl"):
-            raise InputError(f"{lock.name}: a line is not a hash, two blanks and a wheel: {line[:80]}")
+            raise InputError(
+                f"{lock.name}: a line is not a hash, two blanks and a wheel: {line[:80]}"
+            )
         found[name] = digest
     return found
 
 
 def wheels_for(target: Target, cache: Path, *, offline: bool = False) -> list[Path]:
-    """The wheels of a target, in the cache folder and checked; pip fetches what is missing unless `offline`.
+    """The wheels of a target, in the cache folder and checked; pip fetches what is missing unless
+    `offline`.
 
     Raises `InputError` for one that cannot be had or is not the one that was locked.
     """
@@ -42,25 +49,56 @@ def wheels_for(target: Target, cache: Path, *, offline: bool = False) -> list[Pa
         _fetch(target, {name: names[name] for name in missing}, folder)
     for name, digest in names.items():
         if not (folder / name).is_file() or _sha256(folder / name) != digest:
-            raise InputError(f"{folder / name} is not the wheel that {LOCK.name} names: delete it and build again")
+            raise InputError(
+                f"{folder / name} is not the wheel that {LOCK.name} names: delete it and build again"
+            )
     return [folder / name for name in names]
 
 
 def _fetch(target: Target, names: dict[str, str], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     requirements = folder / "requirements.txt"
-    requirements.write_text("".join(f"{_requirement(name)} --hash=sha256:{digest}\n" for name, digest in names.items()), encoding="utf-8")
-    options = ["--quiet", "--disable-pip-version-check", "--no-deps", "--only-binary=:all:", "--require-hashes"]
-    command = [sys.executable, "-m", "pip", "download", *options, *_tags(target), "--dest", str(folder), "-r", str(requirements)]
+    requirements.write_text(
+        "".join(f"{_requirement(name)} --hash=sha256:{digest}\n" for name, digest in names.items()),
+        encoding="utf-8",
+    )
+    options = [
+        "--quiet",
+        "--disable-pip-version-check",
+        "--no-deps",
+        "--only-binary=:all:",
+        "--require-hashes",
+    ]
+    command = [
+        sys.executable,
+        "-m",
+        "pip",
+        "download",
+        *options,
+        *_tags(target),
+        "--dest",
+        str(folder),
+        "-r",
+        str(requirements),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     requirements.unlink()
     if done.returncode:
-        reasons = [line for line in done.stderr.splitlines() if line.startswith("ERROR")] or done.stderr.splitlines()[-1:] or ["pip failed"]
+        reasons = (
+            [line for line in done.stderr.splitlines() if line.startswith("ERROR")]
+            or done.stderr.splitlines()[-1:]
+            or ["pip failed"]
+        )
         raise InputError(f"the wheels for {target.name} cannot be fetched: {reasons[0]}")
 
 
 def _tags(target: Target) -> Iterator[str]:
-    yield from ("--implementation", "cp", "--python-version", f"{target.python[0]}.{target.python[1]}")
+    yield from (
+        "--implementation",
+        "cp",
+        "--python-version",
+        f"{target.python[0]}.{target.python[1]}",
+    )
     for abi in (target.abi, "abi3", "none"):
         yield from ("--abi", abi)
     for name in target.pip_platforms:

@@ -1,7 +1,9 @@
-"""A closed body from the open sheet that a photo shows: a flat back, and a wall around the outline and around holes.
+"""A closed body from the open sheet that a photo shows: a flat back, and a wall around the outline
+and around holes.
 
-Every edge then has two faces that pass it in opposite directions, as printing and boolean operations want it. Where the sheet hangs
-together by a corner only, two of its cells meeting in one vertex, that vertex is split, since four faces of the wall would share an edge.
+Every edge then has two faces that pass it in opposite directions, as printing and boolean
+operations want it. Where the sheet hangs together by a corner only, two of its cells meeting in one
+vertex, that vertex is split, since four faces of the wall would share an edge.
 
 Limits: the back is invented: its confidence is 0, its texture that of the front.
 """
@@ -14,7 +16,10 @@ from .mesh import Geometry
 
 
 def close_back(sheet: Geometry, thickness: float) -> Geometry:
-    """The sheet of triangles with wall and back; `thickness`: metres from the sheet's furthest vertex to the back, above 0."""
+    """The sheet of triangles with wall and back;
+
+    `thickness`: metres from the sheet's furthest vertex to the back, above 0.
+    """
     front = _split_pinches(sheet)
     faces, n = front.corners.reshape(-1, 3), len(front.vertices)
     rim = _outline(faces)
@@ -22,10 +27,16 @@ def close_back(sheet: Geometry, thickness: float) -> Geometry:
     behind = front.vertices.copy()
     behind[:, 1] = behind[:, 1].max() + thickness
     vertices = np.concatenate([front.vertices, behind])
-    corners = np.concatenate([faces.ravel(), (faces[:, ::-1] + n).ravel(), wall.ravel()]).astype(np.int32)
-    starts = np.concatenate([np.arange(0, 2 * faces.size, 3), 2 * faces.size + np.arange(0, wall.size, 4)]).astype(np.int32)
+    corners = np.concatenate([faces.ravel(), (faces[:, ::-1] + n).ravel(), wall.ravel()]).astype(
+        np.int32
+    )
+    starts = np.concatenate(
+        [np.arange(0, 2 * faces.size, 3), 2 * faces.size + np.arange(0, wall.size, 4)]
+    ).astype(np.int32)
     trust = np.concatenate([front.confidence, np.zeros_like(front.confidence)])
-    normals = None if front.normals is None else _corner_normals(front.normals, faces, vertices, wall)
+    normals = (
+        None if front.normals is None else _corner_normals(front.normals, faces, vertices, wall)
+    )
     return Geometry(vertices, corners, starts, np.concatenate([front.uv, front.uv]), trust, normals)
 
 
@@ -37,11 +48,19 @@ def _outline(faces: np.ndarray) -> np.ndarray:
     return edges[~np.isin(code, back)]
 
 
-def _corner_normals(front: np.ndarray, faces: np.ndarray, vertices: np.ndarray, wall: np.ndarray) -> np.ndarray:
+def _corner_normals(
+    front: np.ndarray, faces: np.ndarray, vertices: np.ndarray, wall: np.ndarray
+) -> np.ndarray:
     """(L, 3): the sheet's own normals, the back's, and the wall's, which are smooth along it."""
-    across = np.cross(vertices[wall[:, 1]] - vertices[wall[:, 0]], vertices[wall[:, 3]] - vertices[wall[:, 0]])
+    across = np.cross(
+        vertices[wall[:, 1]] - vertices[wall[:, 0]], vertices[wall[:, 3]] - vertices[wall[:, 0]]
+    )
     n = len(front)
-    smooth = _unit(np.stack([np.bincount((wall % n).ravel(), np.repeat(part, 4), n) for part in _unit(across).T], -1))
+    smooth = _unit(
+        np.stack(
+            [np.bincount((wall % n).ravel(), np.repeat(part, 4), n) for part in _unit(across).T], -1
+        )
+    )
     back = np.broadcast_to([0.0, 1.0, 0.0], (faces.size, 3))
     return np.concatenate([front[faces.ravel()], back, smooth[(wall % n).ravel()]])
 
@@ -59,7 +78,9 @@ def _split_pinches(sheet: Geometry) -> Geometry:
         around = np.flatnonzero((faces == vertex).any(1))
         for fan in _fans(faces[around], int(vertex))[1:]:
             chosen = around[fan]
-            faces[chosen] = np.where(faces[chosen] == vertex, len(sheet.vertices) + len(copies), faces[chosen])
+            faces[chosen] = np.where(
+                faces[chosen] == vertex, len(sheet.vertices) + len(copies), faces[chosen]
+            )
             copies.append(int(vertex))
     take = np.concatenate([np.arange(len(sheet.vertices)), np.array(copies, int)])
     normals = None if sheet.normals is None else sheet.normals[take]
@@ -79,6 +100,9 @@ def _fans(faces: np.ndarray, vertex: int) -> list[list[int]]:
     for index, face in enumerate(faces):
         others = set(map(int, face)) - {vertex}
         joined = [fan for fan in fans if fan[0] & others]
-        merged = (others.union(*(fan[0] for fan in joined)), [index, *(k for fan in joined for k in fan[1])])
+        merged = (
+            others.union(*(fan[0] for fan in joined)),
+            [index, *(k for fan in joined for k in fan[1])],
+        )
         fans = [fan for fan in fans if not any(fan is other for other in joined)] + [merged]
     return [sorted(members) for _, members in fans]

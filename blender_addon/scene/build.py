@@ -1,4 +1,6 @@
-"""One result becomes an object in a scene: mesh, material, light, camera, photo; built again, the same things are updated."""
+"""One result becomes an object in a scene: mesh, material, light, camera, photo; built again, the
+same things are updated.
+"""
 
 import json
 from dataclasses import asdict, dataclass, replace
@@ -19,14 +21,28 @@ from .displacement import displace, flattened, undo_displacement
 from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps, require_spaces
 from .material import Gloss, Maps, ensure_material
 from .mesh import fill_mesh, sheet
-from .provenance import PHOTO_HASH, ROLE, SOURCE_IMAGE, is_isc, label, mark, photo_hash, record, require_local
+from .provenance import (
+    PHOTO_HASH,
+    ROLE,
+    SOURCE_IMAGE,
+    is_isc,
+    label,
+    mark,
+    photo_hash,
+    record,
+    require_local,
+)
 from .provenance import find as find_block
 from .sun import relight
 from .world import ensure_world
 
 __all__ = ["SHADOWS", "BuildOptions", "Built", "build", "find", "is_isc"]
 
-SHADOWS: dict[str, bool | None] = {"usual": None, "on": True, "off": False}  # what the user's choice means for `own_shadows`
+SHADOWS: dict[str, bool | None] = {
+    "usual": None,
+    "on": True,
+    "off": False,
+}  # what the user's choice means for `own_shadows`
 _USUAL_ROUGHNESS = 0.5
 _BACK = 0.02  # of the size: how far the back lies behind the furthest point of the front
 
@@ -35,14 +51,16 @@ _BACK = 0.02  # of the size: how far the back lies behind the furthest point of 
 class BuildOptions:
     """What is built, and what of the user's may be changed.
 
-    `size_metres`: longer side of the object. `own_scene`: in a scene of its own; else in the current one, where the world, the active
-    camera, the resolution and the view transform change only with `set_world, set_camera, set_resolution, set_view_transform`.
-    `sun`: a sun lamp and even light instead of the environment. `displacement`: a flat grid that a modifier displaces, instead of the
-    height mesh. `closed_back`: a wall and a flat back, so that the mesh is closed.
+    `size_metres`: longer side of the object. `own_scene`: in a scene of its own; else in the
+    current one, where the world, the active camera, the resolution and the view transform change
+    only with `set_world, set_camera, set_resolution, set_view_transform`. `sun`: a sun lamp and
+    even light instead of the environment. `displacement`: a flat grid that a modifier displaces,
+    instead of the height mesh. `closed_back`: a wall and a flat back, so that the mesh is closed.
     `specular_from`: the gloss is the fitted "lobe", the photo's specular "image", or "none".
-    `own_shadows`: whether the object casts shadows and lights itself (Cycles). The recovered shading holds those of the photo already, so
-    that without them it looks as photographed. None: a new object does, unless it has a scene of its own; an old one as it is.
-    `name`: the result's own if empty.
+    `own_shadows`: whether the object casts shadows and lights itself (Cycles). The recovered
+    shading holds those of the photo already, so that without them it looks as photographed. None: a
+    new object does, unless it has a scene of its own; an old one as it is. `name`: the result's own
+    if empty.
     """
 
     size_metres: float = 0.1
@@ -78,12 +96,13 @@ def build(
     scene: bpy.types.Scene | None = None,
     photo: bpy.types.Image | None = None,
 ) -> Built:
-    """Builds the result, or updates what was built of the same photo under its name before; another photo's object is left alone, the
-    new one is then called "name-2" and so on.
+    """Builds the result, or updates what was built of the same photo under its name before; another
+    photo's object is left alone, the new one is then called "name-2" and so on.
 
-    `scene`: where to, without a scene of its own; the current one if None. `photo`: shown behind the object; the masked one if None.
-    Raises `InputError`, before anything is changed, for a size that is none, things linked from another file, a mesh being
-    edited, a colour configuration without the spaces that maps need.
+    `scene`: where to, without a scene of its own; the current one if None. `photo`: shown behind
+    the object; the masked one if None. Raises `InputError`, before anything is changed, for a size
+    that is none, things linked from another file, a mesh being edited, a colour configuration
+    without the spaces that maps need.
     """
     options = options or BuildOptions()
     key = _key(options.name or result.name, result, photo)
@@ -95,9 +114,18 @@ def build(
     thing = _object(key, collection, result, options, material)
     attach_maps(thing, maps)
     camera = ensure_camera(key, collection, result, options.size_metres, thing.matrix_basis)
-    show_photo(camera, photo or ensure_image(key, "photo", result.image, COLOR, result.mask.astype(np.float32)))
-    world = ensure_world(key, ensure_image(key, "sky", result.sky, COLOR), result.sun_ambient, options.sun)
-    thing["isc_world"] = world  # so that the light is saved and appended with what it lights, whether or not a scene uses it
+    show_photo(
+        camera,
+        photo or ensure_image(key, "photo", result.image, COLOR, result.mask.astype(np.float32)),
+    )
+    world = ensure_world(
+        key, ensure_image(key, "sky", result.sky, COLOR), result.sun_ambient, options.sun
+    )
+    thing["isc_world"] = (
+        # so that the light is saved and appended with what it lights, whether or not a scene uses
+        # it
+        world
+    )
     for block in (thing, collection):
         record(block, result, json.dumps(asdict(options)))
     relight(thing, options.sun)
@@ -107,10 +135,12 @@ def build(
 
 
 def find(thing: bpy.types.Object | None) -> Built | None:
-    """What belongs to an object, camera or sun that ISC made; None for others, and where object or material are gone.
+    """What belongs to an object, camera or sun that ISC made; None for others, and where object or
+    material are gone.
 
-    A copy of an object is itself what is found, with the material that it wears, beside what it shares with the original. Camera, world,
-    scene and collection are None where they were deleted, or not appended with the object.
+    A copy of an object is itself what is found, with the material that it wears, beside what it
+    shares with the original. Camera, world, scene and collection are None where they were deleted,
+    or not appended with the object.
     """
     if thing is None or not is_isc(thing):
         return None
@@ -120,23 +150,34 @@ def find(thing: bpy.types.Object | None) -> Built | None:
     material = None if made is None else material_of(made)
     if made is None or material is None:
         return None
-    collection = find_block(bpy.data.collections, key, "collection") or next(iter(made.users_collection), None)
+    collection = find_block(bpy.data.collections, key, "collection") or next(
+        iter(made.users_collection), None
+    )
     scene = find_block(bpy.data.scenes, key, "scene") or next(iter(made.users_scene), None)
-    camera, world = find_block(bpy.data.objects, key, "camera"), find_block(bpy.data.worlds, key, "world")
+    camera, world = (
+        find_block(bpy.data.objects, key, "camera"),
+        find_block(bpy.data.worlds, key, "world"),
+    )
     return Built(collection, made, camera, world, scene, material)
 
 
 def _key(name: str, result: Result, photo: bpy.types.Image | None) -> str:
-    """The name, with a number behind it where it is that of another photo's object: photos of different folders may be called alike."""
+    """The name, with a number behind it where it is that of another photo's object: photos of
+    different folders may be called alike.
+    """
     key, number = name, 1
-    while (thing := find_block(bpy.data.objects, key, "object")) is not None and not _of_same_photo(thing, result, photo):
+    while (thing := find_block(bpy.data.objects, key, "object")) is not None and not _of_same_photo(
+        thing, result, photo
+    ):
         number += 1
         key = f"{name}-{number}"
     return key
 
 
 def _of_same_photo(thing: bpy.types.Object, result: Result, photo: bpy.types.Image | None) -> bool:
-    """An image of this file is the same photo however it was changed since; else the photos' bytes tell, where they are known."""
+    """An image of this file is the same photo however it was changed since; else the photos' bytes
+    tell, where they are known.
+    """
     if photo is not None and thing.get(SOURCE_IMAGE) is not None:
         return bool(thing[SOURCE_IMAGE] == photo)
     made_of, given = thing.get(PHOTO_HASH, ""), photo_hash(result)
@@ -145,9 +186,13 @@ def _of_same_photo(thing: bpy.types.Object, result: Result, photo: bpy.types.Ima
 
 def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> None:
     if not 0 < options.size_metres < 1e6:
-        raise InputError(f"a size of {options.size_metres} metres cannot be built: give one above 0")
+        raise InputError(
+            f"a size of {options.size_metres} metres cannot be built: give one above 0"
+        )
     if not options.own_scene and scene.library is not None:
-        raise InputError(f"the scene {scene.name} is linked from another file and cannot be changed: build in a scene of its own")
+        raise InputError(
+            f"the scene {scene.name} is linked from another file and cannot be changed: build in a scene of its own"
+        )
     if options.displacement and options.closed_back:
         raise InputError("a displaced grid has no back: choose displacement or a closed back")
     require_spaces(COLOR, DATA)
@@ -158,11 +203,19 @@ def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> N
 
 
 def _object(
-    key: str, collection: bpy.types.Collection, result: Result, options: BuildOptions, material: bpy.types.Material
+    key: str,
+    collection: bpy.types.Collection,
+    result: Result,
+    options: BuildOptions,
+    material: bpy.types.Material,
 ) -> bpy.types.Object:
     thing, shadows = find_block(bpy.data.objects, key, "object"), options.own_shadows
     if thing is None:
-        thing = mark(bpy.data.objects.new(label(key), mark(bpy.data.meshes.new(label(key)), key, "mesh")), key, "object")
+        thing = mark(
+            bpy.data.objects.new(label(key), mark(bpy.data.meshes.new(label(key)), key, "mesh")),
+            key,
+            "object",
+        )
         shadows = not options.own_scene if shadows is None else shadows
     if shadows is not None:
         thing.visible_shadow = thing.visible_diffuse = shadows
@@ -173,7 +226,10 @@ def _object(
         fill_mesh(thing.data, flattened(geometry))
         displace(key, thing, result, options.size_metres)
     else:
-        fill_mesh(thing.data, close_back(geometry, _BACK * options.size_metres) if options.closed_back else geometry)
+        fill_mesh(
+            thing.data,
+            close_back(geometry, _BACK * options.size_metres) if options.closed_back else geometry,
+        )
         undo_displacement(key, thing)
     if not thing.data.materials:
         thing.data.materials.append(material)
@@ -184,8 +240,15 @@ def _material_maps(key: str, result: Result, maps: dict[str, bpy.types.Image]) -
     base = ensure_image(key, "base_color", result.base_color, COLOR)
     varies = result.specular_variation
     variation = None if varies is None else ensure_image(key, "specular_variation", varies, DATA)
-    flat = np.abs(result.normal_map - (0.5, 0.5, 1)).max() < 1e-3  # a mesh of every pixel has all detail in its own normals
-    return Maps(base, maps["specular"], variation, None if flat else ensure_image(key, "normal_map", result.normal_map, DATA))
+    flat = (
+        np.abs(result.normal_map - (0.5, 0.5, 1)).max() < 1e-3
+    )  # a mesh of every pixel has all detail in its own normals
+    return Maps(
+        base,
+        maps["specular"],
+        variation,
+        None if flat else ensure_image(key, "normal_map", result.normal_map, DATA),
+    )
 
 
 def _gloss(result: Result, options: BuildOptions) -> Gloss:
@@ -196,7 +259,9 @@ def _gloss(result: Result, options: BuildOptions) -> Gloss:
 
 
 def _set_scene(built: Built, options: BuildOptions, result: Result) -> None:
-    everything = replace(options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True)
+    everything = replace(
+        options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True
+    )
     wanted = everything if options.own_scene else options
     if wanted.set_world:
         built.scene.world = built.world

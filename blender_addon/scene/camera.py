@@ -1,4 +1,6 @@
-"""The photo's camera: orthographic, its frame the photo's, pixel by pixel where the render has the size of the maps."""
+"""The photo's camera: orthographic, its frame the photo's, pixel by pixel where the render has the
+size of the maps.
+"""
 
 import bpy
 import numpy as np
@@ -11,9 +13,16 @@ from .provenance import find, label, mark
 
 
 def ensure_camera(
-    key: str, collection: bpy.types.Collection, result: Result, size_metres: float, where: Matrix | None = None
+    key: str,
+    collection: bpy.types.Collection,
+    result: Result,
+    size_metres: float,
+    where: Matrix | None = None,
 ) -> bpy.types.Object:
-    """The camera before the object. `where`: the object's place, its rotation and location count; the world's origin if None."""
+    """The camera before the object.
+
+    `where`: the object's place, its rotation and location count; the world's origin if None.
+    """
     camera = find(bpy.data.objects, key, "camera")
     if camera is None:
         data = mark(bpy.data.cameras.new(label(key, "camera")), key, "camera")
@@ -21,12 +30,21 @@ def ensure_camera(
     put(camera, collection)
     (width, height), step = result.size, metres_per_pixel(result, size_metres)
     column, row, _ = result.origin.astype(float)
-    # Behind everything that can stand in the frame: the object's own depth, and room for what people put beside it.
-    distance = 4 * max(width, height) * step + float(result.vertices[:, 2].max()) * step / result.metres_per_pixel
+    # Behind everything that can stand in the frame: the object's own depth, and room for what
+    # people put beside it.
+    distance = (
+        4 * max(width, height) * step
+        + float(result.vertices[:, 2].max()) * step / result.metres_per_pixel
+    )
     middle = ((0.5 * (width - 1) - column) * step, -distance, (row - 0.5 * (height - 1)) * step)
     data = camera.data
     data.type, data.sensor_fit, data.ortho_scale = "ORTHO", "AUTO", max(width, height) * step
-    data.shift_x, data.shift_y, data.clip_start, data.clip_end = 0.0, 0.0, 0.01 * distance, 3 * distance
+    data.shift_x, data.shift_y, data.clip_start, data.clip_end = (
+        0.0,
+        0.0,
+        0.01 * distance,
+        3 * distance,
+    )
     place = Matrix.LocRotScale(*where.decompose()[:2], None) if where is not None else Matrix()
     camera.matrix_basis = place @ Matrix.Translation(middle) @ Matrix.Rotation(0.5 * np.pi, 4, "X")
     return camera

@@ -1,7 +1,8 @@
-"""The shape as a modifier: a flat grid that a Displace modifier lifts by an image of the heights, for more or less relief.
+"""The shape as a modifier: a flat grid that a Displace modifier lifts by an image of the heights,
+for more or less relief.
 
-The image holds metres toward the viewer, counted from the grid: strength 1 is the recovered shape. Its pixels under a vertex of the
-height mesh have that vertex' height, so that both stand alike.
+The image holds metres toward the viewer, counted from the grid: strength 1 is the recovered shape.
+Its pixels under a vertex of the height mesh have that vertex' height, so that both stand alike.
 
 Limits: the normals are those of the displaced grid, not the recovered ones.
 """
@@ -34,10 +35,14 @@ def heights(result: Result, size_metres: float) -> np.ndarray:
 
 
 def displace(key: str, thing: bpy.types.Object, result: Result, size_metres: float) -> None:
-    """Puts the modifier on the object, with its texture and image; the strength that people set stays."""
+    """Puts the modifier on the object, with its texture and image; the strength that people set
+    stays.
+    """
     image = ensure_image(key, "displacement", heights(result, size_metres), DATA)
     texture = find(bpy.data.textures, key, "displacement")
-    texture = texture or mark(bpy.data.textures.new(label(key, "displacement"), "IMAGE"), key, "displacement")
+    texture = texture or mark(
+        bpy.data.textures.new(label(key, "displacement"), "IMAGE"), key, "displacement"
+    )
     texture.image, texture.use_interpolation, texture.extension = image, False, "EXTEND"
     modifier = thing.modifiers.get(MODIFIER) or thing.modifiers.new(MODIFIER, "DISPLACE")
     modifier.texture, modifier.texture_coords, modifier.uv_layer = texture, "UV", UV

@@ -1,8 +1,10 @@
-"""The height mesh: vertices, faces, UV, the recovered normals, and how far each vertex can be trusted.
+"""The height mesh: vertices, faces, UV, the recovered normals, and how far each vertex can be
+trusted.
 
-Axes: the camera's frame (x right, y up, z toward the viewer) becomes Blender's (x, -z, y); metres. The recovered normals are "free"
-custom normals, a vector a vertex: exact, and not turned when the mesh is deformed (Mesh > Normals > Clear Custom Split Normals then
-gives those of the geometry). Attributes a vertex: `confidence` in [0, 1].
+Axes: the camera's frame (x right, y up, z toward the viewer) becomes Blender's (x, -z, y); metres.
+The recovered normals are "free" custom normals, a vector a vertex: exact, and not turned when the
+mesh is deformed (Mesh > Normals > Clear Custom Split Normals then gives those of the geometry).
+Attributes a vertex: `confidence` in [0, 1].
 """
 
 from dataclasses import dataclass
@@ -19,8 +21,9 @@ UV, NORMAL, CONFIDENCE = "UVMap", "custom_normal", "confidence"
 
 @dataclass(frozen=True)
 class Geometry:
-    """A mesh in Blender's axes: `vertices` (V, 3) metres; `corners` (L,) int32, the vertex of each corner, and `starts` (F,) int32, the
-    first corner of each face; `uv` (V, 2) and `confidence` (V,) a vertex; `normals` (V, 3) a vertex or (L, 3) a corner, None for smooth.
+    """A mesh in Blender's axes: `vertices` (V, 3) metres; `corners` (L,) int32, the vertex of each
+    corner, and `starts` (F,) int32, the first corner of each face; `uv` (V, 2) and `confidence`
+    (V,) a vertex; `normals` (V, 3) a vertex or (L, 3) a corner, None for smooth.
     """
 
     vertices: np.ndarray
@@ -43,7 +46,14 @@ def sheet(result: Result, size_metres: float) -> Geometry:
     rows, columns = result.vertex_pixel.T
     vertices = to_blender(result.vertices.astype(np.float64) * scale)
     starts = np.arange(0, len(corners), 3, dtype=np.int32)
-    return Geometry(vertices, corners, starts, result.uv, result.confidence[rows, columns], to_blender(result.vertex_normals))
+    return Geometry(
+        vertices,
+        corners,
+        starts,
+        result.uv,
+        result.confidence[rows, columns],
+        to_blender(result.vertex_normals),
+    )
 
 
 def metres_per_pixel(result: Result, size_metres: float) -> float:
@@ -63,12 +73,16 @@ def fill_mesh(mesh: bpy.types.Mesh, geometry: Geometry) -> None:
     mesh.loops.foreach_set("vertex_index", geometry.corners)
     mesh.polygons.foreach_set("loop_start", geometry.starts)
     mesh.update(calc_edges=True)
-    mesh.uv_layers.new(name=UV, do_init=False).uv.foreach_set("vector", _flat(geometry.uv[geometry.corners]))
+    mesh.uv_layers.new(name=UV, do_init=False).uv.foreach_set(
+        "vector", _flat(geometry.uv[geometry.corners])
+    )
     trust = mesh.attributes.new(CONFIDENCE, "FLOAT", "POINT")
     trust.data.foreach_set("value", _flat(geometry.confidence))
     if geometry.normals is not None:
         domain = "POINT" if len(geometry.normals) == len(geometry.vertices) else "CORNER"
-        mesh.attributes.new(NORMAL, "FLOAT_VECTOR", domain).data.foreach_set("vector", _flat(geometry.normals))
+        mesh.attributes.new(NORMAL, "FLOAT_VECTOR", domain).data.foreach_set(
+            "vector", _flat(geometry.normals)
+        )
 
 
 def _flat(values: np.ndarray) -> np.ndarray:

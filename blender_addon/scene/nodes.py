@@ -12,7 +12,9 @@ def node_tree(block: Any) -> bpy.types.NodeTree:
     return block.node_tree
 
 
-def add_node(tree: bpy.types.NodeTree, kind: str, place: tuple[float, float], **settings: Any) -> bpy.types.Node:
+def add_node(
+    tree: bpy.types.NodeTree, kind: str, place: tuple[float, float], **settings: Any
+) -> bpy.types.Node:
     """A node of `ShaderNode<kind>` (or the full name) at `place`, with its properties set."""
     node = tree.nodes.new(kind if kind.startswith("Node") else f"ShaderNode{kind}")
     node.location = place
@@ -21,7 +23,9 @@ def add_node(tree: bpy.types.NodeTree, kind: str, place: tuple[float, float], **
     return node
 
 
-def connect(tree: bpy.types.NodeTree, *wires: tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]) -> None:
+def connect(
+    tree: bpy.types.NodeTree, *wires: tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]
+) -> None:
     """Links each output to each input."""
     for source, target in wires:
         tree.links.new(source, target)

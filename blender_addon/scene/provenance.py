@@ -1,9 +1,12 @@
-"""How what ISC made is recognised, and where it comes from: custom properties that are saved and appended with each datablock.
+"""How what ISC made is recognised, and where it comes from: custom properties that are saved and
+appended with each datablock.
 
-`isc_key` is the name of the image it was made of (with a number where photos are called alike), `isc_role` what it is there for ("object",
-"base_color", "camera", ...). Datablocks are found by these two, since people rename things and Blender cuts long names.
+`isc_key` is the name of the image it was made of (with a number where photos are called alike),
+`isc_role` what it is there for ("object", "base_color", "camera", ...). Datablocks are found by
+these two, since people rename things and Blender cuts long names.
 
-Limits: a datablock linked from another file belongs to that file: it is never found here, and cannot be changed.
+Limits: a datablock linked from another file belongs to that file: it is never found here, and
+cannot be changed.
 """
 
 import json
@@ -18,13 +21,24 @@ from isc_core.errors import InputError
 from ..arrays import Result
 
 KEY, ROLE = "isc_key", "isc_role"
-PHOTO_HASH, SOURCE_IMAGE, SPECULAR_LEVEL = "isc_photo_sha256", "isc_source_image", "isc_specular_level"
+PHOTO_HASH, SOURCE_IMAGE, SPECULAR_LEVEL = (
+    "isc_photo_sha256",
+    "isc_source_image",
+    "isc_specular_level",
+)
 _NAME_BYTES = 63  # of a datablock's name in Blender 4.5; later ones take more
 
 
 def find(blocks: Iterable[Any], key: str, role: str) -> Any:
     """The local datablock of that key and role, or None."""
-    return next((block for block in blocks if block.get(KEY) == key and block.get(ROLE) == role and block.library is None), None)
+    return next(
+        (
+            block
+            for block in blocks
+            if block.get(KEY) == key and block.get(ROLE) == role and block.library is None
+        ),
+        None,
+    )
 
 
 def mark(block: Any, key: str, role: str) -> Any:
@@ -62,8 +76,8 @@ def photo_hash(result: Result) -> str:
 
 
 def record(block: Any, result: Result, options: str) -> None:
-    """Writes what the datablock was made from: photo, settings, versions, status, light, and the level of the gloss, 0 where it is not
-    known. `options`: of the build, as JSON.
+    """Writes what the datablock was made from: photo, settings, versions, status, light, and the
+    level of the gloss, 0 where it is not known. `options`: of the build, as JSON.
     """
     described = result.description
     source, settings = described.get("input", {}), described.get("settings", {})

@@ -1,13 +1,18 @@
-"""A plain material that stands in for the group "ISC Dichromatic" while a file is written for programs that know no node groups.
+"""A plain material that stands in for the group "ISC Dichromatic" while a file is written for
+programs that know no node groups.
 
-Equation: base colour = min(1, g v turned(rho; hue, saturation)), as the group computes it: `turned` is Blender's Hue/Saturation, v the
-value, g the gain of the paint. It is baked into an image of 8 bits, coded as sRGB, for that is what base colours of glTF and its like hold.
-Roughness is the group's, the level the group's times its gain. Where the highlights come from the photo's image the group's level is 0, and
-the fitted one takes its place: a file without that image is to be as glossy as the photo.
+Equation: base colour = min(1, g v turned(rho; hue, saturation)), as the group computes it: `turned`
+is Blender's Hue/Saturation, v the value, g the gain of the paint. It is baked into an image of 8
+bits, coded as sRGB, for that is what base colours of glTF and its like hold. Roughness is the
+group's, the level the group's times its gain. Where the highlights come from the photo's image the
+group's level is 0, and the fitted one takes its place: a file without that image is to be as glossy
+as the photo.
 
-Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue, saturation and value).
+Citation: A. R. Smith, "Color gamut transform pairs", SIGGRAPH 1978, doi:10.1145/965139.807361 (hue,
+saturation and value).
 
-Limits: paint brighter than white is cut at 1. The level is one number: its variation over the object stays behind.
+Limits: paint brighter than white is cut at 1. The level is one number: its variation over the
+object stays behind.
 """
 
 from collections.abc import Iterator
@@ -29,7 +34,8 @@ _UNTOUCHED = 1e-6  # as in the group
 
 @contextmanager
 def stand_in(thing: bpy.types.Object, material: bpy.types.Material) -> Iterator[bpy.types.Material]:
-    """Puts the plain version of `material` on the object `thing` in its place, and takes it away again with all that it needed.
+    """Puts the plain version of `material` on the object `thing` in its place, and takes it away
+    again with all that it needed.
 
     Raises `InputError` if the paint comes from nodes that are no image.
     """
@@ -46,7 +52,9 @@ def stand_in(thing: bpy.types.Object, material: bpy.types.Material) -> Iterator[
 
 
 def recoloured(paint: np.ndarray, hue: float, saturation: float, gain: float) -> np.ndarray:
-    """Linear paint (..., 3), >= 0, as the group's nodes turn it: a `hue` of 0.5 and a `saturation` of 1 change nothing. Not cut at 1."""
+    """Linear paint (..., 3), >= 0, as the group's nodes turn it: a `hue` of 0.5 and a `saturation`
+    of 1 change nothing. Not cut at 1.
+    """
     if abs(hue - 0.5) <= _UNTOUCHED and abs(saturation - 1) <= _UNTOUCHED:
         return gain * paint
     value, low = paint.max(-1), paint.min(-1)
@@ -71,7 +79,9 @@ def _fill(plain: bpy.types.Material, thing: bpy.types.Object, material: bpy.type
     if level == 0 and shows_highlights(material):
         level = float(thing.get(SPECULAR_LEVEL, 0.0))
     surface.inputs["Roughness"].default_value = given["Roughness"].default_value
-    surface.inputs["Specular IOR Level"].default_value = 0.5 * level * given["Specular Gain"].default_value  # Blender's plastic is 0.5
+    surface.inputs["Specular IOR Level"].default_value = (
+        0.5 * level * given["Specular Gain"].default_value
+    )  # Blender's plastic is 0.5
     gain = given["Value"].default_value * given["Diffuse Gain"].default_value
     edits = (given["Hue"].default_value, given["Saturation"].default_value, gain)
     if not given["Reflectance"].is_linked:
@@ -80,7 +90,9 @@ def _fill(plain: bpy.types.Material, thing: bpy.types.Object, material: bpy.type
         return
     source = given["Reflectance"].links[0].from_node
     if source.type != "TEX_IMAGE" or source.image is None or not source.image.size[0]:
-        raise InputError(f"the paint of {thing.name} does not come from an image: connect one to the node's Reflectance, or bake it")
+        raise InputError(
+            f"the paint of {thing.name} does not come from an image: connect one to the node's Reflectance, or bake it"
+        )
     picture = tree.nodes.new("ShaderNodeTexImage")
     picture.image = _baked(source.image, *edits)
     tree.links.new(picture.outputs["Color"], surface.inputs["Base Color"])
@@ -92,7 +104,9 @@ def _baked(image: bpy.types.Image, hue: float, saturation: float, gain: float) -
     pixels = np.empty(width * height * 4, np.float32)
     image.pixels.foreach_get(pixels)
     colors = pixels.reshape(-1, 4)[:, :3].astype(float)
-    if not image.is_float and image.colorspace_settings.name == "sRGB":  # Blender gives the codes of such an image, of others the light
+    if (
+        not image.is_float and image.colorspace_settings.name == "sRGB"
+    ):  # Blender gives the codes of such an image, of others the light
         colors = srgb_to_linear(colors)
     baked = bpy.data.images.new("paint", width, height, alpha=False, float_buffer=False)
     baked.colorspace_settings.name = "sRGB"
@@ -104,12 +118,16 @@ def _baked(image: bpy.types.Image, hue: float, saturation: float, gain: float) -
 
 @contextmanager
 def _worn(thing: Any, material: bpy.types.Material, plain: bpy.types.Material) -> Iterator[None]:
-    """The object with `plain` in the slots of `material`; else in its first slot; in one of its own, for a while, where it has none."""
+    """The object with `plain` in the slots of `material`; else in its first slot; in one of its
+    own, for a while, where it has none.
+    """
     lent = not thing.material_slots
     if lent:
         thing.data.materials.append(None)
     slots = list(thing.material_slots)
-    worn = [(slot, slot.material) for slot in slots if slot.material == material] or [(slots[0], slots[0].material)]
+    worn = [(slot, slot.material) for slot in slots if slot.material == material] or [
+        (slots[0], slots[0].material)
+    ]
     try:
         for slot, _ in worn:
             slot.material = plain

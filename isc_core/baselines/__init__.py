@@ -1,4 +1,6 @@
-"""Simple decompositions that SIRFS is compared with: one method a file, and one function that knows their names."""
+"""Simple decompositions that SIRFS is compared with: one method a file, and one function that knows
+their names.
+"""
 
 import numpy as np
 
@@ -12,8 +14,9 @@ METHODS = ("naive", "retinex", "sfs-tsai-shah", "sfs-ikeuchi-horn")
 def estimate(method: str, log_image: np.ndarray, mask: np.ndarray) -> BaselineEstimate:
     """Shape, shading and light by the named method's defaults.
 
-    `log_image` (H, W, 3) natural logarithm of a linear diffuse image, finite in the `mask` (H, W) bool. Raises `InputError` for a
-    name that is not one of `METHODS`, and for arrays that do not fit.
+    `log_image` (H, W, 3) natural logarithm of a linear diffuse image, finite in the `mask` (H, W)
+    bool. Raises `InputError` for a name that is not one of `METHODS`, and for arrays that do not
+    fit.
     """
     match method:
         case "naive":

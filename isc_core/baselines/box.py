@@ -1,4 +1,6 @@
-"""The part of the frame that an object needs, so that empty background costs nothing and changes nothing."""
+"""The part of the frame that an object needs, so that empty background costs nothing and changes
+nothing.
+"""
 
 from dataclasses import dataclass
 
@@ -11,8 +13,10 @@ MARGIN = 3
 
 @dataclass(frozen=True)
 class Box:
-    """Rows and columns [start, stop) of a mask's bounding box in a frame of `shape` (H, W), and how many empty pixels are put
-    around it: (above, below), (left, right). None where the frame cuts the object, since there it has no contour."""
+    """Rows and columns [start, stop) of a mask's bounding box in a frame of `shape` (H, W), and how
+    many empty pixels are put around it: (above, below), (left, right). None where the frame cuts
+    the object, since there it has no contour.
+    """
 
     shape: tuple[int, int]
     rows: tuple[int, int]

@@ -1,16 +1,21 @@
-"""Shape from shading by minimising brightness error and roughness of the normals (Ikeuchi & Horn 1981).
+"""Shape from shading by minimising brightness error and roughness of the normals (Ikeuchi & Horn
+1981).
 
-Problem: find stereographic coordinates (u, v) = 2 (n_x, n_y) / (1 + n_z) of the normals that minimise
+Problem: find stereographic coordinates (u, v) = 2 (n_x, n_y) / (1 + n_z) of the normals that
+minimise
   sum of (E - R(u, v))^2 + weight * (|grad u|^2 + |grad v|^2),   R = max(0, n . l),
-with n in the image plane, along the contour's normal, where the object turns away: there (u, v) has length 2, which slopes could
-not express. Setting the derivative to zero gives the iteration (u, v) <- mean of neighbours + (E - R) grad R / weight.
+with n in the image plane, along the contour's normal, where the object turns away: there (u, v) has
+length 2, which slopes could not express. Setting the derivative to zero gives the iteration (u, v)
+<- mean of neighbours + (E - R) grad R / weight.
 
-Citations: K. Ikeuchi and B. K. P. Horn, "Numerical shape from shading and occluding boundaries", Artificial Intelligence
-17(1-3), 141-184 (1981), doi:10.1016/0004-3702(81)90023-0. The normals are made a surface by least squares as in
-R. T. Frankot and R. Chellappa, IEEE TPAMI 10(4), 439-451 (1988), doi:10.1109/34.3909, but in the mask.
-From coarse to fine, because the contour's news travels one pixel an iteration.
+Citations: K. Ikeuchi and B. K. P. Horn, "Numerical shape from shading and occluding boundaries",
+Artificial Intelligence 17(1-3), 141-184 (1981), doi:10.1016/0004-3702(81)90023-0. The normals are
+made a surface by least squares as in R. T. Frankot and R. Chellappa, IEEE TPAMI 10(4), 439-451
+(1988), doi:10.1109/34.3909, but in the mask. From coarse to fine, because the contour's news
+travels one pixel an iteration.
 
-Limits: one distant light, one albedo; every contour is taken for an occluding one, so flat sheets bulge; smoothness flattens detail.
+Limits: one distant light, one albedo; every contour is taken for an occluding one, so flat sheets
+bulge; smoothness flattens detail.
 """
 
 from dataclasses import dataclass
@@ -29,8 +34,9 @@ _COARSEST = 24
 
 @dataclass(frozen=True)
 class IkeuchiHorn1981Options:
-    """`weight`: of the smoothness, > 0, for brightness scaled to a light of length 1. `iterations`: on each grid.
-    `steepest`: the least n_z, in (0, 1), that slopes are taken from; the contour itself would be infinitely steep.
+    """`weight`: of the smoothness, > 0, for brightness scaled to a light of length 1. `iterations`:
+    on each grid. `steepest`: the least n_z, in (0, 1), that slopes are taken from; the contour
+    itself would be infinitely steep.
     """
 
     weight: float = 1.0
@@ -38,21 +44,32 @@ class IkeuchiHorn1981Options:
     steepest: float = 0.2
 
 
-def estimate(log_image: np.ndarray, mask: np.ndarray, options: IkeuchiHorn1981Options | None = None) -> BaselineEstimate:
+def estimate(
+    log_image: np.ndarray, mask: np.ndarray, options: IkeuchiHorn1981Options | None = None
+) -> BaselineEstimate:
     """Shape and light of an evenly coloured object: all its brightness is shading.
 
-    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool. Raises `InputError` for an empty mask.
+    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool.
+    Raises `InputError` for an empty mask.
     """
-    return from_log_shading(grey_log_shading(log_image, mask), mask, lambda e, m, l: height_from_brightness(e, m, l, options))
+    return from_log_shading(
+        grey_log_shading(log_image, mask),
+        mask,
+        lambda e, m, l: height_from_brightness(e, m, l, options),
+    )
 
 
 def height_from_brightness(
-    brightness: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options | None = None
+    brightness: np.ndarray,
+    mask: np.ndarray,
+    light: np.ndarray,
+    options: IkeuchiHorn1981Options | None = None,
 ) -> np.ndarray:
-    """Height (H, W), float64, pixels toward the viewer, mean 0 in the mask, continued beyond its rim by two pixels.
+    """Height (H, W), float64, pixels toward the viewer, mean 0 in the mask, continued beyond its
+    rim by two pixels.
 
-    `brightness` (H, W), linear; `light` (3,) points to the light (x right, y up, z toward the viewer), brightness being
-    max(0, n . light). Raises `InputError` for an empty mask.
+    `brightness` (H, W), linear; `light` (3,) points to the light (x right, y up, z toward the
+    viewer), brightness being max(0, n . light). Raises `InputError` for an empty mask.
     """
     options = options or IkeuchiHorn1981Options()
     box = Box.of(mask)
@@ -64,8 +81,10 @@ def height_from_brightness(
 
 
 def height_from_normals(normals: np.ndarray, mask: np.ndarray, steepest: float) -> np.ndarray:
-    """The height (H, W) whose slopes fit `normals` (H, W, 3) (x right, y up, z toward) best; two pixels beyond the mask the rim's
-    slopes go on, so that differences across the rim mean something, and further out the height stays."""
+    """The height (H, W) whose slopes fit `normals` (H, W, 3) (x right, y up, z toward) best; two
+    pixels beyond the mask the rim's slopes go on, so that differences across the rim mean
+    something, and further out the height stays.
+    """
     wide = ndimage.binary_dilation(mask, np.ones((3, 3)), iterations=2)
     nearest = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
     n = normals[tuple(nearest)]
@@ -79,17 +98,27 @@ def height_from_normals(normals: np.ndarray, mask: np.ndarray, steepest: float) 
     return height[tuple(outward)] - height[mask].mean()
 
 
-def _solve(shade: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options) -> np.ndarray:
+def _solve(
+    shade: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options
+) -> np.ndarray:
     """Coordinates (2, H, W), 0 outside the mask; starts from the same problem at half the size."""
     if min(mask.shape) >= 2 * _COARSEST:
         smaller = _solve(_halved(shade, mask), _block_any(mask), light, options)
-        start = smaller.repeat(2, axis=1).repeat(2, axis=2)[:, : mask.shape[0], : mask.shape[1]] * mask
+        start = (
+            smaller.repeat(2, axis=1).repeat(2, axis=2)[:, : mask.shape[0], : mask.shape[1]] * mask
+        )
     else:
         start = np.zeros((2, *mask.shape))
     return _relax(start, shade, mask, light, options)
 
 
-def _relax(uv: np.ndarray, shade: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options) -> np.ndarray:
+def _relax(
+    uv: np.ndarray,
+    shade: np.ndarray,
+    mask: np.ndarray,
+    light: np.ndarray,
+    options: IkeuchiHorn1981Options,
+) -> np.ndarray:
     contour = occluding_contour(mask)
     at = (contour.rows, contour.columns)
     rim = 2 * np.stack([contour.right, -contour.down])
@@ -99,7 +128,8 @@ def _relax(uv: np.ndarray, shade: np.ndarray, mask: np.ndarray, light: np.ndarra
         uv[:, *at] = rim
         mean = np.stack([ndimage.correlate(c, _AROUND, mode="constant") for c in uv]) * scale
         reflected, slope = _reflect(mean, light)
-        # Linearised about the neighbours' mean, the step solves the pixel's own problem and cannot overshoot.
+        # Linearised about the neighbours' mean, the step solves the pixel's own problem and cannot
+        # overshoot.
         uv = mean + mask * (shade - reflected) / (options.weight + (slope**2).sum(axis=0)) * slope
         # Beyond the circle of radius 2 normals would point away from the viewer.
         uv *= np.minimum(1, 2 / np.maximum(np.hypot(*uv), 1e-12))

@@ -1,15 +1,18 @@
-"""The direction of one distant light from an image of a convex, evenly coloured, matt object (Zheng & Chellappa 1991).
+"""The direction of one distant light from an image of a convex, evenly coloured, matt object (Zheng
+& Chellappa 1991).
 
 Problem: E = max(0, n . l) with unknown n; find l, whose length is albedo times strength.
 
-Tilt: brightness grows toward the light, so the tilt is the direction of the mean unit gradient of E. Slant: the ratio of the
-mean brightness to its root mean square depends on the slant alone once the normals' distribution is known; here it is that
-of a sphere, attached shadow included. The length follows from the mean brightness.
+Tilt: brightness grows toward the light, so the tilt is the direction of the mean unit gradient of
+E. Slant: the ratio of the mean brightness to its root mean square depends on the slant alone once
+the normals' distribution is known; here it is that of a sphere, attached shadow included. The
+length follows from the mean brightness.
 
-Citation: Q. Zheng and R. Chellappa, "Estimation of illuminant direction, albedo, and shape from shading", IEEE TPAMI 13(7),
-680-702 (1991), doi:10.1109/34.85658.
+Citation: Q. Zheng and R. Chellappa, "Estimation of illuminant direction, albedo, and shape from
+shading", IEEE TPAMI 13(7), 680-702 (1991), doi:10.1109/34.85658.
 
-Limits: one light, one albedo, a rounded object: a shallow relief has no sphere's normals, and texture looks like slant.
+Limits: one light, one albedo, a rounded object: a shallow relief has no sphere's normals, and
+texture looks like slant.
 """
 
 from functools import cache
@@ -21,10 +24,12 @@ _SLANTS = np.deg2rad(np.arange(0.0, 81.0))
 
 
 def estimate_light(brightness: np.ndarray, mask: np.ndarray, smoothing: float = 1.0) -> np.ndarray:
-    """Light vector (3,) in the frame x right, y up, z toward the viewer; its length is in units of `brightness`.
+    """Light vector (3,) in the frame x right, y up, z toward the viewer; its length is in units of
+    `brightness`.
 
-    `brightness` (H, W) >= 0, linear; `mask` (H, W) bool, not empty; `smoothing` is the sigma in pixels of the Gaussian before
-    gradients are taken. A frontal light is the answer where gradients tell nothing.
+    `brightness` (H, W) >= 0, linear; `mask` (H, W) bool, not empty; `smoothing` is the sigma in
+    pixels of the Gaussian before gradients are taken. A frontal light is the answer where gradients
+    tell nothing.
     """
     inside = brightness[mask].astype(float)
     mean, power = float(inside.mean()), float(np.mean(inside**2))
@@ -33,15 +38,24 @@ def estimate_light(brightness: np.ndarray, mask: np.ndarray, smoothing: float = 
     tilt = _tilt(brightness, mask, smoothing)
     means, ratios = _sphere()
     # Ratios fall with the slant, and interpolation wants them rising.
-    slant = float(np.interp(mean / np.sqrt(power), ratios[::-1], _SLANTS[::-1])) if np.hypot(*tilt) > 0 else 0.0
+    slant = (
+        float(np.interp(mean / np.sqrt(power), ratios[::-1], _SLANTS[::-1]))
+        if np.hypot(*tilt) > 0
+        else 0.0
+    )
     length = mean / float(np.interp(slant, _SLANTS, means))
     return length * np.array([np.sin(slant) * tilt[0], np.sin(slant) * tilt[1], np.cos(slant)])
 
 
 def _tilt(brightness: np.ndarray, mask: np.ndarray, smoothing: float) -> np.ndarray:
-    """Unit vector (x right, y up) of the mean unit gradient, or zero. Pixels whose window leaves the mask do not count."""
+    """Unit vector (x right, y up) of the mean unit gradient, or zero.
+
+    Pixels whose window leaves the mask do not count.
+    """
     filled = np.where(mask, brightness, 0).astype(float)
-    down, right = (ndimage.gaussian_filter(filled, smoothing, order=order) for order in ((1, 0), (0, 1)))
+    down, right = (
+        ndimage.gaussian_filter(filled, smoothing, order=order) for order in ((1, 0), (0, 1))
+    )
     core = ndimage.binary_erosion(mask, iterations=int(np.ceil(4 * smoothing)) + 1)
     gradient = np.stack([right[core], -down[core]], axis=1)
     length = np.hypot(gradient[:, 0], gradient[:, 1])
@@ -55,7 +69,9 @@ def _tilt(brightness: np.ndarray, mask: np.ndarray, smoothing: float) -> np.ndar
 
 @cache
 def _sphere() -> tuple[np.ndarray, np.ndarray]:
-    """Mean brightness of a unit sphere's visible half, and its ratio to the root mean square, for each of `_SLANTS`."""
+    """Mean brightness of a unit sphere's visible half, and its ratio to the root mean square, for
+    each of `_SLANTS`.
+    """
     x, y = np.meshgrid(*[np.linspace(-1, 1, 201)] * 2)
     visible = x**2 + y**2 < 1
     x, z = x[visible], np.sqrt(1 - x[visible] ** 2 - y[visible] ** 2)

@@ -1,9 +1,11 @@
 """The light that a log shading and normals call for.
 
-Problem: find L that minimises mean over the mask of |b(n) L - log shading|^2 + ridge * |L without its constant|^2, a channel
-at a time; b are the nine functions of the SIRFS reference (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712).
+Problem: find L that minimises mean over the mask of |b(n) L - log shading|^2 + ridge * |L without
+its constant|^2, a channel at a time; b are the nine functions of the SIRFS reference (Barron &
+Malik 2015, doi:10.1109/TPAMI.2014.2377712).
 
-The ridge spares the constant, so a flat shape, whose normals tell nothing of direction, gets a light from everywhere.
+The ridge spares the constant, so a flat shape, whose normals tell nothing of direction, gets a
+light from everywhere.
 """
 
 import numpy as np
@@ -12,11 +14,13 @@ from ..errors import InputError
 from ..sirfs.illumination import basis
 
 
-def fit_light(log_shading: np.ndarray, normals: np.ndarray, mask: np.ndarray, ridge: float = 1e-3) -> np.ndarray:
+def fit_light(
+    log_shading: np.ndarray, normals: np.ndarray, mask: np.ndarray, ridge: float = 1e-3
+) -> np.ndarray:
     """Light (9, C) float64, reference convention.
 
-    `log_shading` (H, W, C) natural logarithm; `normals` (H, W, 3) unit vectors (down, right, toward the viewer); `mask` (H, W)
-    bool; `ridge` > 0. Raises `InputError` for an empty mask.
+    `log_shading` (H, W, C) natural logarithm; `normals` (H, W, 3) unit vectors (down, right, toward
+    the viewer); `mask` (H, W) bool; `ridge` > 0. Raises `InputError` for an empty mask.
     """
     if not mask.any():
         raise InputError("the mask is empty: mark at least the object's pixels")
@@ -26,4 +30,6 @@ def fit_light(log_shading: np.ndarray, normals: np.ndarray, mask: np.ndarray, ri
     penalty[0, 0] = 1e-12
     # Not as products of matrices, which a library shares among its threads and rounds accordingly.
     own = np.einsum("kn,ln->kl", functions, functions) / count
-    return np.linalg.solve(own + penalty, np.einsum("kn,nc->kc", functions, log_shading[mask].astype(float)) / count)
+    return np.linalg.solve(
+        own + penalty, np.einsum("kn,nc->kc", functions, log_shading[mask].astype(float)) / count
+    )

@@ -1,13 +1,15 @@
 """Heights (or log images) from wanted differences between neighbouring pixels, inside a mask.
 
-Problem: minimise the sum over pairs of 4-neighbours p, q in the mask of (z_q - z_p - d_pq)^2. The normal equations are a
-Poisson equation with natural borders: nothing outside the mask matters. (Least-squares integration of a field that need not
-be integrable goes back to B. K. P. Horn and M. J. Brooks, CVGIP 33(2), 174-208 (1986), doi:10.1016/0734-189X(86)90114-3.)
+Problem: minimise the sum over pairs of 4-neighbours p, q in the mask of (z_q - z_p - d_pq)^2. The
+normal equations are a Poisson equation with natural borders: nothing outside the mask matters.
+(Least-squares integration of a field that need not be integrable goes back to B. K. P. Horn and M.
+J. Brooks, CVGIP 33(2), 174-208 (1986), doi:10.1016/0734-189X(86)90114-3.)
 
-Solved by conjugate gradients, preconditioned by one V-cycle of multigrid with bilinear interpolation and Galerkin coarse
-operators: about 15 iterations whatever the size. Each connected part of the mask comes out with mean zero. (M. R. Hestenes and E. Stiefel,
-J. Res. Natl. Bur. Stand. 49(6), 409-436 (1952), doi:10.6028/jres.049.044.) All sums are taken here, in one order: a library's would round
-otherwise on one thread than on two.
+Solved by conjugate gradients, preconditioned by one V-cycle of multigrid with bilinear
+interpolation and Galerkin coarse operators: about 15 iterations whatever the size. Each connected
+part of the mask comes out with mean zero. (M. R. Hestenes and E. Stiefel, J. Res. Natl. Bur. Stand.
+49(6), 409-436 (1952), doi:10.6028/jres.049.044.) All sums are taken here, in one order: a library's
+would round otherwise on one thread than on two.
 """
 
 from dataclasses import dataclass
@@ -20,12 +22,16 @@ from ..linear import solved
 _COARSEST = 60
 _DAMPING = 0.7
 _MOST_STEPS = 200
-_LIFT = 1e-9  # of the coarsest diagonal: makes its inverse exist; the constants that it lifts are taken off in the end
+# of the coarsest diagonal: makes its inverse exist; the constants that it lifts are taken off in
+# the end
+_LIFT = 1e-9
 
 
 @dataclass(frozen=True)
 class _Level:
-    """One grid: its operator, the inverse of its diagonal, and the interpolation from the next coarser grid."""
+    """One grid: its operator, the inverse of its diagonal, and the interpolation from the next
+    coarser grid.
+    """
 
     operator: sparse.csr_array
     inverse_diagonal: np.ndarray
@@ -47,11 +53,15 @@ class _Multigrid:
         return z + _DAMPING * level.inverse_diagonal * (residual - level.operator @ z)
 
 
-def integrate(right: np.ndarray, down: np.ndarray, mask: np.ndarray, tolerance: float = 1e-6) -> np.ndarray:
-    """Values (H, W) or (H, W, C), float64, 0 outside the mask, mean 0 over each 4-connected part of it.
+def integrate(
+    right: np.ndarray, down: np.ndarray, mask: np.ndarray, tolerance: float = 1e-6
+) -> np.ndarray:
+    """Values (H, W) or (H, W, C), float64, 0 outside the mask, mean 0 over each 4-connected part of
+    it.
 
-    `right[i, j]` is the wanted z[i, j+1] - z[i, j] and `down[i, j]` the wanted z[i+1, j] - z[i, j], (H, W) or (H, W, C); pairs
-    that leave the `mask` (H, W) bool are ignored. `tolerance` bounds the relative residual of the normal equations.
+    `right[i, j]` is the wanted z[i, j+1] - z[i, j] and `down[i, j]` the wanted z[i+1, j] - z[i, j],
+    (H, W) or (H, W, C); pairs that leave the `mask` (H, W) bool are ignored. `tolerance` bounds the
+    relative residual of the normal equations.
     """
     out = np.zeros(right.shape)
     if not mask.any():
@@ -66,7 +76,9 @@ def integrate(right: np.ndarray, down: np.ndarray, mask: np.ndarray, tolerance: 
     return _centred(out, mask)
 
 
-def _conjugate_gradients(operator: sparse.csr_array, multigrid: _Multigrid, right: np.ndarray, tolerance: float) -> np.ndarray:
+def _conjugate_gradients(
+    operator: sparse.csr_array, multigrid: _Multigrid, right: np.ndarray, tolerance: float
+) -> np.ndarray:
     """x (n,) of `operator` x = `right` (n,), to a relative residual of `tolerance`."""
     size = np.abs(right).max(initial=0)
     if size == 0:
@@ -91,14 +103,20 @@ def _dot(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _differences(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
-    """The matrix (pairs, pixels) of differences z_q - z_p, and which pairs it holds: (H, W-1) and (H-1, W) bool."""
+    """The matrix (pairs, pixels) of differences z_q - z_p, and which pairs it holds:
+
+    (H, W-1) and (H-1, W) bool.
+    """
     index = np.full(mask.shape, -1)
     index[mask] = np.arange(mask.sum())
     horizontal, vertical = mask[:, 1:] & mask[:, :-1], mask[1:] & mask[:-1]
     p = np.concatenate([index[:, :-1][horizontal], index[:-1][vertical]])
     q = np.concatenate([index[:, 1:][horizontal], index[1:][vertical]])
     pair = np.arange(len(p))
-    entries = (np.repeat([-1.0, 1.0], len(p)), (np.concatenate([pair, pair]), np.concatenate([p, q])))
+    entries = (
+        np.repeat([-1.0, 1.0], len(p)),
+        (np.concatenate([pair, pair]), np.concatenate([p, q])),
+    )
     return sparse.csr_array(entries, shape=(len(p), int(mask.sum()))), horizontal, vertical
 
 
@@ -112,14 +130,20 @@ def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
         operator = (up.T @ operator @ up).tocsr()
     coarsest = operator.toarray()
     largest = coarsest.diagonal().max(initial=0) or 1.0
-    return _Multigrid(levels, solved(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest))))
+    return _Multigrid(
+        levels, solved(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest)))
+    )
 
 
 def _interpolation(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray]:
-    """Interpolation (pixels, coarse pixels) from the grid of 2 x 2 blocks that hold any pixel of the mask, and that grid's mask."""
+    """Interpolation (pixels, coarse pixels) from the grid of 2 x 2 blocks that hold any pixel of
+    the mask, and that grid's mask.
+    """
     padded = np.pad(mask, [(0, n % 2) for n in mask.shape])
     coarse = padded.reshape(padded.shape[0] // 2, 2, padded.shape[1] // 2, 2).any(axis=(1, 3))
-    along = [_interpolation_1d(fine, rough) for fine, rough in zip(mask.shape, coarse.shape, strict=True)]
+    along = [
+        _interpolation_1d(fine, rough) for fine, rough in zip(mask.shape, coarse.shape, strict=True)
+    ]
     full = sparse.kron(*along, format="csr")[np.flatnonzero(mask)][:, np.flatnonzero(coarse)]
     return sparse.csr_array(sparse.diags_array(1 / full.sum(axis=1)) @ full), coarse
 
@@ -127,7 +151,10 @@ def _interpolation(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray]:
 def _interpolation_1d(fine: int, coarse: int) -> sparse.csr_array:
     at = np.arange(fine)
     beside = np.clip(at // 2 + np.where(at % 2, 1, -1), 0, coarse - 1)
-    entries = (np.repeat([0.75, 0.25], fine), (np.concatenate([at, at]), np.concatenate([at // 2, beside])))
+    entries = (
+        np.repeat([0.75, 0.25], fine),
+        (np.concatenate([at, at]), np.concatenate([at // 2, beside])),
+    )
     return sparse.csr_array(entries, shape=(fine, coarse))
 
 
@@ -135,6 +162,8 @@ def _centred(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
     parts, count = ndimage.label(mask)
     sizes = np.bincount(parts.ravel(), minlength=count + 1)
     for channel in values.reshape(*mask.shape, -1).transpose(2, 0, 1):
-        means = np.bincount(parts.ravel(), channel.ravel(), minlength=count + 1) / np.maximum(sizes, 1)
+        means = np.bincount(parts.ravel(), channel.ravel(), minlength=count + 1) / np.maximum(
+            sizes, 1
+        )
         channel[mask] -= means[parts[mask]]
     return values

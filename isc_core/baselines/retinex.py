@@ -1,13 +1,15 @@
 """Colour Retinex, then shape from its shading (Grosse et al. 2009).
 
-Problem: split log image = log shading + log reflectance. A difference between neighbours belongs to reflectance where it is large
-in brightness (its mean over the channels) or in chromaticity (what is left), else to shading; the shading image is
-the one whose differences fit those best in least squares. Its level in each channel, which differences do not tell, is set to
-median 0, so the overall colour stays in the reflectance.
+Problem: split log image = log shading + log reflectance. A difference between neighbours belongs to
+reflectance where it is large in brightness (its mean over the channels) or in chromaticity (what is
+left), else to shading; the shading image is the one whose differences fit those best in least
+squares. Its level in each channel, which differences do not tell, is set to median 0, so the
+overall colour stays in the reflectance.
 
-Citation: R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman, "Ground truth dataset and baseline evaluations for intrinsic
-image algorithms", ICCV 2009, 2335-2342, doi:10.1109/ICCV.2009.5459428; after E. H. Land and J. J. McCann (1971),
-doi:10.1364/JOSA.61.000001. Shape by Ikeuchi & Horn 1981 (`ikeuchi_horn_1981`).
+Citation: R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman, "Ground truth dataset and baseline
+evaluations for intrinsic image algorithms", ICCV 2009, 2335-2342, doi:10.1109/ICCV.2009.5459428;
+after E. H. Land and J. J. McCann (1971), doi:10.1364/JOSA.61.000001. Shape by Ikeuchi & Horn 1981
+(`ikeuchi_horn_1981`).
 
 Limits: creases and shadow borders are taken for paint, soft paint for shading.
 """
@@ -24,8 +26,9 @@ from .poisson import integrate
 
 @dataclass(frozen=True)
 class RetinexOptions:
-    """`brightness_threshold`, `chromaticity_threshold`: differences of natural logarithms above which a pair of neighbours is a
-    reflectance edge, >= 0; the latter bounds the length of the channels' differences less their mean. `shape`: of the shape step.
+    """`brightness_threshold`, `chromaticity_threshold`: differences of natural logarithms above
+    which a pair of neighbours is a reflectance edge, >= 0; the latter bounds the length of the
+    channels' differences less their mean. `shape`: of the shape step.
     """
 
     brightness_threshold: float = 0.3
@@ -33,18 +36,27 @@ class RetinexOptions:
     shape: IkeuchiHorn1981Options = field(default_factory=IkeuchiHorn1981Options)
 
 
-def estimate(log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions | None = None) -> BaselineEstimate:
+def estimate(
+    log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions | None = None
+) -> BaselineEstimate:
     """Shape and light from the shading of a painted object.
 
-    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool. Raises `InputError` for an empty mask.
+    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool.
+    Raises `InputError` for an empty mask.
     """
     options = options or RetinexOptions()
     shading = log_shading(log_image, mask, options)
-    return from_log_shading(shading, mask, lambda e, m, l: height_from_brightness(e, m, l, options.shape))
+    return from_log_shading(
+        shading, mask, lambda e, m, l: height_from_brightness(e, m, l, options.shape)
+    )
 
 
-def log_shading(log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions | None = None) -> np.ndarray:
-    """Log shading (H, W, 3), float64, median 0 in the mask in every channel, 0 outside; log reflectance is the rest of the image."""
+def log_shading(
+    log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions | None = None
+) -> np.ndarray:
+    """Log shading (H, W, 3), float64, median 0 in the mask in every channel, 0 outside; log
+    reflectance is the rest of the image.
+    """
     check_log_image(log_image, mask)
     options = options or RetinexOptions()
     box = Box.of(mask)
@@ -62,4 +74,6 @@ def log_shading(log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions
 def _is_paint(difference: np.ndarray, options: RetinexOptions) -> np.ndarray:
     brightness = difference.mean(axis=2)
     chromaticity = np.linalg.norm(difference - brightness[..., None], axis=2)
-    return (np.abs(brightness) > options.brightness_threshold) | (chromaticity > options.chromaticity_threshold)
+    return (np.abs(brightness) > options.brightness_threshold) | (
+        chromaticity > options.chromaticity_threshold
+    )

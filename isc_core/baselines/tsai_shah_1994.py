@@ -1,16 +1,19 @@
 """Shape from shading by a local linear approximation in the height itself (Tsai & Shah 1994).
 
-Problem: E = R(p, q) = max(0, n . l), with slopes p, q taken as differences of neighbouring heights. Then E - R is a function
-of each pixel's own height once its neighbours are held, and a damped Newton step solves it, all pixels at once:
+Problem: E = R(p, q) = max(0, n . l), with slopes p, q taken as differences of neighbouring heights.
+Then E - R is a function of each pixel's own height once its neighbours are held, and a damped
+Newton step solves it, all pixels at once:
   z <- z + R' (E - R) / (W + R'^2),   R' = dR/dz,   starting at z = 0.
 
-Citation: P.-S. Tsai and M. Shah, "Shape from shading using linear approximation", Image and Vision Computing 12(8), 487-498
-(1994), doi:10.1016/0262-8856(94)90002-7. Two things differ. Differences are taken toward the neighbours that lie away from the
-light, so that both slopes act on R with one sign; in a fixed direction R' vanishes for lights from one diagonal. And the damping
-stays, where the published gain shrinks with every step and ends before distant pixels have agreed.
+Citation: P.-S. Tsai and M. Shah, "Shape from shading using linear approximation", Image and Vision
+Computing 12(8), 487-498 (1994), doi:10.1016/0262-8856(94)90002-7. Two things differ. Differences
+are taken toward the neighbours that lie away from the light, so that both slopes act on R with one
+sign; in a fixed direction R' vanishes for lights from one diagonal. And the damping stays, where
+the published gain shrinks with every step and ends before distant pixels have agreed.
 
-Limits: local, so noise goes straight into the height and convex is not told from concave, save by a start that lets bright be high;
-nearly blind under frontal light, where a flat surface has R' = 0 (the light is then leaned by `least_lean`).
+Limits: local, so noise goes straight into the height and convex is not told from concave, save by a
+start that lets bright be high; nearly blind under frontal light, where a flat surface has R' = 0
+(the light is then leaned by `least_lean`).
 """
 
 from dataclasses import dataclass
@@ -24,10 +27,10 @@ from .estimate import BaselineEstimate, from_log_shading, grey_log_shading
 
 @dataclass(frozen=True)
 class TsaiShah1994Options:
-    """`steps`: Newton steps per pixel of the object's longer side, > 0, since news travels a pixel a step.
-    `damping`: W, > 0; larger is slower and bears more noise. `least_lean`: least sine of the angle between light and line of
-    sight, in (0, 1). `smoothing`: sigma of the Gaussian over the final height, as a share of the square root of the object's area;
-    0 for none.
+    """`steps`: Newton steps per pixel of the object's longer side, > 0, since news travels a pixel
+    a step. `damping`: W, > 0; larger is slower and bears more noise. `least_lean`: least sine of
+    the angle between light and line of sight, in (0, 1). `smoothing`: sigma of the Gaussian over
+    the final height, as a share of the square root of the object's area; 0 for none.
     """
 
     steps: float = 1.6
@@ -36,21 +39,32 @@ class TsaiShah1994Options:
     smoothing: float = 0.03
 
 
-def estimate(log_image: np.ndarray, mask: np.ndarray, options: TsaiShah1994Options | None = None) -> BaselineEstimate:
+def estimate(
+    log_image: np.ndarray, mask: np.ndarray, options: TsaiShah1994Options | None = None
+) -> BaselineEstimate:
     """Shape and light of an evenly coloured object: all its brightness is shading.
 
-    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool. Raises `InputError` for an empty mask.
+    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool.
+    Raises `InputError` for an empty mask.
     """
-    return from_log_shading(grey_log_shading(log_image, mask), mask, lambda e, m, l: height_from_brightness(e, m, l, options))
+    return from_log_shading(
+        grey_log_shading(log_image, mask),
+        mask,
+        lambda e, m, l: height_from_brightness(e, m, l, options),
+    )
 
 
 def height_from_brightness(
-    brightness: np.ndarray, mask: np.ndarray, light: np.ndarray, options: TsaiShah1994Options | None = None
+    brightness: np.ndarray,
+    mask: np.ndarray,
+    light: np.ndarray,
+    options: TsaiShah1994Options | None = None,
 ) -> np.ndarray:
-    """Height (H, W), float64, pixels toward the viewer, mean 0 in the mask; beyond it the nearest rim height.
+    """Height (H, W), float64, pixels toward the viewer, mean 0 in the mask; beyond it the nearest
+    rim height.
 
-    `brightness` (H, W), linear; `light` (3,) points to the light (x right, y up, z toward the viewer), brightness being
-    max(0, n . light). Raises `InputError` for an empty mask.
+    `brightness` (H, W), linear; `light` (3,) points to the light (x right, y up, z toward the
+    viewer), brightness being max(0, n . light). Raises `InputError` for an empty mask.
     """
     options = options or TsaiShah1994Options()
     box = Box.of(mask)
@@ -75,8 +89,15 @@ def _leaned(light: np.ndarray, least: float) -> np.ndarray:
     return np.array([*(least * direction), np.sqrt(1 - least**2)])
 
 
-def _newton(shade: np.ndarray, mask: np.ndarray, light: tuple[float, float, float], options: TsaiShah1994Options) -> np.ndarray:
-    """Heights for a light with x, y <= 0, from differences to the left and lower neighbours that are in the mask."""
+def _newton(
+    shade: np.ndarray,
+    mask: np.ndarray,
+    light: tuple[float, float, float],
+    options: TsaiShah1994Options,
+) -> np.ndarray:
+    """Heights for a light with x, y <= 0, from differences to the left and lower neighbours that
+    are in the mask.
+    """
     x, y, z = light
     left, below = np.zeros_like(mask), np.zeros_like(mask)
     left[:, 1:] = mask[:, 1:] & mask[:, :-1]
@@ -89,7 +110,9 @@ def _newton(shade: np.ndarray, mask: np.ndarray, light: tuple[float, float, floa
         root = np.sqrt(square)
         towards = (z - x * p - y * q) / root
         slope = -(x * left + y * below) / root - towards * (p + q) / square
-        height += mask * (shade - np.maximum(towards, 0)) * slope / (options.damping + slope * slope)
+        height += (
+            mask * (shade - np.maximum(towards, 0)) * slope / (options.damping + slope * slope)
+        )
     return height
 
 

@@ -1,13 +1,17 @@
-"""Dask's scheduler and workers: started here, or found at an address; and the stream of jobs through them.
+"""Dask's scheduler and workers: started here, or found at an address; and the stream of jobs
+through them.
 
-Citation: M. Rocklin, "Dask: Parallel Computation with Blocked algorithms and Task Scheduling" (2015), doi:10.25080/Majora-7b98e3ed-013.
+Citation: M. Rocklin, "Dask: Parallel Computation with Blocked algorithms and Task Scheduling"
+(2015), doi:10.25080/Majora-7b98e3ed-013.
 
-A window of jobs is at the scheduler at any time, a few for each worker, so that a stream of any length needs the same memory. Workers
-that die are replaced and their images tried again; which image kills them is found out by `attempts`, not by the scheduler's own count,
-which also blames the images that waited beside it.
+A window of jobs is at the scheduler at any time, a few for each worker, so that a stream of any
+length needs the same memory. Workers that die are replaced and their images tried again; which
+image kills them is found out by `attempts`, not by the scheduler's own count, which also blames the
+images that waited beside it.
 
-Limits: one image at a time in a worker process, so workers of a cluster should have one thread each (`dask worker --nthreads 1`). Workers
-of this machine listen on 127.0.0.1 only, but to whoever works on this machine.
+Limits: one image at a time in a worker process, so workers of a cluster should have one thread each
+(`dask worker --nthreads 1`). Workers of this machine listen on 127.0.0.1 only, but to whoever works
+on this machine.
 """
 
 import logging
@@ -41,10 +45,12 @@ Client = Any  # Dask is optional
 
 @dataclass(frozen=True)
 class Crew:
-    """Who works. `workers`: processes, 0 for as many as cores allow; `threads`: of each image, 0 shares the cores among the workers.
+    """Who works. `workers`: processes, 0 for as many as cores allow; `threads`: of each image, 0
+    shares the cores among the workers.
 
-    `memory`: of each worker as Dask reads it ("4GB", "auto", "0" for no limit). `scheduler`: the address of a cluster; then the others
-    do not count. `processes`: false works in threads of this process, for tests and for stores that only this process sees.
+    `memory`: of each worker as Dask reads it ("4GB", "auto", "0" for no limit). `scheduler`: the
+    address of a cluster; then the others do not count. `processes`: false works in threads of this
+    process, for tests and for stores that only this process sees.
     """
 
     workers: int = 0
@@ -55,9 +61,19 @@ class Crew:
 
     def sized(self) -> "Crew":
         """With numbers in place of zeros."""
-        cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        cores = (
+            len(os.sched_getaffinity(0))
+            if hasattr(os, "sched_getaffinity")
+            else os.cpu_count() or 1
+        )
         workers = self.workers or max(1, cores // max(self.threads, 1))
-        return Crew(workers, self.threads or max(1, cores // workers), self.memory, self.scheduler, self.processes)
+        return Crew(
+            workers,
+            self.threads or max(1, cores // workers),
+            self.memory,
+            self.scheduler,
+            self.processes,
+        )
 
 
 def require_dask() -> None:
@@ -65,24 +81,35 @@ def require_dask() -> None:
     try:
         import dask.distributed  # noqa: F401
     except ImportError as error:
-        raise InputError(f"isc batch needs Dask ({error}): install it with `pip install 'isc3d[batch]'`") from error
+        raise InputError(
+            f"isc batch needs Dask ({error}): install it with `pip install 'isc3d[batch]'`"
+        ) from error
 
 
 @contextmanager
 def connected(crew: Crew) -> Iterator[Client]:
-    """A client of the cluster at `crew.scheduler`, or of one that lives as long as the block. Raises `InputError`."""
+    """A client of the cluster at `crew.scheduler`, or of one that lives as long as the block.
+
+    Raises `InputError`.
+    """
     import dask
     from dask.distributed import Client as DaskClient
 
     with ExitStack() as stack:
         if crew.scheduler:
             try:
-                client = stack.enter_context(DaskClient(crew.scheduler, timeout=10, set_as_default=False))
+                client = stack.enter_context(
+                    DaskClient(crew.scheduler, timeout=10, set_as_default=False)
+                )
                 client.wait_for_workers(1, timeout=_CLUSTER_PATIENCE)
             except TimeoutError as error:
-                raise InputError(f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_PATIENCE:.0f} s: start some") from error
+                raise InputError(
+                    f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_PATIENCE:.0f} s: start some"
+                ) from error
             except (OSError, ValueError) as error:
-                raise InputError(f"--scheduler {crew.scheduler}: cannot be reached: {error}") from error
+                raise InputError(
+                    f"--scheduler {crew.scheduler}: cannot be reached: {error}"
+                ) from error
         else:
             stack.enter_context(dask.config.set(_configuration(crew)))
             cluster = stack.enter_context(_local_cluster(crew))
@@ -93,44 +120,68 @@ def connected(crew: Crew) -> Iterator[Client]:
 def _configuration(crew: Crew) -> dict[str, object]:
     """Dask's, for workers of this machine.
 
-    A worker that is full of memory is ended, never paused: paused workers would wait for ever. Libraries get the image's threads. What Dask
-    sets by itself would make the allocator give back every 64 kB at once, which costs small images a third of their time.
+    A worker that is full of memory is ended, never paused: paused workers would wait for ever.
+    Libraries get the image's threads. What Dask sets by itself would make the allocator give back
+    every 64 kB at once, which costs small images a third of their time.
     """
     memory, threads = "distributed.worker.memory", str(crew.threads)
-    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
+    names = (
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+        "NUMBA_NUM_THREADS",
+        "OPENCV_FOR_THREADS_NUM",
+    )
     return {
         "distributed.nanny.pre-spawn-environ": dict.fromkeys(names, threads),
         "distributed.scheduler.allowed-failures": _SUSPICION,
         "distributed.scheduler.worker-saturation": 1.0,
-        "distributed.deploy.lost-worker-timeout": "5 minutes",  # to start again; on a busy machine that takes more than the usual 15 s
-        "distributed.worker.profile.enabled": False,  # keeps its samples of an hour: half a megabyte an image
-        f"{memory}.target": False, f"{memory}.spill": False, f"{memory}.pause": False, f"{memory}.terminate": 0.95,
-    }  # fmt: skip
+        # to start again; on a busy machine that takes more than the usual 15 s
+        "distributed.deploy.lost-worker-timeout": "5 minutes",
+        # keeps its samples of an hour: half a megabyte an image
+        "distributed.worker.profile.enabled": False,
+        f"{memory}.target": False,
+        f"{memory}.spill": False,
+        f"{memory}.pause": False,
+        f"{memory}.terminate": 0.95,
+    }
 
 
 def _local_cluster(crew: Crew, starts: int = _STARTS) -> Any:
-    """Workers of this machine; all begin anew, up to so many `starts`, where one is lost before they are ready. Raises `InputError`."""
+    """Workers of this machine; all begin anew, up to so many `starts`, where one is lost before
+    they are ready. Raises `InputError`.
+    """
     from dask.distributed import LocalCluster
 
     try:
         with _without_interrupts(), warnings.catch_warnings():
             warnings.filterwarnings("ignore", "Port ")  # another is taken, and announced
             return LocalCluster(
-                n_workers=crew.workers, threads_per_worker=1, processes=crew.processes, memory_limit=crew.memory,
-                dashboard_address="127.0.0.1:8787", silence_logs=logging.CRITICAL,
-            )  # fmt: skip
+                n_workers=crew.workers,
+                threads_per_worker=1,
+                processes=crew.processes,
+                memory_limit=crew.memory,
+                dashboard_address="127.0.0.1:8787",
+                silence_logs=logging.CRITICAL,
+            )
     except ValueError as error:
         raise InputError(f"--memory {crew.memory}: {error}") from error
     except RuntimeError as error:
         if starts > 1:
             return _local_cluster(crew, starts - 1)
-        raise InputError(f"the workers could not be started ({error}): give the same command again") from error
+        raise InputError(
+            f"the workers could not be started ({error}): give the same command again"
+        ) from error
 
 
 @contextmanager
 def _without_interrupts() -> Iterator[None]:
-    """Ctrl-C reaches every process of a terminal. Those started here, and by threads that begin here, leave it to this one."""
-    resource_tracker.ensure_running()  # a process of multiprocessing's own; the thread that starts it gets its signals back
+    """Ctrl-C reaches every process of a terminal.
+
+    Those started here, and by threads that begin here, leave it to this one.
+    """
+    # a process of multiprocessing's own; the thread that starts it gets its signals back
+    resource_tracker.ensure_running()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -144,9 +195,13 @@ def dashboard(client: Client) -> str:
 
 
 def worked(
-    client: Client, jobs: Iterator[Job], tick: Callable[[], None], task: Callable[[Job], Outcome] = process
+    client: Client,
+    jobs: Iterator[Job],
+    tick: Callable[[], None],
+    task: Callable[[Job], Outcome] = process,
 ) -> Iterator[tuple[Job, Outcome]]:
-    """Every job with its outcome, in the order in which they end. `tick` is called several times a second; what it raises ends the work.
+    """Every job with its outcome, in the order in which they end. `tick` is called several times a
+    second; what it raises ends the work.
 
     Raises `InputError` when the scheduler, or all workers are lost.
     """
@@ -165,7 +220,10 @@ def worked(
             waiting[key] = job, future
             future.add_done_callback(ended.put)
         for future in _some(ended):
-            if future.status in ("pending", "lost"):  # its worker died before it told; another does it again
+            if future.status in (
+                "pending",
+                "lost",
+            ):  # its worker died before it told; another does it again
                 future.add_done_callback(ended.put)
                 continue
             job, _ = waiting.pop(future.key)
@@ -175,7 +233,9 @@ def worked(
 
 
 class _Workforce:
-    """Looks after the workers: how many jobs they can be given at a time, and whether there are any."""
+    """Looks after the workers: how many jobs they can be given at a time, and whether there are
+    any.
+    """
 
     def __init__(self, client: Client) -> None:
         self._client = client
@@ -184,7 +244,10 @@ class _Workforce:
         self.window = _AHEAD
 
     def look(self) -> None:
-        """Every few seconds: has workers of this machine that were given up started again. Raises `InputError` where all is lost."""
+        """Every few seconds: has workers of this machine that were given up started again.
+
+        Raises `InputError` where all is lost.
+        """
         if (now := time.monotonic()) - self._looked < _LOOK_SECONDS:
             return
         self._looked = now
@@ -196,7 +259,9 @@ class _Workforce:
         if there:
             self._seen = now
         elif now - self._seen > _LONELY_SECONDS:
-            raise InputError(f"there was no worker for {_LONELY_SECONDS:.0f} s: start some, and give the same command again")
+            raise InputError(
+                f"there was no worker for {_LONELY_SECONDS:.0f} s: start some, and give the same command again"
+            )
         self.window = _AHEAD * max(1, there, self._wanted)
 
 
@@ -220,6 +285,11 @@ def _outcome(future: Any) -> Outcome:
         raise InputError(_LOST)
     error = future.exception()
     if isinstance(error, KilledWorker):
-        return Outcome(FAILED, "workers were lost while they worked on it: it may need more memory than they have")
+        return Outcome(
+            FAILED,
+            "workers were lost while they worked on it: it may need more memory than they have",
+        )
     text = re.sub(r"\s+", " ", str(error))
-    return Outcome(FAILED, f"a fault of this program, please report it: {type(error).__name__}: {text}")
+    return Outcome(
+        FAILED, f"a fault of this program, please report it: {type(error).__name__}: {text}"
+    )

@@ -1,7 +1,9 @@
-"""Bringing an input to this machine: a path is taken as it is, a URL is copied to a temporary file through fsspec.
+"""Bringing an input to this machine: a path is taken as it is, a URL is copied to a temporary file
+through fsspec.
 
-Limits: a file of more bytes than `Limits.max_bytes` is refused, an object of a store while it is copied, as soon as it is longer. What a
-store asks for (keys, regions) is given as its fsspec implementation wants it, in the environment of the workers.
+Limits: a file of more bytes than `Limits.max_bytes` is refused, an object of a store while it is
+copied, as soon as it is longer. What a store asks for (keys, regions) is given as its fsspec
+implementation wants it, in the environment of the workers.
 """
 
 import hashlib
@@ -29,12 +31,17 @@ def fsspec_module() -> ModuleType:
     try:
         import fsspec
     except ImportError as error:
-        raise InputError(f"URLs need fsspec ({error}): install it with `pip install 'isc3d[batch]'`") from error
+        raise InputError(
+            f"URLs need fsspec ({error}): install it with `pip install 'isc3d[batch]'`"
+        ) from error
     return fsspec  # type: ignore[no-any-return]
 
 
 def file_system(url: str) -> tuple[Any, str]:
-    """fsspec's file system of a URL, and the path in it. Raises `InputError` where there is none."""
+    """fsspec's file system of a URL, and the path in it.
+
+    Raises `InputError` where there is none.
+    """
     fsspec = fsspec_module()
     try:
         return fsspec.core.url_to_fs(url)  # type: ignore[no-any-return]
@@ -44,7 +51,10 @@ def file_system(url: str) -> tuple[Any, str]:
 
 @contextmanager
 def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
-    """The file as one of this machine, while the block lasts; copies go below `folder`. Raises `InputError`."""
+    """The file as one of this machine, while the block lasts; copies go below `folder`.
+
+    Raises `InputError`.
+    """
     if not is_url(location):
         yield _checked(Path(location), limits)
         return
@@ -60,7 +70,9 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
                     _check_length(location, length, limits)
                     target.write(block)
         except OSError as error:
-            raise InputError(f"{location}: cannot be read: {error.strerror or error or 'there is no such object'}") from error
+            raise InputError(
+                f"{location}: cannot be read: {error.strerror or error or 'there is no such object'}"
+            ) from error
         yield copy
 
 
@@ -77,7 +89,9 @@ def _checked(path: Path, limits: Limits) -> Path:
 
 def _check_length(location: str, length: int, limits: Limits) -> None:
     if length > limits.max_bytes:
-        raise InputError(f"{location}: more than {limits.max_bytes / 1e9:.1f} GB: too large for a photo")
+        raise InputError(
+            f"{location}: more than {limits.max_bytes / 1e9:.1f} GB: too large for a photo"
+        )
 
 
 def sha256(path: Path) -> str:

@@ -1,7 +1,8 @@
 """Whether a result is there already: what it was made of stands in it.
 
-A result's `decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends on: the content of photo and mask, the
-settings, the coding, the priors, the version. How many threads worked on it, where its files lay and when it was made do not count.
+A result's `decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends
+on: the content of photo and mask, the settings, the coding, the priors, the version. How many
+threads worked on it, where its files lay and when it was made do not count.
 """
 
 import hashlib
@@ -21,7 +22,15 @@ def fingerprint(job: Job, photo_sha256: str, mask_sha256: str) -> str:
     settings = asdict(job.recipe.settings)
     del settings["threads"]
     plan = job.plan
-    parts = [photo_sha256, mask_sha256, settings, job.recipe.transfer, plan.arrays, plan.priors_sha256, plan.version]
+    parts = [
+        photo_sha256,
+        mask_sha256,
+        settings,
+        job.recipe.transfer,
+        plan.arrays,
+        plan.priors_sha256,
+        plan.version,
+    ]
     return hashlib.sha256(json.dumps(parts, sort_keys=True).encode()).hexdigest()
 
 

@@ -13,9 +13,15 @@ DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
 # What a line of a manifest may change; all else holds for the whole run.
 _TYPES: dict[str, type] = {
-    "model": str, "separator": str, "illumination": str, "max_size": int, "full_size": bool, "shading_only": bool, "seed": int,
+    "model": str,
+    "separator": str,
+    "illumination": str,
+    "max_size": int,
+    "full_size": bool,
+    "shading_only": bool,
+    "seed": int,
     "transfer": str,
-}  # fmt: skip
+}
 _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 OPTIONS = tuple(_TYPES)
@@ -24,13 +30,19 @@ Options = tuple[tuple[str, str | int | bool], ...]
 
 @dataclass(frozen=True)
 class Recipe:
-    """How an image is decomposed. `settings`: see `pipeline.Settings`; `transfer`: one of `photo.TRANSFERS`."""
+    """How an image is decomposed.
+
+    `settings`: see `pipeline.Settings`; `transfer`: one of `photo.TRANSFERS`.
+    """
 
     settings: Settings = field(default_factory=Settings)
     transfer: str = "auto"
 
     def changed(self, options: Options) -> "Recipe":
-        """The recipe with a line's own options. Raises `InputError` for values that mean nothing."""
+        """The recipe with a line's own options.
+
+        Raises `InputError` for values that mean nothing.
+        """
         given = dict(options)
         transfer = str(given.pop("transfer", self.transfer))
         if transfer not in TRANSFERS:
@@ -44,8 +56,9 @@ class Recipe:
 class Item:
     """One image of the inputs.
 
-    `image`, `mask`: paths or URLs; an empty mask leaves it to the photo. `name`: wanted for the result, "" takes the image's.
-    `options`: what this image is to have otherwise than the run. `label`: the image as the inputs call it, the same wherever they lie.
+    `image`, `mask`: paths or URLs; an empty mask leaves it to the photo. `name`: wanted for the
+    result, "" takes the image's. `options`: what this image is to have otherwise than the run.
+    `label`: the image as the inputs call it, the same wherever they lie.
     """
 
     image: str
@@ -59,8 +72,9 @@ class Item:
 class Plan:
     """What all tasks of a run share.
 
-    `output`: the absolute folder. `run`: the run's own random name. `version`: of ISC. `timeout`: seconds an image, 0 for none.
-    `arrays`: also write `arrays.npz`. `priors`: an absolute file, "" for the package's; `priors_sha256` of it.
+    `output`: the absolute folder. `run`: the run's own random name. `version`: of ISC. `timeout`:
+    seconds an image, 0 for none. `arrays`: also write `arrays.npz`. `priors`: an absolute file, ""
+    for the package's; `priors_sha256` of it.
     """
 
     output: Path
@@ -75,7 +89,11 @@ class Plan:
 
 @dataclass(frozen=True)
 class Job:
-    """One task. `number`: its place in the inputs; `name`: of its folder in the output. `image`, `mask`: absolute paths or URLs."""
+    """One task.
+
+    `number`: its place in the inputs; `name`: of its folder in the output. `image`, `mask`:
+    absolute paths or URLs.
+    """
 
     number: int
     name: str
@@ -94,8 +112,9 @@ class Job:
 class Outcome:
     """What became of a job.
 
-    `status`: done, skipped (it was there already) or failed; `reason`: of a failure, one line. `seconds` it took in the worker;
-    `peak_mb`: the largest memory of the worker meanwhile, 0 where the system does not tell.
+    `status`: done, skipped (it was there already) or failed; `reason`: of a failure, one line.
+    `seconds` it took in the worker; `peak_mb`: the largest memory of the worker meanwhile, 0 where
+    the system does not tell.
     """
 
     status: str
@@ -105,7 +124,10 @@ class Outcome:
 
 
 def parse_options(given: Mapping[str, object], where: str) -> Options:
-    """The options of a line, sorted and of their types; text is read as what it has to be. Raises `InputError`, opened by `where`."""
+    """The options of a line, sorted and of their types; text is read as what it has to be.
+
+    Raises `InputError`, opened by `where`.
+    """
     found: dict[str, str | int | bool] = {}
     for key, value in sorted(given.items()):
         name = key.replace("-", "_")
@@ -124,6 +146,14 @@ def _read(kind: type, value: object, complaint: str) -> str | int | bool:
         return _WORDS[value.lower()]
     if kind is int and isinstance(value, int) and not isinstance(value, bool) and value >= 0:
         return value
-    if kind is int and isinstance(value, str) and value.isascii() and value.isdigit() and len(value) < 19:
+    if (
+        kind is int
+        and isinstance(value, str)
+        and value.isascii()
+        and value.isdigit()
+        and len(value) < 19
+    ):
         return int(value)
-    raise InputError(f"{complaint}: give {'true or false' if kind is bool else 'a whole number from 0 on' if kind is int else 'text'}")
+    raise InputError(
+        f"{complaint}: give {'true or false' if kind is bool else 'a whole number from 0 on' if kind is int else 'text'}"
+    )

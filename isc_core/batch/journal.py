@@ -1,6 +1,8 @@
-"""What came out, image by image, while a run lasts: a file that grows, and the same in the inputs' order once it ends.
+"""What came out, image by image, while a run lasts: a file that grows, and the same in the inputs'
+order once it ends.
 
-Every line is written at once: a run that is killed leaves what it knew. Of each image 8 bytes are kept in memory, where its line begins.
+Every line is written at once: a run that is killed leaves what it knew. Of each image 8 bytes are
+kept in memory, where its line begins.
 """
 
 import json
@@ -17,7 +19,11 @@ from .run_folder import RunFolder
 
 @dataclass(frozen=True)
 class Entry:
-    """One image's line. `number`: its place in the inputs; `name`: of its result, "" for none; `image`, `mask`: as they were given."""
+    """One image's line.
+
+    `number`: its place in the inputs; `name`: of its result, "" for none; `image`, `mask`: as they
+    were given.
+    """
 
     number: int
     name: str
@@ -27,17 +33,33 @@ class Entry:
 
     def row(self) -> dict[str, object]:
         """JSON-ready."""
-        return {"number": self.number, "name": self.name, "image": self.image, "mask": self.mask, **asdict(self.outcome)}
+        return {
+            "number": self.number,
+            "name": self.name,
+            "image": self.image,
+            "mask": self.mask,
+            **asdict(self.outcome),
+        }
 
     @staticmethod
     def of(row: dict[str, object]) -> "Entry":
         """The inverse of `row`."""
-        outcome = Outcome(str(row["status"]), str(row["reason"]), float(str(row["seconds"])), float(str(row["peak_mb"])))
-        return Entry(int(str(row["number"])), str(row["name"]), str(row["image"]), str(row["mask"]), outcome)
+        outcome = Outcome(
+            str(row["status"]),
+            str(row["reason"]),
+            float(str(row["seconds"])),
+            float(str(row["peak_mb"])),
+        )
+        return Entry(
+            int(str(row["number"])), str(row["name"]), str(row["image"]), str(row["mask"]), outcome
+        )
 
 
 class Journal:
-    """Takes entries of `count` images as they come, and gives them back in the inputs' order. Use as a context manager."""
+    """Takes entries of `count` images as they come, and gives them back in the inputs' order.
+
+    Use as a context manager.
+    """
 
     def __init__(self, folder: RunFolder, count: int) -> None:
         self.counts: Counter[str] = Counter()
@@ -54,7 +76,12 @@ class Journal:
         self._all.flush()
         self.counts[entry.outcome.status] += 1
         if entry.outcome.status == FAILED:
-            row = {"image": entry.image, "mask": entry.mask, "name": entry.name, "reason": entry.outcome.reason}
+            row = {
+                "image": entry.image,
+                "mask": entry.mask,
+                "name": entry.name,
+                "reason": entry.outcome.reason,
+            }
             self._failures.write(_line(row))
             self._failures.flush()
 
@@ -69,7 +96,12 @@ class Journal:
     def __enter__(self) -> "Journal":
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._files.close()
 
 

@@ -1,10 +1,12 @@
 """Lists of images: CSV with a header, or JSON lines; read as a stream, a line at a time.
 
-    image,mask,name,max_size                {"image": "cup.png", "mask": "cup_mask.png", "name": "cup", "options": {"max_size": 256}}
-    cup.png,cup_mask.png,cup,256            {"image": "s3://photos/jug.png", "transfer": "linear"}
+    image,mask,name,max_size                {"image": "cup.png", "mask": "cup_mask.png", "name":
+    "cup", "options": {"max_size": 256}} cup.png,cup_mask.png,cup,256            {"image":
+    "s3://photos/jug.png", "transfer": "linear"}
 
-`image` alone is needed. Options are columns or keys of their own, or stand together under `options`. Relative paths are relative to the
-manifest's folder. A mistake in any line is found in the first pass, before work begins; a file that lacks is a failure of that image alone.
+`image` alone is needed. Options are columns or keys of their own, or stand together under
+`options`. Relative paths are relative to the manifest's folder. A mistake in any line is found in
+the first pass, before work begins; a file that lacks is a failure of that image alone.
 """
 
 import csv
@@ -25,7 +27,10 @@ _OWN = ("image", "mask", "name", "options")
 
 
 class Manifest:
-    """The items of a manifest, any number of times. `recipe`: what the lines' options change, to tell whether they can."""
+    """The items of a manifest, any number of times.
+
+    `recipe`: what the lines' options change, to tell whether they can.
+    """
 
     def __init__(self, location: str, recipe: Recipe) -> None:
         self._location, self._recipe = location, recipe
@@ -37,13 +42,19 @@ class Manifest:
     def __iter__(self) -> Iterator[Item]:
         with _opened(self._location) as (file, state):
             self._require_unchanged(state)
-            rows = _csv_rows(file, self._location) if self._location.lower().endswith(".csv") else _json_rows(file, self._location)
+            rows = (
+                _csv_rows(file, self._location)
+                if self._location.lower().endswith(".csv")
+                else _json_rows(file, self._location)
+            )
             for line, row in rows:
                 yield self._item(row, line)
 
     def _require_unchanged(self, state: str) -> None:
         if self._first and self._first != state:
-            raise InputError(f"{self._location} changed while it was read: run again when it is complete")
+            raise InputError(
+                f"{self._location} changed while it was read: run again when it is complete"
+            )
         self._first = state
 
     def _item(self, row: dict[str, Any], line: int) -> Item:
@@ -55,8 +66,18 @@ class Manifest:
             raise InputError(f"{self._at(line)} names no image")
         if name:
             check_given(name, self._at(line))
-        options = self._options(row, line) if len(row) > len(texts) or not row.keys() <= {"image", "mask", "name"} else ()
-        return Item(self._joined(image), self._joined(mask) if mask else "", name, options, self._joined(image))
+        options = (
+            self._options(row, line)
+            if len(row) > len(texts) or not row.keys() <= {"image", "mask", "name"}
+            else ()
+        )
+        return Item(
+            self._joined(image),
+            self._joined(mask) if mask else "",
+            name,
+            options,
+            self._joined(image),
+        )
 
     def _at(self, line: int) -> str:
         return f"{self._location}, line {line}"
@@ -66,7 +87,9 @@ class Manifest:
 
     def _options(self, row: dict[str, Any], line: int) -> Options:
         """The line's options, checked; lines mostly share a few sets of them."""
-        given = {key: value for key, value in row.items() if key not in _OWN and value not in ("", None)}
+        given = {
+            key: value for key, value in row.items() if key not in _OWN and value not in ("", None)
+        }
         together = row.get("options") or {}
         if not given and not together:
             return ()
@@ -97,7 +120,10 @@ def _mapping(options: object, where: str) -> dict[str, object]:
 
 @contextmanager
 def _opened(location: str) -> Iterator[tuple[TextIO, str]]:
-    """The manifest's text, and what tells whether it is still the same. Names of files may hold bytes that are not UTF-8."""
+    """The manifest's text, and what tells whether it is still the same.
+
+    Names of files may hold bytes that are not UTF-8.
+    """
     how: dict[str, Any] = {"encoding": "utf-8-sig", "errors": "surrogateescape", "newline": ""}
     try:
         if is_url(location):
@@ -117,7 +143,9 @@ def _lines(file: TextIO, location: str) -> Iterator[str]:
     while line := file.readline(_LONGEST_LINE):
         number += 1
         if len(line) == _LONGEST_LINE:
-            raise InputError(f"{location}, line {number} is longer than {_LONGEST_LINE} letters: is this a manifest?")
+            raise InputError(
+                f"{location}, line {number} is longer than {_LONGEST_LINE} letters: is this a manifest?"
+            )
         yield line
 
 
@@ -130,7 +158,9 @@ def _json_rows(file: TextIO, location: str) -> Iterator[tuple[int, dict[str, Any
         except (ValueError, RecursionError) as error:
             raise InputError(f"{location}, line {number} is not JSON: {error}") from error
         if not isinstance(row, dict):
-            raise InputError(f'{location}, line {number} is not an object: write {{"image": "cup.png"}}')
+            raise InputError(
+                f'{location}, line {number} is not an object: write {{"image": "cup.png"}}'
+            )
         yield number, row
 
 
@@ -143,7 +173,9 @@ def _csv_rows(file: TextIO, location: str) -> Iterator[tuple[int, dict[str, Any]
             if not cells:
                 continue
             if len(cells) != len(header):
-                raise InputError(f"{location}, line {reader.line_num} has {len(cells)} cells, the header {len(header)}")
+                raise InputError(
+                    f"{location}, line {reader.line_num} has {len(cells)} cells, the header {len(header)}"
+                )
             yield reader.line_num, dict(zip(header, cells, strict=True))
     except csv.Error as error:
         raise InputError(f"{location}, line {reader.line_num} is not CSV: {error}") from error
@@ -152,8 +184,14 @@ def _csv_rows(file: TextIO, location: str) -> Iterator[tuple[int, dict[str, Any]
 def _check_header(header: Iterable[str], location: str) -> None:
     names = list(header)
     if "image" not in names:
-        raise InputError(f"{location}: its first line has no column `image`: begin with image,mask,name or a part of it")
+        raise InputError(
+            f"{location}: its first line has no column `image`: begin with image,mask,name or a part of it"
+        )
     if twice := [name for name in names if names.count(name) > 1]:
         raise InputError(f"{location}: the column {twice[0]!r} stands there twice")
-    if strange := [name for name in names if name not in _OWN and name.replace("-", "_") not in OPTIONS]:
-        raise InputError(f"{location}: unknown column {strange[0]!r}: choose {', '.join((*_OWN, *OPTIONS))}")
+    if strange := [
+        name for name in names if name not in _OWN and name.replace("-", "_") not in OPTIONS
+    ]:
+        raise InputError(
+            f"{location}: unknown column {strange[0]!r}: choose {', '.join((*_OWN, *OPTIONS))}"
+        )

@@ -1,13 +1,17 @@
 """Names of results, from names of files that may be anything.
 
-Problem: a result is a folder in the output, named after its image. Images of different folders share names, and a name in a manifest may
-hold "..", separators, control characters or a device's name. Names must be safe on every file system, unlike each other even where capitals
-do not count, and the same whatever the order of the inputs, so that a run that goes on finds what the run before has made.
+Problem: a result is a folder in the output, named after its image. Images of different folders
+share names, and a name in a manifest may hold "..", separators, control characters or a device's
+name. Names must be safe on every file system, unlike each other even where capitals do not count,
+and the same whatever the order of the inputs, so that a run that goes on finds what the run before
+has made.
 
-Way: a name that several images want gets, for each of them, a hash of image, mask and options behind it. Two passes over the inputs tell:
-the first keeps 16 bytes an image, hashes of names and of images, sorted by NumPy, and finds those that stand there more than once.
+Way: a name that several images want gets, for each of them, a hash of image, mask and options
+behind it. Two passes over the inputs tell: the first keeps 16 bytes an image, hashes of names and
+of images, sorted by NumPy, and finds those that stand there more than once.
 
-Limits: hashes have 64 bits; of a million images two different ones share one with a probability of 3e-8, and the later is left out.
+Limits: hashes have 64 bits; of a million images two different ones share one with a probability of
+3e-8, and the later is left out.
 """
 
 import hashlib
@@ -27,11 +31,20 @@ _UNSAFE_RUN = re.compile(r"[^\w.-]+")
 _HASHED = re.compile(r"-[0-9a-f]{12}")
 _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)(\..*)?", re.IGNORECASE)
 # What the run itself writes into the output folder.
-OWN_FILES = ("failures.jsonl", "summary.html", "summary.csv", "summary.jsonl", "summary-pages", "thumbnails")
+OWN_FILES = (
+    "failures.jsonl",
+    "summary.html",
+    "summary.csv",
+    "summary.jsonl",
+    "summary-pages",
+    "thumbnails",
+)
 
 
 def safe_name(text: str) -> str:
-    """`text` as the name of a folder: letters, digits, ".", "-", "_" stay, runs of all else become "_"; never empty, hidden or reserved."""
+    """`text` as the name of a folder: letters, digits, ".", "-", "_" stay, runs of all else become
+    "_"; never empty, hidden or reserved.
+    """
     name = text
     if not _SAFE.fullmatch(name):
         name = _UNSAFE_RUN.sub("_", unicodedata.normalize("NFC", text)).strip(".-") or "image"
@@ -44,9 +57,19 @@ def safe_name(text: str) -> str:
 
 
 def check_given(name: str, where: str) -> str:
-    """A name that a manifest gives, if it can be one. Raises `InputError`, opened by `where`, for paths and what means something else."""
-    if "/" in name or "\\" in name or any(ord(letter) < 32 for letter in name) or name.strip(". ") == "":
-        raise InputError(f"{where}: {name!r} cannot name a result: give a name without /, \\ and control characters, no path")
+    """A name that a manifest gives, if it can be one.
+
+    Raises `InputError`, opened by `where`, for paths and what means something else.
+    """
+    if (
+        "/" in name
+        or "\\" in name
+        or any(ord(letter) < 32 for letter in name)
+        or name.strip(". ") == ""
+    ):
+        raise InputError(
+            f"{where}: {name!r} cannot name a result: give a name without /, \\ and control characters, no path"
+        )
     if name.casefold() in OWN_FILES or _DEVICES.fullmatch(name):
         raise InputError(f"{where}: the name {name!r} is reserved: choose another")
     return name
@@ -69,11 +92,16 @@ class Names:
             names.append(_hash(wanted_name(item).casefold()))
             identities.append(_hash(_identity(item)))
         self.count = len(names)
-        name, identity = (np.frombuffer(hashes, np.uint64) if self.count else np.zeros(0, np.uint64) for hashes in (names, identities))
+        name, identity = (
+            np.frombuffer(hashes, np.uint64) if self.count else np.zeros(0, np.uint64)
+            for hashes in (names, identities)
+        )
         self._repeated = _repeated(np.sort(identity))
         order = np.lexsort((identity, name))
         name, identity = name[order], identity[order]
-        new = np.append(True, (name[1:] != name[:-1]) | (identity[1:] != identity[:-1]))[: self.count]
+        new = np.append(True, (name[1:] != name[:-1]) | (identity[1:] != identity[:-1]))[
+            : self.count
+        ]
         self._shared = _repeated(name[new])
         self._given: set[int] = set()
 

@@ -30,8 +30,9 @@ _RECENT = 200  # images whose rate tells how long the rest will take
 class Batch:
     """What is asked for.
 
-    `inputs`: photos, folders, patterns, manifests; `masks`: a folder of masks, None looks beside the photos. `output`: the folder to write.
-    `timeout`: seconds an image may take, 0 for no end. `arrays`: write `arrays.npz` too. `priors`: a file of `isc fit-priors`.
+    `inputs`: photos, folders, patterns, manifests; `masks`: a folder of masks, None looks beside
+    the photos. `output`: the folder to write. `timeout`: seconds an image may take, 0 for no end.
+    `arrays`: write `arrays.npz` too. `priors`: a file of `isc fit-priors`.
     """
 
     inputs: Sequence[str]
@@ -51,10 +52,12 @@ def run_batch(
     announce: Callable[[str], None] = lambda line: None,
     task: Callable[[Job], Outcome] = process,
 ) -> Counter[str]:
-    """Makes the result of every image that is not there yet, and returns how many are done, skipped and failed.
+    """Makes the result of every image that is not there yet, and returns how many are done, skipped
+    and failed.
 
-    `announce` is told, once, what a person should know at the beginning. `task`: what a worker does. What is complete stays, however this
-    ends. Raises `InputError` for what is wrong with the run as a whole, before work begins; `Cancelled`.
+    `announce` is told, once, what a person should know at the beginning. `task`: what a worker
+    does. What is complete stays, however this ends. Raises `InputError` for what is wrong with the
+    run as a whole, before work begins; `Cancelled`.
     """
     monitor = monitor or Monitor()
     require_dask()
@@ -75,7 +78,9 @@ def run_batch(
                 with connected(crew) as client:
                     announce(f"{names.count} images; Dask's dashboard: {dashboard(client)}")
                     pace = _Pace(journal, monitor)
-                    for job, outcome in worked(client, _jobs(inputs, names, recipe, plan, journal), pace.tick, task):
+                    for job, outcome in worked(
+                        client, _jobs(inputs, names, recipe, plan, journal), pace.tick, task
+                    ):
                         journal.add(Entry(job.number, job.name, job.image, job.mask, outcome))
                         pace.count(outcome)
             finally:
@@ -106,15 +111,28 @@ def _watched(inputs: Inputs, monitor: Monitor) -> Iterator[Item]:
         yield item
 
 
-def _jobs(inputs: Inputs, names: Names, recipe: Recipe, plan: Plan, journal: Journal) -> Iterator[Job]:
+def _jobs(
+    inputs: Inputs, names: Names, recipe: Recipe, plan: Plan, journal: Journal
+) -> Iterator[Job]:
     """The tasks, as a stream; an item that stands there again needs none."""
     for number, item in enumerate(inputs):
         name = names.name(item)
         image, mask = _absolute(item.image), _absolute(item.mask)
         if name is None:
-            journal.add(Entry(number, "", image, mask, Outcome(SKIPPED, "stands in the inputs more than once")))
+            journal.add(
+                Entry(
+                    number, "", image, mask, Outcome(SKIPPED, "stands in the inputs more than once")
+                )
+            )
             continue
-        yield Job(number, name, image, mask, recipe.changed(item.options) if item.options else recipe, plan)
+        yield Job(
+            number,
+            name,
+            image,
+            mask,
+            recipe.changed(item.options) if item.options else recipe,
+            plan,
+        )
 
 
 def _absolute(location: str) -> str:
@@ -137,7 +155,9 @@ class _Pace:
         """Reports. Raises `Cancelled`."""
         counts, total = self._journal.counts, self._journal.total
         reached = sum(counts.values())
-        self._monitor.report(f"images, done {counts['done']}, {self._told(total - reached)}", reached / total)
+        self._monitor.report(
+            f"images, done {counts['done']}, {self._told(total - reached)}", reached / total
+        )
 
     def _told(self, left: int) -> str:
         counts = self._journal.counts

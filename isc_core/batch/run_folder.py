@@ -6,7 +6,8 @@
     OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    once it ends
     OUT/.isc-batch/          lock, the run's name, the journal, records of attempts, fetched files
 
-The lock is the kernel's (`flock`): it ends with its process, however that ends, so that no stale file keeps anybody out.
+The lock is the kernel's (`flock`): it ends with its process, however that ends, so that no stale
+file keeps anybody out.
 """
 
 import contextlib
@@ -40,7 +41,8 @@ class RunFolder:
 
     @contextmanager
     def held(self, run: str) -> Iterator[None]:
-        """Holds the folder for this process; makes it, and removes what killed runs left, at the beginning and at the end.
+        """Holds the folder for this process; makes it, and removes what killed runs left, at the
+        beginning and at the end.
 
         Raises `InputError` where another process holds it, or it is not ours to write to.
         """
@@ -50,7 +52,9 @@ class RunFolder:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except OSError as error:
                 lock.seek(0)
-                raise InputError(f"{self.output} is being written by another run ({lock.read().strip()}): wait for its end") from error
+                raise InputError(
+                    f"{self.output} is being written by another run ({lock.read().strip()}): wait for its end"
+                ) from error
             lock.truncate(0)
             lock.write(f"process {os.getpid()} on {socket.gethostname()}\n")
             lock.flush()
@@ -73,23 +77,32 @@ class RunFolder:
     def require_run(self, run: str) -> None:
         """Raises `InputError` where this machine does not see the folder of this run."""
         if not self.runs(run):
-            raise InputError(f"{self.output} is not the run's folder on {socket.gethostname()}: give one that all workers share")
+            raise InputError(
+                f"{self.output} is not the run's folder on {socket.gethostname()}: give one that all workers share"
+            )
 
     def _make(self) -> None:
         if self.output.exists() and not self.output.is_dir():
             raise InputError(f"{self.output} is a file: name a folder")
-        if not self.own.is_dir() and (foreign := [name for name in OWN_FILES if (self.output / name).exists()]):
-            raise InputError(f"{self.output} holds {foreign[0]}, which no batch has written: choose another folder")
+        if not self.own.is_dir() and (
+            foreign := [name for name in OWN_FILES if (self.output / name).exists()]
+        ):
+            raise InputError(
+                f"{self.output} holds {foreign[0]}, which no batch has written: choose another folder"
+            )
         try:
             for folder in (self.attempts, self.thumbnails):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"cannot write {self.output}: {error.strerror}; choose another place") from error
+            raise InputError(
+                f"cannot write {self.output}: {error.strerror}; choose another place"
+            ) from error
 
     def _tidy(self) -> None:
         """Removes temporary siblings of results and what was fetched.
 
-        No other run writes here, since the lock is held. Workers of a killed one may be at their last image: they hold what they write.
+        No other run writes here, since the lock is held. Workers of a killed one may be at their
+        last image: they hold what they write.
         """
         for folder in (self.output, self.thumbnails, self.pages):
             remove_unfinished_in(folder)

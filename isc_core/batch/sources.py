@@ -1,7 +1,9 @@
-"""What INPUTS name: photos, folders, patterns and manifests, here or in an object store; as one stream of items.
+"""What INPUTS name: photos, folders, patterns and manifests, here or in an object store; as one
+stream of items.
 
-A file `cup_mask.*` beside `cup.jpg` is its mask; in a folder of masks it is `cup.*` or `cup_mask.*`. Folders are not searched deeper: a
-pattern with ** is. Files come in the order of their names.
+A file `cup_mask.*` beside `cup.jpg` is its mask; in a folder of masks it is `cup.*` or
+`cup_mask.*`. Folders are not searched deeper: a pattern with ** is. Files come in the order of
+their names.
 """
 
 import glob
@@ -20,9 +22,11 @@ _MASK = "_mask"
 
 
 class Inputs:
-    """The items of all inputs, any number of times; folders and patterns are listed once, manifests are streamed each time.
+    """The items of all inputs, any number of times; folders and patterns are listed once, manifests
+    are streamed each time.
 
-    `masks`: a folder of masks, None looks beside the photos. Raises `InputError` for an input that is not there or holds no photo.
+    `masks`: a folder of masks, None looks beside the photos. Raises `InputError` for an input that
+    is not there or holds no photo.
     """
 
     def __init__(self, inputs: Sequence[str], masks: str | None, recipe: Recipe) -> None:
@@ -41,11 +45,16 @@ class Inputs:
             return Manifest(text, recipe)
         found = _listed(text)
         if not found:
-            raise InputError(f"{text}: there is no such photo, folder or manifest, or it holds no photo ({' '.join(PHOTOS)})")
+            raise InputError(
+                f"{text}: there is no such photo, folder or manifest, or it holds no photo ({' '.join(PHOTOS)})"
+            )
         return [Item(location, self._mask_of(location), label=location) for location in found]
 
     def _mask_of(self, location: str) -> str:
-        """The mask that belongs to a photo, "" for none. Raises `InputError` where a folder of masks has none."""
+        """The mask that belongs to a photo, "" for none.
+
+        Raises `InputError` where a folder of masks has none.
+        """
         folder, _, name = location.rpartition("/")
         stem = name.rpartition(".")[0]
         stems = self._stems(folder if self._masks is None else self._masks)
@@ -60,7 +69,9 @@ class Inputs:
 
 def _is_photo(name: str) -> bool:
     stem, dot, suffix = name.rpartition(".")
-    return f"{dot}{suffix}".lower() in PHOTOS and not stem.endswith(_MASK) and not name.startswith(".")
+    return (
+        f"{dot}{suffix}".lower() in PHOTOS and not stem.endswith(_MASK) and not name.startswith(".")
+    )
 
 
 def _listed(text: str) -> list[str]:
@@ -72,14 +83,22 @@ def _listed(text: str) -> list[str]:
         return [f"{folder}/{name}" for name in _files(folder) if _is_photo(name)]
     if Path(text).exists():
         return [text if "/" in text else f"./{text}"]
-    return sorted(f"./{path}" if "/" not in path else path for path in glob.iglob(text, recursive=True) if _is_photo(Path(path).name))
+    return sorted(
+        f"./{path}" if "/" not in path else path
+        for path in glob.iglob(text, recursive=True)
+        if _is_photo(Path(path).name)
+    )
 
 
 def _listed_remote(url: str) -> list[str]:
     system, path = file_system(url)
     try:
         if glob.has_magic(path):
-            return sorted(system.unstrip_protocol(found) for found in system.glob(path) if _is_photo(found.rpartition("/")[2]))
+            return sorted(
+                system.unstrip_protocol(found)
+                for found in system.glob(path)
+                if _is_photo(found.rpartition("/")[2])
+            )
         if system.isdir(path):
             folder = url.rstrip("/")
             return [f"{folder}/{name}" for name in _files(folder) if _is_photo(name)]
@@ -93,7 +112,11 @@ def _files(folder: str) -> list[str]:
     if is_url(folder):
         system, path = file_system(folder)
         try:
-            return sorted(entry["name"].rpartition("/")[2] for entry in system.ls(path, detail=True) if entry["type"] == "file")
+            return sorted(
+                entry["name"].rpartition("/")[2]
+                for entry in system.ls(path, detail=True)
+                if entry["type"] == "file"
+            )
         except FileNotFoundError:
             return []
     try:

@@ -1,8 +1,9 @@
 """A run summed up: pages to look at, and tables for programs, in the inputs' order.
 
-`summary.html` and `summary-pages/N.html`: a thumbnail of every result's sheet, which is a link to the result, and the reasons of failures.
-`summary.csv`, `summary.jsonl`: the same as tables. Names of files may be anything: they are escaped in pages, and cells of the CSV that a
-spreadsheet would take for a formula get an apostrophe in front; JSON lines have them as they are.
+`summary.html` and `summary-pages/N.html`: a thumbnail of every result's sheet, which is a link to
+the result, and the reasons of failures. `summary.csv`, `summary.jsonl`: the same as tables. Names
+of files may be anything: they are escaped in pages, and cells of the CSV that a spreadsheet would
+take for a formula get an apostrophe in front; JSON lines have them as they are.
 """
 
 import csv
@@ -32,8 +33,14 @@ def write_summary(folder: RunFolder, journal: Journal) -> None:
     """Writes the pages and the tables of what the journal holds; each file whole or not at all."""
     with ExitStack() as stack:
         how = {"encoding": "utf-8", "errors": "backslashreplace", "newline": ""}
-        table = stack.enter_context(stack.enter_context(new_file(folder.output / "summary.csv")).open("w", **how))  # type: ignore[call-overload]
-        lines = stack.enter_context(stack.enter_context(new_file(folder.output / "summary.jsonl")).open("w", encoding="ascii"))
+        table = stack.enter_context(
+            stack.enter_context(new_file(folder.output / "summary.csv")).open("w", **how)
+        )  # type: ignore[call-overload]
+        lines = stack.enter_context(
+            stack.enter_context(new_file(folder.output / "summary.jsonl")).open(
+                "w", encoding="ascii"
+            )
+        )
         writer = csv.writer(table)
         writer.writerow(_COLUMNS)
 
@@ -68,7 +75,10 @@ def _page(journal: Journal, entries: list[Entry], page: int, count: int, base: s
     told = ", ".join(f"{journal.counts[status]} {status}" for status in ("done", "skipped", FAILED))
     missing = f", {journal.total - reached} not reached" if reached < journal.total else ""
     links = _links(page, count, base)
-    tables = "".join(f'<a href="{base}{name}">{name}</a>' for name in ("failures.jsonl", "summary.csv", "summary.jsonl"))
+    tables = "".join(
+        f'<a href="{base}{name}">{name}</a>'
+        for name in ("failures.jsonl", "summary.csv", "summary.jsonl")
+    )
     return "\n".join(
         [
             '<!doctype html><html lang="en"><meta charset="utf-8"><meta name="viewport" content="width=device-width">',
@@ -87,8 +97,14 @@ def _links(page: int, count: int, base: str) -> str:
     near = sorted({1, count, *range(max(1, page - 3), min(count, page + 3) + 1)})
     if count == 1:
         return ""
-    place = {number: f"{base}summary.html" if number == 1 else f"{base}summary-pages/{number}.html" for number in near}
-    return "".join(f"<b>{number}</b> " if number == page else f'<a href="{place[number]}">{number}</a>' for number in near)
+    place = {
+        number: f"{base}summary.html" if number == 1 else f"{base}summary-pages/{number}.html"
+        for number in near
+    }
+    return "".join(
+        f"<b>{number}</b> " if number == page else f'<a href="{place[number]}">{number}</a>'
+        for number in near
+    )
 
 
 def _card(entry: Entry, base: str) -> str:

@@ -1,6 +1,7 @@
 """The task of one image: what a worker does.
 
-A worker does one image at a time, however many threads it has: the watchdog and the peak of memory are the process's.
+A worker does one image at a time, however many threads it has: the watchdog and the peak of memory
+are the process's.
 """
 
 import contextlib
@@ -34,7 +35,8 @@ Work = Callable[[Job, Monitor], str]
 
 
 def process(job: Job, work: "Work | None" = None) -> Outcome:
-    """Makes the job's result unless it is there. What is wrong with the image is an outcome; a fault of the program raises.
+    """Makes the job's result unless it is there. What is wrong with the image is an outcome; a
+    fault of the program raises.
 
     `work`: what to do, `decompose_into` if None; returns the status.
     """
@@ -42,7 +44,9 @@ def process(job: Job, work: "Work | None" = None) -> Outcome:
         start = time.perf_counter()
         _reset_peak()
         status, reason = _attempted(job, work or decompose_into)
-        gc.collect(1)  # meshes refer to themselves: else they stay for a hundred images, some 3 MB each
+        gc.collect(
+            1
+        )  # meshes refer to themselves: else they stay for a hundred images, some 3 MB each
         return Outcome(status, reason, round(time.perf_counter() - start, 4), _peak_mb())
 
 
@@ -50,7 +54,9 @@ def _attempted(job: Job, work: Work) -> tuple[str, str]:
     plan = job.plan
     try:
         if plan.version != __version__:
-            raise InputError(f"this worker has ISC {__version__}, the run {plan.version}: install the same version everywhere")
+            raise InputError(
+                f"this worker has ISC {__version__}, the run {plan.version}: install the same version everywhere"
+            )
         folder = RunFolder(plan.output)
         folder.require_run(plan.run)
         with attempt(folder.attempts / job.name, plan.run, plan.timeout) as monitor:
@@ -60,7 +66,10 @@ def _attempted(job: Job, work: Work) -> tuple[str, str]:
     except InputError as error:
         return FAILED, str(error)
     except MemoryError:
-        return FAILED, "there is not enough memory for it: give a smaller image, a smaller --max-size or fewer workers"
+        return (
+            FAILED,
+            "there is not enough memory for it: give a smaller image, a smaller --max-size or fewer workers",
+        )
     except OSError as error:
         return FAILED, f"{error.filename or job.image}: {error.strerror or error}"
 
@@ -79,7 +88,10 @@ def _while_wanted(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
 
 
 def decompose_into(job: Job, monitor: Monitor) -> str:
-    """Decomposes the image into its folder, as `isc decompose` does. Returns whether it is done or was there already."""
+    """Decomposes the image into its folder, as `isc decompose` does.
+
+    Returns whether it is done or was there already.
+    """
     plan, fetched = job.plan, RunFolder(job.plan.output).fetched
     with contextlib.ExitStack() as stack:
         photo = stack.enter_context(local_copy(job.image, plan.limits, fetched))
@@ -94,12 +106,16 @@ def decompose_into(job: Job, monitor: Monitor) -> str:
             _decompose(job, photo, mask, sums, wanted, monitor)
         except InputError as error:
             # The temporary copy's name says nothing to anybody.
-            raise InputError(_renamed(str(error), ((photo, job.image), (mask, job.mask)))) from error
+            raise InputError(
+                _renamed(str(error), ((photo, job.image), (mask, job.mask)))
+            ) from error
     _draw_thumbnail(job, anew=True)
     return DONE
 
 
-def _decompose(job: Job, path: Path, mask: Path | None, sums: tuple[str, str], wanted: str, monitor: Monitor) -> None:
+def _decompose(
+    job: Job, path: Path, mask: Path | None, sums: tuple[str, str], wanted: str, monitor: Monitor
+) -> None:
     plan, recipe = job.plan, job.recipe
     photo = read_photo(path, mask, recipe.transfer, limits=plan.limits)
     if photo.original.sha256 != sums[0] or (mask is not None and sha256(mask) != sums[1]):
@@ -107,7 +123,9 @@ def _decompose(job: Job, path: Path, mask: Path | None, sums: tuple[str, str], w
     require_room(job.folder, 0, arrays=plan.arrays)
     priors = _priors(plan.priors, plan.priors_sha256) if plan.priors else None
     name = PurePath(job.image).name
-    result = decompose(photo, recipe.settings, prior_set=priors, name=name, monitor=monitor.part(0.0, 0.8))
+    result = decompose(
+        photo, recipe.settings, prior_set=priors, name=name, monitor=monitor.part(0.0, 0.8)
+    )
     source = {**result.provenance.input, "mask_sha256": sums[1] or None, "fingerprint": wanted}
     result = replace(result, provenance=replace(result.provenance, input=source))
     save(result, job.folder, arrays=plan.arrays, monitor=monitor.part(0.8, 1.0))
@@ -123,7 +141,9 @@ def _renamed(message: str, copies: tuple[tuple[Path | None, str], ...]) -> str:
 @lru_cache(maxsize=2)
 def _priors(path: str, expected: str) -> PriorSet:
     if sha256(Path(path)) != expected:
-        raise InputError(f"{path} is not the file that the run began with: all workers have to see the same priors")
+        raise InputError(
+            f"{path} is not the file that the run began with: all workers have to see the same priors"
+        )
     return load_prior_set(Path(path))
 
 
@@ -134,7 +154,7 @@ def _draw_thumbnail(job: Job, *, anew: bool) -> None:
         thumbnail(job.folder / "preview.png", target)
 
 
-# --- the peak of memory ---------------------------------------------------------------------------------------------------------------
+# --- the peak of memory ---------------------------------------------------------------------------
 
 
 def _reset_peak() -> None:

@@ -2,11 +2,13 @@
 
 Problem: a surface that looks equally bright from everywhere.
 
-Equation: f_r = albedo / pi. All the light is kept at albedo 1: the integral of f_r cos over the hemisphere is the albedo.
+Equation: f_r = albedo / pi. All the light is kept at albedo 1: the integral of f_r cos over the
+hemisphere is the albedo.
 
 Citation: J. H. Lambert, "Photometria", Augsburg (1760), which has no DOI.
 
-Limits: real matt surfaces brighten toward grazing angles when rough (`oren_nayar`) and darken there under a smooth coat.
+Limits: real matt surfaces brighten toward grazing angles when rough (`oren_nayar`) and darken there
+under a smooth coat.
 """
 
 from dataclasses import dataclass
@@ -26,7 +28,10 @@ class LambertGradient:
 
 @dataclass(frozen=True)
 class Lambert:
-    """`albedo`: share of the light that is reflected, in [0, 1]. Raises `InputError` outside it. Reciprocal."""
+    """`albedo`: share of the light that is reflected, in [0, 1].
+
+    Raises `InputError` outside it. Reciprocal.
+    """
 
     albedo: Parameter = 1.0
 

@@ -1,17 +1,21 @@
 """The rough matt surface, qualitative model (Oren & Nayar 1994).
 
-Problem: clay, cloth or the moon look flatter than a Lambertian sphere and shine back toward the light.
+Problem: clay, cloth or the moon look flatter than a Lambertian sphere and shine back toward the
+light.
 
-Equation: with facets whose slopes have the standard deviation s (radians), a the larger and b the smaller of the angles of view and
-light, and d the azimuth between them,
-f_r = albedo / pi (A + B max(0, cos d) sin a tan b), A = 1 - .5 s^2 / (s^2 + .33), B = .45 s^2 / (s^2 + .09).
-cos d sin a tan b = (view . light - cos a cos b) / max(cos a, cos b), which needs no azimuth and is defined at the pole.
+Equation: with facets whose slopes have the standard deviation s (radians), a the larger and b the
+smaller of the angles of view and light, and d the azimuth between them, f_r = albedo / pi (A + B
+max(0, cos d) sin a tan b), A = 1 - .5 s^2 / (s^2 + .33), B = .45 s^2 / (s^2 + .09). cos d sin a tan
+b = (view . light - cos a cos b) / max(cos a, cos b), which needs no azimuth and is defined at the
+pole.
 
-Citation: M. Oren and S. K. Nayar, "Generalization of Lambert's reflectance model", SIGGRAPH 1994, 239-246, doi:10.1145/192161.192213.
+Citation: M. Oren and S. K. Nayar, "Generalization of Lambert's reflectance model", SIGGRAPH 1994,
+239-246, doi:10.1145/192161.192213.
 
-Limits: a short form of the authors' full model, without light between facets: a white rough surface loses light (22 % at s = .5 seen from
-above), and below s = .3 a grazing view keeps up to 1.5 % too much. s = 0 is Lambert. Reciprocal. Where both angles are grazing f_r grows
-without bound, but f_r cos stays finite.
+Limits: a short form of the authors' full model, without light between facets: a white rough surface
+loses light (22 % at s = .5 seen from above), and below s = .3 a grazing view keeps up to 1.5 % too
+much. s = 0 is Lambert. Reciprocal. Where both angles are grazing f_r grows without bound, but f_r
+cos stays finite.
 """
 
 from dataclasses import dataclass
@@ -32,8 +36,9 @@ class OrenNayarGradient:
 
 @dataclass(frozen=True)
 class OrenNayar:
-    """`albedo`: of the facets, in [0, 1]. `sigma`: standard deviation of their slope angles in radians, in [0, pi/2].
-    Raises `InputError` outside these ranges."""
+    """`albedo`: of the facets, in [0, 1]. `sigma`: standard deviation of their slope angles in
+    radians, in [0, pi/2]. Raises `InputError` outside these ranges.
+    """
 
     albedo: Parameter = 1.0
     sigma: Parameter = 0.3
@@ -46,16 +51,23 @@ class OrenNayar:
         """f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
         return self.albedo * self.gradient(normal, view, light).albedo
 
-    def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> OrenNayarGradient:
+    def gradient(
+        self, normal: np.ndarray, view: np.ndarray, light: np.ndarray
+    ) -> OrenNayarGradient:
         """The derivatives of `value` by albedo and sigma."""
         angles = cosines(normal, view, light)
         term = _azimuth_term(angles)
         square = np.square(self.sigma)
         flat = 1 - 0.5 * square / (square + 0.33) + 0.45 * square / (square + 0.09) * term
         by_sigma = self.sigma * (-0.33 / (square + 0.33) ** 2 + 0.081 / (square + 0.09) ** 2 * term)
-        return OrenNayarGradient(np.where(angles.lit, flat / np.pi, 0), np.where(angles.lit, self.albedo * by_sigma / np.pi, 0))
+        return OrenNayarGradient(
+            np.where(angles.lit, flat / np.pi, 0),
+            np.where(angles.lit, self.albedo * by_sigma / np.pi, 0),
+        )
 
 
 def _azimuth_term(angles: Cosines) -> np.ndarray:
     """max(0, cos d) sin a tan b (...), >= 0."""
-    return np.maximum(angles.between - angles.view * angles.light, 0) / np.maximum(angles.view, angles.light)
+    return np.maximum(angles.between - angles.view * angles.light, 0) / np.maximum(
+        angles.view, angles.light
+    )

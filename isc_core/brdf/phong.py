@@ -1,18 +1,21 @@
 """The glossy lobe around the mirror direction (Phong 1975).
 
-Problem: a highlight that is brightest where the light is mirrored and fades with the angle from there.
+Problem: a highlight that is brightest where the light is mirrored and fades with the angle from
+there.
 
-Equation: c is the cosine between the mirrored view and the light, clamped at 0. Plain, as published: the RADIANCE is strength c^n per
-irradiance across the beam, without the cosine of the light; so f_r = strength c^n / cos_light.
-Normalised (Lafortune & Willems 1994): f_r = strength (n + 2) / (2 pi) c^n, which keeps exactly `strength` of the light seen along the
-normal and less elsewhere.
+Equation: c is the cosine between the mirrored view and the light, clamped at 0. Plain, as
+published: the RADIANCE is strength c^n per irradiance across the beam, without the cosine of the
+light; so f_r = strength c^n / cos_light. Normalised (Lafortune & Willems 1994): f_r = strength (n +
+2) / (2 pi) c^n, which keeps exactly `strength` of the light seen along the normal and less
+elsewhere.
 
-Citation: B. T. Phong, "Illumination for computer generated pictures", Communications of the ACM 18(6), 311-317 (1975),
-doi:10.1145/360825.360839. E. P. Lafortune and Y. D. Willems, "Using the modified Phong reflectance model for physically based rendering",
-report CW 197, KU Leuven (1994), which has no DOI.
+Citation: B. T. Phong, "Illumination for computer generated pictures", Communications of the ACM
+18(6), 311-317 (1975), doi:10.1145/360825.360839. E. P. Lafortune and Y. D. Willems, "Using the
+modified Phong reflectance model for physically based rendering", report CW 197, KU Leuven (1994),
+which has no DOI.
 
-Limits: plain Phong is NOT reciprocal and keeps no energy balance; normalised Phong is reciprocal. Neither grows toward grazing angles
-as real gloss does.
+Limits: plain Phong is NOT reciprocal and keeps no energy balance; normalised Phong is reciprocal.
+Neither grows toward grazing angles as real gloss does.
 """
 
 from dataclasses import dataclass
@@ -33,8 +36,10 @@ class PhongGradient:
 
 @dataclass(frozen=True)
 class Phong:
-    """`strength`: factor of the lobe, >= 0; normalised, the share of the light that it keeps. `exponent`: >= 0, larger is glossier.
-    `normalised`: see the module. Raises `InputError` outside these ranges."""
+    """`strength`: factor of the lobe, >= 0; normalised, the share of the light that it keeps.
+    `exponent`: >= 0, larger is glossier. `normalised`: see the module. Raises `InputError` outside
+    these ranges.
+    """
 
     strength: Parameter = 1.0
     exponent: Parameter = 20.0

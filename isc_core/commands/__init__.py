@@ -1,9 +1,11 @@
 """The sub-commands of `isc`, one a file: each declares its options and does its work.
 
-A command's `run(options, monitor)` returns the lines to print; it raises `InputError` and `Cancelled`.
+A command's `run(options, monitor)` returns the lines to print; it raises `InputError` and
+`Cancelled`.
 
-Packages that build on the core add commands of their own: each is an entry point of the group `isc.commands` that names a module with
-`declare(commands)`. One that cannot be imported here stays in the list and says what to install; the others work all the same.
+Packages that build on the core add commands of their own: each is an entry point of the group
+`isc.commands` that names a module with `declare(commands)`. One that cannot be imported here stays
+in the list and says what to install; the others work all the same.
 """
 
 import argparse
@@ -43,7 +45,9 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def _declare_other(entry: EntryPoint, commands: Commands) -> None:
-    """Adds the command of another package; where that cannot be imported, one that takes any arguments and refuses."""
+    """Adds the command of another package; where that cannot be imported, one that takes any
+    arguments and refuses.
+    """
     try:
         module = entry.load()
     except ImportError as error:
@@ -57,6 +61,8 @@ def _declare_other(entry: EntryPoint, commands: Commands) -> None:
         raise InputError(reason)
 
     # No argument begins with this character, so that all of them, options too, are simply taken.
-    parser = commands.add_parser(entry.name, help="cannot start here: run it to see why", prefix_chars="\0", add_help=False)
+    parser = commands.add_parser(
+        entry.name, help="cannot start here: run it to see why", prefix_chars="\0", add_help=False
+    )
     parser.add_argument("anything", nargs="*")
     parser.set_defaults(run=refuse, quiet=True)

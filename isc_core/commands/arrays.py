@@ -1,4 +1,6 @@
-"""`isc arrays`: a result once more as plain NumPy arrays, for programs that read neither OpenEXR nor glTF."""
+"""`isc arrays`: a result once more as plain NumPy arrays, for programs that read neither OpenEXR
+nor glTF.
+"""
 
 import argparse
 from pathlib import Path
@@ -15,11 +17,17 @@ _EXAMPLES = """  isc arrays cup"""
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "arrays", run, "a result as plain NumPy arrays",
+        commands,
+        "arrays",
+        run,
+        "a result as plain NumPy arrays",
         f"Adds {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, for programs that have NumPy alone. "
-        "isc decompose --arrays writes it at once.", _EXAMPLES,
-    )  # fmt: skip
-    parser.add_argument("result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote")
+        "isc decompose --arrays writes it at once.",
+        _EXAMPLES,
+    )
+    parser.add_argument(
+        "result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote"
+    )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:

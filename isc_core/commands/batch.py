@@ -12,7 +12,18 @@ from ..batch.run import Batch, run_batch
 from ..errors import Rejected
 from ..models.settings import Settings
 from ..progress import Monitor
-from .options import Commands, add_command, add_engine, add_limits, add_settings, add_transfer, count, hints, limits_of, positive
+from .options import (
+    Commands,
+    add_command,
+    add_engine,
+    add_limits,
+    add_settings,
+    add_transfer,
+    count,
+    hints,
+    limits_of,
+    positive,
+)
 
 _EXAMPLES = """  isc batch photos -o results                       every photo of the folder; cup_mask.png is the mask of cup.jpg
   isc batch 'catalogue/**/*.jpg' --masks masks -o results --timeout 300
@@ -27,31 +38,66 @@ what is finished is skipped. Exit code 1: all images were tried and some failed,
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "batch", run, "isc decompose for many photos, resumable",
+        commands,
+        "batch",
+        run,
+        "isc decompose for many photos, resumable",
         "Decomposes many photos, one folder each in DIR. Writes summary.html (look at this first), summary.csv, summary.jsonl and "
-        "failures.jsonl beside them.", _EXAMPLES,
-    )  # fmt: skip
-    parser.add_argument("inputs", nargs="+", metavar="INPUT", help="a folder, photo, quoted pattern, URL, or a .csv or .jsonl manifest")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; finished results are kept")
-    parser.add_argument("--masks", metavar="DIR", help="a folder with the masks of all photos: cup.png or cup_mask.png for cup.jpg")
+        "failures.jsonl beside them.",
+        _EXAMPLES,
+    )
+    parser.add_argument(
+        "inputs",
+        nargs="+",
+        metavar="INPUT",
+        help="a folder, photo, quoted pattern, URL, or a .csv or .jsonl manifest",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="the folder to write; finished results are kept",
+    )
+    parser.add_argument(
+        "--masks",
+        metavar="DIR",
+        help="a folder with the masks of all photos: cup.png or cup_mask.png for cup.jpg",
+    )
     add_transfer(parser)
     add_settings(parser)
     _add_crew(parser)
     add_limits(parser)
     parser.add_argument(
-        "--timeout", type=positive, default=0.0, metavar="SECONDS", help="give up an image that takes longer (default: never)"
+        "--timeout",
+        type=positive,
+        default=0.0,
+        metavar="SECONDS",
+        help="give up an image that takes longer (default: never)",
     )
 
 
 def _add_crew(parser: argparse.ArgumentParser) -> None:
     usual = Crew()
     crew = parser.add_argument_group("who works")
-    crew.add_argument("--workers", type=count, default=usual.workers, metavar="N", help="images at once (default 0: one for each core)")
+    crew.add_argument(
+        "--workers",
+        type=count,
+        default=usual.workers,
+        metavar="N",
+        help="images at once (default 0: one for each core)",
+    )
     crew.add_argument(
         "--memory", default=usual.memory, metavar="SIZE",
         help="of each worker, such as 4GB; one that needs more is ended (default: a fair share)",
     )  # fmt: skip
-    crew.add_argument("--scheduler", default=usual.scheduler, metavar="ADDRESS", help="work on this Dask cluster instead of this machine")
+    crew.add_argument(
+        "--scheduler",
+        default=usual.scheduler,
+        metavar="ADDRESS",
+        help="work on this Dask cluster instead of this machine",
+    )
     add_engine(parser, "threads for each image (0: the cores shared among the workers)")
 
 
@@ -65,12 +111,19 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     )  # fmt: skip
 
     def announce(line: str) -> None:
-        missing = "" if importlib.util.find_spec("bokeh") else " (its pages need `pip install bokeh`)"
+        missing = (
+            "" if importlib.util.find_spec("bokeh") else " (its pages need `pip install bokeh`)"
+        )
         print(f"isc: {line}{missing}", file=sys.stderr)
 
     counts = run_batch(batch, monitor, (lambda line: None) if options.quiet else announce)
     look = f"look at {options.output / 'summary.html'}"
     if counts[FAILED]:
-        raise Rejected(f"{counts[FAILED]} of {sum(counts.values())} images failed, the reasons are in failures.jsonl: {look}")
+        raise Rejected(
+            f"{counts[FAILED]} of {sum(counts.values())} images failed, the reasons are in failures.jsonl: {look}"
+        )
     done, there = counts[DONE], counts[SKIPPED]
-    return hints(options, f"{done} image{'s' * (done != 1)} done, {there} {'was' if there == 1 else 'were'} there already: {look}")
+    return hints(
+        options,
+        f"{done} image{'s' * (done != 1)} done, {there} {'was' if there == 1 else 'were'} there already: {look}",
+    )

@@ -11,7 +11,17 @@ from ..progress import Monitor
 from ..result_folder import require_room, require_writable_result, save
 from ..sirfs.prior_file import load_prior_set
 from ..status_lines import status_lines
-from .options import Commands, add_command, add_engine, add_photo, add_settings, hints, limits_of, number, positive
+from .options import (
+    Commands,
+    add_command,
+    add_engine,
+    add_photo,
+    add_settings,
+    hints,
+    limits_of,
+    number,
+    positive,
+)
 
 _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
@@ -25,13 +35,22 @@ NaN is a hole. --height-scale changes the unit: -0.2 for a distance from the cam
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "decompose", run, "everything: layers, shape, light, shading, reflectance, mesh",
+        commands,
+        "decompose",
+        run,
+        "everything: layers, shape, light, shading, reflectance, mesh",
         "Takes a photo of one glossy object apart: diffuse and specular light, shape, illumination, shading, reflectance. Writes a folder "
-        "with preview.png (look at this first), maps.exr, mesh.glb and decomposition.json.", _EXAMPLES,
-    )  # fmt: skip
+        "with preview.png (look at this first), maps.exr, mesh.glb and decomposition.json.",
+        _EXAMPLES,
+    )
     add_photo(parser)
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier result is replaced"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="the folder to write; an earlier result is replaced",
     )
     add_settings(parser)
     _add_evidence(parser)
@@ -41,11 +60,21 @@ def declare(commands: Commands) -> None:
 def _add_evidence(parser: argparse.ArgumentParser) -> None:
     usual = Evidence()
     known = parser.add_argument_group("what is known already")
-    known.add_argument("--shape", type=Path, metavar="FILE", help="the exact shape, a height map without holes inside the mask")
     known.add_argument(
-        "--light", type=Path, metavar="FILE", help="the exact light, a decomposition.json or a JSON file with 9 x 3 coefficients"
+        "--shape",
+        type=Path,
+        metavar="FILE",
+        help="the exact shape, a height map without holes inside the mask",
     )
-    known.add_argument("--depth", type=Path, metavar="FILE", help="a measured height map, with holes and errors")
+    known.add_argument(
+        "--light",
+        type=Path,
+        metavar="FILE",
+        help="the exact light, a decomposition.json or a JSON file with 9 x 3 coefficients",
+    )
+    known.add_argument(
+        "--depth", type=Path, metavar="FILE", help="a measured height map, with holes and errors"
+    )
     known.add_argument(
         "--depth-sigma",
         type=positive,
@@ -54,10 +83,17 @@ def _add_evidence(parser: argparse.ArgumentParser) -> None:
         help="its standard error in photo pixels (default %(default)s)",
     )
     known.add_argument(
-        "--depth-weight", type=positive, default=usual.depth_weight, metavar="W", help="how much it counts (default %(default)s)"
+        "--depth-weight",
+        type=positive,
+        default=usual.depth_weight,
+        metavar="W",
+        help="how much it counts (default %(default)s)",
     )
     known.add_argument(
-        "--height-scale", type=number, metavar="F", help="photo pixels to one unit of --shape and --depth (default 1; 1/64 for 16 bits)"
+        "--height-scale",
+        type=number,
+        metavar="F",
+        help="photo pixels to one unit of --shape and --depth (default 1; 1/64 for 16 bits)",
     )
 
 
@@ -70,9 +106,20 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     photo = read_photo(options.photo, options.mask, options.transfer, limits=limits_of(options))
     evidence = _evidence(options, photo)
     require_room(options.output, _pixels(photo, settings), arrays=options.arrays)
-    result = decompose(photo, settings, evidence=evidence, prior_set=prior_set, name=options.photo.name, monitor=monitor.part(0.0, 0.8))
+    result = decompose(
+        photo,
+        settings,
+        evidence=evidence,
+        prior_set=prior_set,
+        name=options.photo.name,
+        monitor=monitor.part(0.0, 0.8),
+    )
     save(result, options.output, arrays=options.arrays, monitor=monitor.part(0.8, 1.0))
-    return hints(options, *status_lines(result.provenance.status), f"look at {options.output / 'preview.png'}")
+    return hints(
+        options,
+        *status_lines(result.provenance.status),
+        f"look at {options.output / 'preview.png'}",
+    )
 
 
 def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:

@@ -14,7 +14,12 @@ from ..editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from ..editing.edit_folder import Original, Record, Sheet, require_writable_edit, save_edit
 from ..editing.edited import Edited
 from ..editing.highlights import add_highlight
-from ..editing.light_direction import LightEstimate, explain_shading, explain_specular, share_explained
+from ..editing.light_direction import (
+    LightEstimate,
+    explain_shading,
+    explain_specular,
+    share_explained,
+)
 from ..editing.lights import DirectionalLight, toward, turn, turned_light
 from ..editing.lobes import USUAL_EXPONENT, Lobe, known_lobe
 from ..editing.recolour import Paint, recolour
@@ -43,7 +48,11 @@ _EXAMPLES = """  isc edit cup light-direction -o light                          
 
 every action takes --photo, --mask, --transfer and -o; `isc edit RESULT ACTION --help` shows what else."""
 
-_LOOKS = {"glossier": {"sharper": 2.5, "gain": 1.5}, "rougher": {"sharper": 0.4}, "metallic": {"metal": 1.0}}
+_LOOKS = {
+    "glossier": {"sharper": 2.5, "gain": 1.5},
+    "rougher": {"sharper": 0.4},
+    "metallic": {"metal": 1.0},
+}
 _OTHER_LIGHTS = (
     ("from the left", (-0.8, 0.2, 0.5)),
     ("from the right", (0.8, 0.2, 0.5)),
@@ -58,8 +67,9 @@ _COEFFICIENTS = ("", ".json", ".npy")  # files of lights that are no pictures
 
 @dataclass(frozen=True)
 class _Done:
-    """What an action hands back: the edit, what it measured (JSON-ready), panels for the sheet, the clusters, lines for people;
-    whether the sheet shows the layers."""
+    """What an action hands back: the edit, what it measured (JSON-ready), panels for the sheet, the
+    clusters, lines for people; whether the sheet shows the layers.
+    """
 
     edit: Edited
     measured: Mapping[str, object]
@@ -72,15 +82,25 @@ class _Done:
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "edit", run, "other light, gloss or colour for a decomposed photo",
+        commands,
+        "edit",
+        run,
+        "other light, gloss or colour for a decomposed photo",
         "Edits what isc decompose found: RESULT is its folder. Writes a folder with the picture (edited.png, edited.exr), "
         "before_after.png (look at this first) and edit.json. With --photo the edit is brought back into the photo, "
-        "at its size and in its coding.", _EXAMPLES,
-    )  # fmt: skip
-    parser.add_argument("result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote")
-    actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action", parser_class=Parser)
+        "at its size and in its coding.",
+        _EXAMPLES,
+    )
+    parser.add_argument(
+        "result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote"
+    )
+    actions = parser.add_subparsers(
+        title="actions", metavar="ACTION", required=True, dest="action", parser_class=Parser
+    )
     for name, summary, act, add in _ACTIONS:
-        action = actions.add_parser(name, help=summary, description=f"{summary[0].upper()}{summary[1:]}.")
+        action = actions.add_parser(
+            name, help=summary, description=f"{summary[0].upper()}{summary[1:]}."
+        )
         action.set_defaults(act=act)
         add(action)
         _add_common(action)
@@ -95,42 +115,63 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     monitor.report("reading", 0.0)
     d = load(options.result)
     if not d.mask.any():
-        raise InputError(f"{options.result} has an empty mask: it is damaged; decompose the photo again")
+        raise InputError(
+            f"{options.result} has an empty mask: it is damaged; decompose the photo again"
+        )
     _require_sound(d, options.result)
     monitor.report("editing", 0.2)
     done = options.act(d, options)
     original = None if options.photo is None else _original(d, options)
     notes = [*done.edit.notes, *_notes(d, done, original)]
     monitor.report("writing", 0.7)
-    parameters = {name: _plain(value) for name, value in vars(options).items() if name not in _OF_THE_COMMAND}
+    parameters = {
+        name: _plain(value) for name, value in vars(options).items() if name not in _OF_THE_COMMAND
+    }
     name = Path(str(d.provenance.input.get("name", ""))).name or options.result.name
     sheet = Sheet(f"{name}: {options.action}", _said(options), done.panels, done.layers)
     record = Record(options.action, parameters, done.measured)
     edit = replace(done.edit, notes=tuple(notes))
     save_edit(d, edit, options.output, record, sheet, original=original, clusters=done.clusters)
     monitor.report("writing", 1.0)
-    return [*done.lines, *hints(options, *(f"note: {note}" for note in notes), f"look at {options.output / 'before_after.png'}")]
+    return [
+        *done.lines,
+        *hints(
+            options,
+            *(f"note: {note}" for note in notes),
+            f"look at {options.output / 'before_after.png'}",
+        ),
+    ]
 
 
 def _require_sound(d: Decomposition, folder: Path) -> None:
-    """Raises `InputError` for a result that no decomposition gives: an edit would divide by its zeros."""
+    """Raises `InputError` for a result that no decomposition gives: an edit would divide by its
+    zeros.
+    """
     broken = list(d.identity_errors().broken())
-    broken += [f"{name} >= 0" for name in ("image", "diffuse", "specular", "reflectance", "shading") if getattr(d, name)[d.mask].min() < 0]
+    broken += [
+        f"{name} >= 0"
+        for name in ("image", "diffuse", "specular", "reflectance", "shading")
+        if getattr(d, name)[d.mask].min() < 0
+    ]
     if broken:
-        raise InputError(f"{folder} does not keep to {broken[0]}: it is damaged; decompose the photo again")
+        raise InputError(
+            f"{folder} does not keep to {broken[0]}: it is damaged; decompose the photo again"
+        )
 
 
 def _notes(d: Decomposition, done: _Done, original: Original | None) -> list[str]:
     """What is to be said beside what the edit itself says."""
     notes = []
     if original is not None and d.provenance.input.get("sha256") != original.photo.original.sha256:
-        notes.append("the photo's file is not the one that was decomposed; the edit is brought into it all the same")
+        notes.append(
+            "the photo's file is not the one that was decomposed; the edit is brought into it all the same"
+        )
     if done.layers and np.array_equal(done.edit.image, d.image):
         notes.append("the picture stays as it was: nothing of what was asked for changes it")
     return notes
 
 
-# --- the actions ------------------------------------------------------------------------------------------------------------------------
+# --- the actions ----------------------------------------------------------------------------------
 
 
 def _light_direction(d: Decomposition, options: argparse.Namespace) -> _Done:
@@ -140,14 +181,31 @@ def _light_direction(d: Decomposition, options: argparse.Namespace) -> _Done:
     panels = [_recovered_ball(d)]
     for label, found in (("Best for the shading", shading), ("Best for the highlights", specular)):
         remark = _short(found)
-        panels.append(_ball(_directed(found.light, found.exponent), label, remark) if found.determined else _no_ball(label, remark))
+        panels.append(
+            _ball(_directed(found.light, found.exponent), label, remark)
+            if found.determined
+            else _no_ball(label, remark)
+        )
     glance = glance_at(d.image, d.mask)
     panels.append(_ball_of_glance(d, glance))
     for label, direction in _OTHER_LIGHTS:
         _, share = share_explained(d, toward(*direction))
-        panels.append(_ball(_directed(DirectionalLight(toward(*direction))), f"Light {label}", f"explains {100 * share:.0f} %"))
-    measured = {"shading": _measured(shading), "specular": _measured(specular), "glance": _measured_glance(glance)}
-    lines = [f"{label}: {_long(found)}" for label, found in (("shading", shading), ("highlights", specular))]
+        panels.append(
+            _ball(
+                _directed(DirectionalLight(toward(*direction))),
+                f"Light {label}",
+                f"explains {100 * share:.0f} %",
+            )
+        )
+    measured = {
+        "shading": _measured(shading),
+        "specular": _measured(specular),
+        "glance": _measured_glance(glance),
+    }
+    lines = [
+        f"{label}: {_long(found)}"
+        for label, found in (("shading", shading), ("highlights", specular))
+    ]
     lines.append(f"at first sight: {_long_glance(glance)}")
     return _Done(edit, measured, tuple(panels), None, tuple(lines), layers=False)
 
@@ -157,16 +215,22 @@ def _highlight(d: Decomposition, options: argparse.Namespace) -> _Done:
     light = _chosen_light(d, options)
     level = options.strength if options.replace or options.strength is not None else _USUAL_LEVEL
     edit = add_highlight(d, light, lobe, level=level, replacing=options.replace)
-    ball = _ball(render_sphere(light, exponent=lobe.nearest_exponent)[0], "The light", "on a white ball")
+    ball = _ball(
+        render_sphere(light, exponent=lobe.nearest_exponent)[0], "The light", "on a white ball"
+    )
     return _Done(edit, {"direction": _plain(light.direction)}, (ball,))
 
 
 def _gloss(d: Decomposition, options: argparse.Namespace) -> _Done:
     usual: dict[str, float] = _LOOKS.get(options.look, {})
     if options.present is not None and options.exponent is None and "sharper" not in usual:
-        raise InputError("--present says how sharp the gloss is now: say how sharp it shall be, with --exponent or --look")
+        raise InputError(
+            "--present says how sharp the gloss is now: say how sharp it shall be, with --exponent or --look"
+        )
     if options.exponent is not None and "sharper" in usual:
-        raise InputError(f"--exponent says how sharp, and so does --look {options.look}: give one of them")
+        raise InputError(
+            f"--exponent says how sharp, and so does --look {options.look}: give one of them"
+        )
     sharper = usual.get("sharper", 1.0)
     metal = options.metal if options.metal is not None else usual.get("metal", 0.0)
     gain = options.gain if options.gain is not None else usual.get("gain", 1.0)
@@ -177,17 +241,24 @@ def _gloss(d: Decomposition, options: argparse.Namespace) -> _Done:
 def _dichromatic(d: Decomposition, options: argparse.Namespace) -> _Done:
     layers = []
     for layer in ("diffuse", "specular"):
-        values = {name: getattr(options, f"{layer}_{name}") for name in ("gain", "gamma", "sharpen", "radius")}
+        values = {
+            name: getattr(options, f"{layer}_{name}")
+            for name in ("gain", "gamma", "sharpen", "radius")
+        }
         if options.remove == layer:
             if LayerEdit(**values) != LayerEdit():
-                raise InputError(f"--remove {layer} leaves nothing that --{layer}-... could change: give one of them")
+                raise InputError(
+                    f"--remove {layer} leaves nothing that --{layer}-... could change: give one of them"
+                )
             values["gain"] = 0.0
         layers.append(LayerEdit(**values))
     return _Done(edit_layers(d, DichromaticEdit(*layers)), {})
 
 
 def _recolour(d: Decomposition, options: argparse.Namespace) -> _Done:
-    paint = Paint(options.hue, options.saturation, options.value, options.color, options.match_brightness)
+    paint = Paint(
+        options.hue, options.saturation, options.value, options.color, options.match_brightness
+    )
     if options.cluster is not None and options.region is not None:
         raise InputError("--cluster and --region both say where: give one of them")
     clusters = find_clusters(d, options.clusters, options.seed)
@@ -196,7 +267,12 @@ def _recolour(d: Decomposition, options: argparse.Namespace) -> _Done:
         region = clusters.weight(options.cluster)
     elif options.region is not None:
         region = _read_region(options.region, d, limits_of(options))
-    measured = {"clusters": [{"color": _plain(c), "share": float(s)} for c, s in zip(clusters.colors, clusters.shares, strict=True)]}
+    measured = {
+        "clusters": [
+            {"color": _plain(c), "share": float(s)}
+            for c, s in zip(clusters.colors, clusters.shares, strict=True)
+        ]
+    }
     return _Done(recolour(d, paint, region), measured, (), clusters)
 
 
@@ -205,15 +281,21 @@ def _relight(d: Decomposition, options: argparse.Namespace) -> _Done:
     light, fixed = _new_light(d, options, rotation)
     lobe = _lobe(options)
     if lobe is not None and options.highlights not in ("auto", "render"):
-        raise InputError(f"--exponent and --alpha are of rendered highlights, not of --highlights {options.highlights}: give one of them")
+        raise InputError(
+            f"--exponent and --alpha are of rendered highlights, not of --highlights {options.highlights}: give one of them"
+        )
     choice = Relighting(options.highlights, lobe, options.exposure, not fixed)
     edit = relight(d, light, choice)
-    ball = _ball(light.shading(sphere_normals(320)[0].reshape(-1, 3)).reshape(320, 320, 3), "New light", "on a white ball")
+    ball = _ball(
+        light.shading(sphere_normals(320)[0].reshape(-1, 3)).reshape(320, 320, 3),
+        "New light",
+        "on a white ball",
+    )
     measured = {} if light.coefficients is None else {"coefficients": _plain(light.coefficients)}
     return _Done(edit, measured, (_recovered_ball(d), ball))
 
 
-# --- lights, lobes, regions, photos -----------------------------------------------------------------------------------------------------
+# --- lights, lobes, regions, photos ---------------------------------------------------------------
 
 
 def _chosen_light(d: Decomposition, options: argparse.Namespace) -> DirectionalLight:
@@ -224,12 +306,18 @@ def _chosen_light(d: Decomposition, options: argparse.Namespace) -> DirectionalL
         return DirectionalLight(toward(*options.direction), np.pi * color)
     found = explain_specular(d) if options.like == "specular" else explain_shading(d)
     if not found.light.irradiance.any():
-        raise InputError(f"the {options.like or 'shading'} tells no light here: give --direction X Y Z")
+        raise InputError(
+            f"the {options.like or 'shading'} tells no light here: give --direction X Y Z"
+        )
     own = found.light.irradiance / found.light.irradiance.max()
-    return DirectionalLight(found.light.direction, np.pi * (own if options.color is None else color))
+    return DirectionalLight(
+        found.light.direction, np.pi * (own if options.color is None else color)
+    )
 
 
-def _new_light(d: Decomposition, options: argparse.Namespace, rotation: np.ndarray) -> tuple[NewLight, bool]:
+def _new_light(
+    d: Decomposition, options: argparse.Namespace, rotation: np.ndarray
+) -> tuple[NewLight, bool]:
     """The light, and whether its brightness is meant as it is."""
     turned = not np.array_equal(rotation, np.eye(3))
     if options.light is not None and options.direction is not None:
@@ -239,11 +327,23 @@ def _new_light(d: Decomposition, options: argparse.Namespace, rotation: np.ndarr
     if options.direction is not None:
         color = np.ones(3) if options.color is None else options.color
         ambient = 0.15 if options.ambient is None else options.ambient
-        return NewLight(sun=DirectionalLight(rotation @ toward(*options.direction), np.pi * color, ambient * color)), False
-    if options.light is not None and not options.light.is_dir() and options.light.suffix.lower() not in _COEFFICIENTS:
+        return NewLight(
+            sun=DirectionalLight(
+                rotation @ toward(*options.direction), np.pi * color, ambient * color
+            )
+        ), False
+    if (
+        options.light is not None
+        and not options.light.is_dir()
+        and options.light.suffix.lower() not in _COEFFICIENTS
+    ):
         if turned:
-            raise InputError("an environment picture is not turned here: turn the picture itself, or give a direction")
-        return NewLight(sky=read_linear(options.light, limits=limits_of(options), finite=True)), False
+            raise InputError(
+                "an environment picture is not turned here: turn the picture itself, or give a direction"
+            )
+        return NewLight(
+            sky=read_linear(options.light, limits=limits_of(options), finite=True)
+        ), False
     if options.light is None:
         return NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation), True
     return NewLight(coefficients=turned_light(_read_coefficients(options.light), rotation)), True
@@ -267,8 +367,9 @@ def _lobe(options: argparse.Namespace) -> Lobe | None:
 
 
 def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
-    """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's: its alpha where that is not opaque; else its
-    codes, of which 1 is white where none is larger."""
+    """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's: its alpha
+    where that is not opaque; else its codes, of which 1 is white where none is larger.
+    """
     raster = read_raster(path, limits)
     region = raster.transparency
     if region is None:
@@ -279,8 +380,13 @@ def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
         return region
     scale, size = d.provenance.input.get("scale"), d.provenance.input.get("size")
     if not isinstance(scale, int | float) or [*region.shape[::-1]] != size:
-        raise InputError(f"{path}: the region is {region.shape[1]} x {region.shape[0]} pixels: give one of the photo's size")
-    rows, columns = (np.clip(((np.arange(n) + 0.5) / scale).astype(int), 0, m - 1) for n, m in zip(d.mask.shape, region.shape, strict=True))
+        raise InputError(
+            f"{path}: the region is {region.shape[1]} x {region.shape[0]} pixels: give one of the photo's size"
+        )
+    rows, columns = (
+        np.clip(((np.arange(n) + 0.5) / scale).astype(int), 0, m - 1)
+        for n, m in zip(d.mask.shape, region.shape, strict=True)
+    )
     return region[np.ix_(rows, columns)]
 
 
@@ -288,7 +394,9 @@ def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     given = d.provenance.input
     transfer = options.transfer or str(given.get("transfer", "auto"))
     if given.get("mask_from") == "file" and options.mask is None:
-        raise InputError("the result was made with a mask of its own: give the same one with --mask")
+        raise InputError(
+            "the result was made with a mask of its own: give the same one with --mask"
+        )
     limits = limits_of(options)
     photo = read_photo(options.photo, options.mask, transfer, limits=limits)
     raster = read_raster(options.photo, limits)
@@ -297,16 +405,25 @@ def _original(d: Decomposition, options: argparse.Namespace) -> Original:
     return Original(photo, raster, options.photo)
 
 
-# --- words ------------------------------------------------------------------------------------------------------------------------------
+# --- words ----------------------------------------------------------------------------------------
 
 
 def _ball(color: np.ndarray, label: str, remark: str) -> Panel:
     coverage = sphere_normals(len(color))[1]
-    return Panel(color * 0.95 / max(float(np.percentile(color[coverage > 0.5].max(-1), 99.5)), 1e-9), coverage, label, remark)
+    return Panel(
+        color * 0.95 / max(float(np.percentile(color[coverage > 0.5].max(-1), 99.5)), 1e-9),
+        coverage,
+        label,
+        remark,
+    )
 
 
 def _recovered_ball(d: Decomposition) -> Panel:
-    return _ball(np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination), "Recovered light", "on a white ball")
+    return _ball(
+        np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination),
+        "Recovered light",
+        "on a white ball",
+    )
 
 
 def _directed(light: DirectionalLight, exponent: float | None = None) -> np.ndarray:
@@ -319,7 +436,11 @@ def _no_ball(label: str, remark: str) -> Panel:
 
 
 def _short(found: LightEstimate) -> str:
-    return f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}°" if found.determined else "undetermined"
+    return (
+        f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}°"
+        if found.determined
+        else "undetermined"
+    )
 
 
 def _long(found: LightEstimate) -> str:
@@ -349,7 +470,9 @@ def _ball_of_glance(d: Decomposition, glance: Glance) -> Panel:
     if not glance.determined:
         return _no_ball(label, remark)
     light, share = share_explained(d, glance.direction)
-    return _ball(_directed(light), label, f"explains {100 * share:.0f} %, ± {glance.cone:.0f}°, {remark}")
+    return _ball(
+        _directed(light), label, f"explains {100 * share:.0f} %, ± {glance.cone:.0f}°, {remark}"
+    )
 
 
 def _lamps_of_glance(glance: Glance) -> str:
@@ -379,14 +502,23 @@ def _said(options: argparse.Namespace) -> str:
     skip = (*_OF_THE_COMMAND, "result", "photo", "mask", "transfer")
     words = []
     for name, value in vars(options).items():
-        if name in skip or value is None or value is False or np.array_equal(value, options.usual.get(name)):
+        if (
+            name in skip
+            or value is None
+            or value is False
+            or np.array_equal(value, options.usual.get(name))
+        ):
             continue
         shown = value
         if isinstance(value, np.ndarray):
-            shown = "".join(f"{code:02x}" for code in np.rint(255 * linear_to_srgb(value)).astype(int))
+            shown = "".join(
+                f"{code:02x}" for code in np.rint(255 * linear_to_srgb(value)).astype(int)
+            )
         elif isinstance(value, list):
             shown = " ".join(f"{n:g}" for n in value)
-        words.append(name.replace("_", "-") if value is True else f"{name.replace('_', '-')} {shown}")
+        words.append(
+            name.replace("_", "-") if value is True else f"{name.replace('_', '-')} {shown}"
+        )
     return "   ·   ".join(map(str, words))
 
 
@@ -396,16 +528,32 @@ def _plain(value: object) -> object:
     return readable(str(value)) if isinstance(value, Path) else value
 
 
-# --- options ----------------------------------------------------------------------------------------------------------------------------
+# --- options --------------------------------------------------------------------------------------
 
 
 def _add_common(parser: argparse.ArgumentParser) -> None:
     picture = parser.add_argument_group("the photo")
-    picture.add_argument("--photo", type=Path, metavar="PHOTO", help="the photo that RESULT was made of: the edit is brought back into it")
-    picture.add_argument("--mask", type=Path, metavar="MASK", help="its mask, where the result was made with one")
-    picture.add_argument("--transfer", choices=TRANSFERS, help="how it is coded (default: as isc decompose read it)")
+    picture.add_argument(
+        "--photo",
+        type=Path,
+        metavar="PHOTO",
+        help="the photo that RESULT was made of: the edit is brought back into it",
+    )
+    picture.add_argument(
+        "--mask", type=Path, metavar="MASK", help="its mask, where the result was made with one"
+    )
+    picture.add_argument(
+        "--transfer", choices=TRANSFERS, help="how it is coded (default: as isc decompose read it)"
+    )
     add_limits(parser)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier edit is replaced")
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="the folder to write; an earlier edit is replaced",
+    )
     add_speech(parser, again=True)
     parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))
 
@@ -415,47 +563,87 @@ def _add_nothing(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_lobe(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--exponent", type=_number, metavar="P", help="Blinn-Phong's, 1 to 1e5, larger is sharper")
-    parser.add_argument("--alpha", type=_number, metavar="A", help="of GGX facets instead, 0.01 to 1, smaller is sharper")
+    parser.add_argument(
+        "--exponent", type=_number, metavar="P", help="Blinn-Phong's, 1 to 1e5, larger is sharper"
+    )
+    parser.add_argument(
+        "--alpha",
+        type=_number,
+        metavar="A",
+        help="of GGX facets instead, 0.01 to 1, smaller is sharper",
+    )
 
 
 def _add_direction(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--direction", type=_number, nargs=3, metavar=("X", "Y", "Z"), help="toward the light: right, up, toward the viewer; of any length"
+        "--direction",
+        type=_number,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="toward the light: right, up, toward the viewer; of any length",
     )
     parser.add_argument(
-        "--color", type=_color, metavar="RRGGBB", help="of that light, as in web pages (default ffffff, the photo's own white)"
+        "--color",
+        type=_color,
+        metavar="RRGGBB",
+        help="of that light, as in web pages (default ffffff, the photo's own white)",
     )
 
 
 def _add_highlight(parser: argparse.ArgumentParser) -> None:
     _add_direction(parser)
     parser.add_argument(
-        "--like", choices=("shading", "specular"),
+        "--like",
+        choices=("shading", "specular"),
         help="without --direction: the one light that best explains the shading (default) or the present highlights",
-    )  # fmt: skip
+    )
     _add_lobe(parser)
     parser.add_argument(
-        "--strength", type=_number, metavar="S",
+        "--strength",
+        type=_number,
+        metavar="S",
         help="1: as bright as the photo's white (default 0.7; with --replace, as much light as was there)",
-    )  # fmt: skip
+    )
     parser.add_argument("--replace", action="store_true", help="take the present highlights away")
 
 
 def _add_gloss(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--look", choices=tuple(_LOOKS), help="a good start: a sharper and stronger lobe, a wider one, or metal")
-    parser.add_argument("--exponent", type=_number, metavar="P", help="the new Blinn-Phong exponent, 1 to 1e5")
-    parser.add_argument("--present", type=_number, metavar="P", help="the present one (default: fitted)")
-    parser.add_argument("--gain", type=_number, metavar="G", help="factor of the highlights (default 1; 1.5 for --look glossier)")
-    parser.add_argument("--metal", type=_number, metavar="M", help="how much of a metal, 0 to 1 (default 0; 1 for --look metallic)")
     parser.add_argument(
-        "--method", choices=METHODS, default=Gloss().method, help="change the present highlights (default), or render new ones on the shape"
+        "--look",
+        choices=tuple(_LOOKS),
+        help="a good start: a sharper and stronger lobe, a wider one, or metal",
+    )
+    parser.add_argument(
+        "--exponent", type=_number, metavar="P", help="the new Blinn-Phong exponent, 1 to 1e5"
+    )
+    parser.add_argument(
+        "--present", type=_number, metavar="P", help="the present one (default: fitted)"
+    )
+    parser.add_argument(
+        "--gain",
+        type=_number,
+        metavar="G",
+        help="factor of the highlights (default 1; 1.5 for --look glossier)",
+    )
+    parser.add_argument(
+        "--metal",
+        type=_number,
+        metavar="M",
+        help="how much of a metal, 0 to 1 (default 0; 1 for --look metallic)",
+    )
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default=Gloss().method,
+        help="change the present highlights (default), or render new ones on the shape",
     )
 
 
 def _add_dichromatic(parser: argparse.ArgumentParser) -> None:
     usual = LayerEdit()
-    parser.add_argument("--remove", choices=("diffuse", "specular"), help="leave the other layer alone")
+    parser.add_argument(
+        "--remove", choices=("diffuse", "specular"), help="leave the other layer alone"
+    )
     for layer in ("diffuse", "specular"):
         group = parser.add_argument_group(f"the {layer} layer")
         for name, text in (
@@ -465,37 +653,109 @@ def _add_dichromatic(parser: argparse.ArgumentParser) -> None:
             ("radius", "what counts as detail, in pixels of the maps"),
         ):
             group.add_argument(
-                f"--{layer}-{name}", type=_number, default=getattr(usual, name), metavar="N", help=f"{text} (default %(default)s)"
+                f"--{layer}-{name}",
+                type=_number,
+                default=getattr(usual, name),
+                metavar="N",
+                help=f"{text} (default %(default)s)",
             )
 
 
 def _add_recolour(parser: argparse.ArgumentParser) -> None:
     usual = Paint()
-    parser.add_argument("--hue", type=_number, default=usual.hue, metavar="DEGREES", help="turns the hue")
-    parser.add_argument("--saturation", type=_number, default=usual.saturation, metavar="F", help="factor (default %(default)s)")
-    parser.add_argument("--value", type=_number, default=usual.value, metavar="F", help="factor of the brightness (default %(default)s)")
-    parser.add_argument("--color", type=_color, metavar="RRGGBB", help="the paint, as in web pages; its brightness stays the object's")
-    parser.add_argument("--match-brightness", action="store_true", help="takes the brightness of --color too")
-    parser.add_argument("--region", type=Path, metavar="FILE", help="where: an image, white on black, of the photo's size")
-    parser.add_argument("--cluster", type=count, metavar="N", help="where: the cluster N of the object's paints, see clusters.png")
-    parser.add_argument("--clusters", type=count, default=4, metavar="K", help="how many there are at most (default %(default)s)")
-    parser.add_argument("--seed", type=count, default=0, metavar="N", help="of the clusters' random numbers (default %(default)s)")
+    parser.add_argument(
+        "--hue", type=_number, default=usual.hue, metavar="DEGREES", help="turns the hue"
+    )
+    parser.add_argument(
+        "--saturation",
+        type=_number,
+        default=usual.saturation,
+        metavar="F",
+        help="factor (default %(default)s)",
+    )
+    parser.add_argument(
+        "--value",
+        type=_number,
+        default=usual.value,
+        metavar="F",
+        help="factor of the brightness (default %(default)s)",
+    )
+    parser.add_argument(
+        "--color",
+        type=_color,
+        metavar="RRGGBB",
+        help="the paint, as in web pages; its brightness stays the object's",
+    )
+    parser.add_argument(
+        "--match-brightness", action="store_true", help="takes the brightness of --color too"
+    )
+    parser.add_argument(
+        "--region",
+        type=Path,
+        metavar="FILE",
+        help="where: an image, white on black, of the photo's size",
+    )
+    parser.add_argument(
+        "--cluster",
+        type=count,
+        metavar="N",
+        help="where: the cluster N of the object's paints, see clusters.png",
+    )
+    parser.add_argument(
+        "--clusters",
+        type=count,
+        default=4,
+        metavar="K",
+        help="how many there are at most (default %(default)s)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=count,
+        default=0,
+        metavar="N",
+        help="of the clusters' random numbers (default %(default)s)",
+    )
 
 
 def _add_relight(parser: argparse.ArgumentParser) -> None:
-    for name, text in (("yaw", "front to the right"), ("pitch", "top to the front"), ("roll", "right side up")):
-        parser.add_argument(f"--{name}", type=_number, default=0.0, metavar="DEGREES", help=f"turns the light: {text}")
+    for name, text in (
+        ("yaw", "front to the right"),
+        ("pitch", "top to the front"),
+        ("roll", "right side up"),
+    ):
+        parser.add_argument(
+            f"--{name}",
+            type=_number,
+            default=0.0,
+            metavar="DEGREES",
+            help=f"turns the light: {text}",
+        )
     parser.add_argument(
-        "--light", type=Path, metavar="FILE",
+        "--light",
+        type=Path,
+        metavar="FILE",
         help="another light: a result folder, a JSON file or .npy of 9 x 3 coefficients, or a panorama, twice as wide as high",
-    )  # fmt: skip
+    )
     _add_direction(parser)
-    parser.add_argument("--ambient", type=_number, metavar="A", help="of what --direction does not reach, to its light (default 0.15)")
-    parser.add_argument("--exposure", type=_number, default=1.0, metavar="F", help="factor of the new light (default %(default)s)")
     parser.add_argument(
-        "--highlights", choices=HIGHLIGHTS, default="auto",
+        "--ambient",
+        type=_number,
+        metavar="A",
+        help="of what --direction does not reach, to its light (default 0.15)",
+    )
+    parser.add_argument(
+        "--exposure",
+        type=_number,
+        default=1.0,
+        metavar="F",
+        help="factor of the new light (default %(default)s)",
+    )
+    parser.add_argument(
+        "--highlights",
+        choices=HIGHLIGHTS,
+        default="auto",
         help="what becomes of them (auto: rendered if the lobe is known, fitted or given, else scaled as the shading)",
-    )  # fmt: skip
+    )
     _add_lobe(parser)
 
 
@@ -516,16 +776,33 @@ def _color(text: str) -> np.ndarray:
     except ValueError:
         codes = np.zeros(0)
     if len(digits) != 6 or len(codes) != 3 or not (digits.isascii() and digits.isalnum()):
-        raise argparse.ArgumentTypeError(f"{text!r} is not a colour: write red, green and blue as rrggbb, like 2060c0")
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a colour: write red, green and blue as rrggbb, like 2060c0"
+        )
     return srgb_to_linear(codes / 255)
 
 
-_Action = tuple[str, str, Callable[[Decomposition, argparse.Namespace], _Done], Callable[[argparse.ArgumentParser], None]]
+_Action = tuple[
+    str,
+    str,
+    Callable[[Decomposition, argparse.Namespace], _Done],
+    Callable[[argparse.ArgumentParser], None],
+]
 _ACTIONS: tuple[_Action, ...] = (
-    ("light-direction", "the one light that best explains the shading, and the highlights", _light_direction, _add_nothing),
+    (
+        "light-direction",
+        "the one light that best explains the shading, and the highlights",
+        _light_direction,
+        _add_nothing,
+    ),
     ("highlight", "a new highlight on the recovered shape", _highlight, _add_highlight),
     ("gloss", "glossier, rougher, or like metal", _gloss, _add_gloss),
-    ("dichromatic", "the diffuse and the specular layer, each on its own", _dichromatic, _add_dichromatic),
+    (
+        "dichromatic",
+        "the diffuse and the specular layer, each on its own",
+        _dichromatic,
+        _add_dichromatic,
+    ),
     ("recolour", "another paint under the same gloss", _recolour, _add_recolour),
     ("relight", "the recovered light turned, or another light", _relight, _add_relight),
 )

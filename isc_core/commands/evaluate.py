@@ -27,24 +27,57 @@ _PRIOR = "as for isc decompose (default %(default)s, so that SIRFS is measured b
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "evaluate", run, "accuracy on a data set with ground truth",
-        "Prints the errors of height, normals, shading, reflectance and light for each object, and their geometric means.", _EXAMPLES,
-    )  # fmt: skip
+        commands,
+        "evaluate",
+        run,
+        "accuracy on a data set with ground truth",
+        "Prints the errors of height, normals, shading, reflectance and light for each object, and their geometric means.",
+        _EXAMPLES,
+    )
     parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
     parser.add_argument("--dataset", choices=("mit-berkeley",), required=True, help="its kind")
     parser.add_argument("--objects", type=names, metavar="a,b", help="their names (default: all)")
     parser.add_argument(
-        "--input", choices=INPUTS, default="diffuse", help="images without highlights, or as photographed (default %(default)s)"
+        "--input",
+        choices=INPUTS,
+        default="diffuse",
+        help="images without highlights, or as photographed (default %(default)s)",
     )
-    parser.add_argument("--illumination", choices=(*ILLUMINATIONS, "both"), help="default: both, or laboratory for --input original")
-    parser.add_argument("--model", metavar="NAME", help="as for isc decompose (default: sirfs, or joint for --input original)")
-    parser.add_argument("--separator", default=RunnerOptions().separator, metavar="NAME", help="of joint, mdr, mbp (default %(default)s)")
-    parser.add_argument("--confidence-weights", action="store_true", help="of joint and mdr: as for isc decompose")
-    parser.add_argument("--light-prior", choices=LIGHT_PRIORS, default=RunnerOptions().light_prior, help=_PRIOR)
-    parser.add_argument("--shape-prior", choices=SHAPE_PRIORS, default=RunnerOptions().shape_prior, help=_PRIOR)
-    parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
+    parser.add_argument(
+        "--illumination",
+        choices=(*ILLUMINATIONS, "both"),
+        help="default: both, or laboratory for --input original",
+    )
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="as for isc decompose (default: sirfs, or joint for --input original)",
+    )
+    parser.add_argument(
+        "--separator",
+        default=RunnerOptions().separator,
+        metavar="NAME",
+        help="of joint, mdr, mbp (default %(default)s)",
+    )
+    parser.add_argument(
+        "--confidence-weights", action="store_true", help="of joint and mdr: as for isc decompose"
+    )
+    parser.add_argument(
+        "--light-prior", choices=LIGHT_PRIORS, default=RunnerOptions().light_prior, help=_PRIOR
+    )
+    parser.add_argument(
+        "--shape-prior", choices=SHAPE_PRIORS, default=RunnerOptions().shape_prior, help=_PRIOR
+    )
+    parser.add_argument(
+        "--priors",
+        type=Path,
+        metavar="FILE",
+        help="a file of isc fit-priors (default: those of the package)",
+    )
     add_engine(parser)
-    parser.add_argument("--json", type=Path, metavar="FILE", help="also write the figures to this file")
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="also write the figures to this file"
+    )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
@@ -60,9 +93,14 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     runner_options.check()
     prior_set = shipped_prior_set() if options.priors is None else load_prior_set(options.priors)
     report = evaluate(
-        options.root, objects=options.objects, illuminations=_illuminations(options.illumination, original),
-        input=options.input, model=model, runner=make_runner(runner_options, prior_set), monitor=monitor,
-    )  # fmt: skip
+        options.root,
+        objects=options.objects,
+        illuminations=_illuminations(options.illumination, original),
+        input=options.input,
+        model=model,
+        runner=make_runner(runner_options, prior_set),
+        monitor=monitor,
+    )
     if options.json is not None:
         with new_file(options.json) as partial:
             partial.write_text(json.dumps(report.to_json(), indent=2) + "\n", encoding="utf-8")

@@ -13,9 +13,13 @@ _EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "mask", run, "cut the object out of a box drawn around it",
-        "Finds the object inside a box and writes its mask, white on black. Look at it before you use it: colours alone decide.", _EXAMPLES,
-    )  # fmt: skip
+        commands,
+        "mask",
+        run,
+        "cut the object out of a box drawn around it",
+        "Finds the object inside a box and writes its mask, white on black. Look at it before you use it: colours alone decide.",
+        _EXAMPLES,
+    )
     parser.add_argument("photo", metavar="PHOTO", type=Path, help="the photo, as for isc decompose")
     parser.add_argument(
         "--box",
@@ -26,14 +30,20 @@ def declare(commands: Commands) -> None:
     )
     add_transfer(parser)
     add_limits(parser)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MASK", help="the PNG file to write")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="MASK", help="the PNG file to write"
+    )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work."""
     del monitor  # one step of a second or two
-    found = cut_out(options.photo, options.box, options.output, options.transfer, limits_of(options))
-    return hints(options, f"{options.output}: {int(found.sum())} pixels; look at it before you use it")
+    found = cut_out(
+        options.photo, options.box, options.output, options.transfer, limits_of(options)
+    )
+    return hints(
+        options, f"{options.output}: {int(found.sum())} pixels; look at it before you use it"
+    )
 
 
 def _box(text: str) -> Box:

@@ -1,4 +1,6 @@
-"""How options are read: a parser whose complaints are one line, and the types that several commands share."""
+"""How options are read: a parser whose complaints are one line, and the types that several commands
+share.
+"""
 
 import argparse
 import math
@@ -8,7 +10,14 @@ from typing import Any, NoReturn
 
 from ..errors import InputError
 from ..limits import USUAL, Limits
-from ..models.settings import ILLUMINATIONS, LIGHT_COLOURS, LIGHT_PRIORS, MODELS, SHAPE_PRIORS, Settings
+from ..models.settings import (
+    ILLUMINATIONS,
+    LIGHT_COLOURS,
+    LIGHT_PRIORS,
+    MODELS,
+    SHAPE_PRIORS,
+    Settings,
+)
 from ..photo import TRANSFERS
 from ..separation import METHODS
 
@@ -20,11 +29,15 @@ class _Help(argparse.RawDescriptionHelpFormatter):
 
     def _fill_text(self, text: str, width: int, indent: str) -> str:
         keep = "\n" in text
-        return super()._fill_text(text if keep else "\n".join(textwrap.wrap(text, width)), width, indent)
+        return super()._fill_text(
+            text if keep else "\n".join(textwrap.wrap(text, width)), width, indent
+        )
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises `InputError` instead of printing its usage; options cannot be shortened, so that new ones never change old scripts."""
+    """Raises `InputError` instead of printing its usage; options cannot be shortened, so that new
+    ones never change old scripts.
+    """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(allow_abbrev=False, formatter_class=_Help, **options)
@@ -34,10 +47,15 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message} (see `{self.prog} --help`)")
 
 
-def add_command(commands: Commands, name: str, run: Any, summary: str, description: str, examples: str) -> argparse.ArgumentParser:
+def add_command(
+    commands: Commands, name: str, run: Any, summary: str, description: str, examples: str
+) -> argparse.ArgumentParser:
     """A sub-command's parser, with what all of them have."""
     parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=summary, description=description, epilog=f"examples:\n{examples}" if examples else None
+        name,
+        help=summary,
+        description=description,
+        epilog=f"examples:\n{examples}" if examples else None,
     )
     parser.set_defaults(run=run)
     add_speech(parser)
@@ -45,15 +63,26 @@ def add_command(commands: Commands, name: str, run: Any, summary: str, descripti
 
 
 def add_speech(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
-    """--quiet and --progress. `again`: for an action of a command that has them, so that they may stand before it or behind it."""
-    told = argparse.SUPPRESS if again else None  # what stands before the action is not to be undone by a default
+    """--quiet and --progress.
+
+    `again`: for an action of a command that has them, so that they may stand before it or behind
+    it.
+    """
+    told = (
+        argparse.SUPPRESS if again else None
+    )  # what stands before the action is not to be undone by a default
     parser.add_argument(
-        "--quiet", action="store_true", default=told or False, help="show no progress, and print nothing but what was asked for"
+        "--quiet",
+        action="store_true",
+        default=told or False,
+        help="show no progress, and print nothing but what was asked for",
     )
     parser.add_argument(
-        "--progress", choices=("bar", "json"), default=told or "bar",
+        "--progress",
+        choices=("bar", "json"),
+        default=told or "bar",
         help="json: for programs, a JSON object a line on stdout, cancelled by `cancel` or the end of stdin (default bar)",
-    )  # fmt: skip
+    )
 
 
 def hints(options: argparse.Namespace, *lines: str) -> list[str]:
@@ -63,7 +92,12 @@ def hints(options: argparse.Namespace, *lines: str) -> list[str]:
 
 def add_photo(parser: argparse.ArgumentParser) -> None:
     """PHOTO, --mask, --transfer."""
-    parser.add_argument("photo", metavar="PHOTO", type=Path, help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR, HDR or NumPy .npy")
+    parser.add_argument(
+        "photo",
+        metavar="PHOTO",
+        type=Path,
+        help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR, HDR or NumPy .npy",
+    )
     parser.add_argument(
         "--mask",
         type=Path,
@@ -87,9 +121,12 @@ def add_transfer(parser: argparse.ArgumentParser) -> None:
 def add_limits(parser: argparse.ArgumentParser) -> None:
     """--max-pixels."""
     parser.add_argument(
-        "--max-pixels", type=whole, default=USUAL.max_pixels, metavar="N",
+        "--max-pixels",
+        type=whole,
+        default=USUAL.max_pixels,
+        metavar="N",
         help="refuse images of more pixels (width x height), before they are unpacked (default %(default)s)",
-    )  # fmt: skip
+    )
 
 
 def limits_of(options: argparse.Namespace) -> Limits:
@@ -98,7 +135,9 @@ def limits_of(options: argparse.Namespace) -> Limits:
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
-    """What the command's `Settings` are read from but for --engine and --threads; --priors and --arrays."""
+    """What the command's `Settings` are read from but for --engine and --threads; --priors and
+    --arrays.
+    """
     usual = Settings()
     parser.add_argument(
         "--model",
@@ -113,7 +152,10 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         help=f"what removes highlights: {', '.join(METHODS)} (default {usual.separator})",
     )
     parser.add_argument(
-        "--illumination", choices=ILLUMINATIONS, default=usual.illumination, help="which lights to expect (default %(default)s)"
+        "--illumination",
+        choices=ILLUMINATIONS,
+        default=usual.illumination,
+        help="which lights to expect (default %(default)s)",
     )
     parser.add_argument(
         "--max-size",
@@ -122,36 +164,64 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="long side of the object, in pixels, in the maps (default %(default)s; 0: the photo's)",
     )
-    parser.add_argument("--full-size", action="store_true", help="bring the result back to the photo's resolution")
-    parser.add_argument("--shading-only", action="store_true", help="shape from shading: the object has one colour")
+    parser.add_argument(
+        "--full-size", action="store_true", help="bring the result back to the photo's resolution"
+    )
+    parser.add_argument(
+        "--shading-only", action="store_true", help="shape from shading: the object has one colour"
+    )
     parser.add_argument(
         "--confidence-weights",
         action="store_true",
         help="of joint and mdr: pixels whose separation is in doubt weigh less in shape and light",
     )
     parser.add_argument(
-        "--light-colour", choices=LIGHT_COLOURS, default=usual.light_colour,
+        "--light-colour",
+        choices=LIGHT_COLOURS,
+        default=usual.light_colour,
         help="the light is white, or has the colour that the highlights tell, where they do (default %(default)s)",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--light-prior", choices=LIGHT_PRIORS, default=usual.light_prior,
+        "--light-prior",
+        choices=LIGHT_PRIORS,
+        default=usual.light_prior,
         help="expect the light that the photo seems to show, or that of all photos alike (default %(default)s)",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "--shape-prior", choices=SHAPE_PRIORS, default=usual.shape_prior,
+        "--shape-prior",
+        choices=SHAPE_PRIORS,
+        default=usual.shape_prior,
         help="expect the shape that the photo seems to show, or what its outline alone suggests (default %(default)s)",
-    )  # fmt: skip
-    parser.add_argument("--arrays", action="store_true", help="write arrays.npz too: everything as plain NumPy arrays, for other programs")
-    parser.add_argument("--priors", type=Path, metavar="FILE", help="a file of isc fit-priors (default: those of the package)")
+    )
     parser.add_argument(
-        "--seed", type=count, default=usual.seed, metavar="N", help="of random numbers, written into the result (default %(default)s)"
+        "--arrays",
+        action="store_true",
+        help="write arrays.npz too: everything as plain NumPy arrays, for other programs",
+    )
+    parser.add_argument(
+        "--priors",
+        type=Path,
+        metavar="FILE",
+        help="a file of isc fit-priors (default: those of the package)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=count,
+        default=usual.seed,
+        metavar="N",
+        help="of random numbers, written into the result (default %(default)s)",
     )
 
 
-def add_engine(parser: argparse.ArgumentParser, threads: str = "how many threads to use (0: one for each core)") -> None:
+def add_engine(
+    parser: argparse.ArgumentParser, threads: str = "how many threads to use (0: one for each core)"
+) -> None:
     """--engine and --threads."""
     parser.add_argument(
-        "--engine", choices=("auto", "numba", "numpy"), default="auto", help="compiled kernels, or plain NumPy (auto: compiled if possible)"
+        "--engine",
+        choices=("auto", "numba", "numpy"),
+        default="auto",
+        help="compiled kernels, or plain NumPy (auto: compiled if possible)",
     )
     parser.add_argument("--threads", type=count, default=0, metavar="N", help=threads)
 

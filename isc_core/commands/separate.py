@@ -26,12 +26,22 @@ _EXAMPLES = """  isc separate cup.png -o cup-layers
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "separate", run, "diffuse and specular light only",
+        commands,
+        "separate",
+        run,
+        "diffuse and specular light only",
         "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and pictures of both. A photo without mask, "
-        "transparency and black border is taken as a whole.", _EXAMPLES,
-    )  # fmt: skip
+        "transparency and black border is taken as a whole.",
+        _EXAMPLES,
+    )
     add_photo(parser)
-    parser.add_argument("--method", choices=METHODS, default=BEST, metavar="NAME", help=f"how: {', '.join(METHODS)} (default {BEST})")
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default=BEST,
+        metavar="NAME",
+        help=f"how: {', '.join(METHODS)} (default {BEST})",
+    )
     parser.add_argument(
         "--variant",
         default=IMPROVED,
@@ -47,11 +57,18 @@ def declare(commands: Commands) -> None:
         help="change an option of the method; can be given again; an unknown NAME lists those that there are",
     )
     parser.add_argument(
-        "--prior", type=Path, metavar="FILE",
+        "--prior",
+        type=Path,
+        metavar="FILE",
         help=f"for {BEST}: a grey image of the photo's size, how probable a visible highlight is: black never, middle grey (0.5) not known",
-    )  # fmt: skip
+    )
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier result is replaced"
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="the folder to write; an earlier result is replaced",
     )
 
 
@@ -60,9 +77,17 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
         raise InputError(f"--prior is for the method {BEST} alone")
-    require_writable_result(options.output, separation=True, inputs=(options.photo, options.mask, options.prior))
-    photo = read_photo(options.photo, options.mask, options.transfer, whole_frame=True, limits=limits_of(options))
-    prior = None if options.prior is None else _read_prior(options.prior, photo.mask.shape, limits_of(options))
+    require_writable_result(
+        options.output, separation=True, inputs=(options.photo, options.mask, options.prior)
+    )
+    photo = read_photo(
+        options.photo, options.mask, options.transfer, whole_frame=True, limits=limits_of(options)
+    )
+    prior = (
+        None
+        if options.prior is None
+        else _read_prior(options.prior, photo.mask.shape, limits_of(options))
+    )
     monitor.report(f"separating ({options.method})", 0.1)
     layers = separate(
         options.method, photo.image, photo.mask, photo.clipped,
@@ -88,7 +113,10 @@ def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Ite
 
 
 def _read_prior(path: Path, size: tuple[int, ...], limits: Limits) -> np.ndarray:
-    """The stored values of an image, as probabilities (H, W) in [0, 1]. Raises `InputError` unless it has the photo's size (H, W)."""
+    """The stored values of an image, as probabilities (H, W) in [0, 1].
+
+    Raises `InputError` unless it has the photo's size (H, W).
+    """
     prior: np.ndarray = np.clip(read_linear(path, "linear", limits).mean(axis=2), 0, 1)
     if prior.shape != size:
         raise InputError(f"{path}: the prior must have the photo's size {size}, not {prior.shape}")

@@ -1,21 +1,25 @@
 """The Blinn-Phong extension: the object's gloss made sharper, rougher or metallic.
 
-Equations. Remapping needs no shape: under one light the specular layer is s = w c^p, so that an exponent q makes of it, pixel by pixel,
+Equations. Remapping needs no shape: under one light the specular layer is s = w c^p, so that an
+exponent q makes of it, pixel by pixel,
 
-    s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),     m the pixel's largest channel, w the layer's brightest but for a few,
+    s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),     m the pixel's largest channel, w the layer's
+    brightest but for a few,
 
-with the usual factor, which keeps the energy, and a gain g; for a wider lobe, q < p, m / w counts as a quarter at least, or the edge
-at which the separated layer ends would be lifted with it. Rendering draws the lobe anew on the recovered shape under the light that best
-explains the layer. Metal has no body colour of its own: of the share M of metal the diffuse light goes, the highlight takes the colour of
-the reflectance, and the surroundings are mirrored in that colour:
+with the usual factor, which keeps the energy, and a gain g; for a wider lobe, q < p, m / w counts
+as a quarter at least, or the edge at which the separated layer ends would be lifted with it.
+Rendering draws the lobe anew on the recovered shape under the light that best explains the layer.
+Metal has no body colour of its own: of the share M of metal the diffuse light goes, the highlight
+takes the colour of the reflectance, and the surroundings are mirrored in that colour:
 
-    diffuse' = (1 - M) diffuse,   specular' = s' (1 - M + M r / max r) + M r sum_w f(n, w) L(w) max(0, n . w).
+    diffuse' = (1 - M) diffuse,   specular' = s' (1 - M + M r / max r) + M r sum_w f(n, w) L(w)
+    max(0, n . w).
 
-Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (Blinn-Phong extension); for metals, R. L. Cook, K. E. Torrance 1982,
-doi:10.1145/357290.357293.
+Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (Blinn-Phong extension); for
+metals, R. L. Cook, K. E. Torrance 1982, doi:10.1145/357290.357293.
 
-Limits: remapping cannot spread a highlight beyond where some of it is, so a rougher look soon needs rendering. The mirrored surroundings
-are those that the smooth shading tells.
+Limits: remapping cannot spread a highlight beyond where some of it is, so a rougher look soon needs
+rendering. The mirrored surroundings are those that the smooth shading tells.
 """
 
 from dataclasses import dataclass, replace
@@ -33,15 +37,18 @@ from .lobes import USUAL_EXPONENT, Lobe, known_lobe, lobe_in, lobe_under, streng
 
 METHODS = ("remap", "render")
 _SKY_ROWS = 16
-_FOUND = 0.25  # of the brightest: below, a separation finds less and less of a highlight, until it ends in an edge
+# of the brightest: below, a separation finds less and less of a highlight, until it ends in an edge
+_FOUND = 0.25
 _CENTRE = 99.9  # percentile: the lobe's own centre, but for a few wrong pixels
 
 
 @dataclass(frozen=True)
 class Gloss:
-    """`exponent`: the new lobe's, in [1, 1e5]; None for `sharper` > 0 times the present one's. `present`: the present lobe's, None for the
-    fitted one. `gain` in [0, 1e6]: of the specular layer. `metal` in [0, 1]: the share of metal. `method`: "remap" or "render".
-    Raises `InputError`."""
+    """`exponent`: the new lobe's, in [1, 1e5]; None for `sharper` > 0 times the present one's.
+    `present`: the present lobe's, None for the fitted one. `gain` in [0, 1e6]: of the specular
+    layer. `metal` in [0, 1]: the share of metal. `method`: "remap" or "render". Raises
+    `InputError`.
+    """
 
     exponent: float | None = None
     sharper: float = 1.0
@@ -58,11 +65,16 @@ class Gloss:
         check_range("gain", self.gain, 0, MOST_GAIN)
         check_range("metal", self.metal, 0, 1)
         if self.method not in METHODS:
-            raise InputError(f'unknown method "{self.method}" of gloss: choose {" or ".join(METHODS)}')
+            raise InputError(
+                f'unknown method "{self.method}" of gloss: choose {" or ".join(METHODS)}'
+            )
 
 
 def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None = None) -> Edited:
-    """The scene with another gloss. `light`: to render under; None for the one that best explains the specular layer."""
+    """The scene with another gloss.
+
+    `light`: to render under; None for the one that best explains the specular layer.
+    """
     notes: list[str] = []
     same = gloss.exponent is None and gloss.sharper == 1 and gloss.method == "remap"
     specular = d.specular if same else _new_lobe(d, gloss, light, notes)
@@ -82,7 +94,9 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
 
 
 def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: float) -> np.ndarray:
-    """The specular layer (H, W, 3) of a lobe of exponent `present`, as one of `exponent` would have it; unchanged where they are equal."""
+    """The specular layer (H, W, 3) of a lobe of exponent `present`, as one of `exponent` would have
+    it; unchanged where they are equal.
+    """
     if exponent == present:
         return specular
     level = np.minimum(specular.max(-1, keepdims=True) / white_of(specular, mask, _CENTRE), 1)
@@ -91,10 +105,14 @@ def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: f
     return specular * shape * ((exponent + 8) / (present + 8))
 
 
-def _new_lobe(d: Decomposition, gloss: Gloss, light: DirectionalLight | None, notes: list[str]) -> np.ndarray:
+def _new_lobe(
+    d: Decomposition, gloss: Gloss, light: DirectionalLight | None, notes: list[str]
+) -> np.ndarray:
     """The specular layer of the exponent that is asked for."""
     if not d.specular[d.mask].any():
-        notes.append("the object has no specular light to change: isc edit RESULT highlight gives it some")
+        notes.append(
+            "the object has no specular light to change: isc edit RESULT highlight gives it some"
+        )
         return d.specular
     known = known_lobe(d)
     present = gloss.present or (known.nearest_exponent if known is not None else None)
@@ -103,7 +121,9 @@ def _new_lobe(d: Decomposition, gloss: Gloss, light: DirectionalLight | None, no
     if present is None and fit is not None and fit.determined:
         present = fit.exponent
     if present is None:
-        notes.append("no single light and lobe explain the specular layer: the present exponent is a guess")
+        notes.append(
+            "no single light and lobe explain the specular layer: the present exponent is a guess"
+        )
         present = USUAL_EXPONENT
     exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
     under = light or (fit.light if fit is not None else None)

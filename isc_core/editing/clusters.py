@@ -1,11 +1,14 @@
 """Which parts of an object have the same paint: clusters of its reflectance by colour.
 
-Equation: k-means over (a / L, b / L, L / 5) in Oklab of the reflectance in the light's mean colour, brightness scaled so that its 99.5th
-percentile is white. The ratios do not change when shading was taken for paint, which scales L, a and b alike. Starts: each next centre is
-the one of a few random pixels that lowers the total distance most (k-means++, greedy), with a seed of its own; then alternating means;
-then centres that an eye would hardly tell apart become one. Clusters are numbered by size, the largest first.
+Equation: k-means over (a / L, b / L, L / 5) in Oklab of the reflectance in the light's mean colour,
+brightness scaled so that its 99.5th percentile is white. The ratios do not change when shading was
+taken for paint, which scales L, a and b alike. Starts: each next centre is the one of a few random
+pixels that lowers the total distance most (k-means++, greedy), with a seed of its own; then
+alternating means; then centres that an eye would hardly tell apart become one. Clusters are
+numbered by size, the largest first.
 
-Citation: S. Lloyd 1982, doi:10.1109/TIT.1982.1056489; D. Arthur, S. Vassilvitskii, "k-means++", SODA 2007, doi:10.5555/1283383.1283494.
+Citation: S. Lloyd 1982, doi:10.1109/TIT.1982.1056489; D. Arthur, S. Vassilvitskii, "k-means++",
+SODA 2007, doi:10.5555/1283383.1283494.
 """
 
 from dataclasses import dataclass
@@ -28,8 +31,10 @@ _SURE = 0.7  # shares within 15 % of none and all are none and all
 
 @dataclass(frozen=True)
 class Clusters:
-    """`labels`: (H, W) int, 0 for the largest cluster, -1 outside the mask. `colors`: (K, 3) linear, each cluster's mean in the light's
-    mean colour. `shares`: (K,) of the object's pixels, falling. `paint`: (H, W, 3), what they are clusters of."""
+    """`labels`: (H, W) int, 0 for the largest cluster, -1 outside the mask. `colors`: (K, 3)
+    linear, each cluster's mean in the light's mean colour. `shares`: (K,) of the object's pixels,
+    falling. `paint`: (H, W, 3), what they are clusters of.
+    """
 
     labels: np.ndarray
     colors: np.ndarray
@@ -37,22 +42,28 @@ class Clusters:
     paint: np.ndarray
 
     def weight(self, number: int) -> np.ndarray:
-        """(H, W) in [0, 1]: how much each pixel belongs to the cluster `number`, 1 being the largest. Along its outline pixels are mixtures
-        of two paints: how much of each follows from their colour.
+        """(H, W) in [0, 1]: how much each pixel belongs to the cluster `number`, 1 being the
+        largest. Along its outline pixels are mixtures of two paints: how much of each follows from
+        their colour.
 
         Raises `InputError` for a number that is not there.
         """
         if not 1 <= number <= len(self.shares):
-            raise InputError(f"there is no cluster {number}: choose one of 1 to {len(self.shares)}, see clusters.png")
+            raise InputError(
+                f"there is no cluster {number}: choose one of 1 to {len(self.shares)}, see clusters.png"
+            )
         mask = self.labels >= 0
         member = (self.labels == number - 1).astype(float)[..., None]
-        slope, offset = affine_fit(self.paint, member, mask, _SOFT * white_of(self.paint, mask) ** 2)
+        slope, offset = affine_fit(
+            self.paint, member, mask, _SOFT * white_of(self.paint, mask) ** 2
+        )
         share = np.einsum("hwgc,hwg->hwc", slope, self.paint)[..., 0] + offset[..., 0]
         return np.where(mask, np.clip((share - 0.5) / _SURE + 0.5, 0, 1), 0)
 
 
 def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
-    """Splits the object into at most `count` paints, 1 to 12; fewer where there are not so many colours. The same seed, the same clusters.
+    """Splits the object into at most `count` paints, 1 to 12; fewer where there are not so many
+    colours. The same seed, the same clusters.
 
     Raises `InputError` for another count, or a seed below 0.
     """
@@ -93,7 +104,9 @@ def _means(points: np.ndarray, count: int, generator: np.random.Generator) -> np
     for _ in range(_ROUNDS):
         labels = _nearest(points, centers)
         sizes = np.bincount(labels, minlength=len(centers))
-        sums = np.stack([np.bincount(labels, weights=column, minlength=len(centers)) for column in points.T], 1)
+        sums = np.stack(
+            [np.bincount(labels, weights=column, minlength=len(centers)) for column in points.T], 1
+        )
         moved = np.where(sizes[:, None] > 0, sums / np.maximum(sizes, 1)[:, None], centers)
         if np.abs(moved - centers).max() < 1e-7:
             break

@@ -1,16 +1,20 @@
 """Bringing an edit back into the photo, at its full size.
 
-Problem: the maps may be smaller than the photo, whose detail the edited picture should keep; pixels outside the object must not change.
-Equation: what is brought back is the CHANGE, e = image' - image. Around each pixel k of the maps it is taken to be an affine function of
-the photo's colour I, e ~ A_k^T I + b_k (see `guided`). Where the window's colours tell nothing A falls back to the change as a factor of
-each channel, mean_k e / mean_k I, at most 1: so texture finer than the maps gets the contrast of its new light. A and b, smooth, are
-enlarged and applied to the full photo, and what they leave of e is enlarged as it is. A
-highlight that is taken away or a paint that is changed so ends at the photo's own edges. At the photo's own size e is added as it is.
+Problem: the maps may be smaller than the photo, whose detail the edited picture should keep; pixels
+outside the object must not change. Equation: what is brought back is the CHANGE, e = image' -
+image. Around each pixel k of the maps it is taken to be an affine function of the photo's colour I,
+e ~ A_k^T I + b_k (see `guided`). Where the window's colours tell nothing A falls back to the change
+as a factor of each channel, mean_k e / mean_k I, at most 1: so texture finer than the maps gets the
+contrast of its new light. A and b, smooth, are enlarged and applied to the full photo, and what
+they leave of e is enlarged as it is. A highlight that is taken away or a paint that is changed so
+ends at the photo's own edges. At the photo's own size e is added as it is.
 
-Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013, doi:10.1109/TPAMI.2012.213; enlarging the coefficients:
-K. He, J. Sun, "Fast guided filter" (2015), arXiv:1505.00996.
+Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013,
+doi:10.1109/TPAMI.2012.213; enlarging the coefficients: K. He, J. Sun, "Fast guided filter" (2015),
+arXiv:1505.00996.
 
-Limits: detail that the maps do not hold changes only as its colour says. Where the photo is clipped, so is the edit.
+Limits: detail that the maps do not hold changes only as its colour says. Where the photo is
+clipped, so is the edit.
 """
 
 import numpy as np
@@ -28,14 +32,19 @@ _OFF = 3.0  # pixels of the maps that the object's box may differ
 
 
 def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray, np.ndarray]:
-    """The edited photo (H, W, 3) float32, linear, >= 0, at the size of `photo`, and where it differs from it, (H, W) bool.
+    """The edited photo (H, W, 3) float32, linear, >= 0, at the size of `photo`, and where it
+    differs from it, (H, W) bool.
 
-    `photo`: the one that the result was made of, at full size, with the same mask. Nothing outside the mask changes. Raises `InputError`
-    where photo, mask and result do not fit.
+    `photo`: the one that the result was made of, at full size, with the same mask. Nothing outside
+    the mask changes. Raises `InputError` where photo, mask and result do not fit.
     """
     scale = scale_of(d, photo)
     change = np.where(d.mask[..., None], edit.image - d.image, 0).astype(np.float32)
-    full = change if scale == 1 and change.shape == photo.image.shape else enlarged_change(d, change, photo, scale)
+    full = (
+        change
+        if scale == 1 and change.shape == photo.image.shape
+        else enlarged_change(d, change, photo, scale)
+    )
     changed = photo.mask & (full != 0).any(-1)
     image = photo.image.copy()
     image[changed] = np.maximum(image[changed] + full[changed], 0)
@@ -43,11 +52,16 @@ def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray,
 
 
 def scale_of(d: Decomposition, photo: Photo) -> float:
-    """Map pixels to one photo pixel. Raises `InputError` where the photo or its mask is not that of the result."""
+    """Map pixels to one photo pixel.
+
+    Raises `InputError` where the photo or its mask is not that of the result.
+    """
     stated = d.provenance.input.get("scale")
     size = d.provenance.input.get("size")
     if not isinstance(stated, int | float) or not 0 < stated <= 1 or not isinstance(size, list):
-        raise InputError("the result does not say at which scale of its photo the maps are: decompose the photo again")
+        raise InputError(
+            "the result does not say at which scale of its photo the maps are: decompose the photo again"
+        )
     height, width = photo.mask.shape
     expected = tuple(max(1, int(np.ceil(n * stated - 1e-6))) for n in (height, width))
     if size != [width, height] or expected != d.mask.shape:
@@ -56,19 +70,32 @@ def scale_of(d: Decomposition, photo: Photo) -> float:
         )
     boxes = np.array(mask_box(photo.mask)) * stated, np.array(mask_box(d.mask))
     if np.abs(boxes[0] - boxes[1]).max() > _OFF:
-        raise InputError("the photo's mask is not the one that the result was made with: give the same mask with --mask")
+        raise InputError(
+            "the photo's mask is not the one that the result was made with: give the same mask with --mask"
+        )
     return float(stated)
 
 
 def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: float) -> np.ndarray:
-    """The change (h, w, 3) of the maps' image, led by the colours of the full photo: (H, W, 3) float32, 0 outside its mask."""
+    """The change (h, w, 3) of the maps' image, led by the colours of the full photo:
+
+    (H, W, 3) float32, 0 outside its mask.
+    """
     result = np.zeros(photo.image.shape, np.float32)
     if not change.any():
         return result
     epsilon = _EPSILON * white_of(d.image, d.mask) ** 2
-    mean_image, mean_change = (window_means(values.astype(float), d.mask) for values in (d.image, change))
+    mean_image, mean_change = (
+        window_means(values.astype(float), d.mask) for values in (d.image, change)
+    )
     factor = np.clip(mean_change / np.maximum(mean_image, np.sqrt(epsilon)), -1, 1)
-    slope, offset = affine_fit(d.image.astype(float), change.astype(float), d.mask, epsilon, factor[..., None, :] * np.eye(3))
+    slope, offset = affine_fit(
+        d.image.astype(float),
+        change.astype(float),
+        d.mask,
+        epsilon,
+        factor[..., None, :] * np.eye(3),
+    )
     rest = change - np.einsum("hwgc,hwg->hwc", slope, d.image) - offset
     planes = np.concatenate([slope.reshape(*d.mask.shape, 9), offset + rest], -1)
     nearest = ndimage.distance_transform_edt(~d.mask, return_distances=False, return_indices=True)
@@ -77,6 +104,14 @@ def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: f
     for start in range(0, len(rows), _CHUNK):
         at = rows[start : start + _CHUNK], columns[start : start + _CHUNK]
         places = [(index + 0.5) * scale - 0.5 for index in at]
-        found = np.stack([ndimage.map_coordinates(planes[..., k], places, order=1, mode="nearest") for k in range(12)], -1)
-        result[at] = np.einsum("ngc,ng->nc", found[:, :9].reshape(-1, 3, 3), photo.image[at]) + found[:, 9:]
+        found = np.stack(
+            [
+                ndimage.map_coordinates(planes[..., k], places, order=1, mode="nearest")
+                for k in range(12)
+            ],
+            -1,
+        )
+        result[at] = (
+            np.einsum("ngc,ng->nc", found[:, :9].reshape(-1, 3, 3), photo.image[at]) + found[:, 9:]
+        )
     return result

@@ -1,13 +1,16 @@
 """Dichromatic editing: the diffuse and the specular layer each on its own (thesis, figure 4.50).
 
-Equation, for a layer l with white w (its 99.5th percentile), m its largest channel, G a Gaussian average inside the mask:
-sharpened u = max(0, l + amount (l - G l)); then l' = gain u (m(u) / w)^(gamma - 1). All channels of a pixel share the factor, so that
-gamma keeps its hue. Gain 0 removes the layer.
+Equation, for a layer l with white w (its 99.5th percentile), m its largest channel, G a Gaussian
+average inside the mask: sharpened u = max(0, l + amount (l - G l)); then l' = gain u (m(u) /
+w)^(gamma - 1). All channels of a pixel share the factor, so that gamma keeps its hue. Gain 0
+removes the layer.
 
-Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and Application 10(4), 210-218 (1985),
-doi:10.1002/col.5080100409; H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016).
+Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and
+Application 10(4), 210-218 (1985), doi:10.1002/col.5080100409; H. Akbar, "3D Intrinsic Scene
+Characteristics Extraction Framework for a Single Image" (2016).
 
-Limits: a gamma below 1 lifts what the separation left by mistake; sharpening does so with its noise.
+Limits: a gamma below 1 lifts what the separation left by mistake; sharpening does so with its
+noise.
 """
 
 from dataclasses import dataclass, field
@@ -22,8 +25,10 @@ from .edited import MOST_GAIN, Edited, edited, white_of
 
 @dataclass(frozen=True)
 class LayerEdit:
-    """`gain` in [0, 1e6], 0 removes the layer. `gamma` in [.05, 20], above 1 is more contrast. `sharpen` in [-1, 20]: the share of detail
-    that is added; -1 takes all of it away. `radius` in [.3, 100]: sigma of what counts as detail, in pixels. Raises `InputError`."""
+    """`gain` in [0, 1e6], 0 removes the layer. `gamma` in [.05, 20], above 1 is more contrast.
+    `sharpen` in [-1, 20]: the share of detail that is added; -1 takes all of it away. `radius` in
+    [.3, 100]: sigma of what counts as detail, in pixels. Raises `InputError`.
+    """
 
     gain: float = 1.0
     gamma: float = 1.0
@@ -31,7 +36,12 @@ class LayerEdit:
     radius: float = 2.0
 
     def __post_init__(self) -> None:
-        for name, low, high in (("gain", 0, MOST_GAIN), ("gamma", 0.05, 20), ("sharpen", -1, 20), ("radius", 0.3, 100)):
+        for name, low, high in (
+            ("gain", 0, MOST_GAIN),
+            ("gamma", 0.05, 20),
+            ("sharpen", -1, 20),
+            ("radius", 0.3, 100),
+        ):
             check_range(name, getattr(self, name), low, high)
 
 
@@ -45,16 +55,24 @@ class DichromaticEdit:
 
 def edit_layers(d: Decomposition, change: DichromaticEdit) -> Edited:
     """The scene with both layers changed and added up again."""
-    return edited(d, edited_layer(d.diffuse, d.mask, change.diffuse), edited_layer(d.specular, d.mask, change.specular))
+    return edited(
+        d,
+        edited_layer(d.diffuse, d.mask, change.diffuse),
+        edited_layer(d.specular, d.mask, change.specular),
+    )
 
 
 def edited_layer(layer: np.ndarray, mask: np.ndarray, change: LayerEdit) -> np.ndarray:
-    """One layer (H, W, 3) >= 0, changed inside `mask` (H, W); the same array's values where nothing is asked for."""
+    """One layer (H, W, 3) >= 0, changed inside `mask` (H, W); the same array's values where nothing
+    is asked for.
+    """
     if change.gain == 0:
         return np.zeros_like(layer)
     result = layer
     if change.sharpen:
-        result = np.maximum(result + change.sharpen * (result - masked_blur(result, mask, change.radius)), 0)
+        result = np.maximum(
+            result + change.sharpen * (result - masked_blur(result, mask, change.radius)), 0
+        )
     if change.gamma != 1:
         level = result.max(-1, keepdims=True).astype(float) / white_of(layer, mask)
         # The factor of gamma < 1 is unbounded at black, where there is nothing to lift.
@@ -63,9 +81,13 @@ def edited_layer(layer: np.ndarray, mask: np.ndarray, change: LayerEdit) -> np.n
 
 
 def masked_blur(values: np.ndarray, mask: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian average of `values` (H, W) or (H, W, C) over the pixels of `mask` alone; 0 outside it."""
+    """Gaussian average of `values` (H, W) or (H, W, C) over the pixels of `mask` alone; 0 outside
+    it.
+    """
     if values.ndim == 3:
-        return np.stack([masked_blur(plane, mask, sigma) for plane in np.moveaxis(values, -1, 0)], -1)
+        return np.stack(
+            [masked_blur(plane, mask, sigma) for plane in np.moveaxis(values, -1, 0)], -1
+        )
     weight = ndimage.gaussian_filter(mask.astype(float), sigma, mode="constant")
     total = ndimage.gaussian_filter(np.where(mask, values, 0).astype(float), sigma, mode="constant")
     return np.where(mask, total / np.maximum(weight, 1e-12), 0)

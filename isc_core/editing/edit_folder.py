@@ -1,11 +1,12 @@
 """The files of an edit: the picture, in the photo's own coding, and what a person looks at first.
 
-`edit.json` says what was asked for and what was found; `edited.png` has the photo's depth, coding and alpha (none for a photo of floats);
-`edited.exr` is the same picture in linear light, colours multiplied by alpha as is usual there; `before_after.png` is the sheet;
-`clusters.png`, of recolouring, shows the parts to choose from. A folder appears whole or not at all.
+`edit.json` says what was asked for and what was found; `edited.png` has the photo's depth, coding
+and alpha (none for a photo of floats); `edited.exr` is the same picture in linear light, colours
+multiplied by alpha as is usual there; `before_after.png` is the sheet; `clusters.png`, of
+recolouring, shows the parts to choose from. A folder appears whole or not at all.
 
-Limits: of a float photo with partly transparent pixels those outside the mask are kept bit by bit only where its file is an EXR with plain
-R, G, B; else to the rounding of the product with alpha.
+Limits: of a float photo with partly transparent pixels those outside the mask are kept bit by bit
+only where its file is an EXR with plain R, G, B; else to the rounding of the product with alpha.
 """
 
 import json
@@ -31,7 +32,9 @@ _FADED = 0.06
 
 @dataclass(frozen=True)
 class Original:
-    """The photo to bring the edit back into: its light and mask at full size, its file's values, and the file."""
+    """The photo to bring the edit back into: its light and mask at full size, its file's values,
+    and the file.
+    """
 
     photo: Photo
     raster: Raster
@@ -40,7 +43,9 @@ class Original:
 
 @dataclass(frozen=True)
 class Sheet:
-    """What stands on the sheet: its title, a faint second line, panels that follow the pictures, and whether the layers are shown."""
+    """What stands on the sheet: its title, a faint second line, panels that follow the pictures,
+    and whether the layers are shown.
+    """
 
     title: str
     subtitle: str = ""
@@ -58,7 +63,9 @@ class Record:
 
 
 def require_writable_edit(folder: Path | str, inputs: Iterable[Path | None] = ()) -> None:
-    """Tells before the work whether an edit could be written to `folder` without loss of its `inputs`. Raises `InputError`."""
+    """Tells before the work whether an edit could be written to `folder` without loss of its
+    `inputs`. Raises `InputError`.
+    """
     require_writable(folder, FILES, inputs)
 
 
@@ -68,30 +75,60 @@ def save_edit(
 ) -> None:  # fmt: skip
     """Writes the folder of an edit; the picture is the photo's where there is one, else the maps'.
 
-    Raises `InputError` if the folder is not ours or cannot be written, or the photo is not the result's.
+    Raises `InputError` if the folder is not ours or cannot be written, or the photo is not the
+    result's.
     """
     image, mask, before, raster = _picture(d, edit, original)
-    pair = [Shown(before, mask, "Before"), Shown(image, mask, "After" if sheet.layers else "In the best light")]
-    layers = [Shown(edit.diffuse, d.mask, "Diffuse, after"), Shown(edit.specular, d.mask, "Specular, after")] if sheet.layers else []
+    pair = [
+        Shown(before, mask, "Before"),
+        Shown(image, mask, "After" if sheet.layers else "In the best light"),
+    ]
+    layers = (
+        [
+            Shown(edit.diffuse, d.mask, "Diffuse, after"),
+            Shown(edit.specular, d.mask, "Specular, after"),
+        ]
+        if sheet.layers
+        else []
+    )
     with new_folder(folder, FILES) as partial:
         if raster.peak is not None:
             write_png(partial / "edited.png", raster)
         write_channels(partial / "edited.exr", _linear_planes(image, mask, raster, original))
-        edit_sheet(sheet.title, sheet.subtitle, [*pair, *layers], sheet.others, columns=4 if sheet.layers else 5).save(
-            partial / "before_after.png"
-        )
+        edit_sheet(
+            sheet.title,
+            sheet.subtitle,
+            [*pair, *layers],
+            sheet.others,
+            columns=4 if sheet.layers else 5,
+        ).save(partial / "before_after.png")
         if clusters is not None:
             cluster_sheet(d, clusters).save(partial / "clusters.png")
-        text = {"schema_version": 1, **record.__dict__, "notes": list(edit.notes), "of_photo": original is not None}
-        (partial / "edit.json").write_text(json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        text = {
+            "schema_version": 1,
+            **record.__dict__,
+            "notes": list(edit.notes),
+            "of_photo": original is not None,
+        }
+        (partial / "edit.json").write_text(
+            json.dumps(text, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
 
 
-def _linear_planes(image: np.ndarray, mask: np.ndarray, raster: Raster, original: Original | None) -> dict[str, np.ndarray]:
-    """R, G, B times alpha, and A; outside the mask what the photo's own EXR file stores, which that product may round."""
+def _linear_planes(
+    image: np.ndarray, mask: np.ndarray, raster: Raster, original: Original | None
+) -> dict[str, np.ndarray]:
+    """R, G, B times alpha, and A; outside the mask what the photo's own EXR file stores, which that
+    product may round.
+    """
     alpha = raster.alpha
     cover = np.ones(mask.shape, np.float32) if alpha is None else np.where(alpha > 0, alpha, 1)
     planes = {name: image[..., c] * cover for c, name in enumerate("RGB")}
-    if original is not None and original.path is not None and original.path.suffix.lower() == ".exr":
+    if (
+        original is not None
+        and original.path is not None
+        and original.path.suffix.lower() == ".exr"
+    ):
         stored = read_channels(original.path)
         for name in planes:
             if name in stored and stored[name].shape == mask.shape:
@@ -100,26 +137,39 @@ def _linear_planes(image: np.ndarray, mask: np.ndarray, raster: Raster, original
 
 
 def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
-    """A picture of the clusters, (a Pillow image): the reflectance with all but one faded, for each of them, under its number."""
+    """A picture of the clusters, (a Pillow image): the reflectance with all but one faded, for each
+    of them, under its number.
+    """
     paint = d.reflectance * light_color(d)
     shown = [Shown(paint, d.mask, "Reflectance")]
     for number, share in enumerate(clusters.shares, 1):
         weight = clusters.weight(number)[..., None]
         grey = np.full(3, _FADED * white_of(paint, d.mask))
         values = weight * paint + (1 - weight) * grey
-        shown.append(Shown(values, d.mask, f"Cluster {number}", f"{100 * share:.0f} % of the object"))
+        shown.append(
+            Shown(values, d.mask, f"Cluster {number}", f"{100 * share:.0f} % of the object")
+        )
     return edit_sheet("Clusters", "isc edit RESULT recolour --cluster N", shown)
 
 
-def _picture(d: Decomposition, edit: Edited, original: Original | None) -> tuple[np.ndarray, np.ndarray, np.ndarray, Raster]:
+def _picture(
+    d: Decomposition, edit: Edited, original: Original | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, Raster]:
     """The edited light, its mask, the light before, and the values to be stored."""
     if original is not None:
         photo = original.photo
         image, changed = composite(d, edit, photo)
-        return image, photo.mask, photo.image, recoded(original.raster, photo.original.transfer, image, changed)
+        return (
+            image,
+            photo.mask,
+            photo.image,
+            recoded(original.raster, photo.original.transfer, image, changed),
+        )
     given = d.provenance.input
     bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
     peak = None if bits == 32 else 65535 if bits == 16 else 255
     kind = np.float32 if peak is None else np.uint16 if bits == 16 else np.uint8
-    empty = Raster(np.zeros(d.image.shape, kind), d.mask.astype(np.float32), peak, 32 if peak is None else bits)
+    empty = Raster(
+        np.zeros(d.image.shape, kind), d.mask.astype(np.float32), peak, 32 if peak is None else bits
+    )
     return edit.image, d.mask, d.image, recoded(empty, transfer, edit.image, d.mask)

@@ -1,13 +1,15 @@
 """The result of an edit: the layers of the picture as it would have been.
 
-Equation, per channel, with L = diffuse + specular the light and L' the edited one: image' = L' + residual' where the residual is not below
-0; it belongs to a highlight and goes with that, residual' = residual min(1, specular' / specular). Below 0 it is what the sensor cut off of
-L: there the picture stays cut off at the photo's value while the light is enough for it, and a stronger light lifts it as much
-(Y: luminance),
+Equation, per channel, with L = diffuse + specular the light and L' the edited one: image' = L' +
+residual' where the residual is not below 0; it belongs to a highlight and goes with that, residual'
+= residual min(1, specular' / specular). Below 0 it is what the sensor cut off of L: there the
+picture stays cut off at the photo's value while the light is enough for it, and a stronger light
+lifts it as much (Y: luminance),
 
     image' = min(L', image max(1, Y(L') / Y(L))).
 
-A pixel whose layers are unchanged keeps the photo's own value, bit by bit, which the rounded sum would not.
+A pixel whose layers are unchanged keeps the photo's own value, bit by bit, which the rounded sum
+would not.
 """
 
 from dataclasses import dataclass
@@ -23,7 +25,8 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
 
 @dataclass(frozen=True)
 class Edited:
-    """`image`, `diffuse`, `specular`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and specular >= 0.
+    """`image`, `diffuse`, `specular`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and
+    specular >= 0.
 
     `notes`: what a person should know of the edit, a sentence each.
     """
@@ -34,8 +37,16 @@ class Edited:
     notes: tuple[str, ...] = ()
 
 
-def edited(d: Decomposition, diffuse: np.ndarray | None = None, specular: np.ndarray | None = None, notes: tuple[str, ...] = ()) -> Edited:
-    """The scene with another diffuse or specular layer (H, W, 3); None keeps the present one. Negative light becomes 0."""
+def edited(
+    d: Decomposition,
+    diffuse: np.ndarray | None = None,
+    specular: np.ndarray | None = None,
+    notes: tuple[str, ...] = (),
+) -> Edited:
+    """The scene with another diffuse or specular layer (H, W, 3);
+
+    None keeps the present one. Negative light becomes 0.
+    """
     new_diffuse = d.diffuse if diffuse is None else _layer(diffuse, d.mask)
     new_specular = d.specular if specular is None else _layer(specular, d.mask)
     before, after = d.specular.sum(-1, keepdims=True), new_specular.sum(-1, keepdims=True)
@@ -43,7 +54,9 @@ def edited(d: Decomposition, diffuse: np.ndarray | None = None, specular: np.nda
     same = ((new_diffuse == d.diffuse) & (new_specular == d.specular)).all(-1, keepdims=True)
     new_light = new_diffuse + new_specular
     levels = luminance(d.diffuse + d.specular), luminance(new_light)
-    brighter = np.maximum(np.divide(levels[1], levels[0], out=np.ones_like(levels[0]), where=levels[0] > 0), 1)
+    brighter = np.maximum(
+        np.divide(levels[1], levels[0], out=np.ones_like(levels[0]), where=levels[0] > 0), 1
+    )
     cut_off = np.minimum(new_light, d.image * brighter[..., None]).astype(np.float32)
     total = np.where(d.residual < 0, cut_off, np.maximum(new_light + d.residual * kept, 0))
     return Edited(np.where(same, d.image, total), new_diffuse, new_specular, notes)
@@ -55,14 +68,20 @@ def luminance(color: np.ndarray) -> np.ndarray:
 
 
 def light_color(d: Decomposition) -> np.ndarray:
-    """(3,) the mean colour of the light on the object, of luminance 1. One photo leaves open how much of a tint is light and how much is
-    paint; `reflectance * light_color` is the paint as the photo shows it, and is what colours are chosen for."""
+    """(3,) the mean colour of the light on the object, of luminance 1. One photo leaves open how
+    much of a tint is light and how much is paint; `reflectance * light_color` is the paint as the
+    photo shows it, and is what colours are chosen for.
+    """
     mean = d.shading[d.mask].mean(0, dtype=float)
-    return np.maximum(mean, 1e-3 * mean.max()) / float(luminance(np.maximum(mean, 1e-3 * mean.max())))
+    return np.maximum(mean, 1e-3 * mean.max()) / float(
+        luminance(np.maximum(mean, 1e-3 * mean.max()))
+    )
 
 
 def white_of(layer: np.ndarray, mask: np.ndarray, percentile: float = 99.5) -> float:
-    """The layer's white: this percentile of its brightest channel over the lit pixels of the mask; 1 if none is lit."""
+    """The layer's white: this percentile of its brightest channel over the lit pixels of the mask;
+    1 if none is lit.
+    """
     bright = layer[mask].max(-1)
     lit = bright[bright > 0]
     return float(np.percentile(lit, percentile)) if lit.size else 1.0

@@ -1,10 +1,12 @@
 """New highlights: a lobe on the recovered shape, under a light of one's choice.
 
-Equation: specular' = (specular or 0) + k E/|E| f(n; l) max(0, n . l), the lobe f of `lobes.Lobe`, k by `lobes.strength_of`.
+Equation: specular' = (specular or 0) + k E/|E| f(n; l) max(0, n . l), the lobe f of `lobes.Lobe`, k
+by `lobes.strength_of`.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (rendering highlights).
 
-Limits: the shape is what shading tells, smooth where the paint is busy; so is the highlight. It is clipped where the picture is.
+Limits: the shape is what shading tells, smooth where the paint is busy; so is the highlight. It is
+clipped where the picture is.
 """
 
 from dataclasses import replace
@@ -19,10 +21,16 @@ from .lobes import Lobe, known_lobe, lobe_under, strength_of
 
 
 def add_highlight(
-    d: Decomposition, light: DirectionalLight, lobe: Lobe | None = None, *, level: float | None = None, replacing: bool = False
+    d: Decomposition,
+    light: DirectionalLight,
+    lobe: Lobe | None = None,
+    *,
+    level: float | None = None,
+    replacing: bool = False,
 ) -> Edited:
-    """The scene with a highlight of `lobe` under `light`, of which direction and colour count, on top of the present specular layer or
-    instead of it. `lobe`: None for the fitted one, or the usual one. `level`: see `lobes.strength_of`; 0 adds none.
+    """The scene with a highlight of `lobe` under `light`, of which direction and colour count, on
+    top of the present specular layer or instead of it. `lobe`: None for the fitted one, or the
+    usual one. `level`: see `lobes.strength_of`; 0 adds none.
 
     Raises `InputError` for a light without light.
     """
@@ -33,5 +41,11 @@ def add_highlight(
     rendered = lobe_under(lobe, d.normal, replace(light, irradiance=light.irradiance / power))
     new = strength_of(d, lobe, rendered, level) * rendered
     facing = bool(rendered[d.mask].max() > 1e-3 * rendered.max()) if rendered.any() else False
-    notes = () if facing else ("no part of the object mirrors this light to the viewer: there is no highlight to see",)
+    notes = (
+        ()
+        if facing
+        else (
+            "no part of the object mirrors this light to the viewer: there is no highlight to see",
+        )
+    )
     return edited(d, specular=np.where(replacing, 0, d.specular) + new, notes=notes)

@@ -1,14 +1,17 @@
 """Recolouring: another paint under the same light and the same gloss (thesis, figure 4.51).
 
-Equation, for a paint r, the reflectance times the light's mean colour, with luminance Y(r), in Oklab (L, a, b) with hue h and chroma C:
-h' = h + shift, C' = saturation C, or, for a target colour, the target's hue and the chroma C_target L / L_target, which is the target's own
-paint in more or less light; back in linear light it is scaled to Y(r') = value Y(r), so that texture and shading stay as they were. A
-colour that cannot be that bright moves toward grey at that luminance just until it can. diffuse' = ((1 - w) r + w r') shading, w being the
-region's weight; the specular layer is not touched.
+Equation, for a paint r, the reflectance times the light's mean colour, with luminance Y(r), in
+Oklab (L, a, b) with hue h and chroma C: h' = h + shift, C' = saturation C, or, for a target colour,
+the target's hue and the chroma C_target L / L_target, which is the target's own paint in more or
+less light; back in linear light it is scaled to Y(r') = value Y(r), so that texture and shading
+stay as they were. A colour that cannot be that bright moves toward grey at that luminance just
+until it can. diffuse' = ((1 - w) r + w r') shading, w being the region's weight; the specular layer
+is not touched.
 
 Citation: B. Ottosson 2020 (Oklab, see `chroma`); H. Akbar 2016 (recolouring).
 
-Limits: what the separation left of the highlights in the diffuse layer is painted too. Black and pure white paint take hardly any colour.
+Limits: what the separation left of the highlights in the diffuse layer is painted too. Black and
+pure white paint take hardly any colour.
 """
 
 from dataclasses import dataclass
@@ -24,9 +27,10 @@ from .edited import Edited, edited, light_color, luminance, white_of
 
 @dataclass(frozen=True)
 class Paint:
-    """`hue`: degrees that the hue turns. `saturation`, `value` >= 0: factors of chroma and of luminance. `target`: (3,) linear colour in
-    [0, 1] that the paint becomes first, or None. `target_luminance`: on average it becomes as bright as the target, too.
-    Raises `InputError`."""
+    """`hue`: degrees that the hue turns. `saturation`, `value` >= 0: factors of chroma and of
+    luminance. `target`: (3,) linear colour in [0, 1] that the paint becomes first, or None.
+    `target_luminance`: on average it becomes as bright as the target, too. Raises `InputError`.
+    """
 
     hue: float = 0.0
     saturation: float = 1.0
@@ -43,25 +47,37 @@ class Paint:
             if np.shape(self.target) != (3,):
                 raise InputError("a target colour has three numbers")
         if self.target_luminance and (self.target is None or not np.any(self.target)):
-            raise InputError("the brightness of a target colour is to be taken, but there is none, or it is black")
+            raise InputError(
+                "the brightness of a target colour is to be taken, but there is none, or it is black"
+            )
 
     @property
     def changes(self) -> bool:
         """Whether anything is asked for."""
-        return self.target is not None or self.hue % 360 != 0 or self.saturation != 1 or self.value != 1
+        return (
+            self.target is not None
+            or self.hue % 360 != 0
+            or self.saturation != 1
+            or self.value != 1
+        )
 
 
 def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -> Edited:
-    """The scene with other paint. `region`: (H, W) in [0, 1], where and how much; None for the whole object.
+    """The scene with other paint. `region`: (H, W) in [0, 1], where and how much; None for the
+    whole object.
 
     Raises `InputError` for a region of another size, or of nothing of the object.
     """
     if region is not None and region.shape != d.mask.shape:
-        raise InputError(f"the region is {region.shape}, the maps {d.mask.shape}: give one of their size")
+        raise InputError(
+            f"the region is {region.shape}, the maps {d.mask.shape}: give one of their size"
+        )
     weight = np.where(d.mask, 1.0 if region is None else region, 0.0)
     check_range("the region's weight", weight, 0, 1)
     if not weight.any():
-        raise InputError("the region holds nothing of the object: mark the part to be recoloured in white")
+        raise InputError(
+            "the region holds nothing of the object: mark the part to be recoloured in white"
+        )
     if not paint.changes:
         return edited(d)
     inside = weight > 0
@@ -75,10 +91,17 @@ def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -
 
 
 def repainted(old_paint: np.ndarray, paint: Paint, white: float, weight: np.ndarray) -> np.ndarray:
-    """Paints (N, 3) >= 0, linear, changed. `white`: the brightest that paint gets. `weight` (N, 1): of each in the average."""
+    """Paints (N, 3) >= 0, linear, changed.
+
+    `white`: the brightest that paint gets. `weight` (N, 1): of each in the average.
+    """
     old = luminance(old_paint)
     lab = to_oklab(old_paint)
-    lightness, chroma, hue = lab[:, 0], np.hypot(lab[:, 1], lab[:, 2]), np.arctan2(lab[:, 2], lab[:, 1])
+    lightness, chroma, hue = (
+        lab[:, 0],
+        np.hypot(lab[:, 1], lab[:, 2]),
+        np.arctan2(lab[:, 2], lab[:, 1]),
+    )
     wanted = paint.value * old
     if paint.target is not None:
         goal = to_oklab(np.maximum(paint.target, 1e-6))
@@ -89,21 +112,29 @@ def repainted(old_paint: np.ndarray, paint: Paint, white: float, weight: np.ndar
             wanted = wanted * float(luminance(paint.target)) / max(mean, 1e-9)
     hue, chroma = hue + np.deg2rad(paint.hue), chroma * paint.saturation
     color = from_oklab(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], -1))
-    return _at_luminance(np.maximum(color, 0), wanted, np.maximum(white * max(paint.value, 1.0), old_paint.max(-1)))
+    return _at_luminance(
+        np.maximum(color, 0), wanted, np.maximum(white * max(paint.value, 1.0), old_paint.max(-1))
+    )
 
 
 def _room(d: Decomposition, tint: np.ndarray) -> float:
-    """How bright paint may get: as the object's brightest, or as what the photo shows white in the object's brightest light."""
+    """How bright paint may get: as the object's brightest, or as what the photo shows white in the
+    object's brightest light.
+    """
     float_photo = d.provenance.input.get("bit_depth", 8) == 32
     white = white_of(d.image, d.mask) if float_photo else 1.0
     return max(white_of(d.reflectance * tint, d.mask), white / white_of(d.shading / tint, d.mask))
 
 
 def _at_luminance(color: np.ndarray, wanted: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Colours (N, 3) >= 0 scaled to the luminance `wanted` (N,), and mixed with the grey of it where a channel would exceed `most` (N,)."""
+    """Colours (N, 3) >= 0 scaled to the luminance `wanted` (N,), and mixed with the grey of it
+    where a channel would exceed `most` (N,).
+    """
     now = luminance(color)
     grey = np.broadcast_to(wanted[:, None], color.shape)
-    scaled = np.where(now[:, None] > 1e-12, color * (wanted / np.maximum(now, 1e-12))[:, None], grey)
+    scaled = np.where(
+        now[:, None] > 1e-12, color * (wanted / np.maximum(now, 1e-12))[:, None], grey
+    )
     excess = scaled.max(-1) - wanted
     room = np.maximum(most - wanted, 0)
     share = np.where(excess > room, room / np.maximum(excess, 1e-12), 1)[:, None]

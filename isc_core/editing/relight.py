@@ -1,20 +1,23 @@
 """Relighting: the object under the recovered light turned, or under another light.
 
-Equation: diffuse' = reflectance S'(n), S' by the new light: exp(sum_k L'_k Y_k(n)), one distant light with an ambient rest, or an
-environment's K L of `environment`. What becomes of the highlights is a choice:
-keep     they stay as they are;
-scale    each pixel's follow its own shading, specular' = specular S' / S, at most fourfold: dimmed where the light has gone, not moved;
-remove   they go;
-render   a lobe is rendered under the new light, with the strength under which it has the present layer's energy in the present light.
+Equation: diffuse' = reflectance S'(n), S' by the new light: exp(sum_k L'_k Y_k(n)), one distant
+light with an ambient rest, or an environment's K L of `environment`. What becomes of the highlights
+is a choice: keep     they stay as they are; scale    each pixel's follow its own shading, specular'
+= specular S' / S, at most fourfold: dimmed where the light has gone, not moved; remove   they go;
+render   a lobe is rendered under the new light, with the strength under which it has the present
+layer's energy in the present light.
 
-The present light that a lobe is rendered in is the distant light that best explains the specular layer, or else that of the fit, since the
-recovered one is too smooth for highlights; where neither tells, the recovered one. A light that is turned takes it along. Left to itself
-("auto") a turn fades from the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the angle that this light moves: the
-smallest turn changes least, and a highlight that has gone elsewhere is all rendered.
+The present light that a lobe is rendered in is the distant light that best explains the specular
+layer, or else that of the fit, since the recovered one is too smooth for highlights; where neither
+tells, the recovered one. A light that is turned takes it along. Left to itself ("auto") a turn
+fades from the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the angle that
+this light moves: the smallest turn changes least, and a highlight that has gone elsewhere is all
+rendered.
 
 Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317; H. Akbar 2016 (relighting).
 
-Limits: no cast shadows, old or new: those of the photo stay in the reflectance. Light from behind the object was seen by no normal.
+Limits: no cast shadows, old or new: those of the photo stay in the reflectance. Light from behind
+the object was seen by no normal.
 """
 
 from dataclasses import dataclass, replace
@@ -40,9 +43,11 @@ _FADE = 10.0  # degrees that a light moves until its highlights are new ones
 
 @dataclass(frozen=True)
 class NewLight:
-    """A light of one of three kinds, the others None. `coefficients` (9, 3): of log shading. `sun`: one distant light. `sky`: environment
-    (rows, 2 rows, 3) of linear radiance >= 0, see `environment`. `turned` (3, 3): the rotation that makes `coefficients` of the recovered
-    light, None for another light. Raises `InputError` unless there is exactly one, and sound."""
+    """A light of one of three kinds, the others None. `coefficients` (9, 3): of log shading. `sun`:
+    one distant light. `sky`: environment (rows, 2 rows, 3) of linear radiance >= 0, see
+    `environment`. `turned` (3, 3): the rotation that makes `coefficients` of the recovered light,
+    None for another light. Raises `InputError` unless there is exactly one, and sound.
+    """
 
     coefficients: np.ndarray | None = None
     sun: DirectionalLight | None = None
@@ -51,7 +56,9 @@ class NewLight:
 
     def __post_init__(self) -> None:
         if sum(part is not None for part in (self.coefficients, self.sun, self.sky)) != 1:
-            raise InputError("a new light is one of: coefficients, one distant light, an environment")
+            raise InputError(
+                "a new light is one of: coefficients, one distant light, an environment"
+            )
         if self.sky is not None:
             rows = len(self.sky)
             if np.shape(self.sky) != (rows, 2 * rows, 3) or rows < 2:
@@ -84,10 +91,12 @@ class NewLight:
 
 @dataclass(frozen=True)
 class Relighting:
-    """`highlights`: one of `HIGHLIGHTS`; "auto" renders where a lobe is known and scales otherwise. `lobe`: to render, None for the fitted
-    one. `exposure` > 0: factor of the new light. `balanced`: the new light's white is taken to be the present light's mean colour, and it
-    is made as bright, on average over the object, as the present one; for lights that are not told in the photo's units.
-    Raises `InputError`."""
+    """`highlights`: one of `HIGHLIGHTS`; "auto" renders where a lobe is known and scales otherwise.
+    `lobe`: to render, None for the fitted one. `exposure` > 0: factor of the new light. `balanced`:
+    the new light's white is taken to be the present light's mean colour, and it is made as bright,
+    on average over the object, as the present one; for lights that are not told in the photo's
+    units. Raises `InputError`.
+    """
 
     highlights: str = "auto"
     lobe: Lobe | None = None
@@ -96,13 +105,15 @@ class Relighting:
 
     def __post_init__(self) -> None:
         if self.highlights not in HIGHLIGHTS:
-            raise InputError(f'unknown choice "{self.highlights}" for the highlights: {", ".join(HIGHLIGHTS)}')
+            raise InputError(
+                f'unknown choice "{self.highlights}" for the highlights: {", ".join(HIGHLIGHTS)}'
+            )
         check_range("exposure", self.exposure, 1e-6, 1e6)
 
 
 def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None) -> Edited:
-    """The scene under `light`. The recovered light itself, at exposure 1, returns the image as it is, but for highlights that are to be
-    removed or rendered.
+    """The scene under `light`. The recovered light itself, at exposure 1, returns the image as it
+    is, but for highlights that are to be removed or rendered.
 
     Raises `InputError` for a light that leaves the object black.
     """
@@ -115,14 +126,25 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     new = light.shading(normals)
     if not luminance(new).any():
-        raise InputError("no part of the object sees the new light: bring it to the front, or give it an ambient rest")
+        raise InputError(
+            "no part of the object sees the new light: bring it to the front, or give it an ambient rest"
+        )
     old = d.shading[d.mask].astype(float)
     factor = np.full(3, choice.exposure)
     if choice.balanced:
         tint = light_color(d)
-        factor = factor * tint * float(luminance(d.reflectance[d.mask] * old).sum() / luminance(d.reflectance[d.mask] * new * tint).sum())
+        factor = (
+            factor
+            * tint
+            * float(
+                luminance(d.reflectance[d.mask] * old).sum()
+                / luminance(d.reflectance[d.mask] * new * tint).sum()
+            )
+        )
     turned = np.eye(3) if same else light.turned
-    highlights, note = _highlights(d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, turned)
+    highlights, note = _highlights(
+        d, light, choice, normals, new * factor / np.maximum(old, 1e-9), factor, turned
+    )
     diffuse = d.diffuse if untouched else d.reflectance * _spread(new * factor, d.mask)
     return edited(d, diffuse, highlights, (note,) if note else ())
 
@@ -131,32 +153,55 @@ def _highlights(
     d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray,
     turned: np.ndarray | None,
 ) -> tuple[np.ndarray, str]:  # fmt: skip
-    """The new specular layer, and what to say of it. `turned` (3, 3): how the present light became this one, None for another one."""
+    """The new specular layer, and what to say of it.
+
+    `turned` (3, 3): how the present light became this one, None for another one.
+    """
     lobe = choice.lobe or known_lobe(d)
-    how = choice.highlights if choice.highlights != "auto" else "render" if lobe is not None else "scale"
+    how = (
+        choice.highlights
+        if choice.highlights != "auto"
+        else "render"
+        if lobe is not None
+        else "scale"
+    )
     present = d.specular
     if how == "keep" or not present[d.mask].any():
         return present, ""
     if how == "remove":
         return np.zeros_like(present), ""
     if how == "scale":
-        told = "" if choice.highlights == "scale" else "no lobe is known, so the highlights follow the shading and do not move"
+        told = (
+            ""
+            if choice.highlights == "scale"
+            else "no lobe is known, so the highlights follow the shading and do not move"
+        )
         return _spread(present[d.mask] * np.minimum(ratio, _MOST), d.mask), told
     lobe = lobe or Lobe()
     lamp = None if turned is None else _lamp(d)
     if lamp is None or turned is None:
         before = luminance(NewLight(coefficients=d.illumination).lobe(lobe, normals)).sum()
         strength = luminance(present[d.mask]).sum() / max(float(before), 1e-12)
-        told = "" if light.coefficients is None else "the highlights are rendered in a smooth light, so they are broad"
+        told = (
+            ""
+            if light.coefficients is None
+            else "the highlights are rendered in a smooth light, so they are broad"
+        )
         return _spread(strength * factor * light.lobe(lobe, normals), d.mask), told
     moved = replace(lamp, direction=turned @ lamp.direction)
     before, after = (_spread(lobe_under(lobe, normals, one), d.mask) for one in (lamp, moved))
-    kept = _still(lamp.direction, moved.direction) if choice.highlights == "auto" and choice.lobe is None else 0.0
+    kept = (
+        _still(lamp.direction, moved.direction)
+        if choice.highlights == "auto" and choice.lobe is None
+        else 0.0
+    )
     return factor * (kept * present + (1 - kept) * strength_of(d, lobe, before, None) * after), ""
 
 
 def _lamp(d: Decomposition) -> DirectionalLight | None:
-    """The one light that the highlights come from, of luminance 1 across its beam, or None where nothing tells it."""
+    """The one light that the highlights come from, of luminance 1 across its beam, or None where
+    nothing tells it.
+    """
     found = explain_specular(d)
     lights = () if d.brdf is None or d.brdf.alpha is None else d.brdf.lights
     if not found.determined and not lights:
@@ -176,7 +221,9 @@ def _spread(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def _still(before: np.ndarray, after: np.ndarray) -> float:
-    """The share of the present highlights that stays when their light moves from one unit vector to another."""
+    """The share of the present highlights that stays when their light moves from one unit vector to
+    another.
+    """
     # Of the chord: exact for the smallest angles.
     angle = np.degrees(2 * np.arcsin(min(float(np.linalg.norm(after - before)) / 2, 1.0)))
     return float(np.exp(-np.square(angle / _FADE)))

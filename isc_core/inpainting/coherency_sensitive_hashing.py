@@ -1,20 +1,25 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Finds for patches of one image their nearest patches of another by hashing and coherence (Korman & Avidan 2011).
+"""Finds for patches of one image their nearest patches of another by hashing and coherence (Korman
+& Avidan 2011).
 
-Problem: for each target patch the source patch with the smallest Euclidean distance. Comparing all pairs is exact and takes minutes
-to hours; hashing alone misses many neighbours; images are coherent, so that the neighbour of a good match is often a good match.
+Problem: for each target patch the source patch with the smallest Euclidean distance. Comparing all
+pairs is exact and takes minutes to hours; hashing alone misses many neighbours; images are
+coherent, so that the neighbour of a good match is often a good match.
 
-Equation: each table hashes a patch v by the bins floor((a_j . v + b_j) / r) of its strongest Walsh-Hadamard coefficients a_j . v, with
-random offsets b_j. Candidates of a target patch are (1) source patches in its bin, (2) the matches of target patches in its bin, (3) the
-matches of its two neighbours that were visited before, moved by one pixel, and (4) source patches in the bin of those. A candidate is
-dropped as soon as the distance of its projections, a lower bound, exceeds the best distance; what survives is compared in full.
-Tables follow each other, with a new offset, another width r and the opposite scan direction each.
+Equation: each table hashes a patch v by the bins floor((a_j . v + b_j) / r) of its strongest
+Walsh-Hadamard coefficients a_j . v, with random offsets b_j. Candidates of a target patch are (1)
+source patches in its bin, (2) the matches of target patches in its bin, (3) the matches of its two
+neighbours that were visited before, moved by one pixel, and (4) source patches in the bin of those.
+A candidate is dropped as soon as the distance of its projections, a lower bound, exceeds the best
+distance; what survives is compared in full. Tables follow each other, with a new offset, another
+width r and the opposite scan direction each.
 
-Citation: S. Korman and S. Avidan, "Coherency sensitive hashing", ICCV 2011, 1607-1614, doi:10.1109/ICCV.2011.6126421; IEEE TPAMI
-38(6), 1099-1112 (2016), doi:10.1109/TPAMI.2015.2477814. Ours: widths from the data, and distances that are exact in the end.
+Citation: S. Korman and S. Avidan, "Coherency sensitive hashing", ICCV 2011, 1607-1614,
+doi:10.1109/ICCV.2011.6126421; IEEE TPAMI 38(6), 1099-1112 (2016), doi:10.1109/TPAMI.2015.2477814.
+Ours: widths from the data, and distances that are exact in the end.
 
-Limits: approximate; patches are 8 x 8 pixels, neither turned nor scaled. A patch without a likeness gets some source patch, with a
-large distance.
+Limits: approximate; patches are 8 x 8 pixels, neither turned nor scaled. A patch without a likeness
+gets some source patch, with a large distance.
 """
 
 from dataclasses import dataclass
@@ -33,12 +38,12 @@ from .walsh_hadamard import PATCH, opponent, project, strongest
 @dataclass(frozen=True)
 class CshOptions:
     """`tables`: how many hash tables are tried one after the other, >= 1; more find better matches.
-    `projections`: Walsh-Hadamard coefficients kept of each patch, 1 to 64 C (8 pixels squared, C channels).
-    `hashed`: how many of them, the strongest, a hash looks at, 1 to `projections`.
-    `candidates`: how many patches of one bin are tried, >= 1.
-    `occupancy`: how many source patches share a patch's bin where bins are narrowest, in the median; > 0.
-    `seed`: of the random offsets, >= 0; the same seed gives the same matches.
-    `threads`: how many work at a time, >= 1; the matches do not depend on it.
+    `projections`: Walsh-Hadamard coefficients kept of each patch, 1 to 64 C (8 pixels squared, C
+    channels). `hashed`: how many of them, the strongest, a hash looks at, 1 to `projections`.
+    `candidates`: how many patches of one bin are tried, >= 1. `occupancy`: how many source patches
+    share a patch's bin where bins are narrowest, in the median; > 0. `seed`: of the random offsets,
+    >= 0; the same seed gives the same matches. `threads`: how many work at a time, >= 1; the
+    matches do not depend on it.
     """
 
     tables: int = 8
@@ -54,7 +59,8 @@ class CshOptions:
 class Patches:
     """Patches of one image, by their upper left corners in raster order.
 
-    `image` (H, W, C) contiguous float32; `rows`, `columns` (n,) intp; `index` (H, W) int32, a corner's place in the list, else -1.
+    `image` (H, W, C) contiguous float32; `rows`, `columns` (n,) intp; `index` (H, W) int32, a
+    corner's place in the list, else -1.
     """
 
     image: np.ndarray
@@ -68,8 +74,9 @@ class Patches:
 
 @dataclass(frozen=True)
 class Matches:
-    """For target patch i, `source[i]` (n,) int32 is its place in the list of source patches, `distance[i]` (n,) float32 the sum of
-    squared differences of all values of the two patches."""
+    """For target patch i, `source[i]` (n,) int32 is its place in the list of source patches,
+    `distance[i]` (n,) float32 the sum of squared differences of all values of the two patches.
+    """
 
     source: np.ndarray
     distance: np.ndarray
@@ -81,7 +88,9 @@ def patches_within(image: np.ndarray, usable: np.ndarray) -> Patches:
 
 
 def patches_touching(image: np.ndarray, wanted: np.ndarray) -> Patches:
-    """The patches of `image` (H, W, C), wholly in the frame, that have a pixel in `wanted` (H, W) bool; possibly none."""
+    """The patches of `image` (H, W, C), wholly in the frame, that have a pixel in `wanted` (H, W)
+    bool; possibly none.
+    """
     return _listed(image, _windows(wanted) > 0)
 
 
@@ -93,33 +102,55 @@ def _listed(image: np.ndarray, corners: np.ndarray) -> Patches:
 
 
 def _windows(flags: np.ndarray) -> np.ndarray:
-    """How many of each patch's pixels are set, by corner: (H - 7, W - 7); empty where the image is smaller than a patch."""
+    """How many of each patch's pixels are set, by corner:
+
+    (H - 7, W - 7); empty where the image is smaller than a patch.
+    """
     if min(flags.shape) < PATCH:
         return np.zeros((0, 0), np.int32)
-    sums = np.pad(np.cumsum(np.cumsum(flags, axis=0, dtype=np.int32), axis=1, dtype=np.int32), ((1, 0), (1, 0)))
-    return sums[PATCH:, PATCH:] - sums[:-PATCH, PATCH:] - sums[PATCH:, :-PATCH] + sums[:-PATCH, :-PATCH]
+    sums = np.pad(
+        np.cumsum(np.cumsum(flags, axis=0, dtype=np.int32), axis=1, dtype=np.int32),
+        ((1, 0), (1, 0)),
+    )
+    return (
+        sums[PATCH:, PATCH:]
+        - sums[:-PATCH, PATCH:]
+        - sums[PATCH:, :-PATCH]
+        + sums[:-PATCH, :-PATCH]
+    )
 
 
 class CshSearch:
-    """Matches between target patches and a fixed set of source patches: the sources' projections are computed once."""
+    """Matches between target patches and a fixed set of source patches: the sources' projections
+    are computed once.
+    """
 
     def __init__(self, source: Patches, options: CshOptions | None = None) -> None:
         """Raises `InputError` where there is no source patch, and for options out of range."""
         self.options = options or CshOptions()
         _check(self.options, source)
         self.source = source
-        self._chosen = strongest(source.image, source.rows, source.columns, self.options.projections)
-        self._projected = project(source.image, source.rows, source.columns, self._chosen, self.options.threads)
+        self._chosen = strongest(
+            source.image, source.rows, source.columns, self.options.projections
+        )
+        self._projected = project(
+            source.image, source.rows, source.columns, self._chosen, self.options.threads
+        )
         self._width = _bin_width(self._projected, self.options)
 
-    def match(self, target: Patches, start: np.ndarray | None = None, monitor: Monitor | None = None) -> Matches:
-        """The nearest source patch of each patch of `target`, whose image has as many channels as the sources'.
+    def match(
+        self, target: Patches, start: np.ndarray | None = None, monitor: Monitor | None = None
+    ) -> Matches:
+        """The nearest source patch of each patch of `target`, whose image has as many channels as
+        the sources'.
 
-        `start` (n,) int: matches to begin with, places in the list of sources; else random ones. None gets worse than its start.
-        `monitor` hears of each table. Raises `Cancelled`.
+        `start` (n,) int: matches to begin with, places in the list of sources; else random ones.
+        None gets worse than its start. `monitor` hears of each table. Raises `Cancelled`.
         """
         rng = np.random.default_rng(self.options.seed)
-        projected = project(target.image, target.rows, target.columns, self._chosen, self.options.threads)
+        projected = project(
+            target.image, target.rows, target.columns, self._chosen, self.options.threads
+        )
         best = rng.integers(len(self.source), size=len(target)) if start is None else start
         matches = Matches(best.astype(np.int32), np.full(len(target), np.inf, np.float32))
         for table in range(self.options.tables):
@@ -128,26 +159,55 @@ class CshSearch:
             self._try_table(target, projected, matches, table, rng)
         return matches
 
-    def _try_table(self, target: Patches, projected: np.ndarray, matches: Matches, table: int, rng: np.random.Generator) -> None:
+    def _try_table(
+        self,
+        target: Patches,
+        projected: np.ndarray,
+        matches: Matches,
+        table: int,
+        rng: np.random.Generator,
+    ) -> None:
         """Improves `matches` in place by the candidates of one hash table."""
         width = self._width * np.float32(_WIDTHS[table % len(_WIDTHS)])
         offset = rng.random(self.options.hashed, np.float32) * width
         factors = rng.integers(1 << 40, size=self.options.hashed)
         bits = len(self.source).bit_length()
         hashed = [
-            _Hashed(patches.image, patches.rows, patches.columns, patches.index, values, *_buckets(values, width, offset, factors, bits))
+            _Hashed(
+                patches.image,
+                patches.rows,
+                patches.columns,
+                patches.index,
+                values,
+                *_buckets(values, width, offset, factors, bits),
+            )
             for patches, values in ((self.source, self._projected), (target, projected))
         ]
         salt, forward = int(rng.integers(1 << 30)), table % 2 == 0
-        common = (hashed[0], hashed[1], matches.source, matches.distance, matches.source.copy(), self.options.candidates, salt, forward)
+        common = (
+            hashed[0],
+            hashed[1],
+            matches.source,
+            matches.distance,
+            matches.source.copy(),
+            self.options.candidates,
+            salt,
+            forward,
+        )
         ends = np.linspace(0, len(target), _PARTS + 1).astype(int)
         with Workers(self.options.threads) as workers:
-            workers.run([partial(_sweep, *common, int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)])
+            workers.run(
+                [
+                    partial(_sweep, *common, int(a), int(b))
+                    for a, b in zip(ends[:-1], ends[1:], strict=True)
+                ]
+            )
 
 
 class _Hashed(NamedTuple):
-    """One image's patches (see `Patches`; `places` is its `index`) with their projections (n, k) and one hash table: `bins` (n,), and
-    the members of bin h, `members[starts[h]:starts[h + 1]]`."""
+    """One image's patches (see `Patches`; `places` is its `index`) with their projections (n, k)
+    and one hash table: `bins` (n,), and the members of bin h, `members[starts[h]:starts[h + 1]]`.
+    """
 
     image: np.ndarray
     rows: np.ndarray
@@ -167,29 +227,51 @@ _WIDTHS = (8.0, 4.0, 2.0, 16.0, 1.0)
 
 def _check(options: CshOptions, source: Patches) -> None:
     if not len(source):
-        raise InputError(f"there is no source patch: {PATCH} x {PATCH} pixels without a gap are needed")
+        raise InputError(
+            f"there is no source patch: {PATCH} x {PATCH} pixels without a gap are needed"
+        )
     most = PATCH * PATCH * source.image.shape[2]
     if not 1 <= options.hashed <= options.projections <= most:
-        raise InputError(f"hashed and projections must satisfy 1 <= hashed <= projections <= {most}")
-    if min(options.tables, options.candidates, options.threads) < 1 or not options.occupancy > 0 or options.seed < 0:
-        raise InputError("tables, candidates and threads must be at least 1, occupancy above 0, seed at least 0")
+        raise InputError(
+            f"hashed and projections must satisfy 1 <= hashed <= projections <= {most}"
+        )
+    if (
+        min(options.tables, options.candidates, options.threads) < 1
+        or not options.occupancy > 0
+        or options.seed < 0
+    ):
+        raise InputError(
+            "tables, candidates and threads must be at least 1, occupancy above 0, seed at least 0"
+        )
 
 
 def _bin_width(values: np.ndarray, options: CshOptions) -> np.float32:
-    """The width at which the median patch, with projections `values` (n, k), shares its bin with `occupancy` patches, to about a tenth."""
+    """The width at which the median patch, with projections `values` (n, k), shares its bin with
+    `occupancy` patches, to about a tenth.
+    """
     spread = max(float(np.ptp(values, axis=0).max()), 1e-30)
     low, high = float(np.log(1e-4 * spread)), float(np.log(2 * spread))
     factors = np.random.default_rng(options.seed).integers(1 << 40, size=options.hashed)
     offset = np.zeros(options.hashed, np.float32)
     while high - low > 0.2:
         middle = (low + high) / 2
-        bins, starts, _ = _buckets(values, np.float32(np.exp(middle)), offset, factors, len(values).bit_length())
-        low, high = (low, middle) if np.median(np.diff(starts)[bins]) > options.occupancy else (middle, high)
+        bins, starts, _ = _buckets(
+            values, np.float32(np.exp(middle)), offset, factors, len(values).bit_length()
+        )
+        low, high = (
+            (low, middle)
+            if np.median(np.diff(starts)[bins]) > options.occupancy
+            else (middle, high)
+        )
     return np.float32(np.exp(low))
 
 
-def _buckets(values: np.ndarray, width: np.float32, offset: np.ndarray, factors: np.ndarray, bits: int) -> tuple[np.ndarray, ...]:
-    """The table of patches with projections `values` (n, >= hashed): bins below 2^bits (n,), starts (2^bits + 1,), members (n,)."""
+def _buckets(
+    values: np.ndarray, width: np.float32, offset: np.ndarray, factors: np.ndarray, bits: int
+) -> tuple[np.ndarray, ...]:
+    """The table of patches with projections `values` (n, >= hashed): bins below 2^bits (n,), starts
+    (2^bits + 1,), members (n,).
+    """
     bins, members = np.empty(len(values), np.int32), np.empty(len(values), np.int32)
     starts = np.zeros((1 << bits) + 1, np.int32)
     _hash(values, width, offset, factors, bits, bins)
@@ -199,18 +281,25 @@ def _buckets(values: np.ndarray, width: np.float32, offset: np.ndarray, factors:
 
 @compiled
 def _hash(values, width, offset, factors, bits, bins):
-    """bins[i]: some `bits` of sum_j factor_j floor((v_ij + b_j) / r), bits that all of the factors' 40 bits mix in; nothing overflows."""
+    """bins[i]: some `bits` of sum_j factor_j floor((v_ij + b_j) / r), bits that all of the factors'
+    40 bits mix in; nothing overflows.
+    """
     inverse = np.float32(1) / width
     for i in range(values.shape[0]):
         key = np.int64(0)
         for j in range(offset.shape[0]):
-            key = (key + np.int64(np.floor((values[i, j] + offset[j]) * inverse)) * factors[j]) & ((1 << 60) - 1)
+            key = (key + np.int64(np.floor((values[i, j] + offset[j]) * inverse)) * factors[j]) & (
+                (1 << 60) - 1
+            )
         bins[i] = (key >> 16) & ((1 << bits) - 1)
 
 
 @compiled
 def _sort_into(bins, starts, members):
-    """Counting sort: the patches of bin h become members[starts[h]:starts[h + 1]], in rising order. `starts` begins as zeros."""
+    """Counting sort: the patches of bin h become members[starts[h]:starts[h + 1]], in rising order.
+
+    `starts` begins as zeros.
+    """
     for i in range(bins.shape[0]):
         starts[bins[i] + 1] += 1
     for h in range(starts.shape[0] - 1):
@@ -223,7 +312,10 @@ def _sort_into(bins, starts, members):
 
 @compiled
 def _sweep(source, target, match, distance, before, candidates, salt, forward, low, high):
-    """One pass over the target patches [low, high). Of others it reads `before`, the matches at its start: other threads change theirs."""
+    """One pass over the target patches [low, high).
+
+    Of others it reads `before`, the matches at its start: other threads change theirs.
+    """
     step = 1 if forward else -1
     tried = np.empty(4 * candidates + 4, np.int32)
     image_s, image_t = source.image, target.image
@@ -236,13 +328,27 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
             filled = 1
         for axis in range(2):
             other = found
-            found = _beside(source, target, match, before, low, high, i, step * (1 - axis), step * axis)
+            found = _beside(
+                source, target, match, before, low, high, i, step * (1 - axis), step * axis
+            )
             if found >= 0 and found != other:
                 tried[filled] = found
-                filled = _draw(source.starts, source.members, source.bins[found], candidates, i + salt, tried, filled + 1)
-        filled = _draw(source.starts, source.members, target.bins[i], candidates, i + salt, tried, filled)
+                filled = _draw(
+                    source.starts,
+                    source.members,
+                    source.bins[found],
+                    candidates,
+                    i + salt,
+                    tried,
+                    filled + 1,
+                )
+        filled = _draw(
+            source.starts, source.members, target.bins[i], candidates, i + salt, tried, filled
+        )
         alike = filled
-        filled = _draw(target.starts, target.members, target.bins[i], candidates, i + salt, tried, filled)
+        filled = _draw(
+            target.starts, target.members, target.bins[i], candidates, i + salt, tried, filled
+        )
         for k in range(alike, filled):
             tried[k] = before[tried[k]]
         for k in range(filled):
@@ -250,7 +356,12 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
                 continue
             bound = _projected_distance(projected_s, tried[k], projected_t, i, distance[i])
             if bound < distance[i]:
-                row_s, column_s, row_t, column_t = source.rows[tried[k]], source.columns[tried[k]], target.rows[i], target.columns[i]
+                row_s, column_s, row_t, column_t = (
+                    source.rows[tried[k]],
+                    source.columns[tried[k]],
+                    target.rows[i],
+                    target.columns[i],
+                )
                 total = _distance(image_s, row_s, column_s, image_t, row_t, column_t, distance[i])
                 if total < distance[i]:
                     distance[i], match[i] = total, tried[k]
@@ -258,7 +369,9 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
 
 @compiled
 def _beside(source, target, match, before, low, high, i, down, right):
-    """The source patch that continues the match of target patch i's neighbour, (down, right) before it; -1 where there is none."""
+    """The source patch that continues the match of target patch i's neighbour, (down, right) before
+    it; -1 where there is none.
+    """
     row, column = target.rows[i] - down, target.columns[i] - right
     if row < 0 or column < 0 or row >= target.places.shape[0] or column >= target.places.shape[1]:
         return -1
@@ -274,7 +387,9 @@ def _beside(source, target, match, before, low, high, i, down, right):
 
 @compiled
 def _draw(starts, members, bin_, most, turn, drawn, filled):
-    """Appends up to `most` members of a bin to `drawn`, from a place in it that varies with `turn`; returns the new count."""
+    """Appends up to `most` members of a bin to `drawn`, from a place in it that varies with `turn`;
+    returns the new count.
+    """
     first, size = starts[bin_], starts[bin_ + 1] - starts[bin_]
     for k in range(min(size, most)):
         drawn[filled] = members[first + (turn + k) % size]
@@ -284,7 +399,9 @@ def _draw(starts, members, bin_, most, turn, drawn, filled):
 
 @compiled
 def _projected_distance(source, candidate, target, i, enough):
-    """Squared distance of the projections of two patches, rows of `source` and `target`, or some value above `enough`."""
+    """Squared distance of the projections of two patches, rows of `source` and `target`, or some
+    value above `enough`.
+    """
     total = np.float32(0)
     for first in range(0, source.shape[1], 8):
         for k in range(first, min(first + 8, source.shape[1])):

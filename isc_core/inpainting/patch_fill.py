@@ -1,18 +1,22 @@
-"""Fills a hole with texture from the rest of the image, coarse to fine (Wexler, Shechtman & Irani 2007).
+"""Fills a hole with texture from the rest of the image, coarse to fine (Wexler, Shechtman & Irani
+2007).
 
-Problem: pixels whose values are missing, in an image with texture: every patch that touches the hole should look like some patch
-outside it.
+Problem: pixels whose values are missing, in an image with texture: every patch that touches the
+hole should look like some patch outside it.
 
-Equation: alternate until settled: each patch p that touches the hole finds its nearest source patch (`coherency_sensitive_hashing`), at
-squared distance d_p; each missing pixel becomes the mean of what the matches say of it, with weights g^-e_p exp(-d_p / (2 s)):
-s is the upper quartile of the distances, e_p how deep the patch's centre lies in the hole, g = 1.3 (`voting`). A
-pyramid starts this where the hole is small; its top is filled smoothly (`pull_push`), and each level starts from the one above.
+Equation: alternate until settled: each patch p that touches the hole finds its nearest source patch
+(`coherency_sensitive_hashing`), at squared distance d_p; each missing pixel becomes the mean of
+what the matches say of it, with weights g^-e_p exp(-d_p / (2 s)): s is the upper quartile of the
+distances, e_p how deep the patch's centre lies in the hole, g = 1.3 (`voting`). A pyramid starts
+this where the hole is small; its top is filled smoothly (`pull_push`), and each level starts from
+the one above.
 
-Citation: Y. Wexler, E. Shechtman and M. Irani, "Space-time completion of video", IEEE TPAMI 29(3), 463-476 (2007),
-doi:10.1109/TPAMI.2007.60.
+Citation: Y. Wexler, E. Shechtman and M. Irani, "Space-time completion of video", IEEE TPAMI 29(3),
+463-476 (2007), doi:10.1109/TPAMI.2007.60.
 
-Limits: it invents what is plausible, not what was there. Patches of 8 x 8 pixels are copied without change of brightness, so that a
-shading that occurs nowhere else is not continued. Where no source patch exists, the fill is smooth.
+Limits: it invents what is plausible, not what was there. Patches of 8 x 8 pixels are copied without
+change of brightness, so that a shading that occurs nowhere else is not continued. Where no source
+patch exists, the fill is smooth.
 """
 
 from dataclasses import dataclass, field
@@ -22,7 +26,13 @@ from scipy import ndimage
 
 from ..errors import InputError
 from ..progress import Monitor
-from .coherency_sensitive_hashing import CshOptions, CshSearch, Patches, patches_touching, patches_within
+from .coherency_sensitive_hashing import (
+    CshOptions,
+    CshSearch,
+    Patches,
+    patches_touching,
+    patches_within,
+)
 from .pull_push import fill, pull, push
 from .voting import vote
 from .walsh_hadamard import PATCH
@@ -44,24 +54,37 @@ class PatchFillOptions:
 
 
 def fill_patches(
-    image: np.ndarray, known: np.ndarray, wanted: np.ndarray, options: PatchFillOptions | None = None, monitor: Monitor | None = None
+    image: np.ndarray,
+    known: np.ndarray,
+    wanted: np.ndarray,
+    options: PatchFillOptions | None = None,
+    monitor: Monitor | None = None,
 ) -> np.ndarray:
-    """`image` (H, W, C) with the pixels of `wanted` (H, W) bool filled from those of `known` (H, W) bool: (H, W, C) float32.
+    """`image` (H, W, C) with the pixels of `wanted` (H, W) bool filled from those of `known` (H, W)
+    bool: (H, W, C) float32.
 
-    Known pixels stay; those that are neither known nor wanted (their values are never read) hold some guess. Reports its progress to
-    `monitor`. Raises `InputError` where nothing is known, a pixel is both, or options are out of range.
+    Known pixels stay; those that are neither known nor wanted (their values are never read) hold
+    some guess. Reports its progress to `monitor`. Raises `InputError` where nothing is known, a
+    pixel is both, or options are out of range.
     """
     options = options or PatchFillOptions()
     if not 1 <= options.iterations <= options.most_iterations:
         raise InputError("iterations must be at least 1, most_iterations no less")
     if not known.any() or (known & wanted).any():
-        raise InputError("a hole needs known pixels around it, and no pixel can be both known and missing: check the mask")
+        raise InputError(
+            "a hole needs known pixels around it, and no pixel can be both known and missing: check the mask"
+        )
     values = np.where(known[..., None], image, 0).astype(np.float32)
     return _filled(values, known, wanted, options, 0, monitor or Monitor())
 
 
 def _filled(
-    values: np.ndarray, known: np.ndarray, wanted: np.ndarray, options: PatchFillOptions, level: int, monitor: Monitor
+    values: np.ndarray,
+    known: np.ndarray,
+    wanted: np.ndarray,
+    options: PatchFillOptions,
+    level: int,
+    monitor: Monitor,
 ) -> np.ndarray:
     """One level of the pyramid, 0 the finest, after those above it."""
     if not wanted.any() or min(known.shape) < 2 * PATCH:
@@ -88,11 +111,15 @@ def _filled(
 
 
 def _any_of_four(flags: np.ndarray) -> np.ndarray:
-    """Which 2 x 2 blocks of `flags` (H, W) bool have a pixel set; an odd last row or column stands alone."""
+    """Which 2 x 2 blocks of `flags` (H, W) bool have a pixel set; an odd last row or column stands
+    alone.
+    """
     padded = np.pad(flags, [(0, n % 2) for n in flags.shape])
     return padded[::2, ::2] | padded[1::2, ::2] | padded[::2, 1::2] | padded[1::2, 1::2]
 
 
 def _deepness(target: Patches, depth: np.ndarray) -> np.ndarray:
-    """What votes of `target` patches lose (see `voting`): their centres' `depth` (H, W) in the hole, in pixels, times log g."""
+    """What votes of `target` patches lose (see `voting`): their centres' `depth` (H, W) in the
+    hole, in pixels, times log g.
+    """
     return np.log(_DEPTH_LOSS) * depth[target.rows + PATCH // 2, target.columns + PATCH // 2]

@@ -1,9 +1,12 @@
-"""Fills an image's unknown pixels smoothly from its known ones (the pull-push interpolation of Gortler et al. 1996).
+"""Fills an image's unknown pixels smoothly from its known ones (the pull-push interpolation of
+Gortler et al. 1996).
 
-Problem: values known at some pixels, everywhere wanted. Equation: known pixels are averaged over 2 x 2 blocks down a pyramid (pull); from
-the top, holes take the bilinear interpolation of the finest level that knows anything (push). It is linear in the pixels.
+Problem: values known at some pixels, everywhere wanted. Equation: known pixels are averaged over 2
+x 2 blocks down a pyramid (pull); from the top, holes take the bilinear interpolation of the finest
+level that knows anything (push). It is linear in the pixels.
 
-Citation: S. J. Gortler, R. Grzeszczuk, R. Szeliski and M. F. Cohen, "The Lumigraph", SIGGRAPH 1996, 43-54, doi:10.1145/237170.237200.
+Citation: S. J. Gortler, R. Grzeszczuk, R. Szeliski and M. F. Cohen, "The Lumigraph", SIGGRAPH 1996,
+43-54, doi:10.1145/237170.237200.
 
 Limits: texture does not continue into a hole; the fill is smooth.
 """
@@ -12,8 +15,12 @@ import numpy as np
 
 
 def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """`values` (H, W, C) with all pixels that are not `known` (H, W) bool interpolated, as float32; at least one must be known."""
-    return _pull_push(np.where(known[..., None], values, 0).astype(np.float32), known.astype(np.float32))
+    """`values` (H, W, C) with all pixels that are not `known` (H, W) bool interpolated, as float32;
+    at least one must be known.
+    """
+    return _pull_push(
+        np.where(known[..., None], values, 0).astype(np.float32), known.astype(np.float32)
+    )
 
 
 def _pull_push(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
@@ -37,12 +44,16 @@ def _sum_of_blocks(values: np.ndarray) -> np.ndarray:
 
 
 def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """`values` (H, W, C) where `known` (H, W) bool; elsewhere `coarse`, half as wide and high, doubled bilinearly.
+    """`values` (H, W, C) where `known` (H, W) bool; elsewhere `coarse`, half as wide and high,
+    doubled bilinearly.
 
-    Pixel centres are aligned: each fine pixel is 3/4 of its block's value and 1/4 of the next one's, along both axes.
+    Pixel centres are aligned: each fine pixel is 3/4 of its block's value and 1/4 of the next
+    one's, along both axes.
     """
     at = np.nonzero(~known)
-    (row, next_row), (column, next_column) = (_blocks_beside(place, size) for place, size in zip(at, coarse.shape, strict=False))
+    (row, next_row), (column, next_column) = (
+        _blocks_beside(place, size) for place, size in zip(at, coarse.shape, strict=False)
+    )
     here = 0.75 * coarse[row, column] + 0.25 * coarse[row, next_column]
     there = 0.75 * coarse[next_row, column] + 0.25 * coarse[next_row, next_column]
     filled = values.copy()
@@ -51,6 +62,8 @@ def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarra
 
 
 def _blocks_beside(place: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
-    """The block, one of `size`, that a fine pixel lies in, and the one that it lies nearest to beside that."""
+    """The block, one of `size`, that a fine pixel lies in, and the one that it lies nearest to
+    beside that.
+    """
     near = place // 2
     return near, np.clip(near - 1 + place % 2 * 2, 0, size - 1)

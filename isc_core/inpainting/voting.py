@@ -1,9 +1,9 @@
 # mypy: disable-error-code="no-untyped-def"
 """What matched patches say about the pixels under them: the weighted mean of their votes.
 
-Equation: a pixel under the target patches p becomes sum_p w_p v_p / sum_p w_p, v_p the value at its place in p's match and
-w_p = exp(-d_p / (2 s) - l_p): d_p is the squared distance of p to its match, s the upper quartile of all d, l_p a loss that the caller
-may add. Citation: see `patch_fill`.
+Equation: a pixel under the target patches p becomes sum_p w_p v_p / sum_p w_p, v_p the value at its
+place in p's match and w_p = exp(-d_p / (2 s) - l_p): d_p is the squared distance of p to its match,
+s the upper quartile of all d, l_p a loss that the caller may add. Citation: see `patch_fill`.
 """
 
 import numpy as np
@@ -11,32 +11,52 @@ import numpy as np
 from ..compiled import compiled
 from .coherency_sensitive_hashing import Matches, Patches
 
-# Weights below exp(-60) are as good as none, but must not vanish: where all patches match badly they still decide.
+# Weights below exp(-60) are as good as none, but must not vanish: where all patches match badly
+# they still decide.
 _LEAST = -60.0
 
 
 def vote(
-    values: np.ndarray, target: Patches, source: Patches, matches: Matches, loss: np.ndarray | float = 0.0
+    values: np.ndarray,
+    target: Patches,
+    source: Patches,
+    matches: Matches,
+    loss: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Means (H, W, C) float64 of what `values` (h, w, C), on the sources' grid, hold at the places that match, and which pixels (H, W)
-    bool have any vote; the others are 0. `loss`: l_p >= 0, (n,) or one number."""
+    """Means (H, W, C) float64 of what `values` (h, w, C), on the sources' grid, hold at the places
+    that match, and which pixels (H, W) bool have any vote; the others are 0. `loss`: l_p >= 0, (n,)
+    or one number.
+    """
     height, width = target.index.shape
     scale = 2 * max(float(np.quantile(matches.distance, 0.75)), 1e-12) if len(target) else 1.0
     weight = np.exp(np.maximum(-matches.distance.astype(np.float64) / scale - loss, _LEAST))
     total = np.zeros((height, width, values.shape[2] + 1))
-    _add_votes(values, target.rows, target.columns, source.rows, source.columns, matches.source, weight, total)
+    _add_votes(
+        values,
+        target.rows,
+        target.columns,
+        source.rows,
+        source.columns,
+        matches.source,
+        weight,
+        total,
+    )
     voted = total[..., -1] > 0
     return total[..., :-1] / np.where(voted, total[..., -1], 1)[..., None], voted
 
 
 @compiled
 def _add_votes(image, rows, columns, source_rows, source_columns, matches, weight, total):
-    """total[..., :C] += weight times the matched patch, total[..., C] += weight, over every target patch's pixels."""
+    """total[..., :C] += weight times the matched patch, total[..., C] += weight, over every target
+    patch's pixels.
+    """
     channels = image.shape[2]
     for i in range(rows.shape[0]):
         row, column = source_rows[matches[i]], source_columns[matches[i]]
         for a in range(8):
             for b in range(8):
                 for c in range(channels):
-                    total[rows[i] + a, columns[i] + b, c] += weight[i] * image[row + a, column + b, c]
+                    total[rows[i] + a, columns[i] + b, c] += (
+                        weight[i] * image[row + a, column + b, c]
+                    )
                 total[rows[i] + a, columns[i] + b, channels] += weight[i]

@@ -1,16 +1,19 @@
 # mypy: disable-error-code="no-untyped-def"
 """Projects image patches on the Walsh-Hadamard basis: few numbers that hold nearly all of a patch.
 
-Problem: comparing two patches of 8 x 8 pixels costs 64 products a channel. Natural images put most of a patch's energy into a few
-coefficients of an orthonormal basis, and any subset of them gives a lower bound of the distance: with r_a the length of what the
-subset leaves of a, sum over the subset of (a_k - b_k)^2 + (r_a - r_b)^2 <= |a - b|^2.
+Problem: comparing two patches of 8 x 8 pixels costs 64 products a channel. Natural images put most
+of a patch's energy into a few coefficients of an orthonormal basis, and any subset of them gives a
+lower bound of the distance: with r_a the length of what the subset leaves of a, sum over the subset
+of (a_k - b_k)^2 + (r_a - r_b)^2 <= |a - b|^2.
 
-Equation: P = H X H^T / 8 for a channel's patch X, H the Hadamard matrix (entries +1 and -1): additions alone, 48 of them along
-each axis by the fast transform. Colour channels are mixed beforehand by an orthonormal matrix with rows grey, red-green, yellow-blue,
-so that brightness, which carries most of the energy, is one channel.
+Equation: P = H X H^T / 8 for a channel's patch X, H the Hadamard matrix (entries +1 and -1):
+additions alone, 48 of them along each axis by the fast transform. Colour channels are mixed
+beforehand by an orthonormal matrix with rows grey, red-green, yellow-blue, so that brightness,
+which carries most of the energy, is one channel.
 
-Citation: Y. Hel-Or and H. Hel-Or, "Real-time pattern matching using projection kernels", IEEE TPAMI 27(9), 1430-1445 (2005),
-doi:10.1109/TPAMI.2005.184. Which coefficients are kept is decided by their energy in the image itself, not by a fixed order.
+Citation: Y. Hel-Or and H. Hel-Or, "Real-time pattern matching using projection kernels", IEEE TPAMI
+27(9), 1430-1445 (2005), doi:10.1109/TPAMI.2005.184. Which coefficients are kept is decided by their
+energy in the image itself, not by a fixed order.
 
 Limits: patches are 8 x 8 pixels, a fixed size.
 """
@@ -30,15 +33,19 @@ _SAMPLE = 4096
 
 
 def opponent(image: np.ndarray) -> np.ndarray:
-    """`image` (H, W, C) as contiguous float32, three channels turned to grey, red-green and yellow-blue; distances stay the same."""
+    """`image` (H, W, C) as contiguous float32, three channels turned to grey, red-green and
+    yellow-blue; distances stay the same.
+    """
     turned = image @ _OPPONENT.T if image.shape[2] == 3 else image
     return np.ascontiguousarray(turned, np.float32)
 
 
 def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: int) -> np.ndarray:
-    """The `count` coefficients (as indices below 64 C) with the largest variance over the patches whose corners are given.
+    """The `count` coefficients (as indices below 64 C) with the largest variance over the patches
+    whose corners are given.
 
-    `image` (H, W, C) float32; `rows`, `columns` (n,) of the patches' upper left corners. The strongest comes first.
+    `image` (H, W, C) float32; `rows`, `columns` (n,) of the patches' upper left corners. The
+    strongest comes first.
     """
     step = max(1, len(rows) // _SAMPLE)
     everything = np.arange(_CELLS * image.shape[2])
@@ -46,13 +53,22 @@ def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: i
     return np.argsort(-variance, kind="stable")[:count]
 
 
-def project(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, chosen: np.ndarray, threads: int = 1) -> np.ndarray:
-    """The coefficients `chosen` (k,) of the patches at `rows`, `columns` (n,), of an orthonormal basis, and in a last column the length
-    of the rest: (n, k + 1) float32. The squared distance of two rows never exceeds that of their patches. Fast in raster order."""
+def project(
+    image: np.ndarray, rows: np.ndarray, columns: np.ndarray, chosen: np.ndarray, threads: int = 1
+) -> np.ndarray:
+    """The coefficients `chosen` (k,) of the patches at `rows`, `columns` (n,), of an orthonormal
+    basis, and in a last column the length of the rest: (n, k + 1) float32. The squared distance of
+    two rows never exceeds that of their patches. Fast in raster order.
+    """
     out = np.empty((len(rows), len(chosen) + 1), np.float32)
     ends = np.linspace(0, len(rows), 4 * threads + 1).astype(int)
     with Workers(threads) as workers:
-        workers.run([partial(_project, image, rows[a:b], columns[a:b], chosen, out[a:b]) for a, b in zip(ends[:-1], ends[1:], strict=True)])
+        workers.run(
+            [
+                partial(_project, image, rows[a:b], columns[a:b], chosen, out[a:b])
+                for a, b in zip(ends[:-1], ends[1:], strict=True)
+            ]
+        )
     return out
 
 

@@ -1,8 +1,11 @@
-"""The models: how separation, shape and light are joined to explain one photo. One model a file, and one function that knows their names.
+"""The models: how separation, shape and light are joined to explain one photo. One model a file,
+and one function that knows their names.
 
-A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with.
-Of those that separate, `light_colour` decides which colour of light they see; those that find shape and light are told how the light
-and the shape look (`lamp_network`, `shape_network`), and of what they find `doubts` looks whether the photo shows what they assume.
+A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`,
+`joint.joint`, and the `baselines` to compare with. Of those that separate, `light_colour` decides
+which colour of light they see; those that find shape and light are told how the light and the shape
+look (`lamp_network`, `shape_network`), and of what they find `doubts` looks whether the photo shows
+what they assume.
 """
 
 from dataclasses import replace
@@ -25,7 +28,10 @@ _SOLVERS = {"mdr": mdr, "mbp": mbp, "joint": joint, "sirfs": sirfs}
 
 
 def solve(task: Task) -> Answer:
-    """What the model that `task.settings` names makes of the photo. Raises `InputError`, `Cancelled`."""
+    """What the model that `task.settings` names makes of the photo.
+
+    Raises `InputError`, `Cancelled`.
+    """
     solver = _SOLVERS.get(task.settings.model, baseline)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
@@ -39,8 +45,15 @@ def solve(task: Task) -> Answer:
 
 
 def _seen_shape(task: Task) -> SeenShape | None:
-    """What was seen of the shape; None where that is not asked for, a depth tells more, or the frame cuts the object."""
-    if not task.settings.looks_at_shape or task.known.depth is not None or is_cut(task.working.mask):
+    """What was seen of the shape;
+
+    None where that is not asked for, a depth tells more, or the frame cuts the object.
+    """
+    if (
+        not task.settings.looks_at_shape
+        or task.known.depth is not None
+        or is_cut(task.working.mask)
+    ):
         return None
     if task.seen is not None:
         return task.seen

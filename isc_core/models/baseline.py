@@ -1,4 +1,6 @@
-"""The baselines as models: the whole photo is taken as diffuse, and one direct method gives shape and light."""
+"""The baselines as models: the whole photo is taken as diffuse, and one direct method gives shape
+and light.
+"""
 
 import numpy as np
 
@@ -9,7 +11,10 @@ from .task import Answer, Task
 
 
 def baseline(task: Task) -> Answer:
-    """What the baseline named in the settings makes of the photo. Raises `InputError`, `Cancelled`."""
+    """What the baseline named in the settings makes of the photo.
+
+    Raises `InputError`, `Cancelled`.
+    """
     name, working = task.settings.model, task.working
     split, diffuse = unseparated(task)
     task.monitor.report(f"shape and light ({name})", 0.1)

@@ -1,14 +1,19 @@
-"""What in a photo speaks against what the models assume: opaque glossy paint, one small lamp beside a smooth light of about one colour.
+"""What in a photo speaks against what the models assume: opaque glossy paint, one small lamp beside
+a smooth light of about one colour.
 
-Problem: of a mirror, of glass, or under several lamps a model also finds paint, shape and light that add up to the photo: wrong ones.
+Problem: of a mirror, of glass, or under several lamps a model also finds paint, shape and light
+that add up to the photo: wrong ones.
 
-Equation: `appearance` tells how likely the photo shows each of them, `lamp_network` how likely several lamps; of the two for those the
-mean of the log odds. Beyond a bound that is a doubt: the confidence is multiplied by what is left for opaque paint under one lamp, and the
-status says why. It also says where much of the object is too bright for the photo, or the mask too ragged for a mesh.
+Equation: `appearance` tells how likely the photo shows each of them, `lamp_network` how likely
+several lamps; of the two for those the mean of the log odds. Beyond a bound that is a doubt: the
+confidence is multiplied by what is left for opaque paint under one lamp, and the status says why.
+It also says where much of the object is too bright for the photo, or the mask too ragged for a
+mesh.
 
 Citation: see `appearance` and `lamp_network`.
 
-Limits: measured in docs/methods/doubts.md. Strongly coloured light is another matter, see `light_gamut`.
+Limits: measured in docs/methods/doubts.md. Strongly coloured light is another matter, see
+`light_gamut`.
 """
 
 from dataclasses import replace
@@ -33,15 +38,23 @@ SEVERAL = "there seem to be several lights: one was looked for, so shape, paint 
 
 
 def doubts_of(kinds: dict[str, float], glance: Glance) -> list[str]:
-    """Lines for people, of what `appearance.kinds_of` and `lamp_network.glance_at` found; none where there is no doubt."""
+    """Lines for people, of what `appearance.kinds_of` and `lamp_network.glance_at` found; none
+    where there is no doubt.
+    """
     clear, several = kinds[MIRROR] + kinds[GLASS], several_lamps(kinds, glance)
-    return [*([CLEAR] if clear > LIKELY_CLEAR else []), *([SEVERAL] if several > LIKELY_SEVERAL else [])]
+    return [
+        *([CLEAR] if clear > LIKELY_CLEAR else []),
+        *([SEVERAL] if several > LIKELY_SEVERAL else []),
+    ]
 
 
 def several_lamps(kinds: dict[str, float], glance: Glance) -> float:
-    """The probability of several lamps: the mean of what two networks say, as the logarithms of odds. One has seen photos, mirrors and
-    rooms, the other many more lamps."""
-    odds = [np.log((share + _SURE) / (1 - share + _SURE)) for share in (kinds[LAMPS], glance.several)]
+    """The probability of several lamps: the mean of what two networks say, as the logarithms of
+    odds. One has seen photos, mirrors and rooms, the other many more lamps.
+    """
+    odds = [
+        np.log((share + _SURE) / (1 - share + _SURE)) for share in (kinds[LAMPS], glance.several)
+    ]
     return float(1 / (1 + np.exp(-np.mean(odds))))
 
 
@@ -50,26 +63,41 @@ def doubts_of_photo(photo: Photo) -> list[str]:
     clipped, ragged = float(photo.clipped[photo.mask].mean()), 1 - share_in_blocks(photo.mask)
     lines = []
     if clipped > _MUCH_CLIPPED:
-        lines.append(f"{100 * clipped:.0f} % of the object is too bright for the photo: what is there is a guess; expose less")
+        lines.append(
+            f"{100 * clipped:.0f} % of the object is too bright for the photo: what is there is a guess; expose less"
+        )
     if ragged > _RAGGED:
-        lines.append(f"the mask is so thin or ragged that the mesh leaves out {100 * ragged:.0f} % of it: fill the mask")
+        lines.append(
+            f"the mask is so thin or ragged that the mesh leaves out {100 * ragged:.0f} % of it: fill the mask"
+        )
     return lines
 
 
 def share_in_blocks(mask: np.ndarray) -> float:
-    """Which share of the pixels of `mask` (H, W) bool lies in a block of 2 x 2 pixels that it holds whole."""
+    """Which share of the pixels of `mask` (H, W) bool lies in a block of 2 x 2 pixels that it holds
+    whole.
+    """
     return float(ndimage.binary_opening(mask, np.ones((2, 2))).sum() / max(int(mask.sum()), 1))
 
 
 def doubted(maps: Photo, answer: Answer, glance: Glance) -> Answer:
-    """The answer to the photo of its maps, whose light looks like `glance`, with its doubts in the status: `kinds` and `lamps`, the
-    probabilities, and `doubts`, lines for people."""
+    """The answer to the photo of its maps, whose light looks like `glance`, with its doubts in the
+    status: `kinds` and `lamps`, the probabilities, and `doubts`, lines for people.
+    """
     kinds = kinds_of(maps.image, maps.mask)
     doubts = doubts_of(kinds, glance)
-    split = less_sure(answer.split, max(_left(doubts, kinds, glance), _LEAST)) if doubts else answer.split
+    split = (
+        less_sure(answer.split, max(_left(doubts, kinds, glance), _LEAST))
+        if doubts
+        else answer.split
+    )
     told = {
         "kinds": {kind: round(share, 4) for kind, share in kinds.items()},
-        "lamps": {"none": round(glance.none, 4), "one": round(glance.one, 4), "several": round(glance.several, 4)},
+        "lamps": {
+            "none": round(glance.none, 4),
+            "one": round(glance.one, 4),
+            "several": round(glance.several, 4),
+        },
         "several_lamps": round(several_lamps(kinds, glance), 4),
         "doubts": doubts + doubts_of_photo(maps),
     }

@@ -1,8 +1,10 @@
-"""The colour of the light, where a photo tells it: the photo is explained as it would be under white light, and the colour put back.
+"""The colour of the light, where a photo tells it: the photo is explained as it would be under
+white light, and the colour put back.
 
 Problem: separations, and what a lamp may look like, take the light for white.
 
-Equation: with the light's colour c of mean 1 (`illuminant`), I' = I / c is explained by a model as I' = D' + S' + rest'. Then
+Equation: with the light's colour c of mean 1 (`illuminant`), I' = I / c is explained by a model as
+I' = D' + S' + rest'. Then
 
     D = c D',   S = c S',   rest = c rest',   log shading = log shading' + log c,
 
@@ -10,8 +12,9 @@ so that I = D + S + rest and the reflectance D / shading is that under white lig
 
 Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694.
 
-Limits: those of `illuminant`: few photos tell the colour. Where one does not, the light is taken for white, and the status says why. Light
-of a stronger colour than a lamp's is mostly noticed, see `light_gamut`; the result is then less to be trusted, and says so.
+Limits: those of `illuminant`: few photos tell the colour. Where one does not, the light is taken
+for white, and the status says why. Light of a stronger colour than a lamp's is mostly noticed, see
+`light_gamut`; the result is then less to be trusted, and says so.
 """
 
 from collections.abc import Callable
@@ -35,7 +38,8 @@ _HINT = "the light is coloured: --light-colour estimate takes that into account"
 
 
 def under_light(task: Task, solver: Callable[[Task], Answer]) -> Answer:
-    """What `solver` makes of the photo under white light, back under the light's colour where that is known and asked for.
+    """What `solver` makes of the photo under white light, back under the light's colour where that
+    is known and asked for.
 
     Raises `InputError`, `Cancelled`.
     """
@@ -44,7 +48,9 @@ def under_light(task: Task, solver: Callable[[Task], Answer]) -> Answer:
     used = light.determined and task.settings.light_colour == ESTIMATE
     answer = _back(solver(_whitened(task, light.colour)), light.colour) if used else solver(task)
     split = less_sure(answer.split) if light.too_strong else answer.split
-    return replace(answer, split=split, status=answer.status | {"light_colour": _status(light, used)})
+    return replace(
+        answer, split=split, status=answer.status | {"light_colour": _status(light, used)}
+    )
 
 
 def _status(light: Illuminant, used: bool) -> dict[str, Any]:
@@ -66,7 +72,9 @@ def _whitened(task: Task, colour: np.ndarray) -> Task:
     maps = working if task.one_scale else _recoloured(task.maps, colour)
     split = None if task.split is None else _relit(task.split, 1 / colour)
     light = task.known.light
-    known = task.known if light is None else replace(task.known, light=shifted(light, -np.log(colour)))
+    known = (
+        task.known if light is None else replace(task.known, light=shifted(light, -np.log(colour)))
+    )
     return replace(task, working=working, maps=maps, split=split, known=known)
 
 
@@ -77,11 +85,18 @@ def _recoloured(photo: Photo, colour: np.ndarray) -> Photo:
 def _back(answer: Answer, colour: np.ndarray) -> Answer:
     """The answer under the light again; height and confidence stay."""
     brdf = None if answer.brdf is None else _lobe(answer.brdf, colour)
-    return replace(answer, split=_relit(answer.split, colour), light=shifted(answer.light, np.log(colour)), brdf=brdf)
+    return replace(
+        answer,
+        split=_relit(answer.split, colour),
+        light=shifted(answer.light, np.log(colour)),
+        brdf=brdf,
+    )
 
 
 def _relit(split: Separation, colour: np.ndarray) -> Separation:
-    diffuse, specular, residual = (tinted(layer, colour) for layer in (split.diffuse, split.specular, split.residual))
+    diffuse, specular, residual = (
+        tinted(layer, colour) for layer in (split.diffuse, split.specular, split.residual)
+    )
     return Separation(diffuse, specular, residual, split.confidence)
 
 

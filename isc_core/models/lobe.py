@@ -1,7 +1,8 @@
-"""The lobe that a model's specular layer shows on the shape that it recovered, and what is to be said of it.
+"""The lobe that a model's specular layer shows on the shape that it recovered, and what is to be
+said of it.
 
-Where the shape was given, the fit is to its normals; else to what is left of recovered ones and to how the light looks, see
-`brdf.fitting.recovered`.
+Where the shape was given, the fit is to its normals; else to what is left of recovered ones and to
+how the light looks, see `brdf.fitting.recovered`.
 
 Limits: those of `brdf.fitting`.
 """
@@ -31,8 +32,10 @@ _MUCH_CLIPPED = 0.05  # of the object
 
 @dataclass(frozen=True)
 class FittedLobe:
-    """`brdf`: the fit, None where no highlights were looked for; `status`: what a person should know of it, as the entry "gloss" of a
-    result's status. `clipped`: the share of the object that is brighter than the photo could show."""
+    """`brdf`: the fit, None where no highlights were looked for; `status`: what a person should
+    know of it, as the entry "gloss" of a result's status. `clipped`: the share of the object that
+    is brighter than the photo could show.
+    """
 
     brdf: LobeFit | None
     clipped: float = 0.0
@@ -48,16 +51,25 @@ class FittedLobe:
         span = fit.alpha_interval
         if fit.alpha is None or span is None:
             return {"gloss": fit.reason}
-        low, likely, high = (float(blender_from_alpha(np.clip(alpha, 0, 1))) for alpha in (span.low, fit.alpha, span.high))
+        low, likely, high = (
+            float(blender_from_alpha(np.clip(alpha, 0, 1)))
+            for alpha in (span.low, fit.alpha, span.high)
+        )
         if not fit.determined:
             return {"gloss": f"roughness at most {high:.2f}: {fit.reason}"}
-        return {"gloss": f"roughness {likely:.2f}, {low:.2f} to {high:.2f} with a probability of 68 %"}
+        return {
+            "gloss": f"roughness {likely:.2f}, {low:.2f} to {high:.2f} with a probability of 68 %"
+        }
 
 
-def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, model: LobeModel = "ggx") -> FittedLobe:
-    """Fits the lobe to the specular layer of `split` under the normals of `shape`; clipped pixels count as lower bounds.
+def fit_specular(
+    split: Separation, shape: Shape, task: Task, monitor: Monitor, model: LobeModel = "ggx"
+) -> FittedLobe:
+    """Fits the lobe to the specular layer of `split` under the normals of `shape`; clipped pixels
+    count as lower bounds.
 
-    Where the data cannot tell, the fit says so: that is no error. There is none where nothing looked for highlights. Raises `Cancelled`.
+    Where the data cannot tell, the fit says so: that is no error. There is none where nothing
+    looked for highlights. Raises `Cancelled`.
     """
     photo = task.maps
     if task.settings.separator == "none" and not split.specular.any():
@@ -65,10 +77,20 @@ def fit_specular(split: Separation, shape: Shape, task: Task, monitor: Monitor, 
     with task.clock.stage("gloss"):
         normal, shading = shaded(shape.height, shape.light, photo.mask)
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
-        options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None)
+        options = LobeFitOptions(
+            model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None
+        )
         profile = (task.prior_set or shipped_prior_set()).silhouette
         fit = fit_lobe(
-            split.specular, normal, photo.mask, options=options, clipped=photo.clipped, height=shape.height, shading=shading,
-            outline=outline_normals(photo.mask, profile) if options.recovered else None, glance=task.glance, monitor=monitor,
-        )  # fmt: skip
+            split.specular,
+            normal,
+            photo.mask,
+            options=options,
+            clipped=photo.clipped,
+            height=shape.height,
+            shading=shading,
+            outline=outline_normals(photo.mask, profile) if options.recovered else None,
+            glance=task.glance,
+            monitor=monitor,
+        )
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))

@@ -1,11 +1,13 @@
-"""Modified Dichromatic Reflectance: the specular light is separated first, SIRFS sees the diffuse image.
+"""Modified Dichromatic Reflectance: the specular light is separated first, SIRFS sees the diffuse
+image.
 
 Equation: image = reflectance * shading + specular.
 
-Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image" (2016; no DOI); the dichromatic model:
-S. A. Shafer 1985, doi:10.1002/col.5080100409.
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image"
+(2016; no DOI); the dichromatic model: S. A. Shafer 1985, doi:10.1002/col.5080100409.
 
-With `Settings.confidence_weights` a pixel counts in SIRFS' terms of reflectance by the separation's confidence (`sirfs.reflectance`).
+With `Settings.confidence_weights` a pixel counts in SIRFS' terms of reflectance by the separation's
+confidence (`sirfs.reflectance`).
 
 Limits: what the separation leaves or takes too much of, SIRFS believes.
 """
@@ -17,7 +19,10 @@ from .task import Answer, Task
 
 
 def mdr(task: Task) -> Answer:
-    """Separation, then shape and light of the diffuse image, then the lobe of the specular one. Raises `InputError`, `Cancelled`."""
+    """Separation, then shape and light of the diffuse image, then the lobe of the specular one.
+
+    Raises `InputError`, `Cancelled`.
+    """
     split, working = separated_first(task)
     trust = trust_of(working.confidence, task.settings.confidence_weights)
     shape = recover_shape(working.diffuse, task, task.monitor.part(0.08, 0.92), trust)

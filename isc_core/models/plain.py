@@ -1,6 +1,7 @@
 """Plain SIRFS: the whole photo is taken as diffuse, image = reflectance * shading.
 
-Citation: J. T. Barron, J. Malik, "Shape, illumination, and reflectance from shading", TPAMI 2015, doi:10.1109/TPAMI.2014.2377712.
+Citation: J. T. Barron, J. Malik, "Shape, illumination, and reflectance from shading", TPAMI 2015,
+doi:10.1109/TPAMI.2014.2377712.
 
 Limits: highlights become pale paint, and bend the shape.
 """

@@ -22,16 +22,20 @@ SHAPE_PRIORS = (SEEN, OUTLINE)
 class Settings:
     """What a decomposition is asked for.
 
-    `model`: one of `MODELS`. `separator`: one of `separation.METHODS`, used by `SEPARATING_MODELS`. `illumination`: "natural" or
-    "laboratory", which lights to expect. `max_size`: the object's long side in pixels at which the maps are made, 0 for the photo's;
-    SIRFS is solved at a size of its own, `recover.SOLVE_SIZE`. `full_size`: the maps are then brought to the photo's resolution.
-    `engine`, `threads`: see `SolverOptions`. `seed`: written into the result; no step of these models draws random numbers.
-    `shading_only`: shape-from-shading mode, an object of one colour. `confidence_weights`: of "mdr" and "joint", whether pixels whose
-    separation is in doubt weigh less in SIRFS' terms of reflectance. `light_colour`: of `SEPARATING_MODELS`, "white", or "estimate" for the
-    colour that the photo's highlights tell, where they do. `light_prior`: of `SIRFS_MODELS`, which lights SIRFS expects: those that the
-    photo's looks like ("seen", see `lamp_network`; in natural illumination), or those of all photos of this `illumination` ("usual").
-    `shape_prior`: of `SIRFS_MODELS`, what SIRFS expects of the shape: what the photo looks like ("seen", see `shape_network`; in natural
-    illumination, where no depth is known and the frame does not cut the object), or what its outline alone suggests ("outline").
+    `model`: one of `MODELS`. `separator`: one of `separation.METHODS`, used by `SEPARATING_MODELS`.
+    `illumination`: "natural" or "laboratory", which lights to expect. `max_size`: the object's long
+    side in pixels at which the maps are made, 0 for the photo's; SIRFS is solved at a size of its
+    own, `recover.SOLVE_SIZE`. `full_size`: the maps are then brought to the photo's resolution.
+    `engine`, `threads`: see `SolverOptions`. `seed`: written into the result; no step of these
+    models draws random numbers. `shading_only`: shape-from-shading mode, an object of one colour.
+    `confidence_weights`: of "mdr" and "joint", whether pixels whose separation is in doubt weigh
+    less in SIRFS' terms of reflectance. `light_colour`: of `SEPARATING_MODELS`, "white", or
+    "estimate" for the colour that the photo's highlights tell, where they do. `light_prior`: of
+    `SIRFS_MODELS`, which lights SIRFS expects: those that the photo's looks like ("seen", see
+    `lamp_network`; in natural illumination), or those of all photos of this `illumination`
+    ("usual"). `shape_prior`: of `SIRFS_MODELS`, what SIRFS expects of the shape: what the photo
+    looks like ("seen", see `shape_network`; in natural illumination, where no depth is known and
+    the frame does not cut the object), or what its outline alone suggests ("outline").
     """
 
     model: str = "joint"
@@ -67,8 +71,14 @@ class Settings:
             if value not in known:
                 raise InputError(f'unknown {name} "{value}": choose {", ".join(known)}')
         if self.confidence_weights and self.model not in WEIGHING_MODELS:
-            raise InputError(f"--confidence-weights means nothing to {self.model}: use --model {' or '.join(WEIGHING_MODELS)}")
+            raise InputError(
+                f"--confidence-weights means nothing to {self.model}: use --model {' or '.join(WEIGHING_MODELS)}"
+            )
         if self.light_colour != "white" and self.model not in SEPARATING_MODELS:
-            raise InputError(f"--light-colour means nothing to {self.model}: use --model {' or '.join(SEPARATING_MODELS)}")
+            raise InputError(
+                f"--light-colour means nothing to {self.model}: use --model {' or '.join(SEPARATING_MODELS)}"
+            )
         if self.max_size < 0 or self.threads < 0:
-            raise InputError("--max-size and --threads cannot be negative: 0 means no limit and all cores")
+            raise InputError(
+                "--max-size and --threads cannot be negative: 0 means no limit and all cores"
+            )

@@ -37,10 +37,11 @@ class Clock:
 class Task:
     """One photo to be explained.
 
-    `working`: the photo at the scale at which shape and light are looked for; `maps`: at the scale of the result's maps, the same object
-    where the two scales are one. `known`: at the working scale. `prior_set`: the shipped one if None. `split`: the layers of `maps` by the
-    separator of the settings, where they have been found before; else None. `glance`: how the photo's light looks,
-    `seen`: how its shape does, at the working scale; None where nobody has looked yet.
+    `working`: the photo at the scale at which shape and light are looked for; `maps`: at the scale
+    of the result's maps, the same object where the two scales are one. `known`: at the working
+    scale. `prior_set`: the shipped one if None. `split`: the layers of `maps` by the separator of
+    the settings, where they have been found before; else None. `glance`: how the photo's light
+    looks, `seen`: how its shape does, at the working scale; None where nobody has looked yet.
     """
 
     working: Photo
@@ -62,9 +63,10 @@ class Task:
 
 @dataclass(frozen=True)
 class Answer:
-    """`split`: the layers of `Task.maps`, which sum up to the image. `height` (H, W) in pixels of the maps and `light` (9, 3), both in
-    SIRFS' reference convention: normals, shading and reflectance follow from them. `status`: JSON-ready, how the solver
-    ended. `brdf`: the lobe fitted to the specular layer, None where the model has no specular layer.
+    """`split`: the layers of `Task.maps`, which sum up to the image. `height` (H, W) in pixels of
+    the maps and `light` (9, 3), both in SIRFS' reference convention: normals, shading and
+    reflectance follow from them. `status`: JSON-ready, how the solver ended. `brdf`: the lobe
+    fitted to the specular layer, None where the model has no specular layer.
     """
 
     split: Separation

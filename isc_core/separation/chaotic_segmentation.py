@@ -1,22 +1,29 @@
-"""Removes highlights by finding them with chaotic multilevel thresholds and repainting them (Akbar 2016; Akbar, Suryana & Sahib 2015).
+"""Removes highlights by finding them with chaotic multilevel thresholds and repainting them (Akbar
+2016; Akbar, Suryana & Sahib 2015).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Find the pixels with s > 0, and say what lies beneath.
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Find the pixels with s > 0,
+and say what lies beneath.
 
-Equation: 1. Otsu's K thresholds of the smallest channel min I, in which white light stands out and strong paint does not, found by the
-clonal selection whose random numbers come from a logistic map (`thresholding`); the pixels above the highest one are specular.
-2. They are a hole that is filled from the other pixels of the object by patches matched with Coherency Sensitive Hashing (`inpainting`).
-As published ("colour"): D = min(I, fill), K = 3.
-Ours ("ratio", K = 1): highlights are white, so F = I - min I is known under them. The patches match in the colour of F, F / (sum F + e),
-and hand over what the highlight hides alone, the ratio q = min D / (max D - min D) of their paint, which shading does not change:
-s = min I - q (max I - min I), nowhere below 0. Around each hole a rim is treated as well; pixels without a highlight, whose q agrees,
-stay as they are. The whole s fades out on objects of grey paint (`evidence`).
+Equation: 1. Otsu's K thresholds of the smallest channel min I, in which white light stands out and
+strong paint does not, found by the clonal selection whose random numbers come from a logistic map
+(`thresholding`); the pixels above the highest one are specular.
+2. They are a hole that is filled from the other pixels of the object by patches matched with
+   Coherency Sensitive Hashing (`inpainting`). As published ("colour"): D = min(I, fill), K = 3.
+   Ours ("ratio", K = 1): highlights are white, so F = I - min I is known under them. The patches
+   match in the colour of F, F / (sum F + e), and hand over what the highlight hides alone, the
+   ratio q = min D / (max D - min D) of their paint, which shading does not change: s = min I - q
+   (max I - min I), nowhere below 0. Around each hole a rim is treated as well; pixels without a
+   highlight, whose q agrees, stay as they are. The whole s fades out on objects of grey paint
+   (`evidence`).
 
-Citation: H. Akbar, "3D intrinsic scene characteristics extraction framework for a single image", PhD thesis (2016). H. Akbar, N. Suryana
-and S. Sahib, IJSISE 8(5) (2015), on the chaotic clonal selection. Matching: S. Korman and S. Avidan (2011), doi:10.1109/ICCV.2011.6126421.
-Filling: Y. Wexler, E. Shechtman and M. Irani (2007), doi:10.1109/TPAMI.2007.60.
+Citation: H. Akbar, "3D intrinsic scene characteristics extraction framework for a single image",
+PhD thesis (2016). H. Akbar, N. Suryana and S. Sahib, IJSISE 8(5) (2015), on the chaotic clonal
+selection. Matching: S. Korman and S. Avidan (2011), doi:10.1109/ICCV.2011.6126421. Filling: Y.
+Wexler, E. Shechtman and M. Irani (2007), doi:10.1109/TPAMI.2007.60.
 
-Limits: the light must be white. Otsu's brightest class exists in every photo, with or without highlights: as published, the method
-repaints bright paint too. Paint that occurs under highlights only gets the ratio of the paint most like it.
+Limits: the light must be white. Otsu's brightest class exists in every photo, with or without
+highlights: as published, the method repaints bright paint too. Paint that occurs under highlights
+only gets the ratio of the paint most like it.
 """
 
 from dataclasses import dataclass
@@ -27,7 +34,12 @@ from scipy import ndimage
 
 from ..decomposition import Separation
 from ..errors import InputError
-from ..inpainting.coherency_sensitive_hashing import CshOptions, CshSearch, patches_touching, patches_within
+from ..inpainting.coherency_sensitive_hashing import (
+    CshOptions,
+    CshSearch,
+    patches_touching,
+    patches_within,
+)
 from ..inpainting.patch_fill import PatchFillOptions, fill_patches
 from ..inpainting.pull_push import fill
 from ..inpainting.voting import vote
@@ -41,17 +53,19 @@ from .layers import diffuse_layers, white_layers
 
 @dataclass(frozen=True)
 class ChaoticSegmentationOptions:
-    """`levels`: how many thresholds K split the smallest channel, 1 to 16; pixels above the highest are specular.
-    `optimiser`: what searches them: chaotic_clonal, clonal_selection, particle_swarm, or exact.
-    `evaluations`: the search's budget; `seed`: of the search and of the matching, >= 0.
-    `threshold`: instead of searching, a share of the largest value of the smallest channel, between 0 and 1.
-    `repaint`: "ratio" removes white light only, "colour" replaces the whole pixel, as published.
-    `rim`: how far around them pixels are treated as well, a share of the square root of the object's area, 0 to 1.
-    `guard`: leave objects of grey paint alone.
+    """`levels`: how many thresholds K split the smallest channel, 1 to 16; pixels above the highest
+    are specular. `optimiser`: what searches them: chaotic_clonal, clonal_selection, particle_swarm,
+    or exact. `evaluations`: the search's budget; `seed`: of the search and of the matching, >= 0.
+    `threshold`: instead of searching, a share of the largest value of the smallest channel, between
+    0 and 1. `repaint`: "ratio" removes white light only, "colour" replaces the whole pixel, as
+    published. `rim`: how far around them pixels are treated as well, a share of the square root of
+    the object's area, 0 to 1. `guard`: leave objects of grey paint alone.
     """
 
     levels: int = 1
-    optimiser: Literal["chaotic_clonal", "clonal_selection", "particle_swarm", "exact"] = "chaotic_clonal"
+    optimiser: Literal["chaotic_clonal", "clonal_selection", "particle_swarm", "exact"] = (
+        "chaotic_clonal"
+    )
     evaluations: int = 20_000
     seed: int = 0
     threshold: float | None = None
@@ -79,10 +93,11 @@ def separate(
 ) -> Separation:
     """Splits a photo under white light into diffuse and specular.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above what
-    was recorded: they are never a source. Inside the mask 0 <= diffuse <= image; the specular layer has equal channels unless colours
-    are repainted. Progress goes to `monitor`. Raises `InputError` for unfit arrays or options, and where the ratio is asked of a photo
-    without colour; `Cancelled`.
+    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
+    pixels whose true value lies above what was recorded: they are never a source. Inside the mask 0
+    <= diffuse <= image; the specular layer has equal channels unless colours are repainted.
+    Progress goes to `monitor`. Raises `InputError` for unfit arrays or options, and where the ratio
+    is asked of a photo without colour; `Cancelled`.
     """
     options = options or ChaoticSegmentationOptions()
     monitor = monitor or Monitor()
@@ -103,7 +118,9 @@ def separate(
         return white_layers(inside, mask, np.zeros(mask.shape), clipped)
     if options.repaint == "colour":
         filled = _repainted(scaled, known, specular, options, monitor.part(0.1, 1.0))
-        return diffuse_layers(inside, mask, np.where(specular[..., None], filled * peak, inside), clipped)
+        return diffuse_layers(
+            inside, mask, np.where(specular[..., None], filled * peak, inside), clipped
+        )
     share = colour_evidence(scaled, known | specular) * peak if options.guard else peak
     if share == 0:
         return white_layers(inside, mask, np.zeros(mask.shape), clipped)
@@ -111,10 +128,14 @@ def separate(
     return white_layers(inside, mask, removed, clipped)
 
 
-def find_specular(image: np.ndarray, mask: np.ndarray, options: ChaoticSegmentationOptions) -> np.ndarray:
-    """Which pixels (H, W) bool of `mask` are specular: those above the highest threshold of the smallest channel.
+def find_specular(
+    image: np.ndarray, mask: np.ndarray, options: ChaoticSegmentationOptions
+) -> np.ndarray:
+    """Which pixels (H, W) bool of `mask` are specular: those above the highest threshold of the
+    smallest channel.
 
-    None, where the brightest and the darkest pixel have the same level. Raises `InputError` where the search cannot be done.
+    None, where the brightest and the darkest pixel have the same level. Raises `InputError` where
+    the search cannot be done.
     """
     low = smallest(np.where(mask[..., None], image, 0))
     peak = float(low.max())
@@ -126,43 +147,68 @@ def find_specular(image: np.ndarray, mask: np.ndarray, options: ChaoticSegmentat
     if np.ptp(levels[mask]) == 0:
         return np.zeros_like(mask)
     objective = OtsuObjective.of(levels[mask])
-    found = maximise(options.optimiser, objective, options.levels, evaluations=options.evaluations, seed=options.seed)
+    found = maximise(
+        options.optimiser,
+        objective,
+        options.levels,
+        evaluations=options.evaluations,
+        seed=options.seed,
+    )
     return mask & (levels > found.thresholds[-1])
 
 
 def _check_options(options: ChaoticSegmentationOptions) -> None:
     if not 1 <= options.levels <= 16 or options.seed < 0 or options.evaluations < 1:
-        raise InputError("levels must lie between 1 and 16, seed at 0 or above, evaluations at 1 or above")
+        raise InputError(
+            "levels must lie between 1 and 16, seed at 0 or above, evaluations at 1 or above"
+        )
     if options.optimiser not in OPTIMISERS or options.repaint not in ("ratio", "colour"):
-        raise InputError(f"optimiser must be one of {', '.join(OPTIMISERS)}, repaint ratio or colour")
+        raise InputError(
+            f"optimiser must be one of {', '.join(OPTIMISERS)}, repaint ratio or colour"
+        )
     if not 0 <= options.rim <= 1:
         raise InputError("rim must lie between 0 and 1: it is a share of the object's size")
     if options.threshold is not None and not 0 < options.threshold < 1:
-        raise InputError(f"threshold must lie between 0 and 1, a share of the brightest value, not {options.threshold}")
+        raise InputError(
+            f"threshold must lie between 0 and 1, a share of the brightest value, not {options.threshold}"
+        )
 
 
 def _repainted(
-    image: np.ndarray, known: np.ndarray, specular: np.ndarray, options: ChaoticSegmentationOptions, monitor: Monitor
+    image: np.ndarray,
+    known: np.ndarray,
+    specular: np.ndarray,
+    options: ChaoticSegmentationOptions,
+    monitor: Monitor,
 ) -> np.ndarray:
     """The image (H, W, 3) with specular pixels filled from known ones."""
     usual = PatchFillOptions()
-    matching = CshOptions(tables=usual.matching.tables, candidates=usual.matching.candidates, seed=options.seed)
+    matching = CshOptions(
+        tables=usual.matching.tables, candidates=usual.matching.candidates, seed=options.seed
+    )
     return fill_patches(image, known, specular, PatchFillOptions(matching=matching), monitor)
 
 
 def _white_light(
-    image: np.ndarray, known: np.ndarray, specular: np.ndarray, options: ChaoticSegmentationOptions, monitor: Monitor
+    image: np.ndarray,
+    known: np.ndarray,
+    specular: np.ndarray,
+    options: ChaoticSegmentationOptions,
+    monitor: Monitor,
 ) -> np.ndarray:
     """The specular layer (H, W) of the specular pixels; 0 elsewhere."""
     low = smallest(image)
     chroma = largest(image) - low
-    # Colours are handed over as two sums whose quotient is the ratio: pixels with much colour, whose ratio is sure, count most.
+    # Colours are handed over as two sums whose quotient is the ratio: pixels with much colour,
+    # whose ratio is sure, count most.
     paint = np.stack([low, chroma], axis=2)
     means = fill(paint, known)
     hue = _invariant_colour(image, low, known | specular)
     source, target = patches_within(hue, known), patches_touching(hue, specular)
     if len(source) and len(target):
-        matches = CshSearch(source, CshOptions(tables=_TABLES, seed=options.seed)).match(target, monitor=monitor)
+        matches = CshSearch(source, CshOptions(tables=_TABLES, seed=options.seed)).match(
+            target, monitor=monitor
+        )
         votes, voted = vote(paint, target, source, matches)
         means = np.where(voted[..., None], votes, means)
     ratio = means[..., 0] / np.maximum(means[..., 1], 1e-6)
@@ -170,7 +216,9 @@ def _white_light(
 
 
 def _invariant_colour(image: np.ndarray, low: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """F / (sum F + e), F = I - min I (H, W, 3): a highlight does not change it, and shading little; carried on beyond the mask."""
+    """F / (sum F + e), F = I - min I (H, W, 3): a highlight does not change it, and shading little;
+    carried on beyond the mask.
+    """
     without_white = image - low[..., None]
     total = without_white.sum(axis=2)
     colour = without_white / (total + max(_FAINT * float(total[mask].mean()), 1e-12))[..., None]

@@ -1,14 +1,16 @@
 """Averages that do not cross borders of paint, in a time that does not grow with their reach.
 
-Problem: a statistic over the pixels that a pixel can be joined to without crossing an edge. Equation: along a row (then a column) the
-recursive filter y_j = x_j + a^d_j (y_(j-1) - x_j), forward and back, with a = exp(-sqrt 2 / sigma) and d_j the distance to the neighbour:
-one pixel plus what an edge adds. Passes over rows and columns alternate, the later ones with smaller sigma.
+Problem: a statistic over the pixels that a pixel can be joined to without crossing an edge.
+Equation: along a row (then a column) the recursive filter y_j = x_j + a^d_j (y_(j-1) - x_j),
+forward and back, with a = exp(-sqrt 2 / sigma) and d_j the distance to the neighbour: one pixel
+plus what an edge adds. Passes over rows and columns alternate, the later ones with smaller sigma.
 
-The lower mode is what most pixels agree on when those above are doubted: the fixed point of a weighted average whose weight is 1 below
-it and falls as exp(-(t - mode) / tau) above. Highlights, which only ever raise t, hardly move it.
+The lower mode is what most pixels agree on when those above are doubted: the fixed point of a
+weighted average whose weight is 1 below it and falls as exp(-(t - mode) / tau) above. Highlights,
+which only ever raise t, hardly move it.
 
-Citation: E. S. L. Gastal and M. M. Oliveira, "Domain transform for edge-aware image and video processing", ACM Trans. Graph. 30(4), 69
-(2011), doi:10.1145/2010324.1964964.
+Citation: E. S. L. Gastal and M. M. Oliveira, "Domain transform for edge-aware image and video
+processing", ACM Trans. Graph. 30(4), 69 (2011), doi:10.1145/2010324.1964964.
 """
 
 from dataclasses import dataclass
@@ -20,7 +22,10 @@ _PASSES = 2
 
 @dataclass(frozen=True)
 class Paths:
-    """How far each pixel (H, W) is from its left (`across`) and upper (`down`) neighbour, >= 1; `reach`: sigma, in the same unit."""
+    """How far each pixel (H, W) is from its left (`across`) and upper (`down`) neighbour, >= 1;
+
+    `reach`: sigma, in the same unit.
+    """
 
     across: np.ndarray
     down: np.ndarray
@@ -28,7 +33,9 @@ class Paths:
 
     def average(self, layers: np.ndarray) -> np.ndarray:
         """`layers` (n, H, W), smoothed along the paths."""
-        found = np.ascontiguousarray(layers.transpose(2, 0, 1))  # the axis that is walked along comes first
+        found = np.ascontiguousarray(
+            layers.transpose(2, 0, 1)
+        )  # the axis that is walked along comes first
         for step in range(_PASSES):
             sigma = self.reach * np.sqrt(3) * 2 ** (_PASSES - 1 - step) / np.sqrt(4**_PASSES - 1)
             log_feedback = -np.sqrt(2) / sigma
@@ -43,7 +50,9 @@ class Paths:
         total, weights = self.average(np.stack([weight * value, weight]))
         return total / np.maximum(weights, 1e-12)
 
-    def lower_mode(self, value: np.ndarray, weight: np.ndarray, tau: float, rounds: int) -> np.ndarray:
+    def lower_mode(
+        self, value: np.ndarray, weight: np.ndarray, tau: float, rounds: int
+    ) -> np.ndarray:
         """The lower mode (H, W) of `value` (H, W), `tau` in its unit, by `rounds` of re-weighting."""
         mode = self.weighted(value, weight)
         for _ in range(rounds):
@@ -52,7 +61,10 @@ class Paths:
 
 
 def _walk(layers: np.ndarray, feedback: np.ndarray) -> None:
-    """One pass forward and back over the first axis of `layers` (W, n, H), in place; `feedback` (W, H) of the step into each place."""
+    """One pass forward and back over the first axis of `layers` (W, n, H), in place;
+
+    `feedback` (W, H) of the step into each place.
+    """
     last = len(layers)
     for j in range(1, last):
         layers[j] += feedback[j] * (layers[j - 1] - layers[j])

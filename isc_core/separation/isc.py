@@ -1,31 +1,39 @@
-"""Removes highlights where a photo shows that they are highlights, and leaves everything else alone (the separator of this project).
+"""Removes highlights where a photo shows that they are highlights, and leaves everything else alone
+(the separator of this project).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Colour alone takes pale paint for a highlight; the harm is then far
-greater than all highlights are worth. So a candidate s is found by colour, and then has to prove itself.
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Colour alone takes pale paint
+for a highlight; the harm is then far greater than all highlights are worth. So a candidate s is
+found by colour, and then has to prove itself.
 
-Equation: with C = max I - min I, which white light leaves alone, and the paint's diffuse ratio q = min D / (max D - min D),
+Equation: with C = max I - min I, which white light leaves alone, and the paint's diffuse ratio q =
+min D / (max D - min D),
 
     s = min I - q C.
 
-q is looked for twice. By hue: a low quantile of min I / max I over the pixels of like hue nearby (`hue_grid`), which finds highlights that
-cover whole patches of paint. By place: what most pixels agree on that can be reached without crossing a border of paint (`edge_aware`),
-which tells paints of one hue apart. The first is believed for objects of strong colours only, the second wherever its candidate is
-clear of the scatter of its own paint. Both must not run against C as white paint does (`highlight_cues`), and must be smooth, or, what is
-found by place, be found by the groups of `sparse_coding` as well. Beside borders of paint, where mixed pixels look like highlights, s
-comes from around. The layer is the larger of the two.
+q is looked for twice. By hue: a low quantile of min I / max I over the pixels of like hue nearby
+(`hue_grid`), which finds highlights that cover whole patches of paint. By place: what most pixels
+agree on that can be reached without crossing a border of paint (`edge_aware`), which tells paints
+of one hue apart. The first is believed for objects of strong colours only, the second wherever its
+candidate is clear of the scatter of its own paint. Both must not run against C as white paint does
+(`highlight_cues`), and must be smooth, or, what is found by place, be found by the groups of
+`sparse_coding` as well. Beside borders of paint, where mixed pixels look like highlights, s comes
+from around. The layer is the larger of the two.
 
-All statistics are of the mask's pixels. Objects longer than 640 pixels are judged on averages of square blocks: q's tables and the gains
-are carried over, s itself is computed from the full photo. Where nothing can be proven the pixel stays as it is, and so does
-a photo whose whole layer no display would show.
+All statistics are of the mask's pixels. Objects longer than 640 pixels are judged on averages of
+square blocks: q's tables and the gains are carried over, s itself is computed from the full photo.
+Where nothing can be proven the pixel stays as it is, and so does a photo whose whole layer no
+display would show.
 
-`prior` is the door for what shape and light say: the probability that a highlight can be seen at each pixel. It multiplies the odds of the
-gain there: .5 says nothing, 0 forbids a highlight, 1 takes all of a candidate that has any gain. What colour refuses stays refused.
+`prior` is the door for what shape and light say: the probability that a highlight can be seen at
+each pixel. It multiplies the odds of the gain there: .5 says nothing, 0 forbids a highlight, 1
+takes all of a candidate that has any gain. What colour refuses stays refused.
 
-Citation: the cues and how they are combined are ours; the diffuse ratio is that of H.-L. Shen and Z.-H. Zheng (2013),
-doi:10.1364/AO.52.004483. See also the modules named above.
+Citation: the cues and how they are combined are ours; the diffuse ratio is that of H.-L. Shen and
+Z.-H. Zheng (2013), doi:10.1364/AO.52.004483. See also the modules named above.
 
-Limits: the light must be white. Near-grey paint keeps its highlights, because its q is unknown; so does a photo without colour, and so do
-objects with a fine pattern all over. Pale paint that fades in smoothly on a coloured object passes for a highlight.
+Limits: the light must be white. Near-grey paint keeps its highlights, because its q is unknown; so
+does a photo without colour, and so do objects with a fine pattern all over. Pale paint that fades
+in smoothly on a coloured object passes for a highlight.
 """
 
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -44,7 +52,15 @@ from .checks import check_arrays
 from .edge_aware import Paths
 from .evidence import colour_evidence
 from .filter_statistics import highlight_prior
-from .highlight_cues import Steps, far_from_borders, noise_level, paint_mixing, ramp, roughness, steps_of
+from .highlight_cues import (
+    Steps,
+    far_from_borders,
+    noise_level,
+    paint_mixing,
+    ramp,
+    roughness,
+    steps_of,
+)
 from .hue_grid import HueGrid, Places, hue_of, quantile
 from .layers import white_layers
 from .smoothing import masked_gaussian, weighted_gaussian
@@ -54,13 +70,16 @@ from .sparse_coding import grouped_specular
 _LONGEST = 640
 _BINS, _CHROMA_BINS = 100, 64
 _TINY = np.float32(1e-9)
-# A layer that is nowhere brighter is none, as a share of the brightest value: half a step of a display of eight bits.
+# A layer that is nowhere brighter is none, as a share of the brightest value: half a step of a
+# display of eight bits.
 _FAINTEST = 1 / 512
 # Gaussian smoothing, in pixels, before the ratios by hue and by place are taken.
 _BY_HUE, _BY_PLACE = 0.7, 1.0
-# A step of log C, and of the hue's shares, that counts as a border; the share of the brightest value below which C is noise.
+# A step of log C, and of the hue's shares, that counts as a border; the share of the brightest
+# value below which C is noise.
 _CHROMA_STEP, _SHARE_STEP, _DARK = 0.5, 0.1, 0.03
-# Of the filter by place: its reach as a share of the object's diagonal, the scale of doubt, rounds; and how many times the smallest step.
+# Of the filter by place: its reach as a share of the object's diagonal, the scale of doubt, rounds;
+# and how many times the smallest step.
 _REACH, _DOUBT, _ROUNDS, _SMALLEST_STEP = 0.15, 0.1, 4, 0.01
 # How far around what is proven a highlight may fade out, as a share of the object's diagonal.
 _NEARBY = 0.02
@@ -68,18 +87,21 @@ _NEARBY = 0.02
 
 @dataclass(frozen=True)
 class IscOptions:
-    """Ramps are pairs: no evidence up to the first number, full from the second on (falling ones the other way round).
+    """Ramps are pairs: no evidence up to the first number, full from the second on (falling ones
+    the other way round).
 
-    `hues`: cells around the circle of hues, >= 6. `cell`: side of the grid's cells as a share of the object's longer side, in (0, 1].
-    `low_quantile`: which quantile of min / max over like pixels is the paint's, in (0, 1); lower removes more. `borrowed`: how many votes
-    the pixels of like hue everywhere have in a cell; >= 0.
-    `colourful`: of the bright pixels' colour, sum C / sum max I. `smooth`: of the roughness of the whole candidate, and `smooth_here` of
-    the local one, falling. `unmixed`: of the paint mixing of the whole candidate, falling. `bright`: of min I over its mean.
-    `clear`: of s over `scatter` times what stays, by hue.
-    `scatter_here`: the least relative scatter of a paint's q by place. `coloured`: of 1 - min / max of the paint, by place. `present`: of C
-    over that of like pixels. `unmixed_here`, `smooth_by_place`: as above, by place.
-    `proven`: of the gain of pixels whose surroundings are judged more mildly, by `faint`: of s over what it may be in error by.
-    `filters`: whether the filter statistics have a say as well, see `filter_statistics`: fewer false highlights, fewer true ones.
+    `hues`: cells around the circle of hues, >= 6. `cell`: side of the grid's cells as a share of
+    the object's longer side, in (0, 1]. `low_quantile`: which quantile of min / max over like
+    pixels is the paint's, in (0, 1); lower removes more. `borrowed`: how many votes the pixels of
+    like hue everywhere have in a cell; >= 0. `colourful`: of the bright pixels' colour, sum C / sum
+    max I. `smooth`: of the roughness of the whole candidate, and `smooth_here` of the local one,
+    falling. `unmixed`: of the paint mixing of the whole candidate, falling. `bright`: of min I over
+    its mean. `clear`: of s over `scatter` times what stays, by hue. `scatter_here`: the least
+    relative scatter of a paint's q by place. `coloured`: of 1 - min / max of the paint, by place.
+    `present`: of C over that of like pixels. `unmixed_here`, `smooth_by_place`: as above, by place.
+    `proven`: of the gain of pixels whose surroundings are judged more mildly, by `faint`: of s over
+    what it may be in error by. `filters`: whether the filter statistics have a say as well, see
+    `filter_statistics`: fewer false highlights, fewer true ones.
     """
 
     hues: int = 48
@@ -108,9 +130,11 @@ VARIANTS: dict[str, IscOptions] = {"improved": IscOptions()}
 
 @dataclass(frozen=True)
 class _Photo:
-    """The object at one scale: `image` (H, W, 3), `mask` and `usable` (not clipped) (H, W) bool; smoothed for the ratios by hue: `low`,
-    `high`, their difference `chroma` and the `hue` (H, W). `peak`: the brightest value; `base`: the mean of `low`; `noise`: its standard
-    deviation, which nobody asks of a full photo that was judged on averages."""
+    """The object at one scale: `image` (H, W, 3), `mask` and `usable` (not clipped) (H, W) bool;
+    smoothed for the ratios by hue: `low`, `high`, their difference `chroma` and the `hue` (H, W).
+    `peak`: the brightest value; `base`: the mean of `low`; `noise`: its standard deviation, which
+    nobody asks of a full photo that was judged on averages.
+    """
 
     image: np.ndarray
     mask: np.ndarray
@@ -143,8 +167,10 @@ class _Photo:
 
 @dataclass(frozen=True)
 class _Paints:
-    """What the pixels of like hue say: `share` of the smallest in the largest channel of their paint, and their `chroma`, as tables of the
-    `grid`, in units of 1 and of the photo's peak. `places`: those of the pixels that they were learned from."""
+    """What the pixels of like hue say: `share` of the smallest in the largest channel of their
+    paint, and their `chroma`, as tables of the `grid`, in units of 1 and of the photo's peak.
+    `places`: those of the pixels that they were learned from.
+    """
 
     grid: HueGrid
     places: Places
@@ -154,7 +180,10 @@ class _Paints:
 
 @dataclass(frozen=True)
 class _Judged:
-    """Candidates for s, by hue and by place, and their gains in [0, 1]; `share` (H, W): the paint's min / max by place."""
+    """Candidates for s, by hue and by place, and their gains in [0, 1];
+
+    `share` (H, W): the paint's min / max by place.
+    """
 
     by_hue: np.ndarray
     gain_by_hue: np.ndarray
@@ -173,14 +202,16 @@ def separate(
 ) -> Separation:
     """Splits a photo under white light into diffuse and specular.
 
-    `image` (H, W, 3), linear Rec.709, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above
-    what was recorded: they shape no statistic. `prior` (H, W) in [0, 1] or None: the probability that a highlight can be seen, .5 if
-    nothing is known. Inside the mask 0 <= diffuse <= image; what is outside has no influence.
+    `image` (H, W, 3), linear Rec.709, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool
+    marks pixels whose true value lies above what was recorded: they shape no statistic. `prior` (H,
+    W) in [0, 1] or None: the probability that a highlight can be seen, .5 if nothing is known.
+    Inside the mask 0 <= diffuse <= image; what is outside has no influence.
 
-    Confidence falls with the error to be expected, see `_confidence`. A photo without colour is left as it is, with little confidence.
+    Confidence falls with the error to be expected, see `_confidence`. A photo without colour is
+    left as it is, with little confidence.
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are negative or not finite; `Cancelled`
-    when the monitor says so.
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are
+    negative or not finite; `Cancelled` when the monitor says so.
     """
     options, monitor = options or VARIANTS["improved"], monitor or Monitor()
     check_arrays(image, mask, clipped)
@@ -201,28 +232,44 @@ def separate(
     if factor > 1:
         photo = _photo(image, mask, usable)
         judged = _carried_over(photo, paints, judged, factor)
-    specular = np.maximum(judged.by_hue * _at_odds(judged.gain_by_hue, prior), judged.by_place * _at_odds(judged.gain_by_place, prior))
+    specular = np.maximum(
+        judged.by_hue * _at_odds(judged.gain_by_hue, prior),
+        judged.by_place * _at_odds(judged.gain_by_place, prior),
+    )
     if float(specular.max()) < _FAINTEST * photo.peak:
         specular = np.zeros_like(specular)
     forbidden = np.zeros(mask.shape, bool) if prior is None else prior == 0
     split = white_layers(image, mask, specular, None if clipped is None else clipped & ~forbidden)
     trusted = np.ones(mask.shape, bool) if clipped is None else ~clipped
     confidence = np.where(trusted, _confidence(photo, split.specular[..., 0]), 0)
-    return Separation(unit * split.diffuse, unit * split.specular, unit * split.residual, confidence)
+    return Separation(
+        unit * split.diffuse, unit * split.specular, unit * split.residual, confidence
+    )
 
 
 def _unit(values: np.ndarray) -> np.float32:
-    """A power of two near the largest value: dividing by it rounds nothing, and the small constants mean the same at any exposure."""
+    """A power of two near the largest value: dividing by it rounds nothing, and the small constants
+    mean the same at any exposure.
+    """
     return np.float32(2.0 ** np.ceil(np.log2(max(float(values.max()), 1e-30))))
 
 
 def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> None:
-    if options.hues < 6 or not 0 < options.cell <= 1 or not 0 < options.low_quantile < 1 or not 0 <= options.borrowed < np.inf:
-        raise InputError("hues must be at least 6, cell within (0, 1], low_quantile within (0, 1), borrowed at least 0")
+    if (
+        options.hues < 6
+        or not 0 < options.cell <= 1
+        or not 0 < options.low_quantile < 1
+        or not 0 <= options.borrowed < np.inf
+    ):
+        raise InputError(
+            "hues must be at least 6, cell within (0, 1], low_quantile within (0, 1), borrowed at least 0"
+        )
     if not (0 <= options.scatter < np.inf and 0 <= options.scatter_here < np.inf):
         raise InputError("scatter and scatter_here must be numbers from 0 on")
     for name, ends in vars(options).items():
-        if isinstance(ends, tuple) and (len(ends) != 2 or not np.isfinite(ends).all() or ends[0] == ends[1]):
+        if isinstance(ends, tuple) and (
+            len(ends) != 2 or not np.isfinite(ends).all() or ends[0] == ends[1]
+        ):
             raise InputError(f"{name} must be two different numbers, the ends of a ramp")
     if prior is None:
         return
@@ -232,12 +279,18 @@ def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> N
         raise InputError("the prior must lie within [0, 1] inside the mask: it is a probability")
 
 
-def _blocks(image: np.ndarray, mask: np.ndarray, usable: np.ndarray, factor: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The three at 1 / `factor` of their size: averages of the mask's pixels in each block; a block is usable if all of those are."""
+def _blocks(
+    image: np.ndarray, mask: np.ndarray, usable: np.ndarray, factor: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The three at 1 / `factor` of their size: averages of the mask's pixels in each block; a block
+    is usable if all of those are.
+    """
     if factor == 1:
         return image, mask, usable
     padded = [(0, -n % factor) for n in mask.shape]
-    rows, columns = ((n + extra) // factor for n, (_, extra) in zip(mask.shape, padded, strict=True))
+    rows, columns = (
+        (n + extra) // factor for n, (_, extra) in zip(mask.shape, padded, strict=True)
+    )
     shape = rows, factor, columns, factor
 
     def share(values: np.ndarray) -> np.ndarray:
@@ -245,7 +298,10 @@ def _blocks(image: np.ndarray, mask: np.ndarray, usable: np.ndarray, factor: int
 
     covered = share(mask)
     inside = covered > 0.5
-    whole = np.stack([share(image[..., c]) for c in range(3)], axis=2) / np.maximum(covered, _TINY)[..., None]
+    whole = (
+        np.stack([share(image[..., c]) for c in range(3)], axis=2)
+        / np.maximum(covered, _TINY)[..., None]
+    )
     if not inside.any():
         inside = covered > 0
     return np.where(inside[..., None], whole, 0), inside, inside & (share(mask & ~usable) == 0)
@@ -258,19 +314,30 @@ def _photo(image: np.ndarray, mask: np.ndarray, usable: np.ndarray) -> _Photo:
 
 
 def _paints(photo: _Photo, options: IscOptions) -> _Paints:
-    """The tables of `_Paints`, from bright and coloured pixels; chroma from those that show little candidate highlight."""
+    """The tables of `_Paints`, from bright and coloured pixels; chroma from those that show little
+    candidate highlight.
+    """
     mask, low, high, chroma = photo.mask, photo.low, photo.high, photo.chroma
-    grid = HueGrid((mask.shape[0], mask.shape[1]), max(options.cell * max(mask.shape), 1.0), options.hues)
+    grid = HueGrid(
+        (mask.shape[0], mask.shape[1]), max(options.cell * max(mask.shape), 1.0), options.hues
+    )
     places = _places(grid, photo, 1)
-    telling = (photo.usable & (low > photo.base) & (chroma > photo.base / 2))[mask].astype(np.float32)
-    bins = np.minimum((_BINS * low[mask] / np.maximum(high[mask], _TINY)).astype(np.int64), _BINS - 1)
+    telling = (photo.usable & (low > photo.base) & (chroma > photo.base / 2))[mask].astype(
+        np.float32
+    )
+    bins = np.minimum(
+        (_BINS * low[mask] / np.maximum(high[mask], _TINY)).astype(np.int64), _BINS - 1
+    )
     near, everywhere = grid.histograms(places, bins, _BINS, telling)
     everywhere /= everywhere.sum(axis=-1, keepdims=True)
     near += options.borrowed * everywhere
     share = quantile(near, options.low_quantile)
     found = _specular(low[mask], chroma[mask], places.read(share))
     telling *= np.exp(-np.square(found / np.maximum(0.1 * high[mask], _TINY)))
-    bins = np.minimum((np.clip(chroma[mask] / photo.peak, 0, 1) * (_CHROMA_BINS - 0.01)).astype(np.int64), _CHROMA_BINS - 1)
+    bins = np.minimum(
+        (np.clip(chroma[mask] / photo.peak, 0, 1) * (_CHROMA_BINS - 0.01)).astype(np.int64),
+        _CHROMA_BINS - 1,
+    )
     near, everywhere = grid.histograms(places, bins, _CHROMA_BINS, telling)
     everywhere /= everywhere.sum(axis=-1, keepdims=True)
     near += 20 * everywhere
@@ -278,13 +345,20 @@ def _paints(photo: _Photo, options: IscOptions) -> _Paints:
 
 
 def _places(grid: HueGrid, photo: _Photo, scale: float) -> Places:
-    """Of the mask's pixels; `scale`: how many of them to a pixel of the photo that the grid is of."""
+    """Of the mask's pixels;
+
+    `scale`: how many of them to a pixel of the photo that the grid is of.
+    """
     rows, columns = np.nonzero(photo.mask)
-    return grid.places((rows + 0.5) / scale - 0.5, (columns + 0.5) / scale - 0.5, photo.hue[photo.mask])
+    return grid.places(
+        (rows + 0.5) / scale - 0.5, (columns + 0.5) / scale - 0.5, photo.hue[photo.mask]
+    )
 
 
 def _specular(low: np.ndarray, chroma: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """s = min I - q C, within [0, min I], for a paint whose smallest channel is `share` of its largest."""
+    """s = min I - q C, within [0, min I], for a paint whose smallest channel is `share` of its
+    largest.
+    """
     return np.clip(low - _ratio(share) * chroma, 0, low)
 
 
@@ -301,11 +375,21 @@ def _spread(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 def _judge(photo: _Photo, paints: _Paints, options: IscOptions) -> _Judged:
     """Both candidates and what the evidence leaves of them."""
-    hue_share, usual_chroma = (_spread(paints.places.read(table), photo.mask) for table in (paints.share, photo.peak * paints.chroma))
+    hue_share, usual_chroma = (
+        _spread(paints.places.read(table), photo.mask)
+        for table in (paints.share, photo.peak * paints.chroma)
+    )
     by_hue = _specular(photo.low, photo.chroma, hue_share)
     trust = far_from_borders(_chroma_steps(photo), photo.mask, blur=1.5, unit=0.6)
-    with ThreadPoolExecutor(1) as beside:  # filters release the interpreter's lock, and neither needs what the other finds
-        in_groups = beside.submit(grouped_specular, photo.image, photo.mask, photo.usable if photo.usable.any() else photo.mask)
+    with ThreadPoolExecutor(
+        1
+    ) as beside:  # filters release the interpreter's lock, and neither needs what the other finds
+        in_groups = beside.submit(
+            grouped_specular,
+            photo.image,
+            photo.mask,
+            photo.usable if photo.usable.any() else photo.mask,
+        )
         gain_by_hue = beside.submit(_gain_by_hue, photo, by_hue, hue_share, trust, options)
         by_place, gain_by_place, share = _by_place(photo, usual_chroma, trust, in_groups, options)
         return _Judged(by_hue, gain_by_hue.result(), by_place, gain_by_place, share)
@@ -313,18 +397,25 @@ def _judge(photo: _Photo, paints: _Paints, options: IscOptions) -> _Judged:
 
 def _chroma_steps(photo: _Photo) -> Steps:
     level = photo.chroma + _DARK * photo.peak
-    # Three standard deviations of the difference of two neighbours, whose noise the smoothing has brought down to a third.
+    # Three standard deviations of the difference of two neighbours, whose noise the smoothing has
+    # brought down to a third.
     floor = 3 * 0.3 * 1.4 * photo.noise / level / _CHROMA_STEP
     return steps_of([(np.log(level), _CHROMA_STEP)], photo.mask, floor)
 
 
-def _gain_by_hue(photo: _Photo, candidate: np.ndarray, share: np.ndarray, trust: np.ndarray, options: IscOptions) -> np.ndarray:
-    """The share (H, W) of the candidate by hue that is kept: whether it is believed at all is decided for the object as a whole."""
+def _gain_by_hue(
+    photo: _Photo, candidate: np.ndarray, share: np.ndarray, trust: np.ndarray, options: IscOptions
+) -> np.ndarray:
+    """The share (H, W) of the candidate by hue that is kept: whether it is believed at all is
+    decided for the object as a whole.
+    """
     mask, low = photo.mask, photo.low
     bright = ramp(low / photo.base, options.bright)
     found = candidate * bright
     weight = np.where(mask, ramp(low / photo.base, (0.5, 1.2)), 0)
-    colour = (photo.chroma * weight).sum(dtype=float) / max((photo.high * weight).sum(dtype=float), float(_TINY))
+    colour = (photo.chroma * weight).sum(dtype=float) / max(
+        (photo.high * weight).sum(dtype=float), float(_TINY)
+    )
     scale = max(0.015 * photo.diagonal, 2.5)
     rough, rough_here = roughness(found, trust, mask, scale, fine=1.5)
     believed = float(ramp(colour, options.colourful) * ramp(rough, options.smooth))
@@ -341,21 +432,32 @@ def _mixing(photo: _Photo, found: np.ndarray, share: np.ndarray, trust: np.ndarr
     """The median paint mixing where the candidate `found` (H, W) is strong."""
     inside = np.where(photo.mask, found, 0)
     smooth = _carried_in(inside, np.square(trust), reach=4.0)
-    mixing = paint_mixing(smooth, photo.chroma, _ratio(share), photo.usable, max(0.03 * photo.diagonal, 2.5))
+    mixing = paint_mixing(
+        smooth, photo.chroma, _ratio(share), photo.usable, max(0.03 * photo.diagonal, 2.5)
+    )
     values = inside[photo.mask]
     return float(np.median(mixing[photo.mask][values >= 0.3 * np.quantile(values, 0.99)]))
 
 
 def _carried_in(found: np.ndarray, trust: np.ndarray, reach: float = 2.5) -> np.ndarray:
-    """`found` (H, W) where it can be trusted, and beside borders no more than around them, within `reach` pixels."""
+    """`found` (H, W) where it can be trusted, and beside borders no more than around them, within
+    `reach` pixels.
+    """
     around = weighted_gaussian(found, trust, reach, 1e-3)
     return trust * found + (1 - trust) * np.minimum(around, found)
 
 
 def _by_place(
-    photo: _Photo, usual_chroma: np.ndarray, trust: np.ndarray, in_groups: "Future[np.ndarray]", options: IscOptions
+    photo: _Photo,
+    usual_chroma: np.ndarray,
+    trust: np.ndarray,
+    in_groups: "Future[np.ndarray]",
+    options: IscOptions,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The candidate by place, its gain and the paint's min / max, all (H, W); `in_groups`: what `grouped_specular` is to find."""
+    """The candidate by place, its gain and the paint's min / max, all (H, W);
+
+    `in_groups`: what `grouped_specular` is to find.
+    """
     mask = photo.mask
     smooth = np.where(mask[..., None], masked_gaussian(photo.image, mask, _BY_PLACE), 0)
     low, high = smallest(smooth), largest(smooth)
@@ -368,17 +470,26 @@ def _by_place(
     off = np.clip((seen_ratio - ratio) / np.maximum(ratio, np.float32(1e-3)), -1, 1)
     scatter = np.sqrt(paths.weighted(np.square(off), weight * (off <= 0)))
     candidate = np.where(mask, np.clip(low - ratio * chroma, 0, low), 0)
-    error = np.hypot(np.hypot(scatter, options.scatter_here) * (low - candidate), 3 * photo.noise * (1 + ratio))
+    error = np.hypot(
+        np.hypot(scatter, options.scatter_here) * (low - candidate), 3 * photo.noise * (1 + ratio)
+    )
     gain = ramp(candidate / np.maximum(error, _TINY), (1.0, 3.0))
-    gain *= ramp(photo.chroma / np.maximum(usual_chroma, _TINY), options.present) * ramp(photo.low / photo.base, (0.5, 1.2))
+    gain *= ramp(photo.chroma / np.maximum(usual_chroma, _TINY), options.present) * ramp(
+        photo.low / photo.base, (0.5, 1.2)
+    )
     scale = max(0.015 * photo.diagonal, 2.5)
-    gain *= ramp(paint_mixing(candidate, photo.chroma, ratio, photo.usable, scale), options.unmixed_here)
+    gain *= ramp(
+        paint_mixing(candidate, photo.chroma, ratio, photo.usable, scale), options.unmixed_here
+    )
     safe = gain * trust * ramp(1 - share, options.coloured)
     _, rough_here = roughness(candidate * safe, trust, mask, scale, fine=1.5)
     agreed = np.minimum(gain, in_groups.result() / np.maximum(candidate, _TINY))
     proven = np.where(mask, np.maximum(safe * ramp(rough_here, options.smooth_by_place), agreed), 0)
-    # A highlight fades out: around what is proven, what would not be enough by itself belongs to it.
-    around = ndimage.maximum_filter(ramp(proven, options.proven), 2 * round(_NEARBY * photo.diagonal) + 1)
+    # A highlight fades out: around what is proven, what would not be enough by itself belongs to
+    # it.
+    around = ndimage.maximum_filter(
+        ramp(proven, options.proven), 2 * round(_NEARBY * photo.diagonal) + 1
+    )
     faint = trust * ramp(candidate / np.maximum(error, _TINY), options.faint)
     faint *= ramp(photo.chroma / np.maximum(usual_chroma, _TINY), options.present)
     return candidate, np.where(mask, np.maximum(proven, np.minimum(faint, around)), 0), share
@@ -390,7 +501,9 @@ def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Phot
     free = smooth - low[..., None]
     shares = free / (free.sum(axis=2) + np.float32(dark))[..., None]
     reach = _REACH * photo.diagonal
-    steps = steps_of([(shares, _SHARE_STEP), (np.log(chroma + dark), _CHROMA_STEP)], photo.mask, _SMALLEST_STEP)
+    steps = steps_of(
+        [(shares, _SHARE_STEP), (np.log(chroma + dark), _CHROMA_STEP)], photo.mask, _SMALLEST_STEP
+    )
     across, down = 1 + reach * steps.across, 1 + reach * steps.down
     across[:, 1:][photo.mask[:, 1:] != photo.mask[:, :-1]] = 1e6
     down[1:][photo.mask[1:] != photo.mask[:-1]] = 1e6
@@ -402,7 +515,8 @@ def _carried_over(full: _Photo, paints: _Paints, judged: _Judged, factor: int) -
     mask = full.mask
     hue_share = _spread(_places(paints.grid, full, factor).read(paints.share), mask)
     gain_by_hue, gain_by_place, share = (
-        enlarged(layer, mask.shape, factor) for layer in (judged.gain_by_hue, judged.gain_by_place, judged.share)
+        enlarged(layer, mask.shape, factor)
+        for layer in (judged.gain_by_hue, judged.gain_by_place, judged.share)
     )
     by_hue = _specular(full.low, full.chroma, hue_share)
     by_place = _specular(full.low, full.chroma, share)
@@ -418,7 +532,8 @@ def _at_odds(gain: np.ndarray, prior: np.ndarray | None) -> np.ndarray:
 
 
 def _confidence(photo: _Photo, specular: np.ndarray) -> np.ndarray:
-    """exp(-e / u) (H, W): e, the error to be expected, is a share of what was removed and of what could hide in the smallest channel.
+    """exp(-e / u) (H, W): e, the error to be expected, is a share of what was removed and of what
+    could hide in the smallest channel.
 
     On a pale object colour tells little, and e is up to three times as large.
     """

@@ -1,24 +1,31 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by eroding the angle between colour and white along surfaces of one hue (Mallick et al. 2006).
+"""Removes highlights by eroding the angle between colour and white along surfaces of one hue
+(Mallick et al. 2006).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one photo.
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+photo.
 
-Equation: in axes S, U, V with S along white, s changes S alone. With rho = hypot(U, V), hue theta = atan2(V, U) and
-phi = atan2(S, rho), a highlight is a hill of phi on a plain, as phi of diffuse pixels of one colour is constant. The hill is eroded,
+Equation: in axes S, U, V with S along white, s changes S alone. With rho = hypot(U, V), hue theta =
+atan2(V, U) and phi = atan2(S, rho), a highlight is a hill of phi on a plain, as phi of diffuse
+pixels of one colour is constant. The hill is eroded,
     phi_t = -g sqrt(grad phi' M grad phi),   g = tanh(rho / 2 rho_0) / (1 + exp(|grad rho| - tau)),
-with rho in 8-bit levels; M = 1 where the hue is constant, else the projection on the line of constant hue, along which alone a
-textured surface has one colour. At the end S_D = rho tan(phi) and s = (S - S_D) / sqrt(3).
-Scheme: upwind differences (Rouy & Tourin 1992) and explicit steps; along lines of constant hue by bilinear samples one pixel apart.
+with rho in 8-bit levels; M = 1 where the hue is constant, else the projection on the line of
+constant hue, along which alone a textured surface has one colour. At the end S_D = rho tan(phi) and
+s = (S - S_D) / sqrt(3). Scheme: upwind differences (Rouy & Tourin 1992) and explicit steps; along
+lines of constant hue by bilinear samples one pixel apart.
 
-Citation: S. P. Mallick, T. Zickler, P. N. Belhumeur and D. J. Kriegman, "Specularity removal in images and videos: a PDE approach",
-ECCV 2006, LNCS 3951, 550-563, doi:10.1007/11744023_43. Ours, as options: hue and rho are smoothed before they are differentiated; part
-of the erosion is taken back by a dilation with the same g (an opening), which restores what never was a hill; and only pixels whose
-smallest channel is above its mean lose specular, unless all of these together show too little colour to be told from white paint. And on
-large photos s is found on averages over 2 x 2 pixels, repeatedly, and interpolated, so that highlights that grow with the photo still go.
+Citation: S. P. Mallick, T. Zickler, P. N. Belhumeur and D. J. Kriegman, "Specularity removal in
+images and videos: a PDE approach", ECCV 2006, LNCS 3951, 550-563, doi:10.1007/11744023_43. Ours, as
+options: hue and rho are smoothed before they are differentiated; part of the erosion is taken back
+by a dilation with the same g (an opening), which restores what never was a hill; and only pixels
+whose smallest channel is above its mean lose specular, unless all of these together show too little
+colour to be told from white paint. And on large photos s is found on averages over 2 x 2 pixels,
+repeatedly, and interpolated, so that highlights that grow with the photo still go.
 
-Limits: the light must be white. Erosion has no steady state but the minimum of every region: steps * step is the radius, in pixels, of
-the highlights that it removes, and noise and paler patches of that size go with them. A highlight that touches no diffuse pixel of its
-colour, or lies on grey, stays.
+Limits: the light must be white. Erosion has no steady state but the minimum of every region: steps
+* step is the radius, in pixels, of the highlights that it removes, and noise and paler patches of
+that size go with them. A highlight that touches no diffuse pixel of its colour, or lies on grey,
+stays.
 """
 
 import math
@@ -39,19 +46,20 @@ from .layers import bright_layers
 
 @dataclass(frozen=True)
 class Mallick2006Options:
-    """`steps`, `step`: how many erosion steps, >= 0, of which length in pixels, in (0, .7]; their product is about the radius of the
-    highlights that go.
-    `longest`: objects with a longer side, in pixels, are averaged over blocks down to this, and those blocks are the pixels that all
-    lengths here mean; >= 16, or None for the published method.
-    `restoring_steps`: steps of dilation that follow, >= 0. Zero is the published erosion, `steps` an opening.
-    `smoothing`: standard deviation, in pixels, of the Gaussian that hue and rho get before they are differentiated; >= 0.
-    `edge`: tau, where |grad rho| stops the erosion, in 1/255 of the mask's largest value a pixel; >= 0.
-    `chroma`: rho_0, the rho below which it slows down, in the same levels; > 0.
-    `texture`: |grad theta|, in radians a pixel, above which it runs along lines of constant hue alone; > 0.
-    `bright_saturation`: nothing is removed if the colour (largest minus smallest channel) of the pixels whose smallest channel is above
-    the mean is less than this share of their largest channel, in [0, 1]. Zero is the published method.
-    `fade`: s grows from none where the smallest channel is at its mean to all of it at 1 + fade times the mean; > 0, or None for the
-    published method, which takes all of it everywhere.
+    """`steps`, `step`: how many erosion steps, >= 0, of which length in pixels, in (0, .7]; their
+    product is about the radius of the highlights that go. `longest`: objects with a longer side, in
+    pixels, are averaged over blocks down to this, and those blocks are the pixels that all lengths
+    here mean; >= 16, or None for the published method. `restoring_steps`: steps of dilation that
+    follow, >= 0. Zero is the published erosion, `steps` an opening. `smoothing`: standard
+    deviation, in pixels, of the Gaussian that hue and rho get before they are differentiated; >= 0.
+    `edge`: tau, where |grad rho| stops the erosion, in 1/255 of the mask's largest value a pixel;
+    >= 0. `chroma`: rho_0, the rho below which it slows down, in the same levels; > 0. `texture`:
+    |grad theta|, in radians a pixel, above which it runs along lines of constant hue alone; > 0.
+    `bright_saturation`: nothing is removed if the colour (largest minus smallest channel) of the
+    pixels whose smallest channel is above the mean is less than this share of their largest
+    channel, in [0, 1]. Zero is the published method. `fade`: s grows from none where the smallest
+    channel is at its mean to all of it at 1 + fade times the mean; > 0, or None for the published
+    method, which takes all of it everywhere.
     """
 
     steps: int = 30
@@ -68,7 +76,15 @@ class Mallick2006Options:
 
 VARIANTS: dict[str, Mallick2006Options] = {
     "improved": Mallick2006Options(),
-    "paper": Mallick2006Options(restoring_steps=0, smoothing=0, edge=3, chroma=1, bright_saturation=0, fade=None, longest=None),
+    "paper": Mallick2006Options(
+        restoring_steps=0,
+        smoothing=0,
+        edge=3,
+        chroma=1,
+        bright_saturation=0,
+        fade=None,
+        longest=None,
+    ),
 }
 
 _LEVELS = 255.0
@@ -87,12 +103,14 @@ def separate(
 ) -> Separation:
     """Splits a photo under white light into diffuse and specular.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above what
-    was recorded: the erosion goes around them. Inside the mask 0 <= diffuse <= image; specular has three equal channels; the residual is
-    zero but where clipped. Confidence as in `layers`. `options` None: the improved variant. `monitor` hears of every step.
+    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
+    pixels whose true value lies above what was recorded: the erosion goes around them. Inside the
+    mask 0 <= diffuse <= image; specular has three equal channels; the residual is zero but where
+    clipped. Confidence as in `layers`. `options` None: the improved variant. `monitor` hears of
+    every step.
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are negative or not finite, or no colour at
-    all; `Cancelled`.
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
+    negative or not finite, or no colour at all; `Cancelled`.
     """
     options, monitor = options or Mallick2006Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)
@@ -104,13 +122,17 @@ def separate(
         specular[box] = _specular_of(seen[box], linear[box], options, monitor)
         return specular
 
-    return bright_layers(image, mask, clipped, find, least_saturation=options.bright_saturation, fade=options.fade)
+    return bright_layers(
+        image, mask, clipped, find, least_saturation=options.bright_saturation, fade=options.fade
+    )
 
 
 def _check_options(options: Mallick2006Options) -> None:
     if options.steps < 0 or options.restoring_steps < 0 or not 0 < options.step <= 0.7:
         raise InputError("steps and restoring_steps must be at least 0, step within (0, 0.7]")
-    if not (options.smoothing >= 0 and options.edge >= 0 and options.chroma > 0 and options.texture > 0):
+    if not (
+        options.smoothing >= 0 and options.edge >= 0 and options.chroma > 0 and options.texture > 0
+    ):
         raise InputError("smoothing and edge must be at least 0, chroma and texture above 0")
     if not 0 <= options.bright_saturation <= 1 or not (options.fade is None or options.fade > 0):
         raise InputError("bright_saturation must be within [0, 1], fade above 0 or none")
@@ -118,8 +140,12 @@ def _check_options(options: Mallick2006Options) -> None:
         raise InputError("longest must be at least 16 pixels, or none")
 
 
-def _specular_of(image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor) -> np.ndarray:
-    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`, with no more pixels a side than the options allow."""
+def _specular_of(
+    image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor
+) -> np.ndarray:
+    """Specular (H, W) of `image` (H, W, 3), zero outside `mask`, with no more pixels a side than
+    the options allow.
+    """
     if options.longest is None or max(mask.shape) <= options.longest:
         return _hills(image, mask, options, monitor)
     averages, share = pull(image.astype(np.float32), mask.astype(np.float32))
@@ -128,7 +154,9 @@ def _specular_of(image: np.ndarray, mask: np.ndarray, options: Mallick2006Option
     return np.where(mask, push(*nothing, coarse[..., None])[..., 0], 0)
 
 
-def _hills(image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor) -> np.ndarray:
+def _hills(
+    image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, monitor: Monitor
+) -> np.ndarray:
     """Specular (H, W) of `image` (H, W, 3), zero outside `mask`: what erosion takes off."""
     framed = np.pad(mask, 1)
     scale = _LEVELS / image[mask].max()
@@ -143,7 +171,15 @@ def _hills(image: np.ndarray, mask: np.ndarray, options: Mallick2006Options, mon
     eroded = _evolved(phi, speed, across, down, options.steps, options.step, monitor.part(0, 0.7))
     if options.restoring_steps:
         upside_down = np.where(framed, -eroded, _FAR)
-        restored = -_evolved(upside_down, speed, across, down, options.restoring_steps, options.step, monitor.part(0.7, 1))
+        restored = -_evolved(
+            upside_down,
+            speed,
+            across,
+            down,
+            options.restoring_steps,
+            options.step,
+            monitor.part(0.7, 1),
+        )
         eroded = np.minimum(restored, phi)
     lower = framed & (eroded < phi)
     diffuse = np.where(lower, rho * np.tan(np.where(lower, eroded, 0)), s)
@@ -162,12 +198,16 @@ def _smoothed(values: np.ndarray, mask: np.ndarray, deviation: float) -> np.ndar
 def _flow(
     rho: np.ndarray, u: np.ndarray, v: np.ndarray, mask: np.ndarray, options: Mallick2006Options
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Speed g and the unit direction (x, y) of constant hue, zero where the hue is even; each (H, W) float32.
+    """Speed g and the unit direction (x, y) of constant hue, zero where the hue is even; each (H,
+    W) float32.
 
-    `rho` is every pixel's own, so that grey ones stay; `u`, `v` are the smoothed ones that are differentiated.
+    `rho` is every pixel's own, so that grey ones stay; `u`, `v` are the smoothed ones that are
+    differentiated.
     """
     speed, across, down = np.zeros_like(u), np.zeros_like(u), np.zeros_like(u)
-    _measure_flow(rho, u, v, mask, options.edge, options.chroma, options.texture, speed, across, down)
+    _measure_flow(
+        rho, u, v, mask, options.edge, options.chroma, options.texture, speed, across, down
+    )
     return speed, across, down
 
 
@@ -184,15 +224,26 @@ def _measure_flow(own_rho, u, v, mask, edge, chroma, texture, speed, across, dow
             ux, vx = (u[y, right] - u[y, left]) / 2, (v[y, right] - v[y, left]) / 2
             uy, vy = (u[below, x] - u[above, x]) / 2, (v[below, x] - v[above, x]) / 2
             slope = math.hypot(u[y, x] * ux + v[y, x] * vx, u[y, x] * uy + v[y, x] * vy) / rho
-            speed[y, x] = math.tanh(own_rho[y, x] / (2 * chroma)) / (1 + math.exp(min(slope - edge, 50.0)))
-            turn_x, turn_y = (u[y, x] * vx - v[y, x] * ux) / rho**2, (u[y, x] * vy - v[y, x] * uy) / rho**2
+            speed[y, x] = math.tanh(own_rho[y, x] / (2 * chroma)) / (
+                1 + math.exp(min(slope - edge, 50.0))
+            )
+            turn_x, turn_y = (
+                (u[y, x] * vx - v[y, x] * ux) / rho**2,
+                (u[y, x] * vy - v[y, x] * uy) / rho**2,
+            )
             turn = math.hypot(turn_x, turn_y)
             if turn > texture:
                 across[y, x], down[y, x] = -turn_y / turn, turn_x / turn
 
 
 def _evolved(
-    phi: np.ndarray, speed: np.ndarray, across: np.ndarray, down: np.ndarray, steps: int, step: float, monitor: Monitor
+    phi: np.ndarray,
+    speed: np.ndarray,
+    across: np.ndarray,
+    down: np.ndarray,
+    steps: int,
+    step: float,
+    monitor: Monitor,
 ) -> np.ndarray:
     """`phi` (H, W) after erosion. Its frame, and whatever does not move, keep their values."""
     here, there = phi.astype(np.float32), phi.astype(np.float32)

@@ -1,15 +1,19 @@
-"""Separation by what rendered objects have taught: the layers of `layer_network`, brought to a photo of any size.
+"""Separation by what rendered objects have taught: the layers of `layer_network`, brought to a
+photo of any size.
 
-Problem: the network sees an object at the size it was fitted to; photos are larger, and their highlights have sharp edges.
+Problem: the network sees an object at the size it was fitted to; photos are larger, and their
+highlights have sharp edges.
 
-Equation: the photo, averaged so that the object is `long_side` pixels long, gives y = log(I / D) and the scale b of its error; y is carried
-to the photo's pixels linearly, and D = I exp(-y). What is below the network's own error says nothing: y is taken as max(y - d b, 0) of
-d = `doubt`. What is taken off so is held to the colours of light, see `light_tint`. Confidence is 1 / (1 + e / u): e = D b, the error to be
-expected, u a tenth of the mean light.
+Equation: the photo, averaged so that the object is `long_side` pixels long, gives y = log(I / D)
+and the scale b of its error; y is carried to the photo's pixels linearly, and D = I exp(-y). What
+is below the network's own error says nothing: y is taken as max(y - d b, 0) of d = `doubt`. What is
+taken off so is held to the colours of light, see `light_tint`. Confidence is 1 / (1 + e / u): e = D
+b, the error to be expected, u a tenth of the mean light.
 
 Citation: see `layer_network`.
 
-Limits: those of the network; an object of few pixels is seen as it is. Clipped pixels: see `clipped`.
+Limits: those of the network; an object of few pixels is seen as it is. Clipped pixels: see
+`clipped`.
 """
 
 from dataclasses import replace
@@ -40,13 +44,16 @@ def separate(
     monitor: Monitor | None = None,
     network: LayerNetwork | None = None,
 ) -> Separation:
-    """Splits `image` (H, W, 3), linear, inside `mask` (H, W) bool; `clipped` (H, W) bool. `network`: the shipped one if None.
+    """Splits `image` (H, W, 3), linear, inside `mask` (H, W) bool; `clipped` (H, W) bool.
+    `network`: the shipped one if None.
 
     Raises `InputError` for unfit options and arrays, `Cancelled`.
     """
     options, monitor = options or NetworkOptions(), monitor or Monitor()
     if options.long_side < STRIDE or options.doubt < 0 or not options.tint >= 1:
-        raise InputError(f"the network needs a long side of {STRIDE} pixels or more, a doubt of 0 or more, and a tint of 1 or more")
+        raise InputError(
+            f"the network needs a long side of {STRIDE} pixels or more, a doubt of 0 or more, and a tint of 1 or more"
+        )
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
     excess, error = log_ratio(image, mask, network or shipped_network(), options)

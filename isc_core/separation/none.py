@@ -7,11 +7,15 @@ from .checks import check_arrays
 
 
 def separate(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None) -> Separation:
-    """`image` (H, W, 3) and `mask` (H, W) bool as everywhere. Confidence is 1 in the mask, 0 where `clipped`.
+    """`image` (H, W, 3) and `mask` (H, W) bool as everywhere. Confidence is 1 in the mask, 0 where
+    `clipped`.
 
-    Raises `InputError` for unfit shapes, an empty mask, or values inside the mask that are negative or not finite.
+    Raises `InputError` for unfit shapes, an empty mask, or values inside the mask that are negative
+    or not finite.
     """
     check_arrays(image, mask, clipped)
     trusted = mask if clipped is None else mask & ~clipped
     diffuse = np.where(mask[..., None], image, 0).astype(np.float32)
-    return Separation(diffuse, np.zeros_like(diffuse), np.zeros_like(diffuse), trusted.astype(np.float32))
+    return Separation(
+        diffuse, np.zeros_like(diffuse), np.zeros_like(diffuse), trusted.astype(np.float32)
+    )

@@ -1,4 +1,6 @@
-"""Options of a separation method as people write them, `name=value`, typed as the method's dataclass says."""
+"""Options of a separation method as people write them, `name=value`, typed as the method's
+dataclass says.
+"""
 
 import math
 import types
@@ -12,10 +14,14 @@ _WORDS = {"true": True, "yes": True, "on": True, "false": False, "no": False, "o
 _KINDS = {bool: "yes or no", int: "a whole number", float: "a number", str: "a word"}
 
 
-def parse_changes(method: str, variant: str = IMPROVED, words: Iterable[str] = ()) -> dict[str, object]:
-    """`separate`'s `changes` from words like `levels=3`; of two for the same option the last counts.
+def parse_changes(
+    method: str, variant: str = IMPROVED, words: Iterable[str] = ()
+) -> dict[str, object]:
+    """`separate`'s `changes` from words like `levels=3`; of two for the same option the last
+    counts.
 
-    Raises `InputError` for an unknown method, variant or option, and a value that is not of the option's type.
+    Raises `InputError` for an unknown method, variant or option, and a value that is not of the
+    option's type.
     """
     usual = method_options(method, variant)
     kinds = {} if usual is None else typing.get_type_hints(type(usual))
@@ -30,8 +36,14 @@ def parse_changes(method: str, variant: str = IMPROVED, words: Iterable[str] = (
 
 
 def _value(text: str, kind: object, what: str) -> object:
-    """`text` as the type `kind`: bool, int, float, str, a `Literal`, or a union of them, in which `none` is None."""
-    choices = list(typing.get_args(kind)) if typing.get_origin(kind) in (typing.Union, types.UnionType) else [kind]
+    """`text` as the type `kind`: bool, int, float, str, a `Literal`, or a union of them, in which
+    `none` is None.
+    """
+    choices = (
+        list(typing.get_args(kind))
+        if typing.get_origin(kind) in (typing.Union, types.UnionType)
+        else [kind]
+    )
     if types.NoneType in choices and text.lower() == "none":
         return None
     for choice in choices:
@@ -46,8 +58,17 @@ def _one(text: str, kind: object) -> object | None:
     if typing.get_origin(kind) is typing.Literal:
         return next((value for value in typing.get_args(kind) if str(value) == text), None)
     if typing.get_origin(kind) is tuple:
-        parts = [_one(piece.strip(), part) for piece, part in zip(text.split(","), typing.get_args(kind), strict=False)]
-        return None if None in parts or len(parts) != len(typing.get_args(kind)) or text.count(",") >= len(parts) else tuple(parts)
+        parts = [
+            _one(piece.strip(), part)
+            for piece, part in zip(text.split(","), typing.get_args(kind), strict=False)
+        ]
+        return (
+            None
+            if None in parts
+            or len(parts) != len(typing.get_args(kind))
+            or text.count(",") >= len(parts)
+            else tuple(parts)
+        )
     if kind is bool:
         return _WORDS.get(text.lower())
     if kind is str:

@@ -1,18 +1,22 @@
 """Removes highlights by the intensity ratio of clustered pixels (Shen & Zheng 2013).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one photo.
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+photo.
 
-Equation: adding s leaves max I - min I alone, so the ratio r = max I / (max I - min I) is smallest, r_D, where a surface
-colour shows no highlight, and s = max I - r_D (max I - min I). Pixels with like colours (in the smallest and largest
-chromaticity of I - min I + u, which hardly depends on s) form a cluster; r_D is the median ratio of the cluster.
+Equation: adding s leaves max I - min I alone, so the ratio r = max I / (max I - min I) is smallest,
+r_D, where a surface colour shows no highlight, and s = max I - r_D (max I - min I). Pixels with
+like colours (in the smallest and largest chromaticity of I - min I + u, which hardly depends on s)
+form a cluster; r_D is the median ratio of the cluster.
 
-Citation: H.-L. Shen and Z.-H. Zheng, "Real-time highlight removal using intensity ratio", Applied Optics 52(19), 4483-4493
-(2013), doi:10.1364/AO.52.004483. u = mean(min I). Ours, as options: statistics of the mask instead of the frame; nothing is removed
-where the pixels with min I > u show too little colour to be told from white paint; and s fades in above u, where the published s jumps.
+Citation: H.-L. Shen and Z.-H. Zheng, "Real-time highlight removal using intensity ratio", Applied
+Optics 52(19), 4483-4493 (2013), doi:10.1364/AO.52.004483. u = mean(min I). Ours, as options:
+statistics of the mask instead of the frame; nothing is removed where the pixels with min I > u show
+too little colour to be told from white paint; and s fades in above u, where the published s jumps.
 
-Limits: the light must be white. The median assumes that highlights cover less than half of a cluster's bright coloured pixels. A
-grey surface cannot be told from a highlight by colour: pale objects are left as they are; grey paint in the cluster of a stronger
-colour is darkened. There is no spatial term, so borders of highlights can show.
+Limits: the light must be white. The median assumes that highlights cover less than half of a
+cluster's bright coloured pixels. A grey surface cannot be told from a highlight by colour: pale
+objects are left as they are; grey paint in the cluster of a stronger colour is darkened. There is
+no spatial term, so borders of highlights can show.
 """
 
 from dataclasses import dataclass
@@ -30,13 +34,15 @@ from .layers import DOUBT
 
 @dataclass(frozen=True)
 class Shen2013Options:
-    """`cluster_radius`: L1 distance in the chromaticity plane (values in [0, 1]) within which pixels found one cluster; > 0.
-    `ratio_quantile`: which quantile of a cluster's ratios is taken as the diffuse ratio, in [0, 1]; lower removes more.
-    `bright_saturation`: nothing is removed if the colour (largest minus smallest channel) of the pixels with min I > u is less than
-    this share of their largest channel, in [0, 1]. Zero is the published method, which takes pale objects for one large highlight.
-    `fade`: s grows from none at min I = u to all of it at (1 + fade) u; >= 0. Zero is the published method, with a jump at u.
-    `whole_frame`: statistics of the whole frame, as the mask-less public implementations have them, not of the mask.
-    `label_slip`: a pixel's cluster is the nearest but the first, and the second counts as the first: the slip of a public
+    """`cluster_radius`: L1 distance in the chromaticity plane (values in [0, 1]) within which
+    pixels found one cluster; > 0. `ratio_quantile`: which quantile of a cluster's ratios is taken
+    as the diffuse ratio, in [0, 1]; lower removes more. `bright_saturation`: nothing is removed if
+    the colour (largest minus smallest channel) of the pixels with min I > u is less than this share
+    of their largest channel, in [0, 1]. Zero is the published method, which takes pale objects for
+    one large highlight. `fade`: s grows from none at min I = u to all of it at (1 + fade) u; >= 0.
+    Zero is the published method, with a jump at u. `whole_frame`: statistics of the whole frame, as
+    the mask-less public implementations have them, not of the mask. `label_slip`: a pixel's cluster
+    is the nearest but the first, and the second counts as the first: the slip of a public
     implementation, kept so that its figures can be found again.
     """
 
@@ -57,8 +63,10 @@ VARIANTS: dict[str, Shen2013Options] = {
 
 @dataclass(frozen=True)
 class _Pixels:
-    """The pixels of the mask, or of the frame, in a row: `colours` (n, 3); `high`, `low` (n,) largest and smallest channel; `base` is u,
-    the mean of `low`; `usable` (n,) which of them are linear, i.e. not clipped, and may enter statistics."""
+    """The pixels of the mask, or of the frame, in a row: `colours` (n, 3); `high`, `low` (n,)
+    largest and smallest channel; `base` is u, the mean of `low`; `usable` (n,) which of them are
+    linear, i.e. not clipped, and may enter statistics.
+    """
 
     colours: np.ndarray
     high: np.ndarray
@@ -80,17 +88,19 @@ def separate(
 ) -> Separation:
     """Splits a photo under white light into diffuse and specular.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies
-    above what was recorded. Inside the mask 0 <= diffuse <= image and specular has three equal channels. `options` None: the improved
-    variant. The work is too short to report to `monitor`.
+    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
+    pixels whose true value lies above what was recorded. Inside the mask 0 <= diffuse <= image and
+    specular has three equal channels. `options` None: the improved variant. The work is too short
+    to report to `monitor`.
 
-    The residual is zero but where clipped: the method's equation does not hold there, so such pixels stay out of the statistics and
-    `clipped` explains them.
+    The residual is zero but where clipped: the method's equation does not hold there, so such
+    pixels stay out of the statistics and `clipped` explains them.
 
-    Confidence is exp(-e / u), e being the specular error to be expected: what was removed plus .3 min I, all of min I where the
-    object or a cluster was too grey to judge; 0 where clipped.
+    Confidence is exp(-e / u), e being the specular error to be expected: what was removed plus .3
+    min I, all of min I where the object or a cluster was too grey to judge; 0 where clipped.
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are negative or not finite, or no colour at all.
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
+    negative or not finite, or no colour at all.
     """
     del monitor
     options = options or Shen2013Options()
@@ -107,12 +117,19 @@ def separate(
 
 def _check_options(options: Shen2013Options) -> None:
     shares = (options.ratio_quantile, options.bright_saturation)
-    if not options.cluster_radius > 0 or not options.fade >= 0 or not all(0 <= share <= 1 for share in shares):
-        raise InputError("cluster_radius must be above 0, fade at least 0, ratio_quantile and bright_saturation within [0, 1]")
+    if (
+        not options.cluster_radius > 0
+        or not options.fade >= 0
+        or not all(0 <= share <= 1 for share in shares)
+    ):
+        raise InputError(
+            "cluster_radius must be above 0, fade at least 0, ratio_quantile and bright_saturation within [0, 1]"
+        )
 
 
 def _gather(image: np.ndarray, domain: np.ndarray, clipped: np.ndarray | None) -> _Pixels:
-    # Column by column: which pixel founds a cluster depends on the order, and the published figures come from this one.
+    # Column by column: which pixel founds a cluster depends on the order, and the published figures
+    # come from this one.
     colours = np.asarray(image, np.float32).transpose(1, 0, 2)[domain.T]
     colours = np.where(np.isfinite(colours), colours, 0)
     usable = np.ones(len(colours), bool) if clipped is None else ~clipped.T[domain.T]
@@ -136,23 +153,31 @@ def _specular_of(pixels: _Pixels, options: Shen2013Options) -> tuple[np.ndarray,
         if not len(telling):
             doubt[members] = pixels.low[members]
             continue
-        diffuse_ratio = np.quantile(pixels.high[telling] / pixels.chroma[telling], options.ratio_quantile)
+        diffuse_ratio = np.quantile(
+            pixels.high[telling] / pixels.chroma[telling], options.ratio_quantile
+        )
         removed = pixels.high[members] - diffuse_ratio * pixels.chroma[members]
-        specular[members] = np.clip(removed, 0, pixels.low[members]) * fade_in(pixels.low[members], float(pixels.base), options.fade)
+        specular[members] = np.clip(removed, 0, pixels.low[members]) * fade_in(
+            pixels.low[members], float(pixels.base), options.fade
+        )
     return specular, specular + doubt
 
 
 def _features(pixels: _Pixels, which: np.ndarray) -> np.ndarray:
-    """Smallest and largest chromaticity (m, 2) of the pseudo specular-free image I - min I + u, for the pixels `which` (m,)."""
+    """Smallest and largest chromaticity (m, 2) of the pseudo specular-free image I - min I + u, for
+    the pixels `which` (m,).
+    """
     lift = pixels.base - pixels.low[which]
     total = pixels.colours[which].sum(axis=1) + 3 * lift
     return np.stack([pixels.base / total, (pixels.high[which] + lift) / total], axis=1)
 
 
 def _cluster(features: np.ndarray, options: Shen2013Options) -> np.ndarray:
-    """Labels (n,) from 0: leaders in scan order gather all within `radius`, then every pixel goes to the nearest mean, once.
+    """Labels (n,) from 0: leaders in scan order gather all within `radius`, then every pixel goes
+    to the nearest mean, once.
 
-    Leaders lie further apart than the radius in a bounded plane, so there are only a few, and the loop is short.
+    Leaders lie further apart than the radius in a bounded plane, so there are only a few, and the
+    loop is short.
     """
     labels = np.full(len(features), -1)
     open_ = np.arange(len(features))
@@ -171,9 +196,16 @@ def _cluster(features: np.ndarray, options: Shen2013Options) -> np.ndarray:
 
 
 def _spread(
-    image: np.ndarray, mask: np.ndarray, domain: np.ndarray, specular: np.ndarray, error: np.ndarray, base: np.float32
+    image: np.ndarray,
+    mask: np.ndarray,
+    domain: np.ndarray,
+    specular: np.ndarray,
+    error: np.ndarray,
+    base: np.float32,
 ) -> Separation:
-    """Puts results of the domain's pixels, in column order, back into the frame, zero outside the mask."""
+    """Puts results of the domain's pixels, in column order, back into the frame, zero outside the
+    mask.
+    """
     white = np.zeros(mask.shape, np.float32)
     white.T[domain.T] = specular
     confidence = np.zeros(mask.shape, np.float32)

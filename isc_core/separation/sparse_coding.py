@@ -1,27 +1,34 @@
-"""Removes highlights by sparse coding over a dictionary learnt from specular-free images (the method SC of Akbar 2016).
+"""Removes highlights by sparse coding over a dictionary learnt from specular-free images (the
+method SC of Akbar 2016).
 
-Problem: a pixel is diffuse plus white specular. Write it as a code over one diffuse atom, the paint's colour, and the highlight atom.
+Problem: a pixel is diffuse plus white specular. Write it as a code over one diffuse atom, the
+paint's colour, and the highlight atom.
 
-Equation: in CIE XYZ, y = M I, the highlight atom is h = M (1, 1, 1) / |M (1, 1, 1)|. A specular-free image takes white off until what is
-left does not depend on the specular light: SF1 until the largest chromaticity has a fixed value (Tan & Ikeuchi), which leaves the hue,
-SF2 until the smallest channel is 0 (two-band), which leaves the magnitude too. All have the same part F across h as the photo; alpha =
-|F|, t = h.y. The dictionary has an atom a_k = F / |F| + R_k h for every hue k, R_k being a quantile of t / alpha over its pixels: what
-the paint shows alone. So
+Equation: in CIE XYZ, y = M I, the highlight atom is h = M (1, 1, 1) / |M (1, 1, 1)|. A
+specular-free image takes white off until what is left does not depend on the specular light: SF1
+until the largest chromaticity has a fixed value (Tan & Ikeuchi), which leaves the hue, SF2 until
+the smallest channel is 0 (two-band), which leaves the magnitude too. All have the same part F
+across h as the photo; alpha = |F|, t = h.y. The dictionary has an atom a_k = F / |F| + R_k h for
+every hue k, R_k being a quantile of t / alpha over its pixels: what the paint shows alone. So
 
     y = alpha a_k + beta h,     beta = max(0, t - R_k alpha),     diffuse = y - beta h.
 
-The code is sparse: beta is 0 but where beta > lambda t, and a group switches it on as a whole or not at all. A group is a connected
-region of active pixels without an edge of the specular-free images in it. White paint raises beta as well, but F changes with it; a
-highlight has its own edges of which F takes no notice, and F has edges of which beta takes none. A group's code is kept by the product
-of six ramps, see `_keep`: what cannot be identified is left alone. docs/methods/sparse_coding.md derives all of it.
+The code is sparse: beta is 0 but where beta > lambda t, and a group switches it on as a whole or
+not at all. A group is a connected region of active pixels without an edge of the specular-free
+images in it. White paint raises beta as well, but F changes with it; a highlight has its own edges
+of which F takes no notice, and F has edges of which beta takes none. A group's code is kept by the
+product of six ramps, see `_keep`: what cannot be identified is left alone.
+docs/methods/sparse_coding.md derives all of it.
 
-Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image", thesis (2016), of which only the outline
-(photo, n specular-free images, dictionary, sparse code, diffuse and specular) is public; the equations here are ours and so are the
-groups. SF1: R. T. Tan and K. Ikeuchi, IEEE TPAMI 27(2), 178-193 (2005), doi:10.1109/TPAMI.2005.36. SF2: K.-J. Yoon, Y. Choi and
-I. S. Kweon, ICIP 2006, doi:10.1109/ICIP.2006.312650. Groups: M. Yuan and Y. Lin, J. R. Statist. Soc. B 68(1), 49-67 (2006),
-doi:10.1111/j.1467-9868.2005.00532.x.
+Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image",
+thesis (2016), of which only the outline (photo, n specular-free images, dictionary, sparse code,
+diffuse and specular) is public; the equations here are ours and so are the groups. SF1: R. T. Tan
+and K. Ikeuchi, IEEE TPAMI 27(2), 178-193 (2005), doi:10.1109/TPAMI.2005.36. SF2: K.-J. Yoon, Y.
+Choi and I. S. Kweon, ICIP 2006, doi:10.1109/ICIP.2006.312650. Groups: M. Yuan and Y. Lin, J. R.
+Statist. Soc. B 68(1), 49-67 (2006), doi:10.1111/j.1467-9868.2005.00532.x.
 
-Limits: the light must be white. Near-grey paint keeps its highlights. Broad sheen over most of a paint shifts R_k and stays.
+Limits: the light must be white. Near-grey paint keeps its highlights. Broad sheen over most of a
+paint shifts R_k and stays.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -39,28 +46,40 @@ from .checks import check_arrays, require_colour
 from .layers import diffuse_layers, white_layers
 from .smoothing import masked_gaussian
 
-# Linear Rec.709 to CIE XYZ, and what a specular light of 1 in each channel is there: its length and direction (the highlight atom).
-_XYZ = np.array([[0.4124564, 0.3575761, 0.1804375], [0.2126729, 0.7151522, 0.0721750], [0.0193339, 0.1191920, 0.9503041]])
+# Linear Rec.709 to CIE XYZ, and what a specular light of 1 in each channel is there: its length and
+# direction (the highlight atom).
+_XYZ = np.array(
+    [
+        [0.4124564, 0.3575761, 0.1804375],
+        [0.2126729, 0.7151522, 0.0721750],
+        [0.0193339, 0.1191920, 0.9503041],
+    ]
+)
 _WHITE = float(np.linalg.norm(_XYZ.sum(axis=1)))
 _HIGHLIGHT = _XYZ.sum(axis=1) / _WHITE
 _TINY = 1e-12
 # The plane across the highlight atom, in which paint and its specular-free images lie alike.
-_FIRST = np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0]) / np.linalg.norm(np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0]))
+_FIRST = np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0]) / np.linalg.norm(
+    np.cross(_HIGHLIGHT, [0.0, 0.0, 1.0])
+)
 _ACROSS = np.stack([_FIRST, np.cross(_HIGHLIGHT, _FIRST)])
-# The histogram of log(t / alpha): its range holds every colour from pure blue to grey within rounding.
+# The histogram of log(t / alpha): its range holds every colour from pure blue to grey within
+# rounding.
 _LOG_RATIOS = np.linspace(-1, 5, 241)
 _LOWER = 0.16  # this quantile lies one standard deviation below the median
 
 
 @dataclass(frozen=True)
 class SparseCodingOptions:
-    """`specular_free`: whose edges part the groups and count as evidence, those of "sf1" (hue), "sf2" (magnitude) or "both".
-    `hues`: how many atoms, equal angles of hue; >= 3. `ratio_quantile`: which quantile of t / alpha is R_k, in (0, 1).
-    `grouped`: whether groups of pixels switch the highlight atom on together, or every pixel for itself by an L1 penalty.
-    `sparsity`: lambda; the least share of its brightness that a pixel of a group has as highlight, or, not grouped, the L1 weight as a
-    share of the brightest pixels; in [0, 1). `edge`: least change, as a share of the highlight, that counts as an edge; in (0, 1).
-    `noise`: changes below this share of the brightest pixels are no edges; in [0, 1). `blur`: standard deviation, in pixels, of the
-    smoothing before codes are made; >= 0.
+    """`specular_free`: whose edges part the groups and count as evidence, those of "sf1" (hue),
+    "sf2" (magnitude) or "both". `hues`: how many atoms, equal angles of hue; >= 3.
+    `ratio_quantile`: which quantile of t / alpha is R_k, in (0, 1). `grouped`: whether groups of
+    pixels switch the highlight atom on together, or every pixel for itself by an L1 penalty.
+    `sparsity`: lambda; the least share of its brightness that a pixel of a group has as highlight,
+    or, not grouped, the L1 weight as a share of the brightest pixels; in [0, 1). `edge`: least
+    change, as a share of the highlight, that counts as an edge; in (0, 1). `noise`: changes below
+    this share of the brightest pixels are no edges; in [0, 1). `blur`: standard deviation, in
+    pixels, of the smoothing before codes are made; >= 0.
     """
 
     specular_free: str = "both"
@@ -81,8 +100,10 @@ VARIANTS: dict[str, SparseCodingOptions] = {
 
 @dataclass(frozen=True)
 class _Free:
-    """What highlights leave as it is: `alpha` (H, W), the length of a pixel's part across h, `hue` (H, W), its angle in turns, [0, 1).
-    And what they raise: `brightness` (H, W), t, the part along h. Zero outside `mask`."""
+    """What highlights leave as it is: `alpha` (H, W), the length of a pixel's part across h, `hue`
+    (H, W), its angle in turns, [0, 1). And what they raise: `brightness` (H, W), t, the part along
+    h. Zero outside `mask`.
+    """
 
     alpha: np.ndarray
     hue: np.ndarray
@@ -92,7 +113,11 @@ class _Free:
 
 @dataclass(frozen=True)
 class _Dictionary:
-    """Per hue (k,): `log_ratio`, log R_k, and `spread`, how far the ratios of paint without highlight scatter around it (log)."""
+    """Per hue (k,):
+
+    `log_ratio`, log R_k, and `spread`, how far the ratios of paint without highlight scatter around
+    it (log).
+    """
 
     log_ratio: np.ndarray
     spread: np.ndarray
@@ -107,9 +132,12 @@ class _Dictionary:
 
 @dataclass(frozen=True)
 class Stages:
-    """What the grouped code sees on its way, (H, W) each, 0 outside the mask. `hue`, in turns, and `alpha`: what highlights leave as it is;
-    `brightness`: t, the part along the highlight atom. `beta`: what each pixel by itself has too much of it for its paint's atom.
-    `group`: the number of the group that switches the highlight atom on, -1 for none. `code`: beta times what is kept of its group."""
+    """What the grouped code sees on its way, (H, W) each, 0 outside the mask. `hue`, in turns, and
+    `alpha`: what highlights leave as it is; `brightness`: t, the part along the highlight atom.
+    `beta`: what each pixel by itself has too much of it for its paint's atom. `group`: the number
+    of the group that switches the highlight atom on, -1 for none. `code`: beta times what is kept
+    of its group.
+    """
 
     hue: np.ndarray
     alpha: np.ndarray
@@ -133,11 +161,12 @@ def separate(
 ) -> Separation:
     """Splits a photo under white light into diffuse and specular.
 
-    `image` (H, W, 3), linear Rec.709, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above
-    what was recorded: they shape no atom. Inside the mask 0 <= diffuse <= image; what is outside has no influence.
+    `image` (H, W, 3), linear Rec.709, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool
+    marks pixels whose true value lies above what was recorded: they shape no atom. Inside the mask
+    0 <= diffuse <= image; what is outside has no influence.
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are negative or not finite, and a photo
-    without colour; `Cancelled` when the monitor says so.
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are
+    negative or not finite, and a photo without colour; `Cancelled` when the monitor says so.
     """
     options = options or VARIANTS["improved"]
     monitor = monitor or Monitor()
@@ -153,19 +182,25 @@ def separate(
     monitor.report("sparse codes", 0.4)
     if options.grouped:
         return white_layers(image, mask, _grouped(free, dictionary, options).specular, clipped)
-    return diffuse_layers(image, mask, _diffuse_of_pixels(image, free, dictionary, options), clipped)
+    return diffuse_layers(
+        image, mask, _diffuse_of_pixels(image, free, dictionary, options), clipped
+    )
 
 
 def grouped_specular(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> np.ndarray:
-    """The specular light (H, W), the same in all channels, that the improved variant finds in groups of pixels, before it is clamped.
+    """The specular light (H, W), the same in all channels, that the improved variant finds in
+    groups of pixels, before it is clamped.
 
-    `image` (H, W, 3), zero outside `mask` (H, W) bool; `telling` (H, W) bool, some of the mask: the pixels that shape the atoms.
+    `image` (H, W, 3), zero outside `mask` (H, W) bool; `telling` (H, W) bool, some of the mask: the
+    pixels that shape the atoms.
     """
     return stages(image, mask, telling).specular
 
 
 def stages(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> Stages:
-    """What the improved variant makes of an image on its way to `grouped_specular`; the same arguments."""
+    """What the improved variant makes of an image on its way to `grouped_specular`; the same
+    arguments.
+    """
     options = VARIANTS["improved"]
     free = _specular_free(image, mask, options.blur)
     return _grouped(free, _learn(free, telling, options), options)
@@ -173,9 +208,18 @@ def stages(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> Stages:
 
 def _check_options(options: SparseCodingOptions) -> None:
     if options.specular_free not in ("sf1", "sf2", "both"):
-        raise InputError(f'specular_free must be "sf1", "sf2" or "both", not {options.specular_free!r}')
-    if options.hues < 3 or not 0 < options.ratio_quantile < 1 or not 0 < options.edge < 1 or not 0 <= options.blur < np.inf:
-        raise InputError("hues must be at least 3, ratio_quantile and edge within (0, 1), blur at least 0")
+        raise InputError(
+            f'specular_free must be "sf1", "sf2" or "both", not {options.specular_free!r}'
+        )
+    if (
+        options.hues < 3
+        or not 0 < options.ratio_quantile < 1
+        or not 0 < options.edge < 1
+        or not 0 <= options.blur < np.inf
+    ):
+        raise InputError(
+            "hues must be at least 3, ratio_quantile and edge within (0, 1), blur at least 0"
+        )
     if not all(0 <= share < 1 for share in (options.sparsity, options.noise)):
         raise InputError("sparsity and noise must be within [0, 1)")
 
@@ -183,16 +227,26 @@ def _check_options(options: SparseCodingOptions) -> None:
 def _specular_free(image: np.ndarray, mask: np.ndarray, blur: float) -> _Free:
     pixel = np.where(mask[..., None], masked_gaussian(image, mask, blur), 0) @ _XYZ.T
     one, two = pixel @ _ACROSS[0], pixel @ _ACROSS[1]
-    return _Free(np.hypot(one, two), np.arctan2(two, one) / (2 * np.pi) % 1, pixel @ _HIGHLIGHT, mask)
+    return _Free(
+        np.hypot(one, two), np.arctan2(two, one) / (2 * np.pi) % 1, pixel @ _HIGHLIGHT, mask
+    )
 
 
 def _learn(free: _Free, telling: np.ndarray, options: SparseCodingOptions) -> _Dictionary:
-    """The atoms from the pixels `telling` (H, W) bool: quantiles of log(t / alpha) per hue, pixels weighted by alpha."""
+    """The atoms from the pixels `telling` (H, W) bool: quantiles of log(t / alpha) per hue, pixels
+    weighted by alpha.
+    """
     k = np.minimum((free.hue[telling] * options.hues).astype(int), options.hues - 1)
-    ratio = np.log(np.maximum(free.brightness[telling], _TINY) / np.maximum(free.alpha[telling], _TINY))
+    ratio = np.log(
+        np.maximum(free.brightness[telling], _TINY) / np.maximum(free.alpha[telling], _TINY)
+    )
     size = len(_LOG_RATIOS)
-    place = np.clip((ratio - _LOG_RATIOS[0]) / (_LOG_RATIOS[1] - _LOG_RATIOS[0]), 0, size - 1).astype(int)
-    votes = np.bincount(k * size + place, free.alpha[telling], options.hues * size).reshape(options.hues, size)
+    place = np.clip(
+        (ratio - _LOG_RATIOS[0]) / (_LOG_RATIOS[1] - _LOG_RATIOS[0]), 0, size - 1
+    ).astype(int)
+    votes = np.bincount(k * size + place, free.alpha[telling], options.hues * size).reshape(
+        options.hues, size
+    )
     summed = np.cumsum(ndimage.gaussian_filter1d(votes, 1.0, axis=0, mode="wrap"), axis=1)
 
     def quantile(q: float) -> np.ndarray:
@@ -202,11 +256,15 @@ def _learn(free: _Free, telling: np.ndarray, options: SparseCodingOptions) -> _D
     return _Dictionary(middle, np.maximum(middle - quantile(_LOWER), 0.02))
 
 
-def _diffuse_of_pixels(image: np.ndarray, free: _Free, dictionary: _Dictionary, options: SparseCodingOptions) -> np.ndarray:
-    """Diffuse (H, W, 3), linear RGB: each pixel coded by itself, 1/2 |y - a x - h z|^2 + l (x + z), x, z >= 0, with its hue's atom.
+def _diffuse_of_pixels(
+    image: np.ndarray, free: _Free, dictionary: _Dictionary, options: SparseCodingOptions
+) -> np.ndarray:
+    """Diffuse (H, W, 3), linear RGB: each pixel coded by itself, 1/2 |y - a x - h z|^2 + l (x + z),
+    x, z >= 0, with its hue's atom.
 
-    With unit atoms of inner product c the optimum with both active is x = (p - c q) / (1 - c^2), z = (q - c p) / (1 - c^2), where
-    p = a.y - l and q = h.y - l; if one is negative, the other alone is its p or q.
+    With unit atoms of inner product c the optimum with both active is x = (p - c q) / (1 - c^2), z
+    = (q - c p) / (1 - c^2), where p = a.y - l and q = h.y - l; if one is negative, the other alone
+    is its p or q.
     """
     k = np.minimum((free.hue * options.hues).astype(int), options.hues - 1)
     atom = _atoms((np.arange(options.hues) + 0.5) / options.hues, dictionary.log_ratio)[k]
@@ -219,9 +277,15 @@ def _diffuse_of_pixels(image: np.ndarray, free: _Free, dictionary: _Dictionary, 
 
 
 def _atoms(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
-    """Unit colours (..., 3) in XYZ of `hue` (...) in turns whose part along h is R times that across it."""
+    """Unit colours (..., 3) in XYZ of `hue` (...) in turns whose part along h is R times that
+    across it.
+    """
     angle = 2 * np.pi * hue[..., None]
-    colour = np.cos(angle) * _ACROSS[0] + np.sin(angle) * _ACROSS[1] + np.exp(log_ratio)[..., None] * _HIGHLIGHT
+    colour = (
+        np.cos(angle) * _ACROSS[0]
+        + np.sin(angle) * _ACROSS[1]
+        + np.exp(log_ratio)[..., None] * _HIGHLIGHT
+    )
     return colour / np.linalg.norm(colour, axis=-1, keepdims=True)
 
 
@@ -240,7 +304,9 @@ def _grouped(free: _Free, dictionary: _Dictionary, options: SparseCodingOptions)
     angle = 2 * np.pi * free.hue
     colour = np.stack([np.cos(angle), np.sin(angle), free.alpha, np.exp(log_ratio), beta], axis=2)
     watched = options.specular_free != "sf2", options.specular_free != "sf1"
-    names, number = np.unique(_groups(colour, active, watched, options.edge, floor)[active], return_inverse=True)
+    names, number = np.unique(
+        _groups(colour, active, watched, options.edge, floor)[active], return_inverse=True
+    )
     group[active] = number
     evidence = _evidence(colour, group, free.mask, watched, options.edge, floor, len(names))
     excess = np.log(free.brightness[active] / np.maximum(diffuse[active], _TINY))
@@ -255,8 +321,10 @@ def _grouped(free: _Free, dictionary: _Dictionary, options: SparseCodingOptions)
 
 @dataclass(frozen=True)
 class _Paint:
-    """Of each active pixel (n,): `saturation`, 1 - smallest / largest channel, of its atom; how far its atom's pixels `spread`, and how
-    far it lies above the atom, `excess`, both as logarithms of ratios."""
+    """Of each active pixel (n,): `saturation`, 1 - smallest / largest channel, of its atom; how far
+    its atom's pixels `spread`, and how far it lies above the atom, `excess`, both as logarithms of
+    ratios.
+    """
 
     saturation: np.ndarray
     spread: np.ndarray
@@ -268,13 +336,17 @@ def _saturation(hue: np.ndarray, log_ratio: np.ndarray) -> np.ndarray:
     return 1 - colour.min(axis=-1) / np.maximum(colour.max(axis=-1), _TINY)
 
 
-def _keep(group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarray, brightest: float) -> np.ndarray:
-    """How much of each group's code is kept, in [0, 1]: the product of six ramps over averages weighted by beta.
+def _keep(
+    group: np.ndarray, beta: np.ndarray, paint: _Paint, evidence: np.ndarray, brightest: float
+) -> np.ndarray:
+    """How much of each group's code is kept, in [0, 1]: the product of six ramps over averages
+    weighted by beta.
 
-    `group`, `beta` (n,) of the active pixels; `evidence` (5, groups) as in `_evidence`; `brightest`: of the object's t. Each ramp asks
-    one question: is the paint coloured, so that it can be told from white; are the atom's other pixels of one paint; does the group
-    stand out from them; is it bright, as the image of a lamp is; does its brightness change where the specular-free images do not; and
-    does it fade at its border, as light does and paint does not.
+    `group`, `beta` (n,) of the active pixels; `evidence` (5, groups) as in `_evidence`;
+    `brightest`: of the object's t. Each ramp asks one question: is the paint coloured, so that it
+    can be told from white; are the atom's other pixels of one paint; does the group stand out from
+    them; is it bright, as the image of a lamp is; does its brightness change where the
+    specular-free images do not; and does it fade at its border, as light does and paint does not.
     """
     total = np.maximum(np.bincount(group, beta), _TINY)
 
@@ -298,10 +370,12 @@ def _ramp(value: np.ndarray, none: float, full: float) -> np.ndarray:
 
 @compiled
 def _change(colour, watched, y, x, v, u):
-    """Between two pixels: the change of the specular-free images in units of beta, the step of beta, and the larger beta.
+    """Between two pixels: the change of the specular-free images in units of beta, the step of
+    beta, and the larger beta.
 
-    `colour` (H, W, 5): cosine and sine of the hue, alpha, R, beta. |F - F'|^2 = (alpha - alpha')^2 + alpha alpha' |u - u'|^2 for unit
-    vectors u of the hue: the second part is SF1's, the first one SF2's; `watched` says which count.
+    `colour` (H, W, 5): cosine and sine of the hue, alpha, R, beta. |F - F'|^2 = (alpha - alpha')^2
+    + alpha alpha' |u - u'|^2 for unit vectors u of the hue: the second part is SF1's, the first one
+    SF2's; `watched` says which count.
     """
     one, two = colour[y, x], colour[v, u]
     square = 0.0
@@ -322,7 +396,9 @@ def _root(parent, pixel):
 
 @compiled
 def _groups(colour, active, watched, edge, floor):
-    """Of each pixel (H, W) the first one, as row * W + column, of the region that it is connected with; edges and inactive pixels part."""
+    """Of each pixel (H, W) the first one, as row * W + column, of the region that it is connected
+    with; edges and inactive pixels part.
+    """
     height, width = active.shape
     parent = np.arange(height * width)
     for y in range(height):
@@ -340,8 +416,10 @@ def _groups(colour, active, watched, edge, floor):
 
 @compiled
 def _evidence(colour, group, mask, watched, edge, floor, count):
-    """Sums (5, count) over the neighbours of each group: changes of beta that speak for light and for paint, steps of beta at the
-    border, how many neighbours the border has, and the largest beta. `group` (H, W) is -1 where not active."""
+    """Sums (5, count) over the neighbours of each group: changes of beta that speak for light and
+    for paint, steps of beta at the border, how many neighbours the border has, and the largest
+    beta. `group` (H, W) is -1 where not active.
+    """
     height, width = mask.shape
     sums = np.zeros((5, count))
     for y in range(height):
@@ -349,7 +427,13 @@ def _evidence(colour, group, mask, watched, edge, floor, count):
             if group[y, x] >= 0:
                 sums[4, group[y, x]] = max(sums[4, group[y, x]], colour[y, x, 4])
             for v, u in ((y, x + 1), (y + 1, x)):
-                if v == height or u == width or not mask[y, x] or not mask[v, u] or max(group[y, x], group[v, u]) < 0:
+                if (
+                    v == height
+                    or u == width
+                    or not mask[y, x]
+                    or not mask[v, u]
+                    or max(group[y, x], group[v, u]) < 0
+                ):
                     continue
                 change, step, peak = _change(colour, watched, y, x, v, u)
                 light = step if change < edge * step else 0.0

@@ -1,21 +1,28 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by comparing the photo's derivatives with those of a specular-free image (Tan & Ikeuchi 2005): the iterative method.
+"""Removes highlights by comparing the photo's derivatives with those of a specular-free image (Tan
+& Ikeuchi 2005): the iterative method.
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one photo.
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+photo.
 
-Equation: if the diffuse largest chromaticity L = max D / sum D were known, s = (max I - L sum I) / (1 - 3 L). With one and the same L = .6
-for all pixels this gives an image that is free of specular but for its colours; call its total e. Two neighbours of one paint are both
-diffuse if their totals t = sum I vary as e does: |log |dt| - log |de|| <= epsilon, or, as published, |d log t - d log e| <= epsilon.
-Where they do not, the one with the smaller c = max I / sum I has more specular, and is given the other's c as its L. This is repeated
-until the number of such pairs no longer falls; then epsilon is lowered.
+Equation: if the diffuse largest chromaticity L = max D / sum D were known, s = (max I - L sum I) /
+(1 - 3 L). With one and the same L = .6 for all pixels this gives an image that is free of specular
+but for its colours; call its total e. Two neighbours of one paint are both diffuse if their totals
+t = sum I vary as e does: |log |dt| - log |de|| <= epsilon, or, as published, |d log t - d log e| <=
+epsilon. Where they do not, the one with the smaller c = max I / sum I has more specular, and is
+given the other's c as its L. This is repeated until the number of such pairs no longer falls; then
+epsilon is lowered.
 
-Citation: R. T. Tan and K. Ikeuchi, "Separating reflection components of textured surfaces using a single image", IEEE TPAMI 27(2),
-178-193 (2005), doi:10.1109/TPAMI.2005.36. Ours, as options: no pixel's L exceeds a quantile of c over all pixels of its colour, since
-else the noisiest strong colour spreads over the whole surface; paints are told by what no highlight changes (`colour_groups`); the dark
-guard is relative to the object's brightness; and the object's colourfulness is weighed (`evidence`).
+Citation: R. T. Tan and K. Ikeuchi, "Separating reflection components of textured surfaces using a
+single image", IEEE TPAMI 27(2), 178-193 (2005), doi:10.1109/TPAMI.2005.36. Ours, as options: no
+pixel's L exceeds a quantile of c over all pixels of its colour, since else the noisiest strong
+colour spreads over the whole surface; paints are told by what no highlight changes
+(`colour_groups`); the dark guard is relative to the object's brightness; and the object's
+colourfulness is weighed (`evidence`).
 
-Limits: the light must be white. Every step of texture that is no clear change of hue is a highlight to this method. White paint beside
-a like-hued coloured one is too; the improved variant therefore leaves pale objects alone, also where they do have highlights.
+Limits: the light must be white. Every step of texture that is no clear change of hue is a highlight
+to this method. White paint beside a like-hued coloured one is too; the improved variant therefore
+leaves pale objects alone, also where they do have highlights.
 """
 
 import math
@@ -37,16 +44,19 @@ from .specular_free import fixed_chromaticity
 
 @dataclass(frozen=True)
 class Tan2005Options:
-    """`start`, `step`: epsilon runs from `start` to 0 in steps of `step`; start >= 0, step > 0 and at least start / 1000.
-    `log_of_difference`: compare the logarithms of the differences, as the authors' program does, not the differences of the logarithms.
-    `noise`: neighbours whose c differs less are left as they are; > 0. `colour_step`: neighbours are of different paint if both their
-    red and their green shares of the total differ by more than this; where `by_colour`, if either share of the two-band image does; > 0.
-    `by_colour`: L never exceeds the `quantile`, in [0, 1], of c over the object's pixels in the same cell of the plane of red and green
-    shares of the two-band image with `cells` cells a side (1 to 1000); `window`, odd, is the side in pixels over which they are averaged.
-    `dark`: pixels whose channels are all less are left as they are; a share of the object's brightness (the 99.9 % quantile of the
-    largest channel) where `relative_dark`; >= 0. `weigh_evidence`: remove less, down to nothing, the less colour the object has.
-    `whole_frame`: use the whole frame, its last row and column only as neighbours, and dark pixels as neighbours, as the mask-less
-    public implementations do.
+    """`start`, `step`: epsilon runs from `start` to 0 in steps of `step`; start >= 0, step > 0 and
+    at least start / 1000. `log_of_difference`: compare the logarithms of the differences, as the
+    authors' program does, not the differences of the logarithms. `noise`: neighbours whose c
+    differs less are left as they are; > 0. `colour_step`: neighbours are of different paint if both
+    their red and their green shares of the total differ by more than this; where `by_colour`, if
+    either share of the two-band image does; > 0. `by_colour`: L never exceeds the `quantile`, in
+    [0, 1], of c over the object's pixels in the same cell of the plane of red and green shares of
+    the two-band image with `cells` cells a side (1 to 1000); `window`, odd, is the side in pixels
+    over which they are averaged. `dark`: pixels whose channels are all less are left as they are; a
+    share of the object's brightness (the 99.9 % quantile of the largest channel) where
+    `relative_dark`; >= 0. `weigh_evidence`: remove less, down to nothing, the less colour the
+    object has. `whole_frame`: use the whole frame, its last row and column only as neighbours, and
+    dark pixels as neighbours, as the mask-less public implementations do.
     """
 
     start: float = 0.5
@@ -86,15 +96,18 @@ VARIANTS: dict[str, Tan2005Options] = {
 _BRIGHT_QUANTILE = 0.999
 # The one diffuse chromaticity that makes the specular-free image; any will do.
 _FREE = 0.6
-# Labels of a pixel: done for now, not to be touched, specular towards the next pixel of its row or column, on a border, too even.
+# Labels of a pixel: done for now, not to be touched, specular towards the next pixel of its row or
+# column, on a border, too even.
 _DIFFUSE, _DARK, _ROW, _COLUMN, _BORDER, _EVEN = 0, 1, 2, 3, 4, 5
 
 
 @dataclass(frozen=True)
 class _Pixels:
-    """What the sweeps work on; all (H, W) but `colours` (H, W, 3). `colours` changes, and so do `total`, their sum, `peak`, c, and
-    where not `by_colour` the shares `red` and `green`, once a sweep, where `stale`. `free`: e. `limit`: the largest L. `neighbour`:
-    which pixels may be the second of a pair. `label`: as above."""
+    """What the sweeps work on; all (H, W) but `colours` (H, W, 3). `colours` changes, and so do
+    `total`, their sum, `peak`, c, and where not `by_colour` the shares `red` and `green`, once a
+    sweep, where `stale`. `free`: e. `limit`: the largest L. `neighbour`: which pixels may be the
+    second of a pair. `label`: as above.
+    """
 
     colours: np.ndarray
     total: np.ndarray
@@ -117,13 +130,14 @@ def separate(
 ) -> Separation:
     """Splits a photo under white light into diffuse and specular.
 
-    `image` (H, W, 3), linear, >= 0, any scale (but [0, 1] where `dark` is absolute); `mask` (H, W) bool; `clipped` (H, W) bool marks
-    pixels whose true value lies above what was recorded: they are compared with no other. Inside the mask 0 <= diffuse <= image;
-    specular has three equal channels; the residual is zero but where clipped. Confidence as in `layers`. `options` None: the improved
-    variant.
+    `image` (H, W, 3), linear, >= 0, any scale (but [0, 1] where `dark` is absolute); `mask` (H, W)
+    bool; `clipped` (H, W) bool marks pixels whose true value lies above what was recorded: they are
+    compared with no other. Inside the mask 0 <= diffuse <= image; specular has three equal
+    channels; the residual is zero but where clipped. Confidence as in `layers`. `options` None: the
+    improved variant.
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are negative or not finite, or no colour at all;
-    `Cancelled`.
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
+    negative or not finite, or no colour at all; `Cancelled`.
     """
     options, monitor = options or Tan2005Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)
@@ -142,12 +156,25 @@ def separate(
 
 
 def _check_options(options: Tan2005Options) -> None:
-    if not 0 <= options.start < math.inf or not options.start / 1000 <= options.step < math.inf or options.step <= 0:
-        raise InputError("start must be at least 0, and step above 0 and at least a thousandth of start")
+    if (
+        not 0 <= options.start < math.inf
+        or not options.start / 1000 <= options.step < math.inf
+        or options.step <= 0
+    ):
+        raise InputError(
+            "start must be at least 0, and step above 0 and at least a thousandth of start"
+        )
     if not options.noise > 0 or not options.colour_step > 0 or not 0 <= options.dark < math.inf:
         raise InputError("noise and colour_step must be above 0, dark at least 0")
-    if not 0 <= options.quantile <= 1 or not 1 <= options.cells <= 1000 or options.window < 1 or options.window % 2 == 0:
-        raise InputError("quantile must lie within 0 and 1, cells within 1 and 1000, and window be an odd number of pixels")
+    if (
+        not 0 <= options.quantile <= 1
+        or not 1 <= options.cells <= 1000
+        or options.window < 1
+        or options.window % 2 == 0
+    ):
+        raise InputError(
+            "quantile must lie within 0 and 1, cells within 1 and 1000, and window be an odd number of pixels"
+        )
 
 
 def _bright(image: np.ndarray, domain: np.ndarray, options: Tan2005Options) -> np.ndarray:
@@ -157,7 +184,9 @@ def _bright(image: np.ndarray, domain: np.ndarray, options: Tan2005Options) -> n
     return (high >= options.dark * scale) & (high > 0)
 
 
-def _specular_of(image: np.ndarray, used: np.ndarray, options: Tan2005Options, monitor: Monitor) -> np.ndarray:
+def _specular_of(
+    image: np.ndarray, used: np.ndarray, options: Tan2005Options, monitor: Monitor
+) -> np.ndarray:
     """Specular (H, W) of `image` (H, W, 3); zero where it is not `used` (H, W) bool."""
     shape = used.shape
     if not options.whole_frame:
@@ -203,14 +232,37 @@ def _prepared(image: np.ndarray, used: np.ndarray, options: Tan2005Options) -> _
 
 def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options) -> None:
     """Sweeps until the number of specular pairs no longer falls, for epsilon = log `factor`."""
-    compare = pixels.total, pixels.free, pixels.neighbour, pixels.label, factor, options.log_of_difference
+    compare = (
+        pixels.total,
+        pixels.free,
+        pixels.neighbour,
+        pixels.label,
+        factor,
+        options.log_of_difference,
+    )
     left = _mark(*compare)
     while left:
         _move(
-            *(pixels.colours, pixels.peak, pixels.red, pixels.green, pixels.limit, pixels.label, pixels.stale),
+            *(
+                pixels.colours,
+                pixels.peak,
+                pixels.red,
+                pixels.green,
+                pixels.limit,
+                pixels.label,
+                pixels.stale,
+            ),
             *(options.noise, options.colour_step, options.by_colour),
         )
-        _refresh(pixels.colours, pixels.total, pixels.peak, pixels.red, pixels.green, pixels.stale, not options.by_colour)
+        _refresh(
+            pixels.colours,
+            pixels.total,
+            pixels.peak,
+            pixels.red,
+            pixels.green,
+            pixels.stale,
+            not options.by_colour,
+        )
         before, left = left, _mark(*compare)
         if left >= before:
             break
@@ -218,9 +270,11 @@ def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options
 
 @compiled
 def _mark(total, free, neighbour, label, factor, log_of_difference):
-    """Labels every open pixel as specular towards one of its next neighbours, or diffuse; the number of specular ones.
+    """Labels every open pixel as specular towards one of its next neighbours, or diffuse; the
+    number of specular ones.
 
-    |log a - log b| > epsilon is a > b exp(epsilon) or b > a exp(epsilon): no logarithm, and nothing undefined where both are zero.
+    |log a - log b| > epsilon is a > b exp(epsilon) or b > a exp(epsilon): no logarithm, and nothing
+    undefined where both are zero.
     """
     found = 0
     for y in range(total.shape[0] - 1):
@@ -251,7 +305,9 @@ def _mark(total, free, neighbour, label, factor, log_of_difference):
 
 @compiled
 def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by_colour):
-    """Gives, pair by pair, the pixel with the smaller c the other one's as its diffuse chromaticity, as far as its limit."""
+    """Gives, pair by pair, the pixel with the smaller c the other one's as its diffuse
+    chromaticity, as far as its limit.
+    """
     for y in range(label.shape[0] - 1):
         for x in range(label.shape[1] - 1):
             if label[y, x] != _ROW and label[y, x] != _COLUMN:
@@ -281,7 +337,10 @@ def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by
 
 @compiled
 def _refresh(colours, total, peak, red, green, stale, shares):
-    """Brings totals and chromaticities up to the changed colours; `red` and `green` only where `shares`."""
+    """Brings totals and chromaticities up to the changed colours;
+
+    `red` and `green` only where `shares`.
+    """
     for y in range(total.shape[0]):
         for x in range(total.shape[1]):
             if not stale[y, x]:

@@ -1,21 +1,26 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by comparing ratios of neighbours in the photo and in its two-band image (Yoon, Choi & Kweon 2006).
+"""Removes highlights by comparing ratios of neighbours in the photo and in its two-band image
+(Yoon, Choi & Kweon 2006).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one photo.
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+photo.
 
-Equation: the two-band image F = I - min I, f = sum F, knows no highlights. Where neighbours p, q have one surface colour, i.e. nearly
-the same F / f, the diffuse totals relate as f(p) / f(q); so if sum I(p) / f(p) exceeds sum I(q) / f(q), then p has more specular, and
-s(p) grows until the two are equal. Over and over along all pairs, this gives every pixel the smallest t = sum I / f of the region that it
-hangs together with by pairs of like colour: s = (sum I - t f) / 3.
+Equation: the two-band image F = I - min I, f = sum F, knows no highlights. Where neighbours p, q
+have one surface colour, i.e. nearly the same F / f, the diffuse totals relate as f(p) / f(q); so if
+sum I(p) / f(p) exceeds sum I(q) / f(q), then p has more specular, and s(p) grows until the two are
+equal. Over and over along all pairs, this gives every pixel the smallest t = sum I / f of the
+region that it hangs together with by pairs of like colour: s = (sum I - t f) / 3.
 
-Citation: K.-J. Yoon, Y. Choi and I. S. Kweon, "Fast separation of reflection components using a specularity-invariant image
-representation", ICIP 2006, 973-976, doi:10.1109/ICIP.2006.312650. Ours, as options: the regions are found at once, by union-find, instead
-of by sweeps; t is a quantile over the region's pixels of like colour, since the smallest of all is noise's; F is averaged over a few
-pixels before colours are compared; the dark guard is relative to the object's brightness; and the object's colourfulness is weighed
-(`evidence`).
+Citation: K.-J. Yoon, Y. Choi and I. S. Kweon, "Fast separation of reflection components using a
+specularity-invariant image representation", ICIP 2006, 973-976, doi:10.1109/ICIP.2006.312650. Ours,
+as options: the regions are found at once, by union-find, instead of by sweeps; t is a quantile over
+the region's pixels of like colour, since the smallest of all is noise's; F is averaged over a few
+pixels before colours are compared; the dark guard is relative to the object's brightness; and the
+object's colourfulness is weighed (`evidence`).
 
-Limits: the light must be white. A region may leak where one paint fades into another. White paint beside a like-hued coloured one is a
-highlight to this method; the improved variant therefore leaves pale objects alone, also where they do have highlights.
+Limits: the light must be white. A region may leak where one paint fades into another. White paint
+beside a like-hued coloured one is a highlight to this method; the improved variant therefore leaves
+pale objects alone, also where they do have highlights.
 """
 
 import math
@@ -36,15 +41,18 @@ from .layers import white_layers
 
 @dataclass(frozen=True)
 class Yoon2006Options:
-    """`colour_step`: neighbours are of one colour if red and green shares of F, in [0, 1], both differ by no more than this; > 0.
-    `dark`: a pair is compared if the smallest channel of its first pixel is at least this; >= 0. Where `relative_dark`: if the largest
-    channels of both are at least this share of the object's brightness (the 99.9 % quantile of the largest channel).
-    `regions`: solve by regions; then `quantile` in [0, 1] of t is taken over a region's pixels that share a cell of the (red, green)
-    plane of F's shares with `cells` cells a side (1 to 1000), and `window`, odd, is the side in pixels of the square over which F is
-    averaged before. Else sweep along the pairs at most `sweeps` times, until nothing of more than `tolerance` (absolute) is moved; >= 0.
-    `toolbox_order`: pairs only along columns, with the end of a column mistaken and pairs joining columns, as a public toolbox has it.
-    `weigh_evidence`: remove less, down to nothing, the less colour the object has.
-    `whole_frame`: use the whole frame, as the mask-less public implementations do, not the mask.
+    """`colour_step`: neighbours are of one colour if red and green shares of F, in [0, 1], both
+    differ by no more than this; > 0. `dark`: a pair is compared if the smallest channel of its
+    first pixel is at least this; >= 0. Where `relative_dark`: if the largest channels of both are
+    at least this share of the object's brightness (the 99.9 % quantile of the largest channel).
+    `regions`: solve by regions; then `quantile` in [0, 1] of t is taken over a region's pixels that
+    share a cell of the (red, green) plane of F's shares with `cells` cells a side (1 to 1000), and
+    `window`, odd, is the side in pixels of the square over which F is averaged before. Else sweep
+    along the pairs at most `sweeps` times, until nothing of more than `tolerance` (absolute) is
+    moved; >= 0. `toolbox_order`: pairs only along columns, with the end of a column mistaken and
+    pairs joining columns, as a public toolbox has it. `weigh_evidence`: remove less, down to
+    nothing, the less colour the object has. `whole_frame`: use the whole frame, as the mask-less
+    public implementations do, not the mask.
     """
 
     colour_step: float = 0.1
@@ -61,7 +69,14 @@ class Yoon2006Options:
     whole_frame: bool = False
 
 
-_PAPER = Yoon2006Options(colour_step=0.05, dark=12 / 255, relative_dark=False, regions=False, window=1, weigh_evidence=False)
+_PAPER = Yoon2006Options(
+    colour_step=0.05,
+    dark=12 / 255,
+    relative_dark=False,
+    regions=False,
+    window=1,
+    weigh_evidence=False,
+)
 VARIANTS: dict[str, Yoon2006Options] = {
     "improved": Yoon2006Options(),
     "paper": _PAPER,
@@ -84,8 +99,10 @@ _GREY = 1e-6
 
 @dataclass(frozen=True)
 class _TwoBand:
-    """Per pixel (H, W): `ratio` t = sum I / f, 0 where it is not `known`; `band` f; `red`, `green`, the shares of F; `known`, whether
-    the pixel has a colour and may be compared; `first`, whether it may be the first of a pair."""
+    """Per pixel (H, W): `ratio` t = sum I / f, 0 where it is not `known`; `band` f; `red`, `green`,
+    the shares of F; `known`, whether the pixel has a colour and may be compared; `first`, whether
+    it may be the first of a pair.
+    """
 
     ratio: np.ndarray
     band: np.ndarray
@@ -104,13 +121,14 @@ def separate(
 ) -> Separation:
     """Splits a photo under white light into diffuse and specular.
 
-    `image` (H, W, 3), linear, >= 0, any scale (but [0, 1] where `dark` and `tolerance` are absolute); `mask` (H, W) bool; `clipped`
-    (H, W) bool marks pixels whose true value lies above what was recorded: they are compared with no other. Inside the mask
-    0 <= diffuse <= image; specular has three equal channels; the residual is zero but where clipped. Confidence as in `layers`.
-    `options` None: the improved variant.
+    `image` (H, W, 3), linear, >= 0, any scale (but [0, 1] where `dark` and `tolerance` are
+    absolute); `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above
+    what was recorded: they are compared with no other. Inside the mask 0 <= diffuse <= image;
+    specular has three equal channels; the residual is zero but where clipped. Confidence as in
+    `layers`. `options` None: the improved variant.
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are negative or not finite, or no colour at all;
-    `Cancelled`.
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
+    negative or not finite, or no colour at all; `Cancelled`.
     """
     options, monitor = options or Yoon2006Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)
@@ -120,7 +138,9 @@ def separate(
     seen = np.where(domain[..., None], np.nan_to_num(image), 0).astype(float)
     pixels = _two_band(seen, domain, domain if clipped is None else domain & ~clipped, options)
     monitor.report("comparing neighbours", 0.0)
-    ratio = _by_regions(pixels, options) if options.regions else _by_sweeps(pixels, options, monitor)
+    ratio = (
+        _by_regions(pixels, options) if options.regions else _by_sweeps(pixels, options, monitor)
+    )
     total = seen[..., 0] + seen[..., 1] + seen[..., 2]
     specular = np.where(pixels.known, (total - ratio * (total - 3 * smallest(seen))) / 3, 0)
     if options.weigh_evidence:
@@ -129,7 +149,11 @@ def separate(
 
 
 def _check_options(options: Yoon2006Options) -> None:
-    if not 0 < options.colour_step < math.inf or not 0 <= options.dark < math.inf or not 0 <= options.quantile <= 1:
+    if (
+        not 0 < options.colour_step < math.inf
+        or not 0 <= options.dark < math.inf
+        or not 0 <= options.quantile <= 1
+    ):
         raise InputError("colour_step must be above 0, dark at least 0, quantile within [0, 1]")
     if not 1 <= options.cells <= 1000 or options.window < 1 or options.window % 2 == 0:
         raise InputError("cells must lie within 1 and 1000, and window be an odd number of pixels")
@@ -137,7 +161,9 @@ def _check_options(options: Yoon2006Options) -> None:
         raise InputError("sweeps and tolerance must be at least 0")
 
 
-def _two_band(image: np.ndarray, domain: np.ndarray, usable: np.ndarray, options: Yoon2006Options) -> _TwoBand:
+def _two_band(
+    image: np.ndarray, domain: np.ndarray, usable: np.ndarray, options: Yoon2006Options
+) -> _TwoBand:
     low, high = smallest(image), largest(image)
     total = image[..., 0] + image[..., 1] + image[..., 2]
     band = total - 3 * low
@@ -153,7 +179,9 @@ def _two_band(image: np.ndarray, domain: np.ndarray, usable: np.ndarray, options
 
 
 def _by_regions(pixels: _TwoBand, options: Yoon2006Options) -> np.ndarray:
-    """t (H, W), for every known pixel the quantile over the pixels of its region and cell of colour."""
+    """t (H, W), for every known pixel the quantile over the pixels of its region and cell of
+    colour.
+    """
     parent = np.arange(pixels.known.size)
     for first, second in (_pairs(pixels, options.colour_step, axis) for axis in (1, 0)):
         _unite(first, second, parent)
@@ -177,14 +205,18 @@ def _by_sweeps(pixels: _TwoBand, options: Yoon2006Options, monitor: Monitor) -> 
     ratio, band = pixels.ratio.ravel().copy(), pixels.band.ravel()
     for done in range(options.sweeps):
         monitor.report("comparing neighbours", done / options.sweeps)
-        if not sum(_sweep(first, second, ratio, band, options.tolerance) for first, second in pair_lists):
+        if not sum(
+            _sweep(first, second, ratio, band, options.tolerance) for first, second in pair_lists
+        ):
             break
     ratio = ratio.reshape(pixels.known.shape)
     return ratio.T if options.toolbox_order else ratio
 
 
 def _pairs(pixels: _TwoBand, colour_step: float, axis: int) -> tuple[np.ndarray, np.ndarray]:
-    """Flat indices of all pixels that are of one colour with the next one along the axis, and of those next ones."""
+    """Flat indices of all pixels that are of one colour with the next one along the axis, and of
+    those next ones.
+    """
     here, there = (np.s_[:-1], np.s_[1:]) if axis == 0 else (np.s_[:, :-1], np.s_[:, 1:])
     like = pixels.first[here] & pixels.known[there]
     for share in (pixels.red, pixels.green):
@@ -196,7 +228,9 @@ def _pairs(pixels: _TwoBand, colour_step: float, axis: int) -> tuple[np.ndarray,
 
 
 def _column_pairs(pixels: _TwoBand, colour_step: float) -> tuple[np.ndarray, np.ndarray]:
-    """The same of turned arrays, as one line of columns, in which every pair is broken that would end a row of the photo."""
+    """The same of turned arrays, as one line of columns, in which every pair is broken that would
+    end a row of the photo.
+    """
     line = _TwoBand(*(array.reshape(1, -1) for array in vars(pixels).values()))
     first, second = _pairs(line, colour_step, axis=1)
     kept = second % pixels.known.shape[0] != 0
@@ -205,7 +239,9 @@ def _column_pairs(pixels: _TwoBand, colour_step: float) -> tuple[np.ndarray, np.
 
 @compiled
 def _sweep(first, second, ratio, band, tolerance):
-    """Lowers the larger t of each pair to the smaller one, in order, where more than `tolerance` of light moves; how often it did."""
+    """Lowers the larger t of each pair to the smaller one, in order, where more than `tolerance` of
+    light moves; how often it did.
+    """
     moved = 0
     for k in range(len(first)):
         p, q = first[k], second[k]
@@ -221,7 +257,9 @@ def _sweep(first, second, ratio, band, tolerance):
 
 @compiled
 def _unite(first, second, parent):
-    """Joins the trees of every pair, halving the paths on the way; the root is the tree's smallest index."""
+    """Joins the trees of every pair, halving the paths on the way; the root is the tree's smallest
+    index.
+    """
     for k in range(len(first)):
         p, q = first[k], second[k]
         while parent[p] != p:

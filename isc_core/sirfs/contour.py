@@ -1,8 +1,10 @@
-"""Where the surface turns away from the viewer: points of the occluding contour and their outward normals.
+"""Where the surface turns away from the viewer: points of the occluding contour and their outward
+normals.
 
-A contour point is a mask pixel with a 4-neighbour inside the image and outside the mask; its normal is minus the
-Gaussian-weighted mean offset of the mask pixels in an 11 x 11 window (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712).
-Where the photo's frame cuts the object there is no contour, and a window that the cut reaches gives no normal.
+A contour point is a mask pixel with a 4-neighbour inside the image and outside the mask; its normal
+is minus the Gaussian-weighted mean offset of the mask pixels in an 11 x 11 window (Barron & Malik
+2015, doi:10.1109/TPAMI.2014.2377712). Where the photo's frame cuts the object there is no contour,
+and a window that the cut reaches gives no normal.
 """
 
 from dataclasses import dataclass
@@ -15,7 +17,11 @@ RADIUS = 5
 
 @dataclass(frozen=True)
 class Contour:
-    """`rows`, `columns`: (P,) int64 pixels; `down`, `right`: (P,) components of the unit outward normal in the image plane."""
+    """`rows`, `columns`:
+
+    (P,) int64 pixels; `down`, `right`: (P,) components of the unit outward normal in the image
+    plane.
+    """
 
     rows: np.ndarray
     columns: np.ndarray
@@ -26,8 +32,9 @@ class Contour:
 def occluding_contour(mask: np.ndarray, *, drop_near_edge: bool = False) -> Contour:
     """Contour of `mask` (H, W) bool.
 
-    By default points are dropped only where the frame cuts the object within the window, so that empty padding around the
-    photo changes nothing. `drop_near_edge` drops every point nearer than 5 pixels to the frame, as the published code does.
+    By default points are dropped only where the frame cuts the object within the window, so that
+    empty padding around the photo changes nothing. `drop_near_edge` drops every point nearer than 5
+    pixels to the frame, as the published code does.
     """
     padded = np.pad(mask, 1, mode="edge")
     outside = ~padded

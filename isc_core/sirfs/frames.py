@@ -1,15 +1,17 @@
 """Two conventions for normals and lights, and the exact way between them.
 
-Ours: normals (x right, y up, z toward the viewer); log shading of a channel = sum_k L_k Y_k(n), Y the orthonormal real
-spherical harmonics up to degree 2, all with positive constants, in the order
+Ours: normals (x right, y up, z toward the viewer); log shading of a channel = sum_k L_k Y_k(n), Y
+the orthonormal real spherical harmonics up to degree 2, all with positive constants, in the order
 (0,0) (1,-1) (1,0) (1,1) (2,-2) (2,-1) (2,0) (2,1) (2,2).
 
-The SIRFS reference's (J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712): normals (down, right, toward the viewer);
-the irradiance quadratic of R. Ramamoorthi, P. Hanrahan (2001), "An efficient representation for irradiance environment maps",
-doi:10.1145/383259.383317, with its rounded constants.
+The SIRFS reference's (J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712): normals (down,
+right, toward the viewer); the irradiance quadratic of R. Ramamoorthi, P. Hanrahan (2001), "An
+efficient representation for irradiance environment maps", doi:10.1145/383259.383317, with its
+rounded constants.
 
-Both bases span the quadratics on the sphere, so one 9 x 9 matrix M with b(n) = M Y(n) holds for every unit normal; hence
-L_ours = M^T L_reference. The reference's seventh function is no multiple of Y(2,0): its rest goes into the constant term.
+Both bases span the quadratics on the sphere, so one 9 x 9 matrix M with b(n) = M Y(n) holds for
+every unit normal; hence L_ours = M^T L_reference. The reference's seventh function is no multiple
+of Y(2,0): its rest goes into the constant term.
 """
 
 from functools import cache
@@ -58,12 +60,16 @@ def normal_from_reference(normal: np.ndarray) -> np.ndarray:
 
 
 def light_from_reference(light: np.ndarray) -> np.ndarray:
-    """Coefficients (9, ...) of the reference's basis, as coefficients of `real_sh` that give the same log shading."""
+    """Coefficients (9, ...) of the reference's basis, as coefficients of `real_sh` that give the
+    same log shading.
+    """
     return np.tensordot(_basis_change().T, np.asarray(light, float), axes=1)
 
 
 def light_to_reference(light: np.ndarray) -> np.ndarray:
-    """Coefficients (9, ...) of `real_sh`, as coefficients of the reference's basis that give the same log shading."""
+    """Coefficients (9, ...) of `real_sh`, as coefficients of the reference's basis that give the
+    same log shading.
+    """
     return np.tensordot(np.linalg.inv(_basis_change().T), np.asarray(light, float), axes=1)
 
 
@@ -76,13 +82,26 @@ def _components(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 @cache
 def _basis_change() -> np.ndarray:
-    """M of `reference_basis = M real_sh`, found from both bases at nine directions that fix a quadratic on the sphere."""
+    """M of `reference_basis = M real_sh`, found from both bases at nine directions that fix a
+    quadratic on the sphere.
+    """
     half = sqrt(0.5)
     directions = np.array(
-        [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1], [half, half, 0], [half, 0, half], [0, half, half]]
+        [
+            [1, 0, 0],
+            [-1, 0, 0],
+            [0, 1, 0],
+            [0, -1, 0],
+            [0, 0, 1],
+            [0, 0, -1],
+            [half, half, 0],
+            [half, 0, half],
+            [0, half, half],
+        ]
     )
     change = np.linalg.solve(real_sh(directions), reference_basis(directions)).T
-    # Each function answers to at most two of the others; what else is left of the elimination is rounding.
+    # Each function answers to at most two of the others; what else is left of the elimination is
+    # rounding.
     change[np.abs(change) < 1e-12] = 0.0
     change.setflags(write=False)
     return change

@@ -1,8 +1,9 @@
 """An object at the photo's frame: cut by it, or trimmed to it?
 
-Where the frame cuts the object its outline is no occluding contour; where a photo was merely trimmed to the object it is. A run of the
-mask along the frame is a cut if the mask is hardly wider a few pixels further in (`CUT_RATIO`); a rounded outline that touches the frame
-widens quickly. Limits: a box-shaped object trimmed exactly along its sides counts as cut.
+Where the frame cuts the object its outline is no occluding contour; where a photo was merely
+trimmed to the object it is. A run of the mask along the frame is a cut if the mask is hardly wider
+a few pixels further in (`CUT_RATIO`); a rounded outline that touches the frame widens quickly.
+Limits: a box-shaped object trimmed exactly along its sides counts as cut.
 """
 
 import numpy as np
@@ -13,7 +14,10 @@ CUT_RATIO = 0.75
 
 
 def cut_line(mask: np.ndarray) -> np.ndarray:
-    """Of the first row of `mask` (H, W) bool, the pixels where the frame cuts the object; (W,) bool."""
+    """Of the first row of `mask` (H, W) bool, the pixels where the frame cuts the object;
+
+    (W,) bool.
+    """
     line, inner = mask[0], mask[min(DEPTH, mask.shape[0] - 1)]
     runs, count = ndimage.label(line)
     inner_runs, _ = ndimage.label(inner)
@@ -38,7 +42,9 @@ def _sides(mask: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def continued(mask: np.ndarray, top: int, bottom: int, left: int, right: int) -> np.ndarray:
-    """`mask` with so many rows and columns added; the object goes on into them where the frame cuts it, else they are empty."""
+    """`mask` with so many rows and columns added; the object goes on into them where the frame cuts
+    it, else they are empty.
+    """
     upper, lower, first, last = (cut_line(m) for m in _sides(mask))
     out = np.pad(mask, [(top, bottom), (left, right)])
     rows, columns = slice(top, top + mask.shape[0]), slice(left, left + mask.shape[1])
@@ -51,8 +57,15 @@ def continued(mask: np.ndarray, top: int, bottom: int, left: int, right: int) ->
 
 
 def continued_height(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The height (H, W) inside the mask, going on outside as it arrives at the rim (by point reflection): normals look one pixel out."""
+    """The height (H, W) inside the mask, going on outside as it arrives at the rim (by point
+    reflection): normals look one pixel out.
+    """
     rim = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
-    rows, columns = (np.clip(2 * r - i, 0, n - 1) for r, i, n in zip(rim, np.indices(mask.shape), mask.shape, strict=True))
+    rows, columns = (
+        np.clip(2 * r - i, 0, n - 1)
+        for r, i, n in zip(rim, np.indices(mask.shape), mask.shape, strict=True)
+    )
     at_rim = height[tuple(rim)]
-    return np.where(mask, height, np.where(mask[rows, columns], 2 * at_rim - height[rows, columns], at_rim))
+    return np.where(
+        mask, height, np.where(mask[rows, columns], 2 * at_rim - height[rows, columns], at_rim)
+    )

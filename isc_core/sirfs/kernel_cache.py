@@ -9,8 +9,10 @@ from .solver import compiled_engine_available
 
 
 def announce_compilation(engine: str, monitor: Monitor) -> None:
-    """Reports a stage of its own when the next solve by `engine` ("auto", "numba", "numpy") will compile first: 20 s in silence look
-    like a fault. Call before the first solve: where no cache folder can be written, it also sees to it that kernels work without."""
+    """Reports a stage of its own when the next solve by `engine` ("auto", "numba", "numpy") will
+    compile first: 20 s in silence look like a fault. Call before the first solve: where no cache
+    folder can be written, it also sees to it that kernels work without.
+    """
     if engine == "numpy" or not compiled_engine_available():
         return
     ensure_cache_folder()

@@ -1,8 +1,10 @@
-"""The SIRFS objective as compiled row kernels: the same formulas as `surface`, `reflectance` and `illumination`.
+"""The SIRFS objective as compiled row kernels: the same formulas as `surface`, `reflectance` and
+`illumination`.
 
-Every loop runs over one-dimensional rows with few pointers, so that the compiler turns it into vector instructions; each
-kernel works for float32 and float64 alike. Kernels release the interpreter lock and write to rows of their own, hence the
-spill buffers: pairs reach two rows below a block, and these contributions are added later, in a fixed order.
+Every loop runs over one-dimensional rows with few pointers, so that the compiler turns it into
+vector instructions; each kernel works for float32 and float64 alike. Kernels release the
+interpreter lock and write to rows of their own, hence the spill buffers: pairs reach two rows below
+a block, and these contributions are added later, in a fixed order.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -13,20 +15,37 @@ from numba import njit
 
 _FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}
 compiled = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-# Part of each kernel that calls it: called as a function of its own it would round otherwise in the process that compiles it than in one
-# that reads it from the cache, for the two link it with another copy.
+# Part of each kernel that calls it: called as a function of its own it would round otherwise in the
+# process that compiles it than in one that reads it from the cache, for the two link it with
+# another copy.
 inlined = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy", forceinline=True)
-# Differences of neighbouring heights are exact; reordering them would lose in float32 what the curvature needs.
+# Differences of neighbouring heights are exact; reordering them would lose in float32 what the
+# curvature needs.
 in_order = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
 
 
 @in_order
-def forward_rows(first, last, zp, spans, log_image, light, whiten_smooth, whiten_palette, geometry, whitened, palette, d3, slant):
+def forward_rows(
+    first,
+    last,
+    zp,
+    spans,
+    log_image,
+    light,
+    whiten_smooth,
+    whiten_palette,
+    geometry,
+    whitened,
+    palette,
+    d3,
+    slant,
+):
     """Local geometry, whitened log reflectance and the slant term of rows [first, last).
 
-    zp (H+2, W+2) float64, the height with replicated borders; log_image (H, C, W); light (9, C) already times the basis constants.
-    Fills geometry (H, 9, W): zi zj n1 n2 n3 everywhere, zii zjj zij curvature within spans (H, 2); whitened, palette (H, C, W) within
-    spans; d3 (H, W) the slant term's gradient, unscaled; slant (H,) its sums.
+    zp (H+2, W+2) float64, the height with replicated borders; log_image (H, C, W); light (9, C)
+    already times the basis constants. Fills geometry (H, 9, W): zi zj n1 n2 n3 everywhere, zii zjj
+    zij curvature within spans (H, 2); whitened, palette (H, C, W) within spans; d3 (H, W) the slant
+    term's gradient, unscaled; slant (H,) its sums.
     """
     t = geometry.dtype.type
     one, two, half = t(1), t(2), t(0.5)
@@ -38,9 +57,13 @@ def forward_rows(first, last, zp, spans, log_image, light, whiten_smooth, whiten
         row = geometry[i]
         zi, zj, n1, n2, n3 = row[0], row[1], row[5], row[6], row[7]
         for j in range(width):
-            zi[j] = ((low[j] - up[j]) + 2.0 * (low[j + 1] - up[j + 1]) + (low[j + 2] - up[j + 2])) * 0.125
+            zi[j] = (
+                (low[j] - up[j]) + 2.0 * (low[j + 1] - up[j + 1]) + (low[j + 2] - up[j + 2])
+            ) * 0.125
         for j in range(width):
-            zj[j] = ((up[j + 2] - up[j]) + 2.0 * (mid[j + 2] - mid[j]) + (low[j + 2] - low[j])) * 0.125
+            zj[j] = (
+                (up[j + 2] - up[j]) + 2.0 * (mid[j + 2] - mid[j]) + (low[j + 2] - low[j])
+            ) * 0.125
         for j in range(width):
             n3[j] = one / np.sqrt(one + zi[j] * zi[j] + zj[j] * zj[j])
         for j in range(width):
@@ -59,20 +82,49 @@ def forward_rows(first, last, zp, spans, log_image, light, whiten_smooth, whiten
         count = stop - start
         if count <= 0:
             continue
-        up, mid, low = zp[i, start : stop + 2], zp[i + 1, start : stop + 2], zp[i + 2, start : stop + 2]
-        zi, zj, zii, zjj, zij = row[0, start:stop], row[1, start:stop], row[2, start:stop], row[3, start:stop], row[4, start:stop]
-        n1, n2, n3, k = row[5, start:stop], row[6, start:stop], row[7, start:stop], row[8, start:stop]
+        up, mid, low = (
+            zp[i, start : stop + 2],
+            zp[i + 1, start : stop + 2],
+            zp[i + 2, start : stop + 2],
+        )
+        zi, zj, zii, zjj, zij = (
+            row[0, start:stop],
+            row[1, start:stop],
+            row[2, start:stop],
+            row[3, start:stop],
+            row[4, start:stop],
+        )
+        n1, n2, n3, k = (
+            row[5, start:stop],
+            row[6, start:stop],
+            row[7, start:stop],
+            row[8, start:stop],
+        )
         for j in range(count):
-            left, centre = (up[j] - mid[j]) + (low[j] - mid[j]), (up[j + 1] - mid[j + 1]) + (low[j + 1] - mid[j + 1])
-            zii[j] = (left + 2.0 * centre + ((up[j + 2] - mid[j + 2]) + (low[j + 2] - mid[j + 2]))) * 0.25
+            left, centre = (
+                (up[j] - mid[j]) + (low[j] - mid[j]),
+                (up[j + 1] - mid[j + 1]) + (low[j + 1] - mid[j + 1]),
+            )
+            zii[j] = (
+                left + 2.0 * centre + ((up[j + 2] - mid[j + 2]) + (low[j + 2] - mid[j + 2]))
+            ) * 0.25
         for j in range(count):
-            top, centre = (up[j] - up[j + 1]) + (up[j + 2] - up[j + 1]), (mid[j] - mid[j + 1]) + (mid[j + 2] - mid[j + 1])
-            zjj[j] = (top + 2.0 * centre + ((low[j] - low[j + 1]) + (low[j + 2] - low[j + 1]))) * 0.25
+            top, centre = (
+                (up[j] - up[j + 1]) + (up[j + 2] - up[j + 1]),
+                (mid[j] - mid[j + 1]) + (mid[j + 2] - mid[j + 1]),
+            )
+            zjj[j] = (
+                top + 2.0 * centre + ((low[j] - low[j + 1]) + (low[j + 2] - low[j + 1]))
+            ) * 0.25
         for j in range(count):
             zij[j] = ((low[j + 2] - low[j]) - (up[j + 2] - up[j])) * 0.25
         for j in range(count):
             k[j] = (
-                ((one + zi[j] * zi[j]) * zjj[j] - two * zi[j] * zj[j] * zij[j] + (one + zj[j] * zj[j]) * zii[j])
+                (
+                    (one + zi[j] * zi[j]) * zjj[j]
+                    - two * zi[j] * zj[j] * zij[j]
+                    + (one + zj[j] * zj[j]) * zii[j]
+                )
                 * (n3[j] * n3[j] * n3[j])
                 * half
             )
@@ -108,10 +160,27 @@ def _mix(source, matrix, target):
 
 
 @compiled
-def smoothness_block(first, last, whitened, trust, spans, offsets, table, rises, low, inverse_step, gradient, spill, total, block):
-    """The smoothness term of the pairs whose upper pixel lies in rows [first, last); gradients unscaled. trust (H, W) in [0, 1].
+def smoothness_block(
+    first,
+    last,
+    whitened,
+    trust,
+    spans,
+    offsets,
+    table,
+    rises,
+    low,
+    inverse_step,
+    gradient,
+    spill,
+    total,
+    block,
+):
+    """The smoothness term of the pairs whose upper pixel lies in rows [first, last); gradients
+    unscaled. trust (H, W) in [0, 1].
 
-    gradient (H, C, W) is overwritten in these rows; what goes to the two rows below goes to spill (2, C, W).
+    gradient (H, C, W) is overwritten in these rows; what goes to the two rows below goes to spill
+    (2, C, W).
     """
     t = whitened.dtype.type
     half, soft, zero = t(0.5), t(1e-8), t(0)
@@ -165,7 +234,9 @@ def smoothness_block(first, last, whitened, trust, spans, offsets, table, rises,
                     cells[k] = np.int32(min(f[k], last_cell))
                 for k in range(n):
                     f[k] -= t(cells[k])
-                for k in range(n):  # the only loop that the table's look-up keeps from becoming vector instructions
+                for k in range(
+                    n
+                ):  # the only loop that the table's look-up keeps from becoming vector instructions
                     cell = cells[k]
                     rise = rises[cell]
                     part += w[k] * (table[cell] + f[k] * rise)
@@ -191,8 +262,25 @@ def smoothness_block(first, last, whitened, trust, spans, offsets, table, rises,
 
 
 @compiled
-def curvature_block(first, last, geometry, valid, spans, offsets, table, rises, low, inverse_step, gradient, spill, total, block):
-    """The curvature term of the pairs whose upper pixel lies in rows [first, last); as `smoothness_block`, (H, W) and (2, W)."""
+def curvature_block(
+    first,
+    last,
+    geometry,
+    valid,
+    spans,
+    offsets,
+    table,
+    rises,
+    low,
+    inverse_step,
+    gradient,
+    spill,
+    total,
+    block,
+):
+    """The curvature term of the pairs whose upper pixel lies in rows [first, last); as
+    `smoothness_block`, (H, W) and (2, W).
+    """
     t = geometry.dtype.type
     soft, zero, inv, low_t = t(1e-8), t(0), t(inverse_step), t(low)
     height, width = valid.shape
@@ -268,7 +356,9 @@ def palette_range(palette, trust, spans, low, step, nodes, bounds):
 
 @compiled
 def locate_color(palette, spans, low, inverse_step, nodes, bounds, cell, side):
-    """Where every pixel falls on the occupied part of the grid: cell (H, W) its flat node, side (H, 3, W) its place in the cell."""
+    """Where every pixel falls on the occupied part of the grid: cell (H, W) its flat node, side (H,
+    3, W) its place in the cell.
+    """
     sizes = bounds[:, 1] - bounds[:, 0]
     strides = (sizes[1] * sizes[2], sizes[2], 1)
     t = side.dtype.type
@@ -289,7 +379,9 @@ def locate_color(palette, spans, low, inverse_step, nodes, bounds, cell, side):
 
 @compiled
 def splat_color(trust, spans, cell, side, counts):
-    """Adds every pixel's trust (H, W) to the eight nodes around its whitened log colour; counts (A, B, N)."""
+    """Adds every pixel's trust (H, W) to the eight nodes around its whitened log colour; counts (A,
+    B, N).
+    """
     right, down = counts.shape[2], counts.shape[1] * counts.shape[2]
     flat = counts.reshape(counts.size)
     for i in range(trust.shape[0]):
@@ -312,8 +404,12 @@ def splat_color(trust, spans, cell, side, counts):
 
 
 @compiled
-def gather_color(palette, trust, spans, low, high, inverse_step, cell, side, node_gradient, gradient):
-    """Gradient (H, 3, W) of the whitened log colours from that of the node counts (A, B, N), times trust; 0 off the grid."""
+def gather_color(
+    palette, trust, spans, low, high, inverse_step, cell, side, node_gradient, gradient
+):
+    """Gradient (H, 3, W) of the whitened log colours from that of the node counts (A, B, N), times
+    trust; 0 off the grid.
+    """
     t = gradient.dtype.type
     inv = t(inverse_step)
     right, down = node_gradient.shape[2], node_gradient.shape[1] * node_gradient.shape[2]
@@ -344,7 +440,10 @@ def gather_color(palette, trust, spans, low, high, inverse_step, cell, side, nod
 
 @compiled
 def blur_color(counts, taps, blurred):
-    """Separable blur of counts (A, B, N), zero padded, only where it can matter: `blurred` is right on occupied rows."""
+    """Separable blur of counts (A, B, N), zero padded, only where it can matter:
+
+    `blurred` is right on occupied rows.
+    """
     size_a, size_b, size_c = counts.shape
     half = len(taps) // 2
     occupied = np.zeros((size_a, size_b), np.bool_)
@@ -389,11 +488,19 @@ def blur_color(counts, taps, blurred):
 
 @compiled
 def silhouette_rows(first, last, geometry, expected, strength, gradient, sums):
-    """The silhouette term of rows [first, last): overwrites gradient (2, H, W) with those of n1 and n2, sums (H,) with its costs."""
+    """The silhouette term of rows [first, last): overwrites gradient (2, H, W) with those of n1 and
+    n2, sums (H,) with its costs.
+    """
     t = geometry.dtype.type
     half = t(0.5)
     for i in range(first, last):
-        n1, n2, m1, m2, s = geometry[i, 5], geometry[i, 6], expected[0, i], expected[1, i], strength[i]
+        n1, n2, m1, m2, s = (
+            geometry[i, 5],
+            geometry[i, 6],
+            expected[0, i],
+            expected[1, i],
+            strength[i],
+        )
         g1, g2 = gradient[0, i], gradient[1, i]
         for j in range(len(s)):
             g1[j] = s[j] * (n1[j] - m1[j])
@@ -410,20 +517,31 @@ def backward_rows(
     first, last, geometry, spans, light, whiten_smooth, whiten_palette, g_smooth, g_palette, g_curvature, scales, d3, contour, light_sums,
     out,
 ):  # fmt: skip
-    """Gradients of the first and second derivatives of the height, and of the light, for rows [first, last).
+    """Gradients of the first and second derivatives of the height, and of the light, for rows
+    [first, last).
 
-    g_smooth, g_palette (H, C, W) and g_curvature (H, W) matter within spans (H, 2); scales: (smoothness, palette, curvature, slant);
-    contour (2, H, W); light_sums (H, 9, C), of monomials of the normal; out (5, H + 4, W + 4) with zero borders of two, and zero outside
-    spans in its last three.
+    g_smooth, g_palette (H, C, W) and g_curvature (H, W) matter within spans (H, 2); scales:
+    (smoothness, palette, curvature, slant); contour (2, H, W); light_sums (H, 9, C), of monomials
+    of the normal; out (5, H + 4, W + 4) with zero borders of two, and zero outside spans in its
+    last three.
     """
     t = geometry.dtype.type
     two, three = t(2), t(3)
     channels, width = g_smooth.shape[1], g_smooth.shape[2]
-    k_smooth, k_palette, k_curvature, k_slant = t(scales[0]), t(scales[1]), t(scales[2]), t(scales[3])
+    k_smooth, k_palette, k_curvature, k_slant = (
+        t(scales[0]),
+        t(scales[1]),
+        t(scales[2]),
+        t(scales[3]),
+    )
     m_smooth, m_palette = whiten_smooth.T * k_smooth, whiten_palette.T * k_palette
     shape = (channels, width)
     e_all, f_all = np.empty(shape, geometry.dtype), np.empty(shape, geometry.dtype)
-    d1_all, d2_all, dn3_all = np.empty(width, geometry.dtype), np.empty(width, geometry.dtype), np.empty(width, geometry.dtype)
+    d1_all, d2_all, dn3_all = (
+        np.empty(width, geometry.dtype),
+        np.empty(width, geometry.dtype),
+        np.empty(width, geometry.dtype),
+    )
     along_all, dk_all = np.empty(width, geometry.dtype), np.empty(width, geometry.dtype)
     for i in range(first, last):
         row = geometry[i]
@@ -478,12 +596,16 @@ def backward_rows(
         for j in range(width):
             right[j] = zj[j] * along_all[j] - n3[j] * d2_all[j]
         if count > 0:
-            _curvature_derivatives(row[:, start:stop], dk_all[:count], out[:, i + 2, start + 2 : stop + 2])
+            _curvature_derivatives(
+                row[:, start:stop], dk_all[:count], out[:, i + 2, start + 2 : stop + 2]
+            )
 
 
 @inlined
 def _curvature_derivatives(row, dk, out):
-    """Adds what the curvature's gradient dk (W,), times n3^3, asks of the five derivatives in `out` (5, W); the last three are set."""
+    """Adds what the curvature's gradient dk (W,), times n3^3, asks of the five derivatives in `out`
+    (5, W); the last three are set.
+    """
     t = row.dtype.type
     one, half = t(1), t(0.5)
     zi, zj, zii, zjj, zij = row[0], row[1], row[2], row[3], row[4]
@@ -526,12 +648,24 @@ def _light_sums(d, n1, n2, n3, sums):
         s6 += c * n3[j]
         s7 += a * n3[j]
         s8 += a * n1[j] - b * n2[j]
-    sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8] = s0, s1, s2, s3, s4, s5, s6, s7, s8
+    sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6], sums[7], sums[8] = (
+        s0,
+        s1,
+        s2,
+        s3,
+        s4,
+        s5,
+        s6,
+        s7,
+        s8,
+    )
 
 
 @compiled
 def adjoint_rows(first, last, d, wide):
-    """Rows [first, last) of the gradient of the padded height, (H+2, W+2), from those of its derivatives, (5, H+4, W+4)."""
+    """Rows [first, last) of the gradient of the padded height, (H+2, W+2), from those of its
+    derivatives, (5, H+4, W+4).
+    """
     t = wide.dtype.type
     two, quarter, eighth = t(2), t(0.25), t(0.125)
     width = d.shape[2]
@@ -539,7 +673,11 @@ def adjoint_rows(first, last, d, wide):
     q = np.empty(width, wide.dtype)
     r = np.empty(width, wide.dtype)
     for i in range(first, last):
-        below, here, above = d[:, i], d[:, i + 1], d[:, i + 2]  # sources whose stencil has this row below, at, above its centre
+        below, here, above = (
+            d[:, i],
+            d[:, i + 1],
+            d[:, i + 2],
+        )  # sources whose stencil has this row below, at, above its centre
         b0, b1, b2, b3, b4 = below[0], below[1], below[2], below[3], below[4]
         h1, h2, h3 = here[1], here[2], here[3]
         a0, a1, a2, a3, a4 = above[0], above[1], above[2], above[3], above[4]
@@ -551,4 +689,13 @@ def adjoint_rows(first, last, d, wide):
             r[j] = (b3[j] + two * h3[j] + a3[j]) * quarter
         out = wide[i]
         for j in range(width - 2):
-            out[j] = p[j] + two * p[j + 1] + p[j + 2] + q[j] - q[j + 2] + r[j] - two * r[j + 1] + r[j + 2]
+            out[j] = (
+                p[j]
+                + two * p[j + 1]
+                + p[j + 2]
+                + q[j]
+                - q[j + 2]
+                + r[j]
+                - two * r[j + 1]
+                + r[j + 2]
+            )

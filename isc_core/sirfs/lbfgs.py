@@ -1,9 +1,11 @@
-"""Limited-memory BFGS with a strong Wolfe line search, in place and in the storage type of the unknowns.
+"""Limited-memory BFGS with a strong Wolfe line search, in place and in the storage type of the
+unknowns.
 
-The direction comes from the two-loop recursion (Nocedal 1980, doi:10.1090/S0025-5718-1980-0572855-7) carried out on the
-inner products of the stored vectors alone (after Chen, Wang & Zhou 2014, "Large-scale L-BFGS using MapReduce", NIPS): each
-iteration reads the memory twice, once for products and once for the direction. Products are float64 sums in a fixed order.
-The line search is that of Nocedal & Wright 2006, section 3.5, doi:10.1007/978-0-387-40065-5.
+The direction comes from the two-loop recursion (Nocedal 1980,
+doi:10.1090/S0025-5718-1980-0572855-7) carried out on the inner products of the stored vectors alone
+(after Chen, Wang & Zhou 2014, "Large-scale L-BFGS using MapReduce", NIPS): each iteration reads the
+memory twice, once for products and once for the direction. Products are float64 sums in a fixed
+order. The line search is that of Nocedal & Wright 2006, section 3.5, doi:10.1007/978-0-387-40065-5.
 Limits: smooth unconstrained functions; small kinks are survived, not resolved.
 """
 
@@ -18,9 +20,10 @@ import numpy as np
 class LbfgsOptions:
     """`memory`: pairs kept. `iterations`, `evaluations`: at most so many.
 
-    `loss_tolerance`, `loss_window`: stop once so many previous losses all lie within this relative distance of the current
-    one. `gradient_tolerance`: stop at a largest gradient component this small. `step_tolerance`: or at a smaller step.
-    `armijo`, `wolfe`: the strong Wolfe conditions' constants; `trials`: evaluations of one line search.
+    `loss_tolerance`, `loss_window`: stop once so many previous losses all lie within this relative
+    distance of the current one. `gradient_tolerance`: stop at a largest gradient component this
+    small. `step_tolerance`: or at a smaller step. `armijo`, `wolfe`: the strong Wolfe conditions'
+    constants; `trials`: evaluations of one line search.
     """
 
     memory: int = 10
@@ -37,7 +40,10 @@ class LbfgsOptions:
 
 @dataclass(frozen=True)
 class LbfgsResult:
-    """`loss`: final value. `reason`: why it stopped, one of "loss", "gradient", "step", "iterations", "evaluations"."""
+    """`loss`: final value.
+
+    `reason`: why it stopped, one of "loss", "gradient", "step", "iterations", "evaluations".
+    """
 
     loss: float
     iterations: int
@@ -77,11 +83,15 @@ class NumpyAlgebra:
 Function = Callable[[np.ndarray, np.ndarray], float]
 
 
-_LEAST_COSINE = 1e-10  # between a step and the change of the gradient: below, the pair says nothing of the curvature
+# between a step and the change of the gradient: below, the pair says nothing of the curvature
+_LEAST_COSINE = 1e-10
 
 
 class _Memory:
-    """Steps and gradient changes, with the inner products between all of them. Rows: m steps, m changes, the gradient."""
+    """Steps and gradient changes, with the inner products between all of them.
+
+    Rows: m steps, m changes, the gradient.
+    """
 
     def __init__(self, size: int, length: int, dtype: np.dtype, algebra: Algebra) -> None:  # type: ignore[type-arg]
         self.size = size
@@ -95,8 +105,14 @@ class _Memory:
         return self.vectors[-1]
 
     def next_slot(self) -> int:
-        """A row that holds no pair, else that of the oldest. (A skipped pair can leave a gap anywhere.)"""
-        return next((k for k in range(self.size) if k not in self._order), self._order[0] if self._order else 0)
+        """A row that holds no pair, else that of the oldest.
+
+        (A skipped pair can leave a gap anywhere.)
+        """
+        return next(
+            (k for k in range(self.size) if k not in self._order),
+            self._order[0] if self._order else 0,
+        )
 
     def refresh(self, slot: int | None) -> None:
         """Takes the rows of `slot` as the newest pair (None: only the gradient has changed)."""
@@ -108,7 +124,9 @@ class _Memory:
             return
         self._order = [k for k in self._order if k != slot]
         change = self.size + slot
-        if self._gram[slot, change] > _LEAST_COSINE * np.sqrt(self._gram[slot, slot] * self._gram[change, change]):
+        if self._gram[slot, change] > _LEAST_COSINE * np.sqrt(
+            self._gram[slot, slot] * self._gram[change, change]
+        ):
             self._order.append(slot)
 
     def direction(self, out: np.ndarray) -> float:
@@ -147,20 +165,39 @@ def minimise(
 
 
 class Minimisation:
-    """One that can be put down and taken up again, as if it had never stopped. `x` (N,) is where it is, changed in place; `loss` there."""
+    """One that can be put down and taken up again, as if it had never stopped.
 
-    def __init__(self, function: Function, x: np.ndarray, options: LbfgsOptions, algebra: Algebra) -> None:
+    `x` (N,) is where it is, changed in place; `loss` there.
+    """
+
+    def __init__(
+        self, function: Function, x: np.ndarray, options: LbfgsOptions, algebra: Algebra
+    ) -> None:
         self.x, self._function, self._options = x, function, options
         self._memory = _Memory(options.memory, x.size, x.dtype, algebra)
-        self._direction, self._start, self._old_gradient = np.empty_like(x), np.empty_like(x), np.empty_like(x)
+        self._direction, self._start, self._old_gradient = (
+            np.empty_like(x),
+            np.empty_like(x),
+            np.empty_like(x),
+        )
         self.loss = function(x, self._memory.gradient)
         self._losses, self._evaluations = [self.loss], 1
         self._settled = ""  # why the last step was the last
         self._memory.refresh(None)
 
-    def run(self, each: Callable[[int, float], None] = lambda iteration, loss: None, evaluations: int | None = None) -> LbfgsResult:
-        """Goes on until there is no more to gain, or until it has taken `evaluations` in all (None: as many as the options allow)."""
-        most = self._options.evaluations if evaluations is None else min(evaluations, self._options.evaluations)
+    def run(
+        self,
+        each: Callable[[int, float], None] = lambda iteration, loss: None,
+        evaluations: int | None = None,
+    ) -> LbfgsResult:
+        """Goes on until there is no more to gain, or until it has taken `evaluations` in all (None:
+        as many as the options allow).
+        """
+        most = (
+            self._options.evaluations
+            if evaluations is None
+            else min(evaluations, self._options.evaluations)
+        )
         while not (reason := self._stop(most)):
             self._step()
             each(self._iterations, self.loss)
@@ -186,10 +223,16 @@ class Minimisation:
         if not slope < 0:
             memory.forget()
             slope = memory.direction(self._direction)
-        first = 1.0 if self._iterations else min(1.0, 1.0 / float(np.abs(memory.gradient).sum(dtype=float)))
+        first = (
+            1.0
+            if self._iterations
+            else min(1.0, 1.0 / float(np.abs(memory.gradient).sum(dtype=float)))
+        )
         np.copyto(self._start, self.x)
         np.copyto(self._old_gradient, memory.gradient)
-        search = _Search(self._function, self.x, self._start, self._direction, memory.gradient, options)
+        search = _Search(
+            self._function, self.x, self._start, self._direction, memory.gradient, options
+        )
         step, self.loss = search.run(self.loss, slope, first)
         self._evaluations += search.evaluations
         slot = memory.next_slot()
@@ -200,7 +243,10 @@ class Minimisation:
         settled = all(abs(v - self.loss) <= options.loss_tolerance * abs(self.loss) for v in recent)
         if len(recent) == options.loss_window and settled:
             self._settled = "loss"
-        elif step * float(np.abs(self._direction).max()) < options.step_tolerance or abs(recent[-1] - self.loss) < options.step_tolerance:
+        elif (
+            step * float(np.abs(self._direction).max()) < options.step_tolerance
+            or abs(recent[-1] - self.loss) < options.step_tolerance
+        ):
             self._settled = "step"
         self._losses.append(self.loss)
 
@@ -213,12 +259,27 @@ class _Trial:
 
 
 class _Search:
-    """One line search along `direction` from `start`; `x` and `gradient` end at the accepted point."""
+    """One line search along `direction` from `start`;
+
+    `x` and `gradient` end at the accepted point.
+    """
 
     def __init__(
-        self, function: Function, x: np.ndarray, start: np.ndarray, direction: np.ndarray, gradient: np.ndarray, options: LbfgsOptions
+        self,
+        function: Function,
+        x: np.ndarray,
+        start: np.ndarray,
+        direction: np.ndarray,
+        gradient: np.ndarray,
+        options: LbfgsOptions,
     ) -> None:
-        self._function, self._x, self._start, self._direction, self._gradient = function, x, start, direction, gradient
+        self._function, self._x, self._start, self._direction, self._gradient = (
+            function,
+            x,
+            start,
+            direction,
+            gradient,
+        )
         self._options = options
         self.evaluations = 0
 
@@ -232,13 +293,19 @@ class _Search:
             if not np.isfinite(trial.loss):
                 step = (previous.step + step) / 2
                 continue
-            if trial.loss > loss + o.armijo * step * slope or (self.evaluations > 1 and trial.loss >= previous.loss):
+            if trial.loss > loss + o.armijo * step * slope or (
+                self.evaluations > 1 and trial.loss >= previous.loss
+            ):
                 return self._zoom(origin, previous, trial)
             if abs(trial.slope) <= -o.wolfe * slope:
                 return trial.step, trial.loss
             if trial.slope >= 0:
                 return self._zoom(origin, trial, previous)
-            step = float(np.clip(_cubic_minimum(previous, trial), step + 0.01 * (step - previous.step), 10 * step))
+            step = float(
+                np.clip(
+                    _cubic_minimum(previous, trial), step + 0.01 * (step - previous.step), 10 * step
+                )
+            )
             previous = trial
         return self._settle(previous)
 
@@ -251,7 +318,11 @@ class _Search:
             least, most = min(low.step, high.step), max(low.step, high.step)
             step = float(np.clip(step, least + 0.1 * width, most - 0.1 * width))
             trial = self._try(step)
-            if not np.isfinite(trial.loss) or trial.loss > origin.loss + o.armijo * step * origin.slope or trial.loss >= low.loss:
+            if (
+                not np.isfinite(trial.loss)
+                or trial.loss > origin.loss + o.armijo * step * origin.slope
+                or trial.loss >= low.loss
+            ):
                 high = trial if np.isfinite(trial.loss) else _Trial(step, low.loss + 1, 0.0)
             elif abs(trial.slope) <= -o.wolfe * origin.slope:
                 return trial.step, trial.loss
@@ -268,7 +339,9 @@ class _Search:
         self._x += self._start
         self.evaluations += 1
         loss = self._function(self._x, self._gradient)
-        return _Trial(step, loss, float(np.einsum("n,n->", self._gradient, self._direction, dtype=float)))
+        return _Trial(
+            step, loss, float(np.einsum("n,n->", self._gradient, self._direction, dtype=float))
+        )
 
     def _settle(self, best: _Trial) -> tuple[float, float]:
         """Goes back to the best point seen, which need not be the last one evaluated."""

@@ -1,7 +1,7 @@
 """The SIRFS objective on compiled kernels and a few threads: the engine that users run.
 
-Rows are split into blocks whose number depends on the image alone, and every sum is taken in a fixed order: the result is
-the same, to the byte, on one thread or many.
+Rows are split into blocks whose number depends on the image alone, and every sum is taken in a
+fixed order: the result is the same, to the byte, on one thread or many.
 """
 
 from collections.abc import Callable
@@ -42,9 +42,17 @@ def _from_zero(table: CostTable) -> tuple[float, np.ndarray]:
 
 
 class NumbaEngine:
-    """Evaluates one `Problem` in `dtype` on `workers`. Buffers are reused: an evaluation's arrays are its own only until the next."""
+    """Evaluates one `Problem` in `dtype` on `workers`.
 
-    def __init__(self, problem: Problem, dtype: type[np.floating] = np.float32, workers: Workers | None = None) -> None:
+    Buffers are reused: an evaluation's arrays are its own only until the next.
+    """
+
+    def __init__(
+        self,
+        problem: Problem,
+        dtype: type[np.floating] = np.float32,
+        workers: Workers | None = None,
+    ) -> None:
         self.problem = problem
         self.dtype = np.dtype(dtype)
         self._workers = workers or Workers(1)
@@ -63,16 +71,29 @@ class NumbaEngine:
         self._spans = spans
         self._offsets = np.array(PAIR_OFFSETS, np.int64)
         channels = p.log_image.shape[2]
-        whiten = (np.eye(channels), np.eye(channels)) if p.shading_only else (p.priors.smoothness_whiten, p.priors.parsimony_whiten)
+        whiten = (
+            (np.eye(channels), np.eye(channels))
+            if p.shading_only
+            else (p.priors.smoothness_whiten, p.priors.parsimony_whiten)
+        )
         self._whiten_smooth, self._whiten_palette = (np.ascontiguousarray(m, t) for m in whiten)
-        # the softened difference is positive: float32 finds its cell more exactly when the table starts at 0
+        # the softened difference is positive: float32 finds its cell more exactly when the table
+        # starts at 0
         self._curvature_low, costs = _from_zero(p.priors.curvature)
-        # differences are taken before rounding: two large float32 costs would leave nothing of a small slope
-        self._smooth_table, self._curvature_table = ((v.astype(t), np.diff(v).astype(t)) for v in (p.priors.smoothness.values, costs))
+        # differences are taken before rounding: two large float32 costs would leave nothing of a
+        # small slope
+        self._smooth_table, self._curvature_table = (
+            (v.astype(t), np.diff(v).astype(t)) for v in (p.priors.smoothness.values, costs)
+        )
         if p.silhouette is not None:
-            strength = np.where(p.valid, p.silhouette.precision, 0) * (p.weights.silhouette / max(int(p.valid.sum()), 1))
+            strength = np.where(p.valid, p.silhouette.precision, 0) * (
+                p.weights.silhouette / max(int(p.valid.sum()), 1)
+            )
             field = p.silhouette
-            self._expected, self._strength = np.ascontiguousarray([field.down, field.right], t), strength.astype(t)
+            self._expected, self._strength = (
+                np.ascontiguousarray([field.down, field.right], t),
+                strength.astype(t),
+            )
         count = min(_MOST_BLOCKS, max(1, height // _ROWS_A_BLOCK))
         edges = [height * k // count for k in range(count + 1)]
         self._blocks = list(zip(edges[:-1], edges[1:], strict=True))
@@ -81,7 +102,9 @@ class NumbaEngine:
         t = self.dtype
         height, width = self.problem.valid.shape
         channels, blocks = self.problem.log_image.shape[2], len(self._blocks)
-        self._padded = np.empty((height + 2, width + 2))  # float64: in float32 the rounding of heights would drown their curvature
+        self._padded = np.empty(
+            (height + 2, width + 2)
+        )  # float64: in float32 the rounding of heights would drown their curvature
         self._geometry = np.zeros((height, 9, width), t)
         self._whitened, self._palette = np.zeros((2, height, channels, width), t)
         self._g_smooth, self._g_palette = np.zeros((2, height, channels, width), t)
@@ -96,7 +119,10 @@ class NumbaEngine:
         self._smooth_cost, self._curvature_cost = np.zeros((2, blocks))
         self._silhouette_cost = np.zeros(height)
         if channels == 3:
-            self._cell, self._side = np.zeros((height, width), np.int32), np.zeros((height, 3, width), t)
+            self._cell, self._side = (
+                np.zeros((height, width), np.int32),
+                np.zeros((height, 3, width), t),
+            )
         self._palette_terms: dict[str, float] = {}
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
@@ -107,7 +133,9 @@ class NumbaEngine:
         self._each_block(partial(self._forward, folded))
         if not (np.isfinite(self._slant).all() and np.isfinite(folded).all()):
             # a step too far: kernels that look up tables must not see what is no number
-            return Evaluation(Terms(slant=float("inf")), np.zeros(height.shape, self.dtype), np.zeros(light.shape))
+            return Evaluation(
+                Terms(slant=float("inf")), np.zeros(height.shape, self.dtype), np.zeros(light.shape)
+            )
         pairs: list[Callable[[], None]] = [self._palette_task]
         pairs += [partial(self._pair_block, k) for k in range(len(self._blocks))]
         self._workers.run(pairs)
@@ -116,7 +144,12 @@ class NumbaEngine:
             self._each_block(self._silhouette_rows)
         contour = self._contour_term()
         self._each_block(partial(self._backward, folded))
-        self._workers.run([partial(kernels.adjoint_rows, a, b, self._derivatives, self._wide) for a, b in self._shares(len(self._wide))])
+        self._workers.run(
+            [
+                partial(kernels.adjoint_rows, a, b, self._derivatives, self._wide)
+                for a, b in self._shares(len(self._wide))
+            ]
+        )
         gradient = fold_border(self._wide)
         light_gradient = _unfold_light_gradient(self._light_sums.sum(axis=0))
         cost, pull = light_cost(np.asarray(light, float), p.priors.light, p.weights.light)
@@ -144,28 +177,69 @@ class NumbaEngine:
 
     def _forward(self, light: np.ndarray, first: int, last: int) -> None:
         kernels.forward_rows(
-            first, last, self._padded, self._spans, self._log_image, light, self._whiten_smooth, self._whiten_palette,
-            self._geometry, self._whitened, self._palette, self._d3, self._slant,
-        )  # fmt: skip
+            first,
+            last,
+            self._padded,
+            self._spans,
+            self._log_image,
+            light,
+            self._whiten_smooth,
+            self._whiten_palette,
+            self._geometry,
+            self._whitened,
+            self._palette,
+            self._d3,
+            self._slant,
+        )
 
     def _silhouette_rows(self, first: int, last: int) -> None:
-        kernels.silhouette_rows(first, last, self._geometry, self._expected, self._strength, self._contour, self._silhouette_cost)
+        kernels.silhouette_rows(
+            first,
+            last,
+            self._geometry,
+            self._expected,
+            self._strength,
+            self._contour,
+            self._silhouette_cost,
+        )
 
     def _pair_block(self, k: int) -> None:
         first, last = self._blocks[k]
         p = self.problem
         table = p.priors.curvature
         kernels.curvature_block(
-            first, last, self._geometry, self._valid, self._spans, self._offsets, *self._curvature_table,
-            self._curvature_low, 1 / table.step, self._g_curvature, self._curvature_spill[k], self._curvature_cost, k,
-        )  # fmt: skip
+            first,
+            last,
+            self._geometry,
+            self._valid,
+            self._spans,
+            self._offsets,
+            *self._curvature_table,
+            self._curvature_low,
+            1 / table.step,
+            self._g_curvature,
+            self._curvature_spill[k],
+            self._curvature_cost,
+            k,
+        )
         if p.shading_only:
             return
         table = p.priors.smoothness
         kernels.smoothness_block(
-            first, last, self._whitened, self._trust, self._spans, self._offsets, *self._smooth_table, table.low,
-            1 / table.step, self._g_smooth, self._smooth_spill[k], self._smooth_cost, k,
-        )  # fmt: skip
+            first,
+            last,
+            self._whitened,
+            self._trust,
+            self._spans,
+            self._offsets,
+            *self._smooth_table,
+            table.low,
+            1 / table.step,
+            self._g_smooth,
+            self._smooth_spill[k],
+            self._smooth_cost,
+            k,
+        )
 
     def _add_spills(self) -> None:
         for k, (_, last) in enumerate(self._blocks[:-1]):
@@ -182,34 +256,57 @@ class NumbaEngine:
         nodes = table.values.shape[0]
         step = (table.high - table.low) / (nodes - 1)
         bounds = np.empty((3, 2), np.int64)
-        kernels.palette_range(self._palette, self._trust, self._spans, table.low, step, nodes, bounds)
+        kernels.palette_range(
+            self._palette, self._trust, self._spans, table.low, step, nodes, bounds
+        )
         counts = np.zeros(tuple(bounds[:, 1] - bounds[:, 0]))
-        kernels.locate_color(self._palette, self._spans, table.low, 1 / step, nodes, bounds, self._cell, self._side)
+        kernels.locate_color(
+            self._palette, self._spans, table.low, 1 / step, nodes, bounds, self._cell, self._side
+        )
         kernels.splat_color(self._trust, self._spans, self._cell, self._side, counts)
         pixels = float(p.reflectance_weight.sum())
         blurred = np.empty_like(counts)
-        kernels.blur_color(counts, reflectance.parzen_taps(w.parsimony_sigma / reflectance.SIGMA_UNIT, step, pixels, 3), blurred)
+        kernels.blur_color(
+            counts,
+            reflectance.parzen_taps(w.parsimony_sigma / reflectance.SIGMA_UNIT, step, pixels, 3),
+            blurred,
+        )
         overlap = float((blurred * counts).sum())
         costs = table.values[tuple(slice(a, b) for a, b in bounds)]
         scale = w.absolute / (reflectance.ABSOLUTE_DIVISOR * pixels)
         node_gradient = (-2 * w.parsimony / overlap) * blurred + scale * costs
-        self._palette_terms = {"parsimony": -w.parsimony * float(np.log(overlap)), "absolute": scale * float((costs * counts).sum())}
+        self._palette_terms = {
+            "parsimony": -w.parsimony * float(np.log(overlap)),
+            "absolute": scale * float((costs * counts).sum()),
+        }
         kernels.gather_color(
-            self._palette, self._trust, self._spans, table.low, table.high, 1 / step, self._cell, self._side,
-            node_gradient.astype(self.dtype), self._g_palette,
-        )  # fmt: skip
+            self._palette,
+            self._trust,
+            self._spans,
+            table.low,
+            table.high,
+            1 / step,
+            self._cell,
+            self._side,
+            node_gradient.astype(self.dtype),
+            self._g_palette,
+        )
 
     def _palette_in_numpy(self) -> None:
         """Grey photos and shape-from-shading mode, where these terms cost next to nothing."""
         p, w = self.problem, self.problem.weights
         values = self._palette.transpose(0, 2, 1)
         if p.shading_only:
-            cost, gradient = reflectance.one_color_cost(values, p.reflectance_weight, w.shading_only)
+            cost, gradient = reflectance.one_color_cost(
+                values, p.reflectance_weight, w.shading_only
+            )
             self._palette_terms = {"shading_only": cost}
             self._g_palette[:] = gradient.transpose(0, 2, 1)
             return
         log_reflectance = values @ np.linalg.inv(self._whiten_palette).T
-        parsimony, absolute, gradient = reflectance.palette_cost(log_reflectance, p.reflectance_weight, p.priors, w)
+        parsimony, absolute, gradient = reflectance.palette_cost(
+            log_reflectance, p.reflectance_weight, p.priors, w
+        )
         self._palette_terms = {"parsimony": parsimony, "absolute": absolute}
         self._g_palette[:] = (gradient @ np.linalg.inv(self._whiten_palette)).transpose(0, 2, 1)
 
@@ -217,7 +314,9 @@ class NumbaEngine:
         p, w = self.problem, self.problem.weights
         at = (p.contour.rows, p.contour.columns)
         n1, n2 = self._geometry[:, 5], self._geometry[:, 6]
-        cost, c1, c2 = surface.contour_cost(n1, n2, p.contour, w.contour, w.contour_power, p.valid.size)
+        cost, c1, c2 = surface.contour_cost(
+            n1, n2, p.contour, w.contour, w.contour_power, p.valid.size
+        )
         if p.silhouette is None:
             self._contour[(0, *at)] = c1
             self._contour[(1, *at)] = c2
@@ -229,20 +328,42 @@ class NumbaEngine:
     def _scales(self) -> tuple[float, float, float, float]:
         p, w = self.problem, self.problem.weights
         n, channels = p.valid.size, p.priors.channels
-        smooth = 0.0 if p.shading_only else w.smoothness * 3 / (25 * n * channels) / p.priors.smoothness.step
+        smooth = (
+            0.0
+            if p.shading_only
+            else w.smoothness * 3 / (25 * n * channels) / p.priors.smoothness.step
+        )
         curvature = w.curvature / (25 * n) / p.priors.curvature.step
         return smooth, 1.0, curvature, w.slant / n
 
     def _pair_terms(self) -> dict[str, float]:
         p, w = self.problem, self.problem.weights
         n, channels = p.valid.size, p.priors.channels
-        terms = {"curvature": w.curvature / (25 * n) * float(self._curvature_cost.sum()), "slant": w.slant / n * float(self._slant.sum())}
+        terms = {
+            "curvature": w.curvature / (25 * n) * float(self._curvature_cost.sum()),
+            "slant": w.slant / n * float(self._slant.sum()),
+        }
         if not p.shading_only:
-            terms["smoothness"] = w.smoothness * 3 / (25 * n * channels) * float(self._smooth_cost.sum())
+            terms["smoothness"] = (
+                w.smoothness * 3 / (25 * n * channels) * float(self._smooth_cost.sum())
+            )
         return terms
 
     def _backward(self, light: np.ndarray, first: int, last: int) -> None:
         kernels.backward_rows(
-            first, last, self._geometry, self._spans, light, self._whiten_smooth, self._whiten_palette, self._g_smooth, self._g_palette,
-            self._g_curvature, self._scales(), self._d3, self._contour, self._light_sums, self._derivatives,
-        )  # fmt: skip
+            first,
+            last,
+            self._geometry,
+            self._spans,
+            light,
+            self._whiten_smooth,
+            self._whiten_palette,
+            self._g_smooth,
+            self._g_palette,
+            self._g_curvature,
+            self._scales(),
+            self._d3,
+            self._contour,
+            self._light_sums,
+            self._derivatives,
+        )

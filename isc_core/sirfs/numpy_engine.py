@@ -1,4 +1,6 @@
-"""The SIRFS objective in plain NumPy: the path that always works, and the one the compiled engine is held against."""
+"""The SIRFS objective in plain NumPy: the path that always works, and the one the compiled engine
+is held against.
+"""
 
 import numpy as np
 
@@ -22,13 +24,17 @@ class NumpyEngine:
         p = self.problem
         g = surface.geometry(np.asarray(height, float), self.dtype)
         functions = basis(g.n1, g.n2, g.n3)
-        log_reflectance = self._log_image - np.einsum("khw,kc->hwc", functions, light.astype(self.dtype))
+        log_reflectance = self._log_image - np.einsum(
+            "khw,kc->hwc", functions, light.astype(self.dtype)
+        )
         log_reflectance[~p.valid] = 0
         reflectance_terms, d_reflectance = self._reflectance(log_reflectance)
         d_reflectance[~p.valid] = 0
         d_shading = -d_reflectance
         light_gradient = np.einsum("khw,hwc->kc", functions, d_shading, dtype=float)
-        d1, d2, d3 = basis_adjoint(g.n1, g.n2, g.n3, np.einsum("hwc,kc->khw", d_shading, light.astype(self.dtype)))
+        d1, d2, d3 = basis_adjoint(
+            g.n1, g.n2, g.n3, np.einsum("hwc,kc->khw", d_shading, light.astype(self.dtype))
+        )
         shape_terms, height_gradient = self._shape(height, g, d1, d2, d3)
         cost, pull = light_cost(light.astype(float), p.priors.light, p.weights.light)
         terms = Terms(**reflectance_terms, **shape_terms, light=cost)
@@ -37,25 +43,46 @@ class NumpyEngine:
     def _reflectance(self, log_reflectance: np.ndarray) -> tuple[dict[str, float], np.ndarray]:
         p, w = self.problem, self.problem.weights
         if p.shading_only:
-            cost, gradient = reflectance.one_color_cost(log_reflectance, self._trust, w.shading_only)
+            cost, gradient = reflectance.one_color_cost(
+                log_reflectance, self._trust, w.shading_only
+            )
             return {"shading_only": cost}, gradient
-        smooth, d_smooth = reflectance.smoothness_cost(log_reflectance, self._trust, p.priors, w.smoothness)
-        parsimony, absolute, d_palette = reflectance.palette_cost(log_reflectance, self._trust, p.priors, w)
-        return {"smoothness": smooth, "parsimony": parsimony, "absolute": absolute}, d_smooth + d_palette
+        smooth, d_smooth = reflectance.smoothness_cost(
+            log_reflectance, self._trust, p.priors, w.smoothness
+        )
+        parsimony, absolute, d_palette = reflectance.palette_cost(
+            log_reflectance, self._trust, p.priors, w
+        )
+        return {
+            "smoothness": smooth,
+            "parsimony": parsimony,
+            "absolute": absolute,
+        }, d_smooth + d_palette
 
     def _shape(
-        self, height: np.ndarray, g: surface.Geometry, d1: np.ndarray, d2: np.ndarray, d3: np.ndarray
+        self,
+        height: np.ndarray,
+        g: surface.Geometry,
+        d1: np.ndarray,
+        d2: np.ndarray,
+        d3: np.ndarray,
     ) -> tuple[dict[str, float], np.ndarray]:
         p, w = self.problem, self.problem.weights
-        curvature, dk = surface.curvature_cost(g.curvature, p.valid, p.priors.curvature, w.curvature)
+        curvature, dk = surface.curvature_cost(
+            g.curvature, p.valid, p.priors.curvature, w.curvature
+        )
         slant, d_slant = surface.slant_cost(g.n3, w.slant)
-        contour, c1, c2 = surface.contour_cost(g.n1, g.n2, p.contour, w.contour, w.contour_power, g.n1.size)
+        contour, c1, c2 = surface.contour_cost(
+            g.n1, g.n2, p.contour, w.contour, w.contour_power, g.n1.size
+        )
         at = (p.contour.rows, p.contour.columns)
         d1[at] += c1.astype(d1.dtype)
         d2[at] += c2.astype(d2.dtype)
         terms = {"curvature": curvature, "slant": slant, "contour": contour}
         if p.silhouette is not None:
-            terms["silhouette"], e1, e2 = silhouette_cost(g.n1, g.n2, p.valid, p.silhouette, w.silhouette)
+            terms["silhouette"], e1, e2 = silhouette_cost(
+                g.n1, g.n2, p.valid, p.silhouette, w.silhouette
+            )
             d1, d2 = d1 + e1, d2 + e2
         gradient = surface.height_gradient(g, d1, d2, d3 + d_slant, dk)
         if p.observation is not None:

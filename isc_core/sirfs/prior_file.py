@@ -26,17 +26,25 @@ _COEFFICIENTS = 27
 
 
 def save_prior_set(path: str | Path, priors: PriorSet) -> None:
-    """Writes `priors` to `path` (.npz); the same set gives the same bytes. Raises `InputError` where `path` cannot be written."""
+    """Writes `priors` to `path` (.npz); the same set gives the same bytes.
+
+    Raises `InputError` where `path` cannot be written.
+    """
     with new_file(path) as partial, partial.open("wb") as file:
         _write_archive(file, _to_arrays(priors))
 
 
 def load_prior_set(path: str | Path) -> PriorSet:
-    """Reads a set that `save_prior_set` wrote. Raises `InputError` for a missing, damaged, foreign or newer file."""
+    """Reads a set that `save_prior_set` wrote.
+
+    Raises `InputError` for a missing, damaged, foreign or newer file.
+    """
     try:
         data = Path(path).read_bytes()
     except OSError as error:
-        raise InputError(f"cannot read the priors {path} ({error.strerror}): give a file that 'isc fit-priors' wrote") from error
+        raise InputError(
+            f"cannot read the priors {path} ({error.strerror}): give a file that 'isc fit-priors' wrote"
+        ) from error
     return _parse(data, str(path))
 
 
@@ -46,7 +54,9 @@ def shipped_prior_set() -> PriorSet:
     try:
         data = resource.read_bytes()
     except OSError as error:
-        raise InputError("the package's own priors are missing: reinstall it, or give a file with --priors") from error
+        raise InputError(
+            "the package's own priors are missing: reinstall it, or give a file with --priors"
+        ) from error
     return _parse(data, "the package's own priors")
 
 
@@ -65,10 +75,18 @@ def _to_arrays(priors: PriorSet) -> dict[str, np.ndarray]:
     }
     for name in ("curvature", "grey_smoothness"):
         mixture: ScaleMixture = getattr(priors, name)
-        arrays |= {f"{name}.deviations": mixture.deviations, f"{name}.weights": mixture.weights, f"{name}.reach": np.array(mixture.reach)}
+        arrays |= {
+            f"{name}.deviations": mixture.deviations,
+            f"{name}.weights": mixture.weights,
+            f"{name}.reach": np.array(mixture.reach),
+        }
     for name in ("absolute", "grey_absolute"):
         table: CoarseTable = getattr(priors, name)
-        arrays |= {f"{name}.coarse": table.coarse, f"{name}.base": np.array(table.base), f"{name}.nodes": np.array(table.nodes)}
+        arrays |= {
+            f"{name}.coarse": table.coarse,
+            f"{name}.base": np.array(table.base),
+            f"{name}.nodes": np.array(table.nodes),
+        }
     for name in _LIGHTS:
         light: GaussianLight = getattr(priors.lights, name)
         arrays |= {f"lights.{name}.mean": light.mean, f"lights.{name}.covariance": light.covariance}
@@ -88,7 +106,9 @@ def _write_archive(file: IO[bytes], arrays: dict[str, np.ndarray]) -> None:
 
 
 def _parse(data: bytes, source: str) -> PriorSet:
-    problem = InputError(f"{source} is damaged or not a file of priors: give a file that 'isc fit-priors' wrote")
+    problem = InputError(
+        f"{source} is damaged or not a file of priors: give a file that 'isc fit-priors' wrote"
+    )
     try:
         arrays = parse_arrays(data, source)
     except InputError as error:
@@ -106,7 +126,9 @@ class _Reader:
     def prior_set(self) -> PriorSet:
         version = int(self.numbers("schema_version", ()))
         if version != SCHEMA_VERSION:
-            raise InputError(f"{self.source} has format version {version}, not {SCHEMA_VERSION}: fit the priors again")
+            raise InputError(
+                f"{self.source} has format version {version}, not {SCHEMA_VERSION}: fit the priors again"
+            )
         whiten = self.numbers("parsimony_whiten", (3, 3))
         lights = Lights(**{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in _LIGHTS})
         return PriorSet(
@@ -129,12 +151,16 @@ class _Reader:
             raise self.wrong(f"'{name}' is missing")
         return self.arrays[name]
 
-    def numbers(self, name: str, shape: tuple[int | None, ...], positive: bool = False) -> np.ndarray:
+    def numbers(
+        self, name: str, shape: tuple[int | None, ...], positive: bool = False
+    ) -> np.ndarray:
         """A finite array; None in `shape` stands for any length above 0."""
         array = self.array(name)
         if array.dtype.kind not in "fiu" or array.ndim != len(shape) or array.size == 0:
             raise self.wrong(f"'{name}' has the wrong type or shape")
-        if any(want is not None and want != got for want, got in zip(shape, array.shape, strict=True)):
+        if any(
+            want is not None and want != got for want, got in zip(shape, array.shape, strict=True)
+        ):
             raise self.wrong(f"'{name}' has shape {array.shape} instead of {shape}")
         if not np.isfinite(array).all() or (positive and not (array > 0).all()):
             raise self.wrong(f"'{name}' holds values that no fit gives")
@@ -162,7 +188,9 @@ class _Reader:
         variances = self.numbers(f"{name}.variances", (None,), positive=True)
         weights = self.weights(f"{name}.weights", len(variances))
         covariance = self.covariance(f"{name}.covariance", 3)
-        return ColorScaleMixture(variances, weights, covariance, float(self.numbers(f"{name}.reach", (), positive=True)))
+        return ColorScaleMixture(
+            variances, weights, covariance, float(self.numbers(f"{name}.reach", (), positive=True))
+        )
 
     def table(self, name: str, dimensions: int) -> CoarseTable:
         nodes = int(self.numbers(f"{name}.nodes", (), positive=True))
@@ -171,15 +199,26 @@ class _Reader:
 
     def silhouette(self) -> SilhouetteProfile:
         mean = self.numbers("silhouette.mean", (None,))
-        return SilhouetteProfile(mean, self.numbers("silhouette.spread", (len(mean),), positive=True))
+        return SilhouetteProfile(
+            mean, self.numbers("silhouette.spread", (len(mean),), positive=True)
+        )
 
     def light(self, name: str, size: int) -> GaussianLight:
-        mean, covariance = self.numbers(f"{name}.mean", (size,)), self.covariance(f"{name}.covariance", size)
-        return GaussianLight(mean, covariance, float(self.numbers(f"{name}.floor", (), positive=True)))
+        mean, covariance = (
+            self.numbers(f"{name}.mean", (size,)),
+            self.covariance(f"{name}.covariance", size),
+        )
+        return GaussianLight(
+            mean, covariance, float(self.numbers(f"{name}.floor", (), positive=True))
+        )
 
     def record(self) -> FitRecord:
         try:
             record = json.loads(str(self.array("record")))
-            return FitRecord(tuple(record["objects"]), Contrast(**record["natural_contrast"]), dict(record["options"]))
+            return FitRecord(
+                tuple(record["objects"]),
+                Contrast(**record["natural_contrast"]),
+                dict(record["options"]),
+            )
         except (ValueError, KeyError, TypeError, RecursionError) as error:
             raise self.wrong("its record of the fit is damaged") from error

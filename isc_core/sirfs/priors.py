@@ -1,7 +1,8 @@
 """What SIRFS believes before it sees a photo: statistics of shape, reflectance and illumination.
 
-All are in the convention of the SIRFS reference (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712): lights are
-9 coefficients a channel, stacked channel by channel, for normals in a (down, right, toward the viewer) frame.
+All are in the convention of the SIRFS reference (Barron & Malik 2015,
+doi:10.1109/TPAMI.2014.2377712): lights are 9 coefficients a channel, stacked channel by channel,
+for normals in a (down, right, toward the viewer) frame.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +16,10 @@ from .tables import CostTable
 
 @dataclass(frozen=True)
 class AbsoluteTable:
-    """Cost of a whitened log colour: `values` (n, n, n) for colour or (n,) for grey, nodes from `low` to `high` on each axis."""
+    """Cost of a whitened log colour:
+
+    `values` (n, n, n) for colour or (n,) for grey, nodes from `low` to `high` on each axis.
+    """
 
     low: float
     high: float
@@ -26,7 +30,8 @@ class AbsoluteTable:
 class Light:
     """A Gaussian over the stacked light coefficients l (9 C numbers).
 
-    `mean` and `covariance` are the Gaussian of the light's cost. The solver works in u, with l = unwhiten @ u + offset.
+    `mean` and `covariance` are the Gaussian of the light's cost. The solver works in u, with l =
+    unwhiten @ u + offset.
     """
 
     mean: np.ndarray
@@ -36,14 +41,19 @@ class Light:
 
     @cached_property
     def precision(self) -> np.ndarray:
-        """The inverse covariance, computed once: a library's solver would wake its threads at every evaluation."""
+        """The inverse covariance, computed once: a library's solver would wake its threads at every
+        evaluation.
+        """
         inverse = solved(self.covariance, np.eye(len(self.covariance)))
         return (inverse + inverse.T) / 2
 
 
 @dataclass(frozen=True)
 class SilhouetteProfile:
-    """How far surfaces have turned away at relative depth u = (k + 0.5) / K behind the silhouette: `mean` and `spread`, both (K,)."""
+    """How far surfaces have turned away at relative depth u = (k + 0.5) / K behind the silhouette:
+
+    `mean` and `spread`, both (K,).
+    """
 
     mean: np.ndarray
     spread: np.ndarray
@@ -58,11 +68,11 @@ class SilhouetteProfile:
 class Priors:
     """Everything the SIRFS objective needs besides its weights.
 
-    `channels`: 3 (colour) or 1 (grey).
-    `curvature`: cost of the difference x of two mean curvatures (1 / pixel), symmetric, 0 at x = 0.
-    `smoothness`: cost of m = 0.5 |smoothness_whiten (A_p - A_q)|^2 in colour, of A_p - A_q itself in grey.
-    `parsimony_whiten`: (C, C), takes log reflectance to the space of the parsimony and absolute terms.
-    `silhouette`: see `silhouette`; None where nothing is known of it.
+    `channels`: 3 (colour) or 1 (grey). `curvature`: cost of the difference x of two mean curvatures
+    (1 / pixel), symmetric, 0 at x = 0. `smoothness`: cost of m = 0.5 |smoothness_whiten (A_p -
+    A_q)|^2 in colour, of A_p - A_q itself in grey. `parsimony_whiten`: (C, C), takes log
+    reflectance to the space of the parsimony and absolute terms. `silhouette`: see `silhouette`;
+    None where nothing is known of it.
     """
 
     channels: int

@@ -1,4 +1,6 @@
-"""One SIRFS problem: the photo's logarithm, where it is valid, the contour, and what is believed beforehand."""
+"""One SIRFS problem: the photo's logarithm, where it is valid, the contour, and what is believed
+beforehand.
+"""
 
 from dataclasses import dataclass
 
@@ -10,15 +12,29 @@ from .settings import Weights
 from .silhouette import SilhouetteField
 
 # Half of the 5 x 5 window's offsets (down, right): every unordered pair once.
-PAIR_OFFSETS = ((0, 1), (0, 2), (1, -2), (1, -1), (1, 0), (1, 1), (1, 2), (2, -2), (2, -1), (2, 0), (2, 1), (2, 2))
+PAIR_OFFSETS = (
+    (0, 1),
+    (0, 2),
+    (1, -2),
+    (1, -1),
+    (1, 0),
+    (1, 1),
+    (1, 2),
+    (2, -2),
+    (2, -1),
+    (2, 0),
+    (2, 1),
+    (2, 2),
+)
 
 
 @dataclass(frozen=True)
 class DepthObservation:
     """Heights seen by something else (a depth sensor, another program): a map with holes.
 
-    `height`: (H, W) in pixels toward the viewer, any constant added, NaN where nothing was seen. `sigma`: its standard error in
-    pixels; larger differences cost linearly, so that outliers do not rule. `weight`: of the whole term.
+    `height`: (H, W) in pixels toward the viewer, any constant added, NaN where nothing was seen.
+    `sigma`: its standard error in pixels; larger differences cost linearly, so that outliers do not
+    rule. `weight`: of the whole term.
     """
 
     height: np.ndarray
@@ -28,12 +44,14 @@ class DepthObservation:
 
 @dataclass(frozen=True)
 class Problem:
-    """`log_image`: (H, W, C) natural logarithm of linear intensities, 0 where not `valid`; `valid`: (H, W) bool.
+    """`log_image`: (H, W, C) natural logarithm of linear intensities, 0 where not `valid`; `valid`:
+    (H, W) bool.
 
     `mask`: (H, W) bool, the object; `contour`: its occluding contour.
 
-    `silhouette`: what the outline says of the normals. `shading_only`: shape-from-shading mode, reflectance is taken as one unknown colour.
-    `trust`: (H, W) in [0, 1], how much a valid pixel counts in the terms of reflectance, of a pair the product; not 0 everywhere. None: 1.
+    `silhouette`: what the outline says of the normals. `shading_only`: shape-from-shading mode,
+    reflectance is taken as one unknown colour. `trust`: (H, W) in [0, 1], how much a valid pixel
+    counts in the terms of reflectance, of a pair the product; not 0 everywhere. None: 1.
     """
 
     log_image: np.ndarray

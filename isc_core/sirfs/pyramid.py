@@ -1,9 +1,11 @@
-"""Heights as sums over the levels of a Gaussian pyramid's adjoint, so that one optimiser moves all scales at once.
+"""Heights as sums over the levels of a Gaussian pyramid's adjoint, so that one optimiser moves all
+scales at once.
 
-Z = y_1 + D^T (y_2 + D^T (y_3 + ...)) with D one step down: the filter (1,3,3,1)/sqrt(8) along each axis with replicated edges,
-then every second sample. The gradient of y_1 is dZ, that of y_{k+1} is D dy_k (Barron & Malik 2015,
-doi:10.1109/TPAMI.2014.2377712). A step up doubles heights, as pixels half as large ask for.
-Limits: the replicated edges give nodes of very small levels large weights at the border, so levels stop at `SMALLEST`.
+Z = y_1 + D^T (y_2 + D^T (y_3 + ...)) with D one step down: the filter (1,3,3,1)/sqrt(8) along each
+axis with replicated edges, then every second sample. The gradient of y_1 is dZ, that of y_{k+1} is
+D dy_k (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712). A step up doubles heights, as pixels
+half as large ask for. Limits: the replicated edges give nodes of very small levels large weights at
+the border, so levels stop at `SMALLEST`.
 """
 
 import numpy as np
@@ -13,7 +15,10 @@ SMALLEST = 4
 
 
 def level_shapes(shape: tuple[int, ...], levels: int | None = None) -> list[tuple[int, ...]]:
-    """Shapes of the levels for heights of `shape`, the finest first: `levels` of them, or as many as stay at or above `SMALLEST`."""
+    """Shapes of the levels for heights of `shape`, the finest first:
+
+    `levels` of them, or as many as stay at or above `SMALLEST`.
+    """
     shapes = [shape]
     while levels is None or len(shapes) < levels:
         rows, columns = ((n + 1) // 2 for n in shapes[-1])

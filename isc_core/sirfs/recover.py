@@ -1,7 +1,9 @@
-"""Shape and illumination of one masked diffuse image: the SIRFS problem set up, solved, and brought back to the image's scale.
+"""Shape and illumination of one masked diffuse image: the SIRFS problem set up, solved, and brought
+back to the image's scale.
 
-The priors speak of pixels, so the object is brought to one size first (`RecoverOptions.solve_size`), and a window of its box with
-a fixed margin is solved: neither the photo's scale nor empty space around the object changes the answer.
+The priors speak of pixels, so the object is brought to one size first
+(`RecoverOptions.solve_size`), and a window of its box with a fixed margin is solved: neither the
+photo's scale nor empty space around the object changes the answer.
 """
 
 from dataclasses import dataclass, field, replace
@@ -24,9 +26,11 @@ SOLVE_SIZE = 256
 
 @dataclass(frozen=True)
 class RecoverOptions:
-    """`solve_size`: long side of the object's box, in pixels, at which SIRFS is solved; 0 for the size given.
+    """`solve_size`: long side of the object's box, in pixels, at which SIRFS is solved; 0 for the
+    size given.
 
-    `margin`: pixels of empty space around the box there. `shading_only`: shape-from-shading mode, one reflectance colour.
+    `margin`: pixels of empty space around the box there. `shading_only`: shape-from-shading mode,
+    one reflectance colour.
     """
 
     solve_size: int = SOLVE_SIZE
@@ -37,8 +41,10 @@ class RecoverOptions:
 
 @dataclass(frozen=True)
 class Known:
-    """What is known beforehand, each at the image's scale: `height` (H, W) in pixels, `light` (9, C) reference convention,
-    `depth` an observation with holes; outside the mask it is not looked at."""
+    """What is known beforehand, each at the image's scale: `height` (H, W) in pixels, `light` (9,
+    C) reference convention, `depth` an observation with holes; outside the mask it is not looked
+    at.
+    """
 
     height: np.ndarray | None = None
     light: np.ndarray | None = None
@@ -47,9 +53,11 @@ class Known:
 
 @dataclass(frozen=True)
 class Recovered:
-    """`height`: (H, W) float64 at the image's scale, pixels, 0 mean over the mask unless given; valid in the mask and its surroundings.
+    """`height`: (H, W) float64 at the image's scale, pixels, 0 mean over the mask unless given;
+    valid in the mask and its surroundings.
 
-    `light`: (9, C) reference convention. `solved_shape`: of the window that was solved. `reason`: why the solver stopped.
+    `light`: (9, C) reference convention. `solved_shape`: of the window that was solved. `reason`:
+    why the solver stopped.
     """
 
     height: np.ndarray
@@ -83,7 +91,9 @@ class _Window:
         """The same with the border's values going on beyond the image."""
         rows, columns = (
             np.clip(np.arange(start, start + size), 0, n - 1)
-            for start, size, n in zip((self.top, self.left), (self.height, self.width), array.shape, strict=True)
+            for start, size, n in zip(
+                (self.top, self.left), (self.height, self.width), array.shape, strict=True
+            )
         )
         return array[np.ix_(rows, columns)]
 
@@ -110,33 +120,62 @@ def recover(
 ) -> Recovered:
     """Recovers height and light.
 
-    `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`: zero channels are raised to it, in
-    the logarithm only. `trust`: (H, W) in [0, 1], see `Problem`. `seen`: what was seen of the shape, instead of what the outline suggests.
-    Raises `Cancelled`.
+    `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`:
+    zero channels are raised to it, in the logarithm only. `trust`: (H, W) in [0, 1], see `Problem`.
+    `seen`: what was seen of the shape, instead of what the outline suggests. Raises `Cancelled`.
     """
     options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
     known, base = _levelled(known, mask)
     window, factor = _window(mask, options)
     inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
     scene = _Scene(
-        window.cut(image, 0), inside, _outline(mask, window), photo, floor, priors, weights, options, known, window,
+        window.cut(image, 0),
+        inside,
+        _outline(mask, window),
+        photo,
+        floor,
+        priors,
+        weights,
+        options,
+        known,
+        window,
         None if trust is None else window.cut(trust, 0),
-        None if seen is None else SeenShape(window.cut(seen.normal, 0), window.cut(seen.deviation, 0)),
-    )  # fmt: skip
+        None
+        if seen is None
+        else SeenShape(window.cut(seen.normal, 0), window.cut(seen.deviation, 0)),
+    )
     problem = scene.problem(factor)
-    given = None if known.height is None else _to_solve(window.cut_on(known.height), scene.inside, factor)
-    result = solve(problem, options.solver, known_height=given, known_light=known.light, monitor=monitor)
-    cut = resample_height(result.height, scene.inside.shape) + base if known.height is None else window.cut_on(known.height)
+    given = (
+        None
+        if known.height is None
+        else _to_solve(window.cut_on(known.height), scene.inside, factor)
+    )
+    result = solve(
+        problem, options.solver, known_height=given, known_light=known.light, monitor=monitor
+    )
+    cut = (
+        resample_height(result.height, scene.inside.shape) + base
+        if known.height is None
+        else window.cut_on(known.height)
+    )
     if known.height is None and known.depth is None:
         cut = cut - cut[scene.inside].mean()
     return Recovered(
-        window.put(cut, mask.shape), result.light, result.terms, result.iterations, result.evaluations,
-        result.reason, result.converged, problem.valid.shape,
-    )  # fmt: skip
+        window.put(cut, mask.shape),
+        result.light,
+        result.terms,
+        result.iterations,
+        result.evaluations,
+        result.reason,
+        result.converged,
+        problem.valid.shape,
+    )
 
 
 def _levelled(known: Known, mask: np.ndarray) -> tuple[Known, float]:
-    """What is known with the depth inside the mask alone and its median taken off: a sensor's distances are large, float32 is short."""
+    """What is known with the depth inside the mask alone and its median taken off: a sensor's
+    distances are large, float32 is short.
+    """
     if known.depth is None:
         return known, 0.0
     seen = np.where(mask, known.depth.height, np.nan)
@@ -149,13 +188,20 @@ def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[_Window, float]:
     height, width = int(rows[-1] - rows[0] + 1), int(columns[-1] - columns[0] + 1)
     factor = options.solve_size / max(height, width) if options.solve_size else 1.0
     margin = round(options.margin / factor)
-    return _Window(int(rows[0]) - margin, int(columns[0]) - margin, height + 2 * margin, width + 2 * margin), factor
+    return _Window(
+        int(rows[0]) - margin, int(columns[0]) - margin, height + 2 * margin, width + 2 * margin
+    ), factor
 
 
 def _outline(mask: np.ndarray, window: _Window) -> np.ndarray:
     """The object in the window, going on beyond the photo where the photo's frame cuts it."""
-    below, beyond = window.top + window.height - mask.shape[0], window.left + window.width - mask.shape[1]
-    grown = continued(mask, max(-window.top, 0), max(below, 0), max(-window.left, 0), max(beyond, 0))
+    below, beyond = (
+        window.top + window.height - mask.shape[0],
+        window.left + window.width - mask.shape[1],
+    )
+    grown = continued(
+        mask, max(-window.top, 0), max(below, 0), max(-window.left, 0), max(beyond, 0)
+    )
     top, left = max(window.top, 0), max(window.left, 0)
     return grown[top : top + window.height, left : left + window.width]
 
@@ -179,34 +225,68 @@ class _Scene:
 
     def problem(self, factor: float) -> Problem:
         """The problem at `factor` times the image's scale."""
-        image, valid, outline, photo, depth = self.image, self.inside, self.outline, self.photo, self.known.depth
+        image, valid, outline, photo, depth = (
+            self.image,
+            self.inside,
+            self.outline,
+            self.photo,
+            self.known.depth,
+        )
         trust, seen = self.trust, self.seen
         if depth is not None:
-            depth = DepthObservation(self.window.cut(depth.height, np.nan), depth.sigma, depth.weight)
+            depth = DepthObservation(
+                self.window.cut(depth.height, np.nan), depth.sigma, depth.weight
+            )
         if factor != 1:
             image, share = resample_inside(image, self.inside, factor)
             valid = share >= 0.5 * share.max()  # an object thinner than a pixel fills none by half
-            outline, photo = (resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5 for m in (outline, photo))
+            outline, photo = (
+                resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5
+                for m in (outline, photo)
+            )
             depth = None if depth is None else _scaled_depth(depth, factor)
             trust = None if trust is None else resample_inside(trust, self.inside, factor)[0]
-            seen = None if seen is None else SeenShape(*(resample_inside(m, self.inside, factor)[0] for m in (seen.normal, seen.deviation)))
+            seen = (
+                None
+                if seen is None
+                else SeenShape(
+                    *(
+                        resample_inside(m, self.inside, factor)[0]
+                        for m in (seen.normal, seen.deviation)
+                    )
+                )
+            )
         log_image = np.where(valid[..., None], np.log(np.maximum(image, self.floor)), 0.0)
         return Problem(
-            log_image, valid, outline, _seen(occluding_contour(outline), photo), self.priors, self.weights, depth,
-            self.options.shading_only, expected_field(outline, self.priors.silhouette, seen), trust,
-        )  # fmt: skip
+            log_image,
+            valid,
+            outline,
+            _seen(occluding_contour(outline), photo),
+            self.priors,
+            self.weights,
+            depth,
+            self.options.shading_only,
+            expected_field(outline, self.priors.silhouette, seen),
+            trust,
+        )
 
 
 def _seen(contour: Contour, photo: np.ndarray) -> Contour:
-    """The contour points that lie in the photo: where an object was continued beyond it, its sides are made up."""
+    """The contour points that lie in the photo: where an object was continued beyond it, its sides
+    are made up.
+    """
     keep = photo[contour.rows, contour.columns]
-    return Contour(contour.rows[keep], contour.columns[keep], contour.down[keep], contour.right[keep])
+    return Contour(
+        contour.rows[keep], contour.columns[keep], contour.down[keep], contour.right[keep]
+    )
 
 
 def _scaled_depth(depth: DepthObservation, factor: float) -> DepthObservation:
     seen, share = resample_inside(np.nan_to_num(depth.height), np.isfinite(depth.height), factor)
     scale = height_scale(depth.height.shape, seen.shape)
-    return DepthObservation(np.where(share >= 0.5, seen * scale, np.nan), depth.sigma * scale, depth.weight)
+    return DepthObservation(
+        np.where(share >= 0.5, seen * scale, np.nan), depth.sigma * scale, depth.weight
+    )
 
 
 def _to_solve(height: np.ndarray, inside: np.ndarray, factor: float) -> np.ndarray:

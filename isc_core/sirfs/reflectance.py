@@ -1,9 +1,13 @@
 """What SIRFS believes of reflectance: locally smooth, few colours, likely colours.
 
-With log reflectance A = log I - log shading (n pixels in the crop) and a pixel's trust t in [0, 1], 0 where not valid, n_t = sum t:
-  smoothness  w (3/25)/(C n) * sum over pairs of t_p t_q cost(sqrt(m^2 + 1e-8)), m = 0.5 |B (A_p - A_q)|^2   (colour)
-              w 3/(25 n) * sum of t_p t_q cost(A_p - A_q)                                                     (grey)
-  parsimony   w * -log V, V ~ n_t^-2 sum_pq t_p t_q exp(-|w_p - w_q|^2 / (4 sigma^2)), w = W A: a quadratic Renyi entropy with
+With log reflectance A = log I - log shading (n pixels in the crop) and a pixel's trust t in [0, 1],
+0 where not valid, n_t = sum t:
+  smoothness  w (3/25)/(C n) * sum over pairs of t_p t_q cost(sqrt(m^2 + 1e-8)), m = 0.5 |B (A_p -
+  A_q)|^2   (colour)
+              w 3/(25 n) * sum of t_p t_q cost(A_p - A_q)
+              (grey)
+  parsimony   w * -log V, V ~ n_t^-2 sum_pq t_p t_q exp(-|w_p - w_q|^2 / (4 sigma^2)), w = W A: a
+  quadratic Renyi entropy with
               a Parzen window (Principe & Xu 1999), by splatting onto a grid, blurring and summing
   absolute    w/(8 n_t) * sum of t F at w, F tabulated on the same grid
 Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: no term for highlights.
@@ -25,8 +29,13 @@ SIGMA_UNIT = 20.0
 ABSOLUTE_DIVISOR = 8.0
 
 
-def smoothness_cost(log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weight: float) -> tuple[float, np.ndarray]:
-    """The smoothness term and its gradient with respect to `log_reflectance` (H, W, C); `trust` (H, W)."""
+def smoothness_cost(
+    log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weight: float
+) -> tuple[float, np.ndarray]:
+    """The smoothness term and its gradient with respect to `log_reflectance` (H, W, C);
+
+    `trust` (H, W).
+    """
     t = log_reflectance.dtype.type
     valid, trust = trust > 0, trust.astype(t)
     whitened = log_reflectance @ priors.smoothness_whiten.astype(log_reflectance.dtype)
@@ -56,8 +65,9 @@ def smoothness_cost(log_reflectance: np.ndarray, trust: np.ndarray, priors: Prio
 class Splat:
     """Trilinear weights of samples on the occupied part of a grid.
 
-    `shape`: of the occupied part; `start`: its first node on each axis; `index`: (2^C, n_v) flat nodes; `weight`: (2^C, n_v);
-    `side`: (n_v, C) position in the cell; `inside`: (n_v, C) false where a value was clamped.
+    `shape`: of the occupied part; `start`: its first node on each axis; `index`: (2^C, n_v) flat
+    nodes; `weight`: (2^C, n_v); `side`: (n_v, C) position in the cell; `inside`: (n_v, C) false
+    where a value was clamped.
     """
 
     shape: tuple[int, ...]
@@ -80,7 +90,11 @@ def splat(samples: np.ndarray, table: AbsoluteTable) -> Splat:
     side = position - cell
     start, last = cell.min(axis=0), cell.max(axis=0) + 1
     shape = tuple(int(v) for v in last - start + 1)
-    strides = np.cumprod((*shape[1:][::-1], 1)[::-1][::-1]) if channels == 1 else np.array([shape[1] * shape[2], shape[2], 1])
+    strides = (
+        np.cumprod((*shape[1:][::-1], 1)[::-1][::-1])
+        if channels == 1
+        else np.array([shape[1] * shape[2], shape[2], 1])
+    )
     base = (cell - start) @ strides
     corners = list(product((0, 1), repeat=channels))
     index = np.stack([base + int(np.dot(c, strides)) for c in corners])
@@ -89,7 +103,9 @@ def splat(samples: np.ndarray, table: AbsoluteTable) -> Splat:
 
 
 def gather_gradient(where: Splat, node_gradient: np.ndarray) -> np.ndarray:
-    """Gradient of the samples (n_v, C) from the gradient of the node counts (shape of the occupied part)."""
+    """Gradient of the samples (n_v, C) from the gradient of the node counts (shape of the occupied
+    part).
+    """
     flat = node_gradient.ravel()
     channels = where.side.shape[1]
     gradient = np.zeros(where.side.shape)
@@ -105,7 +121,9 @@ def gather_gradient(where: Splat, node_gradient: np.ndarray) -> np.ndarray:
 
 
 def parzen_taps(sigma: float, step: float, count: float, channels: int) -> np.ndarray:
-    """Blur weights of one axis for the Parzen window of `parsimony_sigma / 20`, and the share 1/count^2 of all axes together."""
+    """Blur weights of one axis for the Parzen window of `parsimony_sigma / 20`, and the share
+    1/count^2 of all axes together.
+    """
     half = min(100, int(np.ceil(6 * sigma / step)))
     k = np.arange(-half, half + 1)
     return np.exp(-((k * step) ** 2) / (4 * sigma**2)) / count ** (2 / channels)
@@ -118,15 +136,21 @@ def blur(counts: np.ndarray, taps: np.ndarray) -> np.ndarray:
     return np.maximum(counts, np.finfo(float).eps)
 
 
-def palette_cost(log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weights: Weights) -> tuple[float, float, np.ndarray]:
-    """The parsimony and absolute terms, and the gradient of their sum with respect to `log_reflectance` (H, W, C); `trust` (H, W)."""
+def palette_cost(
+    log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weights: Weights
+) -> tuple[float, float, np.ndarray]:
+    """The parsimony and absolute terms, and the gradient of their sum with respect to
+    `log_reflectance` (H, W, C); `trust` (H, W).
+    """
     whiten, valid = priors.parsimony_whiten, trust > 0
     samples = log_reflectance[valid].astype(float) @ whiten.T
     where = splat(samples, priors.absolute)
     share = trust[valid].astype(float)
     count = float(share.sum())
     size = int(np.prod(where.shape))
-    counts = np.bincount(where.index.ravel(), (where.weight * share).ravel(), size).reshape(where.shape)
+    counts = np.bincount(where.index.ravel(), (where.weight * share).ravel(), size).reshape(
+        where.shape
+    )
     taps = parzen_taps(weights.parsimony_sigma / SIGMA_UNIT, where.step, count, priors.channels)
     blurred = blur(counts, taps)
     overlap = float((blurred * counts).sum())
@@ -136,11 +160,19 @@ def palette_cost(log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors,
     node_gradient = (-2 * weights.parsimony / overlap) * blurred + scale * costs
     gradient = np.zeros_like(log_reflectance)
     gradient[valid] = (share[:, None] * gather_gradient(where, node_gradient)) @ whiten
-    return -weights.parsimony * float(np.log(overlap)), scale * float((costs * counts).sum()), gradient
+    return (
+        -weights.parsimony * float(np.log(overlap)),
+        scale * float((costs * counts).sum()),
+        gradient,
+    )
 
 
-def one_color_cost(log_reflectance: np.ndarray, trust: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
-    """Shape-from-shading mode: weight/(2 n_t) * sum of t (A - mean A)^2, the mean with t, and its gradient (H, W, C); `trust` (H, W)."""
+def one_color_cost(
+    log_reflectance: np.ndarray, trust: np.ndarray, weight: float
+) -> tuple[float, np.ndarray]:
+    """Shape-from-shading mode: weight/(2 n_t) * sum of t (A - mean A)^2, the mean with t, and its
+    gradient (H, W, C); `trust` (H, W).
+    """
     valid = trust > 0
     away, share = log_reflectance[valid].astype(float), trust[valid].astype(float)[:, None]
     away = away - (share * away).sum(axis=0) / share.sum()

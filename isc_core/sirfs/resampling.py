@@ -1,7 +1,8 @@
 """Bringing an object to the scale at which the priors were fitted, and its height back.
 
-A pixel's centre at index i lies at (i + 0.5) / factor - 0.5 of the resampled grid's source. Images are averaged over the area of
-each new pixel (or interpolated linearly when enlarged) with weights inside the object only, so that no background bleeds in.
+A pixel's centre at index i lies at (i + 0.5) / factor - 0.5 of the resampled grid's source. Images
+are averaged over the area of each new pixel (or interpolated linearly when enlarged) with weights
+inside the object only, so that no background bleeds in.
 """
 
 import numpy as np
@@ -14,33 +15,52 @@ def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
 
 
 def height_scale(old: tuple[int, ...], new: tuple[int, ...]) -> float:
-    """How much larger heights are on a grid of shape `new` than on `old`: sizes are whole, so it is not just the factor asked for."""
+    """How much larger heights are on a grid of shape `new` than on `old`: sizes are whole, so it is
+    not just the factor asked for.
+    """
     return float(np.sqrt(new[0] * new[1] / (old[0] * old[1])))
 
 
-def resample_inside(values: np.ndarray, inside: np.ndarray, factor: float) -> tuple[np.ndarray, np.ndarray]:
+def resample_inside(
+    values: np.ndarray, inside: np.ndarray, factor: float
+) -> tuple[np.ndarray, np.ndarray]:
     """`values` (H, W) or (H, W, C), averaged over `inside` (H, W) bool, at `factor` times the size.
 
-    Returns the values (0 where nothing was inside) and the share of each new pixel that lies inside, in [0, 1].
+    Returns the values (0 where nothing was inside) and the share of each new pixel that lies
+    inside, in [0, 1].
     """
     rows, columns = resampled_shape(inside.shape, factor)
     down, right = _weights(inside.shape[0], rows), _weights(inside.shape[1], columns)
     share = _apply(inside.astype(float), down, right)
     planes = values if values.ndim == 3 else values[..., None]
-    sums = np.stack([_apply(np.where(inside, planes[..., c], 0.0).astype(float), down, right) for c in range(planes.shape[2])], axis=-1)
+    sums = np.stack(
+        [
+            _apply(np.where(inside, planes[..., c], 0.0).astype(float), down, right)
+            for c in range(planes.shape[2])
+        ],
+        axis=-1,
+    )
     mean = sums / np.where(share > 1e-9, share, 1)[..., None]
     return (mean if values.ndim == 3 else mean[..., 0]), share
 
 
-def resample_height(height: np.ndarray, shape: tuple[int, ...], factor: float | None = None) -> np.ndarray:
+def resample_height(
+    height: np.ndarray, shape: tuple[int, ...], factor: float | None = None
+) -> np.ndarray:
     """A smooth height map (h, w) on a grid of `shape`, by cubic splines, in the new grid's pixels.
 
-    `factor`: how many new pixels an old one is wide; None where both grids cover exactly the same area.
+    `factor`: how many new pixels an old one is wide; None where both grids cover exactly the same
+    area.
     """
     if height.shape == shape and factor in (None, 1.0):
         return np.array(height, float)
-    steps = [m / n if factor is None else 1 / factor for n, m in zip(shape, height.shape, strict=True)]
-    places = [np.clip((np.arange(n) + 0.5) * s - 0.5, 0, m - 1) for n, m, s in zip(shape, height.shape, steps, strict=True)]
+    steps = [
+        m / n if factor is None else 1 / factor for n, m in zip(shape, height.shape, strict=True)
+    ]
+    places = [
+        np.clip((np.arange(n) + 0.5) * s - 0.5, 0, m - 1)
+        for n, m, s in zip(shape, height.shape, steps, strict=True)
+    ]
     spline = ndimage.spline_filter(np.asarray(height, float), order=3, mode="nearest")
     grid = np.meshgrid(*places, indexing="ij")
     scale = height_scale(height.shape, shape) if factor is None else factor
@@ -48,8 +68,13 @@ def resample_height(height: np.ndarray, shape: tuple[int, ...], factor: float | 
 
 
 def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
-    """`values` (h, w) at the centres of a grid of `shape` whose pixels are 1/`factor` old ones wide: holes (NaN) stay and do not grow."""
-    rows, columns = (np.minimum(((np.arange(n) + 0.5) / factor).astype(int), m - 1) for n, m in zip(shape, values.shape, strict=True))
+    """`values` (h, w) at the centres of a grid of `shape` whose pixels are 1/`factor` old ones
+    wide: holes (NaN) stay and do not grow.
+    """
+    rows, columns = (
+        np.minimum(((np.arange(n) + 0.5) / factor).astype(int), m - 1)
+        for n, m in zip(shape, values.shape, strict=True)
+    )
     return np.asarray(values, float)[np.ix_(rows, columns)]
 
 
@@ -58,14 +83,19 @@ def _apply(plane: np.ndarray, down: sparse.csr_array, right: sparse.csr_array) -
 
 
 def _weights(size: int, new: int) -> sparse.csr_array:
-    """(new, size) weights, rows summing to 1: box filter when shrinking, linear interpolation when enlarging."""
+    """(new, size) weights, rows summing to 1: box filter when shrinking, linear interpolation when
+    enlarging.
+    """
     if new >= size:
         place = np.clip((np.arange(new) + 0.5) * size / new - 0.5, 0, size - 1)
         low = np.minimum(place.astype(int), max(size - 2, 0))
         part = place - low
         high = np.minimum(low + 1, size - 1)
         rows = np.arange(new)
-        entries = (np.concatenate([1 - part, part]), (np.concatenate([rows, rows]), np.concatenate([low, high])))
+        entries = (
+            np.concatenate([1 - part, part]),
+            (np.concatenate([rows, rows]), np.concatenate([low, high])),
+        )
         return sparse.csr_array(entries, shape=(new, size))
     edges = np.arange(new + 1) * (size / new)
     first, last = np.floor(edges[:-1]).astype(int), np.minimum(np.ceil(edges[1:]).astype(int), size)
@@ -74,4 +104,6 @@ def _weights(size: int, new: int) -> sparse.csr_array:
     overlap = np.minimum(column + 1, edges[1:, None]) - np.maximum(column, edges[:-1, None])
     keep = (overlap > 1e-12) & (column < size)
     row = np.broadcast_to(np.arange(new)[:, None], column.shape)
-    return sparse.csr_array((overlap[keep] * (new / size), (row[keep], column[keep])), shape=(new, size))
+    return sparse.csr_array(
+        (overlap[keep] * (new / size), (row[keep], column[keep])), shape=(new, size)
+    )

@@ -1,11 +1,13 @@
 """The light's prior, once a photo has been looked at.
 
-Problem: which of all lights a photo was taken in, SIRFS finds together with the shape, and often a wrong pair of both. What the photo
-shows at first sight, its shadows and highlights, is not in its model; it can be in its prior.
+Problem: which of all lights a photo was taken in, SIRFS finds together with the shape, and often a
+wrong pair of both. What the photo shows at first sight, its shadows and highlights, is not in its
+model; it can be in its prior.
 
-Equation: a light looks like the eight numbers q, the parts of its log shading along eight orthonormal functions of the normals before the
-object, which with a constant span the harmonics of degree 2. With q = A l for the light's coefficients l (the channels' mean), and q seen
-with deviations d,
+Equation: a light looks like the eight numbers q, the parts of its log shading along eight
+orthonormal functions of the normals before the object, which with a constant span the harmonics of
+degree 2. With q = A l for the light's coefficients l (the channels' mean), and q seen with
+deviations d,
 
     K = S A' (A S A' + diag d^2)^-1,    mean' = mean + K (q - A mean),    S' = S - K A S.
 
@@ -25,7 +27,10 @@ _RINGS, _TURNS, _GRAZING = 12, 32, 0.1
 
 def _front() -> np.ndarray:
     """Normals (384, 3) evenly over those before the object, left and right alike."""
-    z, turn = np.meshgrid(_GRAZING + (1 - _GRAZING) * (np.arange(_RINGS) + 0.5) / _RINGS, 2 * np.pi * (np.arange(_TURNS) + 0.5) / _TURNS)
+    z, turn = np.meshgrid(
+        _GRAZING + (1 - _GRAZING) * (np.arange(_RINGS) + 0.5) / _RINGS,
+        2 * np.pi * (np.arange(_TURNS) + 0.5) / _TURNS,
+    )
     across = np.sqrt(1 - z**2)
     return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=-1).reshape(-1, 3)
 
@@ -42,7 +47,9 @@ LOOK = _look()
 
 
 def seen_light(prior: Light, seen: np.ndarray, deviations: np.ndarray) -> Light:
-    """`prior` for C channels, told that the light looks like `seen` (8,), give or take `deviations` (8,), > 0."""
+    """`prior` for C channels, told that the light looks like `seen` (8,), give or take `deviations`
+    (8,), > 0.
+    """
     channels = len(prior.mean) // 9
     look = np.hstack([LOOK @ light_from_reference(np.eye(9)) / channels] * channels)
     across = np.einsum("ij,kj->ik", prior.covariance, look)

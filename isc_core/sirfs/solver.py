@@ -1,10 +1,12 @@
-"""Shape and illumination from one image: the minimiser of the SIRFS objective (Barron & Malik 2015).
+"""Shape and illumination from one image: the minimiser of the SIRFS objective (Barron & Malik
+2015).
 
-One L-BFGS run moves the height's pyramid levels and the whitened light together. Reflectance is not an unknown:
-log A = log I - log shading reproduces the image exactly. It begins where `settings.Start` says; of several starts the one goes on that has
-the lowest loss after a while. Limits: the objective has many minima; this finds one of them. Solving halved problems first finds others, as
-often worse as better, and saved no time.
-Source: Barron & Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8), 2015, doi:10.1109/TPAMI.2014.2377712.
+One L-BFGS run moves the height's pyramid levels and the whitened light together. Reflectance is not
+an unknown: log A = log I - log shading reproduces the image exactly. It begins where
+`settings.Start` says; of several starts the one goes on that has the lowest loss after a while.
+Limits: the objective has many minima; this finds one of them. Solving halved problems first finds
+others, as often worse as better, and saved no time. Source: Barron & Malik, "Shape, Illumination,
+and Reflectance from Shading", TPAMI 37(8), 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 import os
@@ -27,7 +29,9 @@ from .settings import Start
 
 MOST_THREADS = 64  # more only wait for each other
 _START_LEVEL = 2  # of the pyramid: finer detail of the start is the outline's, not the shape's
-_TRIAL = 80  # evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum have parted
+# evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum
+# have parted
+_TRIAL = 80
 _COARSER = 16  # what `down` multiplies heights by, and that heights of a step up are doubled
 
 
@@ -35,9 +39,10 @@ _COARSER = 16  # what `down` multiplies heights by, and that heights of a step u
 class SolverOptions:
     """How a problem is solved; none of it changes what is solved.
 
-    `engine`: "numba", "numpy", or "auto" for compiled kernels where they can be had. `single`: float32 unknowns (production)
-    or float64. `threads`: 0 for all cores. `levels`: of the height's pyramid, None for as many as make sense. `lbfgs`: the optimiser's; it
-    stops at twice the published tolerance, since what the last evaluations gain in loss they do not gain in accuracy.
+    `engine`: "numba", "numpy", or "auto" for compiled kernels where they can be had. `single`:
+    float32 unknowns (production) or float64. `threads`: 0 for all cores. `levels`: of the height's
+    pyramid, None for as many as make sense. `lbfgs`: the optimiser's; it stops at twice the
+    published tolerance, since what the last evaluations gain in loss they do not gain in accuracy.
     """
 
     engine: str = "auto"
@@ -49,7 +54,8 @@ class SolverOptions:
 
 @dataclass(frozen=True)
 class SirfsResult:
-    """`height`: (H, W) float64, pixels, toward the viewer. `light`: (9, C) float64, reference convention.
+    """`height`: (H, W) float64, pixels, toward the viewer. `light`: (9, C) float64, reference
+    convention.
 
     `terms`: of the objective there. `evaluations` of it; `reason`: why the optimiser stopped.
     """
@@ -81,8 +87,12 @@ def compiled_engine_available() -> bool:
 
 
 def thread_count(options: SolverOptions) -> int:
-    """How many threads `options` ask for on this machine, at most `MOST_THREADS`; 0 means the cores that this process may use."""
-    allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """How many threads `options` ask for on this machine, at most `MOST_THREADS`; 0 means the cores
+    that this process may use.
+    """
+    allowed = (
+        len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
     return min(options.threads or allowed, MOST_THREADS)
 
 
@@ -94,7 +104,9 @@ class _Tools:
             raise InputError(f'unknown engine "{options.engine}": choose auto, numba or numpy')
         self.compiled = options.engine != "numpy" and compiled_engine_available()
         if options.engine == "numba" and not self.compiled:
-            raise InputError("the engine numba needs the package numba: install it, or choose --engine numpy")
+            raise InputError(
+                "the engine numba needs the package numba: install it, or choose --engine numpy"
+            )
         self.dtype: type[np.floating] = np.float32 if options.single else np.float64
         self._workers = workers
 
@@ -113,7 +125,9 @@ class _Tools:
         return CompiledAlgebra(self._workers)
 
     def synthesise(self, levels: list[np.ndarray]) -> np.ndarray:
-        """The height in float64, whatever the levels are stored in: a rounded coarse level still gives a smooth height."""
+        """The height in float64, whatever the levels are stored in: a rounded coarse level still
+        gives a smooth height.
+        """
         height = levels[-1].astype(float)
         if not self.compiled:
             return synthesise([*levels[:-1], height])
@@ -137,10 +151,17 @@ class _Tools:
 
 
 class _Unknowns:
-    """One vector that holds the pyramid levels and the whitened light, or only what is not known beforehand."""
+    """One vector that holds the pyramid levels and the whitened light, or only what is not known
+    beforehand.
+    """
 
     def __init__(
-        self, problem: Problem, tools: _Tools, levels: int | None, known_height: np.ndarray | None, known_light: np.ndarray | None
+        self,
+        problem: Problem,
+        tools: _Tools,
+        levels: int | None,
+        known_height: np.ndarray | None,
+        known_light: np.ndarray | None,
     ) -> None:
         self._problem, self._tools, self._engine = problem, tools, tools.engine(problem)
         self._known_height, self._known_light = known_height, known_light
@@ -155,24 +176,38 @@ class _Unknowns:
 
     def levels(self, vector: np.ndarray) -> list[np.ndarray]:
         """Views of the pyramid levels in `vector`."""
-        return [vector[a:b].reshape(s) for a, b, s in zip(self._edges[:-1], self._edges[1:], self.shapes, strict=True)]
+        return [
+            vector[a:b].reshape(s)
+            for a, b, s in zip(self._edges[:-1], self._edges[1:], self.shapes, strict=True)
+        ]
 
     def height(self) -> np.ndarray:
-        return self._tools.synthesise(self.levels(self.x)) if self._known_height is None else self._known_height
+        return (
+            self._tools.synthesise(self.levels(self.x))
+            if self._known_height is None
+            else self._known_height
+        )
 
     def light(self) -> np.ndarray:
         if self._known_light is not None:
             return self._known_light
         prior = self._problem.priors.light
-        stacked = np.einsum("ij,j->i", prior.unwhiten, self.x[self._edges[-1] :].astype(float)) + prior.offset
+        stacked = (
+            np.einsum("ij,j->i", prior.unwhiten, self.x[self._edges[-1] :].astype(float))
+            + prior.offset
+        )
         return unstack(stacked, self.channels)
 
     def at(self, start: Start) -> np.ndarray:
-        """The vector of `start`, as far as the unknowns are unknown and nothing else is seen of them."""
+        """The vector of `start`, as far as the unknowns are unknown and nothing else is seen of
+        them.
+        """
         p, x = self._problem, np.zeros_like(self.x)
         prior = p.priors.light
         if self._known_light is None:  # whitened, the expected light is at 0
-            x[self._edges[-1] :] = solved(prior.unwhiten, (start.light - 1) * prior.offset[:, None])[:, 0]
+            x[self._edges[-1] :] = solved(
+                prior.unwhiten, (start.light - 1) * prior.offset[:, None]
+            )[:, 0]
         if start.dome and p.silhouette is not None and p.observation is None and self.shapes:
             level = min(_START_LEVEL, len(self.shapes) - 1)
             height = start.dome * p.silhouette.dome
@@ -188,7 +223,9 @@ class _Unknowns:
         if self._known_height is None:
             self._tools.analyse(result.height_gradient, self.levels(gradient))
         if self._known_light is None:
-            gradient[self._edges[-1] :] = np.einsum("ji,j->i", self._problem.priors.light.unwhiten, stack(result.light_gradient))
+            gradient[self._edges[-1] :] = np.einsum(
+                "ji,j->i", self._problem.priors.light.unwhiten, stack(result.light_gradient)
+            )
         self.terms = result.terms
         return result.terms.total
 
@@ -203,32 +240,46 @@ def solve(
 ) -> SirfsResult:
     """Minimises the objective of `problem`.
 
-    Begins as the problem's weights say (`settings.Start`). `known_height` (H, W) or `known_light` (9, C) are kept as given. Progress
-    reports carry the loss. Raises `Cancelled`.
+    Begins as the problem's weights say (`settings.Start`). `known_height` (H, W) or `known_light`
+    (9, C) are kept as given. Progress reports carry the loss. Raises `Cancelled`.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()
     for given in (known_height, known_light):
         if given is not None and not np.isfinite(given).all():
-            raise InputError("a given shape or light has holes or infinite values: fill them, or give the shape as depth")
+            raise InputError(
+                "a given shape or light has holes or infinite values: fill them, or give the shape as depth"
+            )
     with Workers(thread_count(options)) as workers:
         tools = _Tools(options, workers)
         unknowns = _Unknowns(problem, tools, options.levels, known_height, known_light)
         monitor.report("shape and light", 0.0)
         if unknowns.x.size:
-            begun = _begun(unknowns, problem.weights.starts, options.lbfgs, tools.algebra(), monitor)
+            begun = _begun(
+                unknowns, problem.weights.starts, options.lbfgs, tools.algebra(), monitor
+            )
             outcome = begun.run(_reporter(monitor, options.lbfgs.iterations))
             if unknowns.x is not begun.x:  # it had come to its end before another start was tried
                 unknowns(begun.x, np.empty_like(begun.x))
         else:
-            outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")  # all is known: only the loss is asked for
+            outcome = LbfgsResult(
+                unknowns(unknowns.x, unknowns.x), 0, 1, "gradient"
+            )  # all is known: only the loss is asked for
         return SirfsResult(
             np.array(unknowns.height(), float), np.array(unknowns.light(), float), unknowns.terms,
             outcome.iterations, unknowns.evaluations, outcome.reason, outcome.converged,
         )  # fmt: skip
 
 
-def _begun(unknowns: _Unknowns, starts: Sequence[Start], options: LbfgsOptions, algebra: Algebra, monitor: Monitor) -> Minimisation:
-    """The minimisation from the only start there is, or, taken that far, the one whose loss is lowest after `_TRIAL` evaluations."""
+def _begun(
+    unknowns: _Unknowns,
+    starts: Sequence[Start],
+    options: LbfgsOptions,
+    algebra: Algebra,
+    monitor: Monitor,
+) -> Minimisation:
+    """The minimisation from the only start there is, or, taken that far, the one whose loss is
+    lowest after `_TRIAL` evaluations.
+    """
     ways: list[np.ndarray] = []
     for start in starts:
         way = unknowns.at(start)
@@ -257,6 +308,8 @@ def _waiting(monitor: Monitor) -> Callable[[int, float], None]:
 
 def _reporter(monitor: Monitor, most: int) -> Callable[[int, float], None]:
     def each(iteration: int, loss: float) -> None:
-        monitor.report(f"shape and light, loss {loss:.3f}", 1 - 0.99**iteration if iteration < most else 1.0)
+        monitor.report(
+            f"shape and light, loss {loss:.3f}", 1 - 0.99**iteration if iteration < most else 1.0
+        )
 
     return each

@@ -22,34 +22,52 @@ Stencil = tuple[tuple[float, float, float], tuple[float, float, float]]
 def _three(padded: np.ndarray, weights: tuple[float, float, float], axis: int) -> np.ndarray:
     """Correlation with three taps along `axis`, without the outermost elements.
 
-    Differences are taken between neighbours, where they are exact: float32 heights keep their curvature.
+    Differences are taken between neighbours, where they are exact: float32 heights keep their
+    curvature.
     """
     n, t = padded.shape[axis], padded.dtype.type
     left, centre, right = (padded[(slice(None),) * axis + (slice(k, n - 2 + k),)] for k in range(3))
     if weights == (1, -2, 1):
         return (left - centre) + (right - centre)
     if weights[1] == 0:
-        return (right - left) if weights[2] == 1 else (left - right) if weights[2] == -1 else (right - left) * t(weights[2])
+        return (
+            (right - left)
+            if weights[2] == 1
+            else (left - right)
+            if weights[2] == -1
+            else (right - left) * t(weights[2])
+        )
     return (left + right) * t(weights[0]) + centre * t(weights[1])
 
 
 def derivative(padded: np.ndarray, stencil: Stencil) -> np.ndarray:
-    """The derivative `stencil` of a height map; `padded` is (H + 2, W + 2) with replicated borders, the result (H, W)."""
-    axes = (0, 1) if stencil[0][0] != stencil[0][2] or stencil[0][1] < 0 else (1, 0)  # differences first, smoothing second
+    """The derivative `stencil` of a height map;
+
+    `padded` is (H + 2, W + 2) with replicated borders, the result (H, W).
+    """
+    axes = (
+        (0, 1) if stencil[0][0] != stencil[0][2] or stencil[0][1] < 0 else (1, 0)
+    )  # differences first, smoothing second
     for axis in axes:
         padded = _three(padded, stencil[axis], axis)
     return padded
 
 
 def derivative_adjoint(gradient: np.ndarray, stencil: Stencil) -> np.ndarray:
-    """The adjoint of `derivative` after replicating borders: (H, W) gradient of a derivative to (H, W) gradient of the height."""
+    """The adjoint of `derivative` after replicating borders:
+
+    (H, W) gradient of a derivative to (H, W) gradient of the height.
+    """
     full = np.pad(gradient, 2)
     flipped = (stencil[0][::-1], stencil[1][::-1])
     return fold_border(_three(_three(full, flipped[0], 0), flipped[1], 1))
 
 
 def fold_border(wide: np.ndarray) -> np.ndarray:
-    """The adjoint of replicating the border by one pixel: (H + 2, W + 2) to (H, W). Changes `wide`."""
+    """The adjoint of replicating the border by one pixel:
+
+    (H + 2, W + 2) to (H, W). Changes `wide`.
+    """
     wide[1] += wide[0]
     wide[-2] += wide[-1]
     wide[:, 1] += wide[:, 0]

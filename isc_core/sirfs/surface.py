@@ -1,11 +1,13 @@
-"""What SIRFS believes of shape: smooth mean curvature, no favoured slant, a contour that turns away.
+"""What SIRFS believes of shape: smooth mean curvature, no favoured slant, a contour that turns
+away.
 
 With heights Z in pixels, first derivatives Zi (down) and Zj (right) and second ones Zii, Zjj, Zij:
   mean curvature K = [(1 + Zi^2) Zjj - 2 Zi Zj Zij + (1 + Zj^2) Zii] / (2 (1 + Zi^2 + Zj^2)^1.5)
   curvature   w/(25 n) * sum over pairs of C(sqrt((K_p - K_q)^2 + 1e-8)),
   slant       w/n * sum sqrt((log N3)^2 + 0.01^2),
   contour     60 w/n * sum over contour points of max(0, 1 - N . c)^power.
-Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: orthographic, one smooth sheet, no holes.
+Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: orthographic, one smooth sheet,
+no holes.
 """
 
 from dataclasses import dataclass
@@ -21,7 +23,8 @@ from .tables import CostTable
 SOFT_DIFFERENCE = 1e-8
 SLANT_SOFTNESS = 0.01
 CONTOUR_FACTOR = 60.0
-CONTOUR_CLOSE = 1e-3  # nearer than this to pointing exactly outward (or inward) the contour term has no gradient
+# nearer than this to pointing exactly outward (or inward) the contour term has no gradient
+CONTOUR_CLOSE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -40,17 +43,25 @@ class Geometry:
 
 
 def geometry(height: np.ndarray, dtype: npt.DTypeLike = None) -> Geometry:
-    """The local geometry of `height` (H, W), in `dtype` (the height's if None) but for differences of heights, which keep the height's."""
+    """The local geometry of `height` (H, W), in `dtype` (the height's if None) but for differences
+    of heights, which keep the height's.
+    """
     padded = np.pad(height, 1, mode="edge")
-    zi, zj, zii, zjj, zij = (derivative(padded, s).astype(dtype or height.dtype, copy=False) for s in DERIVATIVES)
+    zi, zj, zii, zjj, zij = (
+        derivative(padded, s).astype(dtype or height.dtype, copy=False) for s in DERIVATIVES
+    )
     zi2, zj2 = zi * zi, zj * zj
     n3 = 1 / np.sqrt(1 + zi2 + zj2)
     curvature = ((1 + zi2) * zjj - 2 * zi * zj * zij + (1 + zj2) * zii) * (n3 * n3 * n3) / 2
     return Geometry(zi, zj, zii, zjj, zij, -zi * n3, -zj * n3, n3, curvature)
 
 
-def height_gradient(g: Geometry, d1: np.ndarray, d2: np.ndarray, d3: np.ndarray, dk: np.ndarray) -> np.ndarray:
-    """Gradient of the height from gradients of the normal's components and of the curvature, all (H, W)."""
+def height_gradient(
+    g: Geometry, d1: np.ndarray, d2: np.ndarray, d3: np.ndarray, dk: np.ndarray
+) -> np.ndarray:
+    """Gradient of the height from gradients of the normal's components and of the curvature, all
+    (H, W).
+    """
     n3, n3cubed = g.n3, g.n3**3
     along = g.zi * d1 + g.zj * d2 - d3
     cut = 3 * g.curvature * n3 * n3 * dk
@@ -71,8 +82,12 @@ def pair_slices(down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice
     return (rows_p, slice(b, -a or None)), (rows_q, slice(a, -b or None))
 
 
-def curvature_cost(curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float) -> tuple[float, np.ndarray]:
-    """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`, both (H, W)."""
+def curvature_cost(
+    curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float
+) -> tuple[float, np.ndarray]:
+    """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`,
+    both (H, W).
+    """
     gradient = np.zeros_like(curvature)
     total = 0.0
     for offset in PAIR_OFFSETS:
@@ -97,18 +112,29 @@ def slant_cost(n3: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
     return float(soft.sum(dtype=float)) * float(weight / n3.size), -scale * x / (soft * n3)
 
 
-def contour_cost(n1: np.ndarray, n2: np.ndarray, contour: Contour, weight: float, power: float, pixels: int):  # type: ignore[no-untyped-def]
-    """The contour term and its gradients with respect to n1 and n2 at the contour points only: (cost, (P,), (P,))."""
+def contour_cost(
+    n1: np.ndarray, n2: np.ndarray, contour: Contour, weight: float, power: float, pixels: int
+):  # type: ignore[no-untyped-def]
+    """The contour term and its gradients with respect to n1 and n2 at the contour points only:
+
+    (cost, (P,), (P,)).
+    """
     at = (contour.rows, contour.columns)
     x = n1[at].astype(float) * contour.down + n2[at].astype(float) * contour.right
     gap = np.maximum(0.0, 1 - x)
     scale = CONTOUR_FACTOR * weight / pixels
-    pull = np.where(np.abs(x) < 1 - CONTOUR_CLOSE, -scale * power * np.maximum(gap, CONTOUR_CLOSE) ** (power - 1), 0.0)
+    pull = np.where(
+        np.abs(x) < 1 - CONTOUR_CLOSE,
+        -scale * power * np.maximum(gap, CONTOUR_CLOSE) ** (power - 1),
+        0.0,
+    )
     return scale * float(np.sum(gap**power)), pull * contour.down, pull * contour.right
 
 
 def observation_cost(height: np.ndarray, seen: DepthObservation) -> tuple[float, np.ndarray]:
-    """The observation's term, weight/n_seen * sum of (sqrt(1 + (difference/sigma)^2) - 1), and its gradient (H, W)."""
+    """The observation's term, weight/n_seen * sum of (sqrt(1 + (difference/sigma)^2) - 1), and its
+    gradient (H, W).
+    """
     known = np.isfinite(seen.height)
     count = max(int(known.sum()), 1)
     r = np.where(known, height.astype(float) - np.where(known, seen.height, 0), 0) / seen.sigma

@@ -1,7 +1,9 @@
-"""Costs tabulated on a uniform grid: the negative log densities of the priors, read with linear interpolation.
+"""Costs tabulated on a uniform grid: the negative log densities of the priors, read with linear
+interpolation.
 
-Between nodes the value is interpolated linearly and the derivative is the slope of the current cell; beyond either end
-the end cell's slope goes on, so that a cost never goes flat where an optimiser could get lost.
+Between nodes the value is interpolated linearly and the derivative is the slope of the current
+cell; beyond either end the end cell's slope goes on, so that a cost never goes flat where an
+optimiser could get lost.
 """
 
 from dataclasses import dataclass
@@ -11,7 +13,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class CostTable:
-    """A cost of one number: `values[k]` is the cost at `low + k * step`; `values` is float64 of shape (nodes,)."""
+    """A cost of one number:
+
+    `values[k]` is the cost at `low + k * step`; `values` is float64 of shape (nodes,).
+    """
 
     low: float
     step: float

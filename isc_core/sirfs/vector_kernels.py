@@ -1,4 +1,6 @@
-"""Compiled passes over many vectors, for the pyramid and for L-BFGS; the same formulas as `pyramid` and `NumpyAlgebra`."""
+"""Compiled passes over many vectors, for the pyramid and for L-BFGS; the same formulas as `pyramid`
+and `NumpyAlgebra`.
+"""
 
 # mypy: disable-error-code="no-untyped-def"
 # (the compiler infers the types of every call)
@@ -11,7 +13,9 @@ from numba import njit
 from ..workers import Workers
 from .pyramid import TAPS
 
-_compiled = njit(cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy")
+_compiled = njit(
+    cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy"
+)
 _CHUNK = 1024
 _PARTS = 8
 
@@ -48,7 +52,9 @@ def _combine(first, last, coefficients, vectors, out):
 
 
 class CompiledAlgebra:
-    """`lbfgs.Algebra` on compiled kernels; sums are taken over a fixed number of parts, whatever the threads."""
+    """`lbfgs.Algebra` on compiled kernels; sums are taken over a fixed number of parts, whatever
+    the threads.
+    """
 
     def __init__(self, workers: Workers) -> None:
         self._workers = workers
@@ -57,7 +63,12 @@ class CompiledAlgebra:
         """See `Algebra`."""
         others = np.ascontiguousarray(others)
         sums = np.zeros((_PARTS, len(vectors), len(others)))
-        self._workers.run([partial(_products, a, b, vectors, others, sums[k]) for k, (a, b) in enumerate(_parts(vectors.shape[1]))])
+        self._workers.run(
+            [
+                partial(_products, a, b, vectors, others, sums[k])
+                for k, (a, b) in enumerate(_parts(vectors.shape[1]))
+            ]
+        )
         return sums.sum(axis=0)
 
     def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
@@ -100,7 +111,9 @@ def up_add(coarse, fine, out):
     a, b = t(TAPS[0]), t(TAPS[1])
     height, width = fine.shape
     rows, columns = coarse.shape
-    wide = np.empty((2 * rows + 2, 2 * columns + 2), coarse.dtype)  # the adjoint before its borders are folded back
+    wide = np.empty(
+        (2 * rows + 2, 2 * columns + 2), coarse.dtype
+    )  # the adjoint before its borders are folded back
     line = np.empty(columns, coarse.dtype)
     for i in range(2 * rows + 2):
         # padded row i takes from coarse row k by tap i - 2k in 0..3

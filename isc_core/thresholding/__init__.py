@@ -1,6 +1,8 @@
-"""Multilevel thresholds of an image's levels: Otsu's objective, its exact maximum, and the optimisers that the thesis compares.
+"""Multilevel thresholds of an image's levels: Otsu's objective, its exact maximum, and the
+optimisers that the thesis compares.
 
-Each optimiser is a module with `maximise(objective, count, evaluations, seed, options) -> Optimum`; `exact` needs no search at all.
+Each optimiser is a module with `maximise(objective, count, evaluations, seed, options) -> Optimum`;
+`exact` needs no search at all.
 """
 
 from ..errors import InputError
@@ -13,14 +15,24 @@ __all__ = ["OPTIMISERS", "OtsuObjective", "Optimum", "exact", "maximise", "quant
 OPTIMISERS = ("exact", "chaotic_clonal", "clonal_selection", "particle_swarm")
 
 
-def maximise(optimiser: str, objective: OtsuObjective, count: int, *, evaluations: int = 20_000, seed: int = 0) -> Optimum:
-    """The `count` thresholds that the named optimiser finds within a budget of `evaluations`; the same ones for the same `seed` >= 0.
+def maximise(
+    optimiser: str,
+    objective: OtsuObjective,
+    count: int,
+    *,
+    evaluations: int = 20_000,
+    seed: int = 0,
+) -> Optimum:
+    """The `count` thresholds that the named optimiser finds within a budget of `evaluations`; the
+    same ones for the same `seed` >= 0.
 
-    `exact` ignores budget and seed. Raises `InputError` for an unknown name, a count outside 1..254, a negative seed
-    or a budget below one generation.
+    `exact` ignores budget and seed. Raises `InputError` for an unknown name, a count outside
+    1..254, a negative seed or a budget below one generation.
     """
     if not 1 <= count < LEVELS - 1:
-        raise InputError(f"the number of thresholds must lie between 1 and {LEVELS - 2}, not {count}")
+        raise InputError(
+            f"the number of thresholds must lie between 1 and {LEVELS - 2}, not {count}"
+        )
     if seed < 0:
         raise InputError(f"the seed must be 0 or more, not {seed}")
     if optimiser == "exact":

@@ -1,15 +1,19 @@
 """Clonal selection with chaotic numbers (chaotic ClonalG; Akbar, Suryana & Sahib 2015).
 
-Problem: as in `clonal_selection`. The claim is that chaotic numbers in the place of pseudo-random ones find better thresholds.
+Problem: as in `clonal_selection`. The claim is that chaotic numbers in the place of pseudo-random
+ones find better thresholds.
 
-Equation: the logistic map x <- 4x (1 - x), made uniform by u = (2 / pi) asin(sqrt(x)), supplies the numbers in three places: the first
-population, the affinity maturation (the mutation of clones) and the new antibodies. Everything else is `clonal_selection.search`.
+Equation: the logistic map x <- 4x (1 - x), made uniform by u = (2 / pi) asin(sqrt(x)), supplies the
+numbers in three places: the first population, the affinity maturation (the mutation of clones) and
+the new antibodies. Everything else is `clonal_selection.search`.
 
-Citation: H. Akbar, N. Suryana and S. Sahib, "Chaotic clonal selection optimisation for multi-threshold segmentation", International
-Journal of Signal and Imaging Systems Engineering 8(5), 298-315 (2015), doi:10.1504/IJSISE.2015.071953.
+Citation: H. Akbar, N. Suryana and S. Sahib, "Chaotic clonal selection optimisation for
+multi-threshold segmentation", International Journal of Signal and Imaging Systems Engineering 8(5),
+298-315 (2015), doi:10.1504/IJSISE.2015.071953.
 
-Limits: consecutive values of one orbit depend on each other (see `logistic_map`). Here consecutive numbers come from different orbits, and
-an orbit gives each eighth of its values: then the numbers are as good as independent, and so the search is as good as with any others.
+Limits: consecutive values of one orbit depend on each other (see `logistic_map`). Here consecutive
+numbers come from different orbits, and an orbit gives each eighth of its values: then the numbers
+are as good as independent, and so the search is as good as with any others.
 """
 
 from .clonal_selection import ClonalOptions, search
@@ -19,9 +23,14 @@ from .otsu import OtsuObjective
 
 
 def maximise(
-    objective: OtsuObjective, count: int, evaluations: int = 20_000, seed: int = 0, options: ClonalOptions | None = None
+    objective: OtsuObjective,
+    count: int,
+    evaluations: int = 20_000,
+    seed: int = 0,
+    options: ClonalOptions | None = None,
 ) -> Optimum:
-    """The best `count` thresholds that chaotic ClonalG finds with at most `evaluations`, its orbits' starts chosen by `seed` >= 0.
+    """The best `count` thresholds that chaotic ClonalG finds with at most `evaluations`, its
+    orbits' starts chosen by `seed` >= 0.
 
     Raises `InputError` for unfit options, or a budget below the first population.
     """

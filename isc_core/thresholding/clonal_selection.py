@@ -1,20 +1,26 @@
-"""Clonal selection: candidates are cloned, mutated the less the better they are, and the worst are replaced (ClonalG).
+"""Clonal selection: candidates are cloned, mutated the less the better they are, and the worst are
+replaced (ClonalG).
 
 Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
 
-Equation: a generation clones each of N antibodies N_c = round(beta N) times and moves the clones' thresholds by at most
-s = 254 exp(-rho f) levels, f in [0, 1] being the antibody's affinity. Each antibody gives way to the best of its clones if that is no
-worse, and the d worst antibodies to new ones.
+Equation: a generation clones each of N antibodies N_c = round(beta N) times and moves the clones'
+thresholds by at most s = 254 exp(-rho f) levels, f in [0, 1] being the antibody's affinity. Each
+antibody gives way to the best of its clones if that is no worse, and the d worst antibodies to new
+ones.
 
-Citation: L. N. de Castro and F. J. Von Zuben, "Learning and optimization using the clonal selection principle", IEEE Trans. Evolutionary
-Computation 6(3), 239-251 (2002), doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have equally many clones, as they propose
-for optimisation; N, beta, rho and d are usual values of theirs. Ours are two choices, and the search succeeds by them:
-- the affinity is the rank, scaled to [0, 1]: scaled values are nearly 1 for all but the newest antibodies, and nothing would move far;
-- a clone moves a run of neighbouring thresholds by one common step of at least one level, then sorts them. Good sets of thresholds lie on
-  ridges along which neighbours move together; independent steps rarely follow them, and end one level short of the maximum.
+Citation: L. N. de Castro and F. J. Von Zuben, "Learning and optimization using the clonal selection
+principle", IEEE Trans. Evolutionary Computation 6(3), 239-251 (2002),
+doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have equally many clones, as they
+propose for optimisation; N, beta, rho and d are usual values of theirs. Ours are two choices, and
+the search succeeds by them:
+- the affinity is the rank, scaled to [0, 1]: scaled values are nearly 1 for all but the newest
+  antibodies, and nothing would move far;
+- a clone moves a run of neighbouring thresholds by one common step of at least one level, then
+  sorts them. Good sets of thresholds lie on ridges along which neighbours move together;
+  independent steps rarely follow them, and end one level short of the maximum.
 
-Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of chance, so that another source can be tried
-with nothing else changed: see `chaotic_clonal`.
+Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of chance,
+so that another source can be tried with nothing else changed: see `chaotic_clonal`.
 """
 
 from dataclasses import dataclass
@@ -31,9 +37,9 @@ _TOP = LEVELS - 2  # the highest threshold that leaves a level above it
 
 @dataclass(frozen=True)
 class ClonalOptions:
-    """`population`: how many antibodies N are kept, >= 2. `clone_share`: clones of each as a share beta of N, > 0.
-    `decay`: rho, how fast mutations shrink with affinity, > 0.
-    `replaced_share`: share d / N of the antibodies, the worst, that each generation replaces, in [0, 1).
+    """`population`: how many antibodies N are kept, >= 2. `clone_share`: clones of each as a share
+    beta of N, > 0. `decay`: rho, how fast mutations shrink with affinity, > 0. `replaced_share`:
+    share d / N of the antibodies, the worst, that each generation replaces, in [0, 1).
     """
 
     population: int = 50
@@ -61,16 +67,25 @@ class PseudoRandomNumbers:
 
 
 def maximise(
-    objective: OtsuObjective, count: int, evaluations: int = 20_000, seed: int = 0, options: ClonalOptions | None = None
+    objective: OtsuObjective,
+    count: int,
+    evaluations: int = 20_000,
+    seed: int = 0,
+    options: ClonalOptions | None = None,
 ) -> Optimum:
-    """The best `count` thresholds that ClonalG finds with at most `evaluations`, with pseudo-random numbers from `seed` >= 0.
+    """The best `count` thresholds that ClonalG finds with at most `evaluations`, with pseudo-random
+    numbers from `seed` >= 0.
 
     Raises `InputError` for unfit options, or a budget below the first population.
     """
-    return search(objective, count, evaluations, PseudoRandomNumbers(seed), options or ClonalOptions())
+    return search(
+        objective, count, evaluations, PseudoRandomNumbers(seed), options or ClonalOptions()
+    )
 
 
-def search(objective: OtsuObjective, count: int, evaluations: int, numbers: Numbers, options: ClonalOptions) -> Optimum:
+def search(
+    objective: OtsuObjective, count: int, evaluations: int, numbers: Numbers, options: ClonalOptions
+) -> Optimum:
     """`maximise` with any source of numbers."""
     _check(options)
     clones = max(1, round(options.clone_share * options.population))
@@ -85,7 +100,9 @@ def search(objective: OtsuObjective, count: int, evaluations: int, numbers: Numb
         best = np.argmax(offspring_values, axis=1)
         chosen = np.arange(options.population), best
         better = offspring_values[chosen] >= values
-        antibodies = np.where(better[:, None], offspring.reshape(-1, clones, count)[chosen], antibodies)
+        antibodies = np.where(
+            better[:, None], offspring.reshape(-1, clones, count)[chosen], antibodies
+        )
         values = np.where(better, offspring_values[chosen], values)
         if replaced:
             worst = np.argsort(values, kind="stable")[:replaced]
@@ -118,11 +135,15 @@ def _steps(values: np.ndarray, decay: float) -> np.ndarray:
 
 
 def _mutated(clones: np.ndarray, steps: np.ndarray, numbers: Numbers) -> np.ndarray:
-    """The `clones` (n, K), a run of each one's thresholds moved by one step of at most its entry of `steps` (n,), and sorted."""
+    """The `clones` (n, K), a run of each one's thresholds moved by one step of at most its entry of
+    `steps` (n,), and sorted.
+    """
     size, count = clones.shape
     chance = numbers.uniform((size, 3))
     sway = 2 * chance[:, 0] - 1
-    moves = np.where(sway < 0, -1, 1) * np.maximum(1, np.ceil(np.abs(sway) * steps)).astype(np.int64)
+    moves = np.where(sway < 0, -1, 1) * np.maximum(1, np.ceil(np.abs(sway) * steps)).astype(
+        np.int64
+    )
     ends = np.sort((chance[:, 1:] * count).astype(np.int64), axis=1)
     column = np.arange(count)
     moved = (column >= ends[:, :1]) & (column <= ends[:, 1:])

@@ -1,18 +1,23 @@
 """The logistic map x <- r x (1 - x): its orbits, its bifurcation, and uniform numbers made from it.
 
-Problem: a chaotic sequence is to stand in for pseudo-random numbers, which have to be uniform on [0, 1) and independent.
+Problem: a chaotic sequence is to stand in for pseudo-random numbers, which have to be uniform on
+[0, 1) and independent.
 
-Equation: at r = 4 the map is chaotic on [0, 1] and its orbits have the density 1 / (pi sqrt(x (1 - x))), which is U-shaped. The arcsine
-u = (2 / pi) asin(sqrt(x)) makes it uniform. In u the map is the tent u <- 1 - |1 - 2u|: the next number is a function of the last one, so
-consecutive numbers fill a line of the unit square. After `stride` steps that line has 2^stride branches: taking each stride-th value of
-an orbit, and consecutive values from different orbits, leaves nothing of it at the resolution of the numbers' use.
+Equation: at r = 4 the map is chaotic on [0, 1] and its orbits have the density 1 / (pi sqrt(x (1 -
+x))), which is U-shaped. The arcsine u = (2 / pi) asin(sqrt(x)) makes it uniform. In u the map is
+the tent u <- 1 - |1 - 2u|: the next number is a function of the last one, so consecutive numbers
+fill a line of the unit square. After `stride` steps that line has 2^stride branches: taking each
+stride-th value of an orbit, and consecutive values from different orbits, leaves nothing of it at
+the resolution of the numbers' use.
 
-Citation: S. M. Ulam and J. von Neumann, "On combination of stochastic and deterministic processes", Bulletin of the American Mathematical
-Society 53(11), 1120 (1947) (the density). R. M. May, "Simple mathematical models with very complicated dynamics", Nature 261, 459-467
-(1976), doi:10.1038/261459a0 (the bifurcation).
+Citation: S. M. Ulam and J. von Neumann, "On combination of stochastic and deterministic processes",
+Bulletin of the American Mathematical Society 53(11), 1120 (1947) (the density). R. M. May, "Simple
+mathematical models with very complicated dynamics", Nature 261, 459-467 (1976),
+doi:10.1038/261459a0 (the bifurcation).
 
-Limits: 0 and .75 are fixed points at r = 4; .25, .5 and 1 lead into them. An orbit in floating point can round onto 1 and thence to 0
-(about once in 10^8 steps): orbits that reach such a point are started again.
+Limits: 0 and .75 are fixed points at r = 4; .25, .5 and 1 lead into them. An orbit in floating
+point can round onto 1 and thence to 0 (about once in 10^8 steps): orbits that reach such a point
+are started again.
 """
 
 import numpy as np
@@ -24,15 +29,21 @@ _FORGET = 64  # steps after which rounding has replaced every digit of a start
 
 
 def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarray:
-    """The values (length, ...) of the map from `start` (...) on, which comes first; `rate` within (0, 4].
+    """The values (length, ...) of the map from `start` (...) on, which comes first; `rate` within
+    (0, 4].
 
-    Raises `InputError` for starts outside (0, 1) or, at rate 4, among the degenerate ones, and for other rates.
+    Raises `InputError` for starts outside (0, 1) or, at rate 4, among the degenerate ones, and for
+    other rates.
     """
     if not 0 < rate <= 4:
-        raise InputError(f"the logistic map stays within [0, 1] for rates above 0 and up to 4, not {rate}")
+        raise InputError(
+            f"the logistic map stays within [0, 1] for rates above 0 and up to 4, not {rate}"
+        )
     x = np.asarray(start, np.float64)
     if not ((x > 0) & (x < 1)).all() or (rate == 4 and np.isin(x, DEGENERATE).any()):
-        raise InputError(f"an orbit must start within (0, 1), at rate 4 at none of {DEGENERATE}: it would stand still")
+        raise InputError(
+            f"an orbit must start within (0, 1), at rate 4 at none of {DEGENERATE}: it would stand still"
+        )
     values = np.empty((length, *x.shape))
     for k in range(length):
         values[k] = x
@@ -41,7 +52,9 @@ def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarr
 
 
 def bifurcation(rates: np.ndarray, settle: int = 1000, keep: int = 200) -> np.ndarray:
-    """Where the map ends at each of `rates` (n,) in (0, 4]: values (keep, n) of its orbit from .3 on, after `settle` steps."""
+    """Where the map ends at each of `rates` (n,) in (0, 4]: values (keep, n) of its orbit from .3
+    on, after `settle` steps.
+    """
     x = np.full(np.shape(rates), 0.3)
     values = np.empty((keep, len(rates)))
     for k in range(-settle, keep):
@@ -62,12 +75,19 @@ def uniformised(x: np.ndarray) -> np.ndarray:
 
 
 class ChaoticNumbers:
-    """A source of uniform numbers within [0, 1) from many orbits of the map at rate 4, advanced side by side."""
+    """A source of uniform numbers within [0, 1) from many orbits of the map at rate 4, advanced
+    side by side.
+    """
 
     def __init__(self, seed: int, orbits: int = 1024, stride: int = 8) -> None:
-        """`seed` >= 0 chooses where the `orbits` start; `stride`: how many steps of an orbit lie between two numbers taken from it."""
+        """`seed` >= 0 chooses where the `orbits` start;
+
+        `stride`: how many steps of an orbit lie between two numbers taken from it.
+        """
         if seed < 0 or orbits < 1 or stride < 1:
-            raise InputError("chaotic numbers need a seed >= 0, and at least one orbit and a stride of at least one step")
+            raise InputError(
+                "chaotic numbers need a seed >= 0, and at least one orbit and a stride of at least one step"
+            )
         self._stride = stride
         self._restarts = 0
         self._seed = seed
@@ -88,8 +108,14 @@ class ChaoticNumbers:
         return numbers[:wanted].reshape(shape)
 
     def _starts(self, which: np.ndarray) -> np.ndarray:
-        """Starts of the orbits `which` (n,), spread over (0, 1) by multiples of two irrational numbers; none of them degenerate."""
-        turns = (which + 1) * np.sqrt(2) + (self._seed + 1) * (np.sqrt(5) - 1) / 2 + self._restarts * np.sqrt(3)
+        """Starts of the orbits `which` (n,), spread over (0, 1) by multiples of two irrational
+        numbers; none of them degenerate.
+        """
+        turns = (
+            (which + 1) * np.sqrt(2)
+            + (self._seed + 1) * (np.sqrt(5) - 1) / 2
+            + self._restarts * np.sqrt(3)
+        )
         x = 0.01 + 0.98 * (turns % 1)
         return np.where(np.isin(x, DEGENERATE), x + 1e-3, x)
 

@@ -12,9 +12,10 @@ from ..errors import InputError
 class Optimum:
     """The best thresholds that were found.
 
-    `thresholds` (K,) integer levels, ascending; class 0 is everything <= the first; equal ones leave the class between them empty.
-    `value`: the objective there. `evaluations`: how many candidates were evaluated.
-    `history` (m, 2): after each batch of candidates, the evaluations used so far and the best value so far.
+    `thresholds` (K,) integer levels, ascending; class 0 is everything <= the first; equal ones
+    leave the class between them empty. `value`: the objective there. `evaluations`: how many
+    candidates were evaluated. `history` (m, 2): after each batch of candidates, the evaluations
+    used so far and the best value so far.
     """
 
     thresholds: np.ndarray
@@ -24,10 +25,17 @@ class Optimum:
 
 
 class Account:
-    """Evaluates candidates for an optimiser within a budget, and remembers the best one and how the search went."""
+    """Evaluates candidates for an optimiser within a budget, and remembers the best one and how the
+    search went.
+    """
 
-    def __init__(self, objective: Callable[[np.ndarray], np.ndarray], budget: int, least: int) -> None:
-        """`objective`: values (n,) of candidates (n, K). `budget`: how many of them are allowed; `InputError` if fewer than `least`."""
+    def __init__(
+        self, objective: Callable[[np.ndarray], np.ndarray], budget: int, least: int
+    ) -> None:
+        """`objective`: values (n,) of candidates (n, K).
+
+        `budget`: how many of them are allowed; `InputError` if fewer than `least`.
+        """
         if budget < least:
             raise InputError(
                 f"the search needs at least {least} evaluations, not {budget}: raise the budget or make the population smaller"
@@ -40,7 +48,9 @@ class Account:
         self._history: list[tuple[int, float]] = []
 
     def evaluate(self, thresholds: np.ndarray) -> np.ndarray:
-        """Values (n,) of `thresholds` (n, K), integer and ascending in each row; n must not exceed what is `left`."""
+        """Values (n,) of `thresholds` (n, K), integer and ascending in each row; n must not exceed
+        what is `left`.
+        """
         values = self._objective(thresholds)
         self.left -= len(values)
         self._used += len(values)

@@ -1,18 +1,22 @@
-"""Multilevel Otsu thresholds: the between-class variance, and its exact maximum (Otsu 1979; Liao, Chen & Chung 2001).
+"""Multilevel Otsu thresholds: the between-class variance, and its exact maximum (Otsu 1979; Liao,
+Chen & Chung 2001).
 
-Problem: K thresholds t_1 <= ... <= t_K split the levels 0..255 of an image into K + 1 classes, class 0 being all levels <= t_1. Find those
-whose classes lie furthest apart.
+Problem: K thresholds t_1 <= ... <= t_K split the levels 0..255 of an image into K + 1 classes,
+class 0 being all levels <= t_1. Find those whose classes lie furthest apart.
 
-Equation: with w_k the share of pixels in class k and m_k its mean, maximise sum_k w_k (m_k - m)^2. Each class adds a term that depends on
-its two ends alone, so a table of 257 x 257 terms holds every objective, and dynamic programming over the classes' ends finds the maximum:
-best_k(b) = max_a best_{k-1}(a) + term(a, b).
+Equation: with w_k the share of pixels in class k and m_k its mean, maximise sum_k w_k (m_k - m)^2.
+Each class adds a term that depends on its two ends alone, so a table of 257 x 257 terms holds every
+objective, and dynamic programming over the classes' ends finds the maximum: best_k(b) = max_a
+best_{k-1}(a) + term(a, b).
 
-Citation: N. Otsu, "A threshold selection method from gray-level histograms", IEEE Trans. Systems, Man, and Cybernetics 9(1), 62-66 (1979),
-doi:10.1109/TSMC.1979.4310076. P.-S. Liao, T.-S. Chen and P.-C. Chung, "A fast algorithm for multilevel thresholding", Journal of
-Information Science and Engineering 17(5), 713-727 (2001) (the table of terms).
+Citation: N. Otsu, "A threshold selection method from gray-level histograms", IEEE Trans. Systems,
+Man, and Cybernetics 9(1), 62-66 (1979), doi:10.1109/TSMC.1979.4310076. P.-S. Liao, T.-S. Chen and
+P.-C. Chung, "A fast algorithm for multilevel thresholding", Journal of Information Science and
+Engineering 17(5), 713-727 (2001) (the table of terms).
 
-Limits: several sets of thresholds share the maximum where levels are empty; the exact search returns the lowest ones. The objective knows
-nothing of where pixels lie. Few bright pixels move thresholds little: a class of 1 % of the pixels weighs 1 %.
+Limits: several sets of thresholds share the maximum where levels are empty; the exact search
+returns the lowest ones. The objective knows nothing of where pixels lie. Few bright pixels move
+thresholds little: a class of 1 % of the pixels weighs 1 %.
 """
 
 import numpy as np
@@ -29,21 +33,36 @@ def quantise(values: np.ndarray, peak: float) -> np.ndarray:
     Raises `InputError` for a peak that is not positive and values that are not finite.
     """
     if not (peak > 0 and np.isfinite(peak) and np.isfinite(values).all()):
-        raise InputError("thresholds need finite values and a peak above 0: check that the photo is not black or broken")
-    return np.clip(np.rint(np.asarray(values, np.float64) * ((LEVELS - 1) / peak)), 0, LEVELS - 1).astype(np.uint8)
+        raise InputError(
+            "thresholds need finite values and a peak above 0: check that the photo is not black or broken"
+        )
+    return np.clip(
+        np.rint(np.asarray(values, np.float64) * ((LEVELS - 1) / peak)), 0, LEVELS - 1
+    ).astype(np.uint8)
 
 
 class OtsuObjective:
-    """The between-class variance of one histogram, in squared levels, for many candidates at a time.
+    """The between-class variance of one histogram, in squared levels, for many candidates at a
+    time.
 
     `evaluations` counts the candidates that were asked about; nothing is remembered between calls.
     """
 
     def __init__(self, counts: np.ndarray) -> None:
-        """`counts` (256,): how many pixels have each level, or any weights >= 0. Raises `InputError` where they are unfit or all zero."""
+        """`counts` (256,): how many pixels have each level, or any weights >= 0.
+
+        Raises `InputError` where they are unfit or all zero.
+        """
         counts = np.asarray(counts, np.float64)
-        if counts.shape != (LEVELS,) or not np.isfinite(counts).all() or counts.min() < 0 or counts.sum() <= 0:
-            raise InputError(f"a histogram needs {LEVELS} finite counts >= 0 that are not all zero: check that the mask is not empty")
+        if (
+            counts.shape != (LEVELS,)
+            or not np.isfinite(counts).all()
+            or counts.min() < 0
+            or counts.sum() <= 0
+        ):
+            raise InputError(
+                f"a histogram needs {LEVELS} finite counts >= 0 that are not all zero: check that the mask is not empty"
+            )
         share = counts / counts.sum()
         self.counts = counts
         self.evaluations = 0
@@ -58,18 +77,24 @@ class OtsuObjective:
             or np.min(levels) < 0
             or np.max(levels) >= LEVELS
         ):
-            raise InputError(f"levels must be integers from 0 to {LEVELS - 1}, at least one: quantise the values first")
+            raise InputError(
+                f"levels must be integers from 0 to {LEVELS - 1}, at least one: quantise the values first"
+            )
         return cls(np.bincount(np.ravel(levels), minlength=LEVELS))
 
     def __call__(self, thresholds: np.ndarray) -> np.ndarray:
-        """Values (n,) >= 0 of the rows of `thresholds` (n, K): integers 0..255, ascending in each row."""
+        """Values (n,) >= 0 of the rows of `thresholds` (n, K): integers 0..255, ascending in each
+        row.
+        """
         self.evaluations += len(thresholds)
         ends = np.pad(thresholds + 1, ((0, 0), (1, 1)), constant_values=((0, 0), (0, LEVELS)))
         return self.terms[ends[:, :-1], ends[:, 1:]].sum(axis=1)
 
 
 def exact(objective: OtsuObjective, count: int) -> Optimum:
-    """The maximum with `count` thresholds >= 1, by dynamic programming; the lowest thresholds where several sets share it."""
+    """The maximum with `count` thresholds >= 1, by dynamic programming; the lowest thresholds where
+    several sets share it.
+    """
     best = objective.terms[0].copy()  # of the first class alone, by its end
     best[0] = -np.inf  # it holds level 0 at least: thresholds are levels
     choices = []
@@ -88,7 +113,9 @@ def exact(objective: OtsuObjective, count: int) -> Optimum:
 
 
 def _class_terms(share: np.ndarray) -> np.ndarray:
-    """Terms (257, 257): what a class of the levels a..b-1 adds at [a, b]; minus infinity where b < a, 0 for classes without pixels."""
+    """Terms (257, 257): what a class of the levels a..b-1 adds at [a, b]; minus infinity where b <
+    a, 0 for classes without pixels.
+    """
     levels = np.arange(LEVELS) - share @ np.arange(LEVELS)  # about the mean, where nothing cancels
     weight = np.concatenate([[0.0], np.cumsum(share)])
     moment = np.concatenate([[0.0], np.cumsum(share * levels)])

@@ -1,15 +1,19 @@
-"""Particle swarm: candidates fly, drawn to their own best place and to the best of all (Kennedy & Eberhart 1995).
+"""Particle swarm: candidates fly, drawn to their own best place and to the best of all (Kennedy &
+Eberhart 1995).
 
 Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
 
-Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best place, g the best of all, u uniform within [0, 1)
-for each coordinate, and the constriction w = .7298, c = 1.49618. Places are real; thresholds are their rounded, sorted values.
+Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best place, g
+the best of all, u uniform within [0, 1) for each coordinate, and the constriction w = .7298, c =
+1.49618. Places are real; thresholds are their rounded, sorted values.
 
-Citation: J. Kennedy and R. Eberhart, "Particle swarm optimization", Proc. ICNN'95 4, 1942-1948 (1995), doi:10.1109/ICNN.1995.488968.
-M. Clerc and J. Kennedy, "The particle swarm: explosion, stability, and convergence in a multidimensional complex space", IEEE Trans.
-Evolutionary Computation 6(1), 58-73 (2002), doi:10.1109/4235.985692 (the constriction).
+Citation: J. Kennedy and R. Eberhart, "Particle swarm optimization", Proc. ICNN'95 4, 1942-1948
+(1995), doi:10.1109/ICNN.1995.488968. M. Clerc and J. Kennedy, "The particle swarm: explosion,
+stability, and convergence in a multidimensional complex space", IEEE Trans. Evolutionary
+Computation 6(1), 58-73 (2002), doi:10.1109/4235.985692 (the constriction).
 
-An inertia that falls from .9 to .4 with c = 2 is the other usual setting: `FALLING`. It searches longer before it gathers.
+An inertia that falls from .9 to .4 with c = 2 is the other usual setting: `FALLING`. It searches
+longer before it gathers.
 
 Limits: a swarm that has gathered at a lesser maximum stays there; the rest of its budget is lost.
 """
@@ -27,9 +31,9 @@ _TOP = LEVELS - 2  # the highest threshold that leaves a level above it
 
 @dataclass(frozen=True)
 class SwarmOptions:
-    """`particles`: how many, >= 2. `attraction`: c, both pulls' strength, > 0.
-    `inertia`, `last_inertia`: share w of a velocity that is kept, at the start and at the end of the budget, linear between; in [0, 1).
-    `top_speed`: largest move of a threshold in one step, in levels, > 0.
+    """`particles`: how many, >= 2. `attraction`: c, both pulls' strength, > 0. `inertia`,
+    `last_inertia`: share w of a velocity that is kept, at the start and at the end of the budget,
+    linear between; in [0, 1). `top_speed`: largest move of a threshold in one step, in levels, > 0.
     """
 
     particles: int = 40
@@ -43,9 +47,14 @@ FALLING = SwarmOptions(inertia=0.9, last_inertia=0.4, attraction=2.0)
 
 
 def maximise(
-    objective: OtsuObjective, count: int, evaluations: int = 20_000, seed: int = 0, options: SwarmOptions | None = None
+    objective: OtsuObjective,
+    count: int,
+    evaluations: int = 20_000,
+    seed: int = 0,
+    options: SwarmOptions | None = None,
 ) -> Optimum:
-    """The best `count` thresholds that the swarm finds with at most `evaluations`, with pseudo-random numbers from `seed` >= 0.
+    """The best `count` thresholds that the swarm finds with at most `evaluations`, with
+    pseudo-random numbers from `seed` >= 0.
 
     Raises `InputError` for unfit options, or a budget below one step of the swarm.
     """
@@ -62,7 +71,10 @@ def maximise(
     while account.left >= options.particles:
         leader = own[np.argmax(own_values)]
         pulls = generator.random((2, *shape)) * options.attraction
-        inertia = options.last_inertia + (options.inertia - options.last_inertia) * account.left / evaluations
+        inertia = (
+            options.last_inertia
+            + (options.inertia - options.last_inertia) * account.left / evaluations
+        )
         velocities = inertia * velocities + pulls[0] * (own - places) + pulls[1] * (leader - places)
         velocities = np.clip(velocities, -options.top_speed, options.top_speed)
         places = np.clip(places + velocities, 0, _TOP)

@@ -1,19 +1,24 @@
 """Colours that paints have, linear Rec.709.
 
-Equation: value * (1 - purity + purity * k(hue)), k the fully saturated colour of the hue. Pigments differ in how bright they can be:
-yellow ones reflect up to .85, green and blue ones less than half of it (rough figures, from what paints look like).
+Equation: value * (1 - purity + purity * k(hue)), k the fully saturated colour of the hue. Pigments
+differ in how bright they can be: yellow ones reflect up to .85, green and blue ones less than half
+of it (rough figures, from what paints look like).
 
 Limits: no spectra, no fluorescence.
 """
 
 import numpy as np
 
-# The largest channel that a saturated pigment has, every twelfth of a turn from red over yellow, green, cyan, blue and magenta to red.
+# The largest channel that a saturated pigment has, every twelfth of a turn from red over yellow,
+# green, cyan, blue and magenta to red.
 _LARGEST = (0.7, 0.8, 0.85, 0.55, 0.4, 0.4, 0.45, 0.45, 0.4, 0.4, 0.5, 0.6, 0.7)
 
 
 def colour(hue: float, purity: float, value: float) -> np.ndarray:
-    """(3,): `hue` in turns (0 red, 1/3 green), `purity` in [0, 1], `value` = the largest channel."""
+    """(3,):
+
+    `hue` in turns (0 red, 1/3 green), `purity` in [0, 1], `value` = the largest channel.
+    """
     place = np.mod(hue + np.array([0, 2 / 3, 1 / 3]), 1) * 6
     full = np.clip(np.abs(place - 3) - 1, 0, 1)
     return value * (1 - purity + purity * full)
@@ -49,7 +54,9 @@ def ink(rng: np.random.Generator) -> np.ndarray:
 
 
 def palette(rng: np.random.Generator, count: int) -> np.ndarray:
-    """(count, 3) paints that go well apart: hues spread around the circle, now and then a white or a dark one among them."""
+    """(count, 3) paints that go well apart: hues spread around the circle, now and then a white or
+    a dark one among them.
+    """
     hues = rng.uniform() + (np.arange(count) + rng.uniform(-0.25, 0.25, count)) / count
     paints = np.stack([pigment(rng, hue) for hue in hues])
     chance = rng.random()

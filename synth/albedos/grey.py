@@ -1,4 +1,6 @@
-"""Paints without any colour, R = G = B to the last bit: one grey, or the brightness of one of the coloured families."""
+"""Paints without any colour, R = G = B to the last bit: one grey, or the brightness of one of the
+coloured families.
+"""
 
 import numpy as np
 

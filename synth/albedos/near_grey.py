@@ -1,7 +1,9 @@
-"""Paints with hardly any colour but with texture: white paper with pale print, porcelain, dark rubber, stone. The hard case for separations
-of highlights, for whose white light the paint's own colour is the only contrast.
+"""Paints with hardly any colour but with texture: white paper with pale print, porcelain, dark
+rubber, stone. The hard case for separations of highlights, for whose white light the paint's own
+colour is the only contrast.
 
-Equation: chroma = (largest - smallest channel) / largest channel, at most `LARGEST_CHROMA` everywhere.
+Equation: chroma = (largest - smallest channel) / largest channel, at most `LARGEST_CHROMA`
+everywhere.
 """
 
 import numpy as np
@@ -23,8 +25,12 @@ def _tint(rng: np.random.Generator, value: float) -> np.ndarray:
     return colour(rng.uniform(), rng.uniform(0, LARGEST_CHROMA), value)
 
 
-def _mottled(rng: np.random.Generator, size: int, paint: np.ndarray, amount: float, slope: float) -> np.ndarray:
-    """(size, size, 3): the paint, brighter and darker by `amount` (a share, one standard deviation)."""
+def _mottled(
+    rng: np.random.Generator, size: int, paint: np.ndarray, amount: float, slope: float
+) -> np.ndarray:
+    """(size, size, 3): the paint, brighter and darker by `amount` (a share, one standard
+    deviation).
+    """
     return paint * np.clip(1 + amount * fractal_noise(rng, size, slope), 0.2, 2)[..., None]
 
 
@@ -39,14 +45,25 @@ def _paper(rng: np.random.Generator, size: int) -> np.ndarray:
 def _porcelain(rng: np.random.Generator, size: int) -> np.ndarray:
     """White glaze over a faint relief of shades, now and then with a pale drawing."""
     base = _mottled(rng, size, _tint(rng, rng.uniform(0.55, 0.85)), 0.03, 3)
-    base = over(base, _tint(rng, rng.uniform(0.4, 0.6)), 0.7 * step(smooth_noise(rng, size, rng.uniform(2, 5)) - 0.6, 0.5))
-    return over(base, _tint(rng, rng.uniform(0.3, 0.5)), print_covers(rng, size)[0]) if rng.random() < 0.5 else base
+    base = over(
+        base,
+        _tint(rng, rng.uniform(0.4, 0.6)),
+        0.7 * step(smooth_noise(rng, size, rng.uniform(2, 5)) - 0.6, 0.5),
+    )
+    return (
+        over(base, _tint(rng, rng.uniform(0.3, 0.5)), print_covers(rng, size)[0])
+        if rng.random() < 0.5
+        else base
+    )
 
 
 def _rubber(rng: np.random.Generator, size: int) -> np.ndarray:
     """Dark rubber or plastic, scuffed: paler where it is worn."""
     base = _mottled(rng, size, _tint(rng, rng.uniform(0.035, 0.1)), 0.08, 1.5)
-    worn = step(smooth_noise(rng, size, rng.uniform(1.5, 4)) + 0.4 * fractal_noise(rng, size, 1.5) - 0.8, 0.6)
+    worn = step(
+        smooth_noise(rng, size, rng.uniform(1.5, 4)) + 0.4 * fractal_noise(rng, size, 1.5) - 0.8,
+        0.6,
+    )
     return over(base, _tint(rng, rng.uniform(0.1, 0.2)), 0.6 * worn)
 
 

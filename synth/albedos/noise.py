@@ -1,6 +1,8 @@
-"""Colours that change everywhere: clouds of colour, marble, wood, speckled glaze, a glaze that runs from one colour to another.
+"""Colours that change everywhere: clouds of colour, marble, wood, speckled glaze, a glaze that runs
+from one colour to another.
 
-Equation: marble's veins are the zeros of a fractal field, wood's rings the level lines of a nearly flat one: the turbulence of Perlin.
+Equation: marble's veins are the zeros of a fractal field, wood's rings the level lines of a nearly
+flat one: the turbulence of Perlin.
 
 Citation: K. Perlin, "An image synthesizer", SIGGRAPH 1985, 287-296, doi:10.1145/325334.325247.
 """
@@ -20,7 +22,9 @@ def _clouds(rng: np.random.Generator, size: int) -> np.ndarray:
     """Two or three paints mixed in shares that vary at all scales."""
     paints = palette(rng, int(rng.integers(2, 4)))
     slope, sharpness = rng.uniform(1.5, 3), rng.uniform(1, 2.5)
-    weights = np.stack([np.exp(sharpness * fractal_noise(rng, size, slope)) for _ in paints], axis=-1)
+    weights = np.stack(
+        [np.exp(sharpness * fractal_noise(rng, size, slope)) for _ in paints], axis=-1
+    )
     return weights / weights.sum(-1, keepdims=True) @ paints
 
 
@@ -29,7 +33,11 @@ def _marble(rng: np.random.Generator, size: int) -> np.ndarray:
     stone, vein = (paper(rng), dark(rng)) if rng.random() < 0.7 else (dark(rng), paper(rng))
     if rng.random() < 0.4:
         stone, vein = pigment(rng) * 0.7, paper(rng)
-    result = over(np.broadcast_to(stone, (size, size, 3)), 0.5 * (stone + vein), 0.25 + 0.2 * fractal_noise(rng, size, 2.5))
+    result = over(
+        np.broadcast_to(stone, (size, size, 3)),
+        0.5 * (stone + vein),
+        0.25 + 0.2 * fractal_noise(rng, size, 2.5),
+    )
     for cycles, width, strength in ((1.5, 0.05, 0.8), (4, 0.06, 0.45)):
         field = smooth_noise(rng, size, cycles) + 0.35 * fractal_noise(rng, size, 1.8)
         fade = step(smooth_noise(rng, size, 2) + 0.3, 1)
@@ -46,7 +54,9 @@ def _wood(rng: np.random.Generator, size: int) -> np.ndarray:
     phase = np.mod(rings, 1)
     share = np.where(phase < 0.85, phase / 0.85, (1 - phase) / 0.15) ** 1.5
     fibres = fractal_noise(rng, size, 1.0, 25)
-    return over(np.broadcast_to(early, (size, size, 3)), late, softened(share) * 0.8 + 0.08 * fibres)
+    return over(
+        np.broadcast_to(early, (size, size, 3)), late, softened(share) * 0.8 + 0.08 * fibres
+    )
 
 
 def _speckles(rng: np.random.Generator, size: int) -> np.ndarray:
@@ -55,7 +65,11 @@ def _speckles(rng: np.random.Generator, size: int) -> np.ndarray:
     result = ground * (1 + 0.05 * fractal_noise(rng, size, 2))[..., None]
     for _ in range(int(rng.integers(1, 3))):
         field = smooth_noise(rng, size, rng.uniform(15, 45))
-        result = over(result, dark(rng) if rng.random() < 0.6 else paper(rng), step(field - rng.uniform(1.2, 2), 0.25))
+        result = over(
+            result,
+            dark(rng) if rng.random() < 0.6 else paper(rng),
+            step(field - rng.uniform(1.2, 2), 0.25),
+        )
     return result
 
 
@@ -65,6 +79,11 @@ def _running_glaze(rng: np.random.Generator, size: int) -> np.ndarray:
     _, v = grid(size)
     result = np.broadcast_to(paints[0], (size, size, 3))
     for number, paint in enumerate(paints[1:], 1):
-        run = v - number / len(paints) + 0.06 * smooth_noise(rng, size, 3) + 0.03 * fractal_noise(rng, size, 2, 0.2)
+        run = (
+            v
+            - number / len(paints)
+            + 0.06 * smooth_noise(rng, size, 3)
+            + 0.03 * fractal_noise(rng, size, 2, 0.2)
+        )
         result = over(result, paint, step(run, rng.uniform(0.02, 0.15)))
     return result * (1 + 0.05 * fractal_noise(rng, size, 2))[..., None]

@@ -1,4 +1,6 @@
-"""2 to 6 paints in areas of their own: stripes, cells, or the level sets of a smooth field; edges as soft as a texel."""
+"""2 to 6 paints in areas of their own: stripes, cells, or the level sets of a smooth field; edges
+as soft as a texel.
+"""
 
 import numpy as np
 
@@ -14,18 +16,26 @@ def texture(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def _stripes(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
-    """(size, size) indices: rings, upright stripes or screws of uneven width; an integer number of them around keeps the seam closed."""
+    """(size, size) indices: rings, upright stripes or screws of uneven width; an integer number of
+    them around keeps the seam closed.
+    """
     u, v = grid(size)
     repeats = int(rng.integers(1, 4))
     kind = rng.integers(3)
     place = ((v, 0), (v * 0, 1), (v, rng.choice((-1, 1))))[kind]
-    phase = repeats * (place[0] + place[1] * u) + rng.uniform(0, 0.04) * smooth_noise(rng, size, 3) + rng.uniform()
+    phase = (
+        repeats * (place[0] + place[1] * u)
+        + rng.uniform(0, 0.04) * smooth_noise(rng, size, 3)
+        + rng.uniform()
+    )
     ends = np.cumsum(rng.uniform(0.4, 1.6, count))
     return np.searchsorted(ends[:-1] / ends[-1], np.mod(phase, 1))
 
 
 def _cells(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
-    """(size, size) indices: the cell of the nearest of some random places, each with one of the paints."""
+    """(size, size) indices: the cell of the nearest of some random places, each with one of the
+    paints.
+    """
     u, v = grid(size)
     bend = rng.uniform(0, 0.02)
     u, v = u + bend * smooth_noise(rng, size, 5) / ASPECT, v + bend * smooth_noise(rng, size, 5)

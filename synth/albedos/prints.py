@@ -1,4 +1,6 @@
-"""Prints and drawings on paper, packaging and crockery: labels, pages of text, a band of large letters, brush strokes."""
+"""Prints and drawings on paper, packaging and crockery: labels, pages of text, a band of large
+letters, brush strokes.
+"""
 
 from collections.abc import Callable
 
@@ -15,13 +17,20 @@ def texture(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def print_covers(rng: np.random.Generator, size: int) -> list[np.ndarray]:
-    """What one or two inks cover, (size, size) in [0, 1] each, of a page of text or a drawing that has no colours yet."""
-    makers: tuple[Callable[[np.random.Generator, int], list[np.ndarray]], ...] = (_page_covers, _drawing_covers)
+    """What one or two inks cover, (size, size) in [0, 1] each, of a page of text or a drawing that
+    has no colours yet.
+    """
+    makers: tuple[Callable[[np.random.Generator, int], list[np.ndarray]], ...] = (
+        _page_covers,
+        _drawing_covers,
+    )
     return makers[rng.integers(2)](rng, size)
 
 
 def _label(rng: np.random.Generator, size: int) -> np.ndarray:
-    """A coloured package with two or three pale labels around it, each with a name, a frame, a motif and small print."""
+    """A coloured package with two or three pale labels around it, each with a name, a frame, a
+    motif and small print.
+    """
     count = int(rng.integers(2, 4))
     width, height = rng.uniform(0.7, 0.85) * ASPECT / count, rng.uniform(0.45, 0.65)
     top, face = 0.5 - height / 2 + rng.uniform(-0.05, 0.05), int(rng.choice(FACES[1:]))
@@ -32,9 +41,20 @@ def _label(rng: np.random.Generator, size: int) -> np.ndarray:
         left = start + number * ASPECT / count
         ground.box(left, top, width, height)
         frame.box(left + 0.02, top + 0.02, width - 0.04, height - 0.04, 0.008)
-        letters.centred(name, left + width / 2, top + 0.36 * height, 0.22 * height, face, 0.82 * width, 0.14)
+        letters.centred(
+            name, left + width / 2, top + 0.36 * height, 0.22 * height, face, 0.82 * width, 0.14
+        )
         frame.box(left + 0.1 * width, top + 0.43 * height, 0.8 * width, 0.012)
-        write_lines(letters, rng, left + 0.12 * width, top + 0.48 * height, 0.76 * width, 3, 0.055 * height, FACES[0])
+        write_lines(
+            letters,
+            rng,
+            left + 0.12 * width,
+            top + 0.48 * height,
+            0.76 * width,
+            3,
+            0.055 * height,
+            FACES[0],
+        )
         frame.area(_blossom(rng, left + width / 2, top + 0.85 * height, 0.07 * height))
     base = np.broadcast_to(pigment(rng), (size, size, 3))
     base = over(base, paper(rng), ground.cover())
@@ -59,7 +79,15 @@ def _page_covers(rng: np.random.Generator, size: int) -> list[np.ndarray]:
                 heads.box(left, top, 0.86 * width, 0.12)
                 top += 0.16
                 continue
-            heads.centred(word(rng).capitalize(), left + 0.43 * width, top + 1.8 * height, 1.7 * height, face, 0.8 * width, 0.15)
+            heads.centred(
+                word(rng).capitalize(),
+                left + 0.43 * width,
+                top + 1.8 * height,
+                1.7 * height,
+                face,
+                0.8 * width,
+                0.15,
+            )
             lines = min(int(rng.integers(3, 8)), int((0.95 - top) / (1.9 * height)))
             write_lines(text, rng, left, top + 2.6 * height, 0.86 * width, lines, height, face)
             top += (2.6 + 1.9 * lines + 1.5) * height
@@ -76,9 +104,30 @@ def _band(rng: np.random.Generator, size: int) -> np.ndarray:
     height, repeats = 0.45 * (high - low), int(rng.integers(2, 4))
     for number in range(repeats):
         middle = (number + 0.5) * ASPECT / repeats
-        letters.centred(word(rng).upper(), middle, low + 0.55 * (high - low), height, face, 0.85 * ASPECT / repeats, 0.17)
-        write_lines(letters, rng, middle - 0.4 * ASPECT / repeats, low + 0.66 * (high - low), 0.8 * ASPECT / repeats, 2, 0.03, FACES[1])
-    base = over(np.broadcast_to(pigment(rng), (size, size, 3)), pale(rng) if rng.random() < 0.5 else paper(rng), ground.cover())
+        letters.centred(
+            word(rng).upper(),
+            middle,
+            low + 0.55 * (high - low),
+            height,
+            face,
+            0.85 * ASPECT / repeats,
+            0.17,
+        )
+        write_lines(
+            letters,
+            rng,
+            middle - 0.4 * ASPECT / repeats,
+            low + 0.66 * (high - low),
+            0.8 * ASPECT / repeats,
+            2,
+            0.03,
+            FACES[1],
+        )
+    base = over(
+        np.broadcast_to(pigment(rng), (size, size, 3)),
+        pale(rng) if rng.random() < 0.5 else paper(rng),
+        ground.cover(),
+    )
     return over(base, ink(rng), letters.cover())
 
 
@@ -106,5 +155,8 @@ def _drawing_covers(rng: np.random.Generator, size: int) -> list[np.ndarray]:
 def _blossom(rng: np.random.Generator, x: float, y: float, radius: float) -> np.ndarray:
     """(N, 2): the outline of a flower, a star or a disc."""
     angle = np.linspace(0, 2 * np.pi, 97)[:-1]
-    reach = radius * (1 + rng.uniform(0, 0.45) * np.cos(int(rng.integers(3, 8)) * angle + rng.uniform(0, 2 * np.pi)))
+    reach = radius * (
+        1
+        + rng.uniform(0, 0.45) * np.cos(int(rng.integers(3, 8)) * angle + rng.uniform(0, 2 * np.pi))
+    )
     return np.stack([x + reach * np.cos(angle), y + reach * np.sin(angle)], axis=1)

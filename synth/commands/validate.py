@@ -1,4 +1,6 @@
-"""`isc validate`: how large the errors of every stage are on rendered scenes, what causes them, and whether they are accepted."""
+"""`isc validate`: how large the errors of every stage are on rendered scenes, what causes them, and
+whether they are accepted.
+"""
 
 import argparse
 import shlex
@@ -23,33 +25,93 @@ _NO_BOUNDS = "none"
 def declare(commands: Commands) -> None:
     """Adds the command to the parser."""
     parser = add_command(
-        commands, "validate", run, "errors of every stage on rendered scenes, their causes, and whether they are accepted",
+        commands,
+        "validate",
+        run,
+        "errors of every stage on rendered scenes, their causes, and whether they are accepted",
         "Runs the stages over a dataset of isc synth: tables of errors with confidence intervals, an error budget by swapping in the truth "
         "for one stage at a time, slices by gloss, light, albedo, material and size, pictures, and models side by side. Writes a folder "
         "with report.html, report.json and summary.md. Exits with 1 where a bound is broken; the maps that show why are then in its "
-        "folder evidence.", _EXAMPLES,
-    )  # fmt: skip
-    parser.add_argument("dataset", metavar="DATASET", type=Path, help="a folder that isc synth wrote")
-    parser.add_argument(
-        "-o", "--output", type=Path, required=True, metavar="DIR", help="the folder to write; an earlier report is replaced"
+        "folder evidence.",
+        _EXAMPLES,
     )
-    parser.add_argument("--split", metavar="NAME", help="run one split of the dataset (default: all)")
-    parser.add_argument("--scenes", type=count, default=0, metavar="N", help="run N scenes, drawn by --seed (default: all)")
+    parser.add_argument(
+        "dataset", metavar="DATASET", type=Path, help="a folder that isc synth wrote"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="the folder to write; an earlier report is replaced",
+    )
+    parser.add_argument(
+        "--split", metavar="NAME", help="run one split of the dataset (default: all)"
+    )
+    parser.add_argument(
+        "--scenes",
+        type=count,
+        default=0,
+        metavar="N",
+        help="run N scenes, drawn by --seed (default: all)",
+    )
     stages = "separation, sirfs, gloss (default: all, and the chain with its error budget)"
     parser.add_argument("--stages", type=names, metavar="a,b", help=stages)
     models = f"compare these with plain SIRFS and with SIRFS on the true diffuse layer: {', '.join(SEPARATING_MODELS)} (default: none)"
     parser.add_argument("--models", type=names, metavar="a,b", help=models)
-    parser.add_argument("--separator", choices=METHODS, default=BEST, metavar="NAME", help="how to separate (default %(default)s)")
-    parser.add_argument("--illumination", choices=ILLUMINATIONS, default=ILLUMINATIONS[0], help="which lights SIRFS expects")
-    parser.add_argument("--seed", type=count, default=0, metavar="S", help="of everything drawn at random (default 0)")
-    parser.add_argument("--bounds", metavar="FILE", help="bounds to judge by (default: those of the package; none: judge nothing)")
-    parser.add_argument("--update-bounds", type=Path, metavar="FILE", help="write bounds that this run keeps with a margin")
-    parser.add_argument("--renders", type=count, default=3, metavar="N", help="how many scenes to render again as a check (default 3)")
-    parser.add_argument("--threads", type=count, default=0, metavar="N", help="how many scenes at once (0: one for each core)")
+    parser.add_argument(
+        "--separator",
+        choices=METHODS,
+        default=BEST,
+        metavar="NAME",
+        help="how to separate (default %(default)s)",
+    )
+    parser.add_argument(
+        "--illumination",
+        choices=ILLUMINATIONS,
+        default=ILLUMINATIONS[0],
+        help="which lights SIRFS expects",
+    )
+    parser.add_argument(
+        "--seed",
+        type=count,
+        default=0,
+        metavar="S",
+        help="of everything drawn at random (default 0)",
+    )
+    parser.add_argument(
+        "--bounds",
+        metavar="FILE",
+        help="bounds to judge by (default: those of the package; none: judge nothing)",
+    )
+    parser.add_argument(
+        "--update-bounds",
+        type=Path,
+        metavar="FILE",
+        help="write bounds that this run keeps with a margin",
+    )
+    parser.add_argument(
+        "--renders",
+        type=count,
+        default=3,
+        metavar="N",
+        help="how many scenes to render again as a check (default 3)",
+    )
+    parser.add_argument(
+        "--threads",
+        type=count,
+        default=0,
+        metavar="N",
+        help="how many scenes at once (0: one for each core)",
+    )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work; what can be wrong is found before it begins. Raises `Rejected` where a bound is broken, with the report written."""
+    """Does the work; what can be wrong is found before it begins.
+
+    Raises `Rejected` where a bound is broken, with the report written.
+    """
     from ..validation.bounds import SHIPPED, bounds_from, read_bounds, write_bounds
     from ..validation.folder import require_writable_report, write_report
     from ..validation.models_stage import models_stage
@@ -60,15 +122,23 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     models = tuple(dict.fromkeys(options.models or ()))
     settings = StageOptions(options.separator, options.illumination, models=models)
     stages = find_stages(options.stages) + ((models_stage(models),) if models else ())
-    wanted = RunOptions(options.split, options.scenes, stages, settings, options.seed, options.threads)
+    wanted = RunOptions(
+        options.split, options.scenes, stages, settings, options.seed, options.threads
+    )
     bounds_file = SHIPPED if options.bounds is None else Path(options.bounds)
-    bounds = () if options.bounds == _NO_BOUNDS or (options.bounds is None and not SHIPPED.is_file()) else read_bounds(bounds_file)
+    bounds = (
+        ()
+        if options.bounds == _NO_BOUNDS or (options.bounds is None and not SHIPPED.is_file())
+        else read_bounds(bounds_file)
+    )
     require_writable_report(options.output)
     if options.update_bounds is not None:
         require_writable_file(options.update_bounds)
     if options.output.resolve() == options.dataset.resolve():
         raise InputError("the report cannot replace the dataset: name another folder for -o")
-    outcome = validate(options.dataset, wanted, bounds, options.renders, _command(options), monitor.part(0, 0.9))
+    outcome = validate(
+        options.dataset, wanted, bounds, options.renders, _command(options), monitor.part(0, 0.9)
+    )
     write_report(outcome, options.output, monitor.part(0.9, 1))
     if options.update_bounds is not None:
         write_bounds(options.update_bounds, bounds_from(outcome.figures))
@@ -80,7 +150,13 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 def _command(options: argparse.Namespace) -> str:
     """The command that makes the report again."""
     words = ["isc", "validate", str(options.dataset), "-o", str(options.output)]
-    for name, default in (("split", None), ("scenes", 0), ("separator", BEST), ("illumination", ILLUMINATIONS[0]), ("bounds", None)):
+    for name, default in (
+        ("split", None),
+        ("scenes", 0),
+        ("separator", BEST),
+        ("illumination", ILLUMINATIONS[0]),
+        ("bounds", None),
+    ):
         if (value := getattr(options, name)) != default:
             words += [f"--{name}", str(value)]
     for name in ("stages", "models"):

@@ -1,4 +1,7 @@
-"""The data set's card: `README.md`, what somebody needs who finds the folder without the program that made it."""
+"""The data set's card:
+
+`README.md`, what somebody needs who finds the folder without the program that made it.
+"""
 
 import shlex
 from typing import Any
@@ -49,18 +52,34 @@ Light that goes from one part of the object to another is {interreflection}. Ren
 The scenes are yours: what the generator renders is not covered by the generator's licence (GPL-3.0-or-later), and nothing in it stands
 in the way of giving them away under CC0.{derived}
 """
-_HELD_OUT = {"train": "-", "test_objects": "objects", "test_materials": "materials", "test_lights": "lights", "test": "all three"}
+_HELD_OUT = {
+    "train": "-",
+    "test_objects": "objects",
+    "test_materials": "materials",
+    "test_lights": "lights",
+    "test": "all three",
+}
 _LISTS = ("shapes", "materials", "albedos", "lights", "splits")
 _NUMBERS = ("seed", "size", "samples", "bounces", "exposure", "renderer")
-_FILES = {"mesh": "--mesh", "height": "--height", "albedo_image": "--albedo-image", "natural_lights": "--natural-lights", "hdr": "--hdr"}
+_FILES = {
+    "mesh": "--mesh",
+    "height": "--height",
+    "albedo_image": "--albedo-image",
+    "natural_lights": "--natural-lights",
+    "hdr": "--hdr",
+}
 
 
 def card(settings: dict[str, Any], count: int, splits: dict[str, int]) -> str:
     """The text. `settings`: as in the manifest. `splits`: how many scenes each has."""
-    rows = "\n".join(f"| {name} | {number} | {_HELD_OUT[name]} |" for name, number in splits.items())
+    rows = "\n".join(
+        f"| {name} | {number} | {_HELD_OUT[name]} |" for name, number in splits.items()
+    )
     own = [name.replace("_", " ") for name in _FILES if settings[name]]
     derived = (
-        f"\nScenes that show or are lit by files of others ({', '.join(own)}) are derived from them: their terms apply too" if own else ""
+        f"\nScenes that show or are lit by files of others ({', '.join(own)}) are derived from them: their terms apply too"
+        if own
+        else ""
     )
     if settings["natural_lights"]:
         derived += "; natural_lights.mat is research data"
@@ -71,7 +90,9 @@ def card(settings: dict[str, Any], count: int, splits: dict[str, int]) -> str:
         command=command(settings, count),
         splits=rows,
         sensor=_sensor(settings["sensor"]),
-        interreflection=f"followed for {settings['bounces']} bounces" if settings["bounces"] else "left out",
+        interreflection=f"followed for {settings['bounces']} bounces"
+        if settings["bounces"]
+        else "left out",
         derived=f"{derived}." if derived else "",
     )
 
@@ -86,7 +107,14 @@ def command(settings: dict[str, Any], count: int) -> str:
         words += [f"--{name}", ",".join(settings[name])] if settings[name] else []
     for name, option in _FILES.items():
         if settings[name]:
-            words += [option, "ROOT" if name == "natural_lights" else "FILES" if name == "hdr" else settings[name]["file"]]
+            words += [
+                option,
+                "ROOT"
+                if name == "natural_lights"
+                else "FILES"
+                if name == "hdr"
+                else settings[name]["file"],
+            ]
     words += ["--perspective"] if settings["perspective"] else []
     words += ["--clip"] if sensor["clip"] else []
     words += ["--noise", str(sensor["noise"])] if sensor["noise"] else []

@@ -1,4 +1,5 @@
-"""What `scene.json` says: how a scene was made, in which units and frames, and the few numbers that are not maps.
+"""What `scene.json` says: how a scene was made, in which units and frames, and the few numbers that
+are not maps.
 
 It holds no time and no path, so that the same seed gives the same bytes.
 """
@@ -30,9 +31,7 @@ UNITS = {
     "shading": "radiance of a white matt surface: diffuse = reflectance * shading",
     "environment": "latitude-longitude, row 0 straight up, first column away from the viewer, a quarter along is right",
 }
-ILLUMINATION = (
-    "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, x right, y up, z toward the viewer"
-)
+ILLUMINATION = "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, x right, y up, z toward the viewer"
 CONVENTIONS = {
     "lambert": "f = albedo / pi",
     "oren_nayar": "f = albedo times Oren & Nayar's rough matt lobe, slope deviation sigma in radians",
@@ -42,7 +41,9 @@ CONVENTIONS = {
 }
 
 
-def describe(split: str, recipe: Recipe, scene: Scene, truth: GroundTruth, checksums: dict[str, str]) -> dict[str, Any]:
+def describe(
+    split: str, recipe: Recipe, scene: Scene, truth: GroundTruth, checksums: dict[str, str]
+) -> dict[str, Any]:
     """The content of `scene.json`, ready for JSON. `checksums`: SHA-256 of the files beside it."""
     shape, light = recipe.shape, recipe.light
     return {
@@ -53,7 +54,12 @@ def describe(split: str, recipe: Recipe, scene: Scene, truth: GroundTruth, check
         "object": {"id": shape.name, "family": shape.family, "number": shape.number},
         "material": {"id": recipe.material.name, **_material(scene.material)},
         "albedo": {"family": recipe.albedo, "mean": _mean_color(truth.reflectance, truth.mask)},
-        "light": {"id": light.name, "family": light.family, "number": light.number, "sources": [_light(part) for part in scene.lights]},
+        "light": {
+            "id": light.name,
+            "family": light.family,
+            "number": light.number,
+            "sources": [_light(part) for part in scene.lights],
+        },
         "illumination": {
             "coefficients": truth.illumination.tolist(),
             "convention": ILLUMINATION,
@@ -84,7 +90,9 @@ def describe_picture(picture: Picture) -> dict[str, Any]:
 
 def specular_share(truth: GroundTruth) -> float:
     """The specular layer's part of all light inside the mask, [0, 1]."""
-    specular, diffuse = (float(layer[truth.mask].sum(dtype=np.float64)) for layer in (truth.specular, truth.diffuse))
+    specular, diffuse = (
+        float(layer[truth.mask].sum(dtype=np.float64)) for layer in (truth.specular, truth.diffuse)
+    )
     return specular / max(specular + diffuse, 1e-30)
 
 
@@ -113,7 +121,10 @@ def _render(recipe: Recipe) -> dict[str, Any]:
 
 
 def _camera(camera: Camera) -> dict[str, Any]:
-    """`view_width`: object units across the picture at the origin (Blender's orthographic scale). `focal_length`: pixels."""
+    """`view_width`: object units across the picture at the origin (Blender's orthographic scale).
+
+    `focal_length`: pixels.
+    """
     return {
         "kind": "perspective" if camera.perspective else "orthographic",
         "width": camera.width,
@@ -144,7 +155,11 @@ def _material(material: Material) -> dict[str, Any]:
 
 def _span(values: float | np.ndarray) -> dict[str, float]:
     """A texture in three numbers; a number is all of them."""
-    return {"least": float(np.min(values)), "median": float(np.median(values)), "most": float(np.max(values))}
+    return {
+        "least": float(np.min(values)),
+        "median": float(np.median(values)),
+        "most": float(np.max(values)),
+    }
 
 
 def _mean_color(layer: np.ndarray, mask: np.ndarray) -> list[float]:
@@ -152,11 +167,19 @@ def _mean_color(layer: np.ndarray, mask: np.ndarray) -> list[float]:
 
 
 def _light(light: Light) -> dict[str, Any]:
-    """Every number of a light; of an environment only its size, its pixels being in `environment.exr`."""
+    """Every number of a light; of an environment only its size, its pixels being in
+    `environment.exr`.
+    """
     kind = type(light).__name__.removesuffix("Light").lower()
     if isinstance(light, EnvironmentLight):
         return {"kind": kind, "rows": len(light.radiance)}
-    return {"kind": kind, **{field.name: np.asarray(getattr(light, field.name), float).tolist() for field in fields(light)}}
+    return {
+        "kind": kind,
+        **{
+            field.name: np.asarray(getattr(light, field.name), float).tolist()
+            for field in fields(light)
+        },
+    }
 
 
 def _sensor(sensor: Sensor) -> dict[str, Any]:

@@ -22,9 +22,11 @@ _Kind = TypeVar("_Kind", str, int, float)
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """What slices of a data set are made by. `name`: of the folder. `split`: of `SPLITS`. `object`, `material`, `light`: names of members
-    ("lathe03"). `albedo`, `model`, `light_kind`: families. `gloss_class`: "matt", "broad", "medium" or "sharp". `specular_share`: of all
-    light inside the mask, [0, 1]. `mask_pixels`: the object's. `seed`: of the scene. `folder`: where it lies."""
+    """What slices of a data set are made by. `name`: of the folder. `split`: of `SPLITS`. `object`,
+    `material`, `light`: names of members ("lathe03"). `albedo`, `model`, `light_kind`: families.
+    `gloss_class`: "matt", "broad", "medium" or "sharp". `specular_share`: of all light inside the
+    mask, [0, 1]. `mask_pixels`: the object's. `seed`: of the scene. `folder`: where it lies.
+    """
 
     name: str
     split: str
@@ -42,9 +44,11 @@ class SceneFacts:
 
 
 def list_scenes(root: Path | str, split: str | None = None) -> tuple[Path, ...]:
-    """The folders of a data set's finished scenes, of one split or of all in the order of `SPLITS`, by name.
+    """The folders of a data set's finished scenes, of one split or of all in the order of `SPLITS`,
+    by name.
 
-    Raises `InputError` where `root` is no data set of `isc synth`, for an unknown split, and where there is no scene.
+    Raises `InputError` where `root` is no data set of `isc synth`, for an unknown split, and where
+    there is no scene.
     """
     root = Path(root)
     if split is not None and split not in SPLITS:
@@ -52,14 +56,21 @@ def list_scenes(root: Path | str, split: str | None = None) -> tuple[Path, ...]:
     if not (root / MANIFEST).is_file():
         raise InputError(f"{root} is not a data set of isc synth (it has no {MANIFEST})")
     wanted = SPLITS if split is None else (split,)
-    found = tuple(path.parent for name in wanted for path in sorted((root / name).glob("[!.]*/scene.json")))
+    found = tuple(
+        path.parent for name in wanted for path in sorted((root / name).glob("[!.]*/scene.json"))
+    )
     if not found:
-        raise InputError(f"{root} holds no finished scene{f' of the split {split}' if split else ''}: run isc synth to its end")
+        raise InputError(
+            f"{root} holds no finished scene{f' of the split {split}' if split else ''}: run isc synth to its end"
+        )
     return found
 
 
 def read_facts(folder: Path | str) -> SceneFacts:
-    """What `scene.json` says about a scene. Raises `InputError` where it is absent, damaged, or not ours."""
+    """What `scene.json` says about a scene.
+
+    Raises `InputError` where it is absent, damaged, or not ours.
+    """
     place = Path(folder)
     content = read_description(place)
 
@@ -84,7 +95,10 @@ def read_facts(folder: Path | str) -> SceneFacts:
 
 
 def read_truth(folder: Path | str) -> GroundTruth:
-    """The truth as it was rendered. Raises `InputError` where a file is absent, is not the one that was written, or does not fit."""
+    """The truth as it was rendered.
+
+    Raises `InputError` where a file is absent, is not the one that was written, or does not fit.
+    """
     folder = Path(folder)
     content = read_description(folder)
     require_intact(folder, content)
@@ -93,7 +107,9 @@ def read_truth(folder: Path | str) -> GroundTruth:
     variance = _layers(folder / "variance.exr", dict.fromkeys(VARIANCES, "RGB"))
     environment = read_channels(folder / "environment.exr")
     if missing := [name for name in "RGB" if name not in environment]:
-        raise InputError(f"{folder / 'environment.exr'} lacks the channel {missing[0]}: it is damaged")
+        raise InputError(
+            f"{folder / 'environment.exr'} lacks the channel {missing[0]}: it is damaged"
+        )
     del maps["confidence"]
     return GroundTruth(
         **{**maps, "mask": maps["mask"] > 0.5},
@@ -107,7 +123,10 @@ def read_truth(folder: Path | str) -> GroundTruth:
 
 
 def read_description(folder: Path) -> dict[str, Any]:
-    """The content of `scene.json`. Raises `InputError` where it is absent, damaged, not ours, or of a newer version."""
+    """The content of `scene.json`.
+
+    Raises `InputError` where it is absent, damaged, not ours, or of a newer version.
+    """
     path = folder / "scene.json"
     if not path.is_file():
         raise InputError(f"{folder} is not a scene of isc synth (it has no scene.json)")
@@ -115,7 +134,9 @@ def read_description(folder: Path) -> dict[str, Any]:
     if content.get("kind") != KIND or not isinstance(content.get("schema_version"), int):
         raise InputError(f"{path} was not written by isc synth")
     if content["schema_version"] > SCHEMA_VERSION:
-        raise InputError(f"{path} was written by a newer version (schema {content['schema_version']}): update ISC")
+        raise InputError(
+            f"{path} was written by a newer version (schema {content['schema_version']}): update ISC"
+        )
     return content
 
 
@@ -128,13 +149,19 @@ def read_object(path: Path) -> dict[str, Any]:
 
 
 def require_intact(folder: Path, content: dict[str, Any]) -> None:
-    """Raises `InputError` unless every file beside `scene.json` is the one that was written with it."""
+    """Raises `InputError` unless every file beside `scene.json` is the one that was written with
+    it.
+    """
     for name in DATA_FILES:
         path = folder / name
         if not path.is_file():
-            raise InputError(f"{path} does not exist: the scene is not whole; make it again with isc synth")
+            raise InputError(
+                f"{path} does not exist: the scene is not whole; make it again with isc synth"
+            )
         if checksum(path) != _value(content, folder, str, "files", name):
-            raise InputError(f"{path} is not the file that isc synth wrote: it is damaged or was changed; make the scene again")
+            raise InputError(
+                f"{path} is not the file that isc synth wrote: it is damaged or was changed; make the scene again"
+            )
 
 
 def _value(content: dict[str, Any], folder: Path, kind: type[_Kind], *keys: str) -> _Kind:
@@ -142,7 +169,11 @@ def _value(content: dict[str, Any], folder: Path, kind: type[_Kind], *keys: str)
     for key in keys:
         value = value.get(key) if isinstance(value, dict) else None
     allowed = (int, float) if kind is float else kind
-    if not isinstance(value, allowed) or isinstance(value, bool) or (kind is float and numbers(value, ()) is None):
+    if (
+        not isinstance(value, allowed)
+        or isinstance(value, bool)
+        or (kind is float and numbers(value, ()) is None)
+    ):
         raise InputError(f"{folder / 'scene.json'} has no usable {'.'.join(keys)}: it is damaged")
     return kind(value)
 
@@ -153,7 +184,9 @@ def _layers(path: Path, layers: dict[str, str]) -> dict[str, np.ndarray]:
     for layer, letters in layers.items():
         names = [f"{layer}.{letter}" for letter in letters]
         if missing := [name for name in names if name not in channels]:
-            raise InputError(f"{path} lacks the channel {missing[0]}: it is not a file of isc synth, or is damaged")
+            raise InputError(
+                f"{path} lacks the channel {missing[0]}: it is not a file of isc synth, or is damaged"
+            )
         stack = np.stack([channels[name] for name in names], -1)
         stacks[layer] = stack if len(names) > 1 else stack[..., 0]
     return stacks
@@ -163,5 +196,7 @@ def _coefficients(content: dict[str, Any], folder: Path) -> np.ndarray:
     given = content.get("illumination")
     light = numbers(given.get("coefficients"), (9, 3)) if isinstance(given, dict) else None
     if light is None:
-        raise InputError(f"{folder / 'scene.json'} has no illumination of 9 x 3 numbers: it is damaged")
+        raise InputError(
+            f"{folder / 'scene.json'} has no illumination of 9 x 3 numbers: it is damaged"
+        )
     return light

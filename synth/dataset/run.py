@@ -1,7 +1,9 @@
-"""Making a data set: scene after scene, each whole or not at all, so that an interrupted run goes on where it stopped.
+"""Making a data set: scene after scene, each whole or not at all, so that an interrupted run goes
+on where it stopped.
 
-`manifest.json` is written before the first scene that lacks and says what the run is to become; a folder that holds another run is left
-alone. A scene that is there is kept if it is the one planned and none of its files has changed since.
+`manifest.json` is written before the first scene that lacks and says what the run is to become; a
+folder that holds another run is left alone. A scene that is there is kept if it is the one planned
+and none of its files has changed since.
 
 Limits: a kept scene may come from another version of the program; its `scene.json` says which.
 """
@@ -32,14 +34,17 @@ SCHEMA_VERSION = 1
 KIND = "isc synth data set"
 MOST_SCENES = 100_000  # seeds have five digits in folder names
 _LOOKING = 0.02  # of the whole, for what is there already
-_KERNELS_KEPT = 50  # scenes after which compiled kernels are let go; those needed again come from Dr.Jit's files
+# scenes after which compiled kernels are let go; those needed again come from Dr.Jit's files
+_KERNELS_KEPT = 50
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
 @dataclass(frozen=True)
 class Run:
-    """A data set: the scenes of the seeds `seed` ... `seed` + `count` - 1, drawn from `choices`, taken as `picture` says, with the files of
-    `sources`. Raises `InputError` for an impossible count or seed."""
+    """A data set: the scenes of the seeds `seed` ... `seed` + `count` - 1, drawn from `choices`,
+    taken as `picture` says, with the files of `sources`. Raises `InputError` for an impossible
+    count or seed.
+    """
 
     count: int
     seed: int = 0
@@ -71,14 +76,23 @@ class Outcome:
 
 
 def plan(run: Run) -> tuple[Planned, ...]:
-    """All scenes of a run, in the order of their seeds. Raises `InputError` for splits and sources that cannot be had."""
+    """All scenes of a run, in the order of their seeds.
+
+    Raises `InputError` for splits and sources that cannot be had.
+    """
     pools = make_pools(run.choices, run.sources)
     seeds = range(run.seed, run.seed + run.count)
-    return tuple(Planned(pools.split_of(seed), pools.recipe(seed, run.picture, run.sources)) for seed in seeds)
+    return tuple(
+        Planned(pools.split_of(seed), pools.recipe(seed, run.picture, run.sources))
+        for seed in seeds
+    )
 
 
 def make_dataset(run: Run, out: Path, monitor: Monitor | None = None) -> Outcome:
-    """Makes the scenes of `run` that `out` lacks. Raises `InputError` where `out` holds anything else, and `Cancelled`."""
+    """Makes the scenes of `run` that `out` lacks.
+
+    Raises `InputError` where `out` holds anything else, and `Cancelled`.
+    """
     monitor = monitor or Monitor()
     load_mitsuba()
     planned = plan(run)
@@ -102,15 +116,21 @@ def _make(missing: list[Planned], total: int, out: Path, monitor: Monitor) -> No
         text = f"scene {total - len(missing) + index + 1} of {total}{_time_left(time.monotonic() - begin, index, len(missing))}"
         within = monitor.part(index / len(missing), (index + 1) / len(missing))
         within.report(text, 0.0)
-        scene_itself, truth = photograph(scene.recipe, Monitor(_constant(text, within), within.cancelled))
+        scene_itself, truth = photograph(
+            scene.recipe, Monitor(_constant(text, within), within.cancelled)
+        )
         within.report(text, 0.9)
-        write_scene(out / scene.split / scene.recipe.name, scene.split, scene.recipe, scene_itself, truth)
+        write_scene(
+            out / scene.split / scene.recipe.name, scene.split, scene.recipe, scene_itself, truth
+        )
         del scene_itself, truth
         _tidy(index)
 
 
 def _tidy(index: int) -> None:
-    """Keeps the memory of a long run flat: renderers hold buffers in reference cycles, and Dr.Jit keeps every kernel that it compiled."""
+    """Keeps the memory of a long run flat: renderers hold buffers in reference cycles, and Dr.Jit
+    keeps every kernel that it compiled.
+    """
     gc.collect()
     if index % _KERNELS_KEPT == _KERNELS_KEPT - 1 and has_llvm():
         drjit = load_drjit()
@@ -138,11 +158,15 @@ def is_finished(folder: Path, scene: Planned) -> bool:
         require_intact(folder, content)
     except InputError:
         return False
-    return content.get("split") == scene.split and content.get("picture") == describe_picture(scene.recipe.picture)
+    return content.get("split") == scene.split and content.get("picture") == describe_picture(
+        scene.recipe.picture
+    )
 
 
 def describe_run(run: Run) -> dict[str, Any]:
-    """What decides the scenes of a run, whatever their number: two runs are the same where this is equal."""
+    """What decides the scenes of a run, whatever their number: two runs are the same where this is
+    equal.
+    """
     choices, sources = run.choices, run.sources
     return {
         "seed": run.seed,
@@ -155,33 +179,47 @@ def describe_run(run: Run) -> dict[str, Any]:
         "mesh": _described(sources.mesh),
         "height": _described(sources.height),
         "albedo_image": _described(sources.albedo_image),
-        "natural_lights": _described(sources.natural_lights and sources.natural_lights / "natural_lights.mat"),
+        "natural_lights": _described(
+            sources.natural_lights and sources.natural_lights / "natural_lights.mat"
+        ),
         "hdr": [_described(path) for path in sources.hdr],
     }
 
 
 def require_this_run(out: Path, settings: dict[str, Any], count: int) -> None:
-    """Raises `InputError` unless `out` is new, empty, or holds this run, begun or finished, with no more scenes than `count`."""
+    """Raises `InputError` unless `out` is new, empty, or holds this run, begun or finished, with no
+    more scenes than `count`.
+    """
     if out.exists() and not out.is_dir():
         raise InputError(f"{out} is a file: name a folder")
     path = out / MANIFEST
     if not path.is_file():
         if out.is_dir() and any(entry.name not in _LITTER for entry in out.iterdir()):
-            raise InputError(f"{out} is not empty and not a data set of isc synth: choose another folder")
+            raise InputError(
+                f"{out} is not empty and not a data set of isc synth: choose another folder"
+            )
         require_writable_file(path)
         return
     require_writable_file(path)
     found = read_object(path)
     theirs = found.get("settings")
-    if found.get("kind") != KIND or not isinstance(theirs, dict) or not isinstance(found.get("count"), int):
-        raise InputError(f"{path} is not the manifest of a data set of isc synth: choose another folder")
+    if (
+        found.get("kind") != KIND
+        or not isinstance(theirs, dict)
+        or not isinstance(found.get("count"), int)
+    ):
+        raise InputError(
+            f"{path} is not the manifest of a data set of isc synth: choose another folder"
+        )
     if different := [name for name in settings if theirs.get(name) != settings[name]]:
         name = different[0]
         raise InputError(
             f"{out} holds another run ({name} {_short(theirs.get(name))}, not {_short(settings[name])}): choose another folder"
         )
     if found["count"] > count:
-        raise InputError(f"{out} holds a run of {found['count']} scenes: ask for at least as many, or choose another folder")
+        raise InputError(
+            f"{out} holds a run of {found['count']} scenes: ask for at least as many, or choose another folder"
+        )
 
 
 def _short(value: Any) -> str:
@@ -199,7 +237,9 @@ def _described(path: Path | None) -> dict[str, str] | None:
         raise InputError(f"cannot read {path}: {error.strerror}") from error
 
 
-def _write_root(out: Path, run: Run, settings: dict[str, Any], planned: tuple[Planned, ...], *, complete: bool) -> None:
+def _write_root(
+    out: Path, run: Run, settings: dict[str, Any], planned: tuple[Planned, ...], *, complete: bool
+) -> None:
     """`manifest.json` and `README.md`; what says so already is left alone."""
     counted = Counter(scene.split for scene in planned)
     splits = {name: counted[name] for name in SPLITS if counted[name]}
@@ -212,7 +252,10 @@ def _write_root(out: Path, run: Run, settings: dict[str, Any], planned: tuple[Pl
         "splits": splits,
         "scenes": [_listed(scene) for scene in planned],
     }
-    texts = {MANIFEST: json.dumps(manifest, indent=1) + "\n", "README.md": card(settings, run.count, splits)}
+    texts = {
+        MANIFEST: json.dumps(manifest, indent=1) + "\n",
+        "README.md": card(settings, run.count, splits),
+    }
     for name, text in texts.items():
         content = text.encode()
         if not (out / name).is_file() or (out / name).read_bytes() != content:

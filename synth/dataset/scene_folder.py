@@ -1,9 +1,11 @@
 """The files of one rendered scene.
 
-`maps.exr` has the channels of a result folder of `isc decompose`, so that truth and result compare name by name. `material.exr`:
-`strength.Y` and `gloss.Y` of the material. `variance.exr`: of the Monte Carlo estimates of diffuse, specular and shading.
-`environment.exr`: all lights as seen from the origin. `photo.png`: what a camera would store, the mask as alpha. `preview.png`: what a
-person looks at first. `scene.json`: everything else, with the checksums of the files beside it (see `description`).
+`maps.exr` has the channels of a result folder of `isc decompose`, so that truth and result compare
+name by name. `material.exr`: `strength.Y` and `gloss.Y` of the material. `variance.exr`: of the
+Monte Carlo estimates of diffuse, specular and shading. `environment.exr`: all lights as seen from
+the origin. `photo.png`: what a camera would store, the mask as alpha. `preview.png`: what a person
+looks at first. `scene.json`: everything else, with the checksums of the files beside it (see
+`description`).
 """
 
 import hashlib
@@ -25,28 +27,45 @@ from ..sensor import write_photo
 from ..truth import GroundTruth
 from .description import describe
 
-DATA_FILES = ("maps.exr", "material.exr", "variance.exr", "environment.exr", "photo.png", "preview.png")
+DATA_FILES = (
+    "maps.exr",
+    "material.exr",
+    "variance.exr",
+    "environment.exr",
+    "photo.png",
+    "preview.png",
+)
 FILES = ("scene.json", *DATA_FILES)
 VARIANCES = ("diffuse", "specular", "shading")
 _PREVIEW = 0.5  # of the sheet's size
 
 
 def write_scene(folder: Path, split: str, recipe: Recipe, scene: Scene, truth: GroundTruth) -> None:
-    """Writes the folder, whole or not at all. Raises `InputError` where it holds something else or cannot be written."""
+    """Writes the folder, whole or not at all.
+
+    Raises `InputError` where it holds something else or cannot be written.
+    """
     with new_folder(folder, FILES) as partial:
         write_channels(partial / "maps.exr", map_channels(truth))
-        write_channels(partial / "material.exr", {"strength.Y": truth.strength, "gloss.Y": truth.gloss})
+        write_channels(
+            partial / "material.exr", {"strength.Y": truth.strength, "gloss.Y": truth.gloss}
+        )
         write_channels(partial / "variance.exr", _variance_channels(truth))
         write_channels(partial / "environment.exr", planes(truth.environment, "RGB"))
         write_photo(partial / "photo.png", truth, recipe.picture.sensor.bits or 16)
         _preview(recipe, truth).save(partial / "preview.png")
         checksums = {name: checksum(partial / name) for name in DATA_FILES}
-        text = json.dumps(describe(split, recipe, scene, truth, checksums), indent=2, allow_nan=False)
+        text = json.dumps(
+            describe(split, recipe, scene, truth, checksums), indent=2, allow_nan=False
+        )
         (partial / "scene.json").write_text(text + "\n", encoding="utf-8")
 
 
 def map_channels(truth: GroundTruth) -> dict[str, np.ndarray]:
-    """The channels of `maps.exr`. Truth is to be trusted wherever there is any: confidence is the mask."""
+    """The channels of `maps.exr`.
+
+    Truth is to be trusted wherever there is any: confidence is the mask.
+    """
     mask = truth.mask.astype(np.float32)
     channels: dict[str, np.ndarray] = {}
     for name, letters in LAYERS.items():
@@ -73,12 +92,31 @@ def _variance_channels(truth: GroundTruth) -> dict[str, np.ndarray]:
         "specular": truth.specular_variance,
         "shading": truth.shading_variance,
     }
-    return {name: values for layer in VARIANCES for name, values in planes(variance[layer], "RGB", f"{layer}.").items()}
+    return {
+        name: values
+        for layer in VARIANCES
+        for name, values in planes(variance[layer], "RGB", f"{layer}.").items()
+    }
 
 
 def _preview(recipe: Recipe, truth: GroundTruth) -> Image.Image:
-    words = {"model": recipe.model, "separator": f"{recipe.albedo} albedo", "illumination": f"{recipe.light.family} light"}
-    layers = {name: getattr(truth, name) for name in (*COLOR_MAPS, "normal", "height", "mask", "illumination")}
+    words = {
+        "model": recipe.model,
+        "separator": f"{recipe.albedo} albedo",
+        "illumination": f"{recipe.light.family} light",
+    }
+    layers = {
+        name: getattr(truth, name)
+        for name in (*COLOR_MAPS, "normal", "height", "mask", "illumination")
+    }
     confidence = truth.mask.astype(np.float32)
-    sheet = contact_sheet(Decomposition(**layers, confidence=confidence, provenance=Provenance(words, input={"name": recipe.name})))
-    return sheet.resize((round(_PREVIEW * sheet.width), round(_PREVIEW * sheet.height)), Image.Resampling.LANCZOS)
+    sheet = contact_sheet(
+        Decomposition(
+            **layers,
+            confidence=confidence,
+            provenance=Provenance(words, input={"name": recipe.name}),
+        )
+    )
+    return sheet.resize(
+        (round(_PREVIEW * sheet.width), round(_PREVIEW * sheet.height)), Image.Resampling.LANCZOS
+    )

@@ -1,14 +1,18 @@
-"""Which objects, materials and lights there are, which of them are held out, and which of them meet in the scene of a seed.
+"""Which objects, materials and lights there are, which of them are held out, and which of them meet
+in the scene of a seed.
 
-Equation: of each family every fifth member (number mod 5 = 4) is held out; of materials every fifth round through the albedos, number =
-round * albedos + albedo. A scene of "train" takes members that are seen only; of "test_objects", "test_materials", "test_lights" one that
-is held out in that aspect alone; of "test" three held-out ones. The split follows from the scene's seed, so that a longer run begins
-with the shorter one; the rule knows no run, so that what one run holds out no other run has trained on.
+Equation: of each family every fifth member (number mod 5 = 4) is held out; of materials every fifth
+round through the albedos, number = round * albedos + albedo. A scene of "train" takes members that
+are seen only; of "test_objects", "test_materials", "test_lights" one that is held out in that
+aspect alone; of "test" three held-out ones. The split follows from the scene's seed, so that a
+longer run begins with the shorter one; the rule knows no run, so that what one run holds out no
+other run has trained on.
 
-Citation: S. Kaufman et al., "Leakage in data mining: formulation, detection, and avoidance", ACM Transactions on Knowledge Discovery from
-Data 6(4) (2012), doi:10.1145/2382577.2382579.
+Citation: S. Kaufman et al., "Leakage in data mining: formulation, detection, and avoidance", ACM
+Transactions on Knowledge Discovery from Data 6(4) (2012), doi:10.1145/2382577.2382579.
 
-Limits: a user's own mesh, height map or image is one member and is never held out; HDR files are, from the fifth on.
+Limits: a user's own mesh, height map or image is one member and is never held out; HDR files are,
+from the fifth on.
 """
 
 from dataclasses import dataclass
@@ -25,8 +29,25 @@ from ..recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, Part, Picture, Recipe, 
 from ..shapes import SHAPES
 
 # A scene's split is the entry at its seed modulo ten.
-_PATTERN = ("train", "train", "train", "test_objects", "train", "test_materials", "train", "test_lights", "train", "test")
-_HELD_OUT = {"train": "", "test_objects": "shape", "test_materials": "material", "test_lights": "light", "test": "shape material light"}
+_PATTERN = (
+    "train",
+    "train",
+    "train",
+    "test_objects",
+    "train",
+    "test_materials",
+    "train",
+    "test_lights",
+    "train",
+    "test",
+)
+_HELD_OUT = {
+    "train": "",
+    "test_objects": "shape",
+    "test_materials": "material",
+    "test_lights": "light",
+    "test": "shape material light",
+}
 SPLITS = tuple(_HELD_OUT)
 _EVERY = 5
 _MEMBERS = 20  # of a family of objects or lights
@@ -36,9 +57,11 @@ _GLOSSY_WEIGHT = 3  # of a glossy model beside a matt one
 
 @dataclass(frozen=True)
 class Choices:
-    """The families that scenes are drawn from, by name: `shapes`, `materials` (models), `albedos`, `lights`; and the `splits` wanted, an
-    empty one meaning all that can be. "mesh", "height" and "image" are the user's files ("mesh" among
-    the albedos: its own colours). Raises `InputError` for unknown names."""
+    """The families that scenes are drawn from, by name: `shapes`, `materials` (models), `albedos`,
+    `lights`; and the `splits` wanted, an empty one meaning all that can be. "mesh", "height" and
+    "image" are the user's files ("mesh" among the albedos: its own colours). Raises `InputError`
+    for unknown names.
+    """
 
     shapes: tuple[str, ...] = SHAPES
     materials: tuple[str, ...] = MODELS
@@ -73,7 +96,10 @@ class _Member:
 
 @dataclass(frozen=True)
 class Pools:
-    """All members that a run draws from. `pattern`: the splits that its scenes go through, by seed."""
+    """All members that a run draws from.
+
+    `pattern`: the splits that its scenes go through, by seed.
+    """
 
     shape: tuple[_Member, ...]
     material: tuple[_Member, ...]
@@ -88,23 +114,55 @@ class Pools:
         """The scene of a seed."""
         rng = np.random.default_rng(np.random.SeedSequence(seed))
         held = _HELD_OUT[self.split_of(seed)].split()
-        shape, material, light = (_drawn(getattr(self, kind), kind in held, rng) for kind in ("shape", "material", "light"))
-        return Recipe(seed, shape.part, material.part, material.model, material.albedo, light.part, picture, sources)
+        shape, material, light = (
+            _drawn(getattr(self, kind), kind in held, rng)
+            for kind in ("shape", "material", "light")
+        )
+        return Recipe(
+            seed,
+            shape.part,
+            material.part,
+            material.model,
+            material.albedo,
+            light.part,
+            picture,
+            sources,
+        )
 
 
 def make_pools(choices: Choices, sources: Sources) -> Pools:
-    """The members of all families chosen. Raises `InputError` where a split that was asked for has nothing held out."""
-    shapes = tuple(_Member(part, held) for name in choices.shapes for part, held in _members(name, _shapes_of(name, sources)))
-    lights = tuple(_Member(part, held) for name in choices.lights for part, held in _members(name, _lights_of(name, sources)))
-    for name, path, option in ((IMAGE_FILE, sources.albedo_image, "--albedo-image"), (MESH_FILE, sources.mesh, "--mesh")):
+    """The members of all families chosen.
+
+    Raises `InputError` where a split that was asked for has nothing held out.
+    """
+    shapes = tuple(
+        _Member(part, held)
+        for name in choices.shapes
+        for part, held in _members(name, _shapes_of(name, sources))
+    )
+    lights = tuple(
+        _Member(part, held)
+        for name in choices.lights
+        for part, held in _members(name, _lights_of(name, sources))
+    )
+    for name, path, option in (
+        (IMAGE_FILE, sources.albedo_image, "--albedo-image"),
+        (MESH_FILE, sources.mesh, "--mesh"),
+    ):
         if name in choices.albedos and path is None:
             raise InputError(f"the albedo {name!r} is read from a file: give {option} FILE")
-    materials = tuple(member for model in choices.materials for member in _materials(model, choices.albedos))
+    materials = tuple(
+        member for model in choices.materials for member in _materials(model, choices.albedos)
+    )
     pools = {"shape": shapes, "material": materials, "light": lights}
-    lacking = {kind for kind, members in pools.items() if not any(member.held_out for member in members)}
+    lacking = {
+        kind for kind, members in pools.items() if not any(member.held_out for member in members)
+    }
     possible = [name for name in SPLITS if not lacking & set(_HELD_OUT[name].split())]
     if impossible := [name for name in choices.splits if name not in possible]:
-        raise InputError(f"the split {impossible[0]} cannot be made: nothing is held out of what was chosen; name more, or leave it out")
+        raise InputError(
+            f"the split {impossible[0]} cannot be made: nothing is held out of what was chosen; name more, or leave it out"
+        )
     wanted = choices.splits or tuple(possible)
     return Pools(shapes, materials, lights, tuple(name for name in _PATTERN if name in wanted))
 
@@ -138,7 +196,14 @@ def _materials(model: str, albedos: tuple[str, ...]) -> list[_Member]:
         own = albedo in (IMAGE_FILE, MESH_FILE)
         for turn in range(_ROUNDS):
             number = turn if own else turn * len(ALBEDOS) + ALBEDOS.index(albedo)
-            found.append(_Member(Part(f"{model}_{albedo}" if own else model, number), turn % _EVERY == _EVERY - 1, model, albedo))
+            found.append(
+                _Member(
+                    Part(f"{model}_{albedo}" if own else model, number),
+                    turn % _EVERY == _EVERY - 1,
+                    model,
+                    albedo,
+                )
+            )
     return found
 
 

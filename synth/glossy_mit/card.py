@@ -1,4 +1,6 @@
-"""The cards of a glossy set: what somebody needs who finds the folder without the program that made it."""
+"""The cards of a glossy set: what somebody needs who finds the folder without the program that made
+it.
+"""
 
 import shlex
 
@@ -69,24 +71,47 @@ def card(name: str, level: float, light: str, settings: GlossySettings) -> str:
         name=name,
         last=name.rpartition("/")[2],
         command=command(settings),
-        light=f"the object's own {own} light of the set" + (", and one white panel (softbox), in both layers" if extra else ""),
+        light=f"the object's own {own} light of the set"
+        + (", and one white panel (softbox), in both layers" if extra else ""),
         level=level,
-        coefficients="the set's own light, with the gain" if exact else "the light that fits best (`light_fit_residual`)",
+        coefficients="the set's own light, with the gain"
+        if exact
+        else "the light that fits best (`light_fit_residual`)",
         shading=shading,
         exponent=settings.exponent,
         panel=" and the panel" if extra else "",
         shadows="Shadows are cast by the heights; light between parts of the object is left out. The gloss has the grain of its samples "
-        "(`gloss_noise`)." if physical else "Shadows and light between parts of the object are left out of both layers.",
-    )  # fmt: skip
+        "(`gloss_noise`)."
+        if physical
+        else "Shadows and light between parts of the object are left out of both layers.",
+    )
 
 
 def index(settings: GlossySettings, roots: tuple[str, ...]) -> str:
     """The README of the whole output."""
-    return _INDEX.format(command=command(settings), roots="\n".join(f"- `{name}`" for name in roots))
+    return _INDEX.format(
+        command=command(settings), roots="\n".join(f"- `{name}`" for name in roots)
+    )
 
 
 def command(settings: GlossySettings) -> str:
     """What makes the same files again; folders stand there by name only."""
-    words = ["isc", "synth", "glossy-mit", "ROOT", "-o", "DIR", "--levels", ",".join(f"{level:g}" for level in settings.levels)]
-    words += ["--samples", str(settings.samples), "--seed", str(settings.seed), "--exponent", f"{settings.exponent:g}"]
+    words = [
+        "isc",
+        "synth",
+        "glossy-mit",
+        "ROOT",
+        "-o",
+        "DIR",
+        "--levels",
+        ",".join(f"{level:g}" for level in settings.levels),
+    ]
+    words += [
+        "--samples",
+        str(settings.samples),
+        "--seed",
+        str(settings.seed),
+        "--exponent",
+        f"{settings.exponent:g}",
+    ]
     return shlex.join(words + (["--physical"] if settings.physical else []))

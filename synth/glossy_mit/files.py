@@ -1,13 +1,17 @@
 """The files of one object under one light at one level, laid out as the set lays them out.
 
-`laboratory/OBJECT` holds what is read of a photographed object, `natural/OBJECT` the same images as the natural folder has them, so
-that both readers find them. 16-bit files hold linear values of 1/65535; original = diffuse + specular exactly, in codes.
+`laboratory/OBJECT` holds what is read of a photographed object, `natural/OBJECT` the same images as
+the natural folder has them, so that both readers find them. 16-bit files hold linear values of
+1/65535; original = diffuse + specular exactly, in codes.
 
-Equation: one gain for all levels of an object under a light, so that they differ in the specular layer only: the brightest value of the
-highest level, and of the shading, comes just below 1. Only where this would leave the diffuse layer in the dark (99 % of it below 0.02)
-it is lifted to there, and highlights clip, in the original and the specular codes. The gain goes into the light's constant coefficient.
+Equation: one gain for all levels of an object under a light, so that they differ in the specular
+layer only: the brightest value of the highest level, and of the shading, comes just below 1. Only
+where this would leave the diffuse layer in the dark (99 % of it below 0.02) it is lifted to there,
+and highlights clip, in the original and the specular codes. The gain goes into the light's constant
+coefficient.
 
-Limits: a diffuse value below one code becomes one code, because the set's readers take 0 for "no object here".
+Limits: a diffuse value below one code becomes one code, because the set's readers take 0 for "no
+object here".
 """
 
 import io
@@ -35,16 +39,36 @@ _WHITE = 65535
 _BRIGHTEST = 0.9999
 _DARKEST = 0.02  # what 99 % of the diffuse layer stays below, at least
 LABORATORY_FILES = (
-    RECORD, "original.png", "diffuse.png", "specular.png", "specular.exr", "reflectance.png", "shading.png", "mask.png",
-    "depth_valid.png", "shading_corrected_color.mat", "Z.mat", "L.mat", "crop_idx.mat",
-)  # fmt: skip
-NATURAL_FILES = ("L.mat", "original.png", "diffuse.png", "shading_color.png", "reflectance.png", "mask.png")
+    RECORD,
+    "original.png",
+    "diffuse.png",
+    "specular.png",
+    "specular.exr",
+    "reflectance.png",
+    "shading.png",
+    "mask.png",
+    "depth_valid.png",
+    "shading_corrected_color.mat",
+    "Z.mat",
+    "L.mat",
+    "crop_idx.mat",
+)
+NATURAL_FILES = (
+    "L.mat",
+    "original.png",
+    "diffuse.png",
+    "shading_color.png",
+    "reflectance.png",
+    "mask.png",
+)
 
 
 @dataclass(frozen=True)
 class Exposed:
-    """An object under one light, scaled for its files. `shading`, `diffuse`, `gloss`: (N, 3), the gloss at strength 1; `gain`: by which
-    they were multiplied; `light`: (9, 3) coefficients of our convention that belong to this `shading`."""
+    """An object under one light, scaled for its files. `shading`, `diffuse`, `gloss`: (N, 3), the
+    gloss at strength 1; `gain`: by which they were multiplied; `light`: (9, 3) coefficients of our
+    convention that belong to this `shading`.
+    """
 
     source: Source
     layers: Layers
@@ -82,7 +106,9 @@ class Exposed:
 
     @cached_property
     def shared_files(self) -> dict[str, bytes]:
-        """What does not depend on the level: the files' contents by name, those of the natural folder as `natural/NAME`."""
+        """What does not depend on the level: the files' contents by name, those of the natural
+        folder as `natural/NAME`.
+        """
         whole, light = self.source.whole, light_to_reference(self.light)
         mask = np.full(len(self.diffuse), _WHITE, np.uint16)
         files = {
@@ -91,13 +117,18 @@ class Exposed:
             "shading.png": _png(whole(_codes(self.shading.mean(-1)))),
             "mask.png": _png(whole(mask)),
             "depth_valid.png": _png(whole(mask.astype(np.uint8))),
-            "shading_corrected_color.mat": _matlab({"shading_correct": whole(self.shading.astype(np.float32))}),
+            "shading_corrected_color.mat": _matlab(
+                {"shading_correct": whole(self.shading.astype(np.float32))}
+            ),
             "Z.mat": _matlab({"depth": whole(self.source.height[self.source.mask], np.nan)}),
             "L.mat": _matlab({"color_lights": {"diffuse": light, "shading": light}}),
             "crop_idx.mat": self.source.crop_file,
         }
         natural = {name: files[name] for name in NATURAL_FILES if name in files}
-        natural |= {"L.mat": _matlab({"L": light}), "shading_color.png": _png(whole(_codes(self.shading)))}
+        natural |= {
+            "L.mat": _matlab({"L": light}),
+            "shading_color.png": _png(whole(_codes(self.shading))),
+        }
         return files | {f"natural/{name}": content for name, content in natural.items()}
 
 
@@ -107,22 +138,35 @@ def exposed(source: Source, layers: Layers, highest_level: float) -> Exposed:
     image = diffuse + strength_for(highest_level, diffuse, layers.gloss) * layers.gloss
     usual = float(np.quantile(diffuse.max(-1), 0.99))
     unclipped, lifted = _BRIGHTEST / float(image.max()), _DARKEST / max(usual, 1e-12)
-    return Exposed(source, layers, min(max(unclipped, lifted), _BRIGHTEST / float(layers.shading.max())))
+    return Exposed(
+        source, layers, min(max(unclipped, lifted), _BRIGHTEST / float(layers.shading.max()))
+    )
 
 
 def strength_for(level: float, diffuse: np.ndarray, gloss: np.ndarray) -> float:
-    """What the gloss is multiplied by to hold `level` per cent of the sum of both layers; 0 where there is no gloss at all."""
+    """What the gloss is multiplied by to hold `level` per cent of the sum of both layers; 0 where
+    there is no gloss at all.
+    """
     mirrored = float(gloss.sum(dtype=float))
-    return level / (100 - level) * float(diffuse.sum(dtype=float)) / mirrored if mirrored > 0 else 0.0
+    return (
+        level / (100 - level) * float(diffuse.sum(dtype=float)) / mirrored if mirrored > 0 else 0.0
+    )
 
 
 def write_object(root: Path, picture: Exposed, level: float) -> None:
-    """Writes natural/OBJECT and then laboratory/OBJECT, each whole or not at all. Raises `InputError` where that is impossible."""
+    """Writes natural/OBJECT and then laboratory/OBJECT, each whole or not at all.
+
+    Raises `InputError` where that is impossible.
+    """
     name, shared = picture.source.name, picture.shared_files
     specular = picture.specular(level)
     codes = picture.specular_codes(level)
     original = {"original.png": _png(picture.source.whole(picture.diffuse_codes + codes))}
-    natural = {file.removeprefix("natural/"): content for file, content in shared.items() if file.startswith("natural/")} | original
+    natural = {
+        file.removeprefix("natural/"): content
+        for file, content in shared.items()
+        if file.startswith("natural/")
+    } | original
     with new_folder(root / "natural" / name, NATURAL_FILES) as folder:
         for file in NATURAL_FILES:
             (folder / file).write_bytes(natural[file])
@@ -132,24 +176,41 @@ def write_object(root: Path, picture: Exposed, level: float) -> None:
             if file in shared | original:
                 (folder / file).write_bytes((shared | original)[file])
         (folder / "specular.png").write_bytes(_png(picture.source.whole(codes)))
-        write_channels(folder / "specular.exr", {channel: frame[..., k] for k, channel in enumerate("RGB")})
-        record = describe(picture, level, codes) | {"files": {file: checksum(folder / file) for file in LABORATORY_FILES[1:]}}
+        write_channels(
+            folder / "specular.exr", {channel: frame[..., k] for k, channel in enumerate("RGB")}
+        )
+        record = describe(picture, level, codes) | {
+            "files": {file: checksum(folder / file) for file in LABORATORY_FILES[1:]}
+        }
         (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
 def is_written(root: Path, name: str) -> bool:
-    """Whether all files of an object are there; folders appear whole, so that they are what they were."""
-    natural, laboratory = ((root / light / name, files) for light, files in (("natural", NATURAL_FILES), ("laboratory", LABORATORY_FILES)))
-    return all((folder / file).is_file() for folder, files in (natural, laboratory) for file in files)
+    """Whether all files of an object are there; folders appear whole, so that they are what they
+    were.
+    """
+    natural, laboratory = (
+        (root / light / name, files)
+        for light, files in (("natural", NATURAL_FILES), ("laboratory", LABORATORY_FILES))
+    )
+    return all(
+        (folder / file).is_file() for folder, files in (natural, laboratory) for file in files
+    )
 
 
 def describe(picture: Exposed, level: float, codes: np.ndarray) -> dict[str, Any]:
     """What `object.json` says, but for the checksums. `codes`: (N, 3) of the specular layer."""
     specular, layers = picture.specular(level), picture.layers
     both = float(specular.sum(dtype=float) + picture.diffuse.sum(dtype=float))
-    in_codes = float(codes.sum(dtype=float) / (codes.sum(dtype=float) + picture.diffuse_codes.sum(dtype=float)))
+    in_codes = float(
+        codes.sum(dtype=float) / (codes.sum(dtype=float) + picture.diffuse_codes.sum(dtype=float))
+    )
     clipped = (picture.diffuse + specular > 1).any(-1)
-    panel = None if layers.panel is None else {key: np.asarray(value).tolist() for key, value in asdict(layers.panel).items()}
+    panel = (
+        None
+        if layers.panel is None
+        else {key: np.asarray(value).tolist() for key, value in asdict(layers.panel).items()}
+    )
     return {
         "object": picture.source.name,
         "pixels": len(specular),
@@ -171,7 +232,9 @@ def _codes(values: np.ndarray) -> np.ndarray:
 
 def _png(pixels: np.ndarray) -> bytes:
     """A PNG of (h, w) or (h, w, 3) codes."""
-    done, content = cv2.imencode(".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels, [cv2.IMWRITE_PNG_COMPRESSION, 3])
+    done, content = cv2.imencode(
+        ".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels, [cv2.IMWRITE_PNG_COMPRESSION, 3]
+    )
     if not done:
         raise OSError("the PNG encoder gave nothing")
     return content.tobytes()

@@ -1,14 +1,19 @@
-"""What a gloss without shadows mirrors: of an environment, and of a panel, at points that an orthographic camera along -z sees.
+"""What a gloss without shadows mirrors: of an environment, and of a panel, at points that an
+orthographic camera along -z sees.
 
-Problem: a render by random samples leaves grain of some per cent in the gloss, and methods that remove highlights read grain as texture.
-Without shadows there is nothing to trace: the integral over the light can be summed up, pixel by pixel of the environment.
+Problem: a render by random samples leaves grain of some per cent in the gloss, and methods that
+remove highlights read grain as texture. Without shadows there is nothing to trace: the integral
+over the light can be summed up, pixel by pixel of the environment.
 
-Equation: radiance(n) = sum_j (p + 8) / (8 pi) (n . h_j)^p max(0, n . w_j) E_j, h_j midway between w_j and the viewer, E_j the irradiance
-of a piece of the light across its beam. Normals are visited in small groups; a group leaves out what (n . h)^p makes less than 1e-7.
+Equation: radiance(n) = sum_j (p + 8) / (8 pi) (n . h_j)^p max(0, n . w_j) E_j, h_j midway between
+w_j and the viewer, E_j the irradiance of a piece of the light across its beam. Normals are visited
+in small groups; a group leaves out what (n . h)^p makes less than 1e-7.
 
-Citation: J. F. Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH 1977, doi:10.1145/563858.563893.
+Citation: J. F. Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH
+1977, doi:10.1145/563858.563893.
 
-Limits: pieces are six to a lobe's width, which leaves about 1e-3 of the brightest value; `synth.rendering` estimates the same integral.
+Limits: pieces are six to a lobe's width, which leaves about 1e-3 of the brightest value;
+`synth.rendering` estimates the same integral.
 """
 
 import numpy as np
@@ -47,8 +52,12 @@ def environment_gloss(radiance: np.ndarray, normal: np.ndarray, exponent: float)
     return gloss * _factor(exponent)
 
 
-def panel_layers(panel: PanelLight, position: np.ndarray, normal: np.ndarray, exponent: float) -> tuple[np.ndarray, np.ndarray]:
-    """Shading and gloss of strength 1, (N, 3) each, of points (N, 3) with unit normals (N, 3) before a panel."""
+def panel_layers(
+    panel: PanelLight, position: np.ndarray, normal: np.ndarray, exponent: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Shading and gloss of strength 1, (N, 3) each, of points (N, 3) with unit normals (N, 3)
+    before a panel.
+    """
     count = max(8, int(np.ceil(1.2 * np.sqrt(exponent))))
     steps = (np.arange(count) + 0.5) * 2 / count - 1
     shading, gloss = np.zeros((2, len(position)))
@@ -57,9 +66,15 @@ def panel_layers(panel: PanelLight, position: np.ndarray, normal: np.ndarray, ex
             toward = panel.centre + across * panel.right + along * panel.up - position
             square = np.einsum("ni,ni->n", toward, toward)
             toward /= np.sqrt(square)[:, None]
-            received = np.einsum("ni,ni->n", toward, normal).clip(0) * (-(toward @ panel.normal)).clip(0) / square
+            received = (
+                np.einsum("ni,ni->n", toward, normal).clip(0)
+                * (-(toward @ panel.normal)).clip(0)
+                / square
+            )
             half = toward + _VIEW
-            cosine = np.einsum("ni,ni->n", half, normal) / np.sqrt(np.einsum("ni,ni->n", half, half))
+            cosine = np.einsum("ni,ni->n", half, normal) / np.sqrt(
+                np.einsum("ni,ni->n", half, half)
+            )
             shading += received
             gloss += received * _lobe(cosine, exponent)
     piece = panel.radiance * (panel.area / count**2)

@@ -1,10 +1,13 @@
-"""The two layers of an object under each light: shading exactly as the set has it, and the gloss beside it.
+"""The two layers of an object under each light: shading exactly as the set has it, and the gloss
+beside it.
 
-Equation: shading = exp(SH(normal)) [+ P], gloss = G(environment) [+ G(panel)], where `isc_core.environment` fits the environment to
-exp(SH), P is the panel's irradiance over pi, and G the normalised Blinn-Phong lobe of strength 1 (see `gloss`). In the physical variant
+Equation: shading = exp(SH(normal)) [+ P], gloss = G(environment) [+ G(panel)], where
+`isc_core.environment` fits the environment to exp(SH), P is the panel's irradiance over pi, and G
+the normalised Blinn-Phong lobe of strength 1 (see `gloss`). In the physical variant
 `synth.rendering` renders both layers under environment and panel, with the object's own shadows.
 
-Limits: what lights the object from behind is a guess. The physical variant has the grain of its samples, `noise` says of which size.
+Limits: what lights the object from behind is a guess. The physical variant has the grain of its
+samples, `noise` says of which size.
 """
 
 from dataclasses import dataclass, replace
@@ -37,10 +40,12 @@ _PROBES = 4096  # about as many pixels tell how well the environment fits
 
 @dataclass(frozen=True)
 class Layers:
-    """An object under one light. `shading`, `gloss`: (N, 3) >= 0, the gloss at strength 1. `light`: (9, 3), the log-shading coefficients:
-    the set's own, or those that fit best where there are none; `light_residual`: RMS of shading less exp(SH), over the RMS of shading.
-    `environment_residual`: the same of the environment's shading to the set's own. `noise`: RMS standard error of the gloss, over its RMS.
-    `panel`: the panel that was added, or None."""
+    """An object under one light. `shading`, `gloss`: (N, 3) >= 0, the gloss at strength 1. `light`:
+    (9, 3), the log-shading coefficients: the set's own, or those that fit best where there are
+    none; `light_residual`: RMS of shading less exp(SH), over the RMS of shading.
+    `environment_residual`: the same of the environment's shading to the set's own. `noise`: RMS
+    standard error of the gloss, over its RMS. `panel`: the panel that was added, or None.
+    """
 
     shading: np.ndarray
     gloss: np.ndarray
@@ -61,17 +66,25 @@ class _Part:
 
     def plus(self, other: "_Part", gain: float) -> "_Part":
         """Both lights at once, the other one `gain` times as bright."""
-        return _Part(self.shading + gain * other.shading, self.gloss + gain * other.gloss, self.variance + gain**2 * other.variance)
+        return _Part(
+            self.shading + gain * other.shading,
+            self.gloss + gain * other.gloss,
+            self.variance + gain**2 * other.variance,
+        )
 
     @property
     def noise(self) -> float:
         return _relative_rms(np.sqrt(self.variance), self.gloss)
 
 
-def make_layers(source: Source, settings: GlossySettings, monitor: Monitor, tracer: Tracer | None = None) -> dict[str, Layers]:
-    """The layers under each of `settings.LIGHTS`. `tracer`: the object, for the physical variant; without one nothing casts a shadow.
+def make_layers(
+    source: Source, settings: GlossySettings, monitor: Monitor, tracer: Tracer | None = None
+) -> dict[str, Layers]:
+    """The layers under each of `settings.LIGHTS`. `tracer`: the object, for the physical variant;
+    without one nothing casts a shadow.
 
-    Raises `Cancelled`; `InputError` where the physical variant cannot be rendered here."""
+    Raises `Cancelled`; `InputError` where the physical variant cannot be rendered here.
+    """
     surface = surface_of(source, settings.exponent)
     panel = _panel(surface, source.name, settings.seed)
     monitor.report(f"{source.name}: panel", 0.0)
@@ -82,8 +95,16 @@ def make_layers(source: Source, settings: GlossySettings, monitor: Monitor, trac
         own = np.exp(real_sh(source.normal) @ light)
         environment = environment_from_shading(light, _ENVIRONMENT_ROWS)
         some = slice(None, None, max(1, len(own) // _PROBES))
-        residual = _relative_rms(shading_under(environment, source.normal[some]) - own[some], own[some])
-        part = _lit(surface, EnvironmentLight(environment), settings, tracer, monitor.part(0.3 + 0.35 * step, 0.65 + 0.35 * step))
+        residual = _relative_rms(
+            shading_under(environment, source.normal[some]) - own[some], own[some]
+        )
+        part = _lit(
+            surface,
+            EnvironmentLight(environment),
+            settings,
+            tracer,
+            monitor.part(0.3 + 0.35 * step, 0.65 + 0.35 * step),
+        )
         if tracer is None:
             made[name] = Layers(own, part.gloss, light, 0.0, residual, 0.0, None)
             part = _Part(own, part.gloss, part.variance)
@@ -96,13 +117,29 @@ def make_layers(source: Source, settings: GlossySettings, monitor: Monitor, trac
 
 
 def surface_of(source: Source, exponent: float) -> Surface:
-    """The object's points as the renderer takes them, where `synth.shapes.height_field` has them: object units, the crop's middle at 0."""
+    """The object's points as the renderer takes them, where `synth.shapes.height_field` has them:
+    object units, the crop's middle at 0.
+    """
     (rows, columns), height = np.nonzero(source.mask), source.height[source.mask]
     down, across = source.mask.shape
-    place = np.stack([columns + 0.5 - across / 2, down / 2 - rows - 0.5, height - (height.min() + height.max()) / 2], -1)
+    place = np.stack(
+        [
+            columns + 0.5 - across / 2,
+            down / 2 - rows - 0.5,
+            height - (height.min() + height.max()) / 2,
+        ],
+        -1,
+    )
     view = np.broadcast_to(np.array([0.0, 0.0, 1.0]), place.shape)
     uv = np.full((len(place), 2), 0.5)
-    return Surface(source.mask, place / source.pixels_per_unit, source.normal, view, uv, _material(exponent).at(uv))
+    return Surface(
+        source.mask,
+        place / source.pixels_per_unit,
+        source.normal,
+        view,
+        uv,
+        _material(exponent).at(uv),
+    )
 
 
 def _material(exponent: float) -> Material:
@@ -110,17 +147,26 @@ def _material(exponent: float) -> Material:
 
 
 def _lit(
-    surface: Surface, light: EnvironmentLight | PanelLight, settings: GlossySettings, tracer: Tracer | None, monitor: Monitor
+    surface: Surface,
+    light: EnvironmentLight | PanelLight,
+    settings: GlossySettings,
+    tracer: Tracer | None,
+    monitor: Monitor,
 ) -> _Part:
     """One light, traced where there is something to trace."""
     if tracer is not None:
         options = RenderOptions(samples=settings.samples, seed=settings.seed)
-        lit = light_surface(surface, _material(settings.exponent), (light,), tracer, options, monitor)
+        lit = light_surface(
+            surface, _material(settings.exponent), (light,), tracer, options, monitor
+        )
         return _Part(lit.shading, lit.specular, lit.specular_variance)
     if isinstance(light, PanelLight):
         shading, gloss = panel_layers(light, surface.position, surface.normal, settings.exponent)
     else:
-        shading, gloss = np.zeros_like(surface.normal), environment_gloss(light.radiance, surface.normal, settings.exponent)
+        shading, gloss = (
+            np.zeros_like(surface.normal),
+            environment_gloss(light.radiance, surface.normal, settings.exponent),
+        )
     return _Part(shading, gloss, np.zeros_like(gloss))
 
 
@@ -131,7 +177,9 @@ def _fitted(source: Source, part: _Part, residual: float, panel: PanelLight | No
 
 
 def _panel(surface: Surface, name: str, seed: int) -> PanelLight:
-    """A white panel that the object mirrors toward the viewer somewhere, on the upper side if it can; drawn by the seed and the name."""
+    """A white panel that the object mirrors toward the viewer somewhere, on the upper side if it
+    can; drawn by the seed and the name.
+    """
     rng = np.random.default_rng([seed, crc32(name.encode())])
     tilt = np.degrees(np.arccos(np.clip(surface.normal[:, 2], -1, 1)))
     usual = np.flatnonzero((tilt > _TILTS[0]) & (tilt < _TILTS[1]) & (surface.normal[:, 1] > 0))

@@ -1,7 +1,8 @@
-"""Making the glossy sets: object after object, each folder whole or not at all, so that an interrupted run goes on where it stopped.
+"""Making the glossy sets: object after object, each folder whole or not at all, so that an
+interrupted run goes on where it stopped.
 
-`run.json` is written first and says what the folder is; one that holds anything else, or a run with other settings, is left alone. Objects,
-and the physical variant, may be added to a run.
+`run.json` is written first and says what the folder is; one that holds anything else, or a run with
+other settings, is left alone. Objects, and the physical variant, may be added to a run.
 """
 
 import json
@@ -32,7 +33,10 @@ _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 @dataclass(frozen=True)
 class GlossyOutcome:
-    """`roots`: the data sets, relative to the output's folder. `made`, `kept`: how many objects were made, and were there already."""
+    """`roots`: the data sets, relative to the output's folder.
+
+    `made`, `kept`: how many objects were made, and were there already.
+    """
 
     roots: tuple[str, ...]
     made: int
@@ -40,18 +44,27 @@ class GlossyOutcome:
 
 
 def make_glossy(
-    root: Path, out: Path, settings: GlossySettings, objects: Sequence[str] | None = None, monitor: Monitor | None = None
+    root: Path,
+    out: Path,
+    settings: GlossySettings,
+    objects: Sequence[str] | None = None,
+    monitor: Monitor | None = None,
 ) -> GlossyOutcome:
-    """Makes the glossy sets of the objects (default: all) below `root`, the folder of the MIT-Berkeley set, into `out`.
+    """Makes the glossy sets of the objects (default: all) below `root`, the folder of the
+    MIT-Berkeley set, into `out`.
 
-    Raises `InputError` for unknown objects, files that are missing or damaged, and an `out` that holds anything else; `Cancelled`."""
+    Raises `InputError` for unknown objects, files that are missing or damaged, and an `out` that
+    holds anything else; `Cancelled`.
+    """
     monitor = monitor or Monitor()
     names = tuple(dict.fromkeys(objects)) if objects else list_objects(root, "laboratory")
     for name in names:
         for illumination in ILLUMINATIONS:
             check_request(root, name, illumination, "diffuse")
     if out.resolve().is_relative_to(root.resolve()):
-        raise InputError(f"{out} is inside the data set that is read: choose a folder outside of {root}")
+        raise InputError(
+            f"{out} is inside the data set that is read: choose a folder outside of {root}"
+        )
     _require_this_run(out, settings)
     _write_json(out / RUN, {"kind": KIND, "settings": settings.to_json()})
     roots = _known_roots(out, settings)
@@ -64,16 +77,24 @@ def make_glossy(
     return GlossyOutcome(root_names(settings), made, len(names) - made)
 
 
-def _make_object(root: Path, out: Path, name: str, settings: GlossySettings, monitor: Monitor) -> bool:
+def _make_object(
+    root: Path, out: Path, name: str, settings: GlossySettings, monitor: Monitor
+) -> bool:
     """What of an object is missing; whether anything was."""
-    missing = [prefix for prefix in _prefixes(settings) if not all(is_written(out / path, name) for path in _paths(prefix, settings))]
+    missing = [
+        prefix
+        for prefix in _prefixes(settings)
+        if not all(is_written(out / path, name) for path in _paths(prefix, settings))
+    ]
     if not missing:
         return False
     source = load_source(root, name)
     for step, prefix in enumerate(missing):
         part = monitor.part(step / len(missing), (step + 1) / len(missing))
         tracer = Tracer(mesh_of_height(source.height)) if prefix else None
-        for number, (light, layers) in enumerate(make_layers(source, settings, part.part(0.0, 0.5), tracer).items()):
+        for number, (light, layers) in enumerate(
+            make_layers(source, settings, part.part(0.0, 0.5), tracer).items()
+        ):
             part.report(f"{name}: files of {light}", 0.5 + 0.5 * number / len(LIGHTS))
             picture = exposed(source, layers, max(settings.levels))
             for level in settings.levels:
@@ -93,7 +114,9 @@ def _paths(prefix: str, settings: GlossySettings) -> list[Path]:
 def _known_roots(out: Path, settings: GlossySettings) -> tuple[str, ...]:
     """The sets that are made now, and those that an earlier run has left."""
     everything = root_names(GlossySettings(**{**vars(settings), "physical": True}))
-    return tuple(name for name in everything if name in root_names(settings) or (out / name).is_dir())
+    return tuple(
+        name for name in everything if name in root_names(settings) or (out / name).is_dir()
+    )
 
 
 def _require_this_run(out: Path, settings: GlossySettings) -> None:
@@ -103,7 +126,9 @@ def _require_this_run(out: Path, settings: GlossySettings) -> None:
     require_writable_file(out / RUN)
     if not (out / RUN).is_file():
         if out.is_dir() and any(entry.name not in _LITTER for entry in out.iterdir()):
-            raise InputError(f"{out} is not empty and not a run of isc synth glossy-mit: choose another folder")
+            raise InputError(
+                f"{out} is not empty and not a run of isc synth glossy-mit: choose another folder"
+            )
         return
     found, wanted = read_object(out / RUN), settings.to_json()
     theirs = found.get("settings")
@@ -111,11 +136,15 @@ def _require_this_run(out: Path, settings: GlossySettings) -> None:
         raise InputError(f"{out / RUN} is not of isc synth glossy-mit: choose another folder")
     for name, value in wanted.items():
         if theirs.get(name) != value:
-            raise InputError(f"{out} holds another run ({name} {theirs.get(name)}, not {value}): choose another folder")
+            raise InputError(
+                f"{out} holds another run ({name} {theirs.get(name)}, not {value}): choose another folder"
+            )
 
 
 def _write_cards(out: Path, settings: GlossySettings, roots: tuple[str, ...]) -> None:
-    """`scene.json` and `README.md` of every set, from the records of the objects that are there; the index of all of them."""
+    """`scene.json` and `README.md` of every set, from the records of the objects that are there;
+    the index of all of them.
+    """
     for level in settings.levels:
         for light in LIGHTS:
             for name in (root_name(level, light), f"physical/{root_name(level, light)}"):

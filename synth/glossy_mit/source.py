@@ -1,6 +1,8 @@
-"""One object of the MIT-Berkeley set, as the generator needs it: known pixels as a list, and the frame that they came from.
+"""One object of the MIT-Berkeley set, as the generator needs it: known pixels as a list, and the
+frame that they came from.
 
-Limits: a pixel counts where the mask holds, the reflectance is above 0 and all heights around it are known, so that its normal is exact.
+Limits: a pixel counts where the mask holds, the reflectance is above 0 and all heights around it
+are known, so that its normal is exact.
 """
 
 from dataclasses import dataclass
@@ -18,10 +20,12 @@ from isc_core.sirfs.frames import light_from_reference
 
 @dataclass(frozen=True)
 class Source:
-    """`frame`: rows and columns of the set's files. `rows`, `columns`: 0-based, of its evaluation crop, (h,) and (w,).
-    `mask`: (h, w) bool, the N pixels that are used. `height`: (h, w) pixels toward the viewer, NaN outside `mask`.
-    `reflectance`, `normal`: (N, 3). `lights`: for each illumination the (9, 3) coefficients of log shading, in our convention.
-    `crop_file`: the bytes of crop_idx.mat."""
+    """`frame`: rows and columns of the set's files. `rows`, `columns`: 0-based, of its evaluation
+    crop, (h,) and (w,). `mask`: (h, w) bool, the N pixels that are used. `height`: (h, w) pixels
+    toward the viewer, NaN outside `mask`. `reflectance`, `normal`: (N, 3). `lights`: for each
+    illumination the (9, 3) coefficients of log shading, in our convention. `crop_file`: the bytes
+    of crop_idx.mat.
+    """
 
     name: str
     frame: tuple[int, int]
@@ -36,7 +40,9 @@ class Source:
 
     @property
     def pixels_per_unit(self) -> float:
-        """Pixels of one object unit: the object is two units wide or high, as in `synth.shapes.height_field`."""
+        """Pixels of one object unit: the object is two units wide or high, as in
+        `synth.shapes.height_field`.
+        """
         return float(max(np.ptp(places) + 1 for places in np.nonzero(self.mask))) / 2
 
     def whole(self, values: np.ndarray, outside: float = 0.0) -> np.ndarray:
@@ -49,16 +55,28 @@ class Source:
 
 
 def load_source(root: Path, name: str) -> Source:
-    """Reads an object. Raises `InputError` for files that are missing or damaged, and where no height is known."""
+    """Reads an object.
+
+    Raises `InputError` for files that are missing or damaged, and where no height is known.
+    """
     truths = {illumination: load_object(root, name, illumination) for illumination in ILLUMINATIONS}
     truth = truths["laboratory"]
-    folder = next(path for path in (root / "laboratory" / name, root / "MIT-Berkeley-Laboratory" / name) if path.is_dir())
-    rows, columns = (read_matrix(folder / "crop_idx.mat", key).ravel().astype(int) - 1 for key in ("crop_idx1", "crop_idx2"))
+    folder = next(
+        path
+        for path in (root / "laboratory" / name, root / "MIT-Berkeley-Laboratory" / name)
+        if path.is_dir()
+    )
+    rows, columns = (
+        read_matrix(folder / "crop_idx.mat", key).ravel().astype(int) - 1
+        for key in ("crop_idx1", "crop_idx2")
+    )
     normal = truth_normal(truth.height)
     frame = read_raster(folder / "mask.png").values.shape
     mask = truth.mask & np.isfinite(normal).all(-1) & (truth.reflectance > 0).all(-1)
     if not mask.any():
-        raise InputError(f"{name}: no pixel of its mask has a known height and reflectance: leave the object out")
+        raise InputError(
+            f"{name}: no pixel of its mask has a known height and reflectance: leave the object out"
+        )
     return Source(
         name=name,
         frame=(frame[0], frame[1]),
@@ -68,6 +86,9 @@ def load_source(root: Path, name: str) -> Source:
         height=np.where(mask, truth.height, np.nan),
         reflectance=truth.reflectance[mask],
         normal=normal[mask],
-        lights={illumination: light_from_reference(found.light) for illumination, found in truths.items()},
+        lights={
+            illumination: light_from_reference(found.light)
+            for illumination, found in truths.items()
+        },
         crop_file=(folder / "crop_idx.mat").read_bytes(),
     )

@@ -1,10 +1,13 @@
-"""Lights of a scene by the name of their kind, drawn at random: from a single lamp to a photographed environment.
+"""Lights of a scene by the name of their kind, drawn at random: from a single lamp to a
+photographed environment.
 
-Directions and lengths are those of `synth.lights`: the object is about 2 wide, around the origin, the viewer toward +z. Every draw reaches
-the side that the viewer sees. How bright it is on the whole is left to the caller (`synth.truth.exposed`): the strongest lamp, or an
-environment on the average, gives a white matt surface a radiance of about 1.
+Directions and lengths are those of `synth.lights`: the object is about 2 wide, around the origin,
+the viewer toward +z. Every draw reaches the side that the viewer sees. How bright it is on the
+whole is left to the caller (`synth.truth.exposed`): the strongest lamp, or an environment on the
+average, gives a white matt surface a radiance of about 1.
 
-Limits: colours of invented lights stay within some per cent of white; those of files are as they are.
+Limits: colours of invented lights stay within some per cent of white; those of files are as they
+are.
 """
 
 from pathlib import Path
@@ -24,14 +27,22 @@ FROM_FILES = {
     "natural": "the folder that holds natural_lights.mat",
     "hdr": "an .hdr or .exr file in latitude-longitude layout, or a folder of them",
 }
-_INVENTED = {"point": point_lights, "directional": directional_lights, "area": area_lights, "sh": harmonic_lights}
+_INVENTED = {
+    "point": point_lights,
+    "directional": directional_lights,
+    "area": area_lights,
+    "sh": harmonic_lights,
+}
 
 
-def make_lights(name: str, rng: np.random.Generator, source: Path | None = None) -> tuple[Light, ...]:
+def make_lights(
+    name: str, rng: np.random.Generator, source: Path | None = None
+) -> tuple[Light, ...]:
     """One draw of the kind `name`, of `RIGS`; the same state of `rng` gives the same lights.
 
-    `source`: for "natural" the folder that holds natural_lights.mat; for "hdr" an .hdr or .exr latitude-longitude picture, or a folder of
-    them. Raises `InputError` for an unknown name, a source that is missing, and files that cannot be used.
+    `source`: for "natural" the folder that holds natural_lights.mat; for "hdr" an .hdr or .exr
+    latitude-longitude picture, or a folder of them. Raises `InputError` for an unknown name, a
+    source that is missing, and files that cannot be used.
     """
     if name in _INVENTED:
         return _INVENTED[name](rng)

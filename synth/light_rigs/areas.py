@@ -1,6 +1,8 @@
-"""Softboxes and windows: one or two rectangles that face the object, always with a little light from all around.
+"""Softboxes and windows: one or two rectangles that face the object, always with a little light
+from all around.
 
-Equation: a panel of area A at the distance r that faces the origin gives it about L A / r^2 of irradiance; L is chosen so that this is pi.
+Equation: a panel of area A at the distance r that faces the origin gives it about L A / r^2 of
+irradiance; L is chosen so that this is pi.
 
 Limits: panels are uniform; their frames and window bars are not there.
 """
@@ -14,11 +16,16 @@ _NEAR, _FAR = 3.0, 6.0
 
 
 def area_lights(rng: np.random.Generator) -> tuple[Light, ...]:
-    """One or two panels and weak ambient light. Their sides are seen from the object under 10 to 40 degrees, windows being upright."""
+    """One or two panels and weak ambient light.
+
+    Their sides are seen from the object under 10 to 40 degrees, windows being upright.
+    """
     panels = []
     for place, strength in places(rng):
         distance, side = rng.uniform(_NEAR, _FAR), 2 * np.tan(np.radians(rng.uniform(10, 28)) / 2)
         size = distance * side * np.array([1.0, rng.choice([1.0, rng.uniform(1.2, 1.5)])])
         radiance = np.pi * strength * distance**2 / size.prod() * white(rng)
-        panels.append(panel_toward_origin(tuple(distance * place), (size[0], size[1]), tuple(radiance)))
+        panels.append(
+            panel_toward_origin(tuple(distance * place), (size[0], size[1]), tuple(radiance))
+        )
     return (*panels, ambient(rng, 0.02, 0.15))

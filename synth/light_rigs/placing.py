@@ -1,7 +1,8 @@
-"""What invented lights share: places around the object, near whites, and the weak light that keeps shadows from being black.
+"""What invented lights share: places around the object, near whites, and the weak light that keeps
+shadows from being black.
 
-Equation: a place is given by its tilt from the viewing axis and its turn from straight up, clockwise as the viewer sees it:
-d = (sin tilt sin turn, sin tilt cos turn, cos tilt).
+Equation: a place is given by its tilt from the viewing axis and its turn from straight up,
+clockwise as the viewer sees it: d = (sin tilt sin turn, sin tilt cos turn, cos tilt).
 
 Limits: only the side of the viewer, tilt below 90 degrees, reaches what the viewer sees.
 """
@@ -17,7 +18,9 @@ _AMBIENT_ROWS = 16
 
 
 def toward(tilt: float, turn: float) -> np.ndarray:
-    """The unit vector (3,) at `tilt` from the viewing axis and `turn` from straight up, both in degrees."""
+    """The unit vector (3,) at `tilt` from the viewing axis and `turn` from straight up, both in
+    degrees.
+    """
     t, a = np.radians(tilt), np.radians(turn)
     return np.array([np.sin(t) * np.sin(a), np.sin(t) * np.cos(a), np.cos(t)])
 
@@ -29,8 +32,9 @@ def white(rng: np.random.Generator) -> np.ndarray:
 
 
 def places(rng: np.random.Generator) -> list[tuple[np.ndarray, float]]:
-    """Where one or two lamps stand, (3,) unit vectors, and how strong they are: a key light above or at a side and, in half of the draws,
-    a weaker one across from it."""
+    """Where one or two lamps stand, (3,) unit vectors, and how strong they are: a key light above
+    or at a side and, in half of the draws, a weaker one across from it.
+    """
     turn = rng.uniform(-95, 95)
     key = (toward(rng.uniform(20, 65), turn), 1.0)
     if rng.uniform() < 0.5:
@@ -40,7 +44,9 @@ def places(rng: np.random.Generator) -> list[tuple[np.ndarray, float]]:
 
 
 def ambient(rng: np.random.Generator, weakest: float, strongest: float) -> EnvironmentLight:
-    """Light from all around, brighter from above: a white matt surface gets a radiance from `weakest` to `strongest` on the average."""
+    """Light from all around, brighter from above: a white matt surface gets a radiance from
+    `weakest` to `strongest` on the average.
+    """
     level, contrast = np.exp(rng.uniform(np.log(weakest), np.log(strongest))), rng.uniform(0.2, 0.8)
     height = directions(_AMBIENT_ROWS)[..., 1]
     return EnvironmentLight(level * (1 + contrast * height)[..., None] * white(rng))

@@ -1,8 +1,9 @@
-"""Light on a surface in plain arrays, the two lobes of its material apart; Mitsuba traces the rays and does nothing else.
+"""Light on a surface in plain arrays, the two lobes of its material apart; Mitsuba traces the rays
+and does nothing else.
 
-The estimates are those of `direct_light` and `bounced_light`. Points are taken in chunks with random numbers of their own: threads draw
-the samples of the next chunks while one, to which Mitsuba's variant belongs, traces the rays of this one. Which thread does what changes
-nothing.
+The estimates are those of `direct_light` and `bounced_light`. Points are taken in chunks with
+random numbers of their own: threads draw the samples of the next chunks while one, to which
+Mitsuba's variant belongs, traces the rays of this one. Which thread does what changes nothing.
 
 Limits: see `direct_light`, `bounced_light`, `reflection`.
 """
@@ -31,14 +32,23 @@ _THREADS = 4  # more would wait for the rays, which one thread traces
 
 
 def light_surface(
-    surface: Surface, material: Material, lights: tuple[Light, ...], tracer: Tracer, options: RenderOptions, monitor: Monitor
+    surface: Surface,
+    material: Material,
+    lights: tuple[Light, ...],
+    tracer: Tracer,
+    options: RenderOptions,
+    monitor: Monitor,
 ) -> Lit:
     """Lights the points of `surface`, see `synth.rendering.light_surface`. Raises `Cancelled`."""
-    points = Points(surface.position, surface.normal, surface.view, surface.paint.strength, surface.paint.gloss)
+    points = Points(
+        surface.position, surface.normal, surface.view, surface.paint.strength, surface.paint.gloss
+    )
     samples = (options.samples, options.samples)
     wide = [light for light in lights if isinstance(light, PanelLight | EnvironmentLight)]
     sampled = [(light, sampler) for light in wide if (sampler := sampler_of(light)) is not None]
-    world = World(material, Reflection(material), lights, [sampler for _, sampler in sampled], tracer)
+    world = World(
+        material, Reflection(material), lights, [sampler for _, sampler in sampled], tracer
+    )
     parts = len(sampled) + bool(options.bounces)
     total = Sums(len(points))
     for light in lights:
@@ -46,10 +56,14 @@ def light_surface(
     with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
         for number, (light, sampler) in enumerate(sampled):
             part = monitor.part(number / parts, (number + 1) / parts)
-            _add_direct(total, points, world, (light, sampler), samples, (options.seed, number), pool, part)
+            _add_direct(
+                total, points, world, (light, sampler), samples, (options.seed, number), pool, part
+            )
     if options.bounces:
         last = monitor.part(len(sampled) / parts, 1)
-        _add_bounced(total, points, world, samples, (options.seed, len(sampled)), options.bounces, last)
+        _add_bounced(
+            total, points, world, samples, (options.seed, len(sampled)), options.bounces, last
+        )
     return Lit(total.body, total.gloss, total.body_variance, total.gloss_variance)
 
 
@@ -67,7 +81,13 @@ def _add_direct(
     known = unshadowed(points, world.reflection, source[0])
 
     def draw(chunk: slice) -> Paths:
-        return draw_paths(np.random.default_rng((*seed, chunk.start)), points.at(chunk), world.reflection, source[1], samples)
+        return draw_paths(
+            np.random.default_rng((*seed, chunk.start)),
+            points.at(chunk),
+            world.reflection,
+            source[1],
+            samples,
+        )
 
     chunks = _chunks(len(points), sum(samples))
     for number, (chunk, paths) in enumerate(_ahead(pool, draw, chunks)):
@@ -76,13 +96,21 @@ def _add_direct(
 
 
 def _add_bounced(
-    total: Sums, points: Points, world: World, samples: tuple[int, int], seed: tuple[int, int], bounces: int, monitor: Monitor
+    total: Sums,
+    points: Points,
+    world: World,
+    samples: tuple[int, int],
+    seed: tuple[int, int],
+    bounces: int,
+    monitor: Monitor,
 ) -> None:
     """Adds light between parts of the object."""
     chunks = _chunks(len(points), sum(samples))
     for number, chunk in enumerate(chunks):
         monitor.report("light between parts of the object", number / len(chunks))
-        paths = bounced_paths(np.random.default_rng((*seed, chunk.start)), points.at(chunk), world, samples, bounces)
+        paths = bounced_paths(
+            np.random.default_rng((*seed, chunk.start)), points.at(chunk), world, samples, bounces
+        )
         total.add(chunk, paths, np.ones(len(paths.point), bool))
 
 
@@ -92,7 +120,9 @@ def _chunks(count: int, samples: int) -> list[slice]:
     return [slice(start, min(start + step, count)) for start in range(0, count, step)]
 
 
-def _ahead(pool: ThreadPoolExecutor, work: Callable[[slice], Paths], chunks: list[slice]) -> Iterator[tuple[slice, Paths]]:
+def _ahead(
+    pool: ThreadPoolExecutor, work: Callable[[slice], Paths], chunks: list[slice]
+) -> Iterator[tuple[slice, Paths]]:
     """Results in the order of the chunks, a few of them under way at any time."""
     waiting: deque[tuple[slice, Future[Paths]]] = deque()
     for chunk in chunks:

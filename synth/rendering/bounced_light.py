@@ -1,13 +1,14 @@
 """Light that parts of the object send to each other before it leaves for the camera.
 
-Equation: what arrives along a drawn direction that meets the object is what leaves from there: its direct light by one sample of each
-kind, and, while bounces remain, what arrives there along one more direction, drawn by the cosine or by the gloss with even odds. The
-weights are those of `direct_light`.
+Equation: what arrives along a drawn direction that meets the object is what leaves from there: its
+direct light by one sample of each kind, and, while bounces remain, what arrives there along one
+more direction, drawn by the cosine or by the gloss with even odds. The weights are those of
+`direct_light`.
 
 Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
 
-Limits: paths of `bounces` reflections more than the last one; longer ones are left out. Light through the gloss onto a matt part (caustics)
-is met by chance only: noisy.
+Limits: paths of `bounces` reflections more than the last one; longer ones are left out. Light
+through the gloss onto a matt part (caustics) is met by chance only: noisy.
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,10 @@ from .reflection import Points, Reflection, cosine_density, cosine_directions
 
 @dataclass(frozen=True)
 class World:
-    """What light meets on its way. `reflection`: of the material without its albedo. `samplers`: of those lights that have a size."""
+    """What light meets on its way.
+
+    `reflection`: of the material without its albedo. `samplers`: of those lights that have a size.
+    """
 
     material: Material
     reflection: Reflection
@@ -34,16 +38,27 @@ class World:
     tracer: Tracer
 
 
-def bounced_paths(rng: np.random.Generator, points: Points, world: World, samples: tuple[int, int], bounces: int) -> Paths:
-    """Samples of what arrives from the object itself: `samples` directions by the cosine and by the gloss at each point."""
+def bounced_paths(
+    rng: np.random.Generator, points: Points, world: World, samples: tuple[int, int], bounces: int
+) -> Paths:
+    """Samples of what arrives from the object itself:
+
+    `samples` directions by the cosine and by the gloss at each point.
+    """
     direction = np.concatenate(
-        [cosine_directions(rng, points, samples[0]), world.reflection.draw(rng, points, samples[1])], axis=1
-    )  # fmt: skip
+        [
+            cosine_directions(rng, points, samples[0]),
+            world.reflection.draw(rng, points, samples[1]),
+        ],
+        axis=1,
+    )
     point, sample = np.nonzero(np.einsum("nsi,ni->ns", direction, points.normal) > 1e-9)
     direction, many = direction[point, sample], points.at(point)
     hit, arriving = _arriving(rng, many, direction, world, bounces)
     many, direction = many.at(hit), direction[hit]
-    density = samples[0] * cosine_density(many, direction) + samples[1] * world.reflection.density(many, direction)
+    density = samples[0] * cosine_density(many, direction) + samples[1] * world.reflection.density(
+        many, direction
+    )
     cosine = np.einsum("ni,ni->n", many.normal, direction)
     return Paths(
         point=point[hit],
@@ -58,12 +73,16 @@ def bounced_paths(rng: np.random.Generator, points: Points, world: World, sample
     )
 
 
-def _arriving(rng: np.random.Generator, points: Points, direction: np.ndarray, world: World, bounces: int) -> tuple[np.ndarray, np.ndarray]:
+def _arriving(
+    rng: np.random.Generator, points: Points, direction: np.ndarray, world: World, bounces: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Which of M rays from the points meet the object (K,), and what arrives along those (K, 3)."""
     met = world.tracer.hits(points.lifted(), direction)
     hit = np.flatnonzero(met.valid)
     paint = world.material.at(met.uv[hit])
-    places = Points(met.position[hit], met.normal[hit], -direction[hit], paint.strength, paint.gloss)
+    places = Points(
+        met.position[hit], met.normal[hit], -direction[hit], paint.strength, paint.gloss
+    )
     sums, everything = Sums(len(hit)), slice(0, len(hit))
     for light in world.lights:
         add_exactly(sums, places, world.reflection, light, world.tracer)
@@ -76,9 +95,14 @@ def _arriving(rng: np.random.Generator, points: Points, direction: np.ndarray, w
     return hit, leaving
 
 
-def _one_more(rng: np.random.Generator, places: Points, albedo: np.ndarray, world: World, bounces: int) -> np.ndarray:
+def _one_more(
+    rng: np.random.Generator, places: Points, albedo: np.ndarray, world: World, bounces: int
+) -> np.ndarray:
     """What leaves (K, 3) of the light that arrives from the object along one direction."""
-    by_cosine, by_gloss = cosine_directions(rng, places, 1)[:, 0], world.reflection.draw(rng, places, 1)[:, 0]
+    by_cosine, by_gloss = (
+        cosine_directions(rng, places, 1)[:, 0],
+        world.reflection.draw(rng, places, 1)[:, 0],
+    )
     direction = np.where(rng.random((len(places), 1)) < 0.5, by_cosine, by_gloss)
     cosine = np.einsum("ni,ni->n", places.normal, direction)
     leaving = np.zeros((len(places), 3))
@@ -86,6 +110,9 @@ def _one_more(rng: np.random.Generator, places: Points, albedo: np.ndarray, worl
     hit, arriving = _arriving(rng, places.at(up), direction[up], world, bounces)
     some, direction = places.at(up[hit]), direction[up[hit]]
     density = 0.5 * (cosine_density(some, direction) + world.reflection.density(some, direction))
-    reflected = albedo[up[hit]] * world.reflection.body(some, direction)[:, None] + world.reflection.gloss(some, direction)[:, None]
+    reflected = (
+        albedo[up[hit]] * world.reflection.body(some, direction)[:, None]
+        + world.reflection.gloss(some, direction)[:, None]
+    )
     leaving[up[hit]] = reflected * arriving * (cosine[up[hit]] / density)[:, None]
     return leaving

@@ -1,14 +1,18 @@
-"""The lobes of `materials` as a plugin that Mitsuba's own integrators render: `{"type": "isc_paint", "model": "ggx", ...}`.
+"""The lobes of `materials` as a plugin that Mitsuba's own integrators render: `{"type":
+"isc_paint", "model": "ggx", ...}`.
 
-Parameters, as in `materials`: `model` (lambert, oren_nayar, blinn_phong or ggx; roughplastic is Mitsuba's own); the textures or numbers
-`albedo` (colour), `gloss` and `strength`; the numbers `ior` and `sigma`. `mitsuba.traverse` finds the textures, which may carry gradients.
+Parameters, as in `materials`: `model` (lambert, oren_nayar, blinn_phong or ggx; roughplastic is
+Mitsuba's own); the textures or numbers `albedo` (colour), `gloss` and `strength`; the numbers `ior`
+and `sigma`. `mitsuba.traverse` finds the textures, which may carry gradients.
 
-Equation: f_r = albedo * body + strength * gloss. Component 0 is the body (DiffuseReflection), component 1 the gloss (GlossyReflection):
-a `BSDFContext` with one of these flags evaluates one lobe alone.
+Equation: f_r = albedo * body + strength * gloss. Component 0 is the body (DiffuseReflection),
+component 1 the gloss (GlossyReflection): a `BSDFContext` with one of these flags evaluates one lobe
+alone.
 
 Citation: W. Jakob et al., Mitsuba 3 renderer, 2022, https://mitsuba-renderer.org.
 
-Limits: LLVM variants; a scalar one renders it a ray at a time through Python: tiny pictures only. One-sided.
+Limits: LLVM variants; a scalar one renders it a ray at a time through Python: tiny pictures only.
+One-sided.
 """
 
 from typing import Any
@@ -24,7 +28,8 @@ _PLASTIC = "roughplastic"
 
 
 def register() -> str:
-    """Makes the plugin known to Mitsuba's present variant; again and again does no harm. Returns its name.
+    """Makes the plugin known to Mitsuba's present variant; again and again does no harm. Returns
+    its name.
 
     Raises `InputError` where Mitsuba is not installed.
     """
@@ -47,7 +52,9 @@ def _init(self: Any, properties: Any) -> None:
     mi.BSDF.__init__(self, properties)
     self.model = str(properties.get("model", "blinn_phong"))
     if self.model not in MODELS or self.model == _PLASTIC:
-        raise InputError(f"the plugin {NAME} has no model {self.model!r}: choose {', '.join(name for name in MODELS if name != _PLASTIC)}")
+        raise InputError(
+            f"the plugin {NAME} has no model {self.model!r}: choose {', '.join(name for name in MODELS if name != _PLASTIC)}"
+        )
     self.albedo = properties.get_texture("albedo", 0.5)
     self.gloss = properties.get_texture("gloss", 100.0)
     self.strength = properties.get_texture("strength", 0.1)
@@ -55,7 +62,10 @@ def _init(self: Any, properties: Any) -> None:
     self.f0 = ((ior - 1) / (ior + 1)) ** 2
     sigma = float(properties.get("sigma", 0.3))
     self.sigma = sigma if self.model == "oren_nayar" else 0.0
-    self.m_components = [mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide, mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide]
+    self.m_components = [
+        mi.BSDFFlags.DiffuseReflection | mi.BSDFFlags.FrontSide,
+        mi.BSDFFlags.GlossyReflection | mi.BSDFFlags.FrontSide,
+    ]
     self.m_flags = self.m_components[0] | self.m_components[1]
 
 
@@ -72,7 +82,9 @@ def _lobes(self: Any, point: Any, active: Lanes) -> PaintLobes:
     return PaintLobes(0.0, self.strength.eval_1(point, active), lobe)
 
 
-def _sample(self: Any, context: Any, point: Any, choice: Lanes, place: Lanes, active: Lanes = True) -> tuple[Any, Lanes]:
+def _sample(
+    self: Any, context: Any, point: Any, choice: Lanes, place: Lanes, active: Lanes = True
+) -> tuple[Any, Lanes]:
     dr, mi = load_drjit(), load_mitsuba()
     light = _lobes(self, point, active).sample(point.wi, choice, place)
     density = _pdf(self, context, point, light, active)
@@ -101,7 +113,9 @@ def _pdf(self: Any, context: Any, point: Any, light: Lanes, active: Lanes = True
     return dr.select(active & (point.wi.z > 0) & (light.z > 0), density, 0)
 
 
-def _eval_pdf(self: Any, context: Any, point: Any, light: Lanes, active: Lanes = True) -> tuple[Lanes, Lanes]:
+def _eval_pdf(
+    self: Any, context: Any, point: Any, light: Lanes, active: Lanes = True
+) -> tuple[Lanes, Lanes]:
     return _eval(self, context, point, light, active), _pdf(self, context, point, light, active)
 
 

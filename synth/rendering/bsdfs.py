@@ -1,16 +1,20 @@
-"""The lobes of `materials` on Mitsuba's arrays: how much they reflect, and random directions toward which they reflect most.
+"""The lobes of `materials` on Mitsuba's arrays: how much they reflect, and random directions toward
+which they reflect most.
 
-Directions are in the local frame of a point, z along its normal: `view` toward the camera, `light` toward the light, both unit vectors of
-Dr.Jit, or of numbers in a scalar variant. Parameters are numbers or arrays with an entry for each lane; all may carry gradients.
-They share no code with `isc_core.brdf`, so that each is the other's test.
+Directions are in the local frame of a point, z along its normal: `view` toward the camera, `light`
+toward the light, both unit vectors of Dr.Jit, or of numbers in a scalar variant. Parameters are
+numbers or arrays with an entry for each lane; all may carry gradients. They share no code with
+`isc_core.brdf`, so that each is the other's test.
 
-Equation: values are f_r cos_light. A gloss is sampled by half vectors: with the density p(h) per solid angle of h, the light's is
-p(h) / (4 view . h), in proportion to cos^p of the normal for Blinn-Phong, and to the facets that the view sees for GGX.
+Equation: values are f_r cos_light. A gloss is sampled by half vectors: with the density p(h) per
+solid angle of h, the light's is p(h) / (4 view . h), in proportion to cos^p of the normal for
+Blinn-Phong, and to the facets that the view sees for GGX.
 
-Citation: E. Heitz, "Sampling the GGX distribution of visible normals", Journal of Computer Graphics Techniques 7(4), 2018 (no DOI), as
-Mitsuba does it; the models' own stand in `isc_core.brdf`.
+Citation: E. Heitz, "Sampling the GGX distribution of visible normals", Journal of Computer Graphics
+Techniques 7(4), 2018 (no DOI), as Mitsuba does it; the models' own stand in `isc_core.brdf`.
 
-Limits: reflection only. Half of the directions are drawn for the body and half for the gloss, whatever their strengths.
+Limits: reflection only. Half of the directions are drawn for the body and half for the gloss,
+whatever their strengths.
 """
 
 import math
@@ -53,7 +57,11 @@ class Lobes(Protocol):
 
 
 class Gloss(Protocol):
-    """A glossy lobe of strength 1. All three as in `Lobes`, but for f_r without the cosine, where view and light are above the horizon."""
+    """A glossy lobe of strength 1.
+
+    All three as in `Lobes`, but for f_r without the cosine, where view and light are above the
+    horizon.
+    """
 
     def value(self, view: Lanes, light: Lanes) -> Lanes: ...
 
@@ -85,7 +93,9 @@ class BlinnPhongGloss:
         return mi.reflect(view, half)
 
     def _lobe(self, view: Lanes, light: Lanes) -> Lanes:
-        """cos^p of the half vector, from its sine: for large p the cosine has lost the digits that count."""
+        """cos^p of the half vector, from its sine: for large p the cosine has lost the digits that
+        count.
+        """
         dr = load_drjit()
         half = dr.normalize(view + light)
         return dr.exp(0.5 * self.exponent * _log_complement(half.x * half.x + half.y * half.y))
@@ -106,7 +116,12 @@ class GgxGloss:
         square = grazing * grazing
         fresnel = self.f0 + (1 - self.f0) * square * square * grazing
         shown = facets.smith_g1(view, half) * facets.smith_g1(light, half)
-        return facets.eval(half) * shown * fresnel / (4 * dr.maximum(view.z, 1e-9) * dr.maximum(light.z, 1e-9))
+        return (
+            facets.eval(half)
+            * shown
+            * fresnel
+            / (4 * dr.maximum(view.z, 1e-9) * dr.maximum(light.z, 1e-9))
+        )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
         dr = load_drjit()
@@ -124,7 +139,9 @@ class GgxGloss:
 
 @dataclass(frozen=True)
 class PaintLobes:
-    """A matt body of slope deviation `sigma` (radians; 0 is Lambert) under `strength` times a gloss, or none."""
+    """A matt body of slope deviation `sigma` (radians; 0 is Lambert) under `strength` times a
+    gloss, or none.
+    """
 
     sigma: Lanes = 0.0
     strength: Lanes = 0.0
@@ -136,14 +153,18 @@ class PaintLobes:
         body = dr.select(lit, oren_nayar(self.sigma, view, light) * light.z, 0)
         if self.gloss is None:
             return mi.Float(body), mi.Float(0)
-        return mi.Float(body), mi.Float(dr.select(lit, self.strength * self.gloss.value(view, light) * light.z, 0))
+        return mi.Float(body), mi.Float(
+            dr.select(lit, self.strength * self.gloss.value(view, light) * light.z, 0)
+        )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
         dr = load_drjit()
         matt = dr.maximum(light.z, 0) / math.pi
         if self.gloss is None:
             return matt
-        return dr.select((view.z > 1e-9) & (light.z > 1e-9), 0.5 * (matt + self.gloss.density(view, light)), 0)
+        return dr.select(
+            (view.z > 1e-9) & (light.z > 1e-9), 0.5 * (matt + self.gloss.density(view, light)), 0
+        )
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
         dr, mi = load_drjit(), load_mitsuba()
@@ -155,8 +176,10 @@ class PaintLobes:
 
 @dataclass(frozen=True)
 class PlasticLobes:
-    """Mitsuba's rough plastic, `plugin`, whose parameters are uniform. `drawn`: lobes alike, whose directions are taken: the plugin would
-    draw few for the gloss, which is faint and bright at once."""
+    """Mitsuba's rough plastic, `plugin`, whose parameters are uniform. `drawn`: lobes alike, whose
+    directions are taken: the plugin would draw few for the gloss, which is faint and bright at
+    once.
+    """
 
     plugin: Lanes
     drawn: PaintLobes
@@ -165,7 +188,9 @@ class PlasticLobes:
         mi = load_mitsuba()
         parts = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
         contexts = [mi.BSDFContext(mi.TransportMode.Radiance, int(part)) for part in parts]
-        body, gloss = (self.plugin.eval(context, _interaction(view), light).x for context in contexts)
+        body, gloss = (
+            self.plugin.eval(context, _interaction(view), light).x for context in contexts
+        )
         return body, gloss
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
@@ -178,16 +203,25 @@ class PlasticLobes:
 def rows_of(colour: Lanes) -> np.ndarray:
     """A colour or vector with an entry for each lane as an array (N, 3).
 
-    Part by part: Dr.Jit turns a whole one by a kernel that has the number of lanes in it, and is compiled anew for every other number.
+    Part by part: Dr.Jit turns a whole one by a kernel that has the number of lanes in it, and is
+    compiled anew for every other number.
     """
     load_drjit().eval(colour)
     return np.stack([np.array(part, float) for part in colour], axis=1)
 
 
 def lobes_of(material: Material, paint: Paint) -> Lobes:
-    """The lobes of a material at points whose paint is known, a lane each. Raises `InputError` where Mitsuba is not installed."""
+    """The lobes of a material at points whose paint is known, a lane each.
+
+    Raises `InputError` where Mitsuba is not installed.
+    """
     dr, mi = load_drjit(), load_mitsuba()
-    sigma, f0, strength, gloss = mi.Float(material.sigma), mi.Float(material.f0), lanes(paint.strength), lanes(paint.gloss)
+    sigma, f0, strength, gloss = (
+        mi.Float(material.sigma),
+        mi.Float(material.f0),
+        lanes(paint.strength),
+        lanes(paint.gloss),
+    )
     # What is opaque is no constant of a kernel, so that the next scene finds the kernel compiled.
     dr.make_opaque(sigma, f0)
     if material.model == "blinn_phong":
@@ -201,9 +235,18 @@ def lobes_of(material: Material, paint: Paint) -> Lobes:
 
 
 def rough_plastic(alpha: float, ior: float, albedo: Any = 1.0) -> Lanes:
-    """Mitsuba's plugin as `materials` means it, with a white body unless told otherwise (a number, or a texture as a dictionary)."""
+    """Mitsuba's plugin as `materials` means it, with a white body unless told otherwise (a number,
+    or a texture as a dictionary).
+    """
     body = albedo if isinstance(albedo, dict) else {"type": "rgb", "value": [float(albedo)] * 3}
-    plastic = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, "int_ior": ior, "ext_ior": 1.0, "nonlinear": False}
+    plastic = {
+        "type": "roughplastic",
+        "distribution": "ggx",
+        "alpha": alpha,
+        "int_ior": ior,
+        "ext_ior": 1.0,
+        "nonlinear": False,
+    }
     return load_mitsuba().load_dict({**plastic, "diffuse_reflectance": body})
 
 
@@ -214,13 +257,19 @@ def oren_nayar(sigma: Lanes, view: Lanes, light: Lanes) -> Lanes:
     dr = load_drjit()
     square = sigma * sigma
     flat = 1 - 0.5 * square / (square + 0.33)
-    # sin a sin b cos d is the product of the directions' shadows on the surface, tan b / sin b divides by the larger cosine.
-    together = dr.maximum(view.x * light.x + view.y * light.y, 0) / dr.maximum(dr.maximum(view.z, light.z), 1e-9)
+    # sin a sin b cos d is the product of the directions' shadows on the surface, tan b / sin b
+    # divides by the larger cosine.
+    together = dr.maximum(view.x * light.x + view.y * light.y, 0) / dr.maximum(
+        dr.maximum(view.z, light.z), 1e-9
+    )
     return (flat + 0.45 * square / (square + 0.09) * together) / math.pi
 
 
 def _log_complement(share: Lanes) -> Lanes:
-    """log(1 - share) for a share in [0, 1], with all its digits where the share is small (W. Kahan's way)."""
+    """log(1 - share) for a share in [0, 1], with all its digits where the share is small (W.
+
+    Kahan's way).
+    """
     dr = load_drjit()
     rest = dr.maximum(1 - share, 1e-30)
     lost = dr.select(rest == 1, 1, 1 - rest)

@@ -1,23 +1,26 @@
-"""Light that comes to points of a surface straight from the lights, the two lobes of the material apart.
+"""Light that comes to points of a surface straight from the lights, the two lobes of the material
+apart.
 
-Problem: radiance toward the camera is, for each lobe f, the integral of f V L cos over the directions w to a light L, with V = 0 where the
-object itself stands in between.
+Problem: radiance toward the camera is, for each lobe f, the integral of f V L cos over the
+directions w to a light L, with V = 0 where the object itself stands in between.
 
-Equation: point and directional lights are one direction each: no noise. For panels and environments each sample draws one direction
-toward the light and one where the gloss reflects (matt: by the cosine); with n_k directions of density p_k each adds
+Equation: point and directional lights are one direction each: no noise. For panels and environments
+each sample draws one direction toward the light and one where the gloss reflects (matt: by the
+cosine); with n_k directions of density p_k each adds
 
     f V L cos / sum_k n_k p_k          (the balance heuristic)
 
-Of the body only its loss is estimated: a times the closed form S without shadows, for a body that reflects a constant b, plus
-(V f - a b) L cos / .... b is f for light along the normal; a is the share of the light that is not in shadow, for each half of the samples
-as the other half sees it, which keeps the mean right. So there is no noise on a matt convex body, and none in full shadow.
+Of the body only its loss is estimated: a times the closed form S without shadows, for a body that
+reflects a constant b, plus (V f - a b) L cos / .... b is f for light along the normal; a is the
+share of the light that is not in shadow, for each half of the samples as the other half sees it,
+which keeps the mean right. So there is no noise on a matt convex body, and none in full shadow.
 
-Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", SIGGRAPH 1995,
-doi:10.1145/218380.218498; control variates: J. M. Hammersley, D. C. Handscomb, "Monte Carlo methods" (1964),
-doi:10.1007/978-94-009-5819-7.
+Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
+rendering", SIGGRAPH 1995, doi:10.1145/218380.218498; control variates: J. M. Hammersley, D. C.
+Handscomb, "Monte Carlo methods" (1964), doi:10.1007/978-94-009-5819-7.
 
-Limits: panels do not hide each other or the environment. The variance is estimated from the samples themselves: where light is so rare that
-none of them met it, it is 0 and wrong.
+Limits: panels do not hide each other or the environment. The variance is estimated from the samples
+themselves: where light is so rare that none of them met it, it is 0 and wrong.
 """
 
 from dataclasses import dataclass
@@ -39,31 +42,53 @@ class Sums:
     def __init__(self, count: int) -> None:
         self.body, self.gloss, self.body_variance, self.gloss_variance = np.zeros((4, count, 3))
 
-    def add(self, chunk: slice, paths: "Paths", clear: np.ndarray, unshadowed: "Unshadowed | None" = None) -> None:
-        """Adds the samples of a chunk of points. `clear`: (M,), which reach their light. `unshadowed`: of the chunk's points."""
+    def add(
+        self,
+        chunk: slice,
+        paths: "Paths",
+        clear: np.ndarray,
+        unshadowed: "Unshadowed | None" = None,
+    ) -> None:
+        """Adds the samples of a chunk of points.
+
+        `clear`: (M,), which reach their light. `unshadowed`: of the chunk's points.
+        """
         count = chunk.stop - chunk.start
         body, gloss = clear * paths.body, clear * paths.gloss
         halves = min(paths.samples) >= _ENOUGH
         group = 2 * paths.strategy + paths.half if halves else paths.strategy
-        sizes = [(many + 1 - half) // 2 for many in paths.samples for half in (0, 1)] if halves else list(paths.samples)
+        sizes = (
+            [(many + 1 - half) // 2 for many in paths.samples for half in (0, 1)]
+            if halves
+            else list(paths.samples)
+        )
         if unshadowed is not None:
             share = _clear_share(paths, clear, count)[::-1] if halves else np.ones((2, count))
             first = sizes[0] / paths.samples[0]
-            self.body[chunk] += (first * share[0] + (1 - first) * share[1])[:, None] * unshadowed.body
+            self.body[chunk] += (first * share[0] + (1 - first) * share[1])[
+                :, None
+            ] * unshadowed.body
             body = body - unshadowed.reflected[paths.point] * share[paths.half, paths.point]
         cell = group * count + paths.point
-        for lobe, mean, noise in ((body, self.body, self.body_variance), (gloss, self.gloss, self.gloss_variance)):
+        for lobe, mean, noise in (
+            (body, self.body, self.body_variance),
+            (gloss, self.gloss, self.gloss_variance),
+        ):
             for channel in range(3):
-                total, variance = _sum_and_variance(lobe * paths.light[:, channel], cell, count, sizes)
+                total, variance = _sum_and_variance(
+                    lobe * paths.light[:, channel], cell, count, sizes
+                )
                 mean[chunk, channel] += total
                 noise[chunk, channel] += variance
 
 
 @dataclass(frozen=True)
 class Paths:
-    """M samples that bring light unless something is in the way. `point`: (M,), which point of the chunk. `strategy`: (M,), 0 or 1, what
-    drew it; `samples`: how many each draws at a point. `half`: (M,), 0 or 1, each with half of the samples. `direction`: (M, 3); `reach`:
-    (M,), how far the light is; `light`: (M, 3), L cos / sum n p; `body`, `gloss`: (M,), f of both lobes."""
+    """M samples that bring light unless something is in the way. `point`: (M,), which point of the
+    chunk. `strategy`: (M,), 0 or 1, what drew it; `samples`: how many each draws at a point.
+    `half`: (M,), 0 or 1, each with half of the samples. `direction`: (M, 3); `reach`: (M,), how far
+    the light is; `light`: (M, 3), L cos / sum n p; `body`, `gloss`: (M,), f of both lobes.
+    """
 
     point: np.ndarray
     strategy: np.ndarray
@@ -76,8 +101,17 @@ class Paths:
     gloss: np.ndarray
 
 
-def draw_paths(rng: np.random.Generator, points: Points, reflection: Reflection, sampler: Sampler, samples: tuple[int, int]) -> Paths:
-    """Samples of one light that has a size: `samples` of either kind at each point, toward the light and by the lobe."""
+def draw_paths(
+    rng: np.random.Generator,
+    points: Points,
+    reflection: Reflection,
+    sampler: Sampler,
+    samples: tuple[int, int],
+) -> Paths:
+    """Samples of one light that has a size:
+
+    `samples` of either kind at each point, toward the light and by the lobe.
+    """
     to_light = sampler.draw(rng, points.position, samples[0])
     by_lobe = reflection.draw(rng, points, samples[1])
     direction = np.concatenate([to_light, by_lobe], axis=1)
@@ -108,8 +142,9 @@ def trace_paths(points: Points, paths: Paths, tracer: Tracer) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Unshadowed:
-    """The body of N points without shadows, in closed form. `reflected`: (N,), a constant f that is much like the body's; `body`: (N, 3),
-    the radiance under one light of a body that reflects so."""
+    """The body of N points without shadows, in closed form. `reflected`: (N,), a constant f that is
+    much like the body's; `body`: (N, 3), the radiance under one light of a body that reflects so.
+    """
 
     reflected: np.ndarray
     body: np.ndarray
@@ -119,7 +154,9 @@ class Unshadowed:
         return Unshadowed(self.reflected[chosen], self.body[chosen])
 
 
-def unshadowed(points: Points, reflection: Reflection, light: PanelLight | EnvironmentLight) -> Unshadowed:
+def unshadowed(
+    points: Points, reflection: Reflection, light: PanelLight | EnvironmentLight
+) -> Unshadowed:
     """The points under one light that has a size, as if the object cast no shadow."""
     reflected = reflection.body(points, points.normal)
     if isinstance(light, EnvironmentLight):
@@ -130,25 +167,40 @@ def unshadowed(points: Points, reflection: Reflection, light: PanelLight | Envir
 
 
 def _clear_share(paths: Paths, clear: np.ndarray, count: int) -> np.ndarray:
-    """The share of the light that reaches each point, (2, count), as either half of the samples sees it; 1 where one has none."""
+    """The share of the light that reaches each point, (2, count), as either half of the samples
+    sees it; 1 where one has none.
+    """
     cell, light = paths.half * count + paths.point, paths.light.sum(1)
-    reached, all_of_it = (np.bincount(cell, weight, 2 * count).reshape(2, count) for weight in (clear * light, light))
+    reached, all_of_it = (
+        np.bincount(cell, weight, 2 * count).reshape(2, count) for weight in (clear * light, light)
+    )
     return np.where(all_of_it > 0, reached / np.where(all_of_it > 0, all_of_it, 1), 1)
 
 
-def _sum_and_variance(values: np.ndarray, cell: np.ndarray, count: int, sizes: list[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Sums (count,) of samples over groups of equal law, and their variances. `cell`: group * count + point; `sizes`: samples of each group
-    at a point, those that bring nothing need not be listed."""
-    sums, squares = (np.bincount(cell, values**power, len(sizes) * count).reshape(len(sizes), count) for power in (1, 2))
+def _sum_and_variance(
+    values: np.ndarray, cell: np.ndarray, count: int, sizes: list[int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Sums (count,) of samples over groups of equal law, and their variances. `cell`: group * count
+    + point; `sizes`: samples of each group at a point, those that bring nothing need not be listed.
+    """
+    sums, squares = (
+        np.bincount(cell, values**power, len(sizes) * count).reshape(len(sizes), count)
+        for power in (1, 2)
+    )
     many = np.array(sizes, float)[:, None]
     spread = np.maximum(squares - sums**2 / many, 0) * many / np.maximum(many - 1, 1)
     return sums.sum(0), spread.sum(0)
 
 
-def add_exactly(total: Sums, points: Points, reflection: Reflection, light: Light, tracer: Tracer) -> None:
+def add_exactly(
+    total: Sums, points: Points, reflection: Reflection, light: Light, tracer: Tracer
+) -> None:
     """Adds a light without a size: one direction from each point, one ray, no noise."""
     if isinstance(light, DirectionalLight):
-        toward, reach = np.broadcast_to(np.asarray(light.direction, float), points.position.shape), np.full(len(points), np.inf)
+        toward, reach = (
+            np.broadcast_to(np.asarray(light.direction, float), points.position.shape),
+            np.full(len(points), np.inf),
+        )
         beam = np.broadcast_to(np.asarray(light.irradiance, float), points.position.shape)
     elif isinstance(light, PointLight):
         toward = light.position - points.position

@@ -1,24 +1,31 @@
-"""What wide lights give to matt surfaces that nothing stands before: the part of their shading that needs no random numbers.
+"""What wide lights give to matt surfaces that nothing stands before: the part of their shading that
+needs no random numbers.
 
-Problem: S(n) = 1/pi * integral of L(w) max(n . w, 0) dw for many normals, L being constant on a panel, or on each pixel of a picture laid
-out as `isc_core.environment` says. `isc_core.environment.shading_under` puts each pixel's light at its centre, which is off by 2e-4 at
+Problem: S(n) = 1/pi * integral of L(w) max(n . w, 0) dw for many normals, L being constant on a
+panel, or on each pixel of a picture laid out as `isc_core.environment` says.
+`isc_core.environment.shading_under` puts each pixel's light at its centre, which is off by 2e-4 at
 64 rows, and its matrix has an entry for every normal and pixel.
 
-Equation: with the pixel's moment v = integral of w dw (closed form), a pixel wholly above the horizon of n gives n . v and one below
-gives 0. One that the horizon crosses is taken as flat: over it n . w is the mean m plus two independent uniform numbers in [-a, a] and
-[-b, b], so the mean of what lies above 0 is (F(m + a + b) - F(m + a - b) - F(m - a + b) + F(m - a - b)) / (4 a b), F(x) = max(x, 0)^3 / 6.
-Normals are visited in small groups: what is above for a whole group is one 3 x 3 matrix, and only a band around its horizon is summed.
+Equation: with the pixel's moment v = integral of w dw (closed form), a pixel wholly above the
+horizon of n gives n . v and one below gives 0. One that the horizon crosses is taken as flat: over
+it n . w is the mean m plus two independent uniform numbers in [-a, a] and [-b, b], so the mean of
+what lies above 0 is (F(m + a + b) - F(m + a - b) - F(m - a + b) + F(m - a - b)) / (4 a b), F(x) =
+max(x, 0)^3 / 6. Normals are visited in small groups: what is above for a whole group is one 3 x 3
+matrix, and only a band around its horizon is summed.
 
-A panel: S = L / (2 pi) sum over its edges, cut off at the horizon, of the angle that the edge fills times the cosine between the normal
-and the plane of the edge (Lambert).
+A panel: S = L / (2 pi) sum over its edges, cut off at the horizon, of the angle that the edge fills
+times the cosine between the normal and the plane of the edge (Lambert).
 
-Citation: J. H. Lambert, "Photometria", Augsburg (1760), which has no DOI; D. R. Baum, H. E. Rushmeier, J. M. Winget, "Improving radiosity
-solutions through the use of analytically determined form-factors", SIGGRAPH 1989, doi:10.1145/74333.74367. R. Ramamoorthi, P. Hanrahan,
-"An efficient representation for irradiance environment maps", SIGGRAPH 2001, doi:10.1145/383259.383317 (irradiance of the normal).
+Citation: J. H. Lambert, "Photometria", Augsburg (1760), which has no DOI; D. R. Baum, H. E.
+Rushmeier, J. M. Winget, "Improving radiosity solutions through the use of analytically determined
+form-factors", SIGGRAPH 1989, doi:10.1145/74333.74367. R. Ramamoorthi, P. Hanrahan, "An efficient
+representation for irradiance environment maps", SIGGRAPH 2001, doi:10.1145/383259.383317
+(irradiance of the normal).
 
-Limits: the panel's formula is exact. An environment's error comes from pixels taken as flat and falls with the square of their size: 2e-5
-of the shading at 32 rows of noise, 1e-5 at 64. A single lit pixel, the worst light there is: 1e-4 of its largest shading, 2e-3 at the
-poles, where pixels are triangles.
+Limits: the panel's formula is exact. An environment's error comes from pixels taken as flat and
+falls with the square of their size: 2e-5 of the shading at 32 rows of noise, 1e-5 at 64. A single
+lit pixel, the worst light there is: 1e-4 of its largest shading, 2e-3 at the poles, where pixels
+are triangles.
 """
 
 import numpy as np
@@ -28,13 +35,17 @@ from isc_core.environment import solid_angles
 from ..lights import PanelLight
 
 _CELLS = 10  # normals in one cube of side 1 / _CELLS make a group
-_THINNEST = 1e-3  # of a pixel: a narrower spread would lose the digits that the third powers differ in
+_THINNEST = (
+    1e-3  # of a pixel: a narrower spread would lose the digits that the third powers differ in
+)
 _BLOCK = 512  # normals at a time
 _FEWEST = 32  # rows: larger pixels are divided, they are not flat enough
 
 
 def unoccluded_shading(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The shading, (N, 3), of matt white surfaces with unit normals (N, 3) under `radiance` (rows, 2 rows, 3), without shadows."""
+    """The shading, (N, 3), of matt white surfaces with unit normals (N, 3) under `radiance` (rows,
+    2 rows, 3), without shadows.
+    """
     parts = -(-_FEWEST // len(radiance))
     pixels = _Pixels(np.asarray(radiance, float).repeat(parts, axis=0).repeat(parts, axis=1))
     normals = np.asarray(normals, float)
@@ -45,8 +56,13 @@ def unoccluded_shading(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def unoccluded_panel(panel: PanelLight, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The shading, (N, 3), of matt white points (N, 3) with unit normals (N, 3) under a panel, without shadows."""
-    corners = [panel.centre + a * panel.right + b * panel.up - positions for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    """The shading, (N, 3), of matt white points (N, 3) with unit normals (N, 3) under a panel,
+    without shadows.
+    """
+    corners = [
+        panel.centre + a * panel.right + b * panel.up - positions
+        for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))
+    ]
     heights = [np.einsum("nk,nk->n", corner, normals) for corner in corners]
     total = np.zeros(len(positions))
     leaves, enters = np.zeros_like(positions), np.zeros_like(positions)
@@ -66,7 +82,9 @@ def unoccluded_panel(panel: PanelLight, positions: np.ndarray, normals: np.ndarr
 
 
 def _edge(a: np.ndarray, b: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The angle between vectors (N, 3) times the cosine between the normal and their plane's; 0 where they have no plane."""
+    """The angle between vectors (N, 3) times the cosine between the normal and their plane's; 0
+    where they have no plane.
+    """
     across = np.cross(a, b)
     length = np.linalg.norm(across, axis=1)
     angle = np.arctan2(length, np.einsum("nk,nk->n", a, b))
@@ -110,11 +128,15 @@ class _Pixels:
         """The mean of max(n . w, 0) over each pixel of the band: (N, pixels)."""
         middle = normals @ self.mean[band].T
         least = _THINNEST * self.radius
-        a, b = (np.maximum(np.abs(normals @ side[band].T), least) for side in (self.down, self.along))
+        a, b = (
+            np.maximum(np.abs(normals @ side[band].T), least) for side in (self.down, self.along)
+        )
         crossed = np.abs(middle) < a + b
         above = np.maximum(middle, 0)
         m, a, b = middle[crossed], a[crossed], b[crossed]
-        above[crossed] = (_third(m + a + b) - _third(m + a - b) - _third(m - a + b) + _third(m - a - b)) / (4 * a * b)
+        above[crossed] = (
+            _third(m + a + b) - _third(m + a - b) - _third(m - a + b) + _third(m - a - b)
+        ) / (4 * a * b)
         return above
 
 
@@ -133,9 +155,21 @@ def _moments(rows: int) -> np.ndarray:
 
 
 def _half_sides(rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """From each pixel's centre to the middle of its lower side, and to that of its side along the row: (rows, 2 rows, 3) each."""
-    polar, turn = np.meshgrid((np.arange(rows) + 0.5) * np.pi / rows, (np.arange(2 * rows) + 0.5) * np.pi / rows, indexing="ij")
+    """From each pixel's centre to the middle of its lower side, and to that of its side along the
+    row: (rows, 2 rows, 3) each.
+    """
+    polar, turn = np.meshgrid(
+        (np.arange(rows) + 0.5) * np.pi / rows,
+        (np.arange(2 * rows) + 0.5) * np.pi / rows,
+        indexing="ij",
+    )
     half = np.pi / rows / 2
-    down = np.stack([np.cos(polar) * np.sin(turn), -np.sin(polar), -np.cos(polar) * np.cos(turn)], -1) * half
-    along = np.stack([np.cos(turn), np.zeros_like(turn), np.sin(turn)], -1) * (np.sin(polar) * half)[..., None]
+    down = (
+        np.stack([np.cos(polar) * np.sin(turn), -np.sin(polar), -np.cos(polar) * np.cos(turn)], -1)
+        * half
+    )
+    along = (
+        np.stack([np.cos(turn), np.zeros_like(turn), np.sin(turn)], -1)
+        * (np.sin(polar) * half)[..., None]
+    )
     return down, along

@@ -1,12 +1,14 @@
 """Random directions toward lights that have a size, and how densely they are drawn.
 
-Problem: the light that a point receives is an integral over the directions in which it sees a light; samples belong there.
+Problem: the light that a point receives is an integral over the directions in which it sees a
+light; samples belong there.
 
-Equation: on a panel points are drawn evenly by area, so that directions have the density r^2 / (area cos_panel) per steradian. Pixels of
-an environment are drawn by the light that they hold, radiance x solid angle, and evenly inside: the density is the radiance's share.
+Equation: on a panel points are drawn evenly by area, so that directions have the density r^2 /
+(area cos_panel) per steradian. Pixels of an environment are drawn by the light that they hold,
+radiance x solid angle, and evenly inside: the density is the radiance's share.
 
-Citation: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting calculations", ACM Transactions on Graphics
-15(1), 1-36 (1996), doi:10.1145/226150.226151.
+Citation: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting
+calculations", ACM Transactions on Graphics 15(1), 1-36 (1996), doi:10.1145/226150.226151.
 
 Limits: neither knows the surface: half of an environment's samples may lie below a point's horizon.
 """
@@ -23,8 +25,10 @@ from ..lights import EnvironmentLight, Light, PanelLight
 
 @dataclass(frozen=True)
 class Seen:
-    """What M rays meet of one light. `radiance`: (M, 3), 0 where they miss it. `distance`: (M,) of it, infinite for an environment.
-    `density`: (M,) per steradian, with which `draw` picks each direction; 0 where they miss it."""
+    """What M rays meet of one light. `radiance`: (M, 3), 0 where they miss it. `distance`: (M,) of
+    it, infinite for an environment. `density`: (M,) per steradian, with which `draw` picks each
+    direction; 0 where they miss it.
+    """
 
     radiance: np.ndarray
     distance: np.ndarray
@@ -35,7 +39,10 @@ class Sampler(Protocol):
     """A light that has a size, as directions are drawn toward it."""
 
     def draw(self, rng: np.random.Generator, positions: np.ndarray, count: int) -> np.ndarray:
-        """`count` unit directions toward the light from each of the positions (P, 3): (P, count, 3)."""
+        """`count` unit directions toward the light from each of the positions (P, 3):
+
+        (P, count, 3).
+        """
         ...
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
@@ -44,7 +51,10 @@ class Sampler(Protocol):
 
 
 def sampler_of(light: Light) -> Sampler | None:
-    """How directions toward a light are drawn; None for lights without a size and for those that do not shine."""
+    """How directions toward a light are drawn;
+
+    None for lights without a size and for those that do not shine.
+    """
     if isinstance(light, PanelLight) and np.any(light.radiance):
         return PanelSampler(light)
     if isinstance(light, EnvironmentLight) and np.any(light.radiance):
@@ -80,7 +90,9 @@ class PanelSampler:
 
 
 class EnvironmentSampler:
-    """Directions toward an environment, by the light that its pixels hold (the mean of the channels)."""
+    """Directions toward an environment, by the light that its pixels hold (the mean of the
+    channels).
+    """
 
     def __init__(self, light: EnvironmentLight) -> None:
         self._radiance = np.asarray(light.radiance, float)
@@ -108,7 +120,10 @@ class EnvironmentSampler:
         scale = self._rows / np.pi
         row = (np.arccos(np.clip(directions[:, 1], -1, 1)) * scale).astype(int)
         column = (np.arctan2(directions[:, 0], -directions[:, 2]) * scale).astype(int)
-        # atan2 is negative for the second half of a row, where rounding toward 0 would go the wrong way.
+        # atan2 is negative for the second half of a row, where rounding toward 0 would go the wrong
+        # way.
         column = np.where(directions[:, 0] < 0, 2 * self._rows - 1 + column, column)
-        pixel = np.minimum(row, self._rows - 1) * 2 * self._rows + np.clip(column, 0, 2 * self._rows - 1)
+        pixel = np.minimum(row, self._rows - 1) * 2 * self._rows + np.clip(
+            column, 0, 2 * self._rows - 1
+        )
         return Seen(self._radiance[pixel], np.full(len(pixel), np.inf), self._density[pixel])

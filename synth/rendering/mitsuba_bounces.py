@@ -1,13 +1,14 @@
 """Light that parts of the object send to each other, on Mitsuba's arrays.
 
-Equation: at each point a direction is drawn toward what the lobes reflect, with the density q; it brings f_r cos / q times what leaves the
-part of the object that it meets: direct light there by one sample of each light, albedo * body + gloss, and, while bounces remain, what a
-direction drawn there brings in the same way. What meets nothing brings nothing: that light is direct.
+Equation: at each point a direction is drawn toward what the lobes reflect, with the density q; it
+brings f_r cos / q times what leaves the part of the object that it meets: direct light there by one
+sample of each light, albedo * body + gloss, and, while bounces remain, what a direction drawn there
+brings in the same way. What meets nothing brings nothing: that light is direct.
 
 Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
 
-Limits: paths of `bounces` reflections more than the last one; longer ones are left out. Materials are read by NumPy between the waves of
-rays. Glints of glints are met by chance only: noisy.
+Limits: paths of `bounces` reflections more than the last one; longer ones are left out. Materials
+are read by NumPy between the waves of rays. Glints of glints are met by chance only: noisy.
 """
 
 from dataclasses import dataclass
@@ -37,18 +38,35 @@ class World:
     tracer: Tracer
 
 
-def bounced_light(surface: Surface, world: World, options: RenderOptions, random: np.random.Generator, monitor: Monitor) -> Lit:
-    """What comes to the N points of `surface` from other parts of the object. Raises `Cancelled`."""
+def bounced_light(
+    surface: Surface,
+    world: World,
+    options: RenderOptions,
+    random: np.random.Generator,
+    monitor: Monitor,
+) -> Lit:
+    """What comes to the N points of `surface` from other parts of the object.
+
+    Raises `Cancelled`.
+    """
     count = len(surface.position)
     sums, squares = np.zeros((2, count, 3)), np.zeros((2, count, 3))
     wave = max(1, min(options.samples, _AT_ONCE // count))
     for start in range(0, options.samples, wave):
         monitor.report("light between parts of the object", start / options.samples)
         size = min(wave, options.samples - start)
-        position, normal, view = (np.tile(part, (size, 1)) for part in (surface.position, surface.normal, surface.view))
+        position, normal, view = (
+            np.tile(part, (size, 1)) for part in (surface.position, surface.normal, surface.view)
+        )
         paint = surface.paint
-        many = Paint(np.tile(paint.albedo, (size, 1)), np.tile(paint.strength, size), np.tile(paint.gloss, size))
-        lobes = np.stack(_arriving(position, normal, view, many, world, options.bounces, random)).reshape(2, size, count, 3)
+        many = Paint(
+            np.tile(paint.albedo, (size, 1)),
+            np.tile(paint.strength, size),
+            np.tile(paint.gloss, size),
+        )
+        lobes = np.stack(
+            _arriving(position, normal, view, many, world, options.bounces, random)
+        ).reshape(2, size, count, 3)
         sums += lobes.sum(axis=1)
         squares += (lobes**2).sum(axis=1)
     means = sums / options.samples
@@ -57,9 +75,17 @@ def bounced_light(surface: Surface, world: World, options: RenderOptions, random
 
 
 def _arriving(
-    position: np.ndarray, normal: np.ndarray, view: np.ndarray, paint: Paint, world: World, bounces: int, random: np.random.Generator
+    position: np.ndarray,
+    normal: np.ndarray,
+    view: np.ndarray,
+    paint: Paint,
+    world: World,
+    bounces: int,
+    random: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One sample of what other parts of the object give to body (for albedo 1) and gloss of the points: (N, 3) each."""
+    """One sample of what other parts of the object give to body (for albedo 1) and gloss of the
+    points: (N, 3) each.
+    """
     dr, mi = load_drjit(), load_mitsuba()
     points = points_at(position, normal, view, lobes_of(world.material, paint))
     numbers = generator(len(position), int(random.integers(1 << 32)))
@@ -67,7 +93,10 @@ def _arriving(
     local = points.lobes.sample(points.view, numbers.next_float32(), place)
     density = points.lobes.density(points.view, local)
     useful = (local.z > 0) & (density > 0)
-    weights = [dr.select(useful, value / dr.select(useful, density, 1), 0) for value in points.lobes.values(points.view, local)]
+    weights = [
+        dr.select(useful, value / dr.select(useful, density, 1), 0)
+        for value in points.lobes.values(points.view, local)
+    ]
     toward, origin = points.frame.to_world(local), points.origin
     dr.eval(weights, useful, toward, origin)
     direction = rows_of(toward)
@@ -75,13 +104,27 @@ def _arriving(
     met = hits.valid & np.array(useful, bool)
     body, gloss = np.zeros((2, len(position), 3))
     if met.any():
-        leaving = _leaving(hits.position[met], hits.normal[met], -direction[met], world.material.at(hits.uv[met]), world, bounces, random)
+        leaving = _leaving(
+            hits.position[met],
+            hits.normal[met],
+            -direction[met],
+            world.material.at(hits.uv[met]),
+            world,
+            bounces,
+            random,
+        )
         body[met], gloss[met] = (np.array(weight, float)[met, None] * leaving for weight in weights)
     return body, gloss
 
 
 def _leaving(
-    position: np.ndarray, normal: np.ndarray, view: np.ndarray, paint: Paint, world: World, bounces: int, random: np.random.Generator
+    position: np.ndarray,
+    normal: np.ndarray,
+    view: np.ndarray,
+    paint: Paint,
+    world: World,
+    bounces: int,
+    random: np.random.Generator,
 ) -> np.ndarray:
     """One sample of the radiance that points send toward `view`: (N, 3)."""
     dr = load_drjit()

@@ -1,9 +1,10 @@
-"""One sample of the light that comes to points straight from a light, the lobes apart, on Mitsuba's arrays.
+"""One sample of the light that comes to points straight from a light, the lobes apart, on Mitsuba's
+arrays.
 
 Equation: see `mitsuba_lobes`.
 
-Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", SIGGRAPH 1995,
-doi:10.1145/218380.218498.
+Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
+rendering", SIGGRAPH 1995, doi:10.1145/218380.218498.
 
 Limits: lights do not hide each other.
 """
@@ -21,8 +22,9 @@ from .mitsuba_lights import Beam, WideLight
 
 @dataclass(frozen=True)
 class Points:
-    """Points that are lit, a lane each. `origin`: the position lifted off the surface, where rays start. `frame`: z along the normal.
-    `view`: in that frame."""
+    """Points that are lit, a lane each. `origin`: the position lifted off the surface, where rays
+    start. `frame`: z along the normal. `view`: in that frame.
+    """
 
     position: Lanes
     origin: Lanes
@@ -38,15 +40,21 @@ class Points:
 def points_at(position: np.ndarray, normal: np.ndarray, view: np.ndarray, lobes: Lobes) -> Points:
     """Points from arrays (N, 3) in the camera's frame."""
     dr, mi = load_drjit(), load_mitsuba()
-    place, across, toward = (mi.Vector3f(*(lanes(column) for column in part.T)) for part in (position, normal, view))
+    place, across, toward = (
+        mi.Vector3f(*(lanes(column) for column in part.T)) for part in (position, normal, view)
+    )
     frame, origin = mi.Frame3f(across), place + LIFT * across
     local = frame.to_local(toward)
     dr.eval(place, origin, frame, local)
     return Points(mi.Point3f(place), mi.Point3f(origin), frame, local, lobes)
 
 
-def _visible(points: Points, direction: Lanes, distance: Lanes, needed: Lanes, tracer: Tracer) -> Lanes:
-    """Whether nothing stands between the points and what is `distance` away; only where that is needed."""
+def _visible(
+    points: Points, direction: Lanes, distance: Lanes, needed: Lanes, tracer: Tracer
+) -> Lanes:
+    """Whether nothing stands between the points and what is `distance` away; only where that is
+    needed.
+    """
     mi = load_mitsuba()
     ray = mi.Ray3f(points.origin, direction)
     ray.maxt = mi.Float(distance)
@@ -72,16 +80,22 @@ def generator(lanes: int, seed: int) -> Lanes:
     return random
 
 
-def one_sample(points: Points, light: WideLight, tracer: Tracer, random: Lanes, flat: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-    """The colours that one sample of a light gives: what it gives without shadows to a body that reflects `flat` / pi everywhere, how much
-    more it gives to the body itself, and what it gives to the gloss."""
+def one_sample(
+    points: Points, light: WideLight, tracer: Tracer, random: Lanes, flat: Lanes
+) -> tuple[Lanes, Lanes, Lanes]:
+    """The colours that one sample of a light gives: what it gives without shadows to a body that
+    reflects `flat` / pi everywhere, how much more it gives to the body itself, and what it gives to
+    the gloss.
+    """
     dr, mi = load_drjit(), load_mitsuba()
 
     def draw() -> Lanes:
         return mi.Point2f(random.next_float32(), random.next_float32())
 
     toward = light.sample(points.position, draw(), draw())
-    mirrored = points.frame.to_world(points.lobes.sample(points.view, random.next_float32(), draw()))
+    mirrored = points.frame.to_world(
+        points.lobes.sample(points.view, random.next_float32(), draw())
+    )
     plain, more, gloss = mi.Color3f(0), mi.Color3f(0), mi.Color3f(0)
     for direction in (toward, mirrored):
         local = points.frame.to_local(direction)

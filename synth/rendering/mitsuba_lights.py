@@ -1,11 +1,13 @@
-"""Lights on Mitsuba's arrays: what arrives along a direction, and random directions from which much arrives.
+"""Lights on Mitsuba's arrays: what arrives along a direction, and random directions from which much
+arrives.
 
-Equation: an environment is constant on each pixel; a pixel is drawn in proportion to its light, radiance times solid angle, and a
-direction evenly within it, so the density is share / solid angle. A place on a panel is drawn evenly: distance^2 / (area cos) per
-steradian. Beams (directional and point lights) are not drawn: they come from one direction.
+Equation: an environment is constant on each pixel; a pixel is drawn in proportion to its light,
+radiance times solid angle, and a direction evenly within it, so the density is share / solid angle.
+A place on a panel is drawn evenly: distance^2 / (area cos) per steradian. Beams (directional and
+point lights) are not drawn: they come from one direction.
 
-Citation: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting calculations", ACM Transactions on Graphics 15(1),
-1-36 (1996), doi:10.1145/226150.226151.
+Citation: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting
+calculations", ACM Transactions on Graphics 15(1), 1-36 (1996), doi:10.1145/226150.226151.
 
 Limits: those of `lights`.
 """
@@ -30,11 +32,15 @@ class WideLight(Protocol):
     """A light that fills a solid angle."""
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """The radiance that arrives at a position from a direction, the distance it comes from, and the density of `sample` there."""
+        """The radiance that arrives at a position from a direction, the distance it comes from, and
+        the density of `sample` there.
+        """
         ...
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
-        """A unit direction toward the light for the uniform random numbers `place` (two) and `inside` (two)."""
+        """A unit direction toward the light for the uniform random numbers `place` (two) and
+        `inside` (two).
+        """
         ...
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
@@ -55,7 +61,9 @@ class Sky:
         in_row = share.sum(axis=1)
         self.rows = mi.UInt32(rows)
         self.below = lanes(np.cumsum(in_row))
-        self.before = lanes((np.cumsum(share, axis=1) / np.maximum(in_row, 1e-300)[:, None]).ravel())
+        self.before = lanes(
+            (np.cumsum(share, axis=1) / np.maximum(in_row, 1e-300)[:, None]).ravel()
+        )
         self.density = lanes((share / solid).ravel())
         self.colours = [lanes(self._radiance[..., channel].ravel()) for channel in range(3)]
         dr.make_opaque(self.rows)
@@ -97,8 +105,13 @@ class Panel:
         dr, mi = load_drjit(), load_mitsuba()
         self._light = light
         vectors = (light.centre, light.right, light.up, light.normal)
-        self.centre, self.right, self.up, self.normal = (mi.Vector3f(*np.asarray(vector, float).tolist()) for vector in vectors)
-        self.radiance, self.area = mi.Color3f(*np.asarray(light.radiance, float).tolist()), mi.Float(light.area)
+        self.centre, self.right, self.up, self.normal = (
+            mi.Vector3f(*np.asarray(vector, float).tolist()) for vector in vectors
+        )
+        self.radiance, self.area = (
+            mi.Color3f(*np.asarray(light.radiance, float).tolist()),
+            mi.Float(light.area),
+        )
         dr.make_opaque(self.centre, self.right, self.up, self.normal, self.radiance, self.area)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
@@ -115,7 +128,9 @@ class Panel:
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
         dr = load_drjit()
         del inside
-        return dr.normalize(self.centre + (2 * place.x - 1) * self.right + (2 * place.y - 1) * self.up - position)
+        return dr.normalize(
+            self.centre + (2 * place.x - 1) * self.right + (2 * place.y - 1) * self.up - position
+        )
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
         return unoccluded_panel(self._light, position, normal)
@@ -127,12 +142,21 @@ class Beam:
     def __init__(self, light: DirectionalLight | PointLight) -> None:
         dr, mi = load_drjit(), load_mitsuba()
         self.near = isinstance(light, PointLight)
-        place, strength = (light.position, light.intensity) if isinstance(light, PointLight) else (light.direction, light.irradiance)
-        self.place, self.strength = mi.Vector3f(*np.asarray(place, float).tolist()), mi.Color3f(*np.asarray(strength, float).tolist())
+        place, strength = (
+            (light.position, light.intensity)
+            if isinstance(light, PointLight)
+            else (light.direction, light.irradiance)
+        )
+        self.place, self.strength = (
+            mi.Vector3f(*np.asarray(place, float).tolist()),
+            mi.Color3f(*np.asarray(strength, float).tolist()),
+        )
         dr.make_opaque(self.place, self.strength)
 
     def arriving(self, position: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """The direction toward the light, its distance, and the irradiance (colour) across its beam."""
+        """The direction toward the light, its distance, and the irradiance (colour) across its
+        beam.
+        """
         dr, mi = load_drjit(), load_mitsuba()
         if not self.near:
             return self.place, mi.Float(FAR), self.strength
@@ -150,7 +174,9 @@ def kernel_light(light: Light) -> Any:
 
 
 def _first_above(heap: Lanes, start: Lanes, count: Lanes, value: Lanes) -> Lanes:
-    """The first index of [start, start + count) whose entry in `heap`, rising there, is above `value`; the last one if none is."""
+    """The first index of [start, start + count) whose entry in `heap`, rising there, is above
+    `value`; the last one if none is.
+    """
     dr, mi = load_drjit(), load_mitsuba()
 
     def halve(low: Lanes, high: Lanes) -> tuple[Lanes, Lanes]:
@@ -158,5 +184,9 @@ def _first_above(heap: Lanes, start: Lanes, count: Lanes, value: Lanes) -> Lanes
         above = dr.gather(mi.Float, heap, middle) > value
         return dr.select(above, low, middle + 1), dr.select(above, middle, high)
 
-    low, _ = dr.while_loop((start + 0 * mi.UInt32(value), start + count - 1 + 0 * mi.UInt32(value)), lambda low, high: low < high, halve)
+    low, _ = dr.while_loop(
+        (start + 0 * mi.UInt32(value), start + count - 1 + 0 * mi.UInt32(value)),
+        lambda low, high: low < high,
+        halve,
+    )
     return low

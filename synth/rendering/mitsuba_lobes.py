@@ -1,23 +1,30 @@
-"""Light on a surface by Mitsuba's kernels: body and gloss from the same light paths, for all points at once.
+"""Light on a surface by Mitsuba's kernels: body and gloss from the same light paths, for all points
+at once.
 
-Problem: the radiance that each visible point sends to the camera, the two lobes apart, and the variance of the estimate.
+Problem: the radiance that each visible point sends to the camera, the two lobes apart, and the
+variance of the estimate.
 
-Equation: a directional or point light is summed up as it is. For what fills a solid angle each sample draws two directions, one toward the
-light with the density p and one toward what the lobes reflect with q, and both count as
+Equation: a directional or point light is summed up as it is. For what fills a solid angle each
+sample draws two directions, one toward the light with the density p and one toward what the lobes
+reflect with q, and both count as
 
-    V f_r L cos / (p + q)                                        the balance heuristic; V: nothing stands between
+    V f_r L cos / (p + q)                                        the balance heuristic; V: nothing
+    stands between
 
-The body takes its shading without shadows from a closed form, S, so that only what shadows change is drawn:
-a k S + (V f_r - a k / pi) L cos / (p + q), k = pi f_r with the light along the normal, a the share of the light that gets there. That share
-is estimated by the other half of the samples, so the mean stays right. A convex Lambertian object has no variance, full shadow neither.
-Samples are independent: the variance of a mean is their sum of squares / (n (n - 1)), gathered by Welford's updates.
+The body takes its shading without shadows from a closed form, S, so that only what shadows change
+is drawn: a k S + (V f_r - a k / pi) L cos / (p + q), k = pi f_r with the light along the normal, a
+the share of the light that gets there. That share is estimated by the other half of the samples, so
+the mean stays right. A convex Lambertian object has no variance, full shadow neither. Samples are
+independent: the variance of a mean is their sum of squares / (n (n - 1)), gathered by Welford's
+updates.
 
-Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo rendering", SIGGRAPH 1995,
-doi:10.1145/218380.218498. B. P. Welford, "Note on a method for calculating corrected sums of squares and products", Technometrics 4(3),
-419-420 (1962), doi:10.1080/00401706.1962.10490022. W. Jakob et al., Dr.Jit, 2022, doi:10.1145/3528223.3530099.
+Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
+rendering", SIGGRAPH 1995, doi:10.1145/218380.218498. B. P. Welford, "Note on a method for
+calculating corrected sums of squares and products", Technometrics 4(3), 419-420 (1962),
+doi:10.1080/00401706.1962.10490022. W. Jakob et al., Dr.Jit, 2022, doi:10.1145/3528223.3530099.
 
-Limits: LLVM variants only; float32. Where a rare shadow or glint is met by no sample, neither the mean nor the variance knows of it:
-compare renders of like numbers of samples, or take many.
+Limits: LLVM variants only; float32. Where a rare shadow or glint is met by no sample, neither the
+mean nor the variance knows of it: compare renders of like numbers of samples, or take many.
 """
 
 import math
@@ -46,24 +53,50 @@ _DIVISIBLE = 4  # samples: from so many on each half has a variance of its own
 
 
 def light_surface(
-    surface: Surface, material: Material, lights: tuple[Light, ...], tracer: Tracer, options: RenderOptions, monitor: Monitor
+    surface: Surface,
+    material: Material,
+    lights: tuple[Light, ...],
+    tracer: Tracer,
+    options: RenderOptions,
+    monitor: Monitor,
 ) -> Lit:
-    """Lights the N points of `surface`; see the package. Raises `InputError` where no LLVM variant runs, `Cancelled`."""
+    """Lights the N points of `surface`; see the package.
+
+    Raises `InputError` where no LLVM variant runs, `Cancelled`.
+    """
     if not has_llvm():
-        raise InputError("Mitsuba's kernels need libLLVM 19 or later (Debian's package: libllvm19): install it, or take renderer 'arrays'")
+        raise InputError(
+            "Mitsuba's kernels need libLLVM 19 or later (Debian's package: libllvm19): install it, or take renderer 'arrays'"
+        )
     random = np.random.default_rng(options.seed)
-    world = World(material, [kernel for light in lights if (kernel := kernel_light(light)) is not None], tracer)
+    world = World(
+        material,
+        [kernel for light in lights if (kernel := kernel_light(light)) is not None],
+        tracer,
+    )
     count = len(surface.position)
     pieces = []
     for start in range(0, count, _POINTS):
         end = min(start + _POINTS, count)
-        pieces.append(_light(_piece(surface, slice(start, end)), world, options, random, monitor.part(start / count, end / count)))
-    return Lit(*(np.concatenate([getattr(piece, field.name) for piece in pieces]) for field in fields(Lit)))
+        pieces.append(
+            _light(
+                _piece(surface, slice(start, end)),
+                world,
+                options,
+                random,
+                monitor.part(start / count, end / count),
+            )
+        )
+    return Lit(
+        *(np.concatenate([getattr(piece, field.name) for piece in pieces]) for field in fields(Lit))
+    )
 
 
 def _piece(surface: Surface, chosen: slice) -> Surface:
     """Some of the points of a surface, under the same mask."""
-    paint = Paint(surface.paint.albedo[chosen], surface.paint.strength[chosen], surface.paint.gloss[chosen])
+    paint = Paint(
+        surface.paint.albedo[chosen], surface.paint.strength[chosen], surface.paint.gloss[chosen]
+    )
     return Surface(
         mask=surface.mask,
         position=surface.position[chosen],
@@ -74,11 +107,24 @@ def _piece(surface: Surface, chosen: slice) -> Surface:
     )
 
 
-def _light(surface: Surface, world: World, options: RenderOptions, random: np.random.Generator, monitor: Monitor) -> Lit:
+def _light(
+    surface: Surface,
+    world: World,
+    options: RenderOptions,
+    random: np.random.Generator,
+    monitor: Monitor,
+) -> Lit:
     # Two lanes a point, so that each half of the samples has moments of its own.
     halves = 2 if options.samples >= _DIVISIBLE else 1
-    paint = Paint(*(np.concatenate([part] * halves) for part in (surface.paint.albedo, surface.paint.strength, surface.paint.gloss)))
-    position, normal, view = (np.tile(part, (halves, 1)) for part in (surface.position, surface.normal, surface.view))
+    paint = Paint(
+        *(
+            np.concatenate([part] * halves)
+            for part in (surface.paint.albedo, surface.paint.strength, surface.paint.gloss)
+        )
+    )
+    position, normal, view = (
+        np.tile(part, (halves, 1)) for part in (surface.position, surface.normal, surface.view)
+    )
     points = points_at(position, normal, view, lobes_of(world.material, paint))
     count = len(surface.position)
     total = _dark(count)
@@ -89,10 +135,21 @@ def _light(surface: Surface, world: World, options: RenderOptions, random: np.ra
         if isinstance(light, Beam):
             total = _sum(total, _exact(points, count, light, world.tracer))
         else:
-            gathered = _gather(points, halves * count, light, world.tracer, -(-options.samples // halves), seed, part)
+            gathered = _gather(
+                points,
+                halves * count,
+                light,
+                world.tracer,
+                -(-options.samples // halves),
+                seed,
+                part,
+            )
             total = _sum(total, _joined(gathered.moments(halves), _known(points, surface, light)))
     if options.bounces:
-        total = _sum(total, bounced_light(surface, world, options, random, monitor.part((jobs - 1) / jobs, 1)))
+        total = _sum(
+            total,
+            bounced_light(surface, world, options, random, monitor.part((jobs - 1) / jobs, 1)),
+        )
     monitor.report("light", 1.0)
     return total
 
@@ -107,30 +164,48 @@ def _exact(points: Points, count: int, light: Beam, tracer: Tracer) -> Lit:
 
 
 def _flat(points: Points) -> Lanes:
-    """The albedo of a Lambertian body that is much like the points' own: as theirs, lit along the normal."""
+    """The albedo of a Lambertian body that is much like the points' own: as theirs, lit along the
+    normal.
+    """
     return math.pi * points.lobes.values(points.view, load_mitsuba().Vector3f(0, 0, 1))[0]
 
 
 def _known(points: Points, surface: Surface, light: WideLight) -> np.ndarray:
     """The shading, (N, 3), of such a body without shadows."""
     count = len(surface.position)
-    return light.unoccluded(surface.position, surface.normal) * np.resize(np.array(_flat(points), float), 2 * count)[:count, None]
+    return (
+        light.unoccluded(surface.position, surface.normal)
+        * np.resize(np.array(_flat(points), float), 2 * count)[:count, None]
+    )
 
 
-def _gather(points: Points, lanes: int, light: WideLight, tracer: Tracer, samples: int, seed: int, monitor: Monitor) -> "_Gathered":
+def _gather(
+    points: Points,
+    lanes: int,
+    light: WideLight,
+    tracer: Tracer,
+    samples: int,
+    seed: int,
+    monitor: Monitor,
+) -> "_Gathered":
     flat = _flat(points)
     load_drjit().eval(flat)
     gathered, chunk = _Gathered(lanes, seed), max(1, _AT_ONCE // lanes)
     for start in range(0, samples, chunk):
         monitor.report("light", start / samples)
-        gathered.add(lambda random: one_sample(points, light, tracer, random, flat), min(chunk, samples - start))
+        gathered.add(
+            lambda random: one_sample(points, light, tracer, random, flat),
+            min(chunk, samples - start),
+        )
     return gathered
 
 
 @dataclass(frozen=True)
 class _Moments:
-    """Of `count` samples of (plain, more, gloss), see `one_sample`: (N, 3) each. `means`; `spreads`: sums of squares about the mean;
-    `common`: sum of products of plain and more about their means."""
+    """Of `count` samples of (plain, more, gloss), see `one_sample`: (N, 3) each. `means`;
+    `spreads`: sums of squares about the mean; `common`: sum of products of plain and more about
+    their means.
+    """
 
     count: int
     means: list[np.ndarray]
@@ -149,17 +224,30 @@ class _Moments:
         spread = self.spreads[1] + 2 * drawn * self.common + drawn**2 * self.spreads[0]
         # Where no sample met the light at all, nothing is known of its shadow.
         unmet = np.where(self.means[0] > 0, 0, known**2)
-        return Lit(body, self.means[2], np.maximum(spread, 0) / pairs + unmet, self.spreads[2] / pairs)
+        return Lit(
+            body, self.means[2], np.maximum(spread, 0) / pairs + unmet, self.spreads[2] / pairs
+        )
 
 
 def _joined(parts: list[_Moments], known: np.ndarray) -> Lit:
-    """All parts, each with the share that the other one found; a single one takes all the light as known."""
+    """All parts, each with the share that the other one found; a single one takes all the light as
+    known.
+    """
     total, samples = _dark(len(known)), sum(part.count for part in parts)
     for number, part in enumerate(parts):
         share = parts[1 - number].clear_share() if len(parts) == 2 else np.ones((len(known), 1))
         lit, weight = part.lit(known, share), part.count / samples
-        means, variances = (lit.shading, lit.specular), (lit.shading_variance, lit.specular_variance)
-        total = _sum(total, Lit(*(weight * mean for mean in means), *(weight**2 * variance for variance in variances)))
+        means, variances = (
+            (lit.shading, lit.specular),
+            (lit.shading_variance, lit.specular_variance),
+        )
+        total = _sum(
+            total,
+            Lit(
+                *(weight * mean for mean in means),
+                *(weight**2 * variance for variance in variances),
+            ),
+        )
     return total
 
 
@@ -169,16 +257,22 @@ class _Gathered:
     def __init__(self, lanes: int, seed: int) -> None:
         dr, mi = load_drjit(), load_mitsuba()
         self.random, self.count = generator(lanes, seed), 0
-        self.means, self.spreads = ([dr.zeros(mi.Color3f, lanes) for _ in range(3)] for _ in range(2))
+        self.means, self.spreads = (
+            [dr.zeros(mi.Color3f, lanes) for _ in range(3)] for _ in range(2)
+        )
         self.common = dr.zeros(mi.Color3f, lanes)
         dr.make_opaque(self.means, self.spreads, self.common)
 
     def add(self, estimate: Callable[[Lanes], tuple[Lanes, ...]], samples: int) -> None:
-        """Adds samples of colours that `estimate` makes of random numbers: in one kernel, which does not depend on their number."""
+        """Adds samples of colours that `estimate` makes of random numbers: in one kernel, which
+        does not depend on their number.
+        """
         dr, mi = load_drjit(), load_mitsuba()
         end = dr.opaque(mi.UInt32, self.count + samples)
 
-        def step(k: Lanes, random: Lanes, means: list[Lanes], spreads: list[Lanes], common: Lanes) -> tuple[Lanes, ...]:
+        def step(
+            k: Lanes, random: Lanes, means: list[Lanes], spreads: list[Lanes], common: Lanes
+        ) -> tuple[Lanes, ...]:
             k = k + 1
             values = estimate(random)
             away = [value - mean for value, mean in zip(values, means, strict=True)]
@@ -187,16 +281,32 @@ class _Gathered:
             spreads = [spread + a * b for spread, a, b in zip(spreads, away, left, strict=True)]
             return k, random, means, spreads, common + away[0] * left[1]
 
-        state = (dr.opaque(mi.UInt32, self.count), self.random, self.means, self.spreads, self.common)
-        _, self.random, self.means, self.spreads, self.common = dr.while_loop(state, lambda k, *_: k < end, step)
+        state = (
+            dr.opaque(mi.UInt32, self.count),
+            self.random,
+            self.means,
+            self.spreads,
+            self.common,
+        )
+        _, self.random, self.means, self.spreads, self.common = dr.while_loop(
+            state, lambda k, *_: k < end, step
+        )
         dr.eval(self.random, self.means, self.spreads, self.common)
         self.count += samples
 
     def moments(self, halves: int) -> list[_Moments]:
         """What came in so far, of each half of the lanes."""
-        means, spreads = ([np.split(rows_of(part), halves) for part in parts] for parts in (self.means, self.spreads))
+        means, spreads = (
+            [np.split(rows_of(part), halves) for part in parts]
+            for parts in (self.means, self.spreads)
+        )
         common = np.split(rows_of(self.common), halves)
-        return [_Moments(self.count, [part[k] for part in means], [part[k] for part in spreads], common[k]) for k in range(halves)]
+        return [
+            _Moments(
+                self.count, [part[k] for part in means], [part[k] for part in spreads], common[k]
+            )
+            for k in range(halves)
+        ]
 
 
 def _sum(a: Lit, b: Lit) -> Lit:

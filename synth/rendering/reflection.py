@@ -1,12 +1,14 @@
 """What a material reflects at many points at once, and the directions in which it does so most.
 
-Equation: body and gloss as `synth.materials` says. Directions are drawn from the gloss, matt materials' by the cosine (density cos / pi):
-Blinn-Phong's half vectors have the density (p + 1) / (2 pi) cos^p, those of GGX facets that of the facets that the viewer sees,
-D G1(view) (view . h) / cos_view; a half vector stands for a light direction of 1 / (4 view . h) times its density.
+Equation: body and gloss as `synth.materials` says. Directions are drawn from the gloss, matt
+materials' by the cosine (density cos / pi): Blinn-Phong's half vectors have the density (p + 1) /
+(2 pi) cos^p, those of GGX facets that of the facets that the viewer sees, D G1(view) (view . h) /
+cos_view; a half vector stands for a light direction of 1 / (4 view . h) times its density.
 
-Citation: B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet models for refraction through rough surfaces", EGSR 2007, 195-206,
-doi:10.2312/EGWR/EGSR07/195-206; J. Dupuy, A. Benyoub, "Sampling visible GGX normals with spherical caps", Computer Graphics Forum 42(8),
-e14867 (2023), doi:10.1111/cgf.14867.
+Citation: B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet models for refraction
+through rough surfaces", EGSR 2007, 195-206, doi:10.2312/EGWR/EGSR07/195-206; J. Dupuy, A. Benyoub,
+"Sampling visible GGX normals with spherical caps", Computer Graphics Forum 42(8), e14867 (2023),
+doi:10.1111/cgf.14867.
 
 Limits: those of the lobes. Drawn directions may lie below the horizon, where nothing is reflected.
 """
@@ -26,8 +28,9 @@ from .rough_plastic import RoughPlastic
 
 @dataclass(frozen=True)
 class Points:
-    """N points of a surface, each seen from one direction. `position`, `normal`, `view`: (N, 3), as in `Surface`. `strength`, `gloss`: (N,)
-    of the material there."""
+    """N points of a surface, each seen from one direction. `position`, `normal`, `view`: (N, 3), as
+    in `Surface`. `strength`, `gloss`: (N,) of the material there.
+    """
 
     position: np.ndarray
     normal: np.ndarray
@@ -58,7 +61,9 @@ class Reflection:
             self._plastic = RoughPlastic(float(material.gloss), material.ior)
 
     def body(self, points: Points, light: np.ndarray) -> np.ndarray:
-        """f_r (N,) in 1/sr of the body for albedo 1, lit from the unit directions (N, 3), all above the horizon."""
+        """f_r (N,) in 1/sr of the body for albedo 1, lit from the unit directions (N, 3), all above
+        the horizon.
+        """
         if self._model == "oren_nayar":
             return OrenNayar(1.0, self._sigma).value(points.normal, points.view, light)
         if self._model == "roughplastic":
@@ -66,17 +71,25 @@ class Reflection:
         return np.full(len(points), 1 / np.pi)
 
     def gloss(self, points: Points, light: np.ndarray) -> np.ndarray:
-        """f_r (N,) in 1/sr of the gloss with its strength, lit from the unit directions (N, 3), all above the horizon."""
+        """f_r (N,) in 1/sr of the gloss with its strength, lit from the unit directions (N, 3), all
+        above the horizon.
+        """
         if self.matt or not len(points):
             return np.zeros(len(points))
         if self._model == "blinn_phong":
-            return BlinnPhong(points.strength, points.gloss, "normalised").value(points.normal, points.view, light)
+            return BlinnPhong(points.strength, points.gloss, "normalised").value(
+                points.normal, points.view, light
+            )
         if self._model == "ggx":
-            return points.strength * Ggx(points.gloss, self._f0).value(points.normal, points.view, light)
+            return points.strength * Ggx(points.gloss, self._f0).value(
+                points.normal, points.view, light
+            )
         return self._plastic.gloss(points.normal, points.view, light)
 
     def draw(self, rng: np.random.Generator, points: Points, count: int) -> np.ndarray:
-        """`count` unit directions (N, count, 3) for each point, as the gloss reflects; by the cosine for matt materials."""
+        """`count` unit directions (N, count, 3) for each point, as the gloss reflects; by the
+        cosine for matt materials.
+        """
         if self.matt:
             return cosine_directions(rng, points, count)
         first, turn = rng.random((2, len(points), count))
@@ -86,16 +99,26 @@ class Reflection:
         if self._model == "blinn_phong":
             half = _upright(first ** (1 / (points.gloss[:, None] + 1)), turn) @ frame
         else:
-            half = _visible_facets(first, turn, np.einsum("nij,nj->ni", frame, points.view), points.gloss) @ frame
+            half = (
+                _visible_facets(
+                    first, turn, np.einsum("nij,nj->ni", frame, points.view), points.gloss
+                )
+                @ frame
+            )
         return 2 * np.einsum("...i,...i->...", view, half)[..., None] * half - view
 
     def density(self, points: Points, light: np.ndarray) -> np.ndarray:
-        """Per steradian (N,), how densely `draw` picks the unit directions (N, 3), all above the horizon."""
+        """Per steradian (N,), how densely `draw` picks the unit directions (N, 3), all above the
+        horizon.
+        """
         if self.matt:
             return cosine_density(points, light)
         half = points.view + light
         half /= np.sqrt(_dot(half, half))[:, None]
-        cosine, deviation = np.clip(_dot(points.normal, half), 0, 1), np.maximum(_dot(points.view, half), 1e-9)
+        cosine, deviation = (
+            np.clip(_dot(points.normal, half), 0, 1),
+            np.maximum(_dot(points.view, half), 1e-9),
+        )
         if self._model == "blinn_phong":
             return (points.gloss + 1) / (8 * np.pi) * cosine**points.gloss / deviation
         toward = np.clip(_dot(points.normal, points.view), 1e-9, 1)
@@ -119,9 +142,12 @@ def _upright(cosine: np.ndarray, turn: np.ndarray) -> np.ndarray:
     return np.stack([across * np.cos(turn), across * np.sin(turn), cosine], -1)
 
 
-def _visible_facets(first: np.ndarray, turn: np.ndarray, view: np.ndarray, alpha: np.ndarray) -> np.ndarray:
-    """Half vectors (N, count, 3) in the frame of each normal, for views (N, 3) there: on facets stretched to a sphere the viewer sees a cap
-    whose directions, halved with the view, are even."""
+def _visible_facets(
+    first: np.ndarray, turn: np.ndarray, view: np.ndarray, alpha: np.ndarray
+) -> np.ndarray:
+    """Half vectors (N, count, 3) in the frame of each normal, for views (N, 3) there: on facets
+    stretched to a sphere the viewer sees a cap whose directions, halved with the view, are even.
+    """
     stretch = np.stack([alpha, alpha, np.ones_like(alpha)], -1)
     seen = view * stretch
     seen = (seen / np.linalg.norm(seen, axis=1, keepdims=True))[:, None]

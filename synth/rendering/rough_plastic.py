@@ -1,17 +1,22 @@
 """Mitsuba's rough plastic, in plain arrays: a matt body under a rough dielectric interface.
 
-Equation: f_r = albedo g(cos_view) g(cos_light) / pi + F D G / (4 cos_view cos_light). D, G: GGX facets and Smith's separable shadowing as
-in `isc_core.brdf.ggx`; F: the exact Fresnel term of unpolarised light at a dielectric, for the angle between view and half vector,
+Equation: f_r = albedo g(cos_view) g(cos_light) / pi + F D G / (4 cos_view cos_light). D, G: GGX
+facets and Smith's separable shadowing as in `isc_core.brdf.ggx`; F: the exact Fresnel term of
+unpolarised light at a dielectric, for the angle between view and half vector,
 
-    F = (r_s^2 + r_p^2) / 2,   r_s = (c - n t) / (c + n t),   r_p = (n c - t) / (n c + t),   t = sqrt(1 - (1 - c^2) / n^2)
+    F = (r_s^2 + r_p^2) / 2,   r_s = (c - n t) / (c + n t),   r_p = (n c - t) / (n c + t),   t =
+    sqrt(1 - (1 - c^2) / n^2)
 
-g, what the interface lets through on the way in or out with light between body and interface shared evenly between both, is a table over
-the cosine that Mitsuba integrates; it is read off its own plugin, at the table's knots.
+g, what the interface lets through on the way in or out with light between body and interface shared
+evenly between both, is a table over the cosine that Mitsuba integrates; it is read off its own
+plugin, at the table's knots.
 
-Citation: B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet models for refraction through rough surfaces", EGSR 2007, 195-206,
-doi:10.2312/EGWR/EGSR07/195-206; W. Jakob et al., "Mitsuba 3 renderer", 2022, https://mitsuba-renderer.org (the plastic).
+Citation: B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet models for refraction
+through rough surfaces", EGSR 2007, 195-206, doi:10.2312/EGWR/EGSR07/195-206; W. Jakob et al.,
+"Mitsuba 3 renderer", 2022, https://mitsuba-renderer.org (the plastic).
 
-Limits: `nonlinear` off: colour does not saturate where light returns to the body more than once. One alpha for the whole object.
+Limits: `nonlinear` off: colour does not saturate where light returns to the body more than once.
+One alpha for the whole object.
 """
 
 import numpy as np
@@ -25,16 +30,24 @@ _KNOTS = 64  # of Mitsuba's own table, evenly spaced in the cosine
 
 
 class RoughPlastic:
-    """`alpha`: width of the facets' slopes, in [.01, 1]. `ior`: index of refraction, above 1. Raises `InputError` without Mitsuba."""
+    """`alpha`: width of the facets' slopes, in [.01, 1].
+
+    `ior`: index of refraction, above 1. Raises `InputError` without Mitsuba.
+    """
 
     def __init__(self, alpha: float, ior: float) -> None:
         self._alpha, self._ior = alpha, ior
         self._cosines, self._through = _transmission(alpha, ior)
 
     def body(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr of the body of albedo 1, for unit vectors (..., 3); 0 below the horizon."""
+        """f_r (...) in 1/sr of the body of albedo 1, for unit vectors (..., 3); 0 below the
+        horizon.
+        """
         angles = cosines(normal, view, light)
-        way_in, way_out = (np.interp(cosine, self._cosines, self._through) for cosine in (angles.light, angles.view))
+        way_in, way_out = (
+            np.interp(cosine, self._cosines, self._through)
+            for cosine in (angles.light, angles.view)
+        )
         return np.where(angles.lit, way_in * way_out / np.pi, 0)
 
     def gloss(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
@@ -44,7 +57,9 @@ class RoughPlastic:
 
 
 def fresnel(cosine: np.ndarray, ior: float) -> np.ndarray:
-    """The share (...) of unpolarised light that a dielectric of index `ior` > 1 mirrors, met from outside at a cosine in [0, 1]."""
+    """The share (...) of unpolarised light that a dielectric of index `ior` > 1 mirrors, met from
+    outside at a cosine in [0, 1].
+    """
     inside = np.sqrt(1 - (1 - np.square(cosine)) / ior**2)
     across = (cosine - ior * inside) / (cosine + ior * inside)
     along = (ior * cosine - inside) / (ior * cosine + inside)
@@ -55,7 +70,13 @@ def _transmission(alpha: float, ior: float) -> tuple[np.ndarray, np.ndarray]:
     """The cosines of the table's knots and g there: pi f_body(c, 1) = g(c) g(1)."""
     mi = load_mitsuba()
     white = {"type": "rgb", "value": 1.0}
-    facets = {"type": "roughplastic", "distribution": "ggx", "alpha": alpha, "int_ior": ior, "ext_ior": 1.0}
+    facets = {
+        "type": "roughplastic",
+        "distribution": "ggx",
+        "alpha": alpha,
+        "int_ior": ior,
+        "ext_ior": 1.0,
+    }
     plastic = mi.load_dict({**facets, "nonlinear": False, "diffuse_reflectance": white})
     context = mi.BSDFContext()
     context.type_mask = mi.BSDFFlags.DiffuseReflection

@@ -1,8 +1,8 @@
 """Random objects of known shape, one family a file; `make_shape` makes one by its family's name.
 
-Every mesh is in object units and in the camera's frame (x right, y up, z toward the viewer), posed as a photographer would, centred, and
-as wide or high as 2, whichever is larger. Vertex normals are unit, outward and smooth; texture coordinates have no seam on the side that
-the viewer sees.
+Every mesh is in object units and in the camera's frame (x right, y up, z toward the viewer), posed
+as a photographer would, centred, and as wide or high as 2, whichever is larger. Vertex normals are
+unit, outward and smooth; texture coordinates have no seam on the side that the viewer sees.
 """
 
 from collections.abc import Callable
@@ -31,7 +31,8 @@ SHAPES: tuple[str, ...] = tuple(_MAKERS)
 
 
 def make_shape(name: str, rng: np.random.Generator) -> Mesh:
-    """A random object of the family `name`, one of `SHAPES`; the same state of `rng` gives the same mesh.
+    """A random object of the family `name`, one of `SHAPES`; the same state of `rng` gives the same
+    mesh.
 
     Raises `InputError` for an unknown name.
     """

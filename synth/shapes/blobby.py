@@ -1,10 +1,14 @@
-"""Blobby objects: a few soft ellipsoids that flow into each other, such as pebbles, knuckles, toy animals, jacks.
+"""Blobby objects: a few soft ellipsoids that flow into each other, such as pebbles, knuckles, toy
+animals, jacks.
 
-Equation: sum_i exp(B (1 - q_i(p))) = 1 with q_i(p) = |A_i (p - c_i)|^2, the squared distance from the i-th centre in units of its radius.
-Each ellipsoid holds the origin (q_i(0) < 1). Along a ray from the origin every term is above 1 until the ray leaves its ellipsoid and
-falls from then on, so that the sum is 1 exactly once: the surface is star-shaped. Newton's method on the logarithm finds it.
+Equation: sum_i exp(B (1 - q_i(p))) = 1 with q_i(p) = |A_i (p - c_i)|^2, the squared distance from
+the i-th centre in units of its radius. Each ellipsoid holds the origin (q_i(0) < 1). Along a ray
+from the origin every term is above 1 until the ray leaves its ellipsoid and falls from then on, so
+that the sum is 1 exactly once: the surface is star-shaped. Newton's method on the logarithm finds
+it.
 
-Citation: J. F. Blinn, "A generalization of algebraic surface drawing", ACM Transactions on Graphics 1(3) (1982), doi:10.1145/357306.357310.
+Citation: J. F. Blinn, "A generalization of algebraic surface drawing", ACM Transactions on Graphics
+1(3) (1982), doi:10.1145/357306.357310.
 
 Limits: no holes, no limb that hides another from the origin.
 """
@@ -25,8 +29,9 @@ _STEPS = 8
 
 @dataclass(frozen=True)
 class Blobs:
-    """`centres`: (n, 3). `shapes`: (n, 3, 3), A_i: what makes the i-th ellipsoid, moved to the origin, a unit ball; |A_i c_i| < 1.
-    `blobbiness`: B > 0, the larger the less they flow together."""
+    """`centres`: (n, 3). `shapes`: (n, 3, 3), A_i: what makes the i-th ellipsoid, moved to the
+    origin, a unit ball; |A_i c_i| < 1. `blobbiness`: B > 0, the larger the less they flow together.
+    """
 
     centres: np.ndarray
     shapes: np.ndarray
@@ -67,8 +72,19 @@ def blobby(rng: np.random.Generator) -> Mesh:
     width = length * rng.uniform(0.5, 1.0, count)
     centres = towards * (length * rng.uniform(0.55, 0.9, count))[:, None]
     turns = [Rotation.align_vectors([toward], [(0, 0, 1)])[0].as_matrix() for toward in towards]
-    shapes = np.stack([np.diag([1 / w, 1 / w, 1 / l]) @ turn.T for turn, w, l in zip(turns, width, length, strict=True)])
-    return posed(Blobs(centres, shapes, np.exp(rng.uniform(np.log(1.2), np.log(5)))).mesh(), rng, (0, 25), 30, 15)
+    shapes = np.stack(
+        [
+            np.diag([1 / w, 1 / w, 1 / l]) @ turn.T
+            for turn, w, l in zip(turns, width, length, strict=True)
+        ]
+    )
+    return posed(
+        Blobs(centres, shapes, np.exp(rng.uniform(np.log(1.2), np.log(5)))).mesh(),
+        rng,
+        (0, 25),
+        30,
+        15,
+    )
 
 
 def _spread(candidates: np.ndarray, count: int) -> np.ndarray:

@@ -1,8 +1,10 @@
 """Displaced spheres: pebbles, potatoes, pumpkins, dented and crumpled balls.
 
-Equation: the radius in the direction d is exp(h(d)), h a sum of smooth random functions, of creases -|f|, and of ribs.
+Equation: the radius in the direction d is exp(h(d)), h a sum of smooth random functions, of creases
+-|f|, and of ribs.
 
-Citation: R. L. Cook, "Shade trees", Computer Graphics 18(3) (1984), doi:10.1145/800031.808602 (displacement).
+Citation: R. L. Cook, "Shade trees", Computer Graphics 18(3) (1984), doi:10.1145/800031.808602
+(displacement).
 
 Limits: star-shaped: nothing overhangs as seen from the middle. Normals are those of the mesh.
 """
@@ -24,25 +26,44 @@ def displaced(rng: np.random.Generator) -> Mesh:
     directions, faces = sphere_grid()
     height = displacement(directions, rng, str(rng.choice(STYLES)))
     vertices = directions * np.exp(height)[:, None] * (1, rng.uniform(0.75, 1.1), 1)
-    return posed(Mesh(vertices, vertex_normals(vertices, faces), from_directions(directions), faces), rng, (5, 30), 30, 10)
+    return posed(
+        Mesh(vertices, vertex_normals(vertices, faces), from_directions(directions), faces),
+        rng,
+        (5, 30),
+        30,
+        10,
+    )
 
 
 def displacement(directions: np.ndarray, rng: np.random.Generator, style: str) -> np.ndarray:
     """The logarithm of the radius (N,) in the unit directions (N, 3), of one of `STYLES`."""
     broad = 0.1 * smooth_field(directions, rng, 0.25)
     if style == "gentle":
-        return broad + rng.uniform(0.06, 0.14) * smooth_field(directions, rng, rng.uniform(0.3, 0.5))
+        return broad + rng.uniform(0.06, 0.14) * smooth_field(
+            directions, rng, rng.uniform(0.3, 0.5)
+        )
     if style == "lumpy":
-        return broad + rng.uniform(0.035, 0.07) * smooth_field(directions, rng, rng.uniform(0.7, 1.3))
+        return broad + rng.uniform(0.035, 0.07) * smooth_field(
+            directions, rng, rng.uniform(0.7, 1.3)
+        )
     if style == "dented":
         return broad + _dents(directions, rng, int(rng.integers(6, 25)))
     if style == "crumpled":
         scales = rng.uniform(0.35, 0.5) * 1.6 ** np.arange(4)
-        return 0.6 * broad + sum(0.05 / (1 + i) * ridged(smooth_field(directions, rng, f), 6) for i, f in enumerate(scales))
+        return 0.6 * broad + sum(
+            0.05 / (1 + i) * ridged(smooth_field(directions, rng, f), 6)
+            for i, f in enumerate(scales)
+        )
     if style == "wrinkled":
-        warp = directions + 0.12 * np.stack([smooth_field(directions, rng, 0.6) for _ in range(3)], -1)
+        warp = directions + 0.12 * np.stack(
+            [smooth_field(directions, rng, 0.6) for _ in range(3)], -1
+        )
         stretched = warp * np.where(np.arange(3) == rng.integers(3), 2.5, 0.7)
-        return broad + 0.018 * smooth_field(stretched, rng, 1.1) + 0.03 * ridged(smooth_field(warp, rng, 0.5), 5)
+        return (
+            broad
+            + 0.018 * smooth_field(stretched, rng, 1.1)
+            + 0.03 * ridged(smooth_field(warp, rng, 0.5), 5)
+        )
     return 0.4 * broad + _ribs(directions, rng)
 
 
@@ -62,4 +83,6 @@ def _ribs(directions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     belly = np.hypot(x, z)
     turn = np.arctan2(x, z) + rng.uniform(0, np.pi) + 0.15 * smooth_field(directions, rng, 0.3)
     ribs = np.hypot(np.cos(count / 2 * turn), 0.2) - 1
-    return depth * ribs * belly**2 / (belly**2 + 0.05) - rng.uniform(0.1, 0.35) * np.exp(-((belly / 0.35) ** 2)) * np.abs(y)
+    return depth * ribs * belly**2 / (belly**2 + 0.05) - rng.uniform(0.1, 0.35) * np.exp(
+        -((belly / 0.35) ** 2)
+    ) * np.abs(y)

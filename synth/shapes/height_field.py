@@ -1,14 +1,17 @@
 """A measured or drawn height map as a mesh that the camera sees pixel by pixel as it was.
 
-Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s, y = (H / 2 - r - 1/2) / s and
-z = (height - offset) / s, with s pixels a unit: the mapping of `synth.camera.Camera(W, H, s)`, bit by bit. A vertex stands at each centre,
-with the normal (-dh/dx, -dh/dy, 1) of central differences (one-sided at the rim), and one at each corner of a pixel, at the mean of what
-the pixels around it foretell; so the mesh covers exactly the pixels that have a height.
+Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s, y = (H
+/ 2 - r - 1/2) / s and z = (height - offset) / s, with s pixels a unit: the mapping of
+`synth.camera.Camera(W, H, s)`, bit by bit. A vertex stands at each centre, with the normal (-dh/dx,
+-dh/dy, 1) of central differences (one-sided at the rim), and one at each corner of a pixel, at the
+mean of what the pixels around it foretell; so the mesh covers exactly the pixels that have a
+height.
 
-Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading", doi:10.1109/TPAMI.2014.2377712 (the heights of
-the MIT-Berkeley objects, `Z.mat`).
+Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
+doi:10.1109/TPAMI.2014.2377712 (the heights of the MIT-Berkeley objects, `Z.mat`).
 
-Limits: one side only, open at the rim and behind. Steps between neighbouring pixels become steep walls, not gaps.
+Limits: one side only, open at the rim and behind. Steps between neighbouring pixels become steep
+walls, not gaps.
 """
 
 from dataclasses import dataclass
@@ -24,7 +27,8 @@ from synth.camera import LARGEST, SMALLEST, Camera
 from synth.meshes import Mesh
 
 FEWEST = 64  # pixels with a height
-_DEEPEST = 20.0  # of the range of heights to the larger side of the object: beyond it the unit is not the pixel
+# of the range of heights to the larger side of the object: beyond it the unit is not the pixel
+_DEEPEST = 20.0
 _READERS = {".mat": "a MATLAB file", ".npy": "a NumPy array", ".exr": "an OpenEXR file"}
 # Around a pixel's centre, counter-clockwise from the upper left: rows down, columns to the right.
 _CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
@@ -32,8 +36,10 @@ _CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 @dataclass(frozen=True)
 class HeightField:
-    """`mesh`: in the camera's frame. `pixels_per_unit`: s; `width`, `height`: of the map in pixels; `offset`: pixels, the height at
-    z = 0, so that height = z * pixels_per_unit + offset. The object's larger side is 2 units long; it lies where it lies in the map."""
+    """`mesh`: in the camera's frame. `pixels_per_unit`: s; `width`, `height`: of the map in pixels;
+    `offset`: pixels, the height at z = 0, so that height = z * pixels_per_unit + offset. The
+    object's larger side is 2 units long; it lies where it lies in the map.
+    """
 
     mesh: Mesh
     pixels_per_unit: float
@@ -50,8 +56,9 @@ class HeightField:
 def read_height(path: str | Path) -> np.ndarray:
     """A height map (H, W) float64, pixels toward the viewer, NaN outside the object.
 
-    Of a .mat file the variable `depth`; of an .npy file the array; of an .exr file the channel `height.Z`, `Z`, `Y` or the only one, where
-    `mask.A`, if there is one, is at least one half. Raises `InputError` for what cannot be read or cannot be a height map.
+    Of a .mat file the variable `depth`; of an .npy file the array; of an .exr file the channel
+    `height.Z`, `Z`, `Y` or the only one, where `mask.A`, if there is one, is at least one half.
+    Raises `InputError` for what cannot be read or cannot be a height map.
     """
     path = Path(path)
     if path.suffix.lower() not in _READERS:
@@ -63,26 +70,38 @@ def read_height(path: str | Path) -> np.ndarray:
 
 
 def check_height(height: np.ndarray, what: str = "this height map") -> np.ndarray:
-    """The map as float64, NaN where it is not finite. Raises `InputError`, which names it by `what`, where it is no map, too small
-    or large, empty, or too deep."""
+    """The map as float64, NaN where it is not finite. Raises `InputError`, which names it by
+    `what`, where it is no map, too small or large, empty, or too deep.
+    """
     height = np.asarray(height)
     if height.ndim != 2 or height.dtype.kind not in "fiu":
-        raise InputError(f"{what}: heights are a picture of numbers (H, W), these have shape {height.shape} of {height.dtype}")
+        raise InputError(
+            f"{what}: heights are a picture of numbers (H, W), these have shape {height.shape} of {height.dtype}"
+        )
     if not all(SMALLEST <= side <= LARGEST for side in height.shape):
         size = f"{height.shape[1]} x {height.shape[0]}"
-        raise InputError(f"{what}: {size} pixels cannot be rendered, {SMALLEST} to {LARGEST} a side can: crop or resize it")
+        raise InputError(
+            f"{what}: {size} pixels cannot be rendered, {SMALLEST} to {LARGEST} a side can: crop or resize it"
+        )
     height = np.where(np.isfinite(height), height, np.nan).astype(np.float64)
     known = np.isfinite(height)
     if known.sum() < FEWEST:
-        raise InputError(f"{what}: {known.sum()} pixels have a height, {FEWEST} at least are needed: NaN stands for outside only")
+        raise InputError(
+            f"{what}: {known.sum()} pixels have a height, {FEWEST} at least are needed: NaN stands for outside only"
+        )
     deep, side = np.ptp(height[known]), max(_extents(known))
     if deep > _DEEPEST * side:
-        raise InputError(f"{what}: heights range over {deep:.4g} pixels, the object is {side} wide: give them in pixels, NaN outside")
+        raise InputError(
+            f"{what}: heights range over {deep:.4g} pixels, the object is {side} wide: give them in pixels, NaN outside"
+        )
     return height
 
 
 def place_height(height: np.ndarray) -> HeightField:
-    """A height map (H, W), pixels toward the viewer, NaN outside, as a mesh and its camera. Raises `InputError` as `check_height` does."""
+    """A height map (H, W), pixels toward the viewer, NaN outside, as a mesh and its camera.
+
+    Raises `InputError` as `check_height` does.
+    """
     height = check_height(height)
     known = np.isfinite(height)
     rows, columns = height.shape
@@ -93,7 +112,9 @@ def place_height(height: np.ndarray) -> HeightField:
     normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
     corner_height, corner_normals = _corners(height, across, down, normals)
     corner = np.isfinite(corner_height)
-    corner_normals = corner_normals[corner] / np.linalg.norm(corner_normals[corner], axis=-1, keepdims=True)
+    corner_normals = corner_normals[corner] / np.linalg.norm(
+        corner_normals[corner], axis=-1, keepdims=True
+    )
 
     def vertices(values: np.ndarray, where: np.ndarray, half: float) -> np.ndarray:
         row, column = np.nonzero(where)
@@ -119,7 +140,9 @@ def _extents(known: np.ndarray) -> tuple[int, int]:
 
 
 def _slopes(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Height a pixel to the right and down (H, W): the mean of the differences to the neighbours that are known, 0 where there are none."""
+    """Height a pixel to the right and down (H, W): the mean of the differences to the neighbours
+    that are known, 0 where there are none.
+    """
     slopes = []
     for axis in (1, 0):
         step = np.diff(height, axis=axis)
@@ -132,8 +155,12 @@ def _slopes(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return slopes[0], slopes[1]
 
 
-def _corners(height: np.ndarray, across: np.ndarray, down: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Heights (H + 1, W + 1), NaN away from the object, and normals (H + 1, W + 1, 3), not yet of length 1, at the pixels' corners."""
+def _corners(
+    height: np.ndarray, across: np.ndarray, down: np.ndarray, normals: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Heights (H + 1, W + 1), NaN away from the object, and normals (H + 1, W + 1, 3), not yet of
+    length 1, at the pixels' corners.
+    """
     rows, columns = height.shape
     known = np.isfinite(height)
     count, total = np.zeros((rows + 1, columns + 1)), np.zeros((rows + 1, columns + 1))
@@ -157,7 +184,9 @@ def _fans(known: np.ndarray, corner: np.ndarray) -> np.ndarray:
 
 
 def _coordinates(where: np.ndarray, known: np.ndarray, half: float) -> np.ndarray:
-    """Texture coordinates of centres (`half` 0.5) or corners (0): the box around the object, centred, its larger side filling [0, 1]."""
+    """Texture coordinates of centres (`half` 0.5) or corners (0): the box around the object,
+    centred, its larger side filling [0, 1].
+    """
     row, column = np.nonzero(known)
     middle = np.array([column.min() + column.max() + 1, row.min() + row.max() + 1]) / 2
     r, c = np.nonzero(where)
@@ -171,14 +200,20 @@ def _read_mat(path: Path) -> np.ndarray:
 def _read_npy(path: Path) -> np.ndarray:
     with path.open("rb") as file:
         if file.read(2) == ARCHIVE:
-            raise InputError(f"{path} holds several arrays: save the height map alone with numpy.save")
+            raise InputError(
+                f"{path} holds several arrays: save the height map alone with numpy.save"
+            )
     return read_array(path)
 
 
 def _read_exr(path: Path) -> np.ndarray:
     channels = read_channels(path)
-    names = [name for name in ("height.Z", "Z", "Y") if name in channels] or list(channels)[: len(channels) == 1]
+    names = [name for name in ("height.Z", "Z", "Y") if name in channels] or list(channels)[
+        : len(channels) == 1
+    ]
     if not names:
-        raise InputError(f"{path} has no channel height.Z, Z or Y, but {', '.join(channels)}: keep one of these names for the heights")
+        raise InputError(
+            f"{path} has no channel height.Z, Z or Y, but {', '.join(channels)}: keep one of these names for the heights"
+        )
     height = channels[names[0]]
     return np.where(channels["mask.A"] >= 0.5, height, np.nan) if "mask.A" in channels else height

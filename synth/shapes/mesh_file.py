@@ -1,14 +1,16 @@
 """A user's mesh and its colours, from a file that trimesh reads.
 
-Equation: vertices in one place are one; face corners around it are smooth together where the faces beside each other meet at less than
-`CREASE`; the normal is the sum over such a group of the faces' normals,
-each times the face's angle there. Colours that are no single texture within [0, 1] are
+Equation: vertices in one place are one; face corners around it are smooth together where the faces
+beside each other meet at less than `CREASE`; the normal is the sum over such a group of the faces'
+normals, each times the face's angle there. Colours that are no single texture within [0, 1] are
 painted on one, as seen from the front.
 
-Citation: M. Dawson-Haggerty et al., trimesh (2019), https://trimesh.org; glTF 2.0 (ISO/IEC 12113:2022) for what its colours mean.
+Citation: M. Dawson-Haggerty et al., trimesh (2019), https://trimesh.org; glTF 2.0 (ISO/IEC
+12113:2022) for what its colours mean.
 
-Limits: the file's own normals, transparency and other maps are not used. The frame is kept: y has to be up, +z toward the viewer, as in
-glTF. Only files in the mesh's own folder, or below it, are opened.
+Limits: the file's own normals, transparency and other maps are not used. The frame is kept: y has
+to be up, +z toward the viewer, as in glTF. Only files in the mesh's own folder, or below it, are
+opened.
 """
 
 import io
@@ -45,17 +47,34 @@ _DEEPEST, _FARTHEST = 10_000, 1e6  # of the width; of texture coordinates
 _UNREADABLE = "model.gltf"  # what trimesh asks for where a glTF file is not JSON
 _NO_COLOUR = (102, 102, 102)  # what trimesh gives a material that names none
 PAINTED = 768  # pixels a side of a painted texture
-# A loader trips over whatever a damaged file makes it believe, over variables that it never set, too.
+# A loader trips over whatever a damaged file makes it believe, over variables that it never set,
+# too.
 _ERRORS = (
-    OSError, ValueError, LookupError, TypeError, AttributeError, NameError, ArithmeticError, NotImplementedError, EOFError, AssertionError,
-    SyntaxError, ImportError, RecursionError, MemoryError, struct.error, zlib.error, Image.DecompressionBombError,
-)  # fmt: skip
+    OSError,
+    ValueError,
+    LookupError,
+    TypeError,
+    AttributeError,
+    NameError,
+    ArithmeticError,
+    NotImplementedError,
+    EOFError,
+    AssertionError,
+    SyntaxError,
+    ImportError,
+    RecursionError,
+    MemoryError,
+    struct.error,
+    zlib.error,
+    Image.DecompressionBombError,
+)
 
 
 @dataclass(frozen=True)
 class MeshFile:
-    """`mesh`: centred, its larger x or y extent 2. `albedo`: (h, w, 3) texture for its `uv`, linear in [0, 1], or None where the file has
-    no colours."""
+    """`mesh`: centred, its larger x or y extent 2. `albedo`: (h, w, 3) texture for its `uv`, linear
+    in [0, 1], or None where the file has no colours.
+    """
 
     mesh: Mesh
     albedo: np.ndarray | None
@@ -63,8 +82,9 @@ class MeshFile:
 
 @dataclass(frozen=True)
 class _Part:
-    """One piece of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as `Mesh` has them or None, `texture` (h, w, 3) or None,
-    `colours` (N, 3) or None; linear."""
+    """One piece of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as `Mesh` has them or
+    None, `texture` (h, w, 3) or None, `colours` (N, 3) or None; linear.
+    """
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -74,7 +94,10 @@ class _Part:
 
 
 class _Beside:
-    """The files that a mesh file may ask for: those in its own folder and below. Remembers what was asked for in vain."""
+    """The files that a mesh file may ask for: those in its own folder and below.
+
+    Remembers what was asked for in vain.
+    """
 
     def __init__(self, path: Path) -> None:
         self.folder = path.resolve().parent
@@ -106,16 +129,20 @@ def read_mesh(path: str | Path) -> Mesh:
 
 
 def read_mesh_file(path: str | Path, painted: int = PAINTED) -> MeshFile:
-    """A closed mesh and its base colour; `painted`: pixels a side of a texture that has to be made for it.
+    """A closed mesh and its base colour; `painted`: pixels a side of a texture that has to be made
+    for it.
 
-    Raises `InputError` for a file that is absent, unreadable, empty, huge, or refers to a file that is missing or outside its folder, and
-    for a mesh that is open, turned inconsistently, without volume, or has places that are not finite.
+    Raises `InputError` for a file that is absent, unreadable, empty, huge, or refers to a file that
+    is missing or outside its folder, and for a mesh that is open, turned inconsistently, without
+    volume, or has places that are not finite.
     """
     path = Path(path)
     parts = _read_parts(path)
     vertices = np.concatenate([part.vertices for part in parts])
     starts = np.cumsum([0] + [len(part.vertices) for part in parts])
-    faces = np.concatenate([part.faces + start for part, start in zip(parts, starts[:-1], strict=True)])
+    faces = np.concatenate(
+        [part.faces + start for part, start in zip(parts, starts[:-1], strict=True)]
+    )
     vertices, faces, place = _sound(path, vertices, faces)
     corners, normals = _smooth_corners(vertices, faces, place)
     lone = parts[0] if len(parts) == 1 else None
@@ -124,7 +151,9 @@ def read_mesh_file(path: str | Path, painted: int = PAINTED) -> MeshFile:
     else:
         uv = from_the_front(vertices)
         albedo = _painted(parts, vertices, uv, painted)
-        faces = np.unique(place, return_index=True)[1][place[faces]]  # what lies in one place has one coordinate now
+        faces = np.unique(place, return_index=True)[1][
+            place[faces]
+        ]  # what lies in one place has one coordinate now
     # One vertex of the mesh for each vertex of the file in each smooth group around it.
     groups = len(normals)
     keys, number = np.unique(faces.ravel() * groups + corners, return_inverse=True)
@@ -148,31 +177,50 @@ def _read_parts(path: Path) -> list[_Part]:
         if kind in ("glb", "gltf"):
             _check_claims(path, data)
         with quiet():
-            loaded = trimesh.load(io.BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False)
-            parts = [part for name in loaded.graph.nodes_geometry for part in [_part(loaded, name, kind)] if part is not None]
+            loaded = trimesh.load(
+                io.BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False
+            )
+            parts = [
+                part
+                for name in loaded.graph.nodes_geometry
+                for part in [_part(loaded, name, kind)]
+                if part is not None
+            ]
     except InputError:
         raise
     except _ERRORS as error:
         _check_references(path, beside)
-        raise InputError(f"{path} is not a readable {kind.upper()} file: export the mesh again") from error
+        raise InputError(
+            f"{path} is not a readable {kind.upper()} file: export the mesh again"
+        ) from error
     _check_references(path, beside)
     if not parts:
         raise InputError(f"{path} holds no triangles: export the object as a mesh")
     for name in tuple(beside.given):
         if Path(name).suffix.lower() not in (".mtl", ".bin") and not _is_image(beside.get(name)):
-            raise InputError(f"{path}: its texture {name} is not a readable image: save it again as PNG")
-    if kind == "obj" and not beside.given:  # trimesh invents a grey material for an OBJ file that names none
+            raise InputError(
+                f"{path}: its texture {name} is not a readable image: save it again as PNG"
+            )
+    if (
+        kind == "obj" and not beside.given
+    ):  # trimesh invents a grey material for an OBJ file that names none
         return [replace(part, texture=None) for part in parts]
     return parts
 
 
 def _check_claims(path: Path, data: bytes) -> None:
-    """What a glTF file says it holds, before memory is asked for it: numbers that no buffer holds count as zeros."""
-    text = data[20 : 20 + int.from_bytes(data[12:16], "little")] if data.startswith(b"glTF") else data
+    """What a glTF file says it holds, before memory is asked for it: numbers that no buffer holds
+    count as zeros.
+    """
+    text = (
+        data[20 : 20 + int.from_bytes(data[12:16], "little")] if data.startswith(b"glTF") else data
+    )
     tree = json.loads(text.decode("utf-8", "replace"))
     counts = [accessor["count"] for accessor in tree.get("accessors", [])]
     if any(type(count) is not int or count < 0 for count in counts) or sum(counts) > _MOST_NUMBERS:
-        raise InputError(f"{path} claims more than {_MOST_NUMBERS} entries, or a strange number of them: simplify or export it again")
+        raise InputError(
+            f"{path} claims more than {_MOST_NUMBERS} entries, or a strange number of them: simplify or export it again"
+        )
 
 
 def _is_image(data: bytes) -> bool:
@@ -187,9 +235,13 @@ def _is_image(data: bytes) -> bool:
 
 def _check_references(path: Path, beside: _Beside) -> None:
     if beside.outside:
-        raise InputError(f"{path} refers to {beside.outside[0]}, which is not in its folder: put a copy beside the mesh and refer to that")
+        raise InputError(
+            f"{path} refers to {beside.outside[0]}, which is not in its folder: put a copy beside the mesh and refer to that"
+        )
     if beside.missing:
-        raise InputError(f"{path} refers to {beside.missing[0]}, which is missing: put it beside the mesh, or take the reference out")
+        raise InputError(
+            f"{path} refers to {beside.missing[0]}, which is missing: put it beside the mesh, or take the reference out"
+        )
 
 
 def _part(scene: Any, node: str, kind: str) -> _Part | None:
@@ -199,13 +251,17 @@ def _part(scene: Any, node: str, kind: str) -> _Part | None:
     faces = np.asarray(getattr(piece, "faces", np.empty((0, 3))), dtype=np.int64)
     if not len(faces):
         return None
-    with np.errstate(invalid="ignore", over="ignore"):  # what is not finite is refused later, by name
+    with np.errstate(
+        invalid="ignore", over="ignore"
+    ):  # what is not finite is refused later, by name
         vertices = np.asarray(piece.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
     if np.linalg.det(transform[:3, :3]) < 0:
         faces = faces[:, ::-1]
     uv = getattr(piece.visual, "uv", None)
     # trimesh counts v from the lowest row of a texture, Mesh from the highest.
-    uv = None if uv is None or len(uv) != len(vertices) else np.asarray(uv, float) * (1, -1) + (0, 1)
+    uv = (
+        None if uv is None or len(uv) != len(vertices) else np.asarray(uv, float) * (1, -1) + (0, 1)
+    )
     texture = _texture(getattr(piece.visual, "material", None))
     if texture is not None and uv is None:
         texture = texture if texture.shape[:2] == (1, 1) else None
@@ -213,7 +269,9 @@ def _part(scene: Any, node: str, kind: str) -> _Part | None:
 
 
 def _texture(material: Any) -> np.ndarray | None:
-    """A material's base colour (h, w, 3), linear: its image times its factor, or the factor alone as one pixel; None where it has none."""
+    """A material's base colour (h, w, 3), linear: its image times its factor, or the factor alone
+    as one pixel; None where it has none.
+    """
     image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     factor = getattr(material, "baseColorFactor", None)
     if image is None and factor is None:
@@ -232,7 +290,9 @@ def _texture(material: Any) -> np.ndarray | None:
 
 
 def _vertex_colours(visual: Any, kind: str, count: int) -> np.ndarray | None:
-    """Colours of the vertices (N, 3), linear; those of glTF are stored so, those of other files as a screen shows them."""
+    """Colours of the vertices (N, 3), linear; those of glTF are stored so, those of other files as
+    a screen shows them.
+    """
     if getattr(visual, "kind", None) not in ("vertex", "face"):
         return None
     colours = np.asarray(visual.vertex_colors, float)[:, :3] / 255
@@ -241,12 +301,20 @@ def _vertex_colours(visual: Any, kind: str, count: int) -> np.ndarray | None:
     return colours if kind in ("glb", "gltf") else srgb_to_linear(colours)
 
 
-def _sound(path: Path, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices centred and scaled, faces without empty ones and turned outward, and the number of each vertex's place."""
+def _sound(
+    path: Path, vertices: np.ndarray, faces: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices centred and scaled, faces without empty ones and turned outward, and the number of
+    each vertex's place.
+    """
     if len(faces) > MOST_FACES:
-        raise InputError(f"{path} has {len(faces)} faces, at most {MOST_FACES} are used: simplify it first")
+        raise InputError(
+            f"{path} has {len(faces)} faces, at most {MOST_FACES} are used: simplify it first"
+        )
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(f"{path}: a face refers to a vertex that is not there: export the mesh again")
+        raise InputError(
+            f"{path}: a face refers to a vertex that is not there: export the mesh again"
+        )
     used = vertices[faces.ravel()]
     if not np.isfinite(used).all():
         raise InputError(f"{path} has vertices that are not finite numbers: remove them")
@@ -254,14 +322,22 @@ def _sound(path: Path, vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndar
     with np.errstate(over="ignore"):
         sized = (high - low)[:2].max() > 0 and np.isfinite((high - low) ** 2).all()
     if sized and (high - low)[2] > _DEEPEST * (high - low)[:2].max():
-        raise InputError(f"{path}: the mesh is over {_DEEPEST} times deeper than wide: scale its z as its x and y")
+        raise InputError(
+            f"{path}: the mesh is over {_DEEPEST} times deeper than wide: scale its z as its x and y"
+        )
     if not sized:
-        raise InputError(f"{path}: the mesh has no size: all of its vertices lie in one place or one line toward the viewer")
+        raise InputError(
+            f"{path}: the mesh has no size: all of its vertices lie in one place or one line toward the viewer"
+        )
     # Vertices that no face uses may lie anywhere: they are brought to where the others are.
-    vertices = (np.clip(np.nan_to_num(vertices), low, high) - (low + high) / 2) * (2 / (high - low)[:2].max())
+    vertices = (np.clip(np.nan_to_num(vertices), low, high) - (low + high) / 2) * (
+        2 / (high - low)[:2].max()
+    )
     place = _places(vertices)
     whole = place[faces]
-    faces = faces[(whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])]
+    faces = faces[
+        (whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])
+    ]
     _check_closed(path, place[faces])
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
@@ -286,21 +362,33 @@ def _check_closed(path: Path, faces: np.ndarray) -> None:
     _, number, count = np.unique(key, return_inverse=True, return_counts=True)
     unpaired = int((count % 2).sum())
     if unpaired:
-        raise InputError(f"{path}: the mesh is open, {unpaired} edges have a face on one side only: fill its holes, or give it a thickness")
+        raise InputError(
+            f"{path}: the mesh is open, {unpaired} edges have a face on one side only: fill its holes, or give it a thickness"
+        )
     if np.bincount(number.reshape(-1), np.where(forward, 1, -1)).any():
-        raise InputError(f"{path}: neighbouring faces are turned opposite ways: recalculate the normals so that all point outward")
+        raise InputError(
+            f"{path}: neighbouring faces are turned opposite ways: recalculate the normals so that all point outward"
+        )
 
 
-def _smooth_corners(vertices: np.ndarray, faces: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The smooth group (3 M,) of each corner of the faces in order, and the groups' unit normals (G, 3)."""
+def _smooth_corners(
+    vertices: np.ndarray, faces: np.ndarray, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The smooth group (3 M,) of each corner of the faces in order, and the groups' unit normals
+    (G, 3).
+    """
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     across = np.cross(b - a, c - a)
     length = np.linalg.norm(across, axis=1)
     facing = across / np.where(length > 0, length, 1)[:, None]
     whole, count = place[faces], len(faces)
-    # Half edges: from corner i of a face to its next one; partners run the other way between the same places.
+    # Half edges: from corner i of a face to its next one; partners run the other way between the
+    # same places.
     start, end = whole.ravel(), np.roll(whole, -1, 1).ravel()
-    corner, after = np.arange(3 * count), (np.arange(3 * count) // 3) * 3 + (np.arange(3 * count) % 3 + 1) % 3
+    corner, after = (
+        np.arange(3 * count),
+        (np.arange(3 * count) // 3) * 3 + (np.arange(3 * count) % 3 + 1) % 3,
+    )
     size = int(whole.max()) + 1
     order = np.argsort(np.minimum(start, end) * size + np.maximum(start, end), kind="stable")
     first, second = order[0::2], order[1::2]
@@ -309,11 +397,17 @@ def _smooth_corners(vertices: np.ndarray, faces: np.ndarray, place: np.ndarray) 
     smooth |= (length[first // 3] == 0) | (length[second // 3] == 0)
     smooth &= start[first] == end[second]
     first, second = first[smooth], second[smooth]
-    links = np.concatenate([np.stack([corner[first], after[second]]), np.stack([after[first], corner[second]])], axis=1)
-    graph = coo_matrix((np.ones(links.shape[1], bool), (links[0], links[1])), shape=(3 * count, 3 * count))
+    links = np.concatenate(
+        [np.stack([corner[first], after[second]]), np.stack([after[first], corner[second]])], axis=1
+    )
+    graph = coo_matrix(
+        (np.ones(links.shape[1], bool), (links[0], links[1])), shape=(3 * count, 3 * count)
+    )
     groups, group = connected_components(graph, directed=False)
     angle = _angles(vertices[faces]).ravel()
-    total = np.stack([np.bincount(group, angle * np.repeat(facing[:, i], 3), groups) for i in range(3)], -1)
+    total = np.stack(
+        [np.bincount(group, angle * np.repeat(facing[:, i], 3), groups) for i in range(3)], -1
+    )
     norm = np.linalg.norm(total, axis=1, keepdims=True)
     return group, np.where(norm > 0, total / np.where(norm > 0, norm, 1), (0.0, 0.0, 1.0))
 
@@ -328,8 +422,12 @@ def _within(uv: np.ndarray) -> bool:
     return bool(np.isfinite(uv).all() and (uv >= -1e-3).all() and (uv <= 1.001).all())
 
 
-def _painted(parts: list[_Part], vertices: np.ndarray, front: np.ndarray, side: int) -> np.ndarray | None:
-    """The colours of all parts on one texture, at the coordinates `front` of the vertices; where several lie, the one before the others."""
+def _painted(
+    parts: list[_Part], vertices: np.ndarray, front: np.ndarray, side: int
+) -> np.ndarray | None:
+    """The colours of all parts on one texture, at the coordinates `front` of the vertices; where
+    several lie, the one before the others.
+    """
     if all(part.texture is None and part.colours is None for part in parts):
         return None
     if len(parts) == 1 and parts[0].texture is not None and parts[0].texture.shape[:2] == (1, 1):
@@ -346,21 +444,32 @@ def _painted(parts: list[_Part], vertices: np.ndarray, front: np.ndarray, side: 
     return texture.reshape(side, side, 3)[row, column]
 
 
-def _paint(part: _Part, z: np.ndarray, front: np.ndarray, texture: np.ndarray, depth: np.ndarray) -> None:
-    """Puts one part's colours into a texture (h w, 3) where it is before what is there, by points spread over its faces."""
+def _paint(
+    part: _Part, z: np.ndarray, front: np.ndarray, texture: np.ndarray, depth: np.ndarray
+) -> None:
+    """Puts one part's colours into a texture (h w, 3) where it is before what is there, by points
+    spread over its faces.
+    """
     side = math.isqrt(len(depth))
     x, y = (part.vertices[part.faces, i] for i in range(2))
     toward = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) > (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
     shown = part.faces[toward]  # of a closed mesh the others are behind these
     place = front[shown] * side
     longest = np.linalg.norm(place - np.roll(place, 1, 1), axis=-1).max(1, initial=0)
-    steps = np.ceil(1.25 ** np.ceil(np.log(np.maximum(1.2 * longest, 1)) / np.log(1.25))).astype(int)
+    steps = np.ceil(1.25 ** np.ceil(np.log(np.maximum(1.2 * longest, 1)) / np.log(1.25))).astype(
+        int
+    )
     for step in np.unique(steps):
         i, j = np.nonzero(np.add.outer(np.arange(step + 1), np.arange(step + 1)) <= step)
         weights = np.stack([i, j, step - i - j], -1) / step
-        for faces in np.array_split(shown[steps == step], max(1, (steps == step).sum() * len(weights) // 2_000_000)):
+        for faces in np.array_split(
+            shown[steps == step], max(1, (steps == step).sum() * len(weights) // 2_000_000)
+        ):
             cell = np.clip(np.floor(weights @ front[faces] * side).astype(int), 0, side - 1)
-            index, near = (cell[..., 1] * side + cell[..., 0]).ravel(), (weights @ z[faces][..., None]).ravel()
+            index, near = (
+                (cell[..., 1] * side + cell[..., 0]).ravel(),
+                (weights @ z[faces][..., None]).ravel(),
+            )
             order = np.argsort(near)  # the nearest last: it is the one that stays
             order = order[near[order] >= depth[index[order]]]
             colours = _colours_of(part, faces, weights).reshape(-1, 3)
@@ -368,7 +477,9 @@ def _paint(part: _Part, z: np.ndarray, front: np.ndarray, texture: np.ndarray, d
 
 
 def _colours_of(part: _Part, faces: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The colours (M, P, 3) at the points of faces (M, 3) with barycentric weights (P, 3); a mid grey where a part has none."""
+    """The colours (M, P, 3) at the points of faces (M, 3) with barycentric weights (P, 3); a mid
+    grey where a part has none.
+    """
     if part.colours is not None:
         return weights @ part.colours[faces]
     if part.texture is None:
@@ -377,4 +488,6 @@ def _colours_of(part: _Part, faces: np.ndarray, weights: np.ndarray) -> np.ndarr
         return np.broadcast_to(part.texture[0, 0], (len(faces), len(weights), 3))
     near = np.where(np.abs(part.uv) < _FARTHEST, part.uv, 0)  # what is no number, too
     uv = (weights @ near[faces]).reshape(-1, 2)
-    return texture_at(part.texture, np.stack([uv[:, 0], np.mod(uv[:, 1], 1)], -1)).reshape(len(faces), len(weights), 3)
+    return texture_at(part.texture, np.stack([uv[:, 0], np.mod(uv[:, 1], 1)], -1)).reshape(
+        len(faces), len(weights), 3
+    )

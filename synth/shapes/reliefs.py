@@ -1,11 +1,11 @@
 """Random height fields, as closed slabs: crumpled paper, folded cloth, carved reliefs, quilts.
 
-Equation: paper, sums of |triangle waves| in random directions, bent by a smooth field; cloth, waves whose phase a smooth field bends;
-relief, smooth steps of a smooth field's level sets on a slightly domed plate; quilt, cushions
-|sin u sin v|^(1/2), rounded at their seams.
+Equation: paper, sums of |triangle waves| in random directions, bent by a smooth field; cloth, waves
+whose phase a smooth field bends; relief, smooth steps of a smooth field's level sets on a slightly
+domed plate; quilt, cushions |sin u sin v|^(1/2), rounded at their seams.
 
-Citation: see `synth.shapes.fields`; K. Perlin, "An image synthesizer", Computer Graphics 19(3) (1985), doi:10.1145/325165.325247 (phase
-bent by noise).
+Citation: see `synth.shapes.fields`; K. Perlin, "An image synthesizer", Computer Graphics 19(3)
+(1985), doi:10.1145/325165.325247 (phase bent by noise).
 
 Limits: sheets do not overhang; the back repeats the front, `_THICKNESS` behind it.
 """
@@ -25,7 +25,9 @@ STYLES = ("paper", "cloth", "relief", "quilt")
 
 def relief(rng: np.random.Generator) -> Mesh:
     """A random one of a random style, posed: it stands before the viewer, leaning a little."""
-    x, y = np.meshgrid(np.linspace(-1, 1, _CELLS + 1), np.linspace(1, -1, _CELLS + 1) * rng.uniform(0.65, 1))
+    x, y = np.meshgrid(
+        np.linspace(-1, 1, _CELLS + 1), np.linspace(1, -1, _CELLS + 1) * rng.uniform(0.65, 1)
+    )
     place = np.stack([x, y], -1)
     style = str(rng.choice(STYLES))
     height = relief_height(place, rng, style)
@@ -45,7 +47,10 @@ def relief_height(place: np.ndarray, rng: np.random.Generator, style: str) -> np
     dome = -rng.uniform(0.05, 0.2) * (place**2).sum(-1)
     if style == "quilt":
         turn, count = rng.uniform(0, np.pi), rng.uniform(1.5, 3) * np.pi
-        u, v = (np.cos(turn + a) * place[..., 0] + np.sin(turn + a) * place[..., 1] for a in (0, np.pi / 2))
+        u, v = (
+            np.cos(turn + a) * place[..., 0] + np.sin(turn + a) * place[..., 1]
+            for a in (0, np.pi / 2)
+        )
         waves = (np.sin(count * u) ** 2 + 0.03) * (np.sin(count * v) ** 2 + 0.03)
         return dome + rng.uniform(0.3, 0.7) / count * waves**0.25 + 0.3 * low
     level = smooth_field(place, rng, rng.uniform(0.5, 0.9))
@@ -57,7 +62,9 @@ def _creases(place: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     """Facets between straight creases, their edges rounded within a cell or two."""
     height = np.zeros(place.shape[:-1])
     for turn, frequency in zip(rng.uniform(0, np.pi, 9), rng.uniform(0.35, 1.1, 9), strict=True):
-        along = (place[..., 0] * np.cos(turn) + place[..., 1] * np.sin(turn)) * frequency + rng.uniform()
+        along = (
+            place[..., 0] * np.cos(turn) + place[..., 1] * np.sin(turn)
+        ) * frequency + rng.uniform()
         height += 0.12 / frequency * np.abs(along - np.round(along))
     return gaussian_filter(height, rng.uniform(1, 3))
 
@@ -76,7 +83,10 @@ def _folds(place: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def slab(place: np.ndarray, height: np.ndarray) -> Mesh:
-    """The closed mesh of heights (H, W) over places (H, W, 2), and of the same behind it. Rows run down, columns to the right."""
+    """The closed mesh of heights (H, W) over places (H, W, 2), and of the same behind it.
+
+    Rows run down, columns to the right.
+    """
     rows, columns = height.shape
     front = np.concatenate([place, height[..., None]], -1).reshape(-1, 3)
     faces = grid_faces(rows, columns)
@@ -84,7 +94,9 @@ def slab(place: np.ndarray, height: np.ndarray) -> Mesh:
     rim = np.concatenate([number[:-1, 0], number[-1, :-1], number[:0:-1, -1], number[0, :0:-1]])
     after, back = np.roll(rim, -1), rows * columns
     low = rim + back
-    walls = np.concatenate([np.stack([rim, low, after], -1), np.stack([after, low, np.roll(low, -1)], -1)])
+    walls = np.concatenate(
+        [np.stack([rim, low, after], -1), np.stack([after, low, np.roll(low, -1)], -1)]
+    )
     every = np.concatenate([faces, faces[:, ::-1] + back, walls])
     vertices = np.concatenate([front, front - (0, 0, _THICKNESS)])
     # The walls have vertices of their own, or their normals would round the front's edge off.

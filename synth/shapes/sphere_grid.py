@@ -1,8 +1,11 @@
-"""A sphere without poles: the six sides of a cube, each a square grid, blown up. All star-shaped surfaces are made on it.
+"""A sphere without poles: the six sides of a cube, each a square grid, blown up. All star-shaped
+surfaces are made on it.
 
-Equation: a side's coordinate t in [-1, 1] becomes tan(pi / 4 t) before the point is scaled to length 1, so that cells are nearly equal.
+Equation: a side's coordinate t in [-1, 1] becomes tan(pi / 4 t) before the point is scaled to
+length 1, so that cells are nearly equal.
 
-Citation: C. Ronchi, R. Iacono, P. S. Paolucci, "The cubed sphere", Journal of Computational Physics 124 (1996), doi:10.1006/jcph.1996.0047.
+Citation: C. Ronchi, R. Iacono, P. S. Paolucci, "The cubed sphere", Journal of Computational Physics
+124 (1996), doi:10.1006/jcph.1996.0047.
 
 Limits: cells at the cube's corners are half as large as in the middle of a side.
 """
@@ -11,12 +14,15 @@ from functools import cache
 
 import numpy as np
 
-CELLS = 104  # along a side: 130 thousand triangles, 3 pixels each way where the object is 480 pixels wide
+# along a side: 130 thousand triangles, 3 pixels each way where the object is 480 pixels wide
+CELLS = 104
 
 
 @cache
 def sphere_grid(cells: int = CELLS) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (N, 3) and triangles (M, 3), counter-clockwise from outside; closed, every vertex is there once. Read-only."""
+    """Unit vectors (N, 3) and triangles (M, 3), counter-clockwise from outside; closed, every
+    vertex is there once. Read-only.
+    """
     steps = np.arange(cells + 1)
     number = np.full((cells + 1,) * 3, -1)
     for axis in range(3):
@@ -35,5 +41,10 @@ def _side(number: np.ndarray, axis: int, side: int) -> np.ndarray:
     """The triangles of one side of the cube."""
     grid = np.take(number, side, axis)
     grid = grid if (side > 0) == (axis != 1) else grid.T
-    a, b, c, d = grid[:-1, :-1].ravel(), grid[1:, :-1].ravel(), grid[1:, 1:].ravel(), grid[:-1, 1:].ravel()
+    a, b, c, d = (
+        grid[:-1, :-1].ravel(),
+        grid[1:, :-1].ravel(),
+        grid[1:, 1:].ravel(),
+        grid[:-1, 1:].ravel(),
+    )
     return np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)])

@@ -1,11 +1,14 @@
 """How sure a mean over scenes is: the percentile bootstrap.
 
-Scenes are drawn with replacement, as many as there are, the mean is taken again each time, and the middle 95 % of these means are the
-interval. Errors that span powers of ten are averaged as logarithms, so that no single scene decides.
+Scenes are drawn with replacement, as many as there are, the mean is taken again each time, and the
+middle 95 % of these means are the interval. Errors that span powers of ten are averaged as
+logarithms, so that no single scene decides.
 
-Citation: B. Efron (1979), "Bootstrap methods: another look at the jackknife", doi:10.1214/aos/1176344552.
+Citation: B. Efron (1979), "Bootstrap methods: another look at the jackknife",
+doi:10.1214/aos/1176344552.
 
-Limits: with fewer than about ten scenes the interval is somewhat too narrow; scenes that share an object or a light are not independent.
+Limits: with fewer than about ten scenes the interval is somewhat too narrow; scenes that share an
+object or a light are not independent.
 """
 
 from collections.abc import Sequence
@@ -20,7 +23,10 @@ _SMALLEST = 1e-30  # what an error of 0 counts as where logarithms are taken
 
 @dataclass(frozen=True)
 class Interval:
-    """A value over `scenes` scenes and its interval; `low` and `high` are None where one scene is all there is."""
+    """A value over `scenes` scenes and its interval;
+
+    `low` and `high` are None where one scene is all there is.
+    """
 
     value: float
     low: float | None
@@ -29,9 +35,13 @@ class Interval:
 
 
 def resampled_means(values: np.ndarray, seed: int, resamples: int = RESAMPLES) -> np.ndarray:
-    """Means (resamples, M) over scenes drawn with replacement, of `values` (N, M): every column is drawn with the same scenes."""
+    """Means (resamples, M) over scenes drawn with replacement, of `values` (N, M): every column is
+    drawn with the same scenes.
+    """
     scenes = len(values)
-    counts = np.random.default_rng(seed).multinomial(scenes, np.full(scenes, 1 / scenes), size=resamples)
+    counts = np.random.default_rng(seed).multinomial(
+        scenes, np.full(scenes, 1 / scenes), size=resamples
+    )
     return counts @ values / scenes
 
 
@@ -43,8 +53,13 @@ def percentile_interval(value: float, resampled: np.ndarray, scenes: int) -> Int
     return Interval(value, float(low), float(high), scenes)
 
 
-def mean_interval(values: Sequence[float], *, geometric: bool, seed: int, resamples: int = RESAMPLES) -> Interval:
-    """The mean of finite numbers, one a scene, and its interval; `geometric`: of numbers >= 0. Raises `ValueError` without any."""
+def mean_interval(
+    values: Sequence[float], *, geometric: bool, seed: int, resamples: int = RESAMPLES
+) -> Interval:
+    """The mean of finite numbers, one a scene, and its interval;
+
+    `geometric`: of numbers >= 0. Raises `ValueError` without any.
+    """
     numbers = np.asarray(values, float)
     if not numbers.size or not np.isfinite(numbers).all():
         raise ValueError("a mean over scenes needs at least one, and only finite values")

@@ -1,4 +1,6 @@
-"""The best, the median and the worst scene of each stage, run once more for their pictures and maps: no run has to keep all of them."""
+"""The best, the median and the worst scene of each stage, run once more for their pictures and
+maps: no run has to keep all of them.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,8 +48,13 @@ class _Place:
     value: float
 
 
-def make_cases(scenes: Sequence[SceneResult], options: RunOptions, monitor: Monitor) -> tuple[Case, ...]:
-    """The cases of the chain, if it was run, and of every stage, by their first metric. Raises `InputError`, `Cancelled`."""
+def make_cases(
+    scenes: Sequence[SceneResult], options: RunOptions, monitor: Monitor
+) -> tuple[Case, ...]:
+    """The cases of the chain, if it was run, and of every stage, by their first metric.
+
+    Raises `InputError`, `Cancelled`.
+    """
     ranked = [(stage.name, stage.metrics[0]) for stage in options.stages]
     if any(scene.chain is not None for scene in scenes):
         ranked.append((CHAIN, METRICS[0]))
@@ -57,37 +64,60 @@ def make_cases(scenes: Sequence[SceneResult], options: RunOptions, monitor: Moni
         truth, facts = read_truth(place.scene.facts.folder), place.scene.facts
         kind = f"{facts.gloss_class} {facts.model}, {facts.albedo}, light {facts.light_kind}"
         remark = f"{place.metric.title} {number(place.value)}; {kind}; specular {100 * facts.specular_share:.1f} % of the light"
-        pictures = _chain_pictures(truth, options, own) if place.stage == CHAIN else _stage_pictures(place.stage, truth, options, own)
+        pictures = (
+            _chain_pictures(truth, options, own)
+            if place.stage == CHAIN
+            else _stage_pictures(place.stage, truth, options, own)
+        )
         return Case(place.stage, place.rank, facts.name, remark, pictures)
 
     return side_by_side(run, places, options.threads, "drawing", monitor) if places else ()
 
 
-def _stage_pictures(name: str, truth: GroundTruth, options: RunOptions, monitor: Monitor) -> tuple[Picture, ...]:
+def _stage_pictures(
+    name: str, truth: GroundTruth, options: RunOptions, monitor: Monitor
+) -> tuple[Picture, ...]:
     stage = next(stage for stage in options.stages if stage.name == name)
     return stage.shown(truth, stage.run(given(truth, stage.needs), options.settings, monitor))
 
 
-def _chain_pictures(truth: GroundTruth, options: RunOptions, monitor: Monitor) -> tuple[Picture, ...]:
+def _chain_pictures(
+    truth: GroundTruth, options: RunOptions, monitor: Monitor
+) -> tuple[Picture, ...]:
     """What shape and light become of the photo, with the diffuse layers beside the photo."""
     split = SEPARATION.run(given(truth, ()), options.settings, monitor)
     answer = SIRFS.run(given(truth, (), split.diffuse), options.settings, monitor)
     photo, *rest = SIRFS.shown(truth, answer)
-    layers = [picture for picture in SEPARATION.shown(truth, split) if picture.caption.startswith("diffuse")]
+    layers = [
+        picture
+        for picture in SEPARATION.shown(truth, split)
+        if picture.caption.startswith("diffuse")
+    ]
     return (photo, *layers, *rest)
 
 
-def worst_scenes(verdict: Verdict, figures: Sequence[Figure], scenes: Sequence[SceneResult], many: int = 2) -> tuple[SceneResult, ...]:
+def worst_scenes(
+    verdict: Verdict, figures: Sequence[Figure], scenes: Sequence[SceneResult], many: int = 2
+) -> tuple[SceneResult, ...]:
     """The scenes of a bound's slice that break it most."""
     bound = verdict.bound
-    figure = next(f for f in figures if (f.stage, f.metric.name, f.group.kind, f.group.value) == _key(verdict))
-    values = [(value, k) for k in figure.group.members if (value := scene_value(scenes[k], bound.stage, bound.metric)) is not None]
+    figure = next(
+        f for f in figures if (f.stage, f.metric.name, f.group.kind, f.group.value) == _key(verdict)
+    )
+    values = [
+        (value, k)
+        for k in figure.group.members
+        if (value := scene_value(scenes[k], bound.stage, bound.metric)) is not None
+    ]
     ordered = sorted(values, reverse=not figure.metric.larger_is_better)
     return tuple(scenes[k] for _, k in ordered[:many])
 
 
-def write_evidence(folder: Path, scene: SceneResult, stage: str, options: RunOptions, monitor: Monitor) -> tuple[str, ...]:
-    """Writes FOLDER/truth.exr and FOLDER/STAGE.exr of one scene; of the chain, what each of its stages made of the photo.
+def write_evidence(
+    folder: Path, scene: SceneResult, stage: str, options: RunOptions, monitor: Monitor
+) -> tuple[str, ...]:
+    """Writes FOLDER/truth.exr and FOLDER/STAGE.exr of one scene; of the chain, what each of its
+    stages made of the photo.
 
     Gives the names of the files. Raises `InputError`, `Cancelled`.
     """
@@ -113,17 +143,28 @@ def _key(verdict: Verdict) -> tuple[str, str, str, str]:
 
 
 def _places(stage: str, metric: Metric, scenes: Sequence[SceneResult]) -> list[_Place]:
-    values = [(value, k) for k, scene in enumerate(scenes) if (value := scene_value(scene, stage, metric.name)) is not None]
+    values = [
+        (value, k)
+        for k, scene in enumerate(scenes)
+        if (value := scene_value(scene, stage, metric.name)) is not None
+    ]
     ordered = sorted(values, reverse=metric.larger_is_better)
     if not ordered:
         return []
     picks = dict.fromkeys((0, len(ordered) // 2, len(ordered) - 1))
     ranks = _RANKS if len(picks) == 3 else _RANKS[::2][: len(picks)]
-    return [_Place(stage, metric, rank, scenes[ordered[pick][1]], ordered[pick][0]) for rank, pick in zip(ranks, picks, strict=True)]
+    return [
+        _Place(stage, metric, rank, scenes[ordered[pick][1]], ordered[pick][0])
+        for rank, pick in zip(ranks, picks, strict=True)
+    ]
 
 
 def _truth_maps(truth: GroundTruth) -> dict[str, np.ndarray]:
-    maps = {name: values for name, values in truth.arrays().items() if values.shape[:2] == truth.mask.shape}
+    maps = {
+        name: values
+        for name, values in truth.arrays().items()
+        if values.shape[:2] == truth.mask.shape
+    }
     letters = {2: ("Y",), 3: ("R", "G", "B")}
     return {
         f"{name}.{letter}": np.asarray(values, np.float32).reshape(*truth.mask.shape, -1)[..., k]

@@ -1,6 +1,8 @@
-"""The folder of a validation: `report.json`, `report.html`, `summary.md`, and `evidence/SCENE/*.exr` where something was rejected.
+"""The folder of a validation: `report.json`, `report.html`, `summary.md`, and
+`evidence/SCENE/*.exr` where something was rejected.
 
-It appears whole or not at all; an earlier report there is replaced, together with the evidence that it names.
+It appears whole or not at all; an earlier report there is replaced, together with the evidence that
+it names.
 """
 
 import json
@@ -30,7 +32,10 @@ def require_writable_report(folder: Path) -> None:
 
 
 def write_report(outcome: Outcome, folder: Path, monitor: Monitor) -> None:
-    """Writes the folder; runs the scenes to be shown once more. Raises `InputError`, `Cancelled`."""
+    """Writes the folder; runs the scenes to be shown once more.
+
+    Raises `InputError`, `Cancelled`.
+    """
     cases = make_cases(outcome.measured, outcome.options, monitor.part(0, 0.7))
     with new_folder(folder, _ours(folder)) as partial:
         evidence = _write_evidence(outcome, partial, monitor.part(0.7, 0.95))
@@ -51,7 +56,9 @@ def _write_evidence(outcome: Outcome, folder: Path, monitor: Monitor) -> tuple[s
     names: list[str] = []
     for done, ((name, stage), scene) in enumerate(wanted.items()):
         monitor.report("keeping evidence", done / len(wanted))
-        files = write_evidence(folder / "evidence" / name, scene, stage, outcome.options, monitor.part(1, 1))
+        files = write_evidence(
+            folder / "evidence" / name, scene, stage, outcome.options, monitor.part(1, 1)
+        )
         names += [f"evidence/{name}/{file}" for file in files]
     for check in outcome.checks:
         if not check.passed and check.maps:
@@ -69,4 +76,8 @@ def _ours(folder: Path) -> Sequence[str]:
     except InputError:
         return FILES
     named = content.get("evidence") if isinstance(content, dict) else None
-    return (*FILES, *(name for name in named if isinstance(name, str) and _EVIDENCE.fullmatch(name))) if isinstance(named, list) else FILES
+    return (
+        (*FILES, *(name for name in named if isinstance(name, str) and _EVIDENCE.fullmatch(name)))
+        if isinstance(named, list)
+        else FILES
+    )

@@ -1,4 +1,5 @@
-"""The report as one page that opens without a network: style, bar chart and pictures are inside it, and it runs no script.
+"""The report as one page that opens without a network: style, bar chart and pictures are inside it,
+and it runs no script.
 
 Everything that comes from outside (names of scenes, options, messages) is escaped.
 """
@@ -42,10 +43,17 @@ def page(outcome: Outcome, cases: Sequence[Case], evidence: Sequence[str]) -> st
     """The whole page. `evidence`: files kept, relative to the page."""
     parts = [_head(outcome), _budget_part(outcome.budgets)]
     stages = dict.fromkeys(f.stage for f in outcome.figures)
-    parts += [_stage_part(stage, outcome, cases) for stage in sorted(stages, key=lambda stage: stage != CHAIN)]
+    parts += [
+        _stage_part(stage, outcome, cases)
+        for stage in sorted(stages, key=lambda stage: stage != CHAIN)
+    ]
     parts += [_judged(outcome, evidence), _made(outcome)]
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>ISC validation</title><style>{_STYLE}</style>'
-    return f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n' + "\n".join(parts) + "\n</body></html>\n"
+    return (
+        f'<!DOCTYPE html>\n<html lang="en"><head>{head}</head>\n<body>\n'
+        + "\n".join(parts)
+        + "\n</body></html>\n"
+    )
 
 
 def _head(outcome: Outcome) -> str:
@@ -63,14 +71,31 @@ def _head(outcome: Outcome) -> str:
 def _budget_part(budgets: Sequence[Budget]) -> str:
     if not budgets:
         return ""
-    heading = ["error", "of the chain", *TRUTH_TITLES.values(), "left with all truths", "the same, exact normals"]
+    heading = [
+        "error",
+        "of the chain",
+        *TRUTH_TITLES.values(),
+        "left with all truths",
+        "the same, exact normals",
+    ]
     heading += [f"× with true {name}" for name in TRUTH_TITLES]
     rows = []
     for found in budgets:
         shares = {share.truth: share for share in found.shares}
         cells = [percent(shares[truth].share) if truth in shares else "" for truth in TRUTH_TITLES]
-        alone = [with_interval(shares[truth].alone) if truth in shares else "" for truth in TRUTH_TITLES]
-        rows.append([found.metric.title, with_interval(found.error), *cells, percent(found.rest), percent(found.exact), *alone])
+        alone = [
+            with_interval(shares[truth].alone) if truth in shares else "" for truth in TRUTH_TITLES
+        ]
+        rows.append(
+            [
+                found.metric.title,
+                with_interval(found.error),
+                *cells,
+                percent(found.rest),
+                percent(found.exact),
+                *alone,
+            ]
+        )
     text = (
         "Truth is swapped in for one stage's answer at a time, alone and beside the other truths. A share is what the truth of a stage "
         "saves of the final error, averaged over the orders in which truths can be given; shares and what is left add up to all of it. "
@@ -78,16 +103,29 @@ def _budget_part(budgets: Sequence[Budget]) -> str:
         "can remove: rendered shading is not the exponential of nine spherical harmonics of the normal. Shape and light are not scored "
         "where they are given themselves. Errors are geometric means."
     )
-    return f"<h2>Error budget</h2><p>{escape(text)}</p>{budget_chart(budgets)}{_table(heading, rows)}"
+    return (
+        f"<h2>Error budget</h2><p>{escape(text)}</p>{budget_chart(budgets)}{_table(heading, rows)}"
+    )
 
 
 def budget_chart(budgets: Sequence[Budget]) -> str:
     """Bars of shares, a group for each error, with whiskers for the intervals; an SVG element."""
     left, right, bar, gap = _LABELS + 10.0, 190.0, 15, 16
     width = 1000.0
-    entries = [(found, [*((TRUTH_TITLES[s.truth], _COLORS[s.truth], s.share) for s in found.shares)]) for found in budgets]
-    rows = [(found.metric.title, [*shares, ("left with all truths", _COLORS["rest"], found.rest)]) for found, shares in entries]
-    ends = [end for _, bars in rows for _, _, i in bars for end in (i.value, i.low or i.value, i.high or i.value)]
+    entries = [
+        (found, [*((TRUTH_TITLES[s.truth], _COLORS[s.truth], s.share) for s in found.shares)])
+        for found in budgets
+    ]
+    rows = [
+        (found.metric.title, [*shares, ("left with all truths", _COLORS["rest"], found.rest)])
+        for found, shares in entries
+    ]
+    ends = [
+        end
+        for _, bars in rows
+        for _, _, i in bars
+        for end in (i.value, i.low or i.value, i.high or i.value)
+    ]
     low, high = max(min(0.0, *ends), -1.5), min(max(1.0, *ends), 2.5)
 
     def x(value: float) -> float:
@@ -106,34 +144,66 @@ def budget_chart(budgets: Sequence[Budget]) -> str:
     return f'<div class="wide"><svg {box}>{"".join(parts)}{axis}</svg></div>'
 
 
-def _bar(x: Callable[[float], float], y: float, height: float, name: str, color: str, interval: Interval, end: float) -> str:
+def _bar(
+    x: Callable[[float], float],
+    y: float,
+    height: float,
+    name: str,
+    color: str,
+    interval: Interval,
+    end: float,
+) -> str:
     start, stop = sorted((x(0.0), x(interval.value)))
     drawn = f'<rect x="{start:.1f}" y="{y:.1f}" width="{max(stop - start, 1):.1f}" height="{height}" rx="2" fill="{color}"/>'
     if interval.low is not None and interval.high is not None:
         middle = y + height / 2
-        drawn += (
-            f'<line x1="{x(interval.low):.1f}" x2="{x(interval.high):.1f}" y1="{middle}" y2="{middle}" stroke="#fff" stroke-width="1.5"/>'
-        )
+        drawn += f'<line x1="{x(interval.low):.1f}" x2="{x(interval.high):.1f}" y1="{middle}" y2="{middle}" stroke="#fff" stroke-width="1.5"/>'
     text = f'<text x="{_LABELS}" y="{y + height - 2:.0f}" text-anchor="end" class="faint">{escape(name)}</text>'
-    return drawn + text + f'<text x="{end + 14:.0f}" y="{y + height - 2:.0f}">{escape(percent(interval))}</text>'
+    return (
+        drawn
+        + text
+        + f'<text x="{end + 14:.0f}" y="{y + height - 2:.0f}">{escape(percent(interval))}</text>'
+    )
 
 
 def _stage_part(stage: str, outcome: Outcome, cases: Sequence[Case]) -> str:
     figures = [f for f in outcome.figures if f.stage == stage]
-    title = CHAIN_TITLE if stage == CHAIN else next(found.title for found in outcome.options.stages if found.name == stage)
+    title = (
+        CHAIN_TITLE
+        if stage == CHAIN
+        else next(found.title for found in outcome.options.stages if found.name == stage)
+    )
     if stage == MODELS:
         return f"<h2>{escape(title)}</h2>" + _model_part(outcome) + _cases(stage, cases)
     whole = [f for f in figures if f.group.kind == EVERYTHING]
-    rows = [[f.metric.title, with_interval(f.interval), f.metric.unit, _mean(f), str(f.interval.scenes)] for f in whole]
-    parts = [f"<h2>{escape(title)}</h2>", _table(["figure", "mean [95 % interval]", "unit", "mean over scenes", "scenes"], rows)]
+    rows = [
+        [f.metric.title, with_interval(f.interval), f.metric.unit, _mean(f), str(f.interval.scenes)]
+        for f in whole
+    ]
+    parts = [
+        f"<h2>{escape(title)}</h2>",
+        _table(["figure", "mean [95 % interval]", "unit", "mean over scenes", "scenes"], rows),
+    ]
     names = [f.metric.title for f in whole]
     for kind in dict.fromkeys(f.group.kind for f in figures if f.group.kind != EVERYTHING):
         body = []
         for value in dict.fromkeys(f.group.value for f in figures if f.group.kind == kind):
-            own = {f.metric.title: f for f in figures if f.group.kind == kind and f.group.value == value}
+            own = {
+                f.metric.title: f
+                for f in figures
+                if f.group.kind == kind and f.group.value == value
+            }
             members = next(iter(own.values())).group.members
-            body.append([value, str(len(members)), *(with_interval(own[name].interval) if name in own else "" for name in names)])
-        parts.append(f"<details><summary>by {escape(kind)}</summary>{_table([kind, 'scenes', *names], body)}</details>")
+            body.append(
+                [
+                    value,
+                    str(len(members)),
+                    *(with_interval(own[name].interval) if name in own else "" for name in names),
+                ]
+            )
+        parts.append(
+            f"<details><summary>by {escape(kind)}</summary>{_table([kind, 'scenes', *names], body)}</details>"
+        )
     return "".join(parts) + _cases(stage, cases)
 
 
@@ -141,7 +211,11 @@ def _model_part(outcome: Outcome) -> str:
     parts = [f"<p>{escape(EXPLANATION)}</p>"]
     for table in model_tables(outcome):
         text = _table(table.heading, table.rows, words=table.heading.index("model") + 1)
-        parts.append(text if table.kind == EVERYTHING else f"<details><summary>by {escape(table.kind)}</summary>{text}</details>")
+        parts.append(
+            text
+            if table.kind == EVERYTHING
+            else f"<details><summary>by {escape(table.kind)}</summary>{text}</details>"
+        )
     return "".join(parts)
 
 
@@ -165,9 +239,16 @@ def _case(case: Case) -> str:
 def _judged(outcome: Outcome, evidence: Sequence[str]) -> str:
     if not (outcome.verdicts or outcome.checks):
         return ""
-    rows = [["broken" if v.broken else "kept", v.text] for v in sorted(outcome.verdicts, key=lambda v: not v.broken)]
+    rows = [
+        ["broken" if v.broken else "kept", v.text]
+        for v in sorted(outcome.verdicts, key=lambda v: not v.broken)
+    ]
     rows += [["passed" if c.passed else "failed", c.text] for c in outcome.checks]
-    kept = f"<p>Kept as evidence: {', '.join(f'<code>{escape(name)}</code>' for name in evidence)}.</p>" if evidence else ""
+    kept = (
+        f"<p>Kept as evidence: {', '.join(f'<code>{escape(name)}</code>' for name in evidence)}.</p>"
+        if evidence
+        else ""
+    )
     note = "A bound is broken only where the whole interval lies beyond it; slices of fewer than five scenes are not judged."
     table = _table(["verdict", "what"], rows, words=2)
     return f"<h2>Bounds and checks</h2><p>{note}</p>{kept}<details><summary>all {len(rows)}</summary>{table}</details>"
@@ -175,7 +256,11 @@ def _judged(outcome: Outcome, evidence: Sequence[str]) -> str:
 
 def _made(outcome: Outcome) -> str:
     options = outcome.options
-    facts = [f"separator {options.settings.separator}", f"illumination {options.settings.illumination}", f"seed {options.seed}"]
+    facts = [
+        f"separator {options.settings.separator}",
+        f"illumination {options.settings.illumination}",
+        f"seed {options.seed}",
+    ]
     facts += [f"{name} {version}" for name, version in versions().items()]
     return f"<h2>How it was made</h2><p><code>{escape(outcome.command)}</code></p><p class=faint>{escape(', '.join(facts))}</p>"
 
@@ -183,6 +268,13 @@ def _made(outcome: Outcome) -> str:
 def _table(heading: Sequence[str], rows: Sequence[Sequence[str]], words: int = 1) -> str:
     def line(tag: str, cells: Sequence[str]) -> str:
         kinds = ((' class="word"' if k < words else "") for k in range(len(cells)))
-        return "<tr>" + "".join(f"<{tag}{kind}>{escape(cell)}</{tag}>" for kind, cell in zip(kinds, cells, strict=True)) + "</tr>"
+        return (
+            "<tr>"
+            + "".join(
+                f"<{tag}{kind}>{escape(cell)}</{tag}>"
+                for kind, cell in zip(kinds, cells, strict=True)
+            )
+            + "</tr>"
+        )
 
     return f'<div class="wide"><table>{line("th", heading)}{"".join(line("td", row) for row in rows)}</table></div>'

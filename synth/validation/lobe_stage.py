@@ -1,8 +1,11 @@
-"""The stage "gloss": roughness from the specular layer, with the true shape and the true layers given.
+"""The stage "gloss": roughness from the specular layer, with the true shape and the true layers
+given.
 
-The truth of a varying gloss is its median, weighted by the specular light that it gives; Blinn-Phong exponents are compared as alpha.
+The truth of a varying gloss is its median, weighted by the specular light that it gives;
+Blinn-Phong exponents are compared as alpha.
 
-Limits: where light is only smooth nothing can be told: such scenes count by how many of them are answered all the same.
+Limits: where light is only smooth nothing can be told: such scenes count by how many of them are
+answered all the same.
 """
 
 from dataclasses import dataclass
@@ -33,9 +36,11 @@ class FittedGloss:
 
 @dataclass(frozen=True)
 class GlossScores:
-    """`alpha_factor`: by which alpha is off, 1 or more; `explained`: share of the squared specular image; both where gloss was found, the
-    first where the material says how rough it is. `determined`, `invented`: 1 or 0, whether alpha was told where there is gloss, and where
-    there is none. None: not defined."""
+    """`alpha_factor`: by which alpha is off, 1 or more; `explained`: share of the squared specular
+    image; both where gloss was found, the first where the material says how rough it is.
+    `determined`, `invented`: 1 or 0, whether alpha was told where there is gloss, and where there
+    is none. None: not defined.
+    """
 
     alpha_factor: float | None = None
     explained: float | None = None
@@ -48,8 +53,18 @@ def run_gloss(inputs: Inputs, options: StageOptions, monitor: Monitor) -> Fitted
     if inputs.diffuse is None or inputs.height is None:
         raise ValueError("the gloss is fitted to a known shape and a known diffuse image")
     specular = np.where(inputs.mask[..., None], np.maximum(inputs.image - inputs.diffuse, 0), 0)
-    normal = normal_from_reference(normals(continued_height(inputs.height, inputs.mask).astype(float)))
-    fit = fit_lobe(specular, normal, inputs.mask, options=LobeFitOptions(), clipped=inputs.clipped, height=inputs.height, monitor=monitor)
+    normal = normal_from_reference(
+        normals(continued_height(inputs.height, inputs.mask).astype(float))
+    )
+    fit = fit_lobe(
+        specular,
+        normal,
+        inputs.mask,
+        options=LobeFitOptions(),
+        clipped=inputs.clipped,
+        height=inputs.height,
+        monitor=monitor,
+    )
     return FittedGloss(fit, specular)
 
 
@@ -62,20 +77,30 @@ def score_gloss(truth: GroundTruth, answer: FittedGloss) -> GlossScores:
     if not told or fit.alpha is None:
         return GlossScores(determined=0.0)
     true = _alpha(truth, light)
-    return GlossScores(float(np.exp(abs(np.log(fit.alpha / true)))) if true > 0 else None, fit.explained, 1.0)
+    return GlossScores(
+        float(np.exp(abs(np.log(fit.alpha / true)))) if true > 0 else None, fit.explained, 1.0
+    )
 
 
 def show_gloss(truth: GroundTruth, answer: FittedGloss) -> tuple[Picture, ...]:
     """The specular layer and the fit's, under one exposure."""
     gain = exposure(truth.image, truth.mask)
-    pairs = (("photo", truth.image), ("specular, true", truth.specular), ("specular, of the fit", answer.fit.predicted))
+    pairs = (
+        ("photo", truth.image),
+        ("specular, true", truth.specular),
+        ("specular, of the fit", answer.fit.predicted),
+    )
     return tuple(Picture(caption, lit(gain * values, truth.mask)) for caption, values in pairs)
 
 
 def gloss_maps(answer: FittedGloss) -> dict[str, np.ndarray]:
     """Channels of the specular layer and of the fit's."""
     layers = {"specular": answer.specular, "lobe": answer.fit.predicted}
-    return {f"{name}.{letter}": values[..., k] for name, values in layers.items() for k, letter in enumerate("RGB")}
+    return {
+        f"{name}.{letter}": values[..., k]
+        for name, values in layers.items()
+        for k, letter in enumerate("RGB")
+    }
 
 
 def _alpha(truth: GroundTruth, light: np.ndarray) -> float:
@@ -83,7 +108,9 @@ def _alpha(truth: GroundTruth, light: np.ndarray) -> float:
     gloss = truth.gloss[truth.mask].astype(float)
     order = np.argsort(gloss)
     middle = float(gloss[order][np.searchsorted(np.cumsum(light[order]), light.sum() / 2)])
-    return middle if middle <= 1 else float(alpha_from_exponent(middle))  # exponents are above 1, alphas are not
+    return (
+        middle if middle <= 1 else float(alpha_from_exponent(middle))
+    )  # exponents are above 1, alphas are not
 
 
 GLOSS = Stage(
@@ -92,8 +119,20 @@ GLOSS = Stage(
     needs=("diffuse", "shape"),
     metrics=(
         Metric("alpha_factor", "alpha, off by a factor of"),
-        Metric("explained", "of the specular image explained", geometric=False, larger_is_better=True, margin=0.1),
-        Metric("determined", "told where there is gloss", geometric=False, larger_is_better=True, margin=0.1),
+        Metric(
+            "explained",
+            "of the specular image explained",
+            geometric=False,
+            larger_is_better=True,
+            margin=0.1,
+        ),
+        Metric(
+            "determined",
+            "told where there is gloss",
+            geometric=False,
+            larger_is_better=True,
+            margin=0.1,
+        ),
         Metric("invented", "told where there is none", geometric=False, margin=0.05),
     ),
     run=run_gloss,

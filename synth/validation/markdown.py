@@ -1,4 +1,6 @@
-"""The summary of a validation: what limits the chain in words, and the tables that matter, as Markdown small enough for the docs."""
+"""The summary of a validation: what limits the chain in words, and the tables that matter, as
+Markdown small enough for the docs.
+"""
 
 from collections.abc import Sequence
 
@@ -14,7 +16,13 @@ from .words import percent, with_interval
 
 TRUTH_TITLES = {"diffuse": "separation", "shape": "shape", "light": "light"}
 _TRUTHS = {"diffuse": "diffuse image", "shape": "shape", "light": "light"}
-MODEL_SLICES = (EVERYTHING, "material", "gloss", "albedo", "light")  # of models, in the summary; the report has all
+MODEL_SLICES = (
+    EVERYTHING,
+    "material",
+    "gloss",
+    "albedo",
+    "light",
+)  # of models, in the summary; the report has all
 CHAIN_TITLE = "The whole chain, from the photo"
 
 
@@ -38,7 +46,9 @@ def findings(outcome: Outcome) -> tuple[str, ...]:
         if stage == MODELS:
             found += model_findings(outcome)
         elif first is not None and stage != CHAIN:
-            found.append(f"{stage} by itself: {first.metric.title} {with_interval(first.interval)} over {first.interval.scenes} scenes.")
+            found.append(
+                f"{stage} by itself: {first.metric.title} {with_interval(first.interval)} over {first.interval.scenes} scenes."
+            )
         if worst := _worst_slice(figures):
             best, last = worst
             found.append(
@@ -47,7 +57,9 @@ def findings(outcome: Outcome) -> tuple[str, ...]:
             )
     refused = [scene for scene in outcome.scenes if scene.refused]
     if refused:
-        found.append(f"{len(refused)} of {len(outcome.scenes)} scenes could not be run; the first: {refused[0].refused}.")
+        found.append(
+            f"{len(refused)} of {len(outcome.scenes)} scenes could not be run; the first: {refused[0].refused}."
+        )
     return tuple(found)
 
 
@@ -62,15 +74,27 @@ def summary(outcome: Outcome) -> str:
             lines += _model_part(outcome)
             continue
         rows = [
-            [f.metric.title, with_interval(f.interval), f.metric.unit, str(f.interval.scenes)] for f in figures if f.group.kind == "all"
+            [f.metric.title, with_interval(f.interval), f.metric.unit, str(f.interval.scenes)]
+            for f in figures
+            if f.group.kind == "all"
         ]
-        lines += ["", f"## {_named(stage)}", "", *_table(["figure", "mean [95 % interval]", "unit", "scenes"], rows)]
+        lines += [
+            "",
+            f"## {_named(stage)}",
+            "",
+            *_table(["figure", "mean [95 % interval]", "unit", "scenes"], rows),
+        ]
     return "\n".join([*lines, "", f"Made by `{outcome.command}`.", ""])
 
 
 def budget_table(budgets: Sequence[Budget]) -> list[str]:
     """The budgets as the lines of a Markdown table."""
-    heading = ["error", "of the chain", *(f"share of {title}" for title in TRUTH_TITLES.values()), "left with all truths"]
+    heading = [
+        "error",
+        "of the chain",
+        *(f"share of {title}" for title in TRUTH_TITLES.values()),
+        "left with all truths",
+    ]
     rows = []
     for found in budgets:
         shares = {share.truth: percent(share.share) for share in found.shares}
@@ -83,21 +107,31 @@ def _model_part(outcome: Outcome) -> list[str]:
     lines = ["", f"## {MODELS_TITLE}", "", EXPLANATION]
     tables = {table.kind: table for table in model_tables(outcome)}
     for kind in (kind for kind in MODEL_SLICES if kind in tables):
-        lines += ["", *([] if kind == EVERYTHING else [f"By {kind}:", ""]), *_table(tables[kind].heading, tables[kind].rows)]
+        lines += [
+            "",
+            *([] if kind == EVERYTHING else [f"By {kind}:", ""]),
+            *_table(tables[kind].heading, tables[kind].rows),
+        ]
     return lines
 
 
 def _limits(found: Budget) -> list[str]:
     """What limits the chain most, from its first budget."""
-    ranked: list[tuple[float, str, Interval]] = [(s.share.value, f"not knowing the {_TRUTHS[s.truth]}", s.share) for s in found.shares]
-    ranked.append((found.rest.value, "what the model itself cannot say (left with all truths)", found.rest))
+    ranked: list[tuple[float, str, Interval]] = [
+        (s.share.value, f"not knowing the {_TRUTHS[s.truth]}", s.share) for s in found.shares
+    ]
+    ranked.append(
+        (found.rest.value, "what the model itself cannot say (left with all truths)", found.rest)
+    )
     ranked.sort(key=lambda entry: -entry[0])
     first, second = ranked[0], ranked[1]
     lines = [
         f"What limits the chain most is {first[1]}: {percent(first[2])} of the error of {found.metric.title}; next is {second[1]}: "
         f"{percent(second[2])}."
     ]
-    against = [share for share in found.shares if share.share.high is not None and share.share.high < 0]
+    against = [
+        share for share in found.shares if share.share.high is not None and share.share.high < 0
+    ]
     lines += [
         f"Handing over the true {_TRUTHS[share.truth]} makes this error larger ({percent(share.share)}): its error makes up for others."
         for share in against
@@ -110,13 +144,25 @@ def _named(stage: str) -> str:
 
 
 def _by_stage(figures: Sequence[Figure]) -> dict[str, list[Figure]]:
-    return {stage: [f for f in figures if f.stage == stage] for stage in dict.fromkeys(f.stage for f in figures)}
+    return {
+        stage: [f for f in figures if f.stage == stage]
+        for stage in dict.fromkeys(f.stage for f in figures)
+    }
 
 
 def _worst_slice(figures: Sequence[Figure]) -> tuple[Figure, Figure] | None:
-    """The best and the worst slice of a stage's first metric, of those with five scenes or more; None where intervals overlap."""
+    """The best and the worst slice of a stage's first metric, of those with five scenes or more;
+
+    None where intervals overlap.
+    """
     name = figures[0].metric.name
-    slices = [f for f in figures if f.metric.name == name and f.group.kind not in (EVERYTHING, "split") and f.interval.scenes >= 5]
+    slices = [
+        f
+        for f in figures
+        if f.metric.name == name
+        and f.group.kind not in (EVERYTHING, "split")
+        and f.interval.scenes >= 5
+    ]
     if len(slices) < 2:
         return None
     slices.sort(key=lambda f: f.interval.value, reverse=figures[0].metric.larger_is_better)

@@ -1,12 +1,15 @@
-"""The stage "models": what each model makes of a glossy photo, beside plain SIRFS on the same photo and SIRFS on the true diffuse layer.
+"""The stage "models": what each model makes of a glossy photo, beside plain SIRFS on the same photo
+and SIRFS on the true diffuse layer.
 
-Each model is run as `isc decompose` runs it (`isc_core.models.solve`), and scored as the stage "sirfs" is. Errors count relative to plain
-SIRFS on the same scene, so that a mean over scenes is a paired comparison; the true diffuse layer shows what perfect separation would gain.
+Each model is run as `isc decompose` runs it (`isc_core.models.solve`), and scored as the stage
+"sirfs" is. Errors count relative to plain SIRFS on the same scene, so that a mean over scenes is a
+paired comparison; the true diffuse layer shows what perfect separation would gain.
 
 MBP has the shape and light of plain SIRFS by definition: they are found once.
 
-Limits: SIRFS is solved with the object 256 pixels long, as for a photo, not at the picture's own size as in the stage "sirfs" and the
-chain: figures of the two do not compare. Black channels, in the shadows of lamps in the dark, are raised to half a code, for all alike.
+Limits: SIRFS is solved with the object 256 pixels long, as for a photo, not at the picture's own
+size as in the stage "sirfs" and the chain: figures of the two do not compare. Black channels, in
+the shadows of lamps in the dark, are raised to half a code, for all alike.
 """
 
 from collections.abc import Mapping
@@ -35,7 +38,9 @@ from .stages import BLACK, Inputs, Metric, Picture, Stage, StageOptions
 NAME = "models"
 TITLE = "Models beside plain SIRFS"
 PLAIN, TRUE_DIFFUSE = "plain", "true_diffuse"
-TITLES = {PLAIN: "plain SIRFS", TRUE_DIFFUSE: "SIRFS on the true diffuse layer"} | {name: name for name in SEPARATING_MODELS}
+TITLES = {PLAIN: "plain SIRFS", TRUE_DIFFUSE: "SIRFS on the true diffuse layer"} | {
+    name: name for name in SEPARATING_MODELS
+}
 ERRORS = SIRFS.metrics
 _STARTS = {"mbp": PLAIN}  # whose shape and light a model has
 _SMALLEST = 1e-30
@@ -45,7 +50,10 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Variants(Generic[Item]):
-    """One thing for each way to explain a photo: `plain` SIRFS, SIRFS on the `true_diffuse` layer, and the models; None: not asked for."""
+    """One thing for each way to explain a photo:
+
+    `plain` SIRFS, SIRFS on the `true_diffuse` layer, and the models; None: not asked for.
+    """
 
     plain: Item
     true_diffuse: Item
@@ -60,51 +68,97 @@ class Variants(Generic[Item]):
 
 
 def run_models(inputs: Inputs, options: StageOptions, monitor: Monitor) -> Variants[Estimate]:
-    """Explains the photo in every way; `inputs.split` is used where it is known. Raises `InputError`, `Cancelled`."""
+    """Explains the photo in every way;
+
+    `inputs.split` is used where it is known. Raises `InputError`, `Cancelled`.
+    """
     if inputs.diffuse is None:
-        raise ValueError("the models are compared with SIRFS on the true diffuse layer, which has to be given")
+        raise ValueError(
+            "the models are compared with SIRFS on the true diffuse layer, which has to be given"
+        )
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
-    glance, seen = glance_at(photo.image, photo.mask), shape_at(photo.image, photo.mask)  # of the photo, also for its diffuse layer alone
+    glance, seen = (
+        glance_at(photo.image, photo.mask),
+        shape_at(photo.image, photo.mask),
+    )  # of the photo, also for its diffuse layer alone
 
     def solved(model: str, image: Photo, start: Answer | None = None) -> Answer:
         known = Known() if start is None else Known(start.height, start.light)
         settings = Settings(model, options.separator, options.illumination, threads=options.threads)
-        return solve(Task(image, image, settings, known, monitor=monitor, split=split, glance=glance, seen=seen))
+        return solve(
+            Task(
+                image,
+                image,
+                settings,
+                known,
+                monitor=monitor,
+                split=split,
+                glance=glance,
+                seen=seen,
+            )
+        )
 
     answers = {PLAIN: solved("sirfs", photo)}
     for name in (name for name in SEPARATING_MODELS if name in options.models):
         answers[name] = solved(name, photo, answers.get(_STARTS.get(name, "")))
-    answers[TRUE_DIFFUSE] = solved("sirfs", replace(photo, image=inputs.diffuse, clipped=np.zeros_like(inputs.clipped)))
+    answers[TRUE_DIFFUSE] = solved(
+        "sirfs", replace(photo, image=inputs.diffuse, clipped=np.zeros_like(inputs.clipped))
+    )
     return Variants(**{name: _estimate(inputs, answer) for name, answer in answers.items()})
 
 
 def score_models(truth: GroundTruth, answers: Variants[Estimate]) -> Variants[Scores]:
-    """Plain SIRFS' errors, and those of all others relative to them. Raises `InputError` where the true diffuse image is black."""
+    """Plain SIRFS' errors, and those of all others relative to them.
+
+    Raises `InputError` where the true diffuse image is black.
+    """
     errors = {name: score_sirfs(truth, answer) for name, answer in answers.items()}
     plain = errors[PLAIN]
-    return Variants(**{name: own if name == PLAIN else _relative(own, plain) for name, own in errors.items()})
+    return Variants(
+        **{name: own if name == PLAIN else _relative(own, plain) for name, own in errors.items()}
+    )
 
 
 def show_models(truth: GroundTruth, answers: Variants[Estimate]) -> tuple[Picture, ...]:
-    """The photo, then diffuse layers, reflectance and normals: the truth's, and everyone's at the truth's brightness."""
+    """The photo, then diffuse layers, reflectance and normals: the truth's, and everyone's at the
+    truth's brightness.
+    """
     mask, items = truth.mask, answers.items()
     gain = exposure(truth.image, mask)
-    shown = [Picture("photo", lit(gain * truth.image, mask)), Picture("diffuse, true", lit(gain * truth.diffuse, mask))]
-    diffuse = [(name, own.reflectance * own.shading) for name, own in items if name not in (PLAIN, TRUE_DIFFUSE)]
+    shown = [
+        Picture("photo", lit(gain * truth.image, mask)),
+        Picture("diffuse, true", lit(gain * truth.diffuse, mask)),
+    ]
+    diffuse = [
+        (name, own.reflectance * own.shading)
+        for name, own in items
+        if name not in (PLAIN, TRUE_DIFFUSE)
+    ]
     shown += [Picture(f"diffuse, {name}", lit(gain * values, mask)) for name, values in diffuse]
     gain = exposure(truth.reflectance, mask)
     shown.append(Picture("reflectance, true", lit(gain * truth.reflectance, mask)))
     for name, own in items:
-        scale = (truth.reflectance[mask] * own.reflectance[mask]).sum() / max(np.square(own.reflectance[mask]).sum(), _SMALLEST)
-        shown.append(Picture(f"reflectance, {TITLES[name]}", lit(gain * scale * own.reflectance, mask)))
+        scale = (truth.reflectance[mask] * own.reflectance[mask]).sum() / max(
+            np.square(own.reflectance[mask]).sum(), _SMALLEST
+        )
+        shown.append(
+            Picture(f"reflectance, {TITLES[name]}", lit(gain * scale * own.reflectance, mask))
+        )
     shown.append(Picture("normals, true", directions(truth.normal, mask)))
-    return (*shown, *(Picture(f"normals, {TITLES[name]}", directions(own.normal, mask)) for name, own in items))
+    return (
+        *shown,
+        *(Picture(f"normals, {TITLES[name]}", directions(own.normal, mask)) for name, own in items),
+    )
 
 
 def models_maps(answers: Variants[Estimate]) -> Mapping[str, np.ndarray]:
     """Channels of everyone's maps: "joint.reflectance.R"."""
-    return {f"{name}.{channel}": values for name, own in answers.items() for channel, values in sirfs_maps(own).items()}
+    return {
+        f"{name}.{channel}": values
+        for name, own in answers.items()
+        for channel, values in sirfs_maps(own).items()
+    }
 
 
 def models_stage(models: tuple[str, ...]) -> Stage[Any, Any]:
@@ -134,7 +188,10 @@ def _metric(variant: str, error: Metric) -> Metric:
 
 
 def _photo(inputs: Inputs) -> Photo:
-    """The scene's image as a photo with 16-bit codes. Noise can take light below zero, which no photo holds."""
+    """The scene's image as a photo with 16-bit codes.
+
+    Noise can take light below zero, which no photo holds.
+    """
     height, width = inputs.mask.shape
     source = PhotoSource("", (width, height), 16, "linear", "file")
     return Photo(np.maximum(inputs.image, 0), inputs.mask, 2 * BLACK, inputs.clipped, source)
@@ -142,7 +199,12 @@ def _photo(inputs: Inputs) -> Photo:
 
 def _estimate(inputs: Inputs, answer: Answer) -> Estimate:
     normal, _ = shaded(answer.height, answer.light, inputs.mask)
-    return with_normals(replace(inputs, diffuse=answer.split.diffuse), answer.height, normal, light_from_reference(answer.light))
+    return with_normals(
+        replace(inputs, diffuse=answer.split.diffuse),
+        answer.height,
+        normal,
+        light_from_reference(answer.light),
+    )
 
 
 def _relative(errors: Scores, plain: Scores) -> Scores:

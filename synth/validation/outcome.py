@@ -23,8 +23,10 @@ _PACKAGES = ("numpy", "scipy", "numba", "mitsuba")
 
 @dataclass(frozen=True)
 class Outcome:
-    """`dataset`: as the user named it; `command`: how to run it again. `figures`, `budgets` (none without the chain), `checks` of renders,
-    `verdicts` on bounds. `notes`: what a reader should know. `gains`: of models, none without the stage "models"."""
+    """`dataset`: as the user named it; `command`: how to run it again. `figures`, `budgets` (none
+    without the chain), `checks` of renders, `verdicts` on bounds. `notes`: what a reader should
+    know. `gains`: of models, none without the stage "models".
+    """
 
     dataset: str
     command: str
@@ -45,11 +47,15 @@ class Outcome:
     @property
     def failures(self) -> tuple[str, ...]:
         """Every bound that is broken and every check that failed, in words."""
-        return tuple(v.text for v in self.verdicts if v.broken) + tuple(check.text for check in self.checks if not check.passed)
+        return tuple(v.text for v in self.verdicts if v.broken) + tuple(
+            check.text for check in self.checks if not check.passed
+        )
 
 
 def all_budgets(scenes: Sequence[SceneResult], seed: int) -> tuple[Budget, ...]:
-    """The budget of every metric over the scenes on which the chain was run; none where it was run on none."""
+    """The budget of every metric over the scenes on which the chain was run; none where it was run
+    on none.
+    """
     chains = [scene.chain for scene in scenes if scene.chain is not None]
     return tuple(budget(metric, chains, seed) for metric in METRICS) if chains else ()
 
@@ -97,7 +103,12 @@ def to_json(outcome: Outcome, evidence: Sequence[str]) -> dict[str, Any]:
 
 def _figure(figure: Figure) -> dict[str, Any]:
     group = {"kind": figure.group.kind, "value": figure.group.value}
-    return {"stage": figure.stage, "metric": _metric(figure.metric), "slice": group, "interval": asdict(figure.interval)}
+    return {
+        "stage": figure.stage,
+        "metric": _metric(figure.metric),
+        "slice": group,
+        "interval": asdict(figure.interval),
+    }
 
 
 def _gain(gain: Gain) -> dict[str, Any]:
@@ -107,29 +118,54 @@ def _gain(gain: Gain) -> dict[str, Any]:
 
 def _metric(metric: Metric) -> dict[str, Any]:
     kind = "geometric" if metric.geometric else "arithmetic"
-    return {"name": metric.name, "unit": metric.unit, "mean": kind, "larger_is_better": metric.larger_is_better}
+    return {
+        "name": metric.name,
+        "unit": metric.unit,
+        "mean": kind,
+        "larger_is_better": metric.larger_is_better,
+    }
 
 
 def _budget(found: Budget) -> dict[str, Any]:
-    shares = {share.truth: {"share": asdict(share.share), "alone": asdict(share.alone)} for share in found.shares}
+    shares = {
+        share.truth: {"share": asdict(share.share), "alone": asdict(share.alone)}
+        for share in found.shares
+    }
     rest = {"rest": asdict(found.rest), "rest_with_exact_normals": asdict(found.exact)}
     return {"metric": found.metric.name, "error": asdict(found.error), "shares": shares} | rest
 
 
 def _check(check: RenderCheck) -> dict[str, Any]:
-    return {"scene": check.scene, "what": check.what, "error": check.error, "limit": check.limit, "passed": check.passed}
+    return {
+        "scene": check.scene,
+        "what": check.what,
+        "error": check.error,
+        "limit": check.limit,
+        "passed": check.passed,
+    }
 
 
 def _scene(scene: SceneResult) -> dict[str, Any]:
     facts = {name: value for name, value in asdict(scene.facts).items() if name != "folder"}
-    stages = {result.stage: {"scores": _scores(result.scores), "seconds": round(result.seconds, 4)} for result in scene.stages}
-    return {"facts": facts, "refused": scene.refused, "stages": stages, "chain": None if scene.chain is None else _chain(scene)}
+    stages = {
+        result.stage: {"scores": _scores(result.scores), "seconds": round(result.seconds, 4)}
+        for result in scene.stages
+    }
+    return {
+        "facts": facts,
+        "refused": scene.refused,
+        "stages": stages,
+        "chain": None if scene.chain is None else _chain(scene),
+    }
 
 
 def _chain(scene: SceneResult) -> dict[str, Any]:
     chain = scene.chain
     assert chain is not None
-    swapped = {"+".join(truths) or "nothing": _scores(scores) for truths, scores in zip(COMBINATIONS, chain.swapped, strict=True)}
+    swapped = {
+        "+".join(truths) or "nothing": _scores(scores)
+        for truths, scores in zip(COMBINATIONS, chain.swapped, strict=True)
+    }
     extra = {"untouched": _scores(chain.untouched), "exact_normals": _scores(chain.exact_normals)}
     return {"swapped": swapped, **extra, "light_fit_residual": chain.light_fit_residual}
 

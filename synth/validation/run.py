@@ -1,6 +1,8 @@
-"""Runs the stages over the scenes of a dataset: each stage by itself, then the chain under every combination of truths.
+"""Runs the stages over the scenes of a dataset: each stage by itself, then the chain under every
+combination of truths.
 
-Scenes run side by side, a thread each: compiled kernels release the interpreter. What comes out does not depend on how many.
+Scenes run side by side, a thread each: compiled kernels release the interpreter. What comes out
+does not depend on how many.
 """
 
 import time
@@ -32,8 +34,10 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class RunOptions:
-    """`split`: the one to run, None for all. `scenes`: how many, drawn by `seed` without order; 0 for all. `stages`: which. `settings`: of
-    the stages. `threads`: how many scenes at once, 0 for one on each core."""
+    """`split`: the one to run, None for all. `scenes`: how many, drawn by `seed` without order; 0
+    for all. `stages`: which. `settings`: of the stages. `threads`: how many scenes at once, 0 for
+    one on each core.
+    """
 
     split: str | None = None
     scenes: int = 0
@@ -54,8 +58,9 @@ class StageResult:
 
 @dataclass(frozen=True)
 class SceneResult:
-    """What was measured on one scene. `chain`: None unless both of its stages were asked for. `refused`: why the scene could not be
-    run, empty where it could."""
+    """What was measured on one scene. `chain`: None unless both of its stages were asked for.
+    `refused`: why the scene could not be run, empty where it could.
+    """
 
     facts: SceneFacts
     stages: tuple[StageResult, ...] = ()
@@ -68,19 +73,28 @@ class SceneResult:
 
 
 def choose_scenes(root: Path, options: RunOptions) -> tuple[Path, ...]:
-    """The folders of the scenes to run, in their order in the dataset. Raises `InputError` where there are none."""
+    """The folders of the scenes to run, in their order in the dataset.
+
+    Raises `InputError` where there are none.
+    """
     folders = list_scenes(root, options.split)
     if not folders:
         raise InputError(
-            f"{root} holds no scenes" + (f" of the split {options.split!r}" if options.split else "") + ": make some by isc synth"
+            f"{root} holds no scenes"
+            + (f" of the split {options.split!r}" if options.split else "")
+            + ": make some by isc synth"
         )
     if not options.scenes or options.scenes >= len(folders):
         return folders
-    chosen = np.random.default_rng(options.seed).choice(len(folders), size=options.scenes, replace=False)
+    chosen = np.random.default_rng(options.seed).choice(
+        len(folders), size=options.scenes, replace=False
+    )
     return tuple(folders[k] for k in sorted(chosen))
 
 
-def run_scenes(folders: Sequence[Path], options: RunOptions, monitor: Monitor) -> tuple[SceneResult, ...]:
+def run_scenes(
+    folders: Sequence[Path], options: RunOptions, monitor: Monitor
+) -> tuple[SceneResult, ...]:
     """Measures scenes. Raises `InputError` for a folder that cannot be read, `Cancelled`."""
     announce_compilation("auto", monitor)
     stages = options.stages or all_stages()
@@ -92,7 +106,11 @@ def run_scenes(folders: Sequence[Path], options: RunOptions, monitor: Monitor) -
 
 
 def measure_scene(
-    facts: SceneFacts, truth: GroundTruth, stages: Sequence[Stage[Any, Any]], settings: StageOptions, monitor: Monitor
+    facts: SceneFacts,
+    truth: GroundTruth,
+    stages: Sequence[Stage[Any, Any]],
+    settings: StageOptions,
+    monitor: Monitor,
 ) -> SceneResult:
     """Every stage by itself on one scene, and the chain if both of its stages are among them."""
     answers: dict[str, Any] = {}
@@ -103,7 +121,9 @@ def measure_scene(
             inputs = replace(given(truth, stage.needs), split=answers.get(SEPARATION.name))
             answers[stage.name] = stage.run(inputs, settings, monitor)
             seconds = time.perf_counter() - start
-            results.append(StageResult(stage.name, stage.score(truth, answers[stage.name]), seconds))
+            results.append(
+                StageResult(stage.name, stage.score(truth, answers[stage.name]), seconds)
+            )
         chain = None
         if SEPARATION.name in answers and SIRFS.name in answers:
             alone = next(result.scores for result in results if result.stage == SIRFS.name)
@@ -114,18 +134,30 @@ def measure_scene(
 
 
 def side_by_side(
-    task: Callable[[Item, Monitor], Result], items: Sequence[Item], threads: int, what: str, monitor: Monitor
+    task: Callable[[Item, Monitor], Result],
+    items: Sequence[Item],
+    threads: int,
+    what: str,
+    monitor: Monitor,
 ) -> tuple[Result, ...]:
-    """`task` of every item, in the items' order, some at once. Raises what a task raised, and `Cancelled`."""
+    """`task` of every item, in the items' order, some at once.
+
+    Raises what a task raised, and `Cancelled`.
+    """
     quiet = Monitor(cancelled=monitor.cancelled)
     results: dict[int, Result] = {}
     start = time.monotonic()
     with ThreadPoolExecutor(thread_count(SolverOptions(threads=threads))) as pool:
-        futures: dict[Future[Result], int] = {pool.submit(task, item, quiet): k for k, item in enumerate(items)}
+        futures: dict[Future[Result], int] = {
+            pool.submit(task, item, quiet): k for k, item in enumerate(items)
+        }
         waiting = set(futures)
         try:
             while waiting:
-                monitor.report(f"{what}{_time_left(time.monotonic() - start, len(results), len(items))}", len(results) / len(items))
+                monitor.report(
+                    f"{what}{_time_left(time.monotonic() - start, len(results), len(items))}",
+                    len(results) / len(items),
+                )
                 done, waiting = wait(waiting, _POLL_SECONDS, FIRST_COMPLETED)
                 results.update({futures[future]: future.result() for future in done})
         finally:
@@ -138,4 +170,6 @@ def _time_left(seconds: float, done: int, total: int) -> str:
     if not done:
         return f" {total} scenes"
     left = seconds / done * (total - done)
-    return f" {done} of {total}" + (f", {left:.0f} s left" if left < 90 else f", {left / 60:.0f} min left")
+    return f" {done} of {total}" + (
+        f", {left:.0f} s left" if left < 90 else f", {left / 60:.0f} min left"
+    )

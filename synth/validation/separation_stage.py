@@ -1,7 +1,9 @@
-"""The stage "separation": the photo's diffuse and specular layers against those that were rendered, inside the mask.
+"""The stage "separation": the photo's diffuse and specular layers against those that were rendered,
+inside the mask.
 
-An error is also given as a ratio to that of doing nothing (diffuse = photo): where there are few highlights, doing nothing is hard to beat.
-Whether the confidence knows where the errors are is told by sparsification and rank (see `isc_core.image_metrics`).
+An error is also given as a ratio to that of doing nothing (diffuse = photo): where there are few
+highlights, doing nothing is hard to beat. Whether the confidence knows where the errors are is told
+by sparsification and rank (see `isc_core.image_metrics`).
 """
 
 import math
@@ -26,13 +28,15 @@ _DROPPED = 0.2
 
 @dataclass(frozen=True)
 class SeparationScores:
-    """Inside the mask, of linear values. None: not defined. All but `taken` are of scenes with specular light, since a method that leaves a
-    matt scene alone has errors of zero, which would rule every geometric mean.
+    """Inside the mask, of linear values. None: not defined. All but `taken` are of scenes with
+    specular light, since a method that leaves a matt scene alone has errors of zero, which would
+    rule every geometric mean.
 
-    `mse_*`: mean square errors; `lmse_*`: Grosse's local error; `psnr_*`: dB for a white of 1, 120 at most. `mse_ratio`: diffuse error over
-    that of the untouched photo. `removed`: share of the squared error that leaves with the least confident fifth of the pixels. `rank`:
-    correlation of confidence and squared error, -1 the best. `taken`: of scenes without specular light, the RMS of what was taken from the
-    photo over the photo's own.
+    `mse_*`: mean square errors; `lmse_*`: Grosse's local error; `psnr_*`: dB for a white of 1, 120
+    at most. `mse_ratio`: diffuse error over that of the untouched photo. `removed`: share of the
+    squared error that leaves with the least confident fifth of the pixels. `rank`: correlation of
+    confidence and squared error, -1 the best. `taken`: of scenes without specular light, the RMS of
+    what was taken from the photo over the photo's own.
     """
 
     mse_diffuse: float | None = None
@@ -57,7 +61,11 @@ def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores
     mask = truth.mask
     nothing, wrong = mse(truth.diffuse, truth.image, mask), mse(truth.diffuse, answer.diffuse, mask)
     if nothing <= _LEAST:
-        return SeparationScores(taken=math.sqrt(wrong / max(float(np.square(truth.image[mask].astype(float)).mean()), _LEAST)))
+        return SeparationScores(
+            taken=math.sqrt(
+                wrong / max(float(np.square(truth.image[mask].astype(float)).mean()), _LEAST)
+            )
+        )
     squared = np.square(answer.diffuse[mask].astype(float) - truth.diffuse[mask]).mean(axis=1)
     confidence = answer.confidence[mask]
     sortable = wrong > _LEAST
@@ -77,16 +85,27 @@ def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores
 def show_separation(truth: GroundTruth, answer: Separation) -> tuple[Picture, ...]:
     """True and found layers under one exposure, and the error of the diffuse layer."""
     gain = exposure(truth.image, truth.mask)
-    pairs = [("photo", truth.image), ("diffuse, true", truth.diffuse), ("diffuse, found", answer.diffuse)]
+    pairs = [
+        ("photo", truth.image),
+        ("diffuse, true", truth.diffuse),
+        ("diffuse, found", answer.diffuse),
+    ]
     pairs += [("specular, true", truth.specular), ("specular, found", answer.specular)]
-    error = Picture("error: orange left over, blue overdone", signed_error(gain * (answer.diffuse - truth.diffuse), truth.mask))
+    error = Picture(
+        "error: orange left over, blue overdone",
+        signed_error(gain * (answer.diffuse - truth.diffuse), truth.mask),
+    )
     return (*(Picture(caption, lit(gain * values, truth.mask)) for caption, values in pairs), error)
 
 
 def separation_maps(answer: Separation) -> dict[str, np.ndarray]:
     """Channels of the layers as `isc separate` names them."""
     layers = {"diffuse": answer.diffuse, "specular": answer.specular, "residual": answer.residual}
-    planes = {f"{name}.{letter}": values[..., k] for name, values in layers.items() for k, letter in enumerate("RGB")}
+    planes = {
+        f"{name}.{letter}": values[..., k]
+        for name, values in layers.items()
+        for k, letter in enumerate("RGB")
+    }
     return planes | {"confidence.Y": answer.confidence}
 
 
@@ -108,9 +127,24 @@ SEPARATION = Stage(
         Metric("mse_specular", "specular MSE"),
         Metric("lmse_diffuse", "diffuse LMSE"),
         Metric("lmse_specular", "specular LMSE"),
-        Metric("psnr_diffuse", "diffuse PSNR", "dB", geometric=False, larger_is_better=True, margin=0.5),
-        Metric("psnr_specular", "specular PSNR", "dB", geometric=False, larger_is_better=True, margin=0.5),
-        Metric("removed", "error in the least confident fifth", geometric=False, larger_is_better=True, margin=0.05),
+        Metric(
+            "psnr_diffuse", "diffuse PSNR", "dB", geometric=False, larger_is_better=True, margin=0.5
+        ),
+        Metric(
+            "psnr_specular",
+            "specular PSNR",
+            "dB",
+            geometric=False,
+            larger_is_better=True,
+            margin=0.5,
+        ),
+        Metric(
+            "removed",
+            "error in the least confident fifth",
+            geometric=False,
+            larger_is_better=True,
+            margin=0.05,
+        ),
         Metric("rank", "rank of confidence and error", geometric=False, margin=0.05),
         Metric("taken", "taken from matt scenes, RMS", geometric=False, margin=0.005),
     ),

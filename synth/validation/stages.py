@@ -1,7 +1,8 @@
 """The stages that are validated, and what all of them have in common.
 
-A stage is one step from photo to scene: it sees what the stages before it found, or the truth of that where it is measured by itself.
-Adding one: a file with its `run`, `score` and `shown`, and an entry in `all_stages`.
+A stage is one step from photo to scene: it sees what the stages before it found, or the truth of
+that where it is measured by itself. Adding one: a file with its `run`, `score` and `shown`, and an
+entry in `all_stages`.
 """
 
 from collections.abc import Callable, Mapping
@@ -19,7 +20,9 @@ from isc_core.separation import BEST, METHODS
 
 from ..truth import GroundTruth
 
-Truth = Literal["diffuse", "shape", "light"]  # what can be swapped in for what a stage would have to find
+Truth = Literal[
+    "diffuse", "shape", "light"
+]  # what can be swapped in for what a stage would have to find
 
 # Darker than half a code of 16 bits is black: no colour and no shape can be read there.
 BLACK = 0.5 / 65535
@@ -27,9 +30,11 @@ BLACK = 0.5 / 65535
 
 @dataclass(frozen=True)
 class StageOptions:
-    """`separator`: one of `isc_core.separation.METHODS`. `illumination`: "natural" or "laboratory", which lights SIRFS expects.
-    `threads`: of one solver, 0 for all cores. `models`: which of `SEPARATING_MODELS` the stage "models" compares with plain SIRFS.
-    Raises `InputError` for unknown names."""
+    """`separator`: one of `isc_core.separation.METHODS`. `illumination`: "natural" or "laboratory",
+    which lights SIRFS expects. `threads`: of one solver, 0 for all cores. `models`: which of
+    `SEPARATING_MODELS` the stage "models" compares with plain SIRFS. Raises `InputError` for
+    unknown names.
+    """
 
     separator: str = BEST
     illumination: str = "natural"
@@ -37,7 +42,10 @@ class StageOptions:
     models: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        given = [("separator", self.separator, METHODS), ("illumination", self.illumination, ILLUMINATIONS)]
+        given = [
+            ("separator", self.separator, METHODS),
+            ("illumination", self.illumination, ILLUMINATIONS),
+        ]
         given += [("model", model, SEPARATING_MODELS) for model in self.models]
         for name, value, known in given:
             if value not in known:
@@ -48,9 +56,10 @@ class StageOptions:
 class Inputs:
     """What a stage sees.
 
-    `image`: (H, W, 3) linear, the photo; `mask`, `clipped`: (H, W) bool. `diffuse`: (H, W, 3), the diffuse layer as it is believed to be,
-    None before it is known. `height` (H, W) pixels and `light` (9, 3) in our convention: given as exact, or None. `split`: the layers that
-    the stage "separation" found, None where it was not run.
+    `image`: (H, W, 3) linear, the photo; `mask`, `clipped`: (H, W) bool. `diffuse`: (H, W, 3), the
+    diffuse layer as it is believed to be, None before it is known. `height` (H, W) pixels and
+    `light` (9, 3) in our convention: given as exact, or None. `split`: the layers that the stage
+    "separation" found, None where it was not run.
     """
 
     image: np.ndarray
@@ -66,9 +75,11 @@ class Inputs:
 class Metric:
     """One figure of a stage.
 
-    `name`: the field of the stage's scores. `title`, `unit`: for people. `geometric`: how it is averaged over scenes, as errors that span
-    powers of ten are; else by the plain mean. `larger_is_better`. `margin`: how far a bound that is taken from a run lies from it, as a
-    share of the value where the mean is geometric, else in the metric's unit. `given_by`: truths that hand the answer over.
+    `name`: the field of the stage's scores. `title`, `unit`: for people. `geometric`: how it is
+    averaged over scenes, as errors that span powers of ten are; else by the plain mean.
+    `larger_is_better`. `margin`: how far a bound that is taken from a run lies from it, as a share
+    of the value where the mean is geometric, else in the metric's unit. `given_by`: truths that
+    hand the answer over.
     """
 
     name: str
@@ -94,11 +105,13 @@ Marks = TypeVar("Marks")
 
 @dataclass(frozen=True)
 class Stage(Generic[Answer, Marks]):
-    """`title`: for people. `needs`: the truths that a stage measured by itself is given. `metrics`: the first one ranks scenes.
+    """`title`: for people. `needs`: the truths that a stage measured by itself is given. `metrics`:
+    the first one ranks scenes.
 
-    `run(inputs, options, monitor)` finds an answer and raises `InputError` where it can do nothing with the photo.
-    `score(truth, answer)` gives a dataclass with a field for each metric, None where it is not defined.
-    `shown(truth, answer)` gives pictures of truth and answer, in pairs. `maps(answer)` the channels of an EXR file.
+    `run(inputs, options, monitor)` finds an answer and raises `InputError` where it can do nothing
+    with the photo. `score(truth, answer)` gives a dataclass with a field for each metric, None
+    where it is not defined. `shown(truth, answer)` gives pictures of truth and answer, in pairs.
+    `maps(answer)` the channels of an EXR file.
     """
 
     name: str
@@ -115,7 +128,9 @@ class Stage(Generic[Answer, Marks]):
         for metric in self.metrics:
             if metric.name == name:
                 return metric
-        raise InputError(f"the stage {self.name} has no metric {name!r}: choose {', '.join(metric.name for metric in self.metrics)}")
+        raise InputError(
+            f"the stage {self.name} has no metric {name!r}: choose {', '.join(metric.name for metric in self.metrics)}"
+        )
 
 
 def all_stages() -> tuple[Stage[Any, Any], ...]:
@@ -128,7 +143,10 @@ def all_stages() -> tuple[Stage[Any, Any], ...]:
 
 
 def find_stages(names: tuple[str, ...] | None) -> tuple[Stage[Any, Any], ...]:
-    """Stages by name, in the order of the chain; all of them for None. Raises `InputError` for an unknown name."""
+    """Stages by name, in the order of the chain; all of them for None.
+
+    Raises `InputError` for an unknown name.
+    """
     stages = all_stages()
     known = [stage.name for stage in stages]
     if unknown := [name for name in names or () if name not in known]:
@@ -136,8 +154,13 @@ def find_stages(names: tuple[str, ...] | None) -> tuple[Stage[Any, Any], ...]:
     return tuple(stage for stage in stages if names is None or stage.name in names)
 
 
-def given(truth: GroundTruth, truths: tuple[Truth, ...], diffuse: np.ndarray | None = None) -> Inputs:
-    """What a stage sees of a scene when `truths` are handed over; `diffuse`: what the separation found, where its truth is not."""
+def given(
+    truth: GroundTruth, truths: tuple[Truth, ...], diffuse: np.ndarray | None = None
+) -> Inputs:
+    """What a stage sees of a scene when `truths` are handed over;
+
+    `diffuse`: what the separation found, where its truth is not.
+    """
     mask = truth.mask
     clipped = mask & (truth.image >= 1).any(axis=2) & (truth.residual < 0).any(axis=2)
     return Inputs(

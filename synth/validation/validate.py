@@ -14,11 +14,19 @@ from .render_checks import check_dataset
 from .run import RunOptions, choose_scenes, run_scenes
 
 
-def validate(root: Path, options: RunOptions, bounds: Sequence[Bound], renders: int, command: str, monitor: Monitor) -> Outcome:
+def validate(
+    root: Path,
+    options: RunOptions,
+    bounds: Sequence[Bound],
+    renders: int,
+    command: str,
+    monitor: Monitor,
+) -> Outcome:
     """Validates the stages on the dataset below `root`.
 
-    `bounds` to judge by; `renders`: how many scenes to render again; `command`: what the report says it was made by.
-    Raises `InputError` where the dataset cannot be read or no scene can be run, `Cancelled`.
+    `bounds` to judge by; `renders`: how many scenes to render again; `command`: what the report
+    says it was made by. Raises `InputError` where the dataset cannot be read or no scene can be
+    run, `Cancelled`.
     """
     folders = choose_scenes(root, options)
     checks, notes = check_dataset(folders, renders, options.seed, monitor.part(0, 0.1))
@@ -29,4 +37,15 @@ def validate(root: Path, options: RunOptions, bounds: Sequence[Bound], renders: 
     figures = all_figures(options.stages, measured, options.seed)
     budgets = all_budgets(measured, options.seed)
     gains = all_gains(measured, options.seed)
-    return Outcome(str(root), command, options, scenes, figures, budgets, checks, judge(bounds, figures), notes, gains)
+    return Outcome(
+        str(root),
+        command,
+        options,
+        scenes,
+        figures,
+        budgets,
+        checks,
+        judge(bounds, figures),
+        notes,
+        gains,
+    )

@@ -1,4 +1,6 @@
-"""A result folder that is exact, for tests of the scene: a bump under a known light, and its scene rendered to linear arrays."""
+"""A result folder that is exact, for tests of the scene: a bump under a known light, and its scene
+rendered to linear arrays.
+"""
 
 import json
 from pathlib import Path
@@ -11,8 +13,12 @@ from isc_core.mesh import MeshOptions, build_mesh
 from isc_core.sirfs.frames import real_sh
 
 
-def bump(rows: int = 64, columns: int = 88, centre: tuple[float, float] = (27.0, 38.0)) -> Decomposition:
-    """A dome off the middle of a wide frame, red above and blue below, lit from the upper left; heights and normals are exact."""
+def bump(
+    rows: int = 64, columns: int = 88, centre: tuple[float, float] = (27.0, 38.0)
+) -> Decomposition:
+    """A dome off the middle of a wide frame, red above and blue below, lit from the upper left;
+    heights and normals are exact.
+    """
     row, column = np.indices((rows, columns)).astype(float)
     radius = 0.4 * rows
     x, y = (column - centre[1]) / radius, (centre[0] - row) / radius
@@ -28,21 +34,54 @@ def bump(rows: int = 64, columns: int = 88, centre: tuple[float, float] = (27.0,
     paint = np.where((y > 0)[..., None], [0.45, 0.10, 0.08], [0.08, 0.14, 0.40]) * mask[..., None]
     reflectance = paint.astype(np.float32)
     diffuse = reflectance * shading
-    specular = (0.3 * np.exp(-40 * ((x + 0.3) ** 2 + (y - 0.3) ** 2)) * mask)[..., None].repeat(3, -1).astype(np.float32)
-    about = {"name": "bump.png", "sha256": "0" * 64, "size": [columns, rows], "scale": 1.0, "crop_box": [0, 0, columns, rows]}
-    provenance = Provenance({"model": "mdr", "separator": "isc"}, 0, {"isc": "0.1.0"}, {}, about, {"converged": True})
+    specular = (
+        (0.3 * np.exp(-40 * ((x + 0.3) ** 2 + (y - 0.3) ** 2)) * mask)[..., None]
+        .repeat(3, -1)
+        .astype(np.float32)
+    )
+    about = {
+        "name": "bump.png",
+        "sha256": "0" * 64,
+        "size": [columns, rows],
+        "scale": 1.0,
+        "crop_box": [0, 0, columns, rows],
+    }
+    provenance = Provenance(
+        {"model": "mdr", "separator": "isc"}, 0, {"isc": "0.1.0"}, {}, about, {"converged": True}
+    )
     residual = np.zeros_like(diffuse)
     trust = (mask * np.clip(normal[..., 2], 0, 1)).astype(np.float32)
-    maps = (diffuse + specular, diffuse, specular, residual, reflectance, shading, normal, height, mask, trust)
+    maps = (
+        diffuse + specular,
+        diffuse,
+        specular,
+        residual,
+        reflectance,
+        shading,
+        normal,
+        height,
+        mask,
+        trust,
+    )
     return Decomposition(*maps, light, provenance)
 
 
-def write_result(folder: Path, decomposition: Decomposition | None = None, mesh: MeshOptions | None = None) -> Path:
+def write_result(
+    folder: Path, decomposition: Decomposition | None = None, mesh: MeshOptions | None = None
+) -> Path:
     """A folder with arrays.npz and decomposition.json, as little as the scene needs of a result."""
     d = decomposition or bump()
     folder.mkdir(parents=True, exist_ok=True)
-    write_arrays(d, folder / "arrays.npz", build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh))
+    write_arrays(
+        d, folder / "arrays.npz", build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh)
+    )
     p = d.provenance
-    text = {"schema_version": 1, "settings": p.settings, "versions": p.versions, "input": p.input, "status": p.status}
+    text = {
+        "schema_version": 1,
+        "settings": p.settings,
+        "versions": p.versions,
+        "input": p.input,
+        "status": p.status,
+    }
     (folder / "decomposition.json").write_text(json.dumps(text), encoding="utf-8")
     return folder

@@ -16,14 +16,18 @@ _LAYERS = {
 
 
 def render(scene: Any, folder: Path, samples: int = 1) -> dict[str, np.ndarray]:
-    """Layers (H, W, C) by name, as Blender 5 calls them: "Combined" (RGBA), "Emission", "Diffuse Color", ... Rays pass pixel centres."""
+    """Layers (H, W, C) by name, as Blender 5 calls them: "Combined" (RGBA), "Emission", "Diffuse
+    Color", ... Rays pass pixel centres.
+    """
     import bpy
 
     cycles, layer, picture = scene.cycles, scene.view_layers[0], scene.render.image_settings
     cycles.samples, cycles.seed, cycles.device = samples, 0, "CPU"
     cycles.use_adaptive_sampling, cycles.use_denoising = False, False
     cycles.pixel_filter_type, cycles.filter_width = "BOX", 0.01
-    layer.use_pass_diffuse_color = layer.use_pass_diffuse_direct = layer.use_pass_normal = layer.use_pass_position = True
+    layer.use_pass_diffuse_color = layer.use_pass_diffuse_direct = layer.use_pass_normal = (
+        layer.use_pass_position
+    ) = True
     layer.use_pass_glossy_color = layer.use_pass_glossy_direct = layer.use_pass_emit = True
     if hasattr(picture, "media_type"):
         picture.media_type = "MULTI_LAYER_IMAGE"
@@ -36,7 +40,11 @@ def render(scene: Any, folder: Path, samples: int = 1) -> dict[str, np.ndarray]:
             *_, kind, letter = name.split(".")
             planes.setdefault(_LAYERS.get(kind, kind), {})[letter] = channel.pixels
     letters = {"Combined": "RGBA", "Normal": "XYZ", "Position": "XYZ"}
-    return {name: np.stack([held[letter] for letter in letters.get(name, "RGB")], -1) for name, held in planes.items() if len(held) > 2}
+    return {
+        name: np.stack([held[letter] for letter in letters.get(name, "RGB")], -1)
+        for name, held in planes.items()
+        if len(held) > 2
+    }
 
 
 def pixels(image: Any) -> np.ndarray:

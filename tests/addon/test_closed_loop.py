@@ -1,4 +1,6 @@
-"""The closed loop on an exact result: its white, matt and whole renders are its maps, in its own light and in another one."""
+"""The closed loop on an exact result: its white, matt and whole renders are its maps, in its own
+light and in another one.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -26,28 +28,57 @@ def test_what_stands_in_blender_is_what_was_recovered(result: Result, tmp_path: 
     assert row.shading < 0.08
     assert row.inner <= row.shading
     assert row.diffuse > 30
-    assert row.diffuse > row.diffuse_usual, "Blender's usual filter smooths what the photo's camera has smoothed already"
+    assert row.diffuse > row.diffuse_usual, (
+        "Blender's usual filter smooths what the photo's camera has smoothed already"
+    )
     assert row.image > 30
     assert row.image > row.matt + 3, "the photo has a highlight, the matt object has none"
-    assert closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES).kept.keys() == renders.kept.keys()
+    assert (
+        closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES).kept.keys()
+        == renders.kept.keys()
+    )
     assert closed_loop.loop_table([row]).count("\n") == 3
 
 
 @pytest.mark.parametrize("light", ["sun", "sky"])
-def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(result: Result, light: str) -> None:
-    """A shallow dome has no shadows under light from the front: matt radiance is albedo * irradiance / pi."""
+def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(
+    result: Result, light: str
+) -> None:
+    """A shallow dome has no shadows under light from the front: matt radiance is albedo *
+    irradiance / pi.
+    """
     from benchmarks.closed_loop_renders import Look, picture
 
-    toward, irradiance, height = np.array([0.48, -0.36, 0.8]), np.array([2.0, 1.5, 1.0]), directions(16)[..., :1]
-    sky = np.full((16, 32, 3), 0.1) if light == "sun" else (1 + 0.8 * height) * np.array([0.2, 0.5, 0.8])
+    toward, irradiance, height = (
+        np.array([0.48, -0.36, 0.8]),
+        np.array([2.0, 1.5, 1.0]),
+        directions(16)[..., :1],
+    )
+    sky = (
+        np.full((16, 32, 3), 0.1)
+        if light == "sun"
+        else (1 + 0.8 * height) * np.array([0.2, 0.5, 0.8])
+    )
     sun = irradiance if light == "sun" else np.zeros(3)
     normal = result.normal[result.mask].astype(float)
     truth = np.zeros_like(result.diffuse)
     shading = shading_under(sky, normal) + sun / np.pi * np.maximum(normal @ toward, 0)[:, None]
     truth[result.mask] = result.reflectance[result.mask] * shading
-    got, _ = picture(result, Look(own_shadows=False, relit=Relit(light, sky, toward, sun, truth, truth)), SAMPLES)
-    assert psnr(truth, got / result.reflectance_scale, result.mask, peak=closed_loop.white(truth, result.mask)) > 30
-    assert closed_loop.gain(truth, got, result.mask) == pytest.approx(1 / result.reflectance_scale, rel=0.02)
+    got, _ = picture(
+        result, Look(own_shadows=False, relit=Relit(light, sky, toward, sun, truth, truth)), SAMPLES
+    )
+    assert (
+        psnr(
+            truth,
+            got / result.reflectance_scale,
+            result.mask,
+            peak=closed_loop.white(truth, result.mask),
+        )
+        > 30
+    )
+    assert closed_loop.gain(truth, got, result.mask) == pytest.approx(
+        1 / result.reflectance_scale, rel=0.02
+    )
 
 
 def test_materials_that_shine_by_themselves_are_found(result: Result) -> None:
@@ -77,6 +108,11 @@ def test_only_the_scale_of_a_relit_picture_is_free() -> None:
     rng = np.random.default_rng(0)
     truth, mask = rng.uniform(0, 1, (8, 9, 3)), np.ones((8, 9), bool)
     seen = truth + rng.normal(0, 0.05, truth.shape)
-    assert closed_loop.scaled_psnr(truth, seen, mask) == pytest.approx(closed_loop.scaled_psnr(truth, 7 * seen, mask))
-    assert closed_loop.scaled_psnr(truth, seen * [1, 0.5, 0.5], mask) < closed_loop.scaled_psnr(truth, seen, mask) - 3
+    assert closed_loop.scaled_psnr(truth, seen, mask) == pytest.approx(
+        closed_loop.scaled_psnr(truth, 7 * seen, mask)
+    )
+    assert (
+        closed_loop.scaled_psnr(truth, seen * [1, 0.5, 0.5], mask)
+        < closed_loop.scaled_psnr(truth, seen, mask) - 3
+    )
     assert closed_loop.relative_rms(1.1 * truth, truth, mask) == pytest.approx(0.1)

@@ -1,4 +1,6 @@
-"""The zips: what goes in, that imports still work there, that bytes repeat, and that Blender's own validator is asked."""
+"""The zips: what goes in, that imports still work there, that bytes repeat, and that Blender's own
+validator is asked.
+"""
 
 import ast
 import importlib.util
@@ -17,21 +19,37 @@ from blender_addon.packaging.wheels import locked, wheels_for
 from isc_core.errors import InputError
 
 LINUX = Target("linux-x64", (3, 11), "4.5.0", "5.1.0")
-needs_bpy = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="needs the extra `blender` (Python 3.11 or 3.13)")
+needs_bpy = pytest.mark.skipif(
+    importlib.util.find_spec("bpy") is None,
+    reason="needs the extra `blender` (Python 3.11 or 3.13)",
+)
 
 
 @pytest.mark.parametrize("target", TARGETS, ids=lambda target: target.name)
 def test_each_target_has_one_wheel_of_each_package_and_never_numpy(target: Target) -> None:
     packages = [name.split("-")[0] for name in locked() if target.runs(name)]
-    assert sorted(packages) == ["llvmlite", "numba", "opencv_python_headless", "openexr", "pillow", "scipy", "trimesh"]
+    assert sorted(packages) == [
+        "llvmlite",
+        "numba",
+        "opencv_python_headless",
+        "openexr",
+        "pillow",
+        "scipy",
+        "trimesh",
+    ]
 
 
 def test_every_locked_wheel_is_used_and_has_the_version_the_project_is_tested_with() -> None:
     root = Path(__file__).resolve().parents[2]
-    pins = {line.split(";")[0].strip().lower().replace("-", "_") for line in (root / "constraints.txt").read_text().splitlines()}
+    pins = {
+        line.split(";")[0].strip().lower().replace("-", "_")
+        for line in (root / "constraints.txt").read_text().splitlines()
+    }
     for name in locked():
         assert any(target.runs(name) for target in TARGETS), f"{name} is for nobody"
-        assert "{}=={}".format(*name.lower().split("-")[:2]) in pins, f"{name} is not what constraints.txt pins"
+        assert "{}=={}".format(*name.lower().split("-")[:2]) in pins, (
+            f"{name} is not what constraints.txt pins"
+        )
 
 
 @pytest.mark.parametrize(
@@ -54,24 +72,40 @@ def test_a_wheel_is_chosen_by_its_tags(wheel: str, runs: bool) -> None:
 def test_targets_are_chosen_by_name() -> None:
     assert chosen("all") == TARGETS
     assert [target.name for target in chosen("windows-x64-cp313")] == ["windows-x64-cp313"]
-    with pytest.raises(InputError, match="no extension is built for amiga-cp311: choose all, here, linux-x64-cp311"):
+    with pytest.raises(
+        InputError, match="no extension is built for amiga-cp311: choose all, here, linux-x64-cp311"
+    ):
         chosen("amiga-cp311")
 
 
 @pytest.mark.parametrize(
     ("name", "source", "shipped"),
     [
-        ("worker.py", "from isc_core.errors import InputError\n", "from .isc_core.errors import InputError\n"),
+        (
+            "worker.py",
+            "from isc_core.errors import InputError\n",
+            "from .isc_core.errors import InputError\n",
+        ),
         (
             "a/b.py",
             "def f():\n    from isc_core.errors import (\n        A,\n    )\n",
             "def f():\n    from ..isc_core.errors import (\n        A,\n    )\n",
         ),
-        ("worker.py", 'RUN = "from isc_core.errors import A"\n', 'RUN = "from isc_core.errors import A"\n'),
-        ("a.py", "from . import b\nimport bpy, json\nimport numpy as np\n", "from . import b\nimport bpy, json\nimport numpy as np\n"),
+        (
+            "worker.py",
+            'RUN = "from isc_core.errors import A"\n',
+            'RUN = "from isc_core.errors import A"\n',
+        ),
+        (
+            "a.py",
+            "from . import b\nimport bpy, json\nimport numpy as np\n",
+            "from . import b\nimport bpy, json\nimport numpy as np\n",
+        ),
     ],
 )
-def test_imports_of_the_core_become_relative_and_nothing_else_changes(name: str, source: str, shipped: str) -> None:
+def test_imports_of_the_core_become_relative_and_nothing_else_changes(
+    name: str, source: str, shipped: str
+) -> None:
     assert installed_source(source, name) == shipped
 
 
@@ -94,8 +128,20 @@ def test_an_import_that_would_fail_once_installed_stops_the_build(source: str) -
 
 def test_the_zip_holds_the_addon_the_core_and_no_tools() -> None:
     names = set(contents(LINUX, []))
-    assert {"blender_manifest.toml", "LICENSE", "__init__.py", "headless.py", "isc_core/__main__.py", "isc_core/data/priors.npz"} <= names
-    assert not [name for name in names if name.startswith(("packaging/", "wheels/", "tests/", "blender_addon/")) or "__pycache__" in name]
+    assert {
+        "blender_manifest.toml",
+        "LICENSE",
+        "__init__.py",
+        "headless.py",
+        "isc_core/__main__.py",
+        "isc_core/data/priors.npz",
+    } <= names
+    assert not [
+        name
+        for name in names
+        if name.startswith(("packaging/", "wheels/", "tests/", "blender_addon/"))
+        or "__pycache__" in name
+    ]
 
 
 def test_every_module_in_the_zip_is_python_that_names_no_package_of_the_source_tree() -> None:
@@ -103,14 +149,33 @@ def test_every_module_in_the_zip_is_python_that_names_no_package_of_the_source_t
         if not name.endswith(".py"):
             continue
         tree = ast.parse(content if isinstance(content, bytes) else content.read_bytes(), name)
-        modules = [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.level == 0]
-        modules += [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
-        assert not [module for module in modules if module.split(".")[0] in {"isc_core", "blender_addon", "synth"}], name
+        modules = [
+            node.module or ""
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom) and node.level == 0
+        ]
+        modules += [
+            alias.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.Import)
+            for alias in node.names
+        ]
+        assert not [
+            module
+            for module in modules
+            if module.split(".")[0] in {"isc_core", "blender_addon", "synth"}
+        ], name
 
 
 def test_the_manifest_says_what_the_zip_is_for() -> None:
-    about = tomllib.loads(manifest(LINUX, [Path("x/scipy-1-cp311-cp311-manylinux_2_28_x86_64.whl")]))
-    assert (about["id"], about["blender_version_min"], about["blender_version_max"]) == ("isc_intrinsic", "4.5.0", "5.1.0")
+    about = tomllib.loads(
+        manifest(LINUX, [Path("x/scipy-1-cp311-cp311-manylinux_2_28_x86_64.whl")])
+    )
+    assert (about["id"], about["blender_version_min"], about["blender_version_max"]) == (
+        "isc_intrinsic",
+        "4.5.0",
+        "5.1.0",
+    )
     assert about["platforms"] == ["linux-x64"]
     assert about["wheels"] == ["./wheels/scipy-1-cp311-cp311-manylinux_2_28_x86_64.whl"]
     assert list(about["permissions"]) == ["files"]
@@ -136,7 +201,9 @@ def test_a_wheel_that_is_not_the_locked_one_stops_the_build(tmp_path: Path) -> N
     for name in locked():
         if LINUX.runs(name):
             (folder / name).write_bytes(b"something else")
-    with pytest.raises(InputError, match="is not the wheel that wheels.sha256 names: delete it and build again"):
+    with pytest.raises(
+        InputError, match="is not the wheel that wheels.sha256 names: delete it and build again"
+    ):
         wheels_for(LINUX, tmp_path, offline=True)
 
 
@@ -146,12 +213,29 @@ def test_blender_accepts_the_zip_and_its_refusal_is_reported(tmp_path: Path) -> 
     assert validate(path)
     entries = contents(LINUX, [])
     text = bytes(entries["blender_manifest.toml"]).decode()  # type: ignore[arg-type]
-    write_archive(tmp_path / "bad.zip", entries | {"blender_manifest.toml": text.replace('"Material"', '"Magic"').encode()})
+    write_archive(
+        tmp_path / "bad.zip",
+        entries | {"blender_manifest.toml": text.replace('"Material"', '"Magic"').encode()},
+    )
     with pytest.raises(InputError, match="Blender refuses bad.zip: .*Magic"):
         validate(tmp_path / "bad.zip")
 
 
-def test_the_command_says_in_one_line_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["linux-x64-cp311", "--offline", "-o", str(tmp_path), "--wheels", str(tmp_path / "none")]) == 2
+def test_the_command_says_in_one_line_what_is_wrong(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(
+            [
+                "linux-x64-cp311",
+                "--offline",
+                "-o",
+                str(tmp_path),
+                "--wheels",
+                str(tmp_path / "none"),
+            ]
+        )
+        == 2
+    )
     assert capsys.readouterr().err.count("\n") == 1
     assert not list(tmp_path.glob("*.zip"))

@@ -1,4 +1,6 @@
-"""Photos and results become .blend files and renders: the command, run as users run it, in processes of their own."""
+"""Photos and results become .blend files and renders: the command, run as users run it, in
+processes of their own.
+"""
 
 import importlib.util
 import json
@@ -18,10 +20,13 @@ from tests.addon.scene_fixture import bump, write_result
 from tests.core.lit_balls import under_lamps
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.skipif(importlib.util.find_spec("bpy") is None, reason="needs the extra `blender` (Python 3.11 or 3.13)")
+pytestmark = pytest.mark.skipif(
+    importlib.util.find_spec("bpy") is None,
+    reason="needs the extra `blender` (Python 3.11 or 3.13)",
+)
 
-# Runs a script as Blender's -P does: under the name __main__, with Blender's own arguments before `--`, the script's folder not on the
-# search path, and the project not installed.
+# Runs a script as Blender's -P does: under the name __main__, with Blender's own arguments before
+# `--`, the script's folder not on the search path, and the project not installed.
 AS_BLENDER_DOES = """
 import runpy, sys
 sys.meta_path[:] = [finder for finder in sys.meta_path if "editable" not in repr(finder)]
@@ -42,13 +47,25 @@ def command(*arguments: object) -> list[str]:
 
 
 def run(*arguments: object, **options: object) -> subprocess.CompletedProcess[str]:
-    given = {"cwd": ROOT, "capture_output": True, "text": True, "check": False, "timeout": 300} | options
+    given = {
+        "cwd": ROOT,
+        "capture_output": True,
+        "text": True,
+        "check": False,
+        "timeout": 300,
+    } | options
     return subprocess.run(command(*arguments), **given)  # type: ignore[call-overload]
 
 
 def scenes_of(blend: Path) -> tuple[dict[str, list[object]], str, list[str]]:
     """The file's scenes, the one it opens with, and images that it does not hold."""
-    done = subprocess.run([sys.executable, "-c", SCENES, str(blend)], capture_output=True, text=True, check=True, timeout=100)
+    done = subprocess.run(
+        [sys.executable, "-c", SCENES, str(blend)],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=100,
+    )
     line = next(line for line in done.stdout.splitlines() if line.startswith("ABOUT "))
     scenes, active, loose = json.loads(line.removeprefix("ABOUT "))
     return scenes, active, loose
@@ -58,13 +75,19 @@ def linear_picture(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """A 16-bit PNG as linear colour, (H, W, 3), and alpha, (H, W)."""
     pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., [2, 1, 0, 3]].astype(float) / 65535
     coded = pixels[..., :3]
-    return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4), pixels[..., 3]
+    return np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4), pixels[
+        ..., 3
+    ]
 
 
 def photo(folder: Path, name: str = "bump.png") -> Path:
     """A small photo with an alpha channel."""
     d = bump(48, 64, (20.0, 28.0))
-    coded = np.where(d.image <= 0.0031308, 12.92 * d.image, 1.055 * np.maximum(d.image, 1e-6) ** (1 / 2.4) - 0.055)
+    coded = np.where(
+        d.image <= 0.0031308,
+        12.92 * d.image,
+        1.055 * np.maximum(d.image, 1e-6) ** (1 / 2.4) - 0.055,
+    )
     pixels = np.dstack([coded[..., ::-1], d.mask])
     folder.mkdir(parents=True, exist_ok=True)
     cv2.imwrite(str(folder / name), np.rint(65535 * np.clip(pixels, 0, 1)).astype(np.uint16))
@@ -74,7 +97,9 @@ def photo(folder: Path, name: str = "bump.png") -> Path:
 def test_a_result_becomes_a_file_and_a_render_that_looks_like_it(tmp_path: Path) -> None:
     write_result(tmp_path / "result")
     blend, picture = tmp_path / "scene" / "out.blend", tmp_path / "scene" / "out.png"
-    done = run(tmp_path / "result", "-o", blend, "--render", picture, "--samples", 32, "--specular", "none")
+    done = run(
+        tmp_path / "result", "-o", blend, "--render", picture, "--samples", 32, "--specular", "none"
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     scenes, active, loose = scenes_of(blend)
     assert scenes == {"result": ["CYCLES", 32, 88, 2]}, "the object's own scene, and no other"
@@ -89,24 +114,41 @@ def test_a_result_becomes_a_file_and_a_render_that_looks_like_it(tmp_path: Path)
     assert sorted(path.name for path in (tmp_path / "scene").iterdir()) == ["out.blend", "out.png"]
 
 
-def test_a_folder_goes_into_one_file_with_a_scene_each_or_into_files_of_its_own(tmp_path: Path) -> None:
+def test_a_folder_goes_into_one_file_with_a_scene_each_or_into_files_of_its_own(
+    tmp_path: Path,
+) -> None:
     for name in ("cup", "jug"):
         write_result(tmp_path / "all" / name)
-    done = run(tmp_path / "all", "-o", tmp_path / "all.blend", "--render", tmp_path / "renders", "--samples", 1)
+    done = run(
+        tmp_path / "all",
+        "-o",
+        tmp_path / "all.blend",
+        "--render",
+        tmp_path / "renders",
+        "--samples",
+        1,
+    )
     assert done.returncode == 0, done.stderr
     assert set(scenes_of(tmp_path / "all.blend")[0]) == {"cup", "jug"}
     assert sorted(path.name for path in (tmp_path / "renders").iterdir()) == ["cup.png", "jug.png"]
     done = run(tmp_path / "all", "-o", tmp_path / "files")
     assert done.returncode == 0, done.stderr
-    assert [set(scenes_of(tmp_path / "files" / f"{name}.blend")[0]) for name in ("cup", "jug")] == [{"cup"}, {"jug"}]
+    assert [set(scenes_of(tmp_path / "files" / f"{name}.blend")[0]) for name in ("cup", "jug")] == [
+        {"cup"},
+        {"jug"},
+    ]
 
 
-def test_a_photo_is_taken_apart_when_blender_runs_the_file_from_the_source_tree(tmp_path: Path) -> None:
+def test_a_photo_is_taken_apart_when_blender_runs_the_file_from_the_source_tree(
+    tmp_path: Path,
+) -> None:
     blend, kept = tmp_path / "out.blend", tmp_path / "kept"
     script = ROOT / "blender_addon" / "headless.py"
     arguments = [photo(tmp_path), "-o", blend, "--results", kept, "--max-size", 32, "--threads", 1]
     call = [sys.executable, "-P", "-c", AS_BLENDER_DOES, str(script), *map(str, arguments)]
-    done = subprocess.run(call, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(
+        call, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert set(scenes_of(blend)[0]) == {"bump"}
     about = json.loads((kept / "bump" / "decomposition.json").read_text())
@@ -118,9 +160,19 @@ def test_why_a_result_is_doubtful_is_said(tmp_path: Path) -> None:
     image, mask = under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))
     np.save(tmp_path / "ball.npy", image)
     cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255) * mask)
-    done = run(tmp_path / "ball.npy", "--mask", tmp_path / "mask.png", "--results", tmp_path / "kept", "--max-size", 48)
+    done = run(
+        tmp_path / "ball.npy",
+        "--mask",
+        tmp_path / "mask.png",
+        "--results",
+        tmp_path / "kept",
+        "--max-size",
+        48,
+    )
     assert done.returncode == 0, done.stderr
-    doubts = json.loads((tmp_path / "kept" / "ball" / "decomposition.json").read_text())["status"]["doubts"]
+    doubts = json.loads((tmp_path / "kept" / "ball" / "decomposition.json").read_text())["status"][
+        "doubts"
+    ]
     assert doubts, "the case does not serve"
     assert all(f"note: {line}" in done.stdout for line in doubts), done.stdout
 
@@ -129,7 +181,15 @@ def test_a_results_folder_says_why_it_is_doubtful_too(tmp_path: Path) -> None:
     """What the photo's own run said; a status that is not as it should be says nothing."""
     result, odd = write_result(tmp_path / "all" / "cup"), write_result(tmp_path / "all" / "odd")
     for folder, status in (
-        (result, {"converged": False, "help": "more steps", "gloss": "none found", "doubts": ["it looks like a mirror", "two lamps"]}),
+        (
+            result,
+            {
+                "converged": False,
+                "help": "more steps",
+                "gloss": "none found",
+                "doubts": ["it looks like a mirror", "two lamps"],
+            },
+        ),
         (odd, {"gloss": 3, "doubts": {"a": 1}, "light_colour": "red"}),
     ):
         about = json.loads((folder / "decomposition.json").read_text())
@@ -137,7 +197,9 @@ def test_a_results_folder_says_why_it_is_doubtful_too(tmp_path: Path) -> None:
     done = run(tmp_path / "all", "-o", tmp_path / "out", "--quiet")
     assert done.returncode == 0, done.stderr
     said = [line for line in done.stdout.splitlines() if line.startswith(str(tmp_path / "all"))]
-    assert said == [f"{result}: note: more steps; gloss: none found; note: it looks like a mirror; note: two lamps"]
+    assert said == [
+        f"{result}: note: more steps; gloss: none found; note: it looks like a mirror; note: two lamps"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -148,13 +210,20 @@ def test_a_results_folder_says_why_it_is_doubtful_too(tmp_path: Path) -> None:
         (["RESULT", "-o", "x.blend", "--samples", "0"], "--samples must be 1 or more"),
         (["RESULT", "-o", "x.blend", "--size", "nan"], "--size must be above 0"),
         (["RESULT", "-o", "RESULT/arrays.npz/x.blend"], "a part of the path is a file"),
-        (["RESULT", "--render", "x.jpg"], "--render x.jpg: give a file that ends in .png or .exr, or a folder"),
+        (
+            ["RESULT", "--render", "x.jpg"],
+            "--render x.jpg: give a file that ends in .png or .exr, or a folder",
+        ),
         (["RESULT", "-o", "x.txt"], "-o x.txt: give a file that ends in .blend, or a folder"),
         (["RESULT", "--render", "x.png", "--nonsense"], "unrecognized arguments: --nonsense"),
     ],
 )
 def test_what_cannot_be_done_is_said_in_one_line_before_any_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], says: str
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    arguments: list[str],
+    says: str,
 ) -> None:
     result = write_result(tmp_path / "RESULT")
     monkeypatch.chdir(tmp_path)
@@ -178,7 +247,9 @@ def test_one_that_fails_does_not_hold_up_the_others(tmp_path: Path) -> None:
 
 def test_ctrl_c_ends_the_worker_and_leaves_nothing(tmp_path: Path) -> None:
     call = command(photo(tmp_path), "-o", tmp_path / "out.blend")
-    with subprocess.Popen(call, cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+    with subprocess.Popen(
+        call, cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+    ) as process:
         assert process.stderr is not None
         first = process.stderr.readline()  # the worker is at work
         time.sleep(0.2)
@@ -205,6 +276,13 @@ def test_a_fault_is_not_taken_for_success(tmp_path: Path) -> None:
     """Blender itself ends with 0 after a script that raised."""
     code = "import runpy, sys, blender_addon.command_line as c; c.main = None; sys.argv = ['headless']; "
     code += "runpy.run_module('blender_addon.headless', run_name='__main__')"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False, timeout=100)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=100,
+    )
     assert done.returncode == 1
     assert "TypeError" in done.stderr

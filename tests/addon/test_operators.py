@@ -1,4 +1,6 @@
-"""The operators as people press them: one real run from photo to object, and what is said where something is wrong."""
+"""The operators as people press them: one real run from photo to object, and what is said where
+something is wrong.
+"""
 
 import importlib.util
 import json
@@ -53,22 +55,40 @@ def say(operator: Any, **options: Any) -> str:
 
 
 def census(blender: Any) -> dict[str, list[str]]:
-    kinds = ("objects", "meshes", "materials", "images", "worlds", "scenes", "collections", "node_groups", "cameras", "texts")
+    kinds = (
+        "objects",
+        "meshes",
+        "materials",
+        "images",
+        "worlds",
+        "scenes",
+        "collections",
+        "node_groups",
+        "cameras",
+        "texts",
+    )
     return {kind: sorted(block.name for block in getattr(blender.data, kind)) for kind in kinds}
 
 
-# --- from photo to object ---------------------------------------------------------------------------------------------------------------
+# --- from photo to object -------------------------------------------------------------------------
 
 
 def test_a_photo_becomes_an_object_and_is_made_again_larger(addon: Any) -> None:
     """One real run, of a painted photo with a name that is no file name."""
     addon.data.scenes[0].name = "Mine"
     settings = addon.context.scene.isc
-    settings.image, settings.separator, settings.max_size, settings.samples = photo("Täss/chen 杯.png"), "shen_2013", 36, 3
+    settings.image, settings.separator, settings.max_size, settings.samples = (
+        photo("Täss/chen 杯.png"),
+        "shen_2013",
+        36,
+        3,
+    )
     before = addon.context.scene.world, addon.context.scene.camera
     assert addon.ops.isc.decompose() == {"FINISHED"}
     shown = addon.context.window_manager.isc
-    assert shown.state == "done" and shown.message.startswith("Täss_chen 杯: built in the scene Täss_chen 杯; gloss: ")
+    assert shown.state == "done" and shown.message.startswith(
+        "Täss_chen 杯: built in the scene Täss_chen 杯; gloss: "
+    )
     built = find(addon.context.object)
     assert built is not None and built.scene == addon.context.scene and built.object.select_get()
     assert built.scene.cycles.samples == 3 and built.scene.isc.image == settings.image
@@ -76,27 +96,41 @@ def test_a_photo_becomes_an_object_and_is_made_again_larger(addon: Any) -> None:
     assert (mine.world, mine.camera) == before and not mine.objects, "the user's scene is as before"
     folder = Path(built.object["isc_folder"])
     assert (folder / "mesh.glb").is_file() and not (folder / "arrays.npz").exists()
-    assert sorted(path.name for path in folder.parent.iterdir()) == ["result"], "what was handed over has served"
+    assert sorted(path.name for path in folder.parent.iterdir()) == ["result"], (
+        "what was handed over has served"
+    )
     assert json.loads((folder / "decomposition.json").read_text())["settings"]["max_size"] == 36
     vertices = len(built.object.data.vertices)
     addon.ops.isc.recolour(hue=0.1)
     assert addon.ops.isc.redo(max_size=48) == {"FINISHED"}
     again = find(addon.context.object)
-    assert again is not None and again.object == built.object and len(again.object.data.vertices) > 1.4 * vertices
-    assert requests.request_from_json(again.object["isc_request"]).method.max_size == 48
-    assert len(addon.data.meshes) == 1 and again.material.node_tree.nodes["ISC Dichromatic"].inputs["Hue"].default_value == pytest.approx(
-        0.1
+    assert (
+        again is not None
+        and again.object == built.object
+        and len(again.object.data.vertices) > 1.4 * vertices
     )
+    assert requests.request_from_json(again.object["isc_request"]).method.max_size == 48
+    assert len(addon.data.meshes) == 1 and again.material.node_tree.nodes["ISC Dichromatic"].inputs[
+        "Hue"
+    ].default_value == pytest.approx(0.1)
 
 
 def test_a_box_is_cut_out_as_the_mask(addon: Any) -> None:
     d = bump()
     settings = addon.context.scene.isc
-    settings.image = picture("cup.png", np.where(d.mask[..., None], 3 * d.image + 0.2, [0.02, 0.25, 0.03]), float_buffer=True)
+    settings.image = picture(
+        "cup.png",
+        np.where(d.mask[..., None], 3 * d.image + 0.2, [0.02, 0.25, 0.03]),
+        float_buffer=True,
+    )
     settings.box = (8, 1, 60, 54)
     for _ in range(2):  # the second replaces the first
         assert addon.ops.isc.cut_mask() == {"FINISHED"}
-    assert settings.mask_source == "IMAGE" and settings.mask.name == "cup.png mask" and settings.mask.packed_file is not None
+    assert (
+        settings.mask_source == "IMAGE"
+        and settings.mask.name == "cup.png mask"
+        and settings.mask.packed_file is not None
+    )
     assert [image.name for image in addon.data.images] == ["cup.png", "cup.png mask"]
     found = np.empty(len(settings.mask.pixels), np.float32)
     settings.mask.pixels.foreach_get(found)
@@ -112,12 +146,14 @@ def test_two_runs_at_once_are_refused(addon: Any, tmp_path: Path) -> None:
     (tmp_path / "run").mkdir()
     begin(Run("Decompose jug", (Update() for _ in "many"), lambda *_: "", tmp_path / "run"))  # type: ignore[arg-type]
     assert not addon.ops.isc.decompose.poll()
-    with pytest.raises(InputError, match="Decompose jug is going on: wait for it, or cancel it first"):
+    with pytest.raises(
+        InputError, match="Decompose jug is going on: wait for it, or cancel it first"
+    ):
         run_of(addon.context, request_from_settings(addon.context.scene))
     assert census(addon) == before
 
 
-# --- what is asked for ------------------------------------------------------------------------------------------------------------------
+# --- what is asked for ----------------------------------------------------------------------------
 
 
 def test_the_panel_knows_what_the_command_knows() -> None:
@@ -168,7 +204,9 @@ def test_choices_survive_the_file(addon: Any, tmp_path: Path) -> None:
 
 
 def test_a_request_is_kept_as_text() -> None:
-    asked = requests.Request("a", "b", True, requests.Method(max_size=7), BuildOptions(name="杯"), "Scene")
+    asked = requests.Request(
+        "a", "b", True, requests.Method(max_size=7), BuildOptions(name="杯"), "Scene"
+    )
     assert requests.request_from_json(asked.to_json()) == asked
     later = json.loads(asked.to_json()) | {"of_a_later_version": 1}
     assert requests.request_from_json(json.dumps(later)) == asked
@@ -194,7 +232,7 @@ def test_kept_results_go_to_the_cache_folder(addon: Any, tmp_path: Path) -> None
         preferences.new_folder(tmp_path / "file" / "x", "cup")
 
 
-# --- what is wrong ----------------------------------------------------------------------------------------------------------------------
+# --- what is wrong --------------------------------------------------------------------------------
 
 
 def masked(settings: Any, mask: Any) -> None:
@@ -216,17 +254,25 @@ def set_image(settings: Any, values: np.ndarray) -> None:
         (lambda s: None, "there is no photo: open a file"),
         (lambda s: set_image(s, np.ones((1, 1, 3))), "is 1 x 1 pixels: choose a larger one"),
         (without_mask, "there is no mask image: choose one"),
-        (lambda s: masked(s, bpy.data.images.new("m", 88, 64)), "the mask m is empty: paint the object white on black"),
+        (
+            lambda s: masked(s, bpy.data.images.new("m", 88, 64)),
+            "the mask m is empty: paint the object white on black",
+        ),
         (
             lambda s: masked(s, mask_image(size=(20, 30))),
             "the mask is 30 x 20 pixels, the photo 88 x 64: choose another mask, or tick Scale Mask",
         ),
         (lambda s: masked(s, None), "is the photo itself"),
         (lambda s: set_image(s, np.zeros((32, 32, 3))), "wall: every pixel is black"),
-        (lambda s: set_image(s, 0.3 + np.indices((32, 32, 3)).sum(0) / 200), "choose a mask image, or cut one out of a box"),
+        (
+            lambda s: set_image(s, 0.3 + np.indices((32, 32, 3)).sum(0) / 200),
+            "choose a mask image, or cut one out of a box",
+        ),
     ],
 )
-def test_what_is_wrong_is_said_and_nothing_changes(addon: Any, prepare: Any, complaint: str) -> None:
+def test_what_is_wrong_is_said_and_nothing_changes(
+    addon: Any, prepare: Any, complaint: str
+) -> None:
     prepare(addon.context.scene.isc)
     before, folders = census(addon), list(Path(addon.app.tempdir).iterdir())
     assert complaint in say(addon.ops.isc.decompose)
@@ -237,7 +283,11 @@ def test_what_is_wrong_is_said_and_nothing_changes(addon: Any, prepare: Any, com
 
 def test_a_mask_of_another_size_is_taken_where_that_is_wanted(addon: Any) -> None:
     settings = addon.context.scene.isc
-    settings.image, settings.mask_source, settings.mask = photo(), "IMAGE", mask_image(size=(32, 44))
+    settings.image, settings.mask_source, settings.mask = (
+        photo(),
+        "IMAGE",
+        mask_image(size=(32, 44)),
+    )
     settings.scale_mask = True
     run = run_of(addon.context, request_from_settings(addon.context.scene))
     folder = run.folder
@@ -272,7 +322,7 @@ def test_a_new_mask_has_the_photos_size(addon: Any) -> None:
     assert tuple(settings.mask.size) == (88, 64) and settings.mask_source == "IMAGE"
 
 
-# --- results --------------------------------------------------------------------------------------------------------------------------
+# --- results --------------------------------------------------------------------------------------
 
 
 def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path) -> None:
@@ -281,14 +331,22 @@ def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path
     world, camera = scene.world, scene.camera
     assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
     built = find(addon.context.object)
-    assert built is not None and built.scene == scene and (scene.world, scene.camera) == (world, camera) and len(addon.data.scenes) == 1
+    assert (
+        built is not None
+        and built.scene == scene
+        and (scene.world, scene.camera) == (world, camera)
+        and len(addon.data.scenes) == 1
+    )
     assert (bump_folder / "arrays.npz").is_file(), "a folder of the user's own stays as it is"
 
 
 @pytest.mark.parametrize(
-    ("chosen", "own", "cast"), [("usual", True, False), ("usual", False, True), ("on", True, True), ("off", False, False)]
+    ("chosen", "own", "cast"),
+    [("usual", True, False), ("usual", False, True), ("on", True, True), ("off", False, False)],
 )
-def test_shadows_are_as_chosen(addon: Any, bump_folder: Path, chosen: str, own: bool, cast: bool) -> None:
+def test_shadows_are_as_chosen(
+    addon: Any, bump_folder: Path, chosen: str, own: bool, cast: bool
+) -> None:
     settings = addon.context.scene.isc
     settings.shadows, settings.own_scene = chosen, own
     assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
@@ -306,7 +364,9 @@ def test_a_folder_without_arrays_is_given_them(addon: Any, tmp_path: Path) -> No
 
 def test_what_is_no_result_is_refused(addon: Any, tmp_path: Path, bump_folder: Path) -> None:
     before = census(addon)
-    assert "is no result: give the folder that isc decompose wrote" in say(addon.ops.isc.import_result, directory=str(tmp_path))
+    assert "is no result: give the folder that isc decompose wrote" in say(
+        addon.ops.isc.import_result, directory=str(tmp_path)
+    )
     shutil.copytree(bump_folder, tmp_path / "broken")
     (tmp_path / "broken" / "arrays.npz").write_bytes(b"nothing")
     assert "is damaged" in say(addon.ops.isc.import_result, directory=str(tmp_path / "broken"))
@@ -320,7 +380,9 @@ def test_the_same_object_is_updated(addon: Any, bump_folder: Path) -> None:
     assert census(addon) == once
 
 
-def test_photos_of_one_name_stand_beside_each_other(addon: Any, bump_folder: Path, tmp_path: Path) -> None:
+def test_photos_of_one_name_stand_beside_each_other(
+    addon: Any, bump_folder: Path, tmp_path: Path
+) -> None:
     """From two folders; what panels remember goes by the name that was given."""
     addon.ops.isc.import_result(directory=str(bump_folder))
     first = addon.context.object
@@ -342,7 +404,9 @@ def test_photos_of_one_name_stand_beside_each_other(addon: Any, bump_folder: Pat
 def test_what_is_built_comes_with_the_object_into_another_file(addon: Any, tmp_path: Path) -> None:
     addon.context.scene.isc.image = photo()
     request = request_from_settings(addon.context.scene)
-    addon.ops.isc.build_result(directory=str(write_result(tmp_path / "cup")), request=request.to_json())
+    addon.ops.isc.build_result(
+        directory=str(write_result(tmp_path / "cup")), request=request.to_json()
+    )
     addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon.ops.wm.append(directory=str(tmp_path / "a.blend" / "Object"), filename="cup")
@@ -354,18 +418,24 @@ def test_what_is_built_comes_with_the_object_into_another_file(addon: Any, tmp_p
         requests.remembered(thing, addon.context.scene, 99)
 
 
-# --- words ------------------------------------------------------------------------------------------------------------------------------
+# --- words ----------------------------------------------------------------------------------------
 
 
 def test_messages_speak_of_images_and_fields() -> None:
-    assert in_words("/t/a.npy: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size", {"/t/a.npy": "cup"}) == (
+    assert in_words(
+        "/t/a.npy: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size",
+        {"/t/a.npy": "cup"},
+    ) == (
         "cup: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size, or tick Scale Mask"
     )
     assert in_words("--max-size 9 leaves the object thin", {}) == "Size 9 leaves the object thin"
 
 
 def test_notes_leave_out_what_helps_at_a_terminal() -> None:
-    assert notes_of("note: not converged\ngloss: none\nlook at x/preview.png") == "note: not converged; gloss: none"
+    assert (
+        notes_of("note: not converged\ngloss: none\nlook at x/preview.png")
+        == "note: not converged; gloss: none"
+    )
 
 
 def test_lines_fit() -> None:
@@ -383,5 +453,7 @@ def test_lines_fit() -> None:
         ((1.5, 1.5), (2.0, 2.0), None),
     ],
 )
-def test_a_drawn_box_counts_from_above(first: tuple[float, float], second: tuple[float, float], box: Any) -> None:
+def test_a_drawn_box_counts_from_above(
+    first: tuple[float, float], second: tuple[float, float], box: Any
+) -> None:
     assert box_of(first, second, (100, 200)) == box

@@ -54,14 +54,20 @@ def sun_of(built: Built) -> Any:
     return next((thing for thing in built.collection.objects if thing.type == "LIGHT"), None)
 
 
-def test_recolouring_sets_the_paint_and_nothing_else(addon: Any, built: Built, bump_folder: Path, tmp_path: Path) -> None:
+def test_recolouring_sets_the_paint_and_nothing_else(
+    addon: Any, built: Built, bump_folder: Path, tmp_path: Path
+) -> None:
     before = sockets(built)
     assert addon.ops.isc.recolour(hue=0.5, saturation=0.0, value=0.5) == {"FINISHED"}
     assert sockets(built) == {**before, "Saturation": 0.0, "Value": 0.5}
     result = read_result(bump_folder)
     paint = render(built.scene, tmp_path)["Diffuse Color"]
     inside = result.mask & (result.confidence > 0.8)
-    np.testing.assert_allclose(paint[inside], 0.5 * result.base_color[inside].max(-1, keepdims=True).repeat(3, -1), rtol=0.02)
+    np.testing.assert_allclose(
+        paint[inside],
+        0.5 * result.base_color[inside].max(-1, keepdims=True).repeat(3, -1),
+        rtol=0.02,
+    )
 
 
 def test_gains_reach_paint_and_gloss_wherever_it_comes_from(addon: Any, bump_folder: Path) -> None:
@@ -70,13 +76,24 @@ def test_gains_reach_paint_and_gloss_wherever_it_comes_from(addon: Any, bump_fol
     material = find(addon.context.object).material  # type: ignore[union-attr]
     assert addon.ops.isc.dichromatic(diffuse_gain=0.25, specular_gain=0.5) == {"FINISHED"}
     groups = [node for node in material.node_tree.nodes if node.type == "GROUP"]
-    gains = [node.inputs["Specular Gain"].default_value for node in groups if "Specular Gain" in node.inputs]
+    gains = [
+        node.inputs["Specular Gain"].default_value
+        for node in groups
+        if "Specular Gain" in node.inputs
+    ]
     node = dichromatic_node(material)
-    assert gains == [0.5, 0.5] and node is not None and node.inputs["Diffuse Gain"].default_value == 0.25
+    assert (
+        gains == [0.5, 0.5]
+        and node is not None
+        and node.inputs["Diffuse Gain"].default_value == 0.25
+    )
 
 
 def test_an_edit_begins_with_what_is_set(addon: Any, built: Built) -> None:
-    """From a panel: the redo panel shows the object's values, not the usual ones. Without a window, Blender never asks for that."""
+    """From a panel: the redo panel shows the object's values, not the usual ones.
+
+    Without a window, Blender never asks for that.
+    """
     addon.ops.isc.recolour(hue=0.2, saturation=0.7, value=1.5)
     addon.ops.isc.dichromatic(diffuse_gain=0.3, specular_gain=0.4)
     for kind, wanted in (
@@ -96,7 +113,9 @@ def test_the_sun_stands_where_the_light_was(addon: Any, built: Built, bump_folde
     x, y, z = result.sun_direction
     toward = sun.rotation_quaternion.to_matrix() @ Vector((0, 0, 1))
     np.testing.assert_allclose(toward, (x, -z, y), atol=1e-5)
-    np.testing.assert_allclose(sun.data.energy * np.array(sun.data.color), result.sun_strength, rtol=1e-5)
+    np.testing.assert_allclose(
+        sun.data.energy * np.array(sun.data.color), result.sun_strength, rtol=1e-5
+    )
 
 
 def test_the_sun_goes_where_it_is_told(addon: Any, built: Built) -> None:
@@ -116,7 +135,9 @@ def test_the_recovered_light_comes_back(addon: Any, built: Built, tmp_path: Path
     addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0), ambient=0)
     lit = render(built.scene, tmp_path, samples=4)["Combined"][..., :3]
     middle = 38  # of the bump
-    assert lit[:, middle + 1 :].mean() > 0.003 and not lit[:, :middle].any(), "light from the right alone"
+    assert lit[:, middle + 1 :].mean() > 0.003 and not lit[:, :middle].any(), (
+        "light from the right alone"
+    )
     addon.ops.isc.relight(light="RECOVERED")
     np.testing.assert_array_equal(render(built.scene, tmp_path, samples=4)["Combined"], before)
     assert sun_of(built) is None
@@ -143,12 +164,14 @@ def test_nodes_that_were_taken_away_are_missed(addon: Any, built: Built) -> None
 
 
 def test_an_object_of_unknown_origin_is_not_made_again(addon: Any, built: Built) -> None:
-    assert "is not in this file: open it, and press Decompose" in say(addon.ops.isc.redo, max_size=64)
+    assert "is not in this file: open it, and press Decompose" in say(
+        addon.ops.isc.redo, max_size=64
+    )
     del built.object["isc_request"]
     assert "not known how this object was made" in say(addon.ops.isc.redo, max_size=64)
 
 
-# --- copies -----------------------------------------------------------------------------------------------------------------------------
+# --- copies ---------------------------------------------------------------------------------------
 
 
 def copied(bpy: Any, built: Built, linked: bool = False) -> Built:
@@ -167,7 +190,9 @@ def hue(thing: Any) -> float:
 
 @pytest.mark.parametrize("linked", [False, True])
 @pytest.mark.parametrize("active", ["copy", "original"])
-def test_an_edit_changes_the_active_object_alone(addon: Any, built: Built, tmp_path: Path, linked: bool, active: str) -> None:
+def test_an_edit_changes_the_active_object_alone(
+    addon: Any, built: Built, tmp_path: Path, linked: bool, active: str
+) -> None:
     copy = copied(addon, built, linked)
     other = addon.context.object.copy()
     built.scene.collection.objects.link(other)
@@ -175,7 +200,9 @@ def test_an_edit_changes_the_active_object_alone(addon: Any, built: Built, tmp_p
     built.scene.view_layers[0].objects.active = edited
     assert addon.ops.isc.recolour(hue=0.2, saturation=0.5, value=1.0) == {"FINISHED"}
     assert addon.ops.isc.dichromatic(diffuse_gain=0.5, specular_gain=2.0) == {"FINISHED"}
-    values = {thing: sockets(find(thing))["Diffuse Gain"] for thing in (built.object, copy.object, other)}  # type: ignore[arg-type]
+    values = {
+        thing: sockets(find(thing))["Diffuse Gain"] for thing in (built.object, copy.object, other)
+    }  # type: ignore[arg-type]
     assert values == {thing: 0.5 if thing == edited else 1.0 for thing in values}
     assert hue(edited) == pytest.approx(0.2) and sum(hue(thing) == 0.5 for thing in values) == 2
     shown = render(built.scene, tmp_path)["Diffuse Color"]
@@ -190,22 +217,32 @@ def test_a_material_that_people_made_single_is_the_copys(addon: Any, built: Buil
     assert len(addon.data.materials) == 2, "it was its own already"
 
 
-def test_a_copy_is_never_taken_for_the_original_once_it_was_edited(addon: Any, built: Built, bump_folder: Path) -> None:
+def test_a_copy_is_never_taken_for_the_original_once_it_was_edited(
+    addon: Any, built: Built, bump_folder: Path
+) -> None:
     copy = copied(addon, built)
     addon.ops.isc.recolour(hue=0.3)
     copy.object.name, built.object.name = "a", "z"
     copy.object.material_slots[0].material.name, built.material.name = "a", "z"
     addon.ops.isc.import_result(directory=str(bump_folder))
-    assert addon.context.object == built.object and hue(copy.object) == pytest.approx(0.3) and hue(built.object) == 0.5
+    assert (
+        addon.context.object == built.object
+        and hue(copy.object) == pytest.approx(0.3)
+        and hue(built.object) == 0.5
+    )
     assert find(built.object).material == built.material  # type: ignore[union-attr]
 
 
 def test_a_copy_is_not_decomposed_again(addon: Any, built: Built) -> None:
     copied(addon, built)
-    assert "is a copy, and only the original is updated: choose bump" in say(addon.ops.isc.redo, max_size=64)
+    assert "is a copy, and only the original is updated: choose bump" in say(
+        addon.ops.isc.redo, max_size=64
+    )
     addon.ops.isc.recolour(hue=0.3)
     addon.data.objects.remove(built.object)
-    assert "is a copy, and only the original is updated: press Decompose" in say(addon.ops.isc.redo, max_size=64)
+    assert "is a copy, and only the original is updated: press Decompose" in say(
+        addon.ops.isc.redo, max_size=64
+    )
 
 
 def test_a_copy_is_exported_as_it_is(addon: Any, built: Built, tmp_path: Path) -> None:
@@ -215,7 +252,9 @@ def test_a_copy_is_exported_as_it_is(addon: Any, built: Built, tmp_path: Path) -
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
     built.scene.view_layers[0].objects.active = built.object
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
-    mine, original = (texture(tmp_path / name / "mesh.glb")[20, 38] for name in ("bump.001", "bump"))
+    mine, original = (
+        texture(tmp_path / name / "mesh.glb")[20, 38] for name in ("bump.001", "bump")
+    )
     assert (mine < 0.8 * original).all()
 
 
@@ -231,10 +270,12 @@ def test_own_paint_and_gloss_are_given_on_demand(addon: Any, built: Built) -> No
     assert sharers(copy.object, copy.material) == [built.object]
     assert addon.ops.isc.own_material() == {"FINISHED"}
     own = find(copy.object)
-    assert own is not None and own.material != built.material and not sharers(own.object, own.material)
+    assert (
+        own is not None and own.material != built.material and not sharers(own.object, own.material)
+    )
 
 
-# --- files ------------------------------------------------------------------------------------------------------------------------------
+# --- files ----------------------------------------------------------------------------------------
 
 
 def test_the_results_own_files_are_copied(addon: Any, tmp_path: Path) -> None:
@@ -245,16 +286,27 @@ def test_the_results_own_files_are_copied(addon: Any, tmp_path: Path) -> None:
 
     d = bump()
     save(d, tmp_path / "result")
-    write_arrays(d, tmp_path / "result" / "arrays.npz", build_mesh(d.height, d.normal, d.mask, d.reflectance, None))
+    write_arrays(
+        d,
+        tmp_path / "result" / "arrays.npz",
+        build_mesh(d.height, d.normal, d.mask, d.reflectance, None),
+    )
     addon.ops.isc.import_result(directory=str(tmp_path / "result"))
     assert addon.ops.isc.export(directory=str(tmp_path / "out")) == {"FINISHED"}
     copy = tmp_path / "out" / "bump"
-    assert sorted(path.name for path in copy.iterdir()) == ["decomposition.json", "maps.exr", "mesh.glb", "preview.png"]
+    assert sorted(path.name for path in copy.iterdir()) == [
+        "decomposition.json",
+        "maps.exr",
+        "mesh.glb",
+        "preview.png",
+    ]
     np.testing.assert_array_equal(load(copy).height, d.height)
     assert (copy / "mesh.glb").read_bytes() == (tmp_path / "result" / "mesh.glb").read_bytes()
 
 
-def test_without_them_the_scene_is_written(addon: Any, built: Built, bump_folder: Path, tmp_path: Path) -> None:
+def test_without_them_the_scene_is_written(
+    addon: Any, built: Built, bump_folder: Path, tmp_path: Path
+) -> None:
     import trimesh
 
     from isc_core.exr import read_channels
@@ -264,9 +316,13 @@ def test_without_them_the_scene_is_written(addon: Any, built: Built, bump_folder
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
     result = read_result(bump_folder)
     channels = read_channels(tmp_path / "bump" / "reflectance.exr")
-    np.testing.assert_array_equal(np.stack([channels[letter] for letter in "RGB"], -1), result.reflectance)
+    np.testing.assert_array_equal(
+        np.stack([channels[letter] for letter in "RGB"], -1), result.reflectance
+    )
     mesh = trimesh.load(tmp_path / "bump" / "mesh.glb", force="mesh")
-    np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), np.ptp(places(built), axis=0)[[0, 2, 1]], rtol=1e-4)
+    np.testing.assert_allclose(
+        np.ptp(mesh.vertices, axis=0), np.ptp(places(built), axis=0)[[0, 2, 1]], rtol=1e-4
+    )
     assert mesh.visual.material.baseColorTexture is not None, "the paint goes with it"
     assert built.object.data.materials[0] == material and "plain" not in addon.data.materials
 
@@ -275,7 +331,9 @@ def texture(path: Path) -> np.ndarray:
     """(H, W, 3) codes of the paint in a mesh.glb, row 0 at the top."""
     import trimesh
 
-    return np.asarray(trimesh.load(path, force="mesh").visual.material.baseColorTexture.convert("RGB")).astype(float)
+    return np.asarray(
+        trimesh.load(path, force="mesh").visual.material.baseColorTexture.convert("RGB")
+    ).astype(float)
 
 
 def surface(path: Path) -> dict[str, Any]:
@@ -287,14 +345,30 @@ def surface(path: Path) -> dict[str, Any]:
 
 def specular_factor(path: Path) -> float:
     """1, as the extension says, where the file says nothing."""
-    return float(surface(path).get("extensions", {}).get("KHR_materials_specular", {}).get("specularFactor", 1.0))
+    return float(
+        surface(path)
+        .get("extensions", {})
+        .get("KHR_materials_specular", {})
+        .get("specularFactor", 1.0)
+    )
 
 
 @pytest.mark.parametrize(
-    "edit", [{}, {"Hue": 0.72, "Saturation": 0.6, "Value": 1.4, "Diffuse Gain": 0.8}, {"Saturation": 1.8}, {"Diffuse Gain": 0.3}], ids=str
+    "edit",
+    [
+        {},
+        {"Hue": 0.72, "Saturation": 0.6, "Value": 1.4, "Diffuse Gain": 0.8},
+        {"Saturation": 1.8},
+        {"Diffuse Gain": 0.3},
+    ],
+    ids=str,
 )
-def test_the_paint_is_written_as_it_is_shown(addon: Any, built: Built, bump_folder: Path, tmp_path: Path, edit: dict[str, float]) -> None:
-    """Coded as sRGB, after the edits: what Cycles shows of the paint is what another program will read."""
+def test_the_paint_is_written_as_it_is_shown(
+    addon: Any, built: Built, bump_folder: Path, tmp_path: Path, edit: dict[str, float]
+) -> None:
+    """Coded as sRGB, after the edits: what Cycles shows of the paint is what another program will
+    read.
+    """
     result, node = read_result(bump_folder), dichromatic_node(built.material)
     assert node is not None
     for name, value in edit.items():
@@ -304,7 +378,9 @@ def test_the_paint_is_written_as_it_is_shown(addon: Any, built: Built, bump_fold
     assert set(addon.data.images) == images and "plain" not in addon.data.materials
     codes, inside = texture(tmp_path / "bump" / "mesh.glb"), result.mask & (result.confidence > 0.8)
     if not edit:
-        np.testing.assert_allclose(codes, 255 * linear_to_srgb(np.clip(result.base_color, 0, 1)), atol=0.51)
+        np.testing.assert_allclose(
+            codes, 255 * linear_to_srgb(np.clip(result.base_color, 0, 1)), atol=0.51
+        )
     shown = render(built.scene, tmp_path)["Diffuse Color"][inside]
     np.testing.assert_allclose(codes[inside], 255 * linear_to_srgb(np.clip(shown, 0, 1)), atol=1.0)
 
@@ -315,8 +391,12 @@ def test_recolouring_is_that_of_hsv() -> None:
     paint[20] = 0
     for hue, saturation in ((0.5, 1.3), (0.1, 0.4), (0.93, 2.0), (0.0, 1.0), (1.0, 0.0)):
         hsv = [colorsys.rgb_to_hsv(*color) for color in paint.tolist()]
-        wanted = [colorsys.hsv_to_rgb((h + hue + 0.5) % 1, min(s * saturation, 1), v) for h, s, v in hsv]
-        np.testing.assert_allclose(recoloured(paint, hue, saturation, 0.7), 0.7 * np.array(wanted), atol=1e-12)
+        wanted = [
+            colorsys.hsv_to_rgb((h + hue + 0.5) % 1, min(s * saturation, 1), v) for h, s, v in hsv
+        ]
+        np.testing.assert_allclose(
+            recoloured(paint, hue, saturation, 0.7), 0.7 * np.array(wanted), atol=1e-12
+        )
     np.testing.assert_array_equal(recoloured(paint, 0.5, 1.0, 2.0), 2 * paint)
 
 
@@ -334,12 +414,20 @@ def test_the_gloss_that_is_written_is_the_fitted_one_unless_it_is_not_wanted(
     assert surface(path)["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.35)
 
 
-def test_gloss_that_is_not_known_is_not_written(addon: Any, bump_folder: Path, tmp_path: Path) -> None:
-    write(build(read_result(bump_folder), BuildOptions(specular_from="image", own_scene=False)), tmp_path, from_scene=True)
+def test_gloss_that_is_not_known_is_not_written(
+    addon: Any, bump_folder: Path, tmp_path: Path
+) -> None:
+    write(
+        build(read_result(bump_folder), BuildOptions(specular_from="image", own_scene=False)),
+        tmp_path,
+        from_scene=True,
+    )
     assert specular_factor(tmp_path / "bump" / "mesh.glb") == 0
 
 
-def test_paint_that_is_one_colour_or_comes_from_other_nodes(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_paint_that_is_one_colour_or_comes_from_other_nodes(
+    addon: Any, built: Built, tmp_path: Path
+) -> None:
     tree, node = built.material.node_tree, dichromatic_node(built.material)
     assert node is not None
     tree.links.remove(node.inputs["Reflectance"].links[0])
@@ -348,19 +436,25 @@ def test_paint_that_is_one_colour_or_comes_from_other_nodes(addon: Any, built: B
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
     factor = surface(tmp_path / "bump" / "mesh.glb")["pbrMetallicRoughness"]["baseColorFactor"]
     assert factor == pytest.approx([0.1, 0.2, 0.05, 1])
-    tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], node.inputs["Reflectance"])
+    tree.links.new(
+        tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], node.inputs["Reflectance"]
+    )
     assert "does not come from an image" in say(addon.ops.isc.export, directory=str(tmp_path))
     assert "plain" not in addon.data.materials
 
 
-def test_an_object_without_material_slots_is_written(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_an_object_without_material_slots_is_written(
+    addon: Any, built: Built, tmp_path: Path
+) -> None:
     built.object.data.materials.clear()
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
     assert texture(tmp_path / "bump" / "mesh.glb").shape == (64, 88, 3)
     assert not built.object.material_slots
 
 
-def test_every_slot_that_has_the_material_is_written_with_its_paint(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_every_slot_that_has_the_material_is_written_with_its_paint(
+    addon: Any, built: Built, tmp_path: Path
+) -> None:
     mine = addon.data.materials.new("mine")
     built.object.data.materials.clear()
     for material in (mine, built.material):
@@ -388,7 +482,11 @@ def test_a_place_that_cannot_be_written_is_said(addon: Any, built: Built, tmp_pa
 def test_linked_objects_are_left_alone(addon: Any, built: Built, tmp_path: Path) -> None:
     addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-    addon.ops.wm.link(directory=str(tmp_path / "a.blend" / "Collection"), filename="bump", instance_collections=False)
+    addon.ops.wm.link(
+        directory=str(tmp_path / "a.blend" / "Collection"),
+        filename="bump",
+        instance_collections=False,
+    )
     thing = next(thing for thing in addon.data.objects if thing.type == "MESH")
     addon.context.view_layer.objects.active = thing
     assert thing.library is not None and not addon.ops.isc.recolour.poll()

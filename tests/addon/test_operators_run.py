@@ -1,4 +1,6 @@
-"""A run in steps: what it tells, how it ends, and that nothing of it is left where it did not end well."""
+"""A run in steps: what it tells, how it ends, and that nothing of it is left where it did not end
+well.
+"""
 
 import shutil
 import sys
@@ -16,7 +18,16 @@ import blender_addon  # noqa: E402 (after the skip)
 from blender_addon.operators import tasks  # noqa: E402
 from blender_addon.operators.modal import WorkerOperator, advance  # noqa: E402
 from blender_addon.operators.request import Method  # noqa: E402
-from blender_addon.operators.run import Made, Run, WorkFailed, active, begin, end_active, follow, remove  # noqa: E402
+from blender_addon.operators.run import (
+    Made,
+    Run,
+    WorkFailed,
+    active,
+    begin,
+    end_active,
+    follow,
+    remove,
+)  # noqa: E402
 from blender_addon.operators.tasks import cut_out, decompose  # noqa: E402
 from blender_addon.photo_files import Picture  # noqa: E402
 from blender_addon.worker import Update, Worker, WorkerEnvironment, start  # noqa: E402
@@ -47,7 +58,9 @@ def stand_in(tmp_path: Path, code: str) -> WorkerEnvironment:
     return WorkerEnvironment(Path(sys.executable), (package.parent,), tmp_path / "cache")
 
 
-def script(steps: int, result: Path, closed: list[str] | None = None) -> Generator[Update, None, Made]:
+def script(
+    steps: int, result: Path, closed: list[str] | None = None
+) -> Generator[Update, None, Made]:
     try:
         for number in range(steps):
             yield Update("at work", number / steps)
@@ -88,7 +101,10 @@ def test_stage_and_fraction_are_passed_on(folder: Path) -> None:
     assert (run.status.stage, run.status.fraction) == ("at work", 0.25)
 
 
-@pytest.mark.parametrize(("error", "report"), [(InputError("no room"), ""), (WorkFailed("no room", "the log"), "the log")])
+@pytest.mark.parametrize(
+    ("error", "report"),
+    [(InputError("no room"), ""), (WorkFailed("no room", "the log"), "the log")],
+)
 def test_a_failure_is_told_and_leaves_nothing(folder: Path, error: Exception, report: str) -> None:
     run = Run("Decompose cup", failing(error), take, folder)
     run.step()
@@ -103,7 +119,11 @@ def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
 
     run = Run("Decompose cup", script(0, folder), refuse, folder)
     run.step()
-    assert (run.take_in(None).state, run.status.message, folder.exists()) == ("failed", "linked", False)
+    assert (run.take_in(None).state, run.status.message, folder.exists()) == (
+        "failed",
+        "linked",
+        False,
+    )
 
 
 def test_what_the_worker_says_of_the_result_is_passed_on(folder: Path) -> None:
@@ -122,12 +142,18 @@ def test_an_unforeseen_error_does_not_block_the_next_run(folder: Path, where: st
     def broken(_context: Any, _result: Path) -> str:
         raise ZeroDivisionError("an error of ours")
 
-    steps = failing(ZeroDivisionError("an error of ours")) if where == "script" else script(1, folder)
+    steps = (
+        failing(ZeroDivisionError("an error of ours")) if where == "script" else script(1, folder)
+    )
     run = begin(Run("Decompose cup", steps, broken, folder))
     run.step()
     with pytest.raises(ZeroDivisionError):
         run.step() and run.take_in(None)
-    assert active() is None and run.status.state == "failed" and "an error of ours" in run.status.message
+    assert (
+        active() is None
+        and run.status.state == "failed"
+        and "an error of ours" in run.status.message
+    )
     assert not folder.exists()
 
 
@@ -136,7 +162,11 @@ def test_cancelling_closes_the_script_and_removes_the_folder(folder: Path) -> No
     run = Run("Decompose cup", script(5, folder, closed), take, folder)
     run.step()
     run.cancel()
-    assert (run.status.state, run.status.message, closed) == ("cancelled", "Decompose cup: cancelled", ["closed"])
+    assert (run.status.state, run.status.message, closed) == (
+        "cancelled",
+        "Decompose cup: cancelled",
+        ["closed"],
+    )
     assert run.step().state == "cancelled" and run.take_in(None).state == "cancelled"
     assert not folder.exists()
 
@@ -172,7 +202,9 @@ def test_two_runs_at_once_are_refused(tmp_path: Path, folder: Path) -> None:
     first = begin(Run("Decompose cup", script(5, folder), take, folder))
     (tmp_path / "second").mkdir()
     try:
-        with pytest.raises(InputError, match="Decompose cup is going on: wait for it, or cancel it first"):
+        with pytest.raises(
+            InputError, match="Decompose cup is going on: wait for it, or cancel it first"
+        ):
             begin(Run("Decompose jug", script(5, folder), take, tmp_path / "second"))
         assert active() is first and not (tmp_path / "second").exists()
     finally:
@@ -180,7 +212,9 @@ def test_two_runs_at_once_are_refused(tmp_path: Path, folder: Path) -> None:
     assert active() is None and first.status.state == "cancelled"
 
 
-def test_a_folder_that_is_still_written_to_goes_in_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_is_still_written_to_goes_in_the_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "run").mkdir()
     whole, calls = shutil.rmtree, []
 
@@ -195,7 +229,7 @@ def test_a_folder_that_is_still_written_to_goes_in_the_end(tmp_path: Path, monke
     until(lambda: not (tmp_path / "run").exists())
 
 
-# --- workers ----------------------------------------------------------------------------------------------------------------------------
+# --- workers --------------------------------------------------------------------------------------
 
 
 def photo_file(tmp_path: Path) -> Picture:
@@ -203,7 +237,9 @@ def photo_file(tmp_path: Path) -> Picture:
     return Picture("cup", path=tmp_path / "cup.png")
 
 
-def test_cancelling_kills_the_worker_and_removes_what_it_wrote(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
+    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     environment, workers = stand_in(tmp_path, SLOW), []
 
     def started(*given: Any) -> Worker:
@@ -211,7 +247,12 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(tmp_path: Path, f
         return workers[0]
 
     monkeypatch.setattr(tasks, "start", started)
-    run = Run("Decompose cup", decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment), take, folder)
+    run = Run(
+        "Decompose cup",
+        decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment),
+        take,
+        folder,
+    )
     until(lambda: run.step().stage == "solving")
     assert workers[0].poll().state == "running"
     run.cancel()
@@ -221,7 +262,9 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(tmp_path: Path, f
     assert (tmp_path / "cup.png").is_file(), "the user's own file stays"
 
 
-def test_a_worker_that_is_just_being_started_is_ended_too(tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_worker_that_is_just_being_started_is_ended_too(
+    tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     environment, workers = stand_in(tmp_path, SLOW), []
 
     def slow_start(*given: Any) -> Worker:
@@ -230,7 +273,12 @@ def test_a_worker_that_is_just_being_started_is_ended_too(tmp_path: Path, folder
         return workers[0]
 
     monkeypatch.setattr(tasks, "start", slow_start)
-    run = Run("Decompose cup", decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment), take, folder)
+    run = Run(
+        "Decompose cup",
+        decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment),
+        take,
+        folder,
+    )
     until(lambda: run.step().stage == "starting the worker")
     run.cancel()
     assert not workers
@@ -249,7 +297,9 @@ def test_a_crash_is_reported_with_the_logs_tail(tmp_path: Path, folder: Path) ->
 
 def test_a_worker_that_cannot_be_started_is_said(tmp_path: Path, folder: Path) -> None:
     environment = WorkerEnvironment(tmp_path / "no_python", (), tmp_path / "cache")
-    run = Run("Cut Out", cut_out(photo_file(tmp_path), (0, 0, 9, 9), folder, environment), take, folder)
+    run = Run(
+        "Cut Out", cut_out(photo_file(tmp_path), (0, 0, 9, 9), folder, environment), take, folder
+    )
     until(lambda: run.step().state != "running")
     assert run.status.state == "failed" and "cannot be started" in run.status.message
 
@@ -261,7 +311,9 @@ print(json.dumps({"event": "failed", "message": f"{sys.argv[2]}: make a mask wit
                   "and give it with --mask", "code": 2}), flush=True)
 sys.exit(2)
 """
-    script = decompose(photo_file(tmp_path), None, None, Method(), folder, 0, stand_in(tmp_path, code))
+    script = decompose(
+        photo_file(tmp_path), None, None, Method(), folder, 0, stand_in(tmp_path, code)
+    )
     run = Run("Decompose cup", script, take, folder)
     until(lambda: run.step().state != "running")
     assert run.status.message == "cup: choose a mask image, or cut one out of a box"
@@ -284,11 +336,13 @@ def test_following_ends_the_worker_when_it_is_closed() -> None:
     assert worker.killed == 1
 
 
-# --- in the window ----------------------------------------------------------------------------------------------------------------------
+# --- in the window --------------------------------------------------------------------------------
 
 
 class Plain(WorkerOperator):
-    """The operators' mixin without Blender's class, which cannot be made outside of Blender's own call."""
+    """The operators' mixin without Blender's class, which cannot be made outside of Blender's own
+    call.
+    """
 
     def __init__(self, run: Run) -> None:
         self._run = run
@@ -305,12 +359,19 @@ def event(kind: str, value: str = "NOTHING") -> Any:
 def test_the_timer_polls_and_all_else_passes_through(addon: Any, folder: Path) -> None:
     run = begin(Run("Decompose cup", script(2, folder), take, folder))
     plain, shown = Plain(run), addon.context.window_manager.isc
-    assert plain.modal(addon.context, event("MOUSEMOVE")) == {"PASS_THROUGH"} and run.status.stage == "starting"
+    assert (
+        plain.modal(addon.context, event("MOUSEMOVE")) == {"PASS_THROUGH"}
+        and run.status.stage == "starting"
+    )
     assert plain.modal(addon.context, event("TIMER")) == {"PASS_THROUGH"}
     assert (shown.title, shown.state, shown.stage) == ("Decompose cup", "running", "at work")
     states = [plain.modal(addon.context, event("TIMER")) for _ in range(2)]
     assert states == [{"PASS_THROUGH"}, {"FINISHED"}]
-    assert (shown.state, shown.message, plain.said) == ("done", "took run", [({"INFO"}, "took run")])
+    assert (shown.state, shown.message, plain.said) == (
+        "done",
+        "took run",
+        [({"INFO"}, "took run")],
+    )
     assert shown.longest_call_ms > 0 and shown.import_ms > 0
 
 
@@ -339,7 +400,12 @@ def test_a_report_is_kept_as_text(addon: Any, folder: Path) -> None:
         assert plain.modal(addon.context, event("TIMER")) == {"CANCELLED"}
     assert plain.said == [({"ERROR"}, "it died (see the text ISC Report)")]
     assert [text.name for text in addon.data.texts] == ["ISC Report"]
-    assert addon.data.texts[0].as_string().splitlines() == ["Decompose cup", "it died", "", "the log's tail"]
+    assert addon.data.texts[0].as_string().splitlines() == [
+        "Decompose cup",
+        "it died",
+        "",
+        "the log's tail",
+    ]
 
 
 def test_nothing_is_built_while_something_is_edited(addon: Any, folder: Path) -> None:
@@ -369,15 +435,23 @@ def test_unregistering_ends_the_run(blender: Any, folder: Path) -> None:
     run.step()
     blender_addon.unregister()
     assert run.status.state == "cancelled" and not folder.exists()
-    assert not hasattr(blender.types.Scene, "isc") and not hasattr(blender.ops.isc.decompose, "nothing")
+    assert not hasattr(blender.types.Scene, "isc") and not hasattr(
+        blender.ops.isc.decompose, "nothing"
+    )
 
 
 def test_closing_blender_ends_the_worker(tmp_path: Path) -> None:
-    """A Blender of its own that is left while a run goes on: neither process nor folder outlives it."""
+    """A Blender of its own that is left while a run goes on: neither process nor folder outlives
+    it.
+    """
     import subprocess
 
     environment = stand_in(
-        tmp_path, SLOW.replace("while True", f"open({str(tmp_path / 'pid')!r}, 'w').write(str(__import__('os').getpid()))\nwhile True")
+        tmp_path,
+        SLOW.replace(
+            "while True",
+            f"open({str(tmp_path / 'pid')!r}, 'w').write(str(__import__('os').getpid()))\nwhile True",
+        ),
     )
     code = f"""
 import sys, time
@@ -400,7 +474,14 @@ while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exist
     time.sleep(0.02)
 """
     root = Path(__file__).resolve().parents[2]
-    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
     assert done.returncode == 0, done.stderr
     assert not (tmp_path / "run").exists()
     until(lambda: not Path(f"/proc/{(tmp_path / 'pid').read_text()}").exists())

@@ -1,4 +1,6 @@
-"""Images leave Blender with the light they hold: whatever made them, the worker's reader gives the values that Blender shows."""
+"""Images leave Blender with the light they hold: whatever made them, the worker's reader gives the
+values that Blender shows.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -31,7 +33,14 @@ def fresh() -> None:
     bpy.ops.wm.read_factory_settings(use_empty=True)
 
 
-def generated(name: str = "photo", *, floats: bool = False, alpha: bool = True, width: int = WIDTH, height: int = HEIGHT) -> Any:
+def generated(
+    name: str = "photo",
+    *,
+    floats: bool = False,
+    alpha: bool = True,
+    width: int = WIDTH,
+    height: int = HEIGHT,
+) -> Any:
     """An image of Blender's own, with another value in every pixel."""
     image = bpy.data.images.new(name, width, height, float_buffer=floats, alpha=alpha)
     values = np.random.default_rng(1).uniform(0.1, 0.9, (height, width, 4)).astype(np.float32)
@@ -63,7 +72,11 @@ def given(image: Any, folder: Path) -> tuple[Path, str]:
 
 def known_file(path: Path, kind: type, channels: int = 3) -> np.ndarray:
     """A picture file (H, W, channels) of codes, written; BGR(A) as OpenCV has them."""
-    values: np.ndarray = np.random.default_rng(2).integers(0, np.iinfo(kind).max, (HEIGHT, WIDTH, channels), endpoint=True).astype(kind)
+    values: np.ndarray = (
+        np.random.default_rng(2)
+        .integers(0, np.iinfo(kind).max, (HEIGHT, WIDTH, channels), endpoint=True)
+        .astype(kind)
+    )
     assert cv2.imwrite(str(path), values)
     return values
 
@@ -75,8 +88,12 @@ def test_a_saved_file_is_handed_over_as_it_is(tmp_path: Path) -> None:
     np.testing.assert_array_equal(read_raster(path).values, codes16[..., ::-1])
 
 
-@pytest.mark.parametrize(("space", "transfer"), [("sRGB", "srgb"), ("Non-Color", "linear"), ("Linear Rec.709", "linear")])
-def test_the_colour_space_says_how_a_file_is_coded(tmp_path: Path, space: str, transfer: str) -> None:
+@pytest.mark.parametrize(
+    ("space", "transfer"), [("sRGB", "srgb"), ("Non-Color", "linear"), ("Linear Rec.709", "linear")]
+)
+def test_the_colour_space_says_how_a_file_is_coded(
+    tmp_path: Path, space: str, transfer: str
+) -> None:
     known_file(tmp_path / "a.png", np.uint8)
     image = bpy.data.images.load(str(tmp_path / "a.png"))
     image.colorspace_settings.name = space
@@ -110,7 +127,11 @@ def test_paint_on_a_saved_photo_counts(tmp_path: Path) -> None:
 def test_a_generated_byte_image_is_srgb(tmp_path: Path) -> None:
     image = generated()
     path, transfer = given(image, tmp_path)
-    np.testing.assert_allclose(srgb_to_linear(read_raster(path).values / 255), srgb_to_linear(pixels_of(image)[..., :3]), atol=1e-6)
+    np.testing.assert_allclose(
+        srgb_to_linear(read_raster(path).values / 255),
+        srgb_to_linear(pixels_of(image)[..., :3]),
+        atol=1e-6,
+    )
     assert transfer == "srgb"
 
 
@@ -140,9 +161,13 @@ def test_a_painted_deep_file_keeps_its_light(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
 def test_transparency_arrives_straight(tmp_path: Path, kind: type) -> None:
-    """Float images hold colours multiplied by alpha, byte images do not: the worker wants neither multiplied."""
+    """Float images hold colours multiplied by alpha, byte images do not: the worker wants neither
+    multiplied.
+    """
     stored = known_file(tmp_path / "a.png", kind, 4)
-    stored[..., 3] = np.where(np.indices((HEIGHT, WIDTH))[1] < 7, np.iinfo(kind).max // 2, np.iinfo(kind).max)
+    stored[..., 3] = np.where(
+        np.indices((HEIGHT, WIDTH))[1] < 7, np.iinfo(kind).max // 2, np.iinfo(kind).max
+    )
     cv2.imwrite(str(tmp_path / "a.png"), stored)
     image = bpy.data.images.load(str(tmp_path / "a.png"))
     path = last(hand_over(examine(image, as_pixels=True), tmp_path / "photo"))
@@ -162,7 +187,9 @@ def test_ignored_transparency_is_no_mask(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".png", ".tif"])
-def test_a_photo_with_a_rotation_flag_stays_as_blender_shows_it(tmp_path: Path, suffix: str) -> None:
+def test_a_photo_with_a_rotation_flag_stays_as_blender_shows_it(
+    tmp_path: Path, suffix: str
+) -> None:
     from PIL import Image
 
     flag = Image.Exif()
@@ -172,20 +199,28 @@ def test_a_photo_with_a_rotation_flag_stays_as_blender_shows_it(tmp_path: Path, 
     assert orientation((tmp_path / f"a{suffix}").read_bytes()) == 6
     image = bpy.data.images.load(str(tmp_path / f"a{suffix}"))
     path, _ = given(image, tmp_path)
-    assert read_raster(tmp_path / f"a{suffix}").values.shape[:2] == (WIDTH, HEIGHT), "the worker's reader turns it"
-    np.testing.assert_array_equal(read_raster(path).values, np.rint(255 * pixels_of(image)[..., :3]).astype(np.uint8))
+    assert read_raster(tmp_path / f"a{suffix}").values.shape[:2] == (WIDTH, HEIGHT), (
+        "the worker's reader turns it"
+    )
+    np.testing.assert_array_equal(
+        read_raster(path).values, np.rint(255 * pixels_of(image)[..., :3]).astype(np.uint8)
+    )
 
 
 def test_upright_files_are_upright(tmp_path: Path) -> None:
     known_file(tmp_path / "a.png", np.uint8)
     known_file(tmp_path / "a.tif", np.uint8)
     assert [orientation((tmp_path / name).read_bytes()) for name in ("a.png", "a.tif")] == [1, 1]
-    assert orientation(b"\xff\xd8\xff\xe1\0\0Exif\0\0II*\0\xff\xff\0\0") == 0  # a table outside of what was read: not trusted
+    assert (
+        orientation(b"\xff\xd8\xff\xe1\0\0Exif\0\0II*\0\xff\xff\0\0") == 0
+    )  # a table outside of what was read: not trusted
 
 
 def test_a_wider_working_space_is_brought_to_rec709() -> None:
     to_rec709 = np.array([[1.6, -0.5, -0.1], [-0.1, 1.1, 0], [0, -0.1, 1.1]], np.float32)
-    picture = Picture("a", size=(1, 1), channels=4, is_float=True, associated=True, to_rec709=to_rec709)
+    picture = Picture(
+        "a", size=(1, 1), channels=4, is_float=True, associated=True, to_rec709=to_rec709
+    )
     pixels = np.array([[[0.2, 0.3, 0.1, 0.5]]], np.float32)
     got = light(picture, pixels)
     np.testing.assert_allclose(got[0, 0, :3], to_rec709 @ [0.4, 0.6, 0.2], rtol=1e-6)
@@ -194,7 +229,9 @@ def test_a_wider_working_space_is_brought_to_rec709() -> None:
 
 def test_a_grey_float_image_has_three_channels() -> None:
     picture = Picture("a", size=(2, 1), channels=1, is_float=True)
-    np.testing.assert_array_equal(light(picture, np.array([[[0.25], [4.0]]], np.float32))[0], [[0.25] * 3, [4.0] * 3])
+    np.testing.assert_array_equal(
+        light(picture, np.array([[[0.25], [4.0]]], np.float32))[0], [[0.25] * 3, [4.0] * 3]
+    )
 
 
 def test_codes_survive_the_float_that_blender_makes_of_them() -> None:
@@ -203,7 +240,7 @@ def test_codes_survive_the_float_that_blender_makes_of_them() -> None:
     np.testing.assert_array_equal(codes(Picture("a"), opaque)[..., 0].ravel(), np.arange(256))
 
 
-# --- masks ------------------------------------------------------------------------------------------------------------------------------
+# --- masks ----------------------------------------------------------------------------------------
 
 
 def test_a_painted_mask_fits_the_photo(tmp_path: Path) -> None:
@@ -247,7 +284,7 @@ def test_a_mask_of_another_size_is_scaled_on_demand(tmp_path: Path) -> None:
     assert np.load(path).shape == (HEIGHT, WIDTH)
 
 
-# --- what cannot be used ----------------------------------------------------------------------------------------------------------------
+# --- what cannot be used --------------------------------------------------------------------------
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -264,7 +301,9 @@ def test_a_single_pixel_is_refused() -> None:
         examine(generated(width=1, height=1))
 
 
-@pytest.mark.parametrize(("source", "word"), [("MOVIE", "movie"), ("SEQUENCE", "sequence"), ("TILED", "tiles")])
+@pytest.mark.parametrize(
+    ("source", "word"), [("MOVIE", "movie"), ("SEQUENCE", "sequence"), ("TILED", "tiles")]
+)
 def test_what_is_no_single_picture_is_refused(source: str, word: str) -> None:
     image = generated()
     image.source = source
@@ -288,7 +327,9 @@ def test_an_image_that_is_removed_meanwhile_is_missed(tmp_path: Path) -> None:
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot write .*: No such file or directory; choose another cache folder"):
+    with pytest.raises(
+        InputError, match="cannot write .*: No such file or directory; choose another cache folder"
+    ):
         last(hand_over(examine(generated()), tmp_path / "nowhere" / "photo"))
 
 

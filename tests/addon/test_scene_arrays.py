@@ -1,4 +1,6 @@
-"""Reading a result's arrays: what is there is kept as it is, what is not sound is refused in one line."""
+"""Reading a result's arrays: what is there is kept as it is, what is not sound is refused in one
+line.
+"""
 
 import json
 import shutil
@@ -17,12 +19,28 @@ Arrays = dict[str, np.ndarray]
 
 def test_everything_of_the_file_is_in_the_result(bump_folder: Path) -> None:
     result, d = read_result(bump_folder), bump()
-    for name in ("image", "diffuse", "specular", "reflectance", "shading", "normal", "height", "mask", "confidence"):
+    for name in (
+        "image",
+        "diffuse",
+        "specular",
+        "reflectance",
+        "shading",
+        "normal",
+        "height",
+        "mask",
+        "confidence",
+    ):
         assert np.array_equal(getattr(result, name), getattr(d, name)), name
     with np.load(bump_folder / "arrays.npz") as file:
         assert {name for name in file.files if not hasattr(result, name)} == set()
-        assert np.array_equal(result.sky, file["sky"]) and result.reflectance_scale == float(file["reflectance_scale"])
-    assert result.size == (88, 64) and result.name == "bump" and result.description["settings"]["model"] == "mdr"
+        assert np.array_equal(result.sky, file["sky"]) and result.reflectance_scale == float(
+            file["reflectance_scale"]
+        )
+    assert (
+        result.size == (88, 64)
+        and result.name == "bump"
+        and result.description["settings"]["model"] == "mdr"
+    )
     assert np.isnan(result.roughness) and result.specular_variation is None
 
 
@@ -88,18 +106,24 @@ def test_half_written_arrays_are_refused(tmp_path: Path, bump_folder: Path, keep
         read_result(folder)
 
 
-def test_the_variation_of_the_gloss_is_read_where_there_is_one(tmp_path: Path, bump_folder: Path) -> None:
+def test_the_variation_of_the_gloss_is_read_where_there_is_one(
+    tmp_path: Path, bump_folder: Path
+) -> None:
     folder = shutil.copytree(bump_folder, tmp_path / "copy")
     with np.load(folder / "arrays.npz") as file:
         arrays = {name: file[name] for name in file.files}
     np.savez(folder / "arrays.npz", **arrays, specular_variation=arrays["confidence"])
     result: Result = read_result(folder)
-    assert result.specular_variation is not None and np.array_equal(result.specular_variation, arrays["confidence"])
+    assert result.specular_variation is not None and np.array_equal(
+        result.specular_variation, arrays["confidence"]
+    )
 
 
 def test_what_decomposition_says_may_be_much(tmp_path: Path, bump_folder: Path) -> None:
     """The description is kept whole, letters of all languages too."""
     folder = shutil.copytree(bump_folder, tmp_path / "copy")
     said = {"input": {"name": "чашка/杯.png"}, "settings": {}, "status": {"text": "收敛"}}
-    (folder / "decomposition.json").write_text(json.dumps(said, ensure_ascii=False), encoding="utf-8")
+    (folder / "decomposition.json").write_text(
+        json.dumps(said, ensure_ascii=False), encoding="utf-8"
+    )
     assert read_result(folder).description == said

@@ -1,4 +1,6 @@
-"""Building is repeatable, keeps its hands off what is not its own, survives files, and refuses in one line."""
+"""Building is repeatable, keeps its hands off what is not its own, survives files, and refuses in
+one line.
+"""
 
 import importlib
 import json
@@ -16,8 +18,18 @@ from tests.addon.scene_fixture import bump, write_result
 from tests.addon.scene_render import pixels
 
 KINDS = (
-    "objects", "meshes", "materials", "images", "textures", "worlds", "scenes", "collections", "node_groups", "cameras", "lights",
-)  # fmt: skip
+    "objects",
+    "meshes",
+    "materials",
+    "images",
+    "textures",
+    "worlds",
+    "scenes",
+    "collections",
+    "node_groups",
+    "cameras",
+    "lights",
+)
 
 
 def build(result: Result, scene: Any = None, **options: Any) -> Any:
@@ -37,14 +49,25 @@ def census(bpy: Any) -> dict[str, list[str]]:
 
 
 @pytest.mark.parametrize(
-    "options", [{}, {"sun": True}, {"displacement": True}, {"closed_back": True}, {"specular_from": "image"}, {"own_scene": False}], ids=str
+    "options",
+    [
+        {},
+        {"sun": True},
+        {"displacement": True},
+        {"closed_back": True},
+        {"specular_from": "image"},
+        {"own_scene": False},
+    ],
+    ids=str,
 )
 def test_nothing_piles_up(blender: Any, result: Result, options: dict[str, Any]) -> None:
     build(result, **options)
     once = census(blender)
     build(result, **options)
     assert census(blender) == once
-    assert not [block.name for kind in KINDS for block in getattr(blender.data, kind) if block.users == 0]
+    assert not [
+        block.name for kind in KINDS for block in getattr(blender.data, kind) if block.users == 0
+    ]
 
 
 def test_other_options_leave_nothing_of_the_earlier_ones(blender: Any, result: Result) -> None:
@@ -57,12 +80,18 @@ def test_other_options_leave_nothing_of_the_earlier_ones(blender: Any, result: R
     assert set(changed) <= {"node_groups"}, "a group without users goes when the file is saved"
 
 
-def test_another_resolution_updates_the_same_object(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_another_resolution_updates_the_same_object(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     built = build(result)
     once = census(blender)
     larger = read_result(write_result(tmp_path / "bump", bump(100, 130, (45.0, 60.0))))
     again = build(larger)
-    assert again.object == built.object and again.material == built.material and census(blender) == once
+    assert (
+        again.object == built.object
+        and again.material == built.material
+        and census(blender) == once
+    )
     assert len(again.object.data.vertices) == len(larger.vertices)
     assert tuple(again.object["isc_map_height"].size) == (130, 100)
     assert (again.scene.render.resolution_x, again.scene.render.resolution_y) == (130, 100)
@@ -70,7 +99,11 @@ def test_another_resolution_updates_the_same_object(blender: Any, result: Result
 
 def test_two_photos_stand_beside_each_other(blender: Any, result: Result) -> None:
     first, second = build(result, name="one"), build(result, name="two")
-    assert first.object != second.object and first.scene != second.scene and first.world != second.world
+    assert (
+        first.object != second.object
+        and first.scene != second.scene
+        and first.world != second.world
+    )
     assert first.object.data != second.object.data and len(blender.data.node_groups) == 1
 
 
@@ -86,9 +119,18 @@ def test_photos_of_one_name_do_not_replace_each_other(blender: Any, result: Resu
     made = [build(one) for one in results]
     assert [one.object["isc_key"] for one in made] == ["bump", "bump-2", "bump-3"]
     assert [one.object["isc_photo_sha256"][0] for one in made] == ["a", "b", "c"]
-    assert len({one.object.data for one in made} | {one.material for one in made} | {one.scene for one in made}) == 9
+    assert (
+        len(
+            {one.object.data for one in made}
+            | {one.material for one in made}
+            | {one.scene for one in made}
+        )
+        == 9
+    )
     once = census(blender)
-    assert [build(one).object for one in results] == [one.object for one in made] and census(blender) == once
+    assert [build(one).object for one in results] == [one.object for one in made] and census(
+        blender
+    ) == once
 
 
 def test_a_photo_of_unknown_origin_is_told_by_its_name(blender: Any, result: Result) -> None:
@@ -103,11 +145,24 @@ def test_an_image_is_the_same_photo_after_it_was_painted_on(blender: Any, result
     first, second = (blender.data.images.new("bump", 8, 8) for _ in range(2))
     thing = build_scene(of_photo(result, "a"), BuildOptions(name="bump"), photo=first).object
     thing["isc_source_image"] = first
-    assert build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=first).object == thing
-    assert build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=second).object != thing
+    assert (
+        build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=first).object == thing
+    )
+    assert (
+        build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=second).object != thing
+    )
 
 
-NAMES = ["a/b\\c", "чашка 杯 ☕", "x" * 300, "é" * 100, "  ", "ISC Dichromatic", "con.png", '"quoted"\n']
+NAMES = [
+    "a/b\\c",
+    "чашка 杯 ☕",
+    "x" * 300,
+    "é" * 100,
+    "  ",
+    "ISC Dichromatic",
+    "con.png",
+    '"quoted"\n',
+]
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -117,7 +172,10 @@ def test_any_name_will_do(blender: Any, result: Result, name: str) -> None:
     assert build(result, name=name).object == built.object and census(blender) == once
     assert built.object["isc_key"] == name
     start = name.encode()[:20].decode("utf-8", "ignore")
-    assert all(part.name.startswith(start) for part in (built.object, built.camera, built.collection, built.world, built.material))
+    assert all(
+        part.name.startswith(start)
+        for part in (built.object, built.camera, built.collection, built.world, built.material)
+    )
     assert built.camera.name.endswith("camera")
 
 
@@ -129,7 +187,12 @@ def test_names_that_start_alike_are_different_objects(blender: Any, result: Resu
 
 def test_renamed_things_are_found(blender: Any, result: Result) -> None:
     built = build(result)
-    for part, name in ((built.object, "vase"), (built.collection, "shelf"), (built.material, "clay"), (built.world, "sky")):
+    for part, name in (
+        (built.object, "vase"),
+        (built.collection, "shelf"),
+        (built.material, "clay"),
+        (built.world, "sky"),
+    ):
         part.name = name
     once = census(blender)
     build(result)
@@ -138,8 +201,23 @@ def test_renamed_things_are_found(blender: Any, result: Result) -> None:
 
 def state(scene: Any) -> tuple[Any, ...]:
     render, view = scene.render, scene.view_settings
-    size = (render.resolution_x, render.resolution_y, render.resolution_percentage, render.pixel_aspect_x, render.engine)
-    return (scene.world, scene.camera, *size, render.film_transparent, view.view_transform, view.look, view.exposure, view.gamma)
+    size = (
+        render.resolution_x,
+        render.resolution_y,
+        render.resolution_percentage,
+        render.pixel_aspect_x,
+        render.engine,
+    )
+    return (
+        scene.world,
+        scene.camera,
+        *size,
+        render.film_transparent,
+        view.view_transform,
+        view.look,
+        view.exposure,
+        view.gamma,
+    )
 
 
 def user_scene(bpy: Any) -> Any:
@@ -161,14 +239,21 @@ def test_the_users_scene_stays_as_it_is(blender: Any, result: Result, own: bool)
     assert (built.scene == scene) != own and built.object.name in built.scene.objects
     if own:
         assert built.scene.world == built.world and built.scene.camera == built.camera
-        assert built.scene.view_settings.view_transform == "Standard" and built.scene.render.film_transparent
+        assert (
+            built.scene.view_settings.view_transform == "Standard"
+            and built.scene.render.film_transparent
+        )
 
 
 CHANGES: dict[str, Callable[[Any, Any], bool]] = {
     "set_world": lambda scene, built: scene.world == built.world,
     "set_camera": lambda scene, built: scene.camera == built.camera,
-    "set_resolution": lambda scene, built: (scene.render.resolution_x, scene.render.resolution_y) == (88, 64),
-    "set_view_transform": lambda scene, built: scene.view_settings.view_transform == "Standard" and scene.view_settings.exposure == 0,
+    "set_resolution": lambda scene, built: (
+        (scene.render.resolution_x, scene.render.resolution_y) == (88, 64)
+    ),
+    "set_view_transform": lambda scene, built: (
+        scene.view_settings.view_transform == "Standard" and scene.view_settings.exposure == 0
+    ),
 }
 
 
@@ -189,7 +274,11 @@ def test_a_scene_can_be_chosen(blender: Any, result: Result) -> None:
 def test_what_it_was_made_of_is_written_down(blender: Any, result: Result) -> None:
     built = build(result, size_metres=0.25)
     for block in (built.object, built.collection):
-        assert (block["isc_photo"], block["isc_model"], block["isc_separator"]) == ("bump.png", "mdr", "isc")
+        assert (block["isc_photo"], block["isc_model"], block["isc_separator"]) == (
+            "bump.png",
+            "mdr",
+            "isc",
+        )
         assert block["isc_photo_sha256"] == "0" * 64 and block["isc_version"] == "0.1.0"
         assert json.loads(block["isc_decomposition"]) == result.description
         assert json.loads(block["isc_options"])["size_metres"] == 0.25
@@ -202,13 +291,25 @@ def test_what_isc_made_is_recognised(blender: Any, result: Result) -> None:
     sun = next(thing for thing in built.collection.objects if thing.type == "LIGHT")
     assert find(built.object) == built and find(built.camera) == built and find(sun) == built
     stranger = blender.data.objects.new("cube", None)
-    assert find(stranger) is None and find(None) is None and not is_isc(stranger) and not is_isc(None) and is_isc(built.object)
+    assert (
+        find(stranger) is None
+        and find(None) is None
+        and not is_isc(stranger)
+        and not is_isc(None)
+        and is_isc(built.object)
+    )
 
 
 def check_loaded(bpy: Any, thing: Any, result: Result) -> None:
-    """An object that came out of a file is whole: mesh, normals, material, images with their exact values."""
+    """An object that came out of a file is whole: mesh, normals, material, images with their exact
+    values.
+    """
     mesh = thing.data
-    assert len(mesh.vertices) == len(result.vertices) and mesh.has_custom_normals and "confidence" in mesh.attributes
+    assert (
+        len(mesh.vertices) == len(result.vertices)
+        and mesh.has_custom_normals
+        and "confidence" in mesh.attributes
+    )
     material = mesh.materials[0]
     group = next(node for node in material.node_tree.nodes if node.type == "GROUP")
     assert group.node_tree["isc_group"] == "ISC Dichromatic"
@@ -216,7 +317,9 @@ def check_loaded(bpy: Any, thing: Any, result: Result) -> None:
     assert base.colorspace_settings.name == "Linear Rec.709" and base.packed_file
     np.testing.assert_array_equal(pixels(base)[..., :3], result.base_color)
     for name in ("diffuse", "reflectance", "shading", "normal"):
-        np.testing.assert_array_equal(pixels(thing[f"isc_map_{name}"])[..., :3], getattr(result, name))
+        np.testing.assert_array_equal(
+            pixels(thing[f"isc_map_{name}"])[..., :3], getattr(result, name)
+        )
     assert json.loads(thing["isc_decomposition"]) == result.description
 
 
@@ -224,7 +327,9 @@ def save(bpy: Any, path: Path) -> None:
     bpy.ops.wm.save_as_mainfile(filepath=str(path), check_existing=False)
 
 
-def test_everything_survives_saving_and_loading(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_everything_survives_saving_and_loading(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     from blender_addon.scene import find
 
     build(result, sun=True)
@@ -245,7 +350,9 @@ def test_everything_survives_saving_and_loading(blender: Any, result: Result, tm
 
 
 @pytest.mark.parametrize("kind", ["objects", "collections", "scenes"])
-def test_everything_survives_appending(blender: Any, result: Result, tmp_path: Path, kind: str) -> None:
+def test_everything_survives_appending(
+    blender: Any, result: Result, tmp_path: Path, kind: str
+) -> None:
     from blender_addon.scene import find
 
     name = {"objects": "object", "collections": "collection", "scenes": "scene"}[kind]
@@ -256,7 +363,9 @@ def test_everything_survives_appending(blender: Any, result: Result, tmp_path: P
         setattr(into, kind, [wanted])
     thing = next(thing for thing in blender.data.objects if thing.type == "MESH")
     check_loaded(blender, thing, result)
-    assert bool(blender.data.cameras) == (kind != "objects") and thing["isc_world"] in set(blender.data.worlds)
+    assert bool(blender.data.cameras) == (kind != "objects") and thing["isc_world"] in set(
+        blender.data.worlds
+    )
     found = find(thing)
     assert found is not None and found.object == thing and found.world == thing["isc_world"]
     assert (found.camera is None) == (kind == "objects")
@@ -269,7 +378,9 @@ def link(bpy: Any, path: Path, kind: str, name: str) -> Any:
     return getattr(into, kind)[0]
 
 
-def test_linked_things_are_refused_and_nothing_changes(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_linked_things_are_refused_and_nothing_changes(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     name = build(result).collection.name
     save(blender, tmp_path / "saved.blend")
     blender.ops.wm.read_factory_settings(use_empty=True)
@@ -299,7 +410,9 @@ def test_a_linked_scene_is_refused(blender: Any, result: Result, tmp_path: Path)
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_size_that_is_none_is_refused_and_nothing_changes(blender: Any, result: Result, size: float) -> None:
+def test_a_size_that_is_none_is_refused_and_nothing_changes(
+    blender: Any, result: Result, size: float
+) -> None:
     before = census(blender)
     with pytest.raises(InputError, match="metres"):
         build(result, size_metres=size)
@@ -312,7 +425,9 @@ def test_a_displaced_grid_with_a_back_is_refused(blender: Any, result: Result) -
     assert not blender.data.objects
 
 
-def test_a_colour_configuration_without_our_spaces_is_refused(blender: Any, result: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_colour_configuration_without_our_spaces_is_refused(
+    blender: Any, result: Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(importlib.import_module("blender_addon.scene.build"), "DATA", "Cinema Data")
     before = census(blender)
     with pytest.raises(InputError, match="no space 'Cinema Data'"):
@@ -351,17 +466,34 @@ def test_a_mesh_with_shape_keys_is_filled_anew(blender: Any, result: Result) -> 
 
 def test_things_that_happen_to_have_its_names_are_left_alone(blender: Any, result: Result) -> None:
     cube = blender.data.objects.new("bump", blender.data.meshes.new("bump"))
-    clay, group = blender.data.materials.new("bump"), blender.data.node_groups.new("ISC Dichromatic", "ShaderNodeTree")
+    clay, group = (
+        blender.data.materials.new("bump"),
+        blender.data.node_groups.new("ISC Dichromatic", "ShaderNodeTree"),
+    )
     built = build(result)
-    assert built.object != cube and built.material != clay and not cube.data.vertices and not group.nodes
-    assert next(node for node in built.material.node_tree.nodes if node.type == "GROUP").node_tree != group
+    assert (
+        built.object != cube
+        and built.material != clay
+        and not cube.data.vertices
+        and not group.nodes
+    )
+    assert (
+        next(node for node in built.material.node_tree.nodes if node.type == "GROUP").node_tree
+        != group
+    )
 
 
-def test_an_object_shadows_itself_where_it_stands_among_others(blender: Any, result: Result) -> None:
-    """The recovered shading holds the photo's shadows; in a user's scene people expect an object to cast one."""
+def test_an_object_shadows_itself_where_it_stands_among_others(
+    blender: Any, result: Result
+) -> None:
+    """The recovered shading holds the photo's shadows; in a user's scene people expect an object to
+    cast one.
+    """
     assert not build(result, name="alone").object.visible_shadow
     thing = build(result, name="among others", own_scene=False).object
     assert thing.visible_shadow
     thing.visible_shadow = False
-    assert not build(result, name="among others", own_scene=False).object.visible_shadow, "what people set stays"
+    assert not build(result, name="among others", own_scene=False).object.visible_shadow, (
+        "what people set stays"
+    )
     assert build(result, name="alone", own_shadows=True).object.visible_shadow

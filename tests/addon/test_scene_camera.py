@@ -19,7 +19,10 @@ def build(result: Result, photo: Any = None, **options: Any) -> Any:
     return build_scene(result, BuildOptions(**options), photo=photo)
 
 
-@pytest.mark.parametrize(("rows", "columns", "centre"), [(64, 88, (27.0, 38.0)), (88, 64, (50.0, 30.0)), (51, 51, (24.0, 25.0))])
+@pytest.mark.parametrize(
+    ("rows", "columns", "centre"),
+    [(64, 88, (27.0, 38.0)), (88, 64, (50.0, 30.0)), (51, 51, (24.0, 25.0))],
+)
 def test_a_ray_through_a_pixel_meets_the_objects_point_there(
     blender: Any, tmp_path: Path, rows: int, columns: int, centre: tuple[float, float]
 ) -> None:
@@ -39,13 +42,17 @@ def test_a_ray_through_a_pixel_meets_the_objects_point_there(
     assert not (layers["Combined"][..., 3] > 0)[~covered].any()
 
 
-def test_the_camera_follows_an_object_that_was_moved(blender: Any, bump_folder: Path, tmp_path: Path) -> None:
+def test_the_camera_follows_an_object_that_was_moved(
+    blender: Any, bump_folder: Path, tmp_path: Path
+) -> None:
     result = read_result(bump_folder)
     built = build(result)
     before = render(built.scene, tmp_path)["Diffuse Color"]
     built.object.location, built.object.rotation_euler = (1.0, -2.0, 0.5), (0.3, 0.2, 1.0)
     built = build(result)
-    assert tuple(built.object.location) == pytest.approx((1.0, -2.0, 0.5)), "what people moved stays where it is"
+    assert tuple(built.object.location) == pytest.approx((1.0, -2.0, 0.5)), (
+        "what people moved stays where it is"
+    )
     np.testing.assert_allclose(render(built.scene, tmp_path)["Diffuse Color"], before, atol=0.01)
 
 
@@ -70,4 +77,7 @@ def test_the_photo_stands_behind(blender: Any, bump_folder: Path) -> None:
     theirs.image = blender.data.images.new("theirs", 8, 8)
     for _ in range(2):
         built = build(result, photo=photo)
-        assert [one.image.name for one in built.camera.data.background_images] == ["photo", "theirs"]
+        assert [one.image.name for one in built.camera.data.background_images] == [
+            "photo",
+            "theirs",
+        ]

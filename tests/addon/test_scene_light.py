@@ -24,15 +24,22 @@ def result(bump_folder: Path) -> Result:
     return read_result(bump_folder)
 
 
-def lit(built: Any, result: Result, folder: Path, samples: int = 200) -> tuple[np.ndarray, np.ndarray]:
-    """Direct light on a white surface, and where: (N, 3) and (H, W) bool. Shadows are no question: the bump is convex."""
+def lit(
+    built: Any, result: Result, folder: Path, samples: int = 200
+) -> tuple[np.ndarray, np.ndarray]:
+    """Direct light on a white surface, and where:
+
+    (N, 3) and (H, W) bool. Shadows are no question: the bump is convex.
+    """
     mask = result.mask.copy()
     for _ in range(3):
         mask[1:-1, 1:-1] &= mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
     return render(built.scene, folder, samples)["Diffuse Direct"][mask], mask
 
 
-def test_the_world_gives_the_recovered_shading(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_the_world_gives_the_recovered_shading(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     seen, where = lit(build(result), result, tmp_path)
     wanted = result.shading[where] / result.reflectance_scale
     np.testing.assert_allclose(seen, wanted, rtol=0.04)
@@ -40,12 +47,16 @@ def test_the_world_gives_the_recovered_shading(blender: Any, result: Result, tmp
 
 
 def apart(seen: np.ndarray, wanted: np.ndarray) -> float:
-    """Root mean square of the difference, noise included; light from the wrong side makes it 0.15 and more."""
+    """Root mean square of the difference, noise included; light from the wrong side makes it 0.15
+    and more.
+    """
     return float(np.sqrt(np.square(seen - wanted).mean()))
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_light_comes_from_where_it_was(blender: Any, result: Result, tmp_path: Path, axis: int) -> None:
+def test_light_comes_from_where_it_was(
+    blender: Any, result: Result, tmp_path: Path, axis: int
+) -> None:
     """A sky that shines red from one half of an axis and blue from the other."""
     side = directions(16)[..., axis] > 0
     sky = np.where(side[..., None], [1.0, 0.1, 0.1], [0.1, 0.1, 1.0]).astype(np.float32)
@@ -53,14 +64,18 @@ def test_light_comes_from_where_it_was(blender: Any, result: Result, tmp_path: P
     assert apart(seen, shading_under(sky, result.normal[where].astype(float))) < 0.02
 
 
-def test_the_rotation_is_said_and_turns_the_light(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_the_rotation_is_said_and_turns_the_light(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     from blender_addon.scene.world import MAPPING
 
     side = directions(16)[..., 0] > 0
     sky = np.where(side[..., None], [1.0, 0, 0], [0, 0, 1.0]).astype(np.float32)
     built = build(replace(result, sky=sky))
     mapping = built.world.node_tree.nodes[MAPPING]
-    assert np.rad2deg(mapping.inputs["Rotation"].default_value[2]) == pytest.approx(built.world["isc_rotation"])
+    assert np.rad2deg(mapping.inputs["Rotation"].default_value[2]) == pytest.approx(
+        built.world["isc_rotation"]
+    )
     mapping.inputs["Rotation"].default_value[2] += np.pi
     seen, where = lit(built, result, tmp_path, 100)
     turned = shading_under(sky[:, ::-1], result.normal[where].astype(float))
@@ -70,7 +85,12 @@ def test_the_rotation_is_said_and_turns_the_light(blender: Any, result: Result, 
 def sunlit(result: Result) -> Result:
     direction = np.array([-0.5, 0.4, 0.768], np.float32)
     strength, ambient = np.array([2.0, 1.0, 0.5], np.float32), np.array([0.1, 0.2, 0.3], np.float32)
-    return replace(result, sun_direction=direction / np.linalg.norm(direction), sun_strength=strength, sun_ambient=ambient)
+    return replace(
+        result,
+        sun_direction=direction / np.linalg.norm(direction),
+        sun_strength=strength,
+        sun_ambient=ambient,
+    )
 
 
 def expected(result: Result, where: np.ndarray) -> np.ndarray:
@@ -78,7 +98,9 @@ def expected(result: Result, where: np.ndarray) -> np.ndarray:
     return result.sun_strength / np.pi * facing + result.sun_ambient
 
 
-def test_the_sun_and_the_even_rest_give_the_shading_of_the_optimal_light(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_the_sun_and_the_even_rest_give_the_shading_of_the_optimal_light(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     sunny = sunlit(result)
     built = build(sunny, sun=True)
     seen, where = lit(built, sunny, tmp_path, 64)
@@ -86,7 +108,9 @@ def test_the_sun_and_the_even_rest_give_the_shading_of_the_optimal_light(blender
     build(sunny)
     assert len(blender.data.lights) == 0, "the sun stays where nobody wants it"
     seen, where = lit(built, sunny, tmp_path, 100)
-    np.testing.assert_allclose(seen.mean(0), (result.shading[where] / result.reflectance_scale).mean(0), rtol=0.02)
+    np.testing.assert_allclose(
+        seen.mean(0), (result.shading[where] / result.reflectance_scale).mean(0), rtol=0.02
+    )
 
 
 def test_an_object_is_relit_from_what_it_knows(blender: Any, result: Result) -> None:
@@ -95,14 +119,21 @@ def test_an_object_is_relit_from_what_it_knows(blender: Any, result: Result) -> 
 
     built = build(sunlit(result))
     sun: Any = relight(built.object)
-    assert sun.data.type == "SUN" and sun.data.energy == pytest.approx(2) and sun.name in built.collection.objects
+    assert (
+        sun.data.type == "SUN"
+        and sun.data.energy == pytest.approx(2)
+        and sun.name in built.collection.objects
+    )
     assert tuple(sun.data.color) == pytest.approx((1, 0.5, 0.25))
     toward = sun.rotation_quaternion.to_matrix().col[2]
     x, y, z = sunlit(result).sun_direction
     assert tuple(toward) == pytest.approx((x, -z, y), abs=1e-6)
     assert built.world.node_tree.nodes[SUN].inputs["Factor"].default_value == 1
     assert relight(built.object, on=False) is None
-    assert built.world.node_tree.nodes[SUN].inputs["Factor"].default_value == 0 and not blender.data.lights
+    assert (
+        built.world.node_tree.nodes[SUN].inputs["Factor"].default_value == 0
+        and not blender.data.lights
+    )
 
 
 def test_other_objects_cannot_be_relit(blender: Any) -> None:

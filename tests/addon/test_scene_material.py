@@ -1,4 +1,6 @@
-"""The material is the photo taken apart and put together again: paint exact, gloss added, and everything named and explained."""
+"""The material is the photo taken apart and put together again: paint exact, gloss added, and
+everything named and explained.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +15,17 @@ from isc_core.brdf.shading import directional, radiance
 from tests.addon.scene_render import pixels, render
 
 SOCKETS = {
-    "Reflectance", "Diffuse Gain", "Hue", "Saturation", "Value", "Specular Image", "Specular Level", "Roughness", "Specular Gain", "Normal",
-}  # fmt: skip
+    "Reflectance",
+    "Diffuse Gain",
+    "Hue",
+    "Saturation",
+    "Value",
+    "Specular Image",
+    "Specular Level",
+    "Roughness",
+    "Specular Gain",
+    "Normal",
+}
 
 
 def build(result: Result, **options: Any) -> Any:
@@ -49,11 +60,21 @@ def test_every_socket_has_a_tooltip_and_a_range(blender: Any, result: Result) ->
     inputs = {item.name: item for item in tree.interface.items_tree if item.in_out == "INPUT"}
     assert set(inputs) == SOCKETS and tree.name == "ISC Dichromatic"
     assert all(len(item.description) > 10 for item in inputs.values())
-    for name in ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Specular Level", "Roughness"):
+    for name in (
+        "Diffuse Gain",
+        "Specular Gain",
+        "Hue",
+        "Saturation",
+        "Value",
+        "Specular Level",
+        "Roughness",
+    ):
         assert inputs[name].min_value == 0 and 1 <= inputs[name].max_value <= 25, name
 
 
-def test_the_paint_is_the_base_color_to_float32(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_the_paint_is_the_base_color_to_float32(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     built = build(result)
     paint = render(built.scene, tmp_path)["Diffuse Color"]
     here = inside(result)
@@ -78,7 +99,9 @@ def test_recolouring_turns_the_hue(blender: Any, result: Result, tmp_path: Path)
     node.inputs["Value"].default_value = 0.5
     turned = render(built.scene, tmp_path)["Diffuse Color"]
     # A third of the circle brings each channel to the next one.
-    np.testing.assert_allclose(turned[here], 0.5 * np.roll(result.base_color[here], 1, axis=-1), rtol=1e-4)
+    np.testing.assert_allclose(
+        turned[here], 0.5 * np.roll(result.base_color[here], 1, axis=-1), rtol=1e-4
+    )
     node.inputs["Saturation"].default_value = 0
     grey = render(built.scene, tmp_path)["Diffuse Color"][here]
     assert np.ptp(grey, axis=-1).max() < 1e-6
@@ -101,11 +124,18 @@ def test_gloss_is_added_to_the_paint(blender: Any, result: Result, tmp_path: Pat
     node, here = group_node(built), inside(result)
     node.inputs["Roughness"].default_value = 0.45
     matt = render(built.scene, tmp_path)["Combined"][..., :3][here]
-    lambert = result.base_color[here] / np.pi * np.maximum(result.normal[here] @ direction, 0)[:, None]
+    lambert = (
+        result.base_color[here] / np.pi * np.maximum(result.normal[here] @ direction, 0)[:, None]
+    )
     np.testing.assert_allclose(matt, lambert, rtol=1e-3)
     node.inputs["Specular Level"].default_value = 1
     gloss = render(built.scene, tmp_path)["Combined"][..., :3][here] - matt
-    model = radiance(Ggx(0.45**2, 0.04), result.normal[here].astype(float), np.array([0.0, 0, 1]), directional(direction, 1.0))
+    model = radiance(
+        Ggx(0.45**2, 0.04),
+        result.normal[here].astype(float),
+        np.array([0.0, 0, 1]),
+        directional(direction, 1.0),
+    )
     bright = model[:, 0] > 0.1 * model.max()
     np.testing.assert_allclose(gloss[bright], model[bright], rtol=0.06)
     node.inputs["Specular Gain"].default_value = 3
@@ -116,13 +146,22 @@ def test_gloss_is_added_to_the_paint(blender: Any, result: Result, tmp_path: Pat
 
 @pytest.fixture
 def mirror(blender: Any) -> Any:
-    """A plane of black paint, to be seen at an angle under an even sky of radiance 1: what is seen is the share that it mirrors."""
+    """A plane of black paint, to be seen at an angle under an even sky of radiance 1: what is seen
+    is the share that it mirrors.
+    """
     from blender_addon.scene.dichromatic import dichromatic_group
     from blender_addon.scene.nodes import node_tree
 
     scene, world = blender.context.scene, blender.data.worlds.new("even")
-    scene.world, scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = world, "CYCLES", 4, 4
-    next(node for node in node_tree(world).nodes if node.type == "BACKGROUND").inputs["Color"].default_value = (1, 1, 1, 1)
+    scene.world, scene.render.engine, scene.render.resolution_x, scene.render.resolution_y = (
+        world,
+        "CYCLES",
+        4,
+        4,
+    )
+    next(node for node in node_tree(world).nodes if node.type == "BACKGROUND").inputs[
+        "Color"
+    ].default_value = (1, 1, 1, 1)
     mesh = blender.data.meshes.new("plane")
     mesh.from_pydata([(-9, -9, 0), (9, -9, 0), (9, 9, 0), (-9, 9, 0)], [], [(0, 1, 2, 3)])
     material = blender.data.materials.new("black")
@@ -131,7 +170,10 @@ def mirror(blender: Any) -> Any:
     group, output = tree.nodes.new("ShaderNodeGroup"), tree.nodes.new("ShaderNodeOutputMaterial")
     group.node_tree = dichromatic_group()
     tree.links.new(group.outputs["Surface"], output.inputs["Surface"])
-    group.inputs["Reflectance"].default_value, group.inputs["Roughness"].default_value = (0, 0, 0, 1), 0
+    group.inputs["Reflectance"].default_value, group.inputs["Roughness"].default_value = (
+        (0, 0, 0, 1),
+        0,
+    )
     mesh.materials.append(material)
     camera = blender.data.objects.new("camera", blender.data.cameras.new("camera"))
     camera.data.type, camera.data.ortho_scale, scene.camera = "ORTHO", 0.1, camera
@@ -144,8 +186,13 @@ def mirrored(blender: Any, folder: Path, degrees: float) -> np.ndarray:
     """The share (3,) that the plane mirrors toward a viewer so many degrees off its normal."""
     angle = np.radians(degrees)
     camera = blender.context.scene.camera
-    camera.location, camera.rotation_euler = (0, -5 * np.sin(angle), 5 * np.cos(angle)), (angle, 0, 0)
-    seen: np.ndarray = render(blender.context.scene, folder, samples=4)["Combined"][..., :3].mean((0, 1))
+    camera.location, camera.rotation_euler = (
+        (0, -5 * np.sin(angle), 5 * np.cos(angle)),
+        (angle, 0, 0),
+    )
+    seen: np.ndarray = render(blender.context.scene, folder, samples=4)["Combined"][..., :3].mean(
+        (0, 1)
+    )
     return seen
 
 
@@ -154,50 +201,72 @@ def fresnel(degrees: float, f0: float = 0.04) -> float:
     index = (1 + f0**0.5) / (1 - f0**0.5)
     cosine = np.cos(np.radians(degrees))
     inner = np.sqrt(1 - np.sin(np.radians(degrees)) ** 2 / index**2)
-    across, along = (cosine - index * inner) / (cosine + index * inner), (inner - index * cosine) / (inner + index * cosine)
+    across, along = (
+        (cosine - index * inner) / (cosine + index * inner),
+        (inner - index * cosine) / (inner + index * cosine),
+    )
     return float((across**2 + along**2) / 2)
 
 
 @pytest.mark.parametrize("degrees", [0, 60, 85])
-def test_the_level_scales_all_of_the_gloss_at_grazing_angles_too(blender: Any, mirror: Any, tmp_path: Path, degrees: float) -> None:
+def test_the_level_scales_all_of_the_gloss_at_grazing_angles_too(
+    blender: Any, mirror: Any, tmp_path: Path, degrees: float
+) -> None:
     """As the fit has it: a weak gloss whose edges mirrored all would lay a veil over the object."""
     plastic = fresnel(degrees)
     for level, gain in ((0.0, 1.0), (0.38, 1.0), (0.8, 0.25), (1.0, 1.0)):
         mirror["Specular Level"].default_value, mirror["Specular Gain"].default_value = level, gain
-        np.testing.assert_allclose(mirrored(blender, tmp_path, degrees), level * gain * plastic, rtol=0.01, atol=1e-5)
+        np.testing.assert_allclose(
+            mirrored(blender, tmp_path, degrees), level * gain * plastic, rtol=0.01, atol=1e-5
+        )
 
 
-def test_a_level_above_plastic_mirrors_no_more_than_all(blender: Any, mirror: Any, tmp_path: Path) -> None:
+def test_a_level_above_plastic_mirrors_no_more_than_all(
+    blender: Any, mirror: Any, tmp_path: Path
+) -> None:
     mirror["Specular Level"].default_value = 3.0
     np.testing.assert_allclose(mirrored(blender, tmp_path, 0), 0.12, rtol=0.01)
     steep = mirrored(blender, tmp_path, 85)
     assert (fresnel(85) < steep).all() and (steep < 1).all()
 
 
-def test_a_specular_image_is_a_factor_of_the_level(blender: Any, mirror: Any, tmp_path: Path) -> None:
+def test_a_specular_image_is_a_factor_of_the_level(
+    blender: Any, mirror: Any, tmp_path: Path
+) -> None:
     """A grey one of all of the gloss; a coloured one tints what is mirrored along the normal."""
     mirror["Specular Level"].default_value = 0.8
     mirror["Specular Image"].default_value = (0.5, 0.5, 0.5, 1)
     np.testing.assert_allclose(mirrored(blender, tmp_path, 85), 0.4 * fresnel(85), rtol=0.01)
     mirror["Specular Image"].default_value = (0.9, 0.5, 0.1, 1)
-    np.testing.assert_allclose(mirrored(blender, tmp_path, 0), 0.04 * 0.8 * np.array([0.9, 0.5, 0.1]), rtol=0.01)
+    np.testing.assert_allclose(
+        mirrored(blender, tmp_path, 0), 0.04 * 0.8 * np.array([0.9, 0.5, 0.1]), rtol=0.01
+    )
     mirror["Specular Image"].default_value = (0, 0, 0, 1)
     assert mirrored(blender, tmp_path, 85).max() == 0
 
 
 def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result) -> None:
-    fitted = replace(result, roughness=0.3, specular_level=1.7, specular_variation=result.confidence)
+    fitted = replace(
+        result, roughness=0.3, specular_level=1.7, specular_variation=result.confidence
+    )
     node = group_node(build(fitted))
     assert node.inputs["Roughness"].default_value == pytest.approx(0.3)
     assert node.inputs["Specular Level"].default_value == pytest.approx(1.7)
     (link,) = node.inputs["Specular Image"].links
     assert link.from_node.image["isc_role"] == "specular_variation"
     node = group_node(build(fitted, specular_from="none"))
-    assert node.inputs["Specular Level"].default_value == 0 and not node.inputs["Specular Image"].is_linked
-    assert group_node(build(result)).inputs["Specular Level"].default_value == 0, "gloss that was not fitted"
+    assert (
+        node.inputs["Specular Level"].default_value == 0
+        and not node.inputs["Specular Image"].is_linked
+    )
+    assert group_node(build(result)).inputs["Specular Level"].default_value == 0, (
+        "gloss that was not fitted"
+    )
 
 
-def test_the_photos_own_highlights_are_seen_and_light_nothing(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_the_photos_own_highlights_are_seen_and_light_nothing(
+    blender: Any, result: Result, tmp_path: Path
+) -> None:
     from blender_addon.scene.material import set_specular_gain
 
     built = build(result, specular_from="image")
@@ -207,26 +276,46 @@ def test_the_photos_own_highlights_are_seen_and_light_nothing(blender: Any, resu
     np.testing.assert_allclose(shine[here], 2 * result.specular[here], rtol=0.02, atol=2e-4)
     from blender_addon.scene.dichromatic import highlights_group
 
-    strength = next(node for node in highlights_group().nodes if node.type == "EMISSION").inputs["Strength"]
+    strength = next(node for node in highlights_group().nodes if node.type == "EMISSION").inputs[
+        "Strength"
+    ]
     sources = {link.from_socket.name for link in strength.links[0].from_node.inputs[0].links}
     assert sources == {"Is Camera Ray"}
     build(result)
-    kinds = {node.type for tree in (built.material.node_tree, group_node(built).node_tree) for node in tree.nodes}
-    assert "EMISSION" not in kinds and len([n for n in built.material.node_tree.nodes if n.type == "GROUP"]) == 1
+    kinds = {
+        node.type
+        for tree in (built.material.node_tree, group_node(built).node_tree)
+        for node in tree.nodes
+    }
+    assert (
+        "EMISSION" not in kinds
+        and len([n for n in built.material.node_tree.nodes if n.type == "GROUP"]) == 1
+    )
 
 
 def test_what_people_set_stays(blender: Any, result: Result) -> None:
     built = build(result)
     node = group_node(built)
-    for name, value in (("Diffuse Gain", 0.7), ("Specular Gain", 2.5), ("Hue", 0.2), ("Saturation", 1.3), ("Value", 0.9)):
+    for name, value in (
+        ("Diffuse Gain", 0.7),
+        ("Specular Gain", 2.5),
+        ("Hue", 0.2),
+        ("Saturation", 1.3),
+        ("Value", 0.9),
+    ):
         node.inputs[name].default_value = value
     node.inputs["Roughness"].default_value = 0.9
     node = group_node(build(replace(result, roughness=0.3), specular_from="image"))
-    kept = [node.inputs[name].default_value for name in ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Roughness")]
+    kept = [
+        node.inputs[name].default_value
+        for name in ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value", "Roughness")
+    ]
     assert kept == pytest.approx([0.7, 2.5, 0.2, 1.3, 0.9, 0.3])
 
 
-def test_the_group_is_shared_and_another_versions_is_left_alone(blender: Any, result: Result) -> None:
+def test_the_group_is_shared_and_another_versions_is_left_alone(
+    blender: Any, result: Result
+) -> None:
     from blender_addon.scene.dichromatic import VERSION
 
     first, second = build(result, name="one"), build(result, name="two")
@@ -238,7 +327,9 @@ def test_the_group_is_shared_and_another_versions_is_left_alone(blender: Any, re
     assert group_node(third).node_tree["isc_group_version"] == VERSION
     group_node(second).inputs["Hue"].default_value = 0.2
     second = build(result, name="two")
-    assert group_node(second).node_tree == group_node(third).node_tree, "built again, an object has this version's group"
+    assert group_node(second).node_tree == group_node(third).node_tree, (
+        "built again, an object has this version's group"
+    )
     assert group_node(second).inputs["Hue"].default_value == pytest.approx(0.2)
 
 
@@ -246,7 +337,9 @@ def test_an_edited_group_is_kept_and_a_broken_one_replaced(blender: Any, result:
     tree = group_node(build(result)).node_tree
     tree.nodes.new("ShaderNodeMath").name = "mine"
     assert "mine" in group_node(build(result, name="two")).node_tree.nodes
-    tree.interface.remove(next(item for item in tree.interface.items_tree if item.name == "Roughness"))
+    tree.interface.remove(
+        next(item for item in tree.interface.items_tree if item.name == "Roughness")
+    )
     assert group_node(build(result, name="three")).node_tree != tree
 
 

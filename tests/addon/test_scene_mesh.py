@@ -1,4 +1,6 @@
-"""The mesh that Blender holds: places, normals, UV and confidence are the result's; the closed one is closed, the displaced one alike."""
+"""The mesh that Blender holds: places, normals, UV and confidence are the result's; the closed one
+is closed, the displaced one alike.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -33,7 +35,9 @@ def test_places_normals_uv_and_confidence_are_the_results(blender: Any, bump_fol
     corners = got(mesh.loops, "vertex_index", 1, np.int32)
     assert np.array_equal(corners, result.faces.ravel())
     nx, ny, nz = result.vertex_normals.T
-    np.testing.assert_allclose(got(mesh.corner_normals, "vector", 3), np.stack([nx, -nz, ny], -1)[corners], atol=1e-6)
+    np.testing.assert_allclose(
+        got(mesh.corner_normals, "vector", 3), np.stack([nx, -nz, ny], -1)[corners], atol=1e-6
+    )
     np.testing.assert_array_equal(got(mesh.uv_layers["UVMap"].uv, "vector", 2), result.uv[corners])
     trust = got(mesh.attributes["confidence"].data, "value", 1)
     np.testing.assert_array_equal(trust, result.confidence[tuple(result.vertex_pixel.T)])
@@ -41,7 +45,9 @@ def test_places_normals_uv_and_confidence_are_the_results(blender: Any, bump_fol
 
 
 @pytest.mark.parametrize("size", [0.1, 2.5])
-def test_the_longer_side_has_the_size_asked_for(blender: Any, bump_folder: Path, size: float) -> None:
+def test_the_longer_side_has_the_size_asked_for(
+    blender: Any, bump_folder: Path, size: float
+) -> None:
     result = read_result(bump_folder)
     places = got(build(result, size_metres=size).object.data.vertices, "co", 3)
     pixel = size / result.longest_side
@@ -50,7 +56,9 @@ def test_the_longer_side_has_the_size_asked_for(blender: Any, bump_folder: Path,
 
 
 def manifold(mesh: Any) -> bool:
-    """Whether each edge has two faces, which pass it in opposite directions, and each vertex one fan of faces."""
+    """Whether each edge has two faces, which pass it in opposite directions, and each vertex one
+    fan of faces.
+    """
     corners = got(mesh.loops, "vertex_index", 1, np.int32)
     starts = got(mesh.polygons, "loop_start", 1, np.int32)
     edges: dict[tuple[int, int], int] = {}
@@ -87,7 +95,9 @@ def test_the_closed_body_is_closed(blender: Any, bump_folder: Path) -> None:
 
 def test_parts_that_meet_in_a_vertex_are_closed_too(blender: Any, tmp_path: Path) -> None:
     mask = np.zeros((64, 88), bool)
-    mask[5:20, 10:31] = mask[19:40, 30:50] = True  # two blocks whose cells share the vertex (19, 30)
+    mask[5:20, 10:31] = mask[19:40, 30:50] = (
+        True  # two blocks whose cells share the vertex (19, 30)
+    )
     mask[8:12, 15:18] = False
     d = bump()
     zero = np.zeros_like(d.height)
@@ -104,12 +114,16 @@ def test_the_front_of_the_closed_body_keeps_its_normals(blender: Any, bump_folde
     nx, ny, nz = result.vertex_normals.T
     front = np.stack([nx, -nz, ny], -1)[result.faces.ravel()]
     np.testing.assert_allclose(normals[: len(front)], front, atol=1e-6)
-    np.testing.assert_allclose(normals[len(front) : 2 * len(front)], np.broadcast_to([0, 1, 0], front.shape), atol=1e-6)
+    np.testing.assert_allclose(
+        normals[len(front) : 2 * len(front)], np.broadcast_to([0, 1, 0], front.shape), atol=1e-6
+    )
     wall = normals[2 * len(front) :]
     corners = got(closed.loops, "vertex_index", 1, np.int32)[2 * len(front) :]
     places = got(closed.vertices, "co", 3)[corners]
     middle = got(closed.vertices, "co", 3).mean(0)
-    assert (((places - middle) * wall)[:, [0, 2]].sum(-1) > 0).all(), "the wall's normals look inward"
+    assert (((places - middle) * wall)[:, [0, 2]].sum(-1) > 0).all(), (
+        "the wall's normals look inward"
+    )
 
 
 @pytest.mark.parametrize("faces", [525_000, 900])
@@ -123,22 +137,34 @@ def test_the_displaced_grid_is_the_height_mesh(blender: Any, tmp_path: Path, fac
     displaced = got(lifted.vertices, "co", 3)
     np.testing.assert_allclose(displaced, exact, atol=1e-6 * 0.1)
     flat = np.repeat(got(lifted.polygons, "normal", 3), 3, axis=0)
-    assert np.abs(got(lifted.corner_normals, "vector", 3) - flat).max() > 0.02, "the faces are not smooth"
+    assert np.abs(got(lifted.corner_normals, "vector", 3) - flat).max() > 0.02, (
+        "the faces are not smooth"
+    )
     build(result)
     assert not built.object.modifiers and len(blender.data.textures) == 0
 
 
 def test_the_mesh_can_be_decimated(blender: Any, bump_folder: Path) -> None:
-    """A fifth of the faces still has the recovered normals, which for the bump are known everywhere."""
+    """A fifth of the faces still has the recovered normals, which for the bump are known
+    everywhere.
+    """
     result = read_result(bump_folder)
     built = build(result)
     built.object.modifiers.new("fewer", "DECIMATE").ratio = 0.2
     fewer = evaluated(built)
     assert len(fewer.polygons) < 0.25 * len(built.object.data.polygons)
-    places = got(fewer.vertices, "co", 3)[got(fewer.loops, "vertex_index", 1, np.int32)] / result.metres_per_pixel
-    x, y = (places[:, 0] + result.origin[0] - 38) / 25.6, (27 - result.origin[1] + places[:, 2]) / 25.6
+    places = (
+        got(fewer.vertices, "co", 3)[got(fewer.loops, "vertex_index", 1, np.int32)]
+        / result.metres_per_pixel
+    )
+    x, y = (
+        (places[:, 0] + result.origin[0] - 38) / 25.6,
+        (27 - result.origin[1] + places[:, 2]) / 25.6,
+    )
     wanted = np.stack([x, -np.ones_like(x), y], -1) / np.sqrt(1 + x * x + y * y)[:, None]
-    turned = np.rad2deg(np.arccos(np.clip((got(fewer.corner_normals, "vector", 3) * wanted).sum(-1), -1, 1)))
+    turned = np.rad2deg(
+        np.arccos(np.clip((got(fewer.corner_normals, "vector", 3) * wanted).sum(-1), -1, 1))
+    )
     assert np.percentile(turned, 95) < 4, "degrees"
 
 

@@ -20,7 +20,9 @@ def result(folder: Path) -> Path:
     return folder
 
 
-def test_a_folder_gives_its_photos_and_results_in_order_and_takes_masks_beside_them(tmp_path: Path) -> None:
+def test_a_folder_gives_its_photos_and_results_in_order_and_takes_masks_beside_them(
+    tmp_path: Path,
+) -> None:
     for name in ("b.png", "b_mask.png", "a.JPG", "notes.txt", ".hidden.png"):
         touch(tmp_path / name)
     result(tmp_path / "c")
@@ -33,7 +35,9 @@ def test_a_folder_gives_its_photos_and_results_in_order_and_takes_masks_beside_t
 
 
 def test_a_result_is_known_by_its_description(tmp_path: Path) -> None:
-    assert find_sources([result(tmp_path / "cup")], None) == [Source(tmp_path / "cup", "cup", is_result=True)]
+    assert find_sources([result(tmp_path / "cup")], None) == [
+        Source(tmp_path / "cup", "cup", is_result=True)
+    ]
 
 
 def test_masks_come_from_a_file_or_a_folder(tmp_path: Path) -> None:
@@ -46,14 +50,20 @@ def test_masks_come_from_a_file_or_a_folder(tmp_path: Path) -> None:
     masks[1].unlink()
     with pytest.raises(InputError, match=r"holds no mask for b.jpg: name it b.png"):
         find_sources([a, b], tmp_path / "masks")
-    with pytest.raises(InputError, match="is one file, but there are 2 photos: give a folder of masks"):
+    with pytest.raises(
+        InputError, match="is one file, but there are 2 photos: give a folder of masks"
+    ):
         find_sources([a, b], one)
     with pytest.raises(InputError, match="there is no such mask"):
         find_sources([a], tmp_path / "none.png")
 
 
 def test_names_differ_even_where_capitals_do_not_count(tmp_path: Path) -> None:
-    paths = [touch(tmp_path / "x" / "Cup.png"), touch(tmp_path / "y" / "cup.jpg"), touch(tmp_path / "cup.tif")]
+    paths = [
+        touch(tmp_path / "x" / "Cup.png"),
+        touch(tmp_path / "y" / "cup.jpg"),
+        touch(tmp_path / "cup.tif"),
+    ]
     assert [source.name for source in find_sources(paths, None)] == ["Cup", "cup-2", "cup-3"]
 
 
@@ -65,24 +75,38 @@ def test_what_is_not_there_or_holds_nothing_is_refused(tmp_path: Path) -> None:
 
 
 def test_where_the_files_go() -> None:
-    one, two = [Source(Path("a.png"), "a")], [Source(Path("a.png"), "a"), Source(Path("b.png"), "b")]
+    one, two = (
+        [Source(Path("a.png"), "a")],
+        [Source(Path("a.png"), "a"), Source(Path("b.png"), "b")],
+    )
     blend = (".blend",)
     assert output_files(two, None, blend, "-o", together=True) == [None, None]
     assert output_files(one, Path("o.blend"), blend, "-o", together=True) == [Path("o.blend")]
     assert output_files(two, Path("o.blend"), blend, "-o", together=True) == [Path("o.blend")] * 2
-    assert output_files(two, Path("o"), blend, "-o", together=True) == [Path("o/a.blend"), Path("o/b.blend")]
-    assert output_files(one, Path("o.EXR"), (".png", ".exr"), "--render", together=False) == [Path("o.EXR")]
-    with pytest.raises(InputError, match="--render o.png is one file, but there are 2 objects: give a folder"):
+    assert output_files(two, Path("o"), blend, "-o", together=True) == [
+        Path("o/a.blend"),
+        Path("o/b.blend"),
+    ]
+    assert output_files(one, Path("o.EXR"), (".png", ".exr"), "--render", together=False) == [
+        Path("o.EXR")
+    ]
+    with pytest.raises(
+        InputError, match="--render o.png is one file, but there are 2 objects: give a folder"
+    ):
         output_files(two, Path("o.png"), (".png", ".exr"), "--render", together=False)
 
 
 def test_another_suffix_is_no_folder_unless_there_is_one(tmp_path: Path) -> None:
     one = [Source(Path("a.png"), "a")]
     for name in ("out.jpg", "out.txt", "v1.2"):
-        with pytest.raises(InputError, match=r"--render .*: give a file that ends in .png or .exr, or a folder"):
+        with pytest.raises(
+            InputError, match=r"--render .*: give a file that ends in .png or .exr, or a folder"
+        ):
             output_files(one, tmp_path / name, (".png", ".exr"), "--render", together=False)
     (tmp_path / "v1.2").mkdir()
-    assert output_files(one, tmp_path / "v1.2", (".png", ".exr"), "--render", together=False) == [tmp_path / "v1.2" / "a.png"]
+    assert output_files(one, tmp_path / "v1.2", (".png", ".exr"), "--render", together=False) == [
+        tmp_path / "v1.2" / "a.png"
+    ]
     touch(tmp_path / "out.txt")
     with pytest.raises(InputError, match=r"-o .*: give a file that ends in .blend, or a folder"):
         output_files(one, tmp_path / "out.txt", (".blend",), "-o", together=True)

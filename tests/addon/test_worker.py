@@ -1,4 +1,6 @@
-"""The worker as Blender holds it: real decompositions, and a stand-in for `isc_core` that misbehaves on demand."""
+"""The worker as Blender holds it: real decompositions, and a stand-in for `isc_core` that
+misbehaves on demand.
+"""
 
 import contextlib
 import json
@@ -16,7 +18,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.worker import Job, Update, Worker, WorkerEnvironment, box_mask, start, start_arrays, start_edit
+from blender_addon.worker import (
+    Job,
+    Update,
+    Worker,
+    WorkerEnvironment,
+    box_mask,
+    start,
+    start_arrays,
+    start_edit,
+)
 from isc_core.atomic import remove_unfinished, unfinished
 from isc_core.errors import InputError
 from isc_core.photo import linear_to_srgb
@@ -26,7 +37,8 @@ from tests.core.ball_scene import ball
 ROOT = Path(__file__).resolve().parents[2]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 
-# A package in place of `isc_core`. What it does stands in `behave.py` beside it; its last arguments are always `--progress json`.
+# A package in place of `isc_core`. What it does stands in `behave.py` beside it; its last arguments
+# are always `--progress json`.
 STAND_IN = """
 import json, os, sys, time
 from pathlib import Path
@@ -39,7 +51,9 @@ def write_half():
     partial.mkdir(parents=True)
     (partial / "maps.exr").write_text("half")
 """
-STUBBORN = "write_half()\nsay('progress', stage='asleep', fraction=0.5)\nwhile True: time.sleep(0.05)\n"
+STUBBORN = (
+    "write_half()\nsay('progress', stage='asleep', fraction=0.5)\nwhile True: time.sleep(0.05)\n"
+)
 
 
 @pytest.fixture(scope="session")
@@ -52,7 +66,9 @@ def bytecode(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def cache(tmp_path: Path, bytecode: Path) -> Path:
     """A cache without kernels."""
     (tmp_path / "cache").mkdir()
-    with contextlib.suppress(OSError):  # not allowed to everybody on Windows, and only slower without
+    with contextlib.suppress(
+        OSError
+    ):  # not allowed to everybody on Windows, and only slower without
         (tmp_path / "cache" / "bytecode").symlink_to(bytecode, target_is_directory=True)
     return tmp_path / "cache"
 
@@ -76,7 +92,11 @@ def stand_in(tmp_path: Path) -> Callable[[str], WorkerEnvironment]:
     return make
 
 
-def ended(worker: Worker, seconds: float = 120.0, until: Callable[[Update], bool] = lambda update: update.state != "running") -> Update:
+def ended(
+    worker: Worker,
+    seconds: float = 120.0,
+    until: Callable[[Update], bool] = lambda update: update.state != "running",
+) -> Update:
     """The first update that meets the condition: the worker's end, if nothing else is asked for."""
     deadline = time.monotonic() + seconds
     while not until(update := worker.poll()):
@@ -87,14 +107,21 @@ def ended(worker: Worker, seconds: float = 120.0, until: Callable[[Update], bool
 
 def at_stage(worker: Worker, stage: str) -> None:
     """Waits until the worker is there."""
-    assert ended(worker, until=lambda update: update.stage.startswith(stage) or update.state != "running").state == "running"
+    assert (
+        ended(
+            worker, until=lambda update: update.stage.startswith(stage) or update.state != "running"
+        ).state
+        == "running"
+    )
 
 
 def process_of(worker: Worker) -> "subprocess.Popen[str]":
     return worker._process
 
 
-def job(photo: Path, output: Path, mask: Path | None = None, model: str = "naive", **changes: Any) -> Job:
+def job(
+    photo: Path, output: Path, mask: Path | None = None, model: str = "naive", **changes: Any
+) -> Job:
     return Job(photo, output, mask, model, "none", "natural", 64, **{"threads": 1, **changes})
 
 
@@ -111,10 +138,12 @@ def others(folder: Path, *expected: str) -> list[str]:
     return sorted({entry.name for entry in folder.iterdir()} - {"cache", "stand_in", *expected})
 
 
-# --- real work --------------------------------------------------------------------------------------------------------------------------
+# --- real work ------------------------------------------------------------------------------------
 
 
-def test_arrays_go_in_and_a_result_with_arrays_comes_out(tmp_path: Path, real: WorkerEnvironment) -> None:
+def test_arrays_go_in_and_a_result_with_arrays_comes_out(
+    tmp_path: Path, real: WorkerEnvironment
+) -> None:
     photo, mask = ball_arrays(tmp_path)
     seen: list[Update] = []
     worker = start(job(photo, tmp_path / "new" / "result", mask), real)
@@ -125,7 +154,9 @@ def test_arrays_go_in_and_a_result_with_arrays_comes_out(tmp_path: Path, real: W
     assert fractions == sorted(fractions)
     assert "starting" in {update.stage for update in seen}
     found = load(tmp_path / "new" / "result")
-    assert found.provenance.settings["model"] == "naive" and found.provenance.settings["threads"] == 1
+    assert (
+        found.provenance.settings["model"] == "naive" and found.provenance.settings["threads"] == 1
+    )
     assert (tmp_path / "new" / "result" / "arrays.npz").is_file()
     assert others(tmp_path, "new", "photo.npy", "mask.npy") == []
     worker.kill()  # and what has ended stays as it is
@@ -140,9 +171,14 @@ def test_a_mistake_is_told_in_one_line(tmp_path: Path, real: WorkerEnvironment) 
     assert others(tmp_path) == []
 
 
-def test_masks_edits_and_arrays_are_made_by_workers_too(tmp_path: Path, real: WorkerEnvironment) -> None:
+def test_masks_edits_and_arrays_are_made_by_workers_too(
+    tmp_path: Path, real: WorkerEnvironment
+) -> None:
     d = ball((60, 70), 24.0, (30, 35))
-    np.save(tmp_path / "photo.npy", np.rint(255 * linear_to_srgb(np.clip(d.image, 0, 1))).astype(np.uint8))
+    np.save(
+        tmp_path / "photo.npy",
+        np.rint(255 * linear_to_srgb(np.clip(d.image, 0, 1))).astype(np.uint8),
+    )
     save(d, tmp_path / "result")
     final = ended(box_mask(tmp_path / "photo.npy", (4, 4, 62, 52), tmp_path / "mask.png", real))
     assert final.state == "done" and (tmp_path / "mask.png").is_file(), final
@@ -150,14 +186,20 @@ def test_masks_edits_and_arrays_are_made_by_workers_too(tmp_path: Path, real: Wo
     assert final.state == "failed" and "-4" in final.message
     assert ended(start_arrays(tmp_path / "result", real)).state == "done"
     assert (tmp_path / "result" / "arrays.npz").is_file()
-    final = ended(start_edit(tmp_path / "result", ["recolour", "--hue", "120", "-o", str(tmp_path / "edit")], real))
+    final = ended(
+        start_edit(
+            tmp_path / "result", ["recolour", "--hue", "120", "-o", str(tmp_path / "edit")], real
+        )
+    )
     assert final.state == "done" and (tmp_path / "edit" / "edit.json").is_file(), final
     with pytest.raises(InputError, match="-o DIR"):
         start_edit(tmp_path / "result", ["recolour", "-o"], real)
 
 
 def test_cancelled_while_it_compiles(tmp_path: Path, real: WorkerEnvironment) -> None:
-    """With an empty cache the first solve compiles for long: the worker is told to stop in the midst, and tidies up."""
+    """With an empty cache the first solve compiles for long: the worker is told to stop in the
+    midst, and tidies up.
+    """
     photo, mask = ball_arrays(tmp_path)
     worker = start(job(photo, tmp_path / "new" / "result", mask, "sirfs"), real)
     at_stage(worker, "preparing the compiled kernels")
@@ -181,7 +223,9 @@ def test_the_worker_ends_when_its_program_does(tmp_path: Path, cache: Path) -> N
         "print(worker._process.pid, flush=True)\nos._exit(9)\n"
     )
     command = [sys.executable, "-c", program, photo, mask, tmp_path / "new" / "result", cache]
-    done = subprocess.run(list(map(str, command)), cwd=ROOT, capture_output=True, text=True, check=False, timeout=120)
+    done = subprocess.run(
+        list(map(str, command)), cwd=ROOT, capture_output=True, text=True, check=False, timeout=120
+    )
     assert done.returncode == 9, done.stderr
     wait_for_the_end_of(int(done.stdout))
     assert others(tmp_path, "photo.npy", "mask.npy") == []
@@ -204,56 +248,94 @@ def alive(pid: int) -> bool:
 
 
 def test_the_core_runs_as_a_part_of_an_extension(tmp_path: Path, cache: Path) -> None:
-    """As it is shipped: a folder within the extension's, which alone is on the path, beside the packages of the wheels."""
+    """As it is shipped: a folder within the extension's, which alone is on the path, beside the
+    packages of the wheels.
+    """
     extension = tmp_path / "extension"
-    shutil.copytree(ROOT / "isc_core", extension / "isc_core", ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copytree(
+        ROOT / "isc_core", extension / "isc_core", ignore=shutil.ignore_patterns("__pycache__")
+    )
     save(ball((40, 50), 16.0, (20, 25)), tmp_path / "result")
     before = set(extension.rglob("*"))
-    environment = WorkerEnvironment(Path(sys.executable), (extension, Path(sysconfig.get_path("purelib"))), cache)
+    environment = WorkerEnvironment(
+        Path(sys.executable), (extension, Path(sysconfig.get_path("purelib"))), cache
+    )
     assert ended(start_arrays(tmp_path / "result", environment)).state == "done"
     assert set(extension.rglob("*")) == before, "nothing is written beside the source"
 
 
-# --- misbehaviour -----------------------------------------------------------------------------------------------------------------------
+# --- misbehaviour ---------------------------------------------------------------------------------
 
 Maker = Callable[[str], WorkerEnvironment]
 
 
-def test_the_environment_is_the_one_that_is_named(tmp_path: Path, stand_in: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("PYTHONHOME", "PYTHONPATH", "LD_PRELOAD", "LD_LIBRARY_PATH", "OCIO", "BLENDER_USER_RESOURCES", "NUMBA_NUM_THREADS"):
+def test_the_environment_is_the_one_that_is_named(
+    tmp_path: Path, stand_in: Maker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in (
+        "PYTHONHOME",
+        "PYTHONPATH",
+        "LD_PRELOAD",
+        "LD_LIBRARY_PATH",
+        "OCIO",
+        "BLENDER_USER_RESOURCES",
+        "NUMBA_NUM_THREADS",
+    ):
         monkeypatch.setenv(name, "wrong")
-    environment = stand_in("say('done', output='', lines=[json.dumps([dict(os.environ), sys.path, os.getcwd(), sys.flags.no_user_site])])")
+    environment = stand_in(
+        "say('done', output='', lines=[json.dumps([dict(os.environ), sys.path, os.getcwd(), sys.flags.no_user_site])])"
+    )
     final = ended(start(job(tmp_path / "a.png", tmp_path / "out", threads=3), environment))
     variables, path, folder, no_user_site = json.loads(final.message)
     assert "wrong" not in variables.values()
-    assert (variables["PYTHONPATH"], variables["NUMBA_CACHE_DIR"]) == (str(tmp_path / "stand_in"), str(tmp_path / "cache"))
-    assert variables["OMP_NUM_THREADS"] == variables["OPENBLAS_NUM_THREADS"] == "3" and variables["PATH"] == os.environ["PATH"]
+    assert (variables["PYTHONPATH"], variables["NUMBA_CACHE_DIR"]) == (
+        str(tmp_path / "stand_in"),
+        str(tmp_path / "cache"),
+    )
+    assert (
+        variables["OMP_NUM_THREADS"] == variables["OPENBLAS_NUM_THREADS"] == "3"
+        and variables["PATH"] == os.environ["PATH"]
+    )
     assert path[0] == str(tmp_path / "stand_in") and folder not in path and no_user_site == 1
     assert "OMP_NUM_THREADS" not in environment.variables()
 
 
-def test_what_is_asked_for_reaches_the_command(tmp_path: Path, stand_in: Maker, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_asked_for_reaches_the_command(
+    tmp_path: Path, stand_in: Maker, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     environment = stand_in("say('done', output='', lines=words)")
-    asked = Job(Path("-a.png"), Path("out"), Path("m.png"), "mdr", "isc", "laboratory", 300, 2, "linear")
+    asked = Job(
+        Path("-a.png"), Path("out"), Path("m.png"), "mdr", "isc", "laboratory", 300, 2, "linear"
+    )
     words = ended(start(asked, environment)).message.split("\n")
     here = tmp_path.resolve()
     assert words[:5] == ["decompose", str(here / "-a.png"), "--arrays", "-o", str(here / "out")]
     pairs = dict(zip(words[5::2], words[6::2], strict=True))
     assert pairs == {
-        "--model": "mdr", "--separator": "isc", "--illumination": "laboratory", "--max-size": "300", "--threads": "2",
-        "--transfer": "linear", "--mask": str(here / "m.png"), "--progress": "json",
-    }  # fmt: skip
+        "--model": "mdr",
+        "--separator": "isc",
+        "--illumination": "laboratory",
+        "--max-size": "300",
+        "--threads": "2",
+        "--transfer": "linear",
+        "--mask": str(here / "m.png"),
+        "--progress": "json",
+    }
 
 
 @posix
 @pytest.mark.parametrize("how", ["cancel", "kill"])
-def test_a_stubborn_worker_is_killed_with_all_its_children(tmp_path: Path, stand_in: Maker, how: str) -> None:
+def test_a_stubborn_worker_is_killed_with_all_its_children(
+    tmp_path: Path, stand_in: Maker, how: str
+) -> None:
     child = "import subprocess\nchild = subprocess.Popen(['sleep', '300'])\nprint(child.pid, file=sys.stderr, flush=True)\n"
     worker = start(job(tmp_path / "a.png", tmp_path / "new" / "out"), stand_in(child + STUBBORN))
     at_stage(worker, "asleep")
     assert (tmp_path / "new" / ".out.0a1b2c3d.partial" / "maps.exr").is_file()
-    assert os.getpriority(os.PRIO_PROCESS, process_of(worker).pid) == min(os.getpriority(os.PRIO_PROCESS, 0) + 5, 19)
+    assert os.getpriority(os.PRIO_PROCESS, process_of(worker).pid) == min(
+        os.getpriority(os.PRIO_PROCESS, 0) + 5, 19
+    )
     getattr(worker, how)()
     assert worker.poll().state == "running", "nobody has waited"
     final = ended(worker, 20)
@@ -266,7 +348,10 @@ def test_a_stubborn_worker_is_killed_with_all_its_children(tmp_path: Path, stand
 def test_a_worker_that_is_killed_by_others_is_a_failure(tmp_path: Path, stand_in: Maker) -> None:
     earlier = tmp_path / ".out.11111111.partial"
     earlier.mkdir()
-    worker = start(job(tmp_path / "a.png", tmp_path / "out"), stand_in("print('so far so good', file=sys.stderr, flush=True)\n" + STUBBORN))
+    worker = start(
+        job(tmp_path / "a.png", tmp_path / "out"),
+        stand_in("print('so far so good', file=sys.stderr, flush=True)\n" + STUBBORN),
+    )
     at_stage(worker, "asleep")
     process_of(worker).kill()
     final = ended(worker, 20)
@@ -286,7 +371,10 @@ def test_a_crash_gives_its_last_words(tmp_path: Path, stand_in: Maker) -> None:
 
 def test_silence_is_a_failure(tmp_path: Path, stand_in: Maker) -> None:
     final = ended(start(job(tmp_path / "a.png", tmp_path / "out"), stand_in("")))
-    assert (final.state, final.message) == ("failed", "the worker ended unexpectedly (exit code 0): it left no message")
+    assert (final.state, final.message) == (
+        "failed",
+        "the worker ended unexpectedly (exit code 0): it left no message",
+    )
 
 
 def test_a_missing_worker_is_one_line(tmp_path: Path) -> None:
@@ -297,15 +385,33 @@ def test_a_missing_worker_is_one_line(tmp_path: Path) -> None:
 
 
 def test_a_core_that_is_missing_is_said_to_be(tmp_path: Path) -> None:
-    base = Path(getattr(sys, "_base_executable", sys.executable))  # without the packages of the environment that the tests run in
-    if subprocess.run([base, "-c", "import isc_core"], cwd=tmp_path, capture_output=True, check=False).returncode == 0:
+    base = Path(
+        getattr(sys, "_base_executable", sys.executable)
+    )  # without the packages of the environment that the tests run in
+    if (
+        subprocess.run(
+            [base, "-c", "import isc_core"], cwd=tmp_path, capture_output=True, check=False
+        ).returncode
+        == 0
+    ):
         pytest.skip("isc_core is installed for every program of this machine")
-    final = ended(start(job(tmp_path / "a.png", tmp_path / "out"), WorkerEnvironment(base, (tmp_path,), tmp_path / "cache")))
-    assert final.state == "failed" and "No module named isc_core" in final.message and "\n" not in final.message
+    final = ended(
+        start(
+            job(tmp_path / "a.png", tmp_path / "out"),
+            WorkerEnvironment(base, (tmp_path,), tmp_path / "cache"),
+        )
+    )
+    assert (
+        final.state == "failed"
+        and "No module named isc_core" in final.message
+        and "\n" not in final.message
+    )
 
 
 @posix
-def test_a_program_that_kills_and_leaves_at_once_leaves_nothing(tmp_path: Path, stand_in: Maker) -> None:
+def test_a_program_that_kills_and_leaves_at_once_leaves_nothing(
+    tmp_path: Path, stand_in: Maker
+) -> None:
     environment = stand_in(STUBBORN)
     program = (
         "import sys, time\nfrom pathlib import Path\nfrom blender_addon.worker import Job, WorkerEnvironment, start\n"
@@ -314,8 +420,17 @@ def test_a_program_that_kills_and_leaves_at_once_leaves_nothing(tmp_path: Path, 
         "while worker.poll().stage != 'asleep': time.sleep(0.01)\n"
         "worker.kill()\n"
     )
-    command = [sys.executable, "-c", program, environment.search[0], environment.cache, tmp_path / "new" / "out"]
-    done = subprocess.run(list(map(str, command)), cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    command = [
+        sys.executable,
+        "-c",
+        program,
+        environment.search[0],
+        environment.cache,
+        tmp_path / "new" / "out",
+    ]
+    done = subprocess.run(
+        list(map(str, command)), cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert others(tmp_path) == []
 
@@ -328,9 +443,16 @@ def test_what_a_killed_process_moved_aside_comes_back(tmp_path: Path) -> None:
     (tmp_path / ".out.0000bbbb.partial").touch()
     (tmp_path / ".out.txt.0000bbbb.partial").touch()
     (tmp_path / ".out.0000bbbb.partial.txt").touch()
-    assert {path.name for path in unfinished(target)} == {".out.0000aaaa.old", ".out.0000bbbb.partial"}
+    assert {path.name for path in unfinished(target)} == {
+        ".out.0000aaaa.old",
+        ".out.0000bbbb.partial",
+    }
     remove_unfinished(target)
-    assert sorted(path.name for path in tmp_path.iterdir()) == [".out.0000bbbb.partial.txt", ".out.txt.0000bbbb.partial", "out"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        ".out.0000bbbb.partial.txt",
+        ".out.txt.0000bbbb.partial",
+        "out",
+    ]
     assert (target / "kept").exists()
     (tmp_path / ".out.0000cccc.old").mkdir()
     remove_unfinished(target)

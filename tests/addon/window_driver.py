@@ -1,10 +1,13 @@
-"""Drives a real Blender window with a real mouse and keyboard: decompose, undo, redo, Esc, the Cancel button, save, load during a run.
+"""Drives a real Blender window with a real mouse and keyboard: decompose, undo, redo, Esc, the
+Cancel button, save, load during a run.
 
 Run by ../shared/tools/blender_window/blender_acceptance.sh on Linux, as root:
-    blender_acceptance.sh --ext dist/isc_intrinsic-VERSION-linux-x64-cp314.zip --tab ISC --in demo/input/photo.png --size 1280x800 \\
+    blender_acceptance.sh --ext dist/isc_intrinsic-VERSION-linux-x64-cp314.zip --tab ISC --in
+    demo/input/photo.png --size 1280x800 \\
         --timeout 600 --driver tests/addon/window_driver.py --out OUT
-`acc` is that script's helper: `find` moves the mouse until the button under it runs the operator, `shot` saves the screen, a number that
-is yielded is waited for. Exit code 1 where a check fails; OUT/measured.txt holds the longest calls.
+`acc` is that script's helper: `find` moves the mouse until the button under it runs the operator,
+`shot` saves the screen, a number that is yielded is waited for. Exit code 1 where a check fails;
+OUT/measured.txt holds the longest calls.
 """
 
 import os
@@ -41,7 +44,9 @@ def decompose(acc: Any, measured: list[str]) -> Iterator[float]:
     yield acc.shot("2_running")
     yield from until(lambda: shown().state not in {"running", "ready"}, 400)
     note(acc, measured, "decomposed")
-    acc.check(shown().state == "done" and objects() == [NAME], f"the run ends well: {shown().message}")
+    acc.check(
+        shown().state == "done" and objects() == [NAME], f"the run ends well: {shown().message}"
+    )
     acc.check(bpy.context.scene.name == NAME, "the object's own scene is shown")
     yield acc.shot("3_done")
     space = acc.view3d()[1].spaces.active
@@ -62,7 +67,9 @@ def undo_and_redo(acc: Any) -> Iterator[float]:
     acc.check(objects() == [NAME], "redo brings it back")
 
 
-def cancel(acc: Any, measured: list[str], how: str, stop: Callable[[Any], Iterator[float]]) -> Iterator[float]:
+def cancel(
+    acc: Any, measured: list[str], how: str, stop: Callable[[Any], Iterator[float]]
+) -> Iterator[float]:
     """A run that is ended from the window: its worker dies, the scene is as before."""
     yield from begin(acc)
     yield from until(lambda: shown().fraction > 0.02, 100)
@@ -73,7 +80,9 @@ def cancel(acc: Any, measured: list[str], how: str, stop: Callable[[Any], Iterat
     acc.check(shown().state == "cancelled", f"{how} cancels")
     note(acc, measured, how)
     yield from until(lambda: not workers(), 5)
-    acc.check(not workers() and objects() == [NAME], "no worker is left, and the scene is as before")
+    acc.check(
+        not workers() and objects() == [NAME], "no worker is left, and the scene is as before"
+    )
     yield acc.shot(f"7_after_{how}")
 
 
@@ -119,7 +128,9 @@ def press_cancel(acc: Any) -> Iterator[float]:
 def keys(acc: Any, text: str, wait: float) -> float:
     """Presses keys with the mouse over the view; the seconds to wait."""
     left, top, width, height = acc.rect("VIEW_3D", "WINDOW")
-    return float(acc.xdo(f"mousemove {left + width // 3} {top + height // 2} sleep .3 key {text}", wait))
+    return float(
+        acc.xdo(f"mousemove {left + width // 3} {top + height // 2} sleep .3 key {text}", wait)
+    )
 
 
 def until(fact: Callable[[], Any], seconds: float) -> Iterator[float]:

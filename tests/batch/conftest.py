@@ -15,12 +15,16 @@ from isc_core.models.settings import Settings
 from tests.core.command_line import ball_codes, write_image
 
 QUICK = Recipe(Settings(model="retinex", engine="numpy"))
-HERE = Crew(workers=1, threads=1, memory="0", processes=False)  # threads of this process: a second less, and its memory:// is theirs
+HERE = Crew(
+    workers=1, threads=1, memory="0", processes=False
+)  # threads of this process: a second less, and its memory:// is theirs
 
 
 @pytest.fixture(scope="session")
 def first_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder `photos` of three balls and a file that is no photo, and what a run has made of them in `out`."""
+    """A folder `photos` of three balls and a file that is no photo, and what a run has made of them
+    in `out`.
+    """
     place = tmp_path_factory.mktemp("batch")
     folder = place / "photos"
     folder.mkdir()
@@ -46,7 +50,9 @@ def made(first_run: Path, tmp_path: Path) -> Path:
 
 def batch(*inputs: object, output: Path, **changes: object) -> Batch:
     """A quick batch in this process."""
-    return replace(Batch([str(text) for text in inputs], output, recipe=QUICK, crew=HERE), **changes)
+    return replace(
+        Batch([str(text) for text in inputs], output, recipe=QUICK, crew=HERE), **changes
+    )
 
 
 def rows(path: Path) -> list[dict[str, object]]:

@@ -1,4 +1,7 @@
-"""What the tests have workers do instead of decomposing. In a module of its own, so that worker processes can import it."""
+"""What the tests have workers do instead of decomposing.
+
+In a module of its own, so that worker processes can import it.
+"""
 
 import os
 import signal
@@ -11,7 +14,9 @@ from isc_core.progress import Monitor
 
 
 def obey(job: Job, monitor: Monitor) -> str:
-    """Does what the image's name says: hangs without looking at anything, polls for ever, kills its worker, raises; else writes a file."""
+    """Does what the image's name says: hangs without looking at anything, polls for ever, kills its
+    worker, raises; else writes a file.
+    """
     name = Path(job.image).stem
     if name == "hang":
         time.sleep(600)
@@ -24,7 +29,9 @@ def obey(job: Job, monitor: Monitor) -> str:
         raise ZeroDivisionError("a fault\nof two lines")
     if name == "full":
         raise MemoryError
-    job.folder.mkdir(parents=True, exist_ok=True)  # done before, by a worker that was lost before it could tell
+    job.folder.mkdir(
+        parents=True, exist_ok=True
+    )  # done before, by a worker that was lost before it could tell
     (job.folder / "made").write_text(job.image)
     return DONE
 

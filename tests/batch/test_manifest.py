@@ -28,7 +28,11 @@ def test_both_kinds_say_the_same(tmp_path: Path) -> None:
     )
     assert table == lines
     assert table[0] == Item(
-        f"{tmp_path}/cup.png", f"{tmp_path}/m/cup.png", "tasse", (("full_size", True), ("max_size", 128)), f"{tmp_path}/cup.png"
+        f"{tmp_path}/cup.png",
+        f"{tmp_path}/m/cup.png",
+        "tasse",
+        (("full_size", True), ("max_size", 128)),
+        f"{tmp_path}/cup.png",
     )
     assert [item.image for item in table[1:]] == ["/x/jug.png", "s3://b/k.png"]
     assert table[1].options == (("seed", 3),)
@@ -36,7 +40,9 @@ def test_both_kinds_say_the_same(tmp_path: Path) -> None:
 
 def test_names_of_files_may_be_any_bytes(tmp_path: Path) -> None:
     assert (
-        items(tmp_path / "a.csv", b"\xef\xbb\xbfimage\ncaf\xe9.png\n")[0].image.encode("utf-8", "surrogateescape").endswith(b"caf\xe9.png")
+        items(tmp_path / "a.csv", b"\xef\xbb\xbfimage\ncaf\xe9.png\n")[0]
+        .image.encode("utf-8", "surrogateescape")
+        .endswith(b"caf\xe9.png")
     )
 
 
@@ -65,7 +71,9 @@ def test_names_of_files_may_be_any_bytes(tmp_path: Path) -> None:
         ("a.jsonl", '{"image": "x", "seed": ' + "9" * 5000 + "}\n", "is not JSON"),
     ],
 )
-def test_a_mistake_is_one_line_that_tells_where(tmp_path: Path, name: str, text: str, complaint: str) -> None:
+def test_a_mistake_is_one_line_that_tells_where(
+    tmp_path: Path, name: str, text: str, complaint: str
+) -> None:
     with pytest.raises(InputError) as caught:
         items(tmp_path / name, text)
     assert complaint in str(caught.value)

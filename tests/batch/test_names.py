@@ -12,7 +12,9 @@ from isc_core.batch.item import Item
 from isc_core.batch.names import OWN_FILES, Names, check_given, safe_name, wanted_name
 from isc_core.errors import InputError
 
-ANY_NAME = st.text(st.characters(codec=None), max_size=300) | st.binary(max_size=300).map(os.fsdecode)
+ANY_NAME = st.text(st.characters(codec=None), max_size=300) | st.binary(max_size=300).map(
+    os.fsdecode
+)
 HOSTILE = [
     "",
     ".",
@@ -61,19 +63,41 @@ def test_usual_names_stay() -> None:
         assert safe_name(name) == name
 
 
-@pytest.mark.parametrize("name", ["..", ".", "/abs", "a/b", "a\\b", "x\0y", "x\ny", "nul", "COM1.png", "thumbnails", "Failures.jsonl", " "])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "..",
+        ".",
+        "/abs",
+        "a/b",
+        "a\\b",
+        "x\0y",
+        "x\ny",
+        "nul",
+        "COM1.png",
+        "thumbnails",
+        "Failures.jsonl",
+        " ",
+    ],
+)
 def test_a_manifest_cannot_give_names_that_lead_elsewhere(name: str) -> None:
     with pytest.raises(InputError, match="^here: "):
         check_given(name, "here")
 
 
 def test_names_that_several_want_tell_their_images_apart_in_any_order() -> None:
-    items = [Item(f"{folder}/front.png") for folder in "abcdefgh"] + [Item("a/Front.jpg"), Item("a/back.png"), Item("x", name="BACK")]
+    items = [Item(f"{folder}/front.png") for folder in "abcdefgh"] + [
+        Item("a/Front.jpg"),
+        Item("a/back.png"),
+        Item("x", name="BACK"),
+    ]
     names = Names(items)
     given_names = {item: names.name(item) for item in items}
     assert len({str(name).casefold() for name in given_names.values()}) == len(items) == names.count
     assert all(
-        name is not None and is_safe(name) and name.casefold().startswith(wanted_name(item).casefold()[:4])
+        name is not None
+        and is_safe(name)
+        and name.casefold().startswith(wanted_name(item).casefold()[:4])
         for item, name in given_names.items()
     )
     shuffled = items[:]

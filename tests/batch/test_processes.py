@@ -20,20 +20,43 @@ from tests.batch.tasks import obedient
 from tests.core.command_line import isc_command, run_isc
 
 
-def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(tmp_path: Path) -> None:
+def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
+    tmp_path: Path,
+) -> None:
     for name in ("good1", "good2", "hang", "kill", "kill_once"):
         (tmp_path / f"{name}.png").touch()
-    plan = replace(batch(tmp_path / "*.png", output=tmp_path / "out", timeout=4.0), crew=Crew(workers=2, threads=1, memory="0"))
+    plan = replace(
+        batch(tmp_path / "*.png", output=tmp_path / "out", timeout=4.0),
+        crew=Crew(workers=2, threads=1, memory="0"),
+    )
     assert run_batch(plan, task=obedient) == Counter({DONE: 3, FAILED: 2})
-    reasons = {str(row["name"]): str(row["reason"]) for row in rows(tmp_path / "out" / "failures.jsonl")}
-    assert reasons["hang"] == "took longer than --timeout 4 s and did not react (in obey): its worker was ended"
+    reasons = {
+        str(row["name"]): str(row["reason"]) for row in rows(tmp_path / "out" / "failures.jsonl")
+    }
+    assert (
+        reasons["hang"]
+        == "took longer than --timeout 4 s and did not react (in obey): its worker was ended"
+    )
     assert reasons["kill"].startswith(f"{MOST_LOST} workers were lost while they worked on it")
     assert (tmp_path / "out" / "kill_once" / "made").exists()
 
 
 def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
-    words = ["batch", photos, "-o", tmp_path / "out", "--model", "retinex", "--workers", "1", "--memory", "0"]
-    run = subprocess.Popen(isc_command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True)
+    words = [
+        "batch",
+        photos,
+        "-o",
+        tmp_path / "out",
+        "--model",
+        "retinex",
+        "--workers",
+        "1",
+        "--memory",
+        "0",
+    ]
+    run = subprocess.Popen(
+        isc_command(*words), stderr=subprocess.PIPE, text=True, start_new_session=True
+    )
     while run.poll() is None and not (tmp_path / "out" / "one").exists():
         time.sleep(0.05)
     os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to all of them
@@ -47,13 +70,32 @@ def test_the_command_ctrl_c_and_going_on(photos: Path, tmp_path: Path) -> None:
     assert all((tmp_path / "out" / name / "mesh.glb").is_file() for name in ("one", "two", "three"))
 
 
-def test_a_worker_that_is_lost_while_it_starts_is_started_again(photos: Path, tmp_path: Path) -> None:
-    words = ["batch", photos / "one.png", "-o", tmp_path / "out", "--model", "retinex", "--workers", "2", "--memory", "0"]
-    run = psutil.Popen(isc_command(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+def test_a_worker_that_is_lost_while_it_starts_is_started_again(
+    photos: Path, tmp_path: Path
+) -> None:
+    words = [
+        "batch",
+        photos / "one.png",
+        "-o",
+        tmp_path / "out",
+        "--model",
+        "retinex",
+        "--workers",
+        "2",
+        "--memory",
+        "0",
+    ]
+    run = psutil.Popen(
+        isc_command(*words), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     starting: list[psutil.Process] = []
     while run.poll() is None and not starting:
         with suppress(psutil.Error):  # others come and go
-            starting = [child for child in run.children(recursive=True) if "spawn_main" in " ".join(child.cmdline())]
+            starting = [
+                child
+                for child in run.children(recursive=True)
+                if "spawn_main" in " ".join(child.cmdline())
+            ]
     starting[0].kill()
     printed, told = run.communicate(timeout=300)
     assert "1 image done" in printed, told

@@ -1,4 +1,6 @@
-"""Runs from end to end, with the workers in this process: what is made, skipped, failed, and what stands in the output."""
+"""Runs from end to end, with the workers in this process: what is made, skipped, failed, and what
+stands in the output.
+"""
 
 import csv
 import fcntl
@@ -35,19 +37,39 @@ def files_of(folder: Path) -> dict[str, bytes]:
     return {name: (folder / name).read_bytes() for name in names}
 
 
-def test_good_images_are_made_and_the_bad_one_is_told(made: Path, first_run: Path, tmp_path: Path) -> None:
-    assert {path.name for path in made.iterdir() if path.is_dir()} == {"one", "two", "three", "thumbnails", ".isc-batch"}
+def test_good_images_are_made_and_the_bad_one_is_told(
+    made: Path, first_run: Path, tmp_path: Path
+) -> None:
+    assert {path.name for path in made.iterdir() if path.is_dir()} == {
+        "one",
+        "two",
+        "three",
+        "thumbnails",
+        ".isc-batch",
+    }
     assert load(made / "one").provenance.input["name"] == "one.png"
     failures = rows(made / "failures.jsonl")
-    assert [(row["name"], row["image"]) for row in failures] == [("bad", str(first_run / "photos" / "bad.png"))]
+    assert [(row["name"], row["image"]) for row in failures] == [
+        ("bad", str(first_run / "photos" / "bad.png"))
+    ]
     assert "damaged" in str(failures[0]["reason"])
-    save(decompose(read_photo(first_run / "photos" / "two.png"), QUICK.settings, name="two.png"), tmp_path / "alone")
-    assert files_of(made / "two") == files_of(tmp_path / "alone"), "a batch makes what isc decompose makes"
+    save(
+        decompose(read_photo(first_run / "photos" / "two.png"), QUICK.settings, name="two.png"),
+        tmp_path / "alone",
+    )
+    assert files_of(made / "two") == files_of(tmp_path / "alone"), (
+        "a batch makes what isc decompose makes"
+    )
 
 
 def test_the_summary_shows_all_in_the_inputs_order(made: Path) -> None:
     told = rows(made / "summary.jsonl")
-    assert [(row["name"], row["status"]) for row in told] == [("bad", FAILED), ("one", DONE), ("three", DONE), ("two", DONE)]
+    assert [(row["name"], row["status"]) for row in told] == [
+        ("bad", FAILED),
+        ("one", DONE),
+        ("three", DONE),
+        ("two", DONE),
+    ]
     with (made / "summary.csv").open(newline="") as file:
         assert [row["name"] for row in csv.DictReader(file)] == ["bad", "one", "three", "two"]
     page = (made / "summary.html").read_text()
@@ -57,7 +79,9 @@ def test_the_summary_shows_all_in_the_inputs_order(made: Path) -> None:
         assert (made / "thumbnails" / f"{name}.jpg").read_bytes().startswith(b"\xff\xd8")
 
 
-def test_what_is_finished_is_skipped_and_what_changed_is_made_again(made: Path, photos: Path) -> None:
+def test_what_is_finished_is_skipped_and_what_changed_is_made_again(
+    made: Path, photos: Path
+) -> None:
     before = {name: (made / name).stat().st_ino for name in ("one", "two", "three")}
     write_image(photos / "two.png", ball_codes(13.0))
     (made / "three" / "mesh.glb").unlink()
@@ -83,7 +107,11 @@ def test_what_a_killed_run_left_is_tidied(made: Path, photos: Path) -> None:
     (made / "two").rename(made / ".two.0123abcd.old")
     (made / ".isc-batch" / "attempts" / "three").write_text("another run\n" * 5)
     assert run_batch(batch(photos, output=made)) == Counter({SKIPPED: 3, FAILED: 1})
-    assert not list(made.glob(".*.partial")) + list(made.glob(".*.old")) + list((made / ".isc-batch" / "attempts").iterdir())
+    assert (
+        not list(made.glob(".*.partial"))
+        + list(made.glob(".*.old"))
+        + list((made / ".isc-batch" / "attempts").iterdir())
+    )
 
 
 def test_two_runs_into_one_folder(made: Path, photos: Path) -> None:
@@ -119,12 +147,16 @@ def test_a_manifest_gives_names_masks_and_options(photos: Path, tmp_path: Path) 
     assert counts == Counter({DONE: 2, FAILED: 2, SKIPPED: 1})
     small, whole = (load(tmp_path / "out" / name) for name in ("small", "whole"))
     assert small.mask.sum() < 0.5 * whole.mask.sum()
-    reasons = {str(row["name"]): str(row["reason"]) for row in rows(tmp_path / "out" / "failures.jsonl")}
+    reasons = {
+        str(row["name"]): str(row["reason"]) for row in rows(tmp_path / "out" / "failures.jsonl")
+    }
     assert all("none.png: there is no such file" in reason for reason in reasons.values())
 
 
 def test_a_bad_manifest_is_refused_before_any_work(photos: Path, tmp_path: Path) -> None:
-    (tmp_path / "list.jsonl").write_text('{"image": "photos/one.png"}\n{"image": "photos/two.png", "name": "../../x"}\n')
+    (tmp_path / "list.jsonl").write_text(
+        '{"image": "photos/one.png"}\n{"image": "photos/two.png", "name": "../../x"}\n'
+    )
     with pytest.raises(InputError, match="line 2"):
         run_batch(batch(tmp_path / "list.jsonl", output=tmp_path / "out"))
     assert not (tmp_path / "out" / "one").exists()
@@ -139,7 +171,9 @@ def test_patterns_folders_of_masks_and_what_is_not_there(photos: Path, tmp_path:
     masks.mkdir()
     for name in ("one", "two"):
         write_image(masks / f"{name}.png", (ball_codes(12.0).max(axis=2) > 0).astype("uint8") * 255)
-    assert run_batch(batch(tmp_path / "ph*" / "t?o.png", output=tmp_path / "out", masks=str(masks))) == Counter({DONE: 1})
+    assert run_batch(
+        batch(tmp_path / "ph*" / "t?o.png", output=tmp_path / "out", masks=str(masks))
+    ) == Counter({DONE: 1})
     assert load(tmp_path / "out" / "two").provenance.input["mask_from"] == "file"
     with pytest.raises(InputError, match="holds no mask for three.png"):
         run_batch(batch(photos, output=tmp_path / "out", masks=str(masks)))
@@ -157,19 +191,25 @@ def test_inputs_of_an_object_store(photos: Path, tmp_path: Path) -> None:
     counts = run_batch(batch("memory://catalogue", output=tmp_path / "out", limits=limits))
     assert counts == Counter({DONE: 1, FAILED: 1})
     reason = str(rows(tmp_path / "out" / "failures.jsonl")[0]["reason"])
-    assert reason.startswith("memory://catalogue/bad.png: "), "the name of a temporary copy helps nobody"
+    assert reason.startswith("memory://catalogue/bad.png: "), (
+        "the name of a temporary copy helps nobody"
+    )
     assert not list((tmp_path / "out" / ".isc-batch").glob("fetched/*"))
     manifest = b'{"image": "one.png"}\n{"image": "none.png"}\n'
     store.pipe("/catalogue/list.jsonl", manifest)
     assert run_batch(batch("memory://catalogue/list.jsonl", output=tmp_path / "out"))[SKIPPED] == 1
     small = Limits(max_bytes=100)
-    assert run_batch(batch("memory://catalogue/o*.png", output=tmp_path / "small", limits=small)) == Counter({FAILED: 1})
+    assert run_batch(
+        batch("memory://catalogue/o*.png", output=tmp_path / "small", limits=small)
+    ) == Counter({FAILED: 1})
     assert "too large" in str(rows(tmp_path / "small" / "failures.jsonl")[0]["reason"])
     store.rm("/catalogue", recursive=True)
 
 
 def test_more_pixels_than_allowed(photos: Path, tmp_path: Path) -> None:
-    assert run_batch(batch(photos / "one.png", output=tmp_path / "out", limits=Limits(max_pixels=100))) == Counter({FAILED: 1})
+    assert run_batch(
+        batch(photos / "one.png", output=tmp_path / "out", limits=Limits(max_pixels=100))
+    ) == Counter({FAILED: 1})
     assert "--max-pixels" in str(rows(tmp_path / "out" / "failures.jsonl")[0]["reason"])
 
 
@@ -178,8 +218,13 @@ def test_a_fault_of_the_program_is_told_and_stops_nothing(tmp_path: Path) -> Non
         (tmp_path / f"{name}.png").touch()
     counts = run_batch(batch(tmp_path / "*.png", output=tmp_path / "out"), task=obedient)
     assert counts == Counter({DONE: 1, FAILED: 2})
-    reasons = {str(row["name"]): str(row["reason"]) for row in rows(tmp_path / "out" / "failures.jsonl")}
-    assert reasons["fault"] == "a fault of this program, please report it: ZeroDivisionError: a fault of two lines"
+    reasons = {
+        str(row["name"]): str(row["reason"]) for row in rows(tmp_path / "out" / "failures.jsonl")
+    }
+    assert (
+        reasons["fault"]
+        == "a fault of this program, please report it: ZeroDivisionError: a fault of two lines"
+    )
     assert "memory" in reasons["full"]
 
 
@@ -187,7 +232,10 @@ def test_a_step_that_looks_at_the_clock_is_stopped(tmp_path: Path) -> None:
     (tmp_path / "poll.png").touch()
     plan = batch(tmp_path / "poll.png", output=tmp_path / "out", timeout=0.2)
     assert run_batch(plan, task=obedient) == Counter({FAILED: 1})
-    assert rows(tmp_path / "out" / "failures.jsonl")[0]["reason"] == "took longer than --timeout 0.2 s, in the stage: polling"
+    assert (
+        rows(tmp_path / "out" / "failures.jsonl")[0]["reason"]
+        == "took longer than --timeout 0.2 s, in the stage: polling"
+    )
 
 
 def test_a_cancelled_run_keeps_what_is_complete(photos: Path, tmp_path: Path) -> None:
@@ -202,13 +250,24 @@ def test_a_cancelled_run_keeps_what_is_complete(photos: Path, tmp_path: Path) ->
 def test_names_of_files_are_escaped(tmp_path: Path) -> None:
     folder = tmp_path / "photos"
     folder.mkdir()
-    for name in ('<img src=x onerror="alert(1)">.png', "=cmd.png", "-rf.png", "..png.png", "a\nb.png"):
+    for name in (
+        '<img src=x onerror="alert(1)">.png',
+        "=cmd.png",
+        "-rf.png",
+        "..png.png",
+        "a\nb.png",
+    ):
         (folder / name).write_bytes(b"no photo")
-    assert run_batch(batch(folder, output=tmp_path / "out"))[FAILED] == 4, "hidden files are none of ours"
+    assert run_batch(batch(folder, output=tmp_path / "out"))[FAILED] == 4, (
+        "hidden files are none of ours"
+    )
     page = (tmp_path / "out" / "summary.html").read_text()
     assert "<img src=x" not in page
     assert html.escape('<img src=x onerror="alert(1)">') in page
-    assert {path.parent for path in (tmp_path / "out").rglob("*")} <= {tmp_path / "out", *(tmp_path / "out").rglob("*")}
+    assert {path.parent for path in (tmp_path / "out").rglob("*")} <= {
+        tmp_path / "out",
+        *(tmp_path / "out").rglob("*"),
+    }
 
 
 def test_many_images_have_several_pages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -220,14 +279,21 @@ def test_many_images_have_several_pages(tmp_path: Path, monkeypatch: pytest.Monk
     assert run_batch(batch(folder, output=tmp_path / "out"), task=obedient) == Counter({DONE: 7})
     pages = ["summary.html", "summary-pages/2.html", "summary-pages/3.html"]
     assert [(tmp_path / "out" / page).read_text().count("<figure>") for page in pages] == [3, 3, 1]
-    assert '<a href="../summary.html">1</a>' in (tmp_path / "out" / "summary-pages" / "2.html").read_text()
+    assert (
+        '<a href="../summary.html">1</a>'
+        in (tmp_path / "out" / "summary-pages" / "2.html").read_text()
+    )
     assert len(rows(tmp_path / "out" / "summary.jsonl")) == 7
     assert PAGE > 100
 
 
-def test_a_stream_is_worked_off_in_a_window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_stream_is_worked_off_in_a_window(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """What is at the scheduler stays little, however many lines there are."""
-    (tmp_path / "list.csv").write_text("image\n" + "".join(f"{number}.png\n" for number in range(60)))
+    (tmp_path / "list.csv").write_text(
+        "image\n" + "".join(f"{number}.png\n" for number in range(60))
+    )
     taken, ended, ahead = itertools.count(), itertools.count(), []
     jobs = run_module._jobs
 
@@ -244,5 +310,7 @@ def test_a_stream_is_worked_off_in_a_window(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(run_module, "_jobs", counted)
     monkeypatch.setattr(run_module, "Journal", Counted)
-    assert run_batch(batch(tmp_path / "list.csv", output=tmp_path / "out", crew=HERE), task=obedient) == Counter({DONE: 60})
+    assert run_batch(
+        batch(tmp_path / "list.csv", output=tmp_path / "out", crew=HERE), task=obedient
+    ) == Counter({DONE: 60})
     assert max(ahead) <= 4

@@ -12,7 +12,15 @@ def test_a_grey_photo_is_still_paint_times_shading_and_has_equal_channels() -> N
     shading[0] = 0
     image = shading * paint
     photo = MitBerkeleyObject(
-        "ball", "natural", image, (image > 0).all(-1), np.ones((5, 6), bool), np.zeros((5, 6)), shading, paint, np.ones((9, 3))
+        "ball",
+        "natural",
+        image,
+        (image > 0).all(-1),
+        np.ones((5, 6), bool),
+        np.zeros((5, 6)),
+        shading,
+        paint,
+        np.ones((9, 3)),
     )
     grey = greyed(photo)
     for part in (grey.image, grey.shading, grey.reflectance, grey.light):

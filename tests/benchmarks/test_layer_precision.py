@@ -17,18 +17,26 @@ def answer() -> tuple[Estimate, np.ndarray]:
     light = np.zeros((9, 3))
     light[0], light[1] = -1.0, [0.8, 0.7, 0.6]
     still = np.zeros((*mask.shape, 3))
-    return Estimate(np.zeros(mask.shape), np.where(mask[..., None], normal, (0, 0, 1)), still, still, light), mask
+    return Estimate(
+        np.zeros(mask.shape), np.where(mask[..., None], normal, (0, 0, 1)), still, still, light
+    ), mask
 
 
 def test_the_mirrored_light_is_what_the_set_mirrors() -> None:
     plain, mask = answer()
     layer = np.zeros((*mask.shape, 3))
-    layer[mask] = environment_gloss(environment_from_shading(plain.light), plain.normal[mask], GlossySettings().exponent)
+    layer[mask] = environment_gloss(
+        environment_from_shading(plain.light), plain.normal[mask], GlossySettings().exponent
+    )
     facing = plain.normal[mask][:, 2] > 0.3  # a table of a disc is coarse at its edge
-    np.testing.assert_allclose(mirrored(layer, mask, plain)[mask][facing], layer[mask][facing], rtol=0.05)
+    np.testing.assert_allclose(
+        mirrored(layer, mask, plain)[mask][facing], layer[mask][facing], rtol=0.05
+    )
 
 
-@pytest.mark.parametrize(("name", "share"), [("80 %", 0.8), ("50 %", 0.5), ("mean", 1.0), ("mirrored light", 1.0)])
+@pytest.mark.parametrize(
+    ("name", "share"), [("80 %", 0.8), ("50 %", 0.5), ("mean", 1.0), ("mirrored light", 1.0)]
+)
 def test_as_much_light_is_taken_as_is_said(name: str, share: float) -> None:
     plain, mask = answer()
     layer = np.where(mask[..., None], np.random.default_rng(0).random((*mask.shape, 3)), 0)

@@ -20,8 +20,14 @@ LIGHT = np.array(
 )
 
 
-def ball(shape: tuple[int, int] = (96, 120), radius: float = 40.0, center: tuple[float, float] = (44.0, 66.0)) -> Decomposition:
-    """A ball of `radius` pixels at (row, column) `center`; every identity holds to the precision of float32."""
+def ball(
+    shape: tuple[int, int] = (96, 120),
+    radius: float = 40.0,
+    center: tuple[float, float] = (44.0, 66.0),
+) -> Decomposition:
+    """A ball of `radius` pixels at (row, column) `center`; every identity holds to the precision of
+    float32.
+    """
     rows, columns = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
     x, y = (columns - center[1]) / radius, (center[0] - rows) / radius
     mask = x * x + y * y < 0.99**2
@@ -54,7 +60,13 @@ def ball(shape: tuple[int, int] = (96, 120), radius: float = 40.0, center: tuple
             seed=7,
             versions={"isc": "0.1.0"},
             timings={"solve": 1.25},
-            input={"name": "ball.png", "sha256": "0" * 64, "size": [shape[1], shape[0]], "scale": 1.0, "crop_box": [0, 0, *shape[::-1]]},
+            input={
+                "name": "ball.png",
+                "sha256": "0" * 64,
+                "size": [shape[1], shape[0]],
+                "scale": 1.0,
+                "crop_box": [0, 0, *shape[::-1]],
+            },
             status={"converged": True, "loss": 46.1234},
         ),
     )

@@ -33,7 +33,14 @@ def ball_photo(folder: Path, radius: float = 20.0) -> Path:
 
 def run_isc(*arguments: object, before: str = "") -> subprocess.CompletedProcess[str]:
     """Runs the command in a process of its own; `before` is Python that is run there first."""
-    return subprocess.run(isc_command(*arguments, before=before), capture_output=True, text=True, cwd=ROOT, timeout=300, check=False)
+    return subprocess.run(
+        isc_command(*arguments, before=before),
+        capture_output=True,
+        text=True,
+        cwd=ROOT,
+        timeout=300,
+        check=False,
+    )
 
 
 def isc_command(*arguments: object, before: str = "") -> list[str]:
@@ -41,4 +48,8 @@ def isc_command(*arguments: object, before: str = "") -> list[str]:
     words = [str(argument) for argument in arguments]
     if not before:
         return [sys.executable, "-m", "isc_core", *words]
-    return [sys.executable, "-c", f"{before}\nimport sys\nfrom isc_core.cli import main\nsys.exit(main({words!r}))"]
+    return [
+        sys.executable,
+        "-c",
+        f"{before}\nimport sys\nfrom isc_core.cli import main\nsys.exit(main({words!r}))",
+    ]

@@ -12,7 +12,9 @@ def ball() -> tuple[np.ndarray, np.ndarray]:
     return np.stack([x, y, np.sqrt(np.maximum(1 - x**2 - y**2, 0))], -1) * mask[..., None], mask
 
 
-def under_lamps(*lamps: tuple[float, float, float], paint: tuple[float, float, float] = (0.5, 0.3, 0.2)) -> tuple[np.ndarray, np.ndarray]:
+def under_lamps(
+    *lamps: tuple[float, float, float], paint: tuple[float, float, float] = (0.5, 0.3, 0.2)
+) -> tuple[np.ndarray, np.ndarray]:
     """A glossy painted ball."""
     normal, mask = ball()
     image = 0.06 * np.ones((SIDE, SIDE, 3)) * paint
@@ -28,7 +30,11 @@ def mirror_ball(surroundings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """A mirror, seen from far away."""
     normal, mask = ball()
     seen = 2 * normal[..., 2:] * normal - (0, 0, 1)
-    rows = np.clip(np.arccos(np.clip(seen[..., 1], -1, 1)) / np.pi * len(surroundings), 0, len(surroundings) - 1).astype(int)
+    rows = np.clip(
+        np.arccos(np.clip(seen[..., 1], -1, 1)) / np.pi * len(surroundings),
+        0,
+        len(surroundings) - 1,
+    ).astype(int)
     turn = np.mod(np.arctan2(seen[..., 0], -seen[..., 2]), 2 * np.pi) / (2 * np.pi)
     columns = np.minimum(turn * surroundings.shape[1], surroundings.shape[1] - 1).astype(int)
     image = np.minimum(surroundings[rows, columns], np.quantile(surroundings, 0.98))

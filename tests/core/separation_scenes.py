@@ -1,4 +1,6 @@
-"""What the tests of separation methods share: a made scene, real photos with their truth, and what holds for every split."""
+"""What the tests of separation methods share: a made scene, real photos with their truth, and what
+holds for every split.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +15,9 @@ PAINTS = np.array([[0.7, 0.2, 0.1], [0.15, 0.55, 0.2], [0.1, 0.25, 0.6]])
 
 
 def glossy_disc(height: float = 0.5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true diffuse (both (H, W, 3)) and mask of a shaded disc in sectors of three paints; a white highlight on each paint."""
+    """Image, true diffuse (both (H, W, 3)) and mask of a shaded disc in sectors of three paints; a
+    white highlight on each paint.
+    """
     y, x = np.mgrid[-1:1:96j, -1:1:120j]
     mask = x**2 + y**2 < 0.9
     angle = np.arctan2(y, x)
@@ -32,7 +36,9 @@ def read(path: Path) -> np.ndarray:
 
 def highlight_photo(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Image, true diffuse and the full mask of one of the photos with published figures."""
-    image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    image, truth = (
+        read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     return image, truth, np.ones(image.shape[:2], bool)
 
 
@@ -54,8 +60,13 @@ def error_ratio(split: Separation, image: np.ndarray, truth: np.ndarray, mask: n
     return float(np.mean((split.diffuse - truth)[mask] ** 2) / np.mean((image - truth)[mask] ** 2))
 
 
-def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray, *, tinted: bool = False) -> None:
-    """The identities and ranges of every split; `image` may be anything outside the mask. `tinted`: specular light need not be white."""
+def assert_layers_hold(
+    split: Separation, image: np.ndarray, mask: np.ndarray, *, tinted: bool = False
+) -> None:
+    """The identities and ranges of every split;
+
+    `image` may be anything outside the mask. `tinted`: specular light need not be white.
+    """
     total = split.diffuse + split.specular + split.residual
     assert np.abs(total[mask] - image[mask]).max() <= 1e-6 * image[mask].max()
     assert (split.diffuse >= 0).all() and (split.diffuse[mask] <= image[mask] * (1 + 1e-6)).all()
@@ -65,8 +76,12 @@ def assert_layers_hold(split: Separation, image: np.ndarray, mask: np.ndarray, *
     assert (split.confidence >= 0).all() and (split.confidence <= 1).all()
 
 
-def assert_scale_and_surroundings_do_not_matter(separate: Callable[..., Separation], options: object, scale: float, least: float) -> None:
-    """A wider frame, unknown outside the mask, and another exposure give the same specular layer, of at least `least` on the disc."""
+def assert_scale_and_surroundings_do_not_matter(
+    separate: Callable[..., Separation], options: object, scale: float, least: float
+) -> None:
+    """A wider frame, unknown outside the mask, and another exposure give the same specular layer,
+    of at least `least` on the disc.
+    """
     image, _, mask = glossy_disc()
     split = separate(image, mask, options)
     assert split.specular.max() > least
@@ -75,7 +90,9 @@ def assert_scale_and_surroundings_do_not_matter(separate: Callable[..., Separati
     assert np.allclose(wide.specular[13:-5, 7:-11] / scale, split.specular, atol=2e-6)
 
 
-def assert_any_mask_and_noise_keep_the_layers_sound(separate: Callable[..., Separation], options: object) -> None:
+def assert_any_mask_and_noise_keep_the_layers_sound(
+    separate: Callable[..., Separation], options: object
+) -> None:
     """Noise with grey and black stripes under a scattered mask, and under a mask of one pixel."""
     random = np.random.default_rng(3)
     image = random.random((40, 50, 3)) ** 3
@@ -88,8 +105,12 @@ def assert_any_mask_and_noise_keep_the_layers_sound(separate: Callable[..., Sepa
         assert_layers_hold(split, image, mask)
 
 
-def assert_clipped_cores_are_filled_and_inform_nobody(separate: Callable[..., Separation], at_most: float) -> None:
-    """Clipped pixels get a diffuse layer with at most this error ratio, no confidence, and have no influence on others."""
+def assert_clipped_cores_are_filled_and_inform_nobody(
+    separate: Callable[..., Separation], at_most: float
+) -> None:
+    """Clipped pixels get a diffuse layer with at most this error ratio, no confidence, and have no
+    influence on others.
+    """
     scene, diffuse, mask = glossy_disc(0.9)
     image = np.minimum(scene, 0.95)
     clipped = (scene > 0.95).any(axis=2)

@@ -18,35 +18,54 @@ QUICK = replace(VARIANTS["improved"], surface_colours=2, sample=1000)
 
 
 def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one highlight."""
+    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one
+    highlight.
+    """
     y, x = np.mgrid[-1:1:60j, -1:1:70j]
     mask = x**2 + y**2 < 0.9
     shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
     specular = 0.4 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.03)
     paint = np.where((x > 0)[..., None], RED, GREEN)
-    return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
+    return (
+        (paint * shading[..., None] + specular[..., None]) * mask[..., None],
+        specular * mask,
+        mask,
+    )
 
 
 @pytest.mark.parametrize(("name", "best"), [("animals", 36.6), ("cups", 37.8)])
 def test_published_images(shared: Path, name: str, best: float) -> None:
     """The published method reaches 34.5 and 35.2 dB; the improved one more, from any seed."""
-    image, truth = (read(shared / "data/highlight" / file)[::2, ::2] for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    image, truth = (
+        read(shared / "data/highlight" / file)[::2, ::2]
+        for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     diffuse = separate(image, np.ones(image.shape[:2], bool)).diffuse
     assert -10 * np.log10(np.mean((diffuse - truth) ** 2)) >= best
 
 
 @pytest.mark.parametrize(("name", "least"), [("animals", 32.5), ("cups", 35.2)])
 def test_sihr_from_a_sample(shared: Path, name: str, least: float) -> None:
-    """One random start: between 32.7 and 35.9 dB on animals (the published one 34.5), 35.8 and 37.1 on cups."""
-    image, truth = (read(shared / "data/highlight" / file)[::2, ::2] for file in (f"{name}.bmp", f"{name}_gt.bmp"))
-    diffuse = separate(image, np.ones(image.shape[:2], bool), replace(VARIANTS["sihr"], sample=1024)).diffuse
+    """One random start: between 32.7 and 35.9 dB on animals (the published one 34.5), 35.8 and 37.1
+    on cups.
+    """
+    image, truth = (
+        read(shared / "data/highlight" / file)[::2, ::2]
+        for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
+    diffuse = separate(
+        image, np.ones(image.shape[:2], bool), replace(VARIANTS["sihr"], sample=1024)
+    ).diffuse
     assert -10 * np.log10(np.mean((diffuse - truth) ** 2)) >= least
 
 
 @pytest.mark.parametrize("name", ["box", "frog1"])
 def test_near_grey_objects_are_left_alone(shared: Path, name: str) -> None:
     folder = shared / "data/mit_berkeley_train/laboratory" / name
-    image, mask = read(folder / "original.png")[::2, ::2], cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE)[::2, ::2] > 0
+    image, mask = (
+        read(folder / "original.png")[::2, ::2],
+        cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE)[::2, ::2] > 0,
+    )
     quick = replace(VARIANTS["improved"], sample=1000, iterations=200)
     assert not separate(image, mask, quick).specular.any()
     assert separate(image, mask, replace(quick, weigh_evidence=False)).specular.any()
@@ -55,7 +74,9 @@ def test_near_grey_objects_are_left_alone(shared: Path, name: str) -> None:
 def test_a_rendered_highlight_is_found() -> None:
     image, specular, mask = glossy_scene()
     split = separate(image, mask, QUICK)
-    assert np.mean((split.specular[..., 0] - specular)[mask] ** 2) < 0.05 * np.mean(specular[mask] ** 2)
+    assert np.mean((split.specular[..., 0] - specular)[mask] ** 2) < 0.05 * np.mean(
+        specular[mask] ** 2
+    )
     assert np.abs(split.diffuse + split.specular - image)[mask].max() < 1e-6
     assert (split.diffuse >= 0).all() and (split.diffuse <= image + 1e-6).all()
 
@@ -102,7 +123,12 @@ def test_more_starts_keep_the_least_objective() -> None:
     image, _, mask = glossy_scene()
     pixels = np.ascontiguousarray(255 * image[mask].T)
     few, many = (
-        akashi_2016._best_fit(pixels, np.arange(pixels.shape[1]), replace(QUICK, start="random", starts=n, iterations=80), Monitor())
+        akashi_2016._best_fit(
+            pixels,
+            np.arange(pixels.shape[1]),
+            replace(QUICK, start="random", starts=n, iterations=80),
+            Monitor(),
+        )
         for n in (1, 4)
     )
     assert many.objective < few.objective
@@ -121,8 +147,16 @@ def test_scale_surroundings_and_repetition_do_not_matter() -> None:
 def test_every_variant_keeps_the_bounds(variant: str) -> None:
     image, _, mask = glossy_scene()
     split = separate(image[::3, ::3], mask[::3, ::3], replace(VARIANTS[variant], iterations=60))
-    assert np.isfinite(split.confidence).all() and np.isfinite(split.specular).all() and split.specular.min() >= 0
-    assert (split.diffuse >= 0).all() and (split.diffuse <= image[::3, ::3] + 1e-6).all() and split.specular.any()
+    assert (
+        np.isfinite(split.confidence).all()
+        and np.isfinite(split.specular).all()
+        and split.specular.min() >= 0
+    )
+    assert (
+        (split.diffuse >= 0).all()
+        and (split.diffuse <= image[::3, ::3] + 1e-6).all()
+        and split.specular.any()
+    )
 
 
 def test_one_pixel_and_clipped_pixels() -> None:

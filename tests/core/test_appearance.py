@@ -1,4 +1,6 @@
-"""What a photo seems to show: what the network's answer must not depend on, and what the shipped weights can do."""
+"""What a photo seems to show: what the network's answer must not depend on, and what the shipped
+weights can do.
+"""
 
 from pathlib import Path
 
@@ -7,7 +9,16 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from benchmarks.surroundings import PLACES, make_surroundings
-from isc_core.appearance import GLASS, KINDS, LAMPS, MIRROR, ORDINARY, AppearanceNetwork, kinds_of, read_appearance
+from isc_core.appearance import (
+    GLASS,
+    KINDS,
+    LAMPS,
+    MIRROR,
+    ORDINARY,
+    AppearanceNetwork,
+    kinds_of,
+    read_appearance,
+)
 from isc_core.errors import InputError
 from tests.core.lit_balls import mirror_ball, under_lamps
 
@@ -16,9 +27,19 @@ SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
 
 def small_network(rng: np.random.Generator) -> AppearanceNetwork:
     """Two levels, random weights."""
-    weights = tuple(rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32) for inputs, outputs in SHAPES)
+    weights = tuple(
+        rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32)
+        for inputs, outputs in SHAPES
+    )
     biases = tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in SHAPES)
-    return AppearanceNetwork(weights, biases, rng.normal(size=30), rng.uniform(1, 2, 30), rng.normal(size=(30, 4)), rng.normal(size=4))
+    return AppearanceNetwork(
+        weights,
+        biases,
+        rng.normal(size=30),
+        rng.uniform(1, 2, 30),
+        rng.normal(size=(30, 4)),
+        rng.normal(size=4),
+    )
 
 
 def photo(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -38,17 +59,23 @@ def test_the_answer_is_one_of_probabilities_whatever_the_exposure_and_the_side()
     found = shares(kinds_of(image, mask, network))
     assert found.min() > 0 and found.sum() == pytest.approx(1)
     np.testing.assert_allclose(shares(kinds_of(8 * image, mask, network)), found, rtol=1e-4)
-    np.testing.assert_allclose(shares(kinds_of(image[:, ::-1], mask[:, ::-1], network)), found, rtol=1e-9)
+    np.testing.assert_allclose(
+        shares(kinds_of(image[:, ::-1], mask[:, ::-1], network)), found, rtol=1e-9
+    )
 
 
 def test_what_is_outside_the_mask_and_the_number_of_threads_change_nothing() -> None:
     rng = np.random.default_rng(1)
     network, (image, mask) = small_network(rng), photo(rng)
     found = shares(kinds_of(image, mask, network))
-    padded = np.pad(np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9)
+    padded = np.pad(
+        np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9
+    )
     for threads in (1, 3):
         with threadpool_limits(threads):
-            np.testing.assert_array_equal(shares(kinds_of(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found)
+            np.testing.assert_array_equal(
+                shares(kinds_of(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found
+            )
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-30, 1.0])
@@ -59,8 +86,13 @@ def test_photos_without_anything_in_them_are_judged_too(level: float) -> None:
 
 @pytest.mark.parametrize("place", PLACES)
 def test_mirrors_look_like_mirrors(place: str) -> None:
-    found = [kinds_of(*mirror_ball(make_surroundings(place, np.random.default_rng([9, k])))) for k in range(10)]
-    assert sum(kinds[MIRROR] + kinds[GLASS] > 0.5 for kinds in found) >= (6 if place == "clutter" else 8)
+    found = [
+        kinds_of(*mirror_ball(make_surroundings(place, np.random.default_rng([9, k]))))
+        for k in range(10)
+    ]
+    assert sum(kinds[MIRROR] + kinds[GLASS] > 0.5 for kinds in found) >= (
+        6 if place == "clutter" else 8
+    )
 
 
 def test_paint_under_one_lamp_is_ordinary_and_under_three_it_is_not() -> None:
@@ -77,7 +109,12 @@ def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}
     parts |= {f"bias{k:02d}": values for k, values in enumerate(network.biases)}
     parts |= {name: getattr(network, name) for name in ("middle", "scale", "head", "odds")}
-    for wrong in ({"head": network.head[:9]}, {"scale": 0 * network.scale}, {"bias01": np.ones(3)}, {"weight00": np.ones((9, 3, 4))}):
+    for wrong in (
+        {"head": network.head[:9]},
+        {"scale": 0 * network.scale},
+        {"bias01": np.ones(3)},
+        {"weight00": np.ones((9, 3, 4))},
+    ):
         np.savez(bad, **(parts | wrong))
         with pytest.raises(InputError, match="not the weights"):
             read_appearance(bad)

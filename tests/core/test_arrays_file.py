@@ -1,4 +1,6 @@
-"""The plain arrays of a result: the same scene as its maps and mesh, and light that gives the photo back."""
+"""The plain arrays of a result: the same scene as its maps and mesh, and light that gives the photo
+back.
+"""
 
 import json
 from dataclasses import replace
@@ -54,7 +56,9 @@ def test_the_maps_are_those_of_the_result(arrays: Arrays) -> None:
     for name in (*COLOR_MAPS, "normal", "height", "confidence", "mask"):
         assert np.array_equal(arrays[name], getattr(d, name)), name
     whole = {"mask": bool, "faces": np.int32, "vertex_pixel": np.int32, "photo_size": np.int32}
-    assert {name: values.dtype for name, values in arrays.items()} == {name: whole.get(name, np.float32) for name in arrays}
+    assert {name: values.dtype for name, values in arrays.items()} == {
+        name: whole.get(name, np.float32) for name in arrays
+    }
     assert arrays["photo_size"].tolist() == [120, 96] and arrays["crop_scale"] == 1
 
 
@@ -67,22 +71,35 @@ def test_the_mesh_is_that_of_the_glb(arrays: Arrays, folder: Path) -> None:
     record = json.loads((folder / "decomposition.json").read_text())["mesh"]
     assert arrays["reflectance_scale"] == pytest.approx(record["reflectance_scale"])
     assert arrays["origin"] == pytest.approx(list(record["origin"].values()))
-    np.testing.assert_allclose(arrays["mesh_illumination"], record["illumination"]["coefficients"], rtol=1e-6)
+    np.testing.assert_allclose(
+        arrays["mesh_illumination"], record["illumination"]["coefficients"], rtol=1e-6
+    )
 
 
 def test_vertices_know_their_pixels(arrays: Arrays) -> None:
     row, column = arrays["vertex_pixel"].T
-    place = np.stack([column - arrays["origin"][0], arrays["origin"][1] - row], -1) * arrays["metres_per_pixel"]
+    place = (
+        np.stack([column - arrays["origin"][0], arrays["origin"][1] - row], -1)
+        * arrays["metres_per_pixel"]
+    )
     np.testing.assert_allclose(arrays["vertices"][:, :2], place, atol=1e-7)
-    np.testing.assert_allclose(arrays["uv"], np.stack([(column + 0.5) / 120, 1 - (row + 0.5) / 96], -1), atol=1e-6)
+    np.testing.assert_allclose(
+        arrays["uv"], np.stack([(column + 0.5) / 120, 1 - (row + 0.5) / 96], -1), atol=1e-6
+    )
     assert arrays["mask"][row, column].all()
 
 
 def test_base_color_and_its_light_give_the_diffuse_image(arrays: Arrays) -> None:
     mask = arrays["mask"]
-    np.testing.assert_allclose(arrays["base_color"][mask], (arrays["reflectance_scale"] * arrays["reflectance"])[mask], rtol=1e-6)
+    np.testing.assert_allclose(
+        arrays["base_color"][mask],
+        (arrays["reflectance_scale"] * arrays["reflectance"])[mask],
+        rtol=1e-6,
+    )
     shading = np.exp(real_sh(arrays["normal"][mask].astype(float)) @ arrays["mesh_illumination"])
-    np.testing.assert_allclose(arrays["base_color"][mask] * shading, arrays["diffuse"][mask], rtol=1e-4)
+    np.testing.assert_allclose(
+        arrays["base_color"][mask] * shading, arrays["diffuse"][mask], rtol=1e-4
+    )
     assert arrays["base_color"][~mask].min() > 0
 
 
@@ -106,7 +123,9 @@ def test_the_sun_explains_the_shading(arrays: Arrays) -> None:
 
 
 def test_detail_stays_where_vertices_are_few() -> None:
-    """With every second pixel a vertex, vertex normal and normal map together are the recovered normals, without rounding to codes."""
+    """With every second pixel a vertex, vertex normal and normal map together are the recovered
+    normals, without rounding to codes.
+    """
     d = ball()
     mesh = built(d, max_faces=3000)
     arrays = arrays_of(d, mesh)
@@ -126,9 +145,13 @@ def glossy() -> Decomposition:
     """The ball under the gloss of one lamp, with the lobe that fits it."""
     d = ball()
     lamp = np.array([-0.37, 0.46, 0.807]) / np.linalg.norm([-0.37, 0.46, 0.807])
-    gloss = 0.6 * radiance(Ggx(0.2, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(lamp, 1.0))
+    gloss = 0.6 * radiance(
+        Ggx(0.2, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(lamp, 1.0)
+    )
     specular = np.where(d.mask[..., None], gloss, 0).astype(np.float32)
-    return replace(d, image=d.diffuse + specular, specular=specular, brdf=fit_lobe(specular, d.normal, d.mask))
+    return replace(
+        d, image=d.diffuse + specular, specular=specular, brdf=fit_lobe(specular, d.normal, d.mask)
+    )
 
 
 def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
@@ -137,34 +160,52 @@ def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
     found, gloss = read(tmp_path / "out" / ARRAYS), gloss_of(d)
     assert found["roughness"] == pytest.approx(gloss.roughness) == pytest.approx(0.2**0.5, rel=0.05)
     assert gloss.specular is not None and d.brdf is not None
-    assert found["specular_level"] == pytest.approx(float(found["reflectance_scale"]) * gloss.specular)
+    assert found["specular_level"] == pytest.approx(
+        float(found["reflectance_scale"]) * gloss.specular
+    )
     assert np.array_equal(found["lobe"], d.brdf.predicted.astype(np.float32))
     assert ("specular_variation" in found) == (gloss.variation is not None)
-    assert np.isnan(arrays["roughness"]) and np.isnan(arrays["specular_level"]) and not arrays["lobe"].any()
+    assert (
+        np.isnan(arrays["roughness"])
+        and np.isnan(arrays["specular_level"])
+        and not arrays["lobe"].any()
+    )
 
 
-def test_the_command_gives_the_same_bytes_as_the_option(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_gives_the_same_bytes_as_the_option(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     save(ball(), tmp_path / "later")
     assert not (tmp_path / "later" / ARRAYS).exists()
     assert main(["arrays", str(tmp_path / "later")]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'later' / ARRAYS} is written\n"
     assert (tmp_path / "later" / ARRAYS).read_bytes() == (folder / ARRAYS).read_bytes()
     load(tmp_path / "later")
-    save(ball(), tmp_path / "later")  # a result with arrays is still one of ours, and its arrays do not outlive it
+    save(
+        ball(), tmp_path / "later"
+    )  # a result with arrays is still one of ours, and its arrays do not outlive it
     assert not (tmp_path / "later" / ARRAYS).exists()
 
 
-def test_a_disk_without_room_for_arrays_is_known_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_without_room_for_arrays_is_known_before(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda path: SimpleNamespace(free=50_000_000))
     require_room(tmp_path / "out", 1_000_000)
     with pytest.raises(InputError, match="no space is left"):
         require_room(tmp_path / "out", 1_000_000, arrays=True)
     monkeypatch.undo()
-    maps = [values.nbytes for values in arrays_of(ball(), built(ball())).values() if values.shape[:2] == (96, 120)]
+    maps = [
+        values.nbytes
+        for values in arrays_of(ball(), built(ball())).values()
+        if values.shape[:2] == (96, 120)
+    ]
     assert sum(maps) == 129 * 96 * 120
 
 
-def test_a_folder_without_a_result_is_one_clear_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_without_a_result_is_one_clear_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["arrays", "--quiet", str(tmp_path)]) == 2
     message = capsys.readouterr().err
     assert message.count("\n") == 1 and "not a result folder" in message

@@ -31,7 +31,12 @@ def everything(folder: Path) -> list[str]:
 
 def test_a_new_folder_appears_with_its_parents(tmp_path: Path) -> None:
     make(tmp_path / "a" / "b" / "out")
-    assert everything(tmp_path / "a" / "b") == ["out", "out/maps", "out/maps/one.bin", "out/mark.json"]
+    assert everything(tmp_path / "a" / "b") == [
+        "out",
+        "out/maps",
+        "out/maps/one.bin",
+        "out/mark.json",
+    ]
 
 
 def test_nothing_stands_under_the_final_name_before_the_end(tmp_path: Path) -> None:
@@ -56,7 +61,9 @@ def test_an_interruption_leaves_nothing(tmp_path: Path, stop: type[BaseException
 
 
 @pytest.mark.parametrize("stop", [KeyboardInterrupt, Cancelled])
-def test_an_interruption_keeps_the_earlier_result(tmp_path: Path, stop: type[BaseException]) -> None:
+def test_an_interruption_keeps_the_earlier_result(
+    tmp_path: Path, stop: type[BaseException]
+) -> None:
     make(tmp_path / "out", "old")
     with pytest.raises(stop):
         make(tmp_path / "out", "half", fails=stop())
@@ -89,7 +96,9 @@ def test_a_link_to_a_folder_stays_a_link(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("foreign", ["thesis.tex", "maps/mine.bin", "data.bin"])
 def test_what_is_not_ours_is_refused_and_kept(tmp_path: Path, foreign: str) -> None:
-    """Another file beside a result, one deep inside, and a folder that only shares a name with ours."""
+    """Another file beside a result, one deep inside, and a folder that only shares a name with
+    ours.
+    """
     if foreign != "data.bin":
         make(tmp_path / "out", "old")
     (tmp_path / "out" / foreign).parent.mkdir(parents=True, exist_ok=True)
@@ -140,7 +149,9 @@ def test_a_failing_disk_is_one_clear_line_and_leaves_nothing(tmp_path: Path, cod
     assert everything(tmp_path) == []
 
 
-def test_a_failure_of_the_last_step_brings_the_earlier_result_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_failure_of_the_last_step_brings_the_earlier_result_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     make(tmp_path / "out", "old")
     real, calls = os.replace, []
 
@@ -176,7 +187,13 @@ def test_ctrl_c_in_a_real_process_leaves_nothing(tmp_path: Path) -> None:
         "    os.kill(os.getpid(), signal.SIGINT)\n"
     )
     root = Path(__file__).resolve().parents[2]
-    done = subprocess.run([sys.executable, "-c", script, str(tmp_path / "out")], cwd=root, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path / "out")],
+        cwd=root,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert "KeyboardInterrupt" in done.stderr
     assert everything(tmp_path) == []
 

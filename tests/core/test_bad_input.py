@@ -25,7 +25,10 @@ def one_line(text: str) -> str:
 
 
 def refused(capfd: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """Runs a command in this process and returns its message. What C libraries write themselves would count as well."""
+    """Runs a command in this process and returns its message.
+
+    What C libraries write themselves would count as well.
+    """
     code = main([str(argument) for argument in arguments])
     out, err = capfd.readouterr()
     assert code == 2, (code, out, err)
@@ -65,7 +68,11 @@ def cmyk(folder: Path) -> list[object]:
 
 
 def with_mask(make_mask: Callable[[tuple[int, ...]], np.ndarray]) -> Maker:
-    return lambda folder: [ball_photo(folder), "--mask", write_image(folder / "mask.png", make_mask(ball_codes().shape[:2]))]
+    return lambda folder: [
+        ball_photo(folder),
+        "--mask",
+        write_image(folder / "mask.png", make_mask(ball_codes().shape[:2])),
+    ]
 
 
 def three_pixels(shape: tuple[int, ...]) -> np.ndarray:
@@ -79,7 +86,11 @@ def picture(pixels: np.ndarray) -> Maker:
 
 
 def constant(folder: Path) -> list[object]:
-    return [write_image(folder / "grey.png", np.full((60, 60, 3), 90, np.uint8)), "--mask", write_image(folder / "mask.png", disc())]
+    return [
+        write_image(folder / "grey.png", np.full((60, 60, 3), 90, np.uint8)),
+        "--mask",
+        write_image(folder / "mask.png", disc()),
+    ]
 
 
 def hidden(folder: Path) -> list[object]:
@@ -95,27 +106,41 @@ PHOTOS: dict[str, tuple[Maker, str]] = {
     "unreadable file": (hidden, "cannot be read"),
     "folder": (lambda folder: [folder], "folder"),
     "empty file": (lambda folder: [write_bytes(folder / "empty.png", b"")], "empty"),
-    "text named png": (lambda folder: [write_bytes(folder / "letter.png", b"Dear all,\nno picture here.\n")], "not an image"),
+    "text named png": (
+        lambda folder: [write_bytes(folder / "letter.png", b"Dear all,\nno picture here.\n")],
+        "not an image",
+    ),
     "device": (lambda folder: ["/dev/null"], "not a regular file"),
     "truncated png": (truncated, "damaged"),
-    "mask of another size": (with_mask(lambda shape: np.full((shape[0] + 1, shape[1]), 255, np.uint8)), "photo's size"),
+    "mask of another size": (
+        with_mask(lambda shape: np.full((shape[0] + 1, shape[1]), 255, np.uint8)),
+        "photo's size",
+    ),
     "empty mask": (with_mask(lambda shape: np.zeros(shape, np.uint8)), "empty"),
     "mask of three pixels": (with_mask(three_pixels), "3 pixels"),
-    "missing mask": (lambda folder: [ball_photo(folder), "--mask", folder / "no-mask.png"], "no such file"),
+    "missing mask": (
+        lambda folder: [ball_photo(folder), "--mask", folder / "no-mask.png"],
+        "no such file",
+    ),
     "NaN": (exr_with(np.nan), "NaN"),
     "infinite": (exr_with(np.inf), "infinite"),
     "negative": (exr_with(-0.5), "negative"),
     "constant": (constant, "the same"),
     "all black": (picture(np.zeros((60, 60, 3), np.uint8)), "black"),
     "one pixel wide": (picture(np.full((60, 1, 3), 90, np.uint8)), "1 x 60"),
-    "60000 x 10": (picture(np.tile(np.arange(60000, dtype=np.uint16)[:, None], (10, 1, 3))), "60000 x 10"),
+    "60000 x 10": (
+        picture(np.tile(np.arange(60000, dtype=np.uint16)[:, None], (10, 1, 3))),
+        "60000 x 10",
+    ),
     "CMYK jpeg": (cmyk, "CMYK"),
 }
 
 
 @pytest.mark.parametrize("case", PHOTOS)
 @pytest.mark.parametrize("command", [("decompose",), ("separate",)], ids=["decompose", "separate"])
-def test_a_photo_that_cannot_be_used(tmp_path: Path, capfd: pytest.CaptureFixture[str], case: str, command: tuple[str, ...]) -> None:
+def test_a_photo_that_cannot_be_used(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], case: str, command: tuple[str, ...]
+) -> None:
     make, words = PHOTOS[case]
     message = refused(capfd, *command, *make(tmp_path), "-o", tmp_path / "out" / "result")
     assert words in message
@@ -132,8 +157,12 @@ def test_the_same_in_a_process_of_its_own(tmp_path: Path, case: str) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_a_photo_without_a_mask_names_the_remedy(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    photo = write_image(tmp_path / "full.png", np.arange(60 * 60 * 3, dtype=np.uint16).reshape(60, 60, 3) + 9000)
+def test_a_photo_without_a_mask_names_the_remedy(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    photo = write_image(
+        tmp_path / "full.png", np.arange(60 * 60 * 3, dtype=np.uint16).reshape(60, 60, 3) + 9000
+    )
     assert "isc mask" in refused(capfd, "decompose", photo, "-o", tmp_path / "out")
 
 
@@ -141,12 +170,21 @@ def test_a_palette_picture_can_be_used(tmp_path: Path, capfd: pytest.CaptureFixt
     coded = Image.fromarray((ball_codes() >> 8).astype(np.uint8)).quantize(64)
     coded.save(tmp_path / "palette.png")
     assert coded.mode == "P"
-    code = main(["decompose", str(tmp_path / "palette.png"), "--model", "naive", "-o", str(tmp_path / "out")])
+    code = main(
+        [
+            "decompose",
+            str(tmp_path / "palette.png"),
+            "--model",
+            "naive",
+            "-o",
+            str(tmp_path / "out"),
+        ]
+    )
     assert code == 0, capfd.readouterr().err
     assert (tmp_path / "out" / "decomposition.json").is_file()
 
 
-# --- where the result goes --------------------------------------------------------------------------------------------------------------
+# --- where the result goes ------------------------------------------------------------------------
 
 
 def test_a_folder_below_a_file(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
@@ -165,7 +203,9 @@ def test_a_folder_of_somebody_else(tmp_path: Path, capfd: pytest.CaptureFixture[
     (tmp_path / "letters").mkdir()
     letter = tmp_path / "letters" / "letter.txt"
     letter.write_text("mine")
-    assert "not empty" in refused(capfd, "decompose", ball_photo(tmp_path), "-o", tmp_path / "letters")
+    assert "not empty" in refused(
+        capfd, "decompose", ball_photo(tmp_path), "-o", tmp_path / "letters"
+    )
     assert letter.read_text() == "mine"
 
 
@@ -177,8 +217,12 @@ def test_a_folder_that_cannot_be_written(tmp_path: Path, capfd: pytest.CaptureFi
         place = Path("/proc")
         if not place.is_dir():
             pytest.skip("the superuser can write to every folder")
-    assert "cannot write" in refused(capfd, "decompose", ball_photo(tmp_path), "-o", place / "result")
-    assert "cannot" in refused(capfd, "mask", ball_photo(tmp_path), "--box", "5,5,44,42", "-o", place / "mask.png")
+    assert "cannot write" in refused(
+        capfd, "decompose", ball_photo(tmp_path), "-o", place / "result"
+    )
+    assert "cannot" in refused(
+        capfd, "mask", ball_photo(tmp_path), "--box", "5,5,44,42", "-o", place / "mask.png"
+    )
 
 
 @pytest.fixture
@@ -203,9 +247,15 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
         subprocess.run(["umount", str(place)], capture_output=True, check=True)
 
 
-@pytest.mark.parametrize("command", [("decompose", "--model", "naive"), ("separate", "--method", "none")], ids=["decompose", "separate"])
+@pytest.mark.parametrize(
+    "command",
+    [("decompose", "--model", "naive"), ("separate", "--method", "none")],
+    ids=["decompose", "separate"],
+)
 @pytest.mark.parametrize("kilobytes", [4, 64])
-def test_a_full_disk(tmp_path: Path, small_disk: Callable[[int], Path], command: tuple[str, ...], kilobytes: int) -> None:
+def test_a_full_disk(
+    tmp_path: Path, small_disk: Callable[[int], Path], command: tuple[str, ...], kilobytes: int
+) -> None:
     place = small_disk(kilobytes)
     done = run_isc(*command, ball_photo(tmp_path), "--quiet", "-o", place / "result")
     assert done.returncode == 2, done.stderr
@@ -214,15 +264,26 @@ def test_a_full_disk(tmp_path: Path, small_disk: Callable[[int], Path], command:
 
 
 def test_a_disk_that_fills_up_while_writing(tmp_path: Path) -> None:
-    """A limit on the size of files fails in the same place as a disk that fills up, and needs no rights."""
+    """A limit on the size of files fails in the same place as a disk that fills up, and needs no
+    rights.
+    """
     limit = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))"
-    done = run_isc("decompose", ball_photo(tmp_path), "--model", "naive", "--quiet", "-o", tmp_path / "result", before=limit)
+    done = run_isc(
+        "decompose",
+        ball_photo(tmp_path),
+        "--model",
+        "naive",
+        "--quiet",
+        "-o",
+        tmp_path / "result",
+        before=limit,
+    )
     assert done.returncode == 2, done.stderr
     assert "cannot write" in one_line(done.stderr)
     assert [entry.name for entry in tmp_path.iterdir()] == ["ball.png"]
 
 
-# --- options ----------------------------------------------------------------------------------------------------------------------------
+# --- options --------------------------------------------------------------------------------------
 
 DECOMPOSE = ("decompose", "PHOTO", "-o", "OUT")
 MASK = ("mask", "PHOTO", "-o", "OUT.png")
@@ -252,7 +313,11 @@ OPTIONS = [
     (("separate", "PHOTO", "-o", "OUT"), ("--method", "guess"), "shen_2013"),
     (("separate", "PHOTO", "-o", "OUT"), ("--prior", "nothing.png"), "no such file"),
     (("separate", "PHOTO", "-o", "OUT"), ("--prior",), "--prior"),
-    (("separate", "PHOTO", "--method", "shen_2013", "--prior", "PHOTO", "-o", "OUT"), (), "--prior is for the method isc alone"),
+    (
+        ("separate", "PHOTO", "--method", "shen_2013", "--prior", "PHOTO", "-o", "OUT"),
+        (),
+        "--prior is for the method isc alone",
+    ),
     (MASK, ("--box", "1,2,3"), "x,y,w,h"),
     (MASK, ("--box", "a,b,c,d"), "x,y,w,h"),
     (MASK, ("--box", "40,40,400,400"), "inside"),
@@ -263,13 +328,25 @@ OPTIONS = [
     (("evaluate", "NOWHERE"), ("--dataset", "mit-berkeley", "--model", "guess"), "joint"),
     (("evaluate", "NOWHERE"), ("--dataset", "mit-berkeley", "--objects", ","), "--objects"),
     (("fit-priors", "NOWHERE", "-o", "OUT.npz"), (), "MIT-Berkeley"),
-    (("fit-priors", "NOWHERE", "-o", "OUT.npz"), ("--objects", "a,b", "--leave-out", "c"), "not allowed"),
+    (
+        ("fit-priors", "NOWHERE", "-o", "OUT.npz"),
+        ("--objects", "a,b", "--leave-out", "c"),
+        "not allowed",
+    ),
 ]
 
 
-@pytest.mark.parametrize(("command", "options", "words"), OPTIONS, ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
+@pytest.mark.parametrize(
+    ("command", "options", "words"),
+    OPTIONS,
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
 def test_an_option_that_means_nothing(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], command: tuple[str, ...], options: tuple[str, ...], words: str
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    command: tuple[str, ...],
+    options: tuple[str, ...],
+    words: str,
 ) -> None:
     places = {"PHOTO": ball_photo(tmp_path), "NOWHERE": tmp_path / "nowhere"}
     places |= {name: tmp_path / "made" / name for name in ("OUT", "OUT.png", "OUT.jpg", "OUT.npz")}
@@ -278,10 +355,12 @@ def test_an_option_that_means_nothing(
     assert [entry.name for entry in tmp_path.iterdir()] == ["ball.png"]
 
 
-# --- what is known beforehand -----------------------------------------------------------------------------------------------------------
+# --- what is known beforehand ---------------------------------------------------------------------
 
 
-def saved(name: str, array: np.ndarray, *, pickled: bool = False) -> Callable[[Path, tuple[int, ...]], Path]:
+def saved(
+    name: str, array: np.ndarray, *, pickled: bool = False
+) -> Callable[[Path, tuple[int, ...]], Path]:
     def make(folder: Path, shape: tuple[int, ...]) -> Path:
         np.save(folder / name, array, allow_pickle=pickled)
         return folder / name
@@ -319,7 +398,11 @@ EVIDENCE = {
     "shape with a hole": ("--shape", with_hole, "--depth"),
     "shape of 8 bits": ("--shape", eight_bits, "16"),
     "shape of three numbers a pixel": ("--shape", saved("cube.npy", np.zeros((9, 9, 3))), "(H, W)"),
-    "shape of objects": ("--shape", saved("object.npy", np.array([[{}]], dtype=object), pickled=True), "objects"),
+    "shape of objects": (
+        "--shape",
+        saved("object.npy", np.array([[{}]], dtype=object), pickled=True),
+        "objects",
+    ),
     "shape cut short": ("--shape", written("cut.npy", b"\x93NUMPY\x01\x00v"), "damaged"),
     "shape that is no result": ("--shape", lambda folder, shape: folder, "not a result folder"),
     "depth of holes": ("--depth", of_shape(np.nan), "holes"),
@@ -327,15 +410,25 @@ EVIDENCE = {
     "depth that is text": ("--depth", written("depth.png", b"deep\n"), "not an image"),
     "light missing": ("--light", lambda folder, shape: folder / "nowhere.json", "No such file"),
     "light that is text": ("--light", written("light.json", b"bright\n"), "JSON"),
-    "light of 9 numbers": ("--light", written("light.json", b"[1, 2, 3, 4, 5, 6, 7, 8, 9]"), "9 lists of 3"),
-    "light without end": ("--light", written("light.json", str([[float("nan")] * 3] * 9).replace("nan", "NaN").encode()), "9 lists of 3"),
+    "light of 9 numbers": (
+        "--light",
+        written("light.json", b"[1, 2, 3, 4, 5, 6, 7, 8, 9]"),
+        "9 lists of 3",
+    ),
+    "light without end": (
+        "--light",
+        written("light.json", str([[float("nan")] * 3] * 9).replace("nan", "NaN").encode()),
+        "9 lists of 3",
+    ),
     "priors that are text": ("--priors", written("priors.npz", b"likely\n"), "priors"),
     "priors missing": ("--priors", lambda folder, shape: folder / "nowhere.npz", "No such file"),
 }
 
 
 @pytest.mark.parametrize("case", EVIDENCE)
-def test_evidence_that_cannot_be_used(tmp_path: Path, capfd: pytest.CaptureFixture[str], case: str) -> None:
+def test_evidence_that_cannot_be_used(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], case: str
+) -> None:
     option, make, words = EVIDENCE[case]
     photo = ball_photo(tmp_path)
     path = make(tmp_path, ball_codes().shape[:2])
@@ -344,12 +437,19 @@ def test_evidence_that_cannot_be_used(tmp_path: Path, capfd: pytest.CaptureFixtu
     assert not (tmp_path / "result").exists()
 
 
-def test_a_name_with_a_line_break_stays_on_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    assert "no such file" in refused(capfd, "decompose", tmp_path / "two\nlines.png", "-o", tmp_path / "result")
+def test_a_name_with_a_line_break_stays_on_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert "no such file" in refused(
+        capfd, "decompose", tmp_path / "two\nlines.png", "-o", tmp_path / "result"
+    )
 
 
 def test_the_reference_of_these_tests_is_usable() -> None:
     """If the ball itself were refused, every test above would pass for nothing."""
     codes = ball_codes()
-    assert codes.dtype == np.uint16 and 1000 < np.count_nonzero(codes.max(-1)) < codes.shape[0] * codes.shape[1]
+    assert (
+        codes.dtype == np.uint16
+        and 1000 < np.count_nonzero(codes.max(-1)) < codes.shape[0] * codes.shape[1]
+    )
     assert cv2.__version__

@@ -65,9 +65,15 @@ def bumps() -> Shape:
     height, p, q = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
     for across, up, width, tall in ((-15, 10, 14, 10), (20, -15, 12, 8), (10, 25, 10, -6)):
         hill = tall * np.exp(-((x - across) ** 2 + (y - up) ** 2) / (2 * width**2))
-        height, p, q = height + hill, p - hill * (x - across) / width**2, q - hill * (y - up) / width**2
+        height, p, q = (
+            height + hill,
+            p - hill * (x - across) / width**2,
+            q - hill * (y - up) / width**2,
+        )
     normal = np.stack([-p, -q, np.ones_like(p)], axis=-1)
-    return Shape(height, normal / np.linalg.norm(normal, axis=-1, keepdims=True), np.ones(x.shape, bool))
+    return Shape(
+        height, normal / np.linalg.norm(normal, axis=-1, keepdims=True), np.ones(x.shape, bool)
+    )
 
 
 def light_from(slant: float, tilt: float, length: float = 0.8) -> np.ndarray:
@@ -89,11 +95,18 @@ LIGHTS = [(0, 0), (20, 45), (35, 135), (45, -60)]
 @pytest.mark.parametrize(("slant", "tilt"), LIGHTS)
 def test_ikeuchi_horn_recovers_a_hemisphere(slant: float, tilt: float) -> None:
     shape = hemisphere()
-    for light in (light_from(slant, tilt), estimate_light(shape.lit(light_from(slant, tilt)), shape.mask)):
-        height = ikeuchi_horn_1981.height_from_brightness(shape.lit(light_from(slant, tilt)), shape.mask, light)
+    for light in (
+        light_from(slant, tilt),
+        estimate_light(shape.lit(light_from(slant, tilt)), shape.mask),
+    ):
+        height = ikeuchi_horn_1981.height_from_brightness(
+            shape.lit(light_from(slant, tilt)), shape.mask, light
+        )
         assert shape.normal_error(height) < 0.3 * shape.flat_error
         assert shape.correlation(height) > 0.95
-        assert np.std(height[shape.mask]) == pytest.approx(np.std(shape.height[shape.mask]), rel=0.45)
+        assert np.std(height[shape.mask]) == pytest.approx(
+            np.std(shape.height[shape.mask]), rel=0.45
+        )
 
 
 @pytest.mark.parametrize(("slant", "tilt"), LIGHTS[1:])
@@ -106,7 +119,9 @@ def test_ikeuchi_horn_finds_bumps_without_a_contour(slant: float, tilt: float) -
 
 @pytest.mark.parametrize("make", [hemisphere, bumps])
 @pytest.mark.parametrize(("slant", "tilt"), LIGHTS[2:])
-def test_tsai_shah_beats_flat_under_slanted_light(make: Callable[[], Shape], slant: float, tilt: float) -> None:
+def test_tsai_shah_beats_flat_under_slanted_light(
+    make: Callable[[], Shape], slant: float, tilt: float
+) -> None:
     shape, light = make(), light_from(slant, tilt)
     height = tsai_shah_1994.height_from_brightness(shape.lit(light), shape.mask, light)
     assert shape.normal_error(height) < 0.8 * shape.flat_error
@@ -140,7 +155,10 @@ def test_integration_is_exact_for_a_surface_and_separate_for_parts() -> None:
     down[:-1][mask[1:] & mask[:-1]] = np.diff(wanted, axis=0)[mask[1:] & mask[:-1]]
     found = integrate(right, down, mask, tolerance=1e-10)
     assert not found[~mask].any() and found[60, 2] == pytest.approx(0)
-    for part in (mask & (columns < 75) & (rows != 60) | (mask & (columns > 3) & (columns < 75)), mask & (columns >= 75)):
+    for part in (
+        mask & (columns < 75) & (rows != 60) | (mask & (columns > 3) & (columns < 75)),
+        mask & (columns >= 75),
+    ):
         part_wanted = wanted[part] - wanted[part].mean(axis=0)
         assert np.abs(found[part] - part_wanted).max() < 1e-6 * np.abs(part_wanted).max()
     assert np.allclose(integrate(right[..., 1], down[..., 1], mask, tolerance=1e-10), found[..., 1])
@@ -155,7 +173,8 @@ def test_integration_minimises_the_squares() -> None:
     def misfit(z: np.ndarray) -> float:
         horizontal, vertical = mask[:, 1:] & mask[:, :-1], mask[1:] & mask[:-1]
         return float(
-            ((np.diff(z, axis=1) - right[:, :-1])[horizontal] ** 2).sum() + ((np.diff(z, axis=0) - down[:-1])[vertical] ** 2).sum()
+            ((np.diff(z, axis=1) - right[:, :-1])[horizontal] ** 2).sum()
+            + ((np.diff(z, axis=0) - down[:-1])[vertical] ** 2).sum()
         )
 
     best = integrate(right, down, mask, tolerance=1e-10)
@@ -172,7 +191,9 @@ def test_integration_is_the_same_on_any_number_of_threads_and_for_tiny_steps() -
         with threadpool_limits(threads):
             found.append(integrate(right, down, mask))
     np.testing.assert_array_equal(*found)
-    np.testing.assert_allclose(integrate(1e-200 * right, 1e-200 * down, mask) * 1e200, found[0], atol=1e-9)
+    np.testing.assert_allclose(
+        integrate(1e-200 * right, 1e-200 * down, mask) * 1e200, found[0], atol=1e-9
+    )
 
 
 def test_fit_light_returns_the_light_that_was_used() -> None:
@@ -181,7 +202,9 @@ def test_fit_light_returns_the_light_that_was_used() -> None:
     log_shading = reference_basis(shape.normal) @ light
     reference = normal_to_reference(shape.normal)
     assert np.abs(fit_light(log_shading, reference, shape.mask, ridge=1e-10) - light).max() < 1e-5
-    misfit = log_shading - reference_basis(shape.normal) @ fit_light(log_shading, reference, shape.mask)
+    misfit = log_shading - reference_basis(shape.normal) @ fit_light(
+        log_shading, reference, shape.mask
+    )
     assert np.std(misfit[shape.mask]) < 0.05 * np.std(log_shading[shape.mask])
 
 
@@ -205,7 +228,9 @@ def test_retinex_takes_paint_off_the_shading() -> None:
     found = retinex.log_shading(log_image, shape.mask)
     for channel in range(3):
         # What a best level leaves, for the method and for the photo itself taken as shading.
-        error, photo_error = (np.std((guess[..., channel] - truth)[shape.mask]) for guess in (found, log_image))
+        error, photo_error = (
+            np.std((guess[..., channel] - truth)[shape.mask]) for guess in (found, log_image)
+        )
         assert error < 0.2 * min(photo_error, float(truth.std()))
 
 
@@ -213,7 +238,9 @@ def test_retinex_leaves_the_overall_colour_in_the_reflectance() -> None:
     log_image, _ = painted(hemisphere(), light_from(20, 45))
     mask = hemisphere().mask
     tinted = log_image + np.log([3.0, 1.0, 0.2])
-    assert np.allclose(retinex.log_shading(tinted, mask), retinex.log_shading(log_image, mask), atol=1e-8)
+    assert np.allclose(
+        retinex.log_shading(tinted, mask), retinex.log_shading(log_image, mask), atol=1e-8
+    )
 
 
 def test_retinex_keeps_the_shape_that_paint_hides_from_plain_shading() -> None:
@@ -230,7 +257,9 @@ def test_empty_background_changes_nothing(method: str) -> None:
     mask = hemisphere().mask
     plain = baselines.estimate(method, log_image, mask)
     pads = [(11, 30), (0, 7)]
-    wide = baselines.estimate(method, np.pad(log_image, [*pads, (0, 0)], constant_values=-3.0), np.pad(mask, pads))
+    wide = baselines.estimate(
+        method, np.pad(log_image, [*pads, (0, 0)], constant_values=-3.0), np.pad(mask, pads)
+    )
     inner = (slice(11, 11 + SIZE), slice(0, SIZE))
     assert np.allclose(wide.height[inner][mask], plain.height[mask], atol=1e-9)
     assert np.allclose(wide.log_shading[inner], plain.log_shading, atol=1e-9)
@@ -264,10 +293,20 @@ def odd_masks() -> list[np.ndarray]:
 @pytest.mark.parametrize("mask", odd_masks())
 @pytest.mark.parametrize("spread", [0.0, 3.0])
 def test_odd_masks_give_finite_answers(method: str, mask: np.ndarray, spread: float) -> None:
-    log_image = np.where(mask[..., None], -9 + spread * np.random.default_rng(1).random((*mask.shape, 3)), np.nan)
+    log_image = np.where(
+        mask[..., None], -9 + spread * np.random.default_rng(1).random((*mask.shape, 3)), np.nan
+    )
     answer = baselines.estimate(method, log_image, mask)
-    assert answer.height.shape == mask.shape and answer.log_shading.shape == (*mask.shape, 3) and answer.light.shape == (9, 3)
-    assert np.isfinite(answer.height).all() and np.isfinite(answer.log_shading).all() and np.isfinite(answer.light).all()
+    assert (
+        answer.height.shape == mask.shape
+        and answer.log_shading.shape == (*mask.shape, 3)
+        and answer.light.shape == (9, 3)
+    )
+    assert (
+        np.isfinite(answer.height).all()
+        and np.isfinite(answer.log_shading).all()
+        and np.isfinite(answer.light).all()
+    )
 
 
 def test_box_goes_there_and_back() -> None:

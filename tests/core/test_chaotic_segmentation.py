@@ -1,4 +1,6 @@
-"""Chaotic Segmentation: measured gains, the layers' identities, what it must leave alone, and its options."""
+"""Chaotic Segmentation: measured gains, the layers' identities, what it must leave alone, and its
+options.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -10,29 +12,44 @@ import pytest
 from isc_core.decomposition import Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.separation.chaotic_segmentation import VARIANTS, ChaoticSegmentationOptions, find_specular, separate
+from isc_core.separation.chaotic_segmentation import (
+    VARIANTS,
+    ChaoticSegmentationOptions,
+    find_specular,
+    separate,
+)
 from tests.core.separation_scenes import assert_layers_hold, read
 
 PAPER = VARIANTS["paper"]
 
 
 def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one highlight over both."""
+    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one
+    highlight over both.
+    """
     y, x = np.mgrid[-1:1:90j, -1:1:110j]
     mask = x**2 + y**2 < 0.9
     shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
     specular = 0.5 * np.exp(-((x - 0.05) ** 2 + (y + 0.2) ** 2) / 0.02)
     paint = np.where((x > 0)[..., None], [0.7, 0.25, 0.15], [0.2, 0.6, 0.15])
-    return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
+    return (
+        (paint * shading[..., None] + specular[..., None]) * mask[..., None],
+        specular * mask,
+        mask,
+    )
 
 
 def ratio(split: Separation, image: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
     return float(np.mean((split.diffuse - truth)[mask] ** 2) / np.mean((image - truth)[mask] ** 2))
 
 
-@pytest.mark.parametrize(("name", "improved", "paper"), [("animals", 0.2, 0.65), ("cups", 0.26, 0.55)])
+@pytest.mark.parametrize(
+    ("name", "improved", "paper"), [("animals", 0.2, 0.65), ("cups", 0.26, 0.55)]
+)
 def test_gains_on_photos_with_truth(shared: Path, name: str, improved: float, paper: float) -> None:
-    image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    image, truth = (
+        read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     mask = np.ones(image.shape[:2], bool)
     ours, published = separate(image, mask), separate(image, mask, PAPER)
     assert_layers_hold(ours, image, mask, tinted=True)
@@ -54,7 +71,9 @@ def test_recovers_a_rendered_highlight_across_a_border_of_paints() -> None:
     split = separate(image, mask)
     assert_layers_hold(split, image, mask, tinted=True)
     assert np.ptp(split.specular, axis=2).max() == 0
-    assert np.mean((split.specular[..., 0] - specular)[mask] ** 2) < 0.05 * np.mean(specular[mask] ** 2)
+    assert np.mean((split.specular[..., 0] - specular)[mask] ** 2) < 0.05 * np.mean(
+        specular[mask] ** 2
+    )
 
 
 def test_a_matte_scene_stays_as_it_is() -> None:
@@ -78,7 +97,9 @@ def test_every_optimiser_finds_the_same_pixels(optimiser: str) -> None:
     image, _, mask = glossy_scene()
     for levels in (1, 2, 3):
         chaotic = find_specular(image, mask, replace(PAPER, levels=levels))
-        assert chaotic.any() and np.array_equal(find_specular(image, mask, replace(PAPER, levels=levels, optimiser=optimiser)), chaotic)
+        assert chaotic.any() and np.array_equal(
+            find_specular(image, mask, replace(PAPER, levels=levels, optimiser=optimiser)), chaotic
+        )
 
 
 def test_more_levels_and_higher_thresholds_find_less() -> None:
@@ -118,7 +139,10 @@ def test_grey_photos() -> None:
         separate(ramp, mask)
     assert_layers_hold(separate(ramp, mask, PAPER), ramp, mask, tinted=True)
     flat = np.full((30, 40, 3), 0.5)
-    assert not separate(flat, mask, PAPER).specular.any() and not separate(np.zeros_like(flat), mask, PAPER).specular.any()
+    assert (
+        not separate(flat, mask, PAPER).specular.any()
+        and not separate(np.zeros_like(flat), mask, PAPER).specular.any()
+    )
 
 
 def test_stops_when_asked() -> None:
@@ -132,7 +156,14 @@ def test_stops_when_asked() -> None:
 
 @pytest.mark.parametrize(
     "change",
-    [{"levels": 0}, {"levels": 17}, {"optimiser": "luck"}, {"threshold": 1.0}, {"threshold": 0.0}, {"threshold": float("nan")}]
+    [
+        {"levels": 0},
+        {"levels": 17},
+        {"optimiser": "luck"},
+        {"threshold": 1.0},
+        {"threshold": 0.0},
+        {"threshold": float("nan")},
+    ]
     + [{"rim": -0.1}, {"seed": -1}, {"evaluations": 0}, {"repaint": "gold"}],
 )
 def test_refuses_options_out_of_range(change: dict[str, object]) -> None:

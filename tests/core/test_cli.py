@@ -40,7 +40,7 @@ def isc(*arguments: object) -> int:
     return main([str(argument) for argument in arguments])
 
 
-# --- help -------------------------------------------------------------------------------------------------------------------------------
+# --- help -----------------------------------------------------------------------------------------
 
 
 def test_version(capsys: pytest.CaptureFixture[str]) -> None:
@@ -49,7 +49,9 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_explains_itself_with_an_example(capsys: pytest.CaptureFixture[str], command: str) -> None:
+def test_every_command_explains_itself_with_an_example(
+    capsys: pytest.CaptureFixture[str], command: str
+) -> None:
     assert isc(command, "--help") == 0
     text = capsys.readouterr().out
     assert f"  isc {command} " in text.partition("examples:")[2]
@@ -61,7 +63,9 @@ def test_the_examples_in_the_help_are_commands(capsys: pytest.CaptureFixture[str
     found = []
     for words in ((), *((command,) for command in COMMANDS)):
         isc(*words, "--help")
-        found += re.findall(r"^  isc (\S+ \S.*?)(?:  .*)?$", capsys.readouterr().out.partition("examples:")[2], re.M)
+        found += re.findall(
+            r"^  isc (\S+ \S.*?)(?:  .*)?$", capsys.readouterr().out.partition("examples:")[2], re.M
+        )
     assert len(found) >= 10
     for example in found:
         assert callable(build_parser().parse_args(example.split()).run), example
@@ -72,7 +76,7 @@ def test_the_modules_name_runs_the_command() -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, f"isc {__version__}\n", "")
 
 
-# --- decompose --------------------------------------------------------------------------------------------------------------------------
+# --- decompose ------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -87,32 +91,80 @@ def test_decompose_writes_a_whole_result(result: Path) -> None:
     found = load(result / "result")
     assert found.identity_errors().broken() == ()
     assert found.mask.shape == ball_codes().shape[:2]
-    assert found.provenance.settings["model"] == "joint" and found.provenance.settings["separator"] == BEST
+    assert (
+        found.provenance.settings["model"] == "joint"
+        and found.provenance.settings["separator"] == BEST
+    )
     assert found.provenance.input["name"] == "ball.png"
-    assert {"maps.exr", "decomposition.json", "mesh.glb", "preview.png"} <= {entry.name for entry in (result / "result").iterdir()}
+    assert {"maps.exr", "decomposition.json", "mesh.glb", "preview.png"} <= {
+        entry.name for entry in (result / "result").iterdir()
+    }
     assert sorted(entry.name for entry in result.iterdir()) == ["ball.png", "result"]
 
 
 def test_decompose_passes_the_reference_check(result: Path, shared: Path) -> None:
     checker = shared / "tools" / "check_result.py"
-    done = subprocess.run([sys.executable, str(checker), str(result / "result")], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(checker), str(result / "result")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stdout + done.stderr
 
 
 def test_options_reach_the_result(tmp_path: Path) -> None:
-    options = ["--model", "sirfs", "--illumination", "laboratory", "--max-size", "30", "--seed", "5", "--threads", "1", "--engine", "numpy"]
-    assert isc("decompose", ball_photo(tmp_path), *options, "--transfer", "linear", "--quiet", "-o", tmp_path / "out") == 0
+    options = [
+        "--model",
+        "sirfs",
+        "--illumination",
+        "laboratory",
+        "--max-size",
+        "30",
+        "--seed",
+        "5",
+        "--threads",
+        "1",
+        "--engine",
+        "numpy",
+    ]
+    assert (
+        isc(
+            "decompose",
+            ball_photo(tmp_path),
+            *options,
+            "--transfer",
+            "linear",
+            "--quiet",
+            "-o",
+            tmp_path / "out",
+        )
+        == 0
+    )
     p = load(tmp_path / "out").provenance
-    expected = {"model": "sirfs", "illumination": "laboratory", "max_size": 30, "threads": 1, "engine": "numpy"}
+    expected = {
+        "model": "sirfs",
+        "illumination": "laboratory",
+        "max_size": 30,
+        "threads": 1,
+        "engine": "numpy",
+    }
     assert {name: p.settings[name] for name in expected} == expected
     assert p.seed == 5
     assert p.input["transfer"] == "linear"
     assert max(p.input["crop_box"][2:]) <= 30
 
 
-def test_the_same_command_gives_the_same_bytes_on_any_number_of_threads(result: Path, tmp_path: Path) -> None:
-    assert isc("decompose", result / "ball.png", "--threads", "1", "--quiet", "-o", tmp_path / "again") == 0
-    assert (tmp_path / "again" / "maps.exr").read_bytes() == (result / "result" / "maps.exr").read_bytes()
+def test_the_same_command_gives_the_same_bytes_on_any_number_of_threads(
+    result: Path, tmp_path: Path
+) -> None:
+    assert (
+        isc("decompose", result / "ball.png", "--threads", "1", "--quiet", "-o", tmp_path / "again")
+        == 0
+    )
+    assert (tmp_path / "again" / "maps.exr").read_bytes() == (
+        result / "result" / "maps.exr"
+    ).read_bytes()
 
 
 def test_an_earlier_result_is_replaced(tmp_path: Path) -> None:
@@ -134,7 +186,7 @@ def test_what_is_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> N
     assert (printed.out, printed.err) == ("", "")
 
 
-# --- what is known beforehand -----------------------------------------------------------------------------------------------------------
+# --- what is known beforehand ---------------------------------------------------------------------
 
 
 def test_a_known_shape_and_a_known_light_are_kept(tmp_path: Path) -> None:
@@ -145,26 +197,60 @@ def test_a_known_shape_and_a_known_light_are_kept(tmp_path: Path) -> None:
     write_channels(tmp_path / "shape.exr", {"Z": np.where(mask, height, np.nan)})
     (tmp_path / "light.json").write_text(json.dumps({"coefficients": LIGHT.tolist()}))
     known = ["--shape", tmp_path / "shape.exr", "--light", tmp_path / "light.json"]
-    assert isc("decompose", photo, "--model", "sirfs", *known, "--quiet", "-o", tmp_path / "out") == 0
+    assert (
+        isc("decompose", photo, "--model", "sirfs", *known, "--quiet", "-o", tmp_path / "out") == 0
+    )
     found = load(tmp_path / "out")
     np.testing.assert_allclose(found.illumination, LIGHT, atol=1e-9)
     np.testing.assert_allclose(found.height[mask], (height - height[mask].min())[mask], atol=1e-4)
 
 
 def test_a_known_shape_goes_on_beyond_its_rim(tmp_path: Path) -> None:
-    """Nothing outside the mask is read: on a slanted plane even the normals at the rim are the plane's."""
+    """Nothing outside the mask is read: on a slanted plane even the normals at the rim are the
+    plane's.
+    """
     photo = ball_photo(tmp_path)
     mask = read_photo(photo).mask
     rows, columns = np.indices(mask.shape)
     np.save(tmp_path / "plane.npy", np.where(mask, 0.5 * columns - 0.25 * rows, -1000.0))
-    assert isc("decompose", photo, "--model", "sirfs", "--shape", tmp_path / "plane.npy", "--quiet", "-o", tmp_path / "out") == 0
+    assert (
+        isc(
+            "decompose",
+            photo,
+            "--model",
+            "sirfs",
+            "--shape",
+            tmp_path / "plane.npy",
+            "--quiet",
+            "-o",
+            tmp_path / "out",
+        )
+        == 0
+    )
     expected = np.array([-0.5, -0.25, 1.0]) / np.linalg.norm([-0.5, -0.25, 1.0])
-    np.testing.assert_allclose(load(tmp_path / "out").normal[mask], np.broadcast_to(expected, (int(mask.sum()), 3)), atol=0.02)
+    np.testing.assert_allclose(
+        load(tmp_path / "out").normal[mask],
+        np.broadcast_to(expected, (int(mask.sum()), 3)),
+        atol=0.02,
+    )
 
 
 def test_the_result_of_a_run_is_a_known_shape_for_the_next(result: Path, tmp_path: Path) -> None:
     folder = result / "result"
-    assert isc("decompose", result / "ball.png", "--shape", folder, "--light", folder, "--quiet", "-o", tmp_path / "out") == 0
+    assert (
+        isc(
+            "decompose",
+            result / "ball.png",
+            "--shape",
+            folder,
+            "--light",
+            folder,
+            "--quiet",
+            "-o",
+            tmp_path / "out",
+        )
+        == 0
+    )
     before, after = load(folder), load(tmp_path / "out")
     np.testing.assert_array_equal(after.height, before.height)
     np.testing.assert_allclose(after.illumination, before.illumination, atol=1e-9)
@@ -205,7 +291,9 @@ def test_a_height_map_means_the_same_in_every_format(tmp_path: Path, kind: str) 
 
 def test_the_height_scale_is_the_unit(tmp_path: Path) -> None:
     np.save(tmp_path / "distance.npy", np.array([[1, 2], [3, 4]]))
-    np.testing.assert_array_equal(read_height(tmp_path / "distance.npy", (2, 2), -0.5), [[-0.5, -1.0], [-1.5, -2.0]])
+    np.testing.assert_array_equal(
+        read_height(tmp_path / "distance.npy", (2, 2), -0.5), [[-0.5, -1.0], [-1.5, -2.0]]
+    )
     write_image(tmp_path / "codes.png", np.arange(64 * 64, dtype=np.uint16).reshape(64, 64))
     assert read_height(tmp_path / "codes.png", (64, 64), 2.0)[0, 3] == 6.0
 
@@ -219,18 +307,25 @@ def test_a_height_map_that_cannot_be_chosen(tmp_path: Path) -> None:
 @pytest.mark.parametrize("shape", ["plain", "coefficients", "decomposition"])
 def test_a_light_is_read_from_what_people_have(tmp_path: Path, shape: str) -> None:
     plain = LIGHT.tolist()
-    forms = {"plain": plain, "coefficients": {"coefficients": plain}, "decomposition": {"illumination": {"coefficients": plain}}}
+    forms = {
+        "plain": plain,
+        "coefficients": {"coefficients": plain},
+        "decomposition": {"illumination": {"coefficients": plain}},
+    }
     (tmp_path / "decomposition.json").write_text(json.dumps(forms[shape]))
     np.testing.assert_array_equal(read_light(tmp_path / "decomposition.json"), LIGHT)
     np.testing.assert_array_equal(read_light(tmp_path), LIGHT)
 
 
-# --- the other commands -----------------------------------------------------------------------------------------------------------------
+# --- the other commands ---------------------------------------------------------------------------
 
 
 def disc_photo(folder: Path) -> Path:
     """A disc of three strong paints with three highlights, a 16-bit PNG; nothing is clipped."""
-    return write_image(folder / "disc.png", np.rint(65535 * np.clip(linear_to_srgb(0.7 * glossy_disc()[0]), 0, 1)).astype(np.uint16))
+    return write_image(
+        folder / "disc.png",
+        np.rint(65535 * np.clip(linear_to_srgb(0.7 * glossy_disc()[0]), 0, 1)).astype(np.uint16),
+    )
 
 
 def layer(maps: dict[str, np.ndarray], name: str) -> np.ndarray:
@@ -250,25 +345,39 @@ def test_separate_adds_up(tmp_path: Path) -> None:
 
 def test_separate_uses_the_best_method_unless_told(tmp_path: Path) -> None:
     photo = disc_photo(tmp_path)
-    for folder, words in (("usual", ()), ("best", ("--method", BEST)), ("other", ("--method", "none"))):
+    for folder, words in (
+        ("usual", ()),
+        ("best", ("--method", BEST)),
+        ("other", ("--method", "none")),
+    ):
         assert isc("separate", photo, *words, "--quiet", "-o", tmp_path / folder) == 0
-    usual, best, other = (layer(read_channels(tmp_path / name / "separation.exr"), "specular") for name in ("usual", "best", "other"))
+    usual, best, other = (
+        layer(read_channels(tmp_path / name / "separation.exr"), "specular")
+        for name in ("usual", "best", "other")
+    )
     assert np.array_equal(usual, best) and usual.max() > 0.2 and not other.any()
 
 
 def grey_ball(folder: Path) -> Path:
-    return write_image(folder / "grey.png", np.repeat(ball_codes().mean(axis=-1, keepdims=True), 3, axis=-1).astype(np.uint16))
+    return write_image(
+        folder / "grey.png",
+        np.repeat(ball_codes().mean(axis=-1, keepdims=True), 3, axis=-1).astype(np.uint16),
+    )
 
 
 def test_grey_photos_are_separated_into_themselves(tmp_path: Path) -> None:
     photo = grey_ball(tmp_path)
     assert isc("separate", photo, "--quiet", "-o", tmp_path / "out") == 0
     maps, original = read_channels(tmp_path / "out" / "separation.exr"), read_photo(photo)
-    np.testing.assert_allclose(layer(maps, "diffuse")[original.mask], original.image[original.mask], atol=1e-6)
+    np.testing.assert_allclose(
+        layer(maps, "diffuse")[original.mask], original.image[original.mask], atol=1e-6
+    )
     assert not layer(maps, "specular")[~original.clipped].any()
 
 
-def test_a_photo_that_is_left_alone_is_said_to_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_photo_that_is_left_alone_is_said_to_be(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert isc("separate", grey_ball(tmp_path), "-o", tmp_path / "grey") == 0
     assert "no colour" in capsys.readouterr().err
     assert isc("separate", ball_photo(tmp_path), "--method", "none", "-o", tmp_path / "same") == 0
@@ -279,7 +388,9 @@ def test_grey_photos_are_decomposed(tmp_path: Path) -> None:
     photo = grey_ball(tmp_path)
     assert isc("decompose", photo, "--quiet", "-o", tmp_path / "joint") == 0
     assert load(tmp_path / "joint").identity_errors().broken() == ()
-    assert isc("decompose", photo, "--model", "mdr", "--quiet", "-o", tmp_path / "out") == 0  # by colour alone, and there is none
+    assert (
+        isc("decompose", photo, "--model", "mdr", "--quiet", "-o", tmp_path / "out") == 0
+    )  # by colour alone, and there is none
     found = load(tmp_path / "out")
     assert found.identity_errors().broken() == ()
     unclipped = found.mask & ~read_photo(photo).clipped
@@ -290,27 +401,43 @@ def test_a_prior_says_where_highlights_can_be(tmp_path: Path) -> None:
     """Black: nowhere; middle grey: nothing is said; the left half black: on the right alone."""
     photo = disc_photo(tmp_path)
     half = np.full((96, 120), 32768, np.uint16)
-    priors = {"black": 0 * half, "middle": half, "right": np.where(np.arange(120) < 60, 0, half).astype(np.uint16)}
+    priors = {
+        "black": 0 * half,
+        "middle": half,
+        "right": np.where(np.arange(120) < 60, 0, half).astype(np.uint16),
+    }
     assert isc("separate", photo, "--quiet", "-o", tmp_path / "usual") == 0
     for name, codes in priors.items():
         prior = write_image(tmp_path / f"{name}.png", codes)
         assert isc("separate", photo, "--prior", prior, "--quiet", "-o", tmp_path / name) == 0
     usual, black, middle, right = (
-        layer(read_channels(tmp_path / name / "separation.exr"), "specular") for name in ("usual", "black", "middle", "right")
+        layer(read_channels(tmp_path / name / "separation.exr"), "specular")
+        for name in ("usual", "black", "middle", "right")
     )
-    assert usual[:, :60].max() > 0.2 and not black.any() and np.abs(middle - usual).max() < 1e-3 * usual.max()
+    assert (
+        usual[:, :60].max() > 0.2
+        and not black.any()
+        and np.abs(middle - usual).max() < 1e-3 * usual.max()
+    )
     assert not right[:, :60].any() and np.array_equal(right[:, 60:], middle[:, 60:])
 
 
-def test_a_prior_of_another_size_is_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_prior_of_another_size_is_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     prior = write_image(tmp_path / "prior.png", np.full((96, 119), 128, np.uint8))
     assert isc("separate", disc_photo(tmp_path), "--prior", prior, "-o", tmp_path / "out") == 2
     error = capfd.readouterr().err
-    assert "prior.png: the prior must have the photo's size (96, 120), not (96, 119)" in error and error.count("\n") == 1
+    assert (
+        "prior.png: the prior must have the photo's size (96, 120), not (96, 119)" in error
+        and error.count("\n") == 1
+    )
     assert not (tmp_path / "out").exists()
 
 
-def test_separate_takes_the_whole_frame_where_nothing_marks_the_object(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_separate_takes_the_whole_frame_where_nothing_marks_the_object(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     photo = write_image(tmp_path / "full.png", ball_codes() // 2 + 9000)
     assert isc("separate", photo, "--method", "none", "-o", tmp_path / "out") == 0
     assert "isc: note: there is no mask" in capfd.readouterr().err
@@ -328,19 +455,39 @@ def test_mask_finds_the_ball_in_its_box(tmp_path: Path, capfd: pytest.CaptureFix
     assert (found & truth).sum() / (found | truth).sum() > 0.9
 
 
-def test_evaluate_scores_and_writes(shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_evaluate_scores_and_writes(
+    shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     root = shared / "data" / "mit_berkeley_train"
-    options = ["--dataset", "mit-berkeley", "--objects", "apple", "--model", "naive", "--input", "original"]
-    assert isc("evaluate", root, *options, "--quiet", "--json", tmp_path / "new" / "scores.json") == 0
+    options = [
+        "--dataset",
+        "mit-berkeley",
+        "--objects",
+        "apple",
+        "--model",
+        "naive",
+        "--input",
+        "original",
+    ]
+    assert (
+        isc("evaluate", root, *options, "--quiet", "--json", tmp_path / "new" / "scores.json") == 0
+    )
     scores = json.loads((tmp_path / "new" / "scores.json").read_text())
     assert list(scores["results"]) == ["laboratory/original"]
     average = scores["results"]["laboratory/original"]["apple"]["avg"]
     assert f"{average:.5f}" in capfd.readouterr().out
 
 
-@pytest.mark.parametrize(("model", "light", "input"), [("sirfs", "natural", "diffuse"), ("mdr", "laboratory", "original")])
-def test_what_is_evaluated_explains_the_image(shared: Path, model: str, light: str, input: str) -> None:
-    """Shading times reflectance is the photo, for mdr its diffuse layer, and the surface is not flat."""
+@pytest.mark.parametrize(
+    ("model", "light", "input"),
+    [("sirfs", "natural", "diffuse"), ("mdr", "laboratory", "original")],
+)
+def test_what_is_evaluated_explains_the_image(
+    shared: Path, model: str, light: str, input: str
+) -> None:
+    """Shading times reflectance is the photo, for mdr its diffuse layer, and the surface is not
+    flat.
+    """
     truth = load_object(shared / "data" / "mit_berkeley_train", "apple", light, input)
     answer = make_runner(RunnerOptions(model), shipped_prior_set())(truth, Monitor())
     product = (answer.shading * answer.reflectance)[truth.valid]
@@ -352,20 +499,33 @@ def test_what_is_evaluated_explains_the_image(shared: Path, model: str, light: s
     assert answer.normal[truth.valid][:, 2].min() < 0.5
 
 
-def test_priors_are_fitted_to_the_chosen_objects(shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_priors_are_fitted_to_the_chosen_objects(
+    shared: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     root, path = shared / "data" / "mit_berkeley_train", tmp_path / "priors.npz"
     assert isc("fit-priors", root, "--objects", "box", "-o", path) == 2
     assert "at least two" in capfd.readouterr().err
     left_out = "cup1,dinosaur,panther"
     assert isc("fit-priors", root, "--leave-out", left_out, "--quiet", "-o", path) == 0
-    assert load_prior_set(path).record.objects == ("apple", "box", "frog1", "paper1", "phone", "squirrel", "teabag2")
-    assert isc("decompose", ball_photo(tmp_path), "--priors", path, "--quiet", "-o", tmp_path / "out") == 0
+    assert load_prior_set(path).record.objects == (
+        "apple",
+        "box",
+        "frog1",
+        "paper1",
+        "phone",
+        "squirrel",
+        "teabag2",
+    )
+    assert (
+        isc("decompose", ball_photo(tmp_path), "--priors", path, "--quiet", "-o", tmp_path / "out")
+        == 0
+    )
     assert isc("fit-priors", root, "--leave-out", "teapot", "-o", tmp_path / "new.npz") == 2
     assert "unknown object 'teapot'" in capfd.readouterr().err
     assert not (tmp_path / "new.npz").exists()
 
 
-# --- stopping ---------------------------------------------------------------------------------------------------------------------------
+# --- stopping -------------------------------------------------------------------------------------
 
 CTRL_C_WORKS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 
@@ -373,8 +533,12 @@ CTRL_C_WORKS = "import signal; signal.signal(signal.SIGINT, signal.default_int_h
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_stop_during_the_solve_leaves_nothing(tmp_path: Path, number: signal.Signals) -> None:
     photo = ball_photo(tmp_path, 110.0)
-    command = isc_command("decompose", photo, "--engine", "numpy", "-o", tmp_path / "new" / "out", before=CTRL_C_WORKS)
-    with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+    command = isc_command(
+        "decompose", photo, "--engine", "numpy", "-o", tmp_path / "new" / "out", before=CTRL_C_WORKS
+    )
+    with subprocess.Popen(
+        command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
         assert process.stderr is not None
         stages = []
         for line in process.stderr:
@@ -421,7 +585,11 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
 
 def test_the_command_also_runs_outside_the_main_thread(tmp_path: Path) -> None:
     photo, codes = ball_photo(tmp_path), []
-    thread = threading.Thread(target=lambda: codes.append(isc("separate", photo, "--method", "none", "--quiet", "-o", tmp_path / "out")))
+    thread = threading.Thread(
+        target=lambda: codes.append(
+            isc("separate", photo, "--method", "none", "--quiet", "-o", tmp_path / "out")
+        )
+    )
     thread.start()
     thread.join()
     assert codes == [0]
@@ -429,16 +597,25 @@ def test_the_command_also_runs_outside_the_main_thread(tmp_path: Path) -> None:
 
 def test_a_reader_that_goes_away_is_no_error() -> None:
     pipe = f"{sys.executable} -m isc_core decompose --help | true; exit ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", pipe], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        ["bash", "-c", pipe], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode in (0, 1)
     assert done.stderr == ""
 
 
 @pytest.mark.parametrize(
-    ("error", "words"), [(MemoryError(), "memory"), (OSError(5, "Input/output error", "disk"), "disk: Input/output error")]
+    ("error", "words"),
+    [
+        (MemoryError(), "memory"),
+        (OSError(5, "Input/output error", "disk"), "disk: Input/output error"),
+    ],
 )
 def test_trouble_with_the_machine_is_one_line(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], error: BaseException, words: str
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    words: str,
 ) -> None:
     def fail(arguments: list[str], speaker: object) -> int:
         raise error
@@ -449,13 +626,15 @@ def test_trouble_with_the_machine_is_one_line(
     assert words in text and text.count("\n") == 1
 
 
-# --- the terminal -----------------------------------------------------------------------------------------------------------------------
+# --- the terminal ---------------------------------------------------------------------------------
 
 
 def through_terminal(script: str) -> str:
     """What a Python script writes when its standard error is a terminal."""
     parent, child = pty.openpty()
-    with subprocess.Popen([sys.executable, "-c", script], cwd=ROOT, stderr=child, env={**os.environ, "COLUMNS": "80"}) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", script], cwd=ROOT, stderr=child, env={**os.environ, "COLUMNS": "80"}
+    ) as process:
         os.close(child)
         written = b""
         while True:
@@ -503,18 +682,31 @@ def test_a_file_gets_a_line_for_each_stage(tmp_path: Path) -> None:
     assert (tmp_path / "log").read_text() == "isc: shape and light\nisc: maps\n"
 
 
-# --- compiled kernels -------------------------------------------------------------------------------------------------------------------
+# --- compiled kernels -----------------------------------------------------------------------------
 
 
 def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
-    """Numba refuses functions that it cannot cache; here it is forbidden every folder but one that is named, and none is."""
+    """Numba refuses functions that it cannot cache; here it is forbidden every folder but one that
+    is named, and none is.
+    """
     pytest.importorskip("numba")
     check = (
         "import os, numba; from isc_core.compiled import ensure_cache_folder; ensure_cache_folder()\n"
         "from isc_core.sirfs import kernels; print(kernels.forward_rows.stats.cache_path)"
     )
-    environment = {**os.environ, "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator", "TMPDIR": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", check], cwd=ROOT, env=environment, capture_output=True, text=True, check=False)
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_LOCATOR_CLASSES": "UserProvidedCacheLocator",
+        "TMPDIR": str(tmp_path),
+    }
+    done = subprocess.run(
+        [sys.executable, "-c", check],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(str(tmp_path))
     assert not list(tmp_path.iterdir())

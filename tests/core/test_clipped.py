@@ -13,14 +13,24 @@ from tests.core.separation_scenes import glossy_disc, highlight_photo, psnr
 
 
 def clipped_disc(gain: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Recorded image, true diffuse, true specular (H, W), mask and clipped map of a disc with highlights, full at 1."""
+    """Recorded image, true diffuse, true specular (H, W), mask and clipped map of a disc with
+    highlights, full at 1.
+    """
     image, diffuse, mask = glossy_disc()
     bright = gain * image
-    return np.minimum(bright, 1), gain * diffuse, gain * (image - diffuse)[..., 0], mask, (bright >= 1).any(axis=2)
+    return (
+        np.minimum(bright, 1),
+        gain * diffuse,
+        gain * (image - diffuse)[..., 0],
+        mask,
+        (bright >= 1).any(axis=2),
+    )
 
 
 def explained(specular: np.ndarray, gain: float) -> tuple[Separation, np.ndarray, np.ndarray]:
-    """The split of the clipped disc where `specular` was found outside the clipped pixels, with the image and the clipped map."""
+    """The split of the clipped disc where `specular` was found outside the clipped pixels, with the
+    image and the clipped map.
+    """
     image, _, _, mask, clipped = clipped_disc(gain)
     return white_layers(image, mask, np.where(clipped, 0, specular), clipped), image, clipped
 
@@ -30,7 +40,9 @@ def test_cores_of_highlights_are_recovered(gain: float) -> None:
     image, diffuse, specular, mask, clipped = clipped_disc(gain)
     assert clipped.sum() > 50
     split, _, _ = explained(specular, gain)
-    assert np.sqrt(np.mean((split.specular[..., 0] - specular)[clipped] ** 2)) < 0.15 * specular.max()
+    assert (
+        np.sqrt(np.mean((split.specular[..., 0] - specular)[clipped] ** 2)) < 0.15 * specular.max()
+    )
     assert np.abs(split.diffuse - np.minimum(diffuse, 1))[clipped].mean() < 0.06
     total = split.diffuse + split.specular + split.residual
     assert np.abs(total - image)[mask].max() < 1e-6 and not split.confidence[clipped].any()
@@ -64,7 +76,10 @@ def test_knowing_what_is_clipped_does_no_harm(shared: Path, method: str) -> None
     photo = read_photo(shared / "data/highlight/animals.bmp", transfer="linear", whole_frame=True)
     truth = highlight_photo(shared, "animals")[1]
     assert photo.clipped.any()
-    blind, told = (psnr(separate(method, photo.image, photo.mask, clipped), truth) for clipped in (None, photo.clipped))
+    blind, told = (
+        psnr(separate(method, photo.image, photo.mask, clipped), truth)
+        for clipped in (None, photo.clipped)
+    )
     assert told >= blind - 0.02
 
 

@@ -1,4 +1,6 @@
-"""Coherency Sensitive Hashing: matches near the exhaustive optimum, exact distances, and only sources that are allowed."""
+"""Coherency Sensitive Hashing: matches near the exhaustive optimum, exact distances, and only
+sources that are allowed.
+"""
 
 import numpy as np
 import pytest
@@ -6,7 +8,13 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.inpainting import walsh_hadamard
-from isc_core.inpainting.coherency_sensitive_hashing import CshOptions, CshSearch, Patches, patches_touching, patches_within
+from isc_core.inpainting.coherency_sensitive_hashing import (
+    CshOptions,
+    CshSearch,
+    Patches,
+    patches_touching,
+    patches_within,
+)
 
 
 def texture(height: int, width: int, seed: int) -> np.ndarray:
@@ -14,7 +22,9 @@ def texture(height: int, width: int, seed: int) -> np.ndarray:
     rng = np.random.default_rng(seed)
     image = np.zeros((height, width, 3))
     for sigma in (1.0, 3.0, 9.0):
-        noise = ndimage.gaussian_filter(rng.normal(size=(height, width, 3)), (sigma, sigma, 0), mode="wrap")
+        noise = ndimage.gaussian_filter(
+            rng.normal(size=(height, width, 3)), (sigma, sigma, 0), mode="wrap"
+        )
         image += np.sign(noise) * np.abs(noise / noise.std()) ** 0.3
     return np.clip(0.5 + 0.1 * image + 0.01 * rng.normal(size=image.shape), 0, 1)
 
@@ -46,7 +56,9 @@ def exhaustive(source: Patches, target: Patches, which: np.ndarray) -> np.ndarra
 @pytest.mark.parametrize("case", ["later view", "other half"])
 def test_mean_distance_is_near_the_exhaustive_optimum(case: str) -> None:
     image = texture(140, 200, seed=1)
-    first, second = (image, seen_later(image)) if case == "later view" else (image[:, :100], image[:, 100:])
+    first, second = (
+        (image, seen_later(image)) if case == "later view" else (image[:, :100], image[:, 100:])
+    )
     source, target = everywhere(first), everywhere(second)
     which = np.random.default_rng(2).choice(len(target), 400, replace=False)
     found = np.sqrt(CshSearch(source).match(target).distance[which]).mean()
@@ -62,7 +74,9 @@ def test_one_table_is_worse_than_many() -> None:
 def test_distances_are_those_of_the_matches() -> None:
     source, target = everywhere(texture(50, 60, 1)), everywhere(texture(40, 70, 2))
     matches = CshSearch(source).match(target)
-    true = ((vectors(target, np.arange(len(target))) - vectors(source, matches.source)) ** 2).sum(axis=1)
+    true = ((vectors(target, np.arange(len(target))) - vectors(source, matches.source)) ** 2).sum(
+        axis=1
+    )
     assert np.allclose(matches.distance, true, rtol=1e-4)
 
 
@@ -81,9 +95,13 @@ def test_sources_lie_in_their_mask_and_targets_touch_theirs() -> None:
     source, target = patches_within(image, usable), patches_touching(image, hole)
     assert len(target) == (10 + 7) * (15 + 7)
     matches = CshSearch(source).match(target)
-    for row, column in zip(source.rows[matches.source], source.columns[matches.source], strict=True):
+    for row, column in zip(
+        source.rows[matches.source], source.columns[matches.source], strict=True
+    ):
         assert usable[row : row + 8, column : column + 8].all()
-    assert len(source) == sum(usable[r : r + 8, c : c + 8].all() for r in range(53) for c in range(73))
+    assert len(source) == sum(
+        usable[r : r + 8, c : c + 8].all() for r in range(53) for c in range(73)
+    )
 
 
 def test_same_seed_same_matches_and_no_worse_than_the_start() -> None:
@@ -92,7 +110,10 @@ def test_same_seed_same_matches_and_no_worse_than_the_start() -> None:
     once, again = search.match(target), search.match(target)
     assert np.array_equal(once.source, again.source)
     for threads in (1, 5):
-        assert np.array_equal(CshSearch(source, CshOptions(tables=2, threads=threads)).match(target).source, once.source)
+        assert np.array_equal(
+            CshSearch(source, CshOptions(tables=2, threads=threads)).match(target).source,
+            once.source,
+        )
     good = CshSearch(source, CshOptions(tables=8)).match(target)
     assert (search.match(target, start=good.source).distance <= good.distance * (1 + 1e-6)).all()
 
@@ -111,7 +132,9 @@ def test_projections_keep_distances_and_bound_them() -> None:
     assert np.allclose((bound**2).sum(axis=1), (all_cells**2).sum(axis=1), rtol=1e-4)
     assert (part <= true * (1 + 1e-4)).all() and part.sum() > 0.6 * true.sum()
     mixed = np.random.default_rng(0).permutation(len(patches))
-    again = walsh_hadamard.project(patches.image, patches.rows[mixed], patches.columns[mixed], chosen, threads=3)
+    again = walsh_hadamard.project(
+        patches.image, patches.rows[mixed], patches.columns[mixed], chosen, threads=3
+    )
     assert np.array_equal(again, bound[mixed])
 
 
@@ -123,7 +146,17 @@ def test_one_channel_and_small_images() -> None:
     assert len(tiny) == 1 and CshSearch(tiny).match(tiny).distance[0] == 0
 
 
-@pytest.mark.parametrize("change", [{"tables": 0}, {"projections": 200}, {"hashed": 30}, {"candidates": 0}, {"occupancy": 0}, {"seed": -1}])
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"tables": 0},
+        {"projections": 200},
+        {"hashed": 30},
+        {"candidates": 0},
+        {"occupancy": 0},
+        {"seed": -1},
+    ],
+)
 def test_refuses_options_out_of_range(change: dict[str, int]) -> None:
     with pytest.raises(InputError, match="must"):
         CshSearch(everywhere(texture(20, 20, 1)), CshOptions(**change))

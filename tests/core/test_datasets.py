@@ -1,4 +1,6 @@
-"""The reader of MIT-Berkeley: what it returns is consistent with itself, and what it refuses it refuses in one line."""
+"""The reader of MIT-Berkeley: what it returns is consistent with itself, and what it refuses it
+refuses in one line.
+"""
 
 import shutil
 from pathlib import Path
@@ -13,7 +15,18 @@ from isc_core.errors import InputError
 from isc_core.metrics import truth_normal
 from isc_core.sirfs.frames import reference_basis
 
-TRAINING = ("apple", "box", "cup1", "dinosaur", "frog1", "panther", "paper1", "phone", "squirrel", "teabag2")
+TRAINING = (
+    "apple",
+    "box",
+    "cup1",
+    "dinosaur",
+    "frog1",
+    "panther",
+    "paper1",
+    "phone",
+    "squirrel",
+    "teabag2",
+)
 
 
 @pytest.fixture
@@ -24,7 +37,10 @@ def root(shared: Path) -> Path:
 @pytest.fixture
 def copy(root: Path, tmp_path: Path) -> Path:
     """A set of one object that a test may damage, under the folder names of the original release."""
-    for source, target in (("laboratory", "MIT-Berkeley-Laboratory"), ("natural", "MIT-Berkeley-Natural")):
+    for source, target in (
+        ("laboratory", "MIT-Berkeley-Laboratory"),
+        ("natural", "MIT-Berkeley-Natural"),
+    ):
         folder = tmp_path / target / "apple"
         folder.mkdir(parents=True)
         for path in (root / source / "apple").iterdir():
@@ -61,7 +77,9 @@ def test_light_and_height_explain_the_natural_shading(root: Path) -> None:
 
 
 def test_original_is_diffuse_plus_highlights(root: Path) -> None:
-    original, diffuse = (load_object(root, "apple", "laboratory", kind) for kind in ("original", "diffuse"))
+    original, diffuse = (
+        load_object(root, "apple", "laboratory", kind) for kind in ("original", "diffuse")
+    )
     highlight = (original.image - diffuse.image)[diffuse.valid]
     assert highlight.min() > -2 / 65535 and highlight.max() > 0.1
 
@@ -113,7 +131,16 @@ def test_refuses_what_it_does_not_know(root: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["Z.mat", "L.mat", "crop_idx.mat", "mask.png", "diffuse.png", "reflectance.png", "shading_corrected_color.mat"]
+    "name",
+    [
+        "Z.mat",
+        "L.mat",
+        "crop_idx.mat",
+        "mask.png",
+        "diffuse.png",
+        "reflectance.png",
+        "shading_corrected_color.mat",
+    ],
 )
 @pytest.mark.parametrize("damage", ["missing", "empty", "truncated", "text"])
 def test_a_damaged_file_is_named(copy: Path, name: str, damage: str) -> None:
@@ -121,7 +148,13 @@ def test_a_damaged_file_is_named(copy: Path, name: str, damage: str) -> None:
     if damage == "missing":
         path.unlink()
     else:
-        path.write_bytes({"empty": b"", "truncated": path.read_bytes()[:150], "text": b"no picture, no matrix " * 20}[damage])
+        path.write_bytes(
+            {
+                "empty": b"",
+                "truncated": path.read_bytes()[:150],
+                "text": b"no picture, no matrix " * 20,
+            }[damage]
+        )
     with pytest.raises(InputError, match=name) as caught:
         load_object(copy, "apple", "laboratory")
     assert "\n" not in str(caught.value)

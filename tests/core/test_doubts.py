@@ -13,12 +13,17 @@ from isc_core.models.doubts import doubted, doubts_of, doubts_of_photo, share_in
 from isc_core.photo import Photo, PhotoSource
 
 SIZE = 20
-SURE, MIRRORED = {ORDINARY: 0.9, MIRROR: 0.06, GLASS: 0.02, LAMPS: 0.02}, {ORDINARY: 0.2, MIRROR: 0.4, GLASS: 0.3, LAMPS: 0.1}
+SURE, MIRRORED = (
+    {ORDINARY: 0.9, MIRROR: 0.06, GLASS: 0.02, LAMPS: 0.02},
+    {ORDINARY: 0.2, MIRROR: 0.4, GLASS: 0.3, LAMPS: 0.1},
+)
 
 
 def lit_by(several: float) -> Glance:
     """One lamp or, with a probability of `several`, more."""
-    return Glance(0.0, 1 - several, several, np.full(len(PLACES), 1 / len(PLACES)), np.zeros(8), np.ones(8))
+    return Glance(
+        0.0, 1 - several, several, np.full(len(PLACES), 1 / len(PLACES)), np.zeros(8), np.ones(8)
+    )
 
 
 def answered() -> tuple[Photo, Answer]:
@@ -47,7 +52,9 @@ def answered() -> tuple[Photo, Answer]:
 )
 def test_each_kind_has_its_line(kinds: dict[str, float], several: float, words: list[str]) -> None:
     found = doubts_of(kinds, lit_by(several))
-    assert len(found) == len(words) and all(word in line for word, line in zip(words, found, strict=True))
+    assert len(found) == len(words) and all(
+        word in line for word, line in zip(words, found, strict=True)
+    )
 
 
 @pytest.mark.parametrize(
@@ -66,14 +73,20 @@ def test_a_doubt_leaves_the_confidence_left_for_paint(
     monkeypatch.setattr(doubts, "kinds_of", lambda image, mask: kinds)
     photo, answer = answered()
     found = doubted(photo, answer, lit_by(several))
-    assert found.status["converged"] and found.status["kinds"] == kinds and bool(found.status["doubts"]) == (left < 1)
+    assert (
+        found.status["converged"]
+        and found.status["kinds"] == kinds
+        and bool(found.status["doubts"]) == (left < 1)
+    )
     np.testing.assert_allclose(found.split.confidence, left * answer.split.confidence, rtol=1e-3)
     np.testing.assert_array_equal(found.split.diffuse, answer.split.diffuse)
 
 
 def test_the_status_tells_how_likely_each_kind_is() -> None:
     found = doubted(*answered(), lit_by(0.25)).status
-    assert list(found["kinds"]) == list(KINDS) and sum(found["kinds"].values()) == pytest.approx(1, abs=1e-3)
+    assert list(found["kinds"]) == list(KINDS) and sum(found["kinds"].values()) == pytest.approx(
+        1, abs=1e-3
+    )
     assert found["lamps"] == {"none": 0.0, "one": 0.75, "several": 0.25}
 
 

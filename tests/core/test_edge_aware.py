@@ -32,7 +32,11 @@ def test_it_is_an_average() -> None:
     layers = texture(3, 40, 50)
     before = layers.copy()
     found = rough_paths().average(layers)
-    assert found.min() >= layers.min() and found.max() <= layers.max() and found.std() < 0.5 * layers.std()
+    assert (
+        found.min() >= layers.min()
+        and found.max() <= layers.max()
+        and found.std() < 0.5 * layers.std()
+    )
     assert np.array_equal(layers, before)
     assert np.allclose(rough_paths().average(5 * layers - 2), 5 * found - 2)
     assert np.allclose(rough_paths().average(layers[1:2])[0], found[1])
@@ -67,9 +71,13 @@ def test_reach_is_the_standard_deviation() -> None:
         found = open_paths(201, 201, reach).average(spot)[0]
         offset = np.arange(201) - 100
         assert found.sum() == pytest.approx(1, abs=1e-3)
-        assert np.allclose(found, found[::-1, ::-1], atol=1e-6) and np.allclose(found, found.T, atol=1e-6)
+        assert np.allclose(found, found[::-1, ::-1], atol=1e-6) and np.allclose(
+            found, found.T, atol=1e-6
+        )
         for axis in (0, 1):
-            assert np.sqrt((found.sum(axis=axis) * offset**2).sum()) == pytest.approx(reach, rel=0.03)
+            assert np.sqrt((found.sum(axis=axis) * offset**2).sum()) == pytest.approx(
+                reach, rel=0.03
+            )
 
 
 def test_far_from_borders_a_slope_stays() -> None:
@@ -103,7 +111,9 @@ def test_the_lower_mode_is_hardly_moved_by_what_lies_above() -> None:
     mean, mode = paths.weighted(value, ones), paths.lower_mode(value, ones, 0.1, 6)
     assert np.abs(mean - 0.3).mean() > 0.1 and np.abs(mode - 0.3)[20:-20, 20:-20].max() < 0.03
     below = paths.lower_mode(0.6 - value, ones, 0.1, 6)
-    assert np.abs(below - 0.3)[20:-20, 20:-20].min() > 0.05, "what lies below is no highlight and counts in full"
+    assert np.abs(below - 0.3)[20:-20, 20:-20].min() > 0.05, (
+        "what lies below is no highlight and counts in full"
+    )
 
 
 def test_the_lower_mode_falls_with_every_round_until_it_stands() -> None:
@@ -123,7 +133,9 @@ def test_the_lower_mode_goes_with_its_unit() -> None:
 
 
 def test_rows_and_columns_count_alike() -> None:
-    """Exactly where nothing is in the way; within a hundredth of the values' range where borders are."""
+    """Exactly where nothing is in the way; within a hundredth of the values' range where borders
+    are.
+    """
     value, _ = spotted()
     ones = np.ones((80, 100))
     plain, turned = open_paths(80, 100, 12.0), open_paths(100, 80, 12.0)
@@ -135,7 +147,11 @@ def test_rows_and_columns_count_alike() -> None:
     down[1:][part[1:] != part[:-1]] = 1e6
     value = np.where(part, value + 0.2, value)
     one = Paths(across, down, 12.0).lower_mode(value, ones, 0.1, 4)
-    other = Paths(down.T.copy(), across.T.copy(), 12.0).lower_mode(np.ascontiguousarray(value.T), ones.T.copy(), 0.1, 4).T
+    other = (
+        Paths(down.T.copy(), across.T.copy(), 12.0)
+        .lower_mode(np.ascontiguousarray(value.T), ones.T.copy(), 0.1, 4)
+        .T
+    )
     assert np.abs(one - other).max() < 0.05 and np.abs(one - other).mean() < 0.005
 
 
@@ -143,4 +159,8 @@ def test_rows_and_columns_count_alike() -> None:
 def test_small_photos(shape: tuple[int, int]) -> None:
     value = texture(*shape)
     found = open_paths(*shape, reach=1.0).lower_mode(value, np.ones(shape), 0.1, 3)
-    assert found.shape == shape and found.min() >= value.min() - 1e-12 and found.max() <= value.max() + 1e-12
+    assert (
+        found.shape == shape
+        and found.min() >= value.min() - 1e-12
+        and found.max() <= value.max() + 1e-12
+    )

@@ -22,16 +22,29 @@ def work(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A result folder, `ball`, and the photo that it is of."""
     folder = tmp_path_factory.mktemp("edit")
     scene = ball()
-    scene.provenance.input.update(size=[120, 96], scale=1.0, bit_depth=16, transfer="srgb", mask_from="alpha")
+    scene.provenance.input.update(
+        size=[120, 96], scale=1.0, bit_depth=16, transfer="srgb", mask_from="alpha"
+    )
     save(scene, folder / "ball")
     codes = np.rint(65535 * np.clip(linear_to_srgb(scene.image), 0, 1)).astype(np.uint16)
-    cv2.imwrite(str(folder / "photo.png"), np.dstack([codes[..., ::-1], 65535 * scene.mask.astype(np.uint16)]))
+    cv2.imwrite(
+        str(folder / "photo.png"),
+        np.dstack([codes[..., ::-1], 65535 * scene.mask.astype(np.uint16)]),
+    )
     (folder / "light.json").write_text(json.dumps(LIGHT[::-1].tolist()))
     np.save(folder / "light.npy", LIGHT)
-    cv2.imwrite(str(folder / "sky.png"), np.random.default_rng(0).integers(0, 255, (16, 32, 3), np.uint8))
+    cv2.imwrite(
+        str(folder / "sky.png"), np.random.default_rng(0).integers(0, 255, (16, 32, 3), np.uint8)
+    )
     sky = np.full((16, 32, 3), 0.5, np.float32)
-    write_channels(folder / "broken.exr", {name: np.where(np.arange(32) == 3, np.inf, sky[..., 0]) for name in "RGB"})
-    cv2.imwrite(str(folder / "region.png"), np.uint8(255 * (np.arange(120) < 60)) * np.ones((96, 1), np.uint8))
+    write_channels(
+        folder / "broken.exr",
+        {name: np.where(np.arange(32) == 3, np.inf, sky[..., 0]) for name in "RGB"},
+    )
+    cv2.imwrite(
+        str(folder / "region.png"),
+        np.uint8(255 * (np.arange(120) < 60)) * np.ones((96, 1), np.uint8),
+    )
     return folder
 
 
@@ -55,7 +68,9 @@ ACTIONS = [
 
 
 @pytest.mark.parametrize("action", ACTIONS)
-def test_every_action_writes_its_pictures(work: Path, tmp_path: Path, action: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_action_writes_its_pictures(
+    work: Path, tmp_path: Path, action: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = action.format(work).split()
     assert main(["edit", str(work / "ball"), *words, "-o", str(tmp_path / "out"), "--quiet"]) == 0
     found = {path.name for path in (tmp_path / "out").iterdir()}
@@ -65,7 +80,11 @@ def test_every_action_writes_its_pictures(work: Path, tmp_path: Path, action: st
     assert told["action"] == words[0] and told["schema_version"] == 1
     output = capsys.readouterr()
     assert not output.err
-    assert ("shading: from" in output.out) == (words[0] == "light-direction") == ("at first sight: " in output.out)
+    assert (
+        ("shading: from" in output.out)
+        == (words[0] == "light-direction")
+        == ("at first sight: " in output.out)
+    )
 
 
 def test_an_edit_of_the_photo_keeps_what_is_not_the_object(work: Path, tmp_path: Path) -> None:
@@ -82,17 +101,42 @@ def test_an_edit_of_the_photo_keeps_what_is_not_the_object(work: Path, tmp_path:
         "--quiet",
     ]
     assert main(arguments) == 0
-    before, after = (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in (work / "photo.png", tmp_path / "out" / "edited.png"))
+    before, after = (
+        cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        for path in (work / "photo.png", tmp_path / "out" / "edited.png")
+    )
     mask = ball().mask
-    assert after.dtype == np.uint16 and np.array_equal(after[~mask], before[~mask]) and np.array_equal(after[..., 3], before[..., 3])
+    assert (
+        after.dtype == np.uint16
+        and np.array_equal(after[~mask], before[~mask])
+        and np.array_equal(after[..., 3], before[..., 3])
+    )
     assert not np.array_equal(after[mask], before[mask])
 
 
 def test_an_edit_of_nothing_is_the_photo(work: Path, tmp_path: Path) -> None:
-    for words in ("dichromatic", "recolour --hue 360", "relight --yaw 360", f"relight --light {work}/light.npy", "gloss"):
-        arguments = ["edit", str(work / "ball"), *words.split(), "--photo", str(work / "photo.png"), "-o", str(tmp_path / "out"), "--quiet"]
+    for words in (
+        "dichromatic",
+        "recolour --hue 360",
+        "relight --yaw 360",
+        f"relight --light {work}/light.npy",
+        "gloss",
+    ):
+        arguments = [
+            "edit",
+            str(work / "ball"),
+            *words.split(),
+            "--photo",
+            str(work / "photo.png"),
+            "-o",
+            str(tmp_path / "out"),
+            "--quiet",
+        ]
         assert main(arguments) == 0
-        before, after = (cv2.imread(str(path), cv2.IMREAD_UNCHANGED) for path in (work / "photo.png", tmp_path / "out" / "edited.png"))
+        before, after = (
+            cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+            for path in (work / "photo.png", tmp_path / "out" / "edited.png")
+        )
         assert np.array_equal(before, after), words
 
 
@@ -140,18 +184,27 @@ def test_a_mistake_is_one_line_and_writes_nothing(
     work: Path, tmp_path: Path, words: str, told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     output = tmp_path / "out"
-    assert main(["edit", str(work / "ball"), *words.format(work).split(), "-o", str(output), "--quiet"]) == 2
+    assert (
+        main(
+            ["edit", str(work / "ball"), *words.format(work).split(), "-o", str(output), "--quiet"]
+        )
+        == 2
+    )
     error = capsys.readouterr().err
     assert error.startswith("isc: error: ") and error.count("\n") == 1 and told in error
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_is_not_ours_is_left_alone(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_that_is_not_ours_is_left_alone(
+    work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "mine.txt").write_text("mine")
     for folder in (work / "ball", tmp_path):
         assert main(["edit", str(work / "ball"), "gloss", "-o", str(folder), "--quiet"]) == 2
     assert main(["edit", str(tmp_path), "gloss", "-o", str(tmp_path / "out"), "--quiet"]) == 2
-    assert (tmp_path / "mine.txt").read_text() == "mine" and "decomposition.json" in capsys.readouterr().err
+    assert (
+        tmp_path / "mine.txt"
+    ).read_text() == "mine" and "decomposition.json" in capsys.readouterr().err
 
 
 def edited(result: Path, output: Path, *words: str) -> np.ndarray:
@@ -163,24 +216,50 @@ def edited(result: Path, output: Path, *words: str) -> np.ndarray:
 @pytest.mark.parametrize("coding", ["alpha", "0 and 1"])
 def test_a_region_is_read_as_a_mask_is(work: Path, tmp_path: Path, coding: str) -> None:
     left = (np.arange(120) < 60) * np.ones((96, 1), np.uint8)
-    region = np.dstack([np.full((96, 120, 3), 255, np.uint8), np.uint8(255) * left]) if coding == "alpha" else left
+    region = (
+        np.dstack([np.full((96, 120, 3), 255, np.uint8), np.uint8(255) * left])
+        if coding == "alpha"
+        else left
+    )
     cv2.imwrite(str(tmp_path / "region.png"), region.astype(np.uint8))
     words = ("recolour", "--hue", "120", "--region")
     found = edited(work / "ball", tmp_path / "found", *words, str(tmp_path / "region.png"))
-    assert np.array_equal(found, edited(work / "ball", tmp_path / "wanted", *words, str(work / "region.png")))
+    assert np.array_equal(
+        found, edited(work / "ball", tmp_path / "wanted", *words, str(work / "region.png"))
+    )
 
 
-@pytest.mark.parametrize(("option", "action"), [("--light", "relight"), ("--region", "recolour --hue 5")])
-def test_what_is_read_is_never_replaced(work: Path, tmp_path: Path, option: str, action: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("option", "action"), [("--light", "relight"), ("--region", "recolour --hue 5")]
+)
+def test_what_is_read_is_never_replaced(
+    work: Path, tmp_path: Path, option: str, action: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     edited(work / "ball", tmp_path / "out", "recolour", "--hue", "9")
     given = tmp_path / "out" / "edited.png"
     before = given.read_bytes()
-    assert main(["edit", str(work / "ball"), *action.split(), option, str(given), "-o", str(tmp_path / "out"), "--quiet"]) == 2
+    assert (
+        main(
+            [
+                "edit",
+                str(work / "ball"),
+                *action.split(),
+                option,
+                str(given),
+                "-o",
+                str(tmp_path / "out"),
+                "--quiet",
+            ]
+        )
+        == 2
+    )
     assert "lies in" in capsys.readouterr().err and given.read_bytes() == before
 
 
 @pytest.mark.parametrize("damage", ["shading", "normal", "diffuse", "light"])
-def test_a_damaged_result_is_named(work: Path, tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_result_is_named(
+    work: Path, tmp_path: Path, damage: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     broken = tmp_path / "broken"
     shutil.copytree(work / "ball", broken)
     if damage == "light":
@@ -191,23 +270,50 @@ def test_a_damaged_result_is_named(work: Path, tmp_path: Path, damage: str, caps
         channels = read_channels(broken / "maps.exr")
         write_channels(
             broken / "maps.exr",
-            {name: (-1 if damage == "diffuse" else 0) * v if name.startswith(damage) else v for name, v in channels.items()},
+            {
+                name: (-1 if damage == "diffuse" else 0) * v if name.startswith(damage) else v
+                for name, v in channels.items()
+            },
         )
     for action in ("light-direction", "recolour --hue 5", "relight --yaw 10"):
-        assert main(["edit", str(broken), *action.split(), "-o", str(tmp_path / "out"), "--quiet"]) == 2
+        assert (
+            main(["edit", str(broken), *action.split(), "-o", str(tmp_path / "out"), "--quiet"])
+            == 2
+        )
         error = capsys.readouterr().err
         assert "damaged" in error and error.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 
-def test_quiet_is_heard_before_the_action_too(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["edit", "--quiet", str(work / "ball"), "relight", "--yaw", "30", "-o", str(tmp_path / "out")]) == 0
+def test_quiet_is_heard_before_the_action_too(
+    work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(
+            [
+                "edit",
+                "--quiet",
+                str(work / "ball"),
+                "relight",
+                "--yaw",
+                "30",
+                "-o",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 0
+    )
     output = capsys.readouterr()
     assert not output.out and not output.err
 
 
-def test_an_edit_that_changes_nothing_says_so(work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["edit", str(work / "ball"), "recolour", "--hue", "360", "-o", str(tmp_path / "out")]) == 0
+def test_an_edit_that_changes_nothing_says_so(
+    work: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(["edit", str(work / "ball"), "recolour", "--hue", "360", "-o", str(tmp_path / "out")])
+        == 0
+    )
     assert "stays as it was" in capsys.readouterr().out
     assert json.loads((tmp_path / "out" / "edit.json").read_text())["notes"]
 

@@ -1,4 +1,6 @@
-"""Edits: doing nothing changes nothing, layers stay apart, lights turn as rotations do, colours change and textures do not."""
+"""Edits: doing nothing changes nothing, layers stay apart, lights turn as rotations do, colours
+change and textures do not.
+"""
 
 from dataclasses import replace
 
@@ -38,7 +40,10 @@ def test_edits_that_ask_for_nothing_return_the_image_bit_by_bit(scene: Decomposi
         recolour(scene, Paint()),
         recolour(scene, Paint(hue=360.0)),
         relight(scene, NewLight(coefficients=scene.illumination)),
-        relight(scene, NewLight(coefficients=turned_light(scene.illumination, turn(yaw=360, pitch=-720)))),
+        relight(
+            scene,
+            NewLight(coefficients=turned_light(scene.illumination, turn(yaw=360, pitch=-720))),
+        ),
         change_gloss(scene, Gloss()),
         add_highlight(scene, DirectionalLight(toward(0, 0, 1)), level=0.0),
     ):
@@ -64,7 +69,7 @@ def test_no_edit_touches_what_is_outside_the_mask_or_the_scene(scene: Decomposit
     assert np.array_equal(scene.image, before)
 
 
-# --- dichromatic ------------------------------------------------------------------------------------------------------------------------
+# --- dichromatic ----------------------------------------------------------------------------------
 
 
 def test_removing_a_layer_leaves_the_other(scene: Decomposition) -> None:
@@ -77,8 +82,12 @@ def test_removing_a_layer_leaves_the_other(scene: Decomposition) -> None:
 
 
 def test_a_gain_is_linear(scene: Decomposition) -> None:
-    clear = replace(scene, residual=np.zeros_like(scene.residual), image=scene.diffuse + scene.specular)
-    images = [edit_layers(clear, DichromaticEdit(specular=LayerEdit(gain=g))).image for g in (1, 2, 3)]
+    clear = replace(
+        scene, residual=np.zeros_like(scene.residual), image=scene.diffuse + scene.specular
+    )
+    images = [
+        edit_layers(clear, DichromaticEdit(specular=LayerEdit(gain=g))).image for g in (1, 2, 3)
+    ]
     assert np.abs(images[2] - images[1] - (images[1] - images[0])).max() < 1e-6
     assert np.abs(images[1] - images[0] - clear.specular).max() < 1e-6
 
@@ -96,15 +105,20 @@ def test_sharpening_stays_inside_the_mask_and_flat_is_flat() -> None:
     mask = np.zeros((40, 40), bool)
     mask[8:30, 10:33] = True
     assert masked_blur(mask * 0.7, mask, 3.0)[mask] == pytest.approx(0.7)
-    flat = replace(ball(), mask=np.ones((96, 120), bool), diffuse=np.full((96, 120, 3), 0.4, np.float32))
+    flat = replace(
+        ball(), mask=np.ones((96, 120), bool), diffuse=np.full((96, 120, 3), 0.4, np.float32)
+    )
     edit = edit_layers(flat, DichromaticEdit(diffuse=LayerEdit(sharpen=3.0)))
     assert edit.diffuse == pytest.approx(0.4, abs=1e-6)
     d = ball()
-    contrast = [edit_layers(d, DichromaticEdit(diffuse=LayerEdit(sharpen=s))).diffuse[d.mask].std() for s in (-1, 0, 1)]
+    contrast = [
+        edit_layers(d, DichromaticEdit(diffuse=LayerEdit(sharpen=s))).diffuse[d.mask].std()
+        for s in (-1, 0, 1)
+    ]
     assert contrast[0] < contrast[1] < contrast[2]
 
 
-# --- recolouring ------------------------------------------------------------------------------------------------------------------------
+# --- recolouring ----------------------------------------------------------------------------------
 
 
 def test_oklab_is_there_and_back_and_grey_has_no_chroma() -> None:
@@ -129,25 +143,42 @@ def test_a_target_colour_is_reached_at_the_texture_s_luminance(scene: Decomposit
     new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
     chroma = new / new.sum(-1, keepdims=True)
     assert chroma == pytest.approx(np.broadcast_to(target / target.sum(), chroma.shape), abs=0.02)
-    bright = recolour(scene, Paint(target=target, target_luminance=True)).diffuse[scene.mask] / scene.shading[scene.mask]
-    assert luminance(bright * light_color(scene)).mean() == pytest.approx(target @ LUMINANCE, rel=0.01)
+    bright = (
+        recolour(scene, Paint(target=target, target_luminance=True)).diffuse[scene.mask]
+        / scene.shading[scene.mask]
+    )
+    assert luminance(bright * light_color(scene)).mean() == pytest.approx(
+        target @ LUMINANCE, rel=0.01
+    )
 
 
-def test_no_colour_is_brighter_than_the_paint_was_or_what_the_photo_shows_white(scene: Decomposition) -> None:
+def test_no_colour_is_brighter_than_the_paint_was_or_what_the_photo_shows_white(
+    scene: Decomposition,
+) -> None:
     seen = scene.reflectance * light_color(scene)
     for bits in (8, 32):
         given = replace(scene, provenance=replace(scene.provenance, input={"bit_depth": bits}))
         edit = recolour(given, Paint(target=np.array([0.0, 0.0, 1.0])))
         new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
         white = 1.0 if bits == 8 else white_of(scene.image, scene.mask)
-        assert new.max() <= max(seen.max(), white / white_of(scene.shading / light_color(scene), scene.mask)) * 1.001
+        assert (
+            new.max()
+            <= max(seen.max(), white / white_of(scene.shading / light_color(scene), scene.mask))
+            * 1.001
+        )
         assert luminance(new) == pytest.approx(luminance(seen[scene.mask]), rel=1e-4)
 
 
 def test_evenly_grey_paint_takes_colour(scene: Decomposition) -> None:
     grey = np.where(scene.mask[..., None], 0.2, 0).astype(np.float32) * np.ones(3, np.float32)
     diffuse = (grey * scene.shading).astype(np.float32)
-    even = replace(scene, reflectance=grey, diffuse=diffuse, image=diffuse + scene.specular, residual=0 * diffuse)
+    even = replace(
+        scene,
+        reflectance=grey,
+        diffuse=diffuse,
+        image=diffuse + scene.specular,
+        residual=0 * diffuse,
+    )
     red = recolour(even, Paint(target=np.array([1.0, 0.0, 0.0]))).diffuse[scene.mask].mean(0)
     assert red[0] > 2 * red[1:].max()
 
@@ -175,11 +206,15 @@ def test_clusters_are_the_paints_and_the_same_each_time(scene: Decomposition) ->
 
 
 def test_one_grey_paint_is_one_cluster(scene: Decomposition) -> None:
-    grey = replace(scene, reflectance=np.where(scene.mask[..., None], 0.4, scene.reflectance * 0), shading=scene.shading * 0 + 0.5)
+    grey = replace(
+        scene,
+        reflectance=np.where(scene.mask[..., None], 0.4, scene.reflectance * 0),
+        shading=scene.shading * 0 + 0.5,
+    )
     assert len(find_clusters(grey, 5).shares) == 1
 
 
-# --- lights -----------------------------------------------------------------------------------------------------------------------------
+# --- lights ---------------------------------------------------------------------------------------
 
 
 def test_a_turned_light_shades_turned_normals() -> None:
@@ -198,7 +233,12 @@ def test_turns_compose_and_come_back() -> None:
 
 
 @pytest.mark.parametrize(
-    ("angles", "start", "end"), [((90, 0, 0), (0, 0, 1), (1, 0, 0)), ((0, 90, 0), (0, 1, 0), (0, 0, 1)), ((0, 0, 90), (1, 0, 0), (0, 1, 0))]
+    ("angles", "start", "end"),
+    [
+        ((90, 0, 0), (0, 0, 1), (1, 0, 0)),
+        ((0, 90, 0), (0, 1, 0), (0, 0, 1)),
+        ((0, 0, 90), (1, 0, 0), (0, 1, 0)),
+    ],
 )
 def test_yaw_pitch_and_roll_turn_as_they_say(angles: tuple, start: tuple, end: tuple) -> None:
     assert np.array_equal(turn(*angles) @ np.array(start, float), np.array(end, float))
@@ -212,40 +252,72 @@ def test_relighting_is_reflectance_times_shading(scene: Decomposition) -> None:
     assert not edit.specular.any()
 
 
-def test_a_uniform_sky_shades_evenly_and_a_balanced_light_is_as_bright(scene: Decomposition) -> None:
+def test_a_uniform_sky_shades_evenly_and_a_balanced_light_is_as_bright(
+    scene: Decomposition,
+) -> None:
     sky = np.broadcast_to([0.5, 0.5, 0.5], (16, 32, 3))
     even = relight(scene, NewLight(sky=sky), Relighting("remove"))
     assert even.diffuse[scene.mask] == pytest.approx(0.5 * scene.reflectance[scene.mask], rel=0.01)
     balanced = relight(scene, NewLight(sky=sky), Relighting("remove", balanced=True))
-    assert luminance(balanced.diffuse[scene.mask]).sum() == pytest.approx(luminance(scene.diffuse[scene.mask]).sum(), rel=1e-3)
+    assert luminance(balanced.diffuse[scene.mask]).sum() == pytest.approx(
+        luminance(scene.diffuse[scene.mask]).sum(), rel=1e-3
+    )
 
 
 def test_highlights_are_kept_scaled_removed_or_rendered(scene: Decomposition) -> None:
     light = NewLight(coefficients=turned_light(scene.illumination, turn(yaw=80)))
-    kept, scaled, removed = (relight(scene, light, Relighting(how)) for how in ("keep", "scale", "remove"))
+    kept, scaled, removed = (
+        relight(scene, light, Relighting(how)) for how in ("keep", "scale", "remove")
+    )
     assert np.array_equal(kept.specular, scene.specular) and not removed.specular.any()
     ratio = kept.diffuse[scene.mask] / scene.diffuse[scene.mask]
-    assert scaled.specular[scene.mask] == pytest.approx(scene.specular[scene.mask] * np.minimum(ratio, 4), abs=1e-5)
+    assert scaled.specular[scene.mask] == pytest.approx(
+        scene.specular[scene.mask] * np.minimum(ratio, 4), abs=1e-5
+    )
     assert relight(scene, light).notes
-    rendered = relight(scene, NewLight(coefficients=scene.illumination), Relighting("render", Lobe(40), exposure=2.0))
-    assert luminance(rendered.specular[scene.mask]).sum() == pytest.approx(2 * luminance(scene.specular[scene.mask]).sum(), rel=1e-3)
+    rendered = relight(
+        scene,
+        NewLight(coefficients=scene.illumination),
+        Relighting("render", Lobe(40), exposure=2.0),
+    )
+    assert luminance(rendered.specular[scene.mask]).sum() == pytest.approx(
+        2 * luminance(scene.specular[scene.mask]).sum(), rel=1e-3
+    )
 
 
 def fitted(scene: Decomposition, determined: bool) -> Decomposition:
     alpha = 0.2 if determined else None
-    return replace(scene, brdf=LobeFit("ggx: of the test", determined, "", alpha, None, (), None, None, 0.9, scene.specular))
+    return replace(
+        scene,
+        brdf=LobeFit(
+            "ggx: of the test", determined, "", alpha, None, (), None, None, 0.9, scene.specular
+        ),
+    )
 
 
 def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decomposition) -> None:
     light = NewLight(coefficients=turned_light(scene.illumination, turn(yaw=80)))
     by_fit = relight(fitted(scene, True), light)
     assert not any("no lobe" in note for note in by_fit.notes)
-    assert np.array_equal(by_fit.specular, relight(scene, light, Relighting("render", Lobe(alpha=0.2))).specular)
-    assert np.array_equal(relight(fitted(scene, False), light).specular, relight(scene, light, Relighting("scale")).specular)
-    bound = replace(scene, brdf=LobeFit("ggx: of the test", False, "narrow", 0.2, None, (), None, None, 0.9, scene.specular))
+    assert np.array_equal(
+        by_fit.specular, relight(scene, light, Relighting("render", Lobe(alpha=0.2))).specular
+    )
+    assert np.array_equal(
+        relight(fitted(scene, False), light).specular,
+        relight(scene, light, Relighting("scale")).specular,
+    )
+    bound = replace(
+        scene,
+        brdf=LobeFit(
+            "ggx: of the test", False, "narrow", 0.2, None, (), None, None, 0.9, scene.specular
+        ),
+    )
     assert np.array_equal(relight(bound, light).specular, by_fit.specular)
     sharper = change_gloss(fitted(scene, True), Gloss(exponent=100))
-    assert np.array_equal(sharper.specular, change_gloss(scene, Gloss(exponent=100, present=Lobe(alpha=0.2).nearest_exponent)).specular)
+    assert np.array_equal(
+        sharper.specular,
+        change_gloss(scene, Gloss(exponent=100, present=Lobe(alpha=0.2).nearest_exponent)).specular,
+    )
 
 
 @pytest.mark.parametrize("lobe", ["fitted", "none"])
@@ -255,7 +327,10 @@ def test_the_smallest_change_of_light_changes_least(scene: Decomposition, lobe: 
     for yaw, exposure, most in ((0.01, 1.0, 0.002), (0.0, 1.0001, 0.002), (1.0, 1.0, 0.2)):
         rotation = turn(yaw=yaw)
         light = NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation)
-        assert np.abs(relight(d, light, Relighting(exposure=exposure)).image[d.mask] - before).max() < most * before.max()
+        assert (
+            np.abs(relight(d, light, Relighting(exposure=exposure)).image[d.mask] - before).max()
+            < most * before.max()
+        )
 
 
 def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> None:
@@ -263,7 +338,9 @@ def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> 
     columns = np.indices(d.mask.shape)[1]
     for yaw in (0.0, 30.0, 60.0):
         rotation = turn(yaw=yaw)
-        new = relight(d, NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation)).specular
+        new = relight(
+            d, NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation)
+        ).specular
         weight = luminance(new) ** 2
         centres.append((weight * columns).sum() / weight.sum())
         assert luminance(new).max() <= 4 * luminance(d.specular).max()
@@ -272,36 +349,55 @@ def test_highlights_move_with_the_light_that_is_turned(scene: Decomposition) -> 
 
 def test_highlights_are_removed_and_rendered_in_the_present_light_too(scene: Decomposition) -> None:
     light = NewLight(coefficients=scene.illumination)
-    removed, rendered = relight(scene, light, Relighting("remove")), relight(scene, light, Relighting("render", Lobe(200)))
+    removed, rendered = (
+        relight(scene, light, Relighting("remove")),
+        relight(scene, light, Relighting("render", Lobe(200))),
+    )
     assert not removed.specular.any() and np.array_equal(removed.diffuse, scene.diffuse)
-    assert not np.allclose(rendered.specular, scene.specular, atol=0.01) and np.array_equal(rendered.diffuse, scene.diffuse)
+    assert not np.allclose(rendered.specular, scene.specular, atol=0.01) and np.array_equal(
+        rendered.diffuse, scene.diffuse
+    )
     assert not np.array_equal(relight(scene, light, Relighting(lobe=Lobe(200))).image, scene.image)
 
 
-# --- clipped highlights ----------------------------------------------------------------------------------------------------------------
+# --- clipped highlights ---------------------------------------------------------------------------
 
 
 def test_a_clipped_highlight_stays_white_on_other_paint(scene: Decomposition) -> None:
     """What the sensor cut off was of the old paint's colour, and says nothing of the new one's."""
     light, full = scene.diffuse + scene.specular, 0.4
-    d = replace(scene, residual=np.minimum(full - light, 0) * scene.mask[..., None], image=np.minimum(light, full) * scene.mask[..., None])
+    d = replace(
+        scene,
+        residual=np.minimum(full - light, 0) * scene.mask[..., None],
+        image=np.minimum(light, full) * scene.mask[..., None],
+    )
     clipped = (d.residual < 0).all(-1) & (d.specular > full).all(-1)
     assert clipped.sum() > 5
-    for edit in (recolour(d, Paint(hue=180)), edit_layers(d, DichromaticEdit(diffuse=LayerEdit(gain=0.05)))):
+    for edit in (
+        recolour(d, Paint(hue=180)),
+        edit_layers(d, DichromaticEdit(diffuse=LayerEdit(gain=0.05))),
+    ):
         assert (edit.image[clipped] >= full - 1e-6).all()
         assert (edit.image[clipped] <= 1.5 * full).all()
 
 
-def test_what_was_cut_off_neither_stays_dark_in_more_light_nor_glows_in_less(scene: Decomposition) -> None:
+def test_what_was_cut_off_neither_stays_dark_in_more_light_nor_glows_in_less(
+    scene: Decomposition,
+) -> None:
     clipped = (scene.residual < -1e-3).any(-1)
-    images = [edit_layers(scene, DichromaticEdit(LayerEdit(gain=g), LayerEdit(gain=g))).image for g in (0.1, 0.9, 0.999, 1.001, 2.0)]
+    images = [
+        edit_layers(scene, DichromaticEdit(LayerEdit(gain=g), LayerEdit(gain=g))).image
+        for g in (0.1, 0.9, 0.999, 1.001, 2.0)
+    ]
     for less, more in zip(images, images[1:], strict=False):
         assert (more[clipped] >= less[clipped] - 1e-6).all()
     assert images[4][clipped] == pytest.approx(2 * scene.image[clipped], rel=1e-5)
-    assert images[0][clipped] == pytest.approx(0.1 * (scene.diffuse + scene.specular)[clipped], rel=1e-5)
+    assert images[0][clipped] == pytest.approx(
+        0.1 * (scene.diffuse + scene.specular)[clipped], rel=1e-5
+    )
 
 
-# --- gloss ------------------------------------------------------------------------------------------------------------------------------
+# --- gloss ----------------------------------------------------------------------------------------
 
 
 def test_a_lobe_in_a_sky_with_one_bright_spot_is_the_lobe_under_that_light() -> None:
@@ -333,16 +429,22 @@ def test_a_wider_lobe_does_not_lift_the_edge_at_which_a_highlight_was_cut_off() 
     assert wider[(full > 0.5) & (full < 0.6)].min() > 0.6 * wider.max()
 
 
-def test_a_new_highlight_is_where_its_light_says_and_as_strong_as_before(scene: Decomposition) -> None:
+def test_a_new_highlight_is_where_its_light_says_and_as_strong_as_before(
+    scene: Decomposition,
+) -> None:
     light = DirectionalLight(toward(-0.6, 0.4, 0.7))
     edit = add_highlight(scene, light, Lobe(60.0), replacing=True)
-    assert luminance(edit.specular).sum() == pytest.approx(luminance(scene.specular).sum(), rel=1e-4)
+    assert luminance(edit.specular).sum() == pytest.approx(
+        luminance(scene.specular).sum(), rel=1e-4
+    )
     found = explain_specular(replace(scene, specular=edit.specular))
     assert np.rad2deg(np.arccos(found.light.direction @ light.direction)) < 1
     assert found.exponent == pytest.approx(60, rel=0.05)
     added = add_highlight(scene, light, level=0.5)
     assert (added.specular >= scene.specular).all()
-    assert (added.specular - scene.specular).max() == pytest.approx(0.5 * np.percentile(scene.image[scene.mask].max(-1), 99.5), rel=0.1)
+    assert (added.specular - scene.specular).max() == pytest.approx(
+        0.5 * np.percentile(scene.image[scene.mask].max(-1), 99.5), rel=0.1
+    )
 
 
 def test_a_light_from_behind_gives_no_highlight_and_says_so(scene: Decomposition) -> None:
@@ -367,12 +469,17 @@ def test_metal_has_no_body_and_the_colour_of_the_paint(scene: Decomposition) -> 
 
 
 def test_a_matt_object_says_that_it_has_no_gloss_to_change(scene: Decomposition) -> None:
-    matt = replace(scene, specular=np.zeros_like(scene.specular), residual=np.zeros_like(scene.residual), image=scene.diffuse)
+    matt = replace(
+        scene,
+        specular=np.zeros_like(scene.specular),
+        residual=np.zeros_like(scene.residual),
+        image=scene.diffuse,
+    )
     edit = change_gloss(matt, Gloss(exponent=100))
     assert np.array_equal(edit.image, matt.image) and "no specular light" in edit.notes[0]
 
 
-# --- what cannot be -----------------------------------------------------------------------------------------------------------------------
+# --- what cannot be -------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,6 @@
-"""Edits brought back into the photo: outside the mask nothing changes, in any file format; inside the edit arrives at full size."""
+"""Edits brought back into the photo: outside the mask nothing changes, in any file format; inside
+the edit arrives at full size.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -34,7 +36,10 @@ def half_size(full: Decomposition) -> Decomposition:
     """The same ball at half its size, as the working maps of the photo `full`."""
     height, width = full.mask.shape
     half = ball((height // 2, width // 2), 40.0, (48.0, 60.0))
-    return replace(half, provenance=Provenance(input={"scale": SCALE, "size": [width, height], "name": "ball.png"}))
+    return replace(
+        half,
+        provenance=Provenance(input={"scale": SCALE, "size": [width, height], "name": "ball.png"}),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +64,9 @@ def test_no_edit_is_the_photo_bit_by_bit_at_any_size(full: Decomposition) -> Non
 
 
 @pytest.mark.parametrize("change", [MATT, DichromaticEdit(diffuse=LayerEdit(gain=0.5))])
-def test_an_enlarged_edit_is_near_the_edit_made_at_full_size(full: Decomposition, change: DichromaticEdit) -> None:
+def test_an_enlarged_edit_is_near_the_edit_made_at_full_size(
+    full: Decomposition, change: DichromaticEdit
+) -> None:
     half, photo = half_size(full), photo_of(full)
     image, _ = composite(half, edit_layers(half, change), photo)
     wanted = edit_layers(full, change).image
@@ -76,9 +83,14 @@ def test_edges_of_the_paint_stay_as_sharp_as_the_photo_s(full: Decomposition) ->
     texture = 1 + 0.2 * generator.uniform(-1, 1, full.mask.shape)[..., None].astype(np.float32)
     half, photo = half_size(full), photo_of(full)
     photo = replace(photo, image=photo.image * texture)
-    image, _ = composite(half, edit_layers(half, DichromaticEdit(LayerEdit(gain=0.5), LayerEdit(gain=0.5))), photo)
+    image, _ = composite(
+        half, edit_layers(half, DichromaticEdit(LayerEdit(gain=0.5), LayerEdit(gain=0.5))), photo
+    )
     inner = full.mask & (full.normal[..., 2] > 0.5)
-    fine = [np.abs(np.diff(picture[..., 0], axis=1))[inner[:, 1:]].mean() for picture in (photo.image, image)]
+    fine = [
+        np.abs(np.diff(picture[..., 0], axis=1))[inner[:, 1:]].mean()
+        for picture in (photo.image, image)
+    ]
     assert fine[1] == pytest.approx(0.5 * fine[0], rel=0.15)
 
 
@@ -92,27 +104,46 @@ def test_another_photo_or_mask_is_refused(full: Decomposition) -> None:
             composite(half, edit, wrong)
 
 
-# --- files ------------------------------------------------------------------------------------------------------------------------------
+# --- files ----------------------------------------------------------------------------------------
 
 
 def coded(full: Decomposition, kind: type, transfer: str) -> tuple[np.ndarray, np.ndarray]:
-    """RGB codes of the ball before noise, and an alpha with every value, opaque enough on the object."""
+    """RGB codes of the ball before noise, and an alpha with every value, opaque enough on the
+    object.
+    """
     generator = np.random.default_rng(4)
     image = np.where(full.mask[..., None], full.image, generator.uniform(0, 1, full.image.shape))
     peak = np.iinfo(kind).max
-    values = np.rint(np.clip(linear_to_srgb(image) if transfer == "srgb" else image, 0, 1) * peak).astype(kind)
-    alpha = np.where(full.mask, generator.integers(peak // 2 + 1, peak, full.mask.shape), generator.integers(0, peak // 2, full.mask.shape))
+    values = np.rint(
+        np.clip(linear_to_srgb(image) if transfer == "srgb" else image, 0, 1) * peak
+    ).astype(kind)
+    alpha = np.where(
+        full.mask,
+        generator.integers(peak // 2 + 1, peak, full.mask.shape),
+        generator.integers(0, peak // 2, full.mask.shape),
+    )
     return values, alpha.astype(kind)
 
 
-@pytest.mark.parametrize(("kind", "transfer"), [(np.uint8, "srgb"), (np.uint16, "srgb"), (np.uint16, "linear")])
-def test_png_keeps_depth_coding_alpha_and_all_other_pixels(full: Decomposition, tmp_path: Path, kind: type, transfer: str) -> None:
+@pytest.mark.parametrize(
+    ("kind", "transfer"), [(np.uint8, "srgb"), (np.uint16, "srgb"), (np.uint16, "linear")]
+)
+def test_png_keeps_depth_coding_alpha_and_all_other_pixels(
+    full: Decomposition, tmp_path: Path, kind: type, transfer: str
+) -> None:
     values, alpha = coded(full, kind, transfer)
     cv2.imwrite(str(tmp_path / "photo.png"), np.dstack([values[..., ::-1], alpha]))
     photo = read_photo(tmp_path / "photo.png", transfer=transfer)
     half = half_size(full)
     original = Original(photo, read_raster(tmp_path / "photo.png"))
-    save_edit(half, recolour(half, Paint(hue=120)), tmp_path / "out", Record("recolour"), Sheet("t"), original=original)
+    save_edit(
+        half,
+        recolour(half, Paint(hue=120)),
+        tmp_path / "out",
+        Record("recolour"),
+        Sheet("t"),
+        original=original,
+    )
     written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
     assert written.dtype == kind
     assert np.array_equal(written[..., 3], alpha)
@@ -126,28 +157,58 @@ def test_png_keeps_depth_coding_alpha_and_all_other_pixels(full: Decomposition, 
     )
 
 
-def test_a_grey_photo_gets_colour_only_where_it_is_painted(full: Decomposition, tmp_path: Path) -> None:
+def test_a_grey_photo_gets_colour_only_where_it_is_painted(
+    full: Decomposition, tmp_path: Path
+) -> None:
     values = coded(full, np.uint8, "srgb")[0][..., 1]
     cv2.imwrite(str(tmp_path / "photo.png"), values)
     cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255 * full.mask))
     photo = read_photo(tmp_path / "photo.png", tmp_path / "mask.png")
     half = half_size(full)
     original = Original(photo, read_raster(tmp_path / "photo.png"))
-    save_edit(half, recolour(half, Paint(hue=120)), tmp_path / "out", Record("recolour"), Sheet("t"), original=original)
+    save_edit(
+        half,
+        recolour(half, Paint(hue=120)),
+        tmp_path / "out",
+        Record("recolour"),
+        Sheet("t"),
+        original=original,
+    )
     written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
     assert np.array_equal(written[~full.mask], np.repeat(values[~full.mask][:, None], 3, 1))
 
 
 def test_exr_stays_linear_and_unchanged_outside(full: Decomposition, tmp_path: Path) -> None:
-    light = np.where(full.mask[..., None], 3 * full.image, np.random.default_rng(1).uniform(0, 9, full.image.shape)).astype(np.float32)
+    light = np.where(
+        full.mask[..., None],
+        3 * full.image,
+        np.random.default_rng(1).uniform(0, 9, full.image.shape),
+    ).astype(np.float32)
     generator = np.random.default_rng(7)
-    alpha = np.where(full.mask, 1, generator.choice([0, 0.1, 0.3, 0.47], full.mask.shape)).astype(np.float32)
-    write_channels(tmp_path / "photo.exr", {**{c: light[..., k] for k, c in enumerate("RGB")}, "A": alpha})
+    alpha = np.where(full.mask, 1, generator.choice([0, 0.1, 0.3, 0.47], full.mask.shape)).astype(
+        np.float32
+    )
+    write_channels(
+        tmp_path / "photo.exr", {**{c: light[..., k] for k, c in enumerate("RGB")}, "A": alpha}
+    )
     photo = read_photo(tmp_path / "photo.exr")
     half = half_size(full)
     original = Original(photo, read_raster(tmp_path / "photo.exr"), tmp_path / "photo.exr")
-    half = replace(half, image=half.image * 3, diffuse=half.diffuse * 3, specular=half.specular * 3, shading=half.shading * 3)
-    save_edit(half, edit_layers(half, MATT), tmp_path / "out", Record("dichromatic"), Sheet("t"), original=original)
+    half = replace(
+        half,
+        image=half.image * 3,
+        diffuse=half.diffuse * 3,
+        specular=half.specular * 3,
+        shading=half.shading * 3,
+    )
+    save_edit(
+        half,
+        edit_layers(half, MATT),
+        tmp_path / "out",
+        Record("dichromatic"),
+        Sheet("t"),
+        original=original,
+    )
     written = read_channels(tmp_path / "out" / "edited.exr")
     assert set(written) == {"R", "G", "B", "A"}
     assert np.array_equal(written["A"], alpha)
@@ -164,4 +225,6 @@ def test_without_a_photo_the_maps_picture_is_written_with_the_mask_as_alpha(tmp_
     written = cv2.imread(str(tmp_path / "out" / "edited.png"), cv2.IMREAD_UNCHANGED)
     assert np.array_equal(written[..., 3], 255 * scene.mask.astype(np.uint8))
     channels = read_channels(tmp_path / "out" / "edited.exr")
-    assert np.stack([channels[c] for c in "RGB"], -1) == pytest.approx(edit_layers(scene, MATT).image, abs=1e-6)
+    assert np.stack([channels[c] for c in "RGB"], -1) == pytest.approx(
+        edit_layers(scene, MATT).image, abs=1e-6
+    )

@@ -1,4 +1,6 @@
-"""The optimal light direction: found again where one light made the picture, doubted where none did."""
+"""The optimal light direction: found again where one light made the picture, doubted where none
+did.
+"""
 
 from dataclasses import replace
 
@@ -20,7 +22,9 @@ def lit(scene: Decomposition, light: DirectionalLight) -> Decomposition:
     return replace(scene, shading=shading, diffuse=scene.reflectance * shading)
 
 
-def glossy(scene: Decomposition, light: np.ndarray, exponent: float, strength: np.ndarray) -> Decomposition:
+def glossy(
+    scene: Decomposition, light: np.ndarray, exponent: float, strength: np.ndarray
+) -> Decomposition:
     specular = lobe_light(scene.normal, light, exponent)[..., None] * strength
     return replace(scene, specular=np.where(scene.mask[..., None], specular, 0).astype(np.float32))
 
@@ -31,7 +35,9 @@ def degrees(a: np.ndarray, b: np.ndarray) -> float:
 
 @pytest.mark.parametrize("direction", LIGHTS)
 def test_a_lambert_ball_tells_its_light(direction: tuple[float, float, float]) -> None:
-    true = DirectionalLight(toward(*direction), np.array([3.0, 2.5, 2.0]), np.array([0.1, 0.12, 0.2]))
+    true = DirectionalLight(
+        toward(*direction), np.array([3.0, 2.5, 2.0]), np.array([0.1, 0.12, 0.2])
+    )
     found = explain_shading(lit(ball(), true))
     assert degrees(found.light.direction, true.direction) < 1
     assert found.light.irradiance == pytest.approx(true.irradiance, rel=0.03)
@@ -41,8 +47,13 @@ def test_a_lambert_ball_tells_its_light(direction: tuple[float, float, float]) -
     assert found.determined
 
 
-@pytest.mark.parametrize(("direction", "exponent"), [(LIGHTS[0], 60.0), (LIGHTS[1], 12.0), (LIGHTS[2], 300.0), (LIGHTS[3], 60.0)])
-def test_a_lobe_tells_its_light_and_exponent(direction: tuple[float, float, float], exponent: float) -> None:
+@pytest.mark.parametrize(
+    ("direction", "exponent"),
+    [(LIGHTS[0], 60.0), (LIGHTS[1], 12.0), (LIGHTS[2], 300.0), (LIGHTS[3], 60.0)],
+)
+def test_a_lobe_tells_its_light_and_exponent(
+    direction: tuple[float, float, float], exponent: float
+) -> None:
     light, strength = toward(*direction), np.array([0.5, 0.45, 0.4])
     found = explain_specular(glossy(ball(), light, exponent, strength))
     assert degrees(found.light.direction, light) < 1
@@ -57,18 +68,28 @@ def test_outliers_hardly_move_the_light() -> None:
     scene = lit(ball(), true)
     shading = scene.shading.copy()
     shading[30:36, 50:56] = 8.0
-    assert degrees(explain_shading(replace(scene, shading=shading)).light.direction, true.direction) < 3
+    assert (
+        degrees(explain_shading(replace(scene, shading=shading)).light.direction, true.direction)
+        < 3
+    )
 
 
 def test_the_cone_holds_what_noise_in_blocks_does() -> None:
-    """Errors that whole regions share move the direction by about what the cone says, not by the tiny error of single pixels."""
+    """Errors that whole regions share move the direction by about what the cone says, not by the
+    tiny error of single pixels.
+    """
     generator = np.random.default_rng(3)
     true = DirectionalLight(toward(0.4, 0.5, 0.7))
     scene = lit(ball(), true)
     moved, cones = [], []
     for _ in range(6):
         patches = np.kron(generator.normal(0, 0.08, (12, 12)), np.ones((8, 10)))[..., None]
-        found = explain_shading(replace(scene, shading=np.where(scene.mask[..., None], np.maximum(scene.shading + patches, 0), 0)))
+        found = explain_shading(
+            replace(
+                scene,
+                shading=np.where(scene.mask[..., None], np.maximum(scene.shading + patches, 0), 0),
+            )
+        )
         moved.append(degrees(found.light.direction, true.direction))
         cones.append(found.cone)
     assert 0.4 < np.sqrt(np.mean(np.square(moved)) / 2) / np.mean(cones) < 2.5
@@ -77,7 +98,9 @@ def test_the_cone_holds_what_noise_in_blocks_does() -> None:
 def test_flat_light_and_no_gloss_are_undetermined() -> None:
     scene = ball()
     flat = replace(
-        scene, shading=np.full_like(scene.shading, 0.5) * scene.mask[..., None].astype(np.float32), specular=np.zeros_like(scene.specular)
+        scene,
+        shading=np.full_like(scene.shading, 0.5) * scene.mask[..., None].astype(np.float32),
+        specular=np.zeros_like(scene.specular),
     )
     for found in (explain_shading(flat), explain_specular(flat)):
         assert found.explained == 0
@@ -101,11 +124,15 @@ def test_the_sphere_is_brightest_where_it_faces_the_light() -> None:
 
 
 def test_specks_of_a_matt_object_tell_no_light() -> None:
-    """Where the fit of the lobe says that there are next to no highlights, two faint pixels are no direction."""
+    """Where the fit of the lobe says that there are next to no highlights, two faint pixels are no
+    direction.
+    """
     scene = ball()
     specks = np.zeros_like(scene.specular)
     specks[30:32, 40] = 0.01
     fit = LobeFit("ggx", False, NO_LIGHT, None, None, (), None, None, 0.0, np.zeros_like(specks))
     matt = replace(scene, specular=specks, brdf=fit)
     assert not explain_specular(matt).determined
-    assert explain_specular(replace(matt, brdf=None)).exponent is not None, "without a fit whatever there is is explained"
+    assert explain_specular(replace(matt, brdf=None)).exponent is not None, (
+        "without a fit whatever there is is explained"
+    )

@@ -3,7 +3,13 @@
 import numpy as np
 import pytest
 
-from isc_core.environment import directions, environment_from_shading, resampled, shading_under, solid_angles
+from isc_core.environment import (
+    directions,
+    environment_from_shading,
+    resampled,
+    shading_under,
+    solid_angles,
+)
 from isc_core.sirfs.frames import real_sh
 
 
@@ -31,13 +37,21 @@ def test_a_constant_light_is_a_uniform_sky() -> None:
     light = np.zeros((9, 3))
     light[0] = np.log([0.2, 0.5, 2.0]) * np.sqrt(4 * np.pi)
     sky = environment_from_shading(light, rows=16)
-    np.testing.assert_allclose(shading_under(sky, facing_normals(50)), [[0.2, 0.5, 2.0]] * 50, rtol=0.02)
+    np.testing.assert_allclose(
+        shading_under(sky, facing_normals(50)), [[0.2, 0.5, 2.0]] * 50, rtol=0.02
+    )
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_the_sky_gives_the_recovered_shading(seed: int) -> None:
-    """Lights of the strength that decompositions find. Not every contrast is within a sky's reach: some error remains."""
-    light = np.random.default_rng(seed).normal(size=(9, 3)) * np.array([0.5, *[0.5] * 3, *[0.15] * 5])[:, None]
+    """Lights of the strength that decompositions find.
+
+    Not every contrast is within a sky's reach: some error remains.
+    """
+    light = (
+        np.random.default_rng(seed).normal(size=(9, 3))
+        * np.array([0.5, *[0.5] * 3, *[0.15] * 5])[:, None]
+    )
     sky = environment_from_shading(light)
     normals = facing_normals(400)
     error = np.abs(shading_under(sky, normals) / np.exp(real_sh(normals) @ light) - 1)
@@ -56,13 +70,17 @@ def test_light_from_the_left_comes_from_the_left() -> None:
 
 @pytest.mark.parametrize("rows", [7, 16, 24, 32, 51])
 def test_resampling_loses_no_light_from_any_side(rows: int) -> None:
-    """Exact for the sum; what stays within a pixel keeps its moment only as far as the larger pixels tell."""
+    """Exact for the sum; what stays within a pixel keeps its moment only as far as the larger
+    pixels tell.
+    """
     sky = np.random.default_rng(4).gamma(0.3, size=(24, 48, 3))
     other = resampled(sky, rows)
     assert other.shape == (rows, 2 * rows, 3)
     light, kept = ((r * solid_angles(len(r))[..., None]).sum((0, 1)) for r in (sky, other))
     np.testing.assert_allclose(kept, light, rtol=1e-12)
-    np.testing.assert_allclose(shading_under(other, facing_normals(40)), shading_under(sky, facing_normals(40)), rtol=0.15)
+    np.testing.assert_allclose(
+        shading_under(other, facing_normals(40)), shading_under(sky, facing_normals(40)), rtol=0.15
+    )
     assert other.min() >= sky.min() and other.max() <= sky.max() * (1 + 1e-12)
 
 

@@ -26,7 +26,9 @@ def write_set(root: Path) -> Path:
     for seed, name in enumerate(("ball", "bowl")):
         rng = np.random.default_rng(seed)
         inside = np.hypot(rows - 20, columns - 22) < 15
-        height = np.where(inside, (8 - 4 * seed) * np.cos(np.hypot(rows - 20, columns - 22) / 14), np.nan)
+        height = np.where(
+            inside, (8 - 4 * seed) * np.cos(np.hypot(rows - 20, columns - 22) / 14), np.nan
+        )
         normal = np.nan_to_num(truth_normal(height), nan=0.57)
         reflectance = rng.uniform(0.2, 0.9, (40, 44, 3)) * inside[..., None]
         for illumination in ("natural", "laboratory"):
@@ -34,16 +36,26 @@ def write_set(root: Path) -> Path:
             folder.mkdir(parents=True)
             light = rng.normal(size=(9, 3)) * 0.2 - np.eye(9, 3)
             shading = np.minimum(np.exp(reference_basis(normal) @ light), 1) * inside[..., None]
-            images = {"diffuse": shading * reflectance, "reflectance": reflectance, "shading_color": shading, "mask": inside}
+            images = {
+                "diffuse": shading * reflectance,
+                "reflectance": reflectance,
+                "shading_color": shading,
+                "mask": inside,
+            }
             if illumination == "laboratory":
                 images["original"] = images["diffuse"] + 0.05 * inside[..., None]
             for file, image in images.items():
                 stored = np.round(np.minimum(image, 1) * 65535).astype(np.uint16)
-                assert cv2.imwrite(str(folder / f"{file}.png"), stored[:, :, ::-1] if stored.ndim == 3 else stored)
+                assert cv2.imwrite(
+                    str(folder / f"{file}.png"), stored[:, :, ::-1] if stored.ndim == 3 else stored
+                )
             scipy.io.savemat(folder / "shading_corrected_color.mat", {"shading_correct": shading})
             scipy.io.savemat(folder / "L.mat", {"L": light, "color_lights": {"diffuse": light}})
             scipy.io.savemat(folder / "Z.mat", {"depth": height})
-            scipy.io.savemat(folder / "crop_idx.mat", {"crop_idx1": np.arange(3, 39), "crop_idx2": np.arange(4, 43)})
+            scipy.io.savemat(
+                folder / "crop_idx.mat",
+                {"crop_idx1": np.arange(3, 39), "crop_idx2": np.arange(4, 43)},
+            )
     return root
 
 
@@ -67,7 +79,13 @@ def oracle(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
 def naive(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
     del monitor
     flat = np.broadcast_to([0.0, 0.0, 1.0], truth.image.shape)
-    return Estimate(np.zeros(truth.height.shape), flat, np.ones(truth.image.shape), truth.image, np.zeros((9, 3)))
+    return Estimate(
+        np.zeros(truth.height.shape),
+        flat,
+        np.ones(truth.image.shape),
+        truth.image,
+        np.zeros((9, 3)),
+    )
 
 
 def test_a_baseline_is_scored_on_its_own_shading(root: Path) -> None:
@@ -76,14 +94,23 @@ def test_a_baseline_is_scored_on_its_own_shading(root: Path) -> None:
     answer = make_runner(RunnerOptions("retinex"), shipped_prior_set())(truth, Monitor())
     own = retinex.log_shading(np.log(np.where(truth.valid[..., None], truth.image, 1)), truth.valid)
     np.testing.assert_allclose(answer.shading[truth.valid], np.exp(own[truth.valid]))
-    np.testing.assert_allclose((answer.shading * answer.reflectance)[truth.valid], truth.image[truth.valid])
+    np.testing.assert_allclose(
+        (answer.shading * answer.reflectance)[truth.valid], truth.image[truth.valid]
+    )
 
 
 @pytest.mark.parametrize("model", ["mdr", "joint"])
-def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(root: Path, model: str) -> None:
-    """To the bit: the layers are stored in fewer digits than the set's images, and SIRFS' many minima would show that."""
+def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(
+    root: Path, model: str
+) -> None:
+    """To the bit: the layers are stored in fewer digits than the set's images, and SIRFS' many
+    minima would show that.
+    """
     truth = load_object(root, "ball", "natural")
-    plain, other = (make_runner(RunnerOptions(name, "none"), shipped_prior_set())(truth, Monitor()) for name in ("sirfs", model))
+    plain, other = (
+        make_runner(RunnerOptions(name, "none"), shipped_prior_set())(truth, Monitor())
+        for name in ("sirfs", model)
+    )
     np.testing.assert_array_equal(other.height, plain.height)
     np.testing.assert_array_equal(other.reflectance, plain.reflectance)
 
@@ -91,12 +118,16 @@ def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(root: Path
 def test_what_was_seen_is_expected_where_that_is_asked_for(root: Path) -> None:
     def height(illumination: str, **priors: str) -> np.ndarray:
         options = RunnerOptions(threads=1, **priors)  # type: ignore[arg-type]
-        return make_runner(options, shipped_prior_set())(load_object(root, "ball", illumination), Monitor()).height
+        return make_runner(options, shipped_prior_set())(
+            load_object(root, "ball", illumination), Monitor()
+        ).height
 
     by_itself = height("natural")
     for prior in ("light_prior", "shape_prior"):
         assert not np.array_equal(height("natural", **{prior: "seen"}), by_itself)
-    np.testing.assert_array_equal(height("laboratory", light_prior="seen"), height("laboratory"))  # its light is known
+    np.testing.assert_array_equal(
+        height("laboratory", light_prior="seen"), height("laboratory")
+    )  # its light is known
     with pytest.raises(InputError, match="unknown shape prior"):
         RunnerOptions(shape_prior="round").check()
 
@@ -111,11 +142,17 @@ def test_runs_every_object_under_every_light(report: EvaluationReport) -> None:
         ("natural", "ball"), ("natural", "bowl"), ("laboratory", "ball"), ("laboratory", "bowl"),
     ]  # fmt: skip
     assert report.illuminations == ("natural", "laboratory")
-    assert all(r.scores.average > 1e-4 and r.loss is None and r.valid_pixels > 500 for r in report.results)
+    assert all(
+        r.scores.average > 1e-4 and r.loss is None and r.valid_pixels > 500 for r in report.results
+    )
 
 
-def test_the_oracle_is_perfect_and_the_naive_answer_is_not(root: Path, report: EvaluationReport) -> None:
-    perfect = evaluate(root, objects=["bowl"], illuminations=["natural"], model="oracle", runner=oracle)
+def test_the_oracle_is_perfect_and_the_naive_answer_is_not(
+    root: Path, report: EvaluationReport
+) -> None:
+    perfect = evaluate(
+        root, objects=["bowl"], illuminations=["natural"], model="oracle", runner=oracle
+    )
     assert len(perfect.results) == 1 and perfect.results[0].loss == 1.25
     assert perfect.mean("natural").average < 1e-7 < report.mean("natural").average
 
@@ -130,7 +167,11 @@ def test_means_are_geometric(report: EvaluationReport) -> None:
 def test_json_has_the_names_of_the_reference(report: EvaluationReport) -> None:
     stored = json.loads(json.dumps(report.to_json(), allow_nan=False))
     names = {"height", "normal", "shading", "reflectance", "rs_mse", "light", "avg"}
-    assert set(stored["geometric_means"]) == set(stored["results"]) == {"natural/diffuse", "laboratory/diffuse"}
+    assert (
+        set(stored["geometric_means"])
+        == set(stored["results"])
+        == {"natural/diffuse", "laboratory/diffuse"}
+    )
     assert set(stored["geometric_means"]["natural/diffuse"]) == names | {"seconds"}
     ball = stored["results"]["natural/diffuse"]["ball"]
     assert names | {"final_loss", "evaluations", "valid_pixels", "seconds"} == set(ball)
@@ -145,16 +186,24 @@ def test_table_is_aligned_and_complete(report: EvaluationReport) -> None:
 
 
 def test_original_input_shows_the_highlights(root: Path, report: EvaluationReport) -> None:
-    original = evaluate(root, illuminations=["laboratory"], input="original", model="naive", runner=naive)
-    assert original.results[0].scores.reflectance != report.under("laboratory")[0].scores.reflectance
+    original = evaluate(
+        root, illuminations=["laboratory"], input="original", model="naive", runner=naive
+    )
+    assert (
+        original.results[0].scores.reflectance != report.under("laboratory")[0].scores.reflectance
+    )
     assert "laboratory/original" in original.to_json()["results"]
 
 
 def test_natural_light_has_highlights_where_the_set_was_given_some(tmp_path: Path) -> None:
     root = write_set(tmp_path)
     for name in ("ball", "bowl"):
-        (root / "natural" / name / "original.png").write_bytes((root / "natural" / name / "diffuse.png").read_bytes())
-    glossy = evaluate(root, illuminations=["natural"], input="original", model="naive", runner=naive)
+        (root / "natural" / name / "original.png").write_bytes(
+            (root / "natural" / name / "diffuse.png").read_bytes()
+        )
+    glossy = evaluate(
+        root, illuminations=["natural"], input="original", model="naive", runner=naive
+    )
     assert [result.name for result in glossy.results] == ["ball", "bowl"]
 
 
@@ -162,19 +211,41 @@ def test_bad_names_are_found_before_the_first_run(root: Path) -> None:
     def never(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
         raise AssertionError("must not run")
 
-    wrong: tuple[dict[str, Any], ...] = ({"objects": ["ball", "cube"]}, {"input": "original"}, {"illuminations": ["dusk"]}, {"objects": []})
+    wrong: tuple[dict[str, Any], ...] = (
+        {"objects": ["ball", "cube"]},
+        {"input": "original"},
+        {"illuminations": ["dusk"]},
+        {"objects": []},
+    )
     for options in wrong:
         with pytest.raises(InputError):
             evaluate(root, model="never", runner=never, **options)
 
 
 def test_a_name_given_twice_counts_once(root: Path) -> None:
-    assert len(evaluate(root, objects=["ball", "ball"], illuminations=["natural"], model="naive", runner=naive).results) == 1
+    assert (
+        len(
+            evaluate(
+                root,
+                objects=["ball", "ball"],
+                illuminations=["natural"],
+                model="naive",
+                runner=naive,
+            ).results
+        )
+        == 1
+    )
 
 
 def test_progress_rises_and_cancelling_stops(root: Path) -> None:
     seen: list[tuple[str, float]] = []
-    evaluate(root, objects=["ball"], model="oracle", runner=oracle, monitor=Monitor(lambda stage, f: seen.append((stage, f))))
+    evaluate(
+        root,
+        objects=["ball"],
+        model="oracle",
+        runner=oracle,
+        monitor=Monitor(lambda stage, f: seen.append((stage, f))),
+    )
     fractions = [f for _, f in seen]
     assert fractions == [0, 0.25, 0.5, 0.75, 1] and "ball" in seen[0][0]
     with pytest.raises(Cancelled):
@@ -197,7 +268,9 @@ def test_bootstrap_covers_and_repeats() -> None:
     swapped = paired_bootstrap(base, better, 3)
     assert (1 / swapped.ratio, 1 / swapped.high, 1 / swapped.low) == pytest.approx(found, rel=1e-9)
     # The width is that of a mean of ten: about 2 * 1.96 * .2 / sqrt(10) in logarithms.
-    assert np.log(found.high / found.low) == pytest.approx(2 * 1.96 * np.std(better - base) / np.sqrt(10), rel=0.1)
+    assert np.log(found.high / found.low) == pytest.approx(
+        2 * 1.96 * np.std(better - base) / np.sqrt(10), rel=0.1
+    )
 
 
 def test_bootstrap_refuses_unpaired_values() -> None:

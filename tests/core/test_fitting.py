@@ -1,4 +1,6 @@
-"""The priors' statistics: known densities are recovered, tables are densities, symmetries hold, and the reference's constants are near."""
+"""The priors' statistics: known densities are recovered, tables are densities, symmetries hold, and
+the reference's constants are near.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,14 +15,29 @@ from isc_core.sirfs.fitting import absolute_table, lights, roughness
 from isc_core.sirfs.fitting.absolute_color import TableFitOptions, fit_absolute_table
 from isc_core.sirfs.fitting.color_mixture import ColorCells, fit_color_mixture
 from isc_core.sirfs.fitting.cross_validation import held_out_log_likelihood
-from isc_core.sirfs.fitting.fit import FitOptions, LightFitOptions, color_histogram, fit_priors, fit_whitening
+from isc_core.sirfs.fitting.fit import (
+    FitOptions,
+    LightFitOptions,
+    color_histogram,
+    fit_priors,
+    fit_whitening,
+)
 from isc_core.sirfs.fitting.pairs import pair_differences
 from isc_core.sirfs.fitting.scale_mixture import Magnitudes, ScaleMixture, fit_scale_mixture
-from isc_core.sirfs.fitting.statistics import ObjectStatistics, TrainingObject, collect_statistics, object_statistics
+from isc_core.sirfs.fitting.statistics import (
+    ObjectStatistics,
+    TrainingObject,
+    collect_statistics,
+    object_statistics,
+)
 from isc_core.sirfs.fitting.training import read_training_objects
 from isc_core.sirfs.fitting.whitening import parsimony_whitening
 
-FAST = FitOptions(iterations=20, absolute=TableFitOptions(max_steps=4, runs=1), grey_absolute=TableFitOptions(max_steps=20, runs=1))
+FAST = FitOptions(
+    iterations=20,
+    absolute=TableFitOptions(max_steps=4, runs=1),
+    grey_absolute=TableFitOptions(max_steps=20, runs=1),
+)
 
 
 def scale_mixture_samples(seed: int = 0, count: int = 200_000) -> np.ndarray:
@@ -36,8 +53,18 @@ def painted_ball(seed: int, size: int = 40) -> TrainingObject:
     inside = i**2 + j**2 < (0.45 * size) ** 2
     height = np.where(inside, np.sqrt(np.maximum((size / 2) ** 2 - i**2 - j**2, 0)), np.nan)
     paint = np.where((i > j)[..., None], rng.uniform(0.1, 0.9, 3), rng.uniform(0.1, 0.9, 3))
-    reflectance = np.clip(paint * np.exp(0.02 * rng.normal(size=(size, size, 1))), 0, 1) * inside[..., None]
-    return TrainingObject(f"ball{seed}", reflectance, inside, height, rng.normal(size=(9, 3)), rng.normal(size=(9, 3)), inside)
+    reflectance = (
+        np.clip(paint * np.exp(0.02 * rng.normal(size=(size, size, 1))), 0, 1) * inside[..., None]
+    )
+    return TrainingObject(
+        f"ball{seed}",
+        reflectance,
+        inside,
+        height,
+        rng.normal(size=(9, 3)),
+        rng.normal(size=(9, 3)),
+        inside,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -68,21 +95,31 @@ class TestPairs:
         valid = np.ones((5, 6), bool)
         valid[2, 3] = False
         points = [(i, j) for i in range(5) for j in range(6) if valid[i, j]]
-        near = [(p, q) for p in points for q in points if p < q and abs(p[0] - q[0]) <= 2 and abs(p[1] - q[1]) <= 2]
+        near = [
+            (p, q)
+            for p in points
+            for q in points
+            if p < q and abs(p[0] - q[0]) <= 2 and abs(p[1] - q[1]) <= 2
+        ]
         wanted = sorted(abs(values[p] - values[q]) for p, q in near)
         assert sorted(np.abs(pair_differences(values, valid))) == wanted
 
     def test_invalid_values_are_never_used(self) -> None:
         values = np.full((8, 8, 3), np.nan)
         values[2:6, 2:6] = 1.0
-        assert np.array_equal(np.unique(pair_differences(values, np.isfinite(values[..., 0]))), [0.0])
+        assert np.array_equal(
+            np.unique(pair_differences(values, np.isfinite(values[..., 0]))), [0.0]
+        )
 
 
 class TestScaleMixture:
     def test_recovers_a_known_density(self) -> None:
         mixture = fit_scale_mixture(Magnitudes.of(scale_mixture_samples()))
         x = np.array([0.0, 0.01, 0.05, 0.1, 0.3, 0.6])
-        truth = sum(w * np.exp(-(x**2) / (2 * s * s)) / (s * np.sqrt(2 * np.pi)) for w, s in ((0.7, 0.02), (0.3, 0.3)))
+        truth = sum(
+            w * np.exp(-(x**2) / (2 * s * s)) / (s * np.sqrt(2 * np.pi))
+            for w, s in ((0.7, 0.02), (0.3, 0.3))
+        )
         assert np.abs(mixture.log_density(x) - np.log(truth)).max() < 0.12
 
     def test_table_is_a_density(self) -> None:
@@ -105,7 +142,11 @@ class TestScaleMixture:
     def test_merging_is_like_fitting_all_at_once(self) -> None:
         x = scale_mixture_samples(count=3000)
         merged = Magnitudes.merged([Magnitudes.of(x[:1000]), Magnitudes.of(x[1000:])])
-        assert np.allclose(fit_scale_mixture(merged).weights, fit_scale_mixture(Magnitudes.of(x)).weights, atol=1e-9)
+        assert np.allclose(
+            fit_scale_mixture(merged).weights,
+            fit_scale_mixture(Magnitudes.of(x)).weights,
+            atol=1e-9,
+        )
 
     def test_density_has_a_floor(self) -> None:
         narrow = ScaleMixture(np.array([1e-3]), np.array([1.0]), 1.0)
@@ -128,7 +169,9 @@ class TestColorMixture:
         assert np.abs(mixture.covariance - unit).max() < 0.03
         assert np.allclose(mixture.whiten() @ mixture.covariance @ mixture.whiten(), np.eye(3))
         m = np.array([0.0, 1e-4, 1e-3, 1e-2, 3e-2])
-        truth = sum(w * (2 * np.pi * v) ** -1.5 * np.exp(-m / v) for w, v in ((0.6, 1e-4), (0.4, 1e-2)))
+        truth = sum(
+            w * (2 * np.pi * v) ** -1.5 * np.exp(-m / v) for w, v in ((0.6, 1e-4), (0.4, 1e-2))
+        )
         assert np.abs(mixture.log_density(m) - np.log(truth)).max() < 0.15
 
     def test_a_few_large_differences_do_not_set_the_covariance(self) -> None:
@@ -165,7 +208,12 @@ class TestColorMixture:
 
 def test_whitening_whitens() -> None:
     rng = np.random.default_rng(3)
-    data = rng.normal(size=(20_000, 3)) @ np.diag([2.0, 1.0, 0.5]) @ np.linalg.qr(rng.normal(size=(3, 3)))[0] + 1.0
+    data = (
+        rng.normal(size=(20_000, 3))
+        @ np.diag([2.0, 1.0, 0.5])
+        @ np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        + 1.0
+    )
     second = data.T @ data / len(data)
     exact = parsimony_whitening(second, floor=0.0)
     assert np.allclose(exact @ second @ exact, np.eye(3))
@@ -179,7 +227,10 @@ class TestRoughness:
     def test_gradient(self, shape: tuple[int, ...]) -> None:
         rng = np.random.default_rng(4)
         f, direction, step = rng.normal(size=shape), rng.normal(size=shape), 1e-6
-        slope = (roughness.roughness_numpy(f + step * direction)[0] - roughness.roughness_numpy(f - step * direction)[0]) / (2 * step)
+        slope = (
+            roughness.roughness_numpy(f + step * direction)[0]
+            - roughness.roughness_numpy(f - step * direction)[0]
+        ) / (2 * step)
         assert (roughness.roughness_numpy(f)[1] * direction).sum() == pytest.approx(slope, rel=1e-6)
 
     def test_engines_agree(self) -> None:
@@ -202,8 +253,12 @@ class TestAbsoluteTable:
         histogram = absolute_table.splat(points, 12, weights)
         nodes = np.linspace(absolute_table.LOW, absolute_table.HIGH, 12)
         assert histogram.sum() == pytest.approx(weights.sum())
-        assert (histogram.sum(axis=(1, 2)) * nodes).sum() == pytest.approx((weights * points[:, 0]).sum())
-        assert (histogram.sum(axis=(0, 1)) * nodes).sum() == pytest.approx((weights * points[:, 2]).sum())
+        assert (histogram.sum(axis=(1, 2)) * nodes).sum() == pytest.approx(
+            (weights * points[:, 0]).sum()
+        )
+        assert (histogram.sum(axis=(0, 1)) * nodes).sum() == pytest.approx(
+            (weights * points[:, 2]).sum()
+        )
 
     def test_points_outside_go_to_the_border(self) -> None:
         histogram = absolute_table.splat(np.array([[-99.0], [99.0]]), 12, np.ones(2))
@@ -234,16 +289,24 @@ class TestAbsoluteTable:
         density = np.exp(-0.5 * ((nodes + 1) / 0.8) ** 2)
         density /= density.sum()
         losses: list[float] = []
-        table = fit_absolute_table(density, TableFitOptions(smoothness=0.5, tolerance=1e-8, max_steps=2000), losses.append).table()
+        table = fit_absolute_table(
+            density, TableFitOptions(smoothness=0.5, tolerance=1e-8, max_steps=2000), losses.append
+        ).table()
         near = np.abs(nodes + 1) < 1.5
         fitted = np.exp(-table.values) / np.exp(-table.values).sum()
         assert np.abs(fitted - density)[near].max() < 0.05 * density.max()
         assert losses[-1] < losses[0]
 
     def test_more_smoothness_bends_less(self) -> None:
-        histogram = absolute_table.splat(np.random.default_rng(7).normal(-1, 0.5, (50, 1)), 256, np.full(50, 0.02))
+        histogram = absolute_table.splat(
+            np.random.default_rng(7).normal(-1, 0.5, (50, 1)), 256, np.full(50, 0.02)
+        )
         bends = [
-            roughness.roughness_numpy(fit_absolute_table(histogram, TableFitOptions(smoothness=c, tolerance=1e-7)).table().values)[0]
+            roughness.roughness_numpy(
+                fit_absolute_table(histogram, TableFitOptions(smoothness=c, tolerance=1e-7))
+                .table()
+                .values
+            )[0]
             for c in (4.0, 64.0)
         ]
         assert bends[1] < 0.5 * bends[0]
@@ -284,14 +347,23 @@ class TestLights:
 
     def test_grey_is_the_mean_of_the_channels(self, environments: np.ndarray) -> None:
         samples = environments.transpose(2, 0, 1)
-        derived, direct = lights.fit_light(samples).grey(), lights.fit_light(samples.mean(axis=2, keepdims=True))
+        derived, direct = (
+            lights.fit_light(samples).grey(),
+            lights.fit_light(samples.mean(axis=2, keepdims=True)),
+        )
         assert np.allclose(derived.mean, direct.mean)
         assert np.allclose(derived.covariance, direct.covariance)
 
     def test_ridge_widens_brightness_and_colour_apart(self, environments: np.ndarray) -> None:
         samples = environments.transpose(2, 0, 1)
-        gain = lights.fit_light(samples, ridge=(0.3, 0.1)).covariance - lights.fit_light(samples).covariance
-        bright, blue = np.tile(np.eye(9)[0], 3) / np.sqrt(3), np.repeat([-1.0, 0, 1], 9) * np.tile(np.eye(9)[0], 3) / np.sqrt(2)
+        gain = (
+            lights.fit_light(samples, ridge=(0.3, 0.1)).covariance
+            - lights.fit_light(samples).covariance
+        )
+        bright, blue = (
+            np.tile(np.eye(9)[0], 3) / np.sqrt(3),
+            np.repeat([-1.0, 0, 1], 9) * np.tile(np.eye(9)[0], 3) / np.sqrt(2),
+        )
         assert bright @ gain @ bright == pytest.approx(0.3)
         assert blue @ gain @ blue == pytest.approx(0.1)
         assert bright @ gain @ blue == pytest.approx(0, abs=1e-12)
@@ -301,14 +373,20 @@ class TestLights:
         rng = np.random.default_rng(9)
         base = lights.fit_light(rng.normal(size=(400, 9, 3)))
         truth = lights.scaled(base, lights.Contrast(brightness, color))
-        drawn = rng.multivariate_normal(truth.mean, truth.covariance, size=300).reshape(-1, 3, 9).transpose(0, 2, 1)
+        drawn = (
+            rng.multivariate_normal(truth.mean, truth.covariance, size=300)
+            .reshape(-1, 3, 9)
+            .transpose(0, 2, 1)
+        )
         found = lights.fit_contrast(base, drawn)
         assert found.brightness == pytest.approx(brightness, rel=0.05)
         assert found.color == pytest.approx(color, rel=0.05)
 
     def test_likelihood_is_that_of_a_gaussian(self) -> None:
         light = lights.GaussianLight(np.zeros(2), np.diag([1.0, 4.0]))
-        assert light.log_likelihood(np.array([[1.0, 2.0]]))[0] == pytest.approx(-0.5 * (1 + 1) - np.log(2) - np.log(2 * np.pi))
+        assert light.log_likelihood(np.array([[1.0, 2.0]]))[0] == pytest.approx(
+            -0.5 * (1 + 1) - np.log(2) - np.log(2 * np.pi)
+        )
 
 
 class TestFit:
@@ -316,7 +394,9 @@ class TestFit:
         statistics = object_statistics(painted_ball(0, size=120))
         assert statistics.curvature.absolute_sum / statistics.curvature.counts.sum() < 2e-3
 
-    def test_all_priors_expand(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+    def test_all_priors_expand(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
         fitted = fit_priors(balls, environments, FAST)
         for illumination in ("natural", "laboratory"):
             for channels in (3, 1):
@@ -324,41 +404,68 @@ class TestFit:
                 assert priors.light.mean.shape == (9 * channels,)
                 assert priors.absolute.values.ndim == channels
                 assert priors.absolute.values.min() == 0
-                assert priors.parsimony_whiten.shape == priors.smoothness_whiten.shape == (channels, channels)
+                assert (
+                    priors.parsimony_whiten.shape
+                    == priors.smoothness_whiten.shape
+                    == (channels, channels)
+                )
         assert fitted.record.objects == tuple(f"ball{k}" for k in range(8))
 
-    def test_same_objects_give_the_same_priors_in_any_order(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+    def test_same_objects_give_the_same_priors_in_any_order(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
         one = fit_priors(balls, environments, FAST)
         other = fit_priors(dict(reversed(balls.items())), environments, FAST)
         assert np.array_equal(one.absolute.coarse, other.absolute.coarse)
         assert np.array_equal(one.color_smoothness.weights, other.color_smoothness.weights)
 
-    def test_contrast_can_be_given(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+    def test_contrast_can_be_given(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
         light = LightFitOptions(natural_contrast=lights.Contrast(2.0, 2.0))
-        fitted = fit_priors(balls, environments, FitOptions(FAST.components, 5, light=light, absolute=FAST.absolute))
+        fitted = fit_priors(
+            balls, environments, FitOptions(FAST.components, 5, light=light, absolute=FAST.absolute)
+        )
         plain = lights.fit_light(lights.mirrored(environments.transpose(2, 0, 1)))
         assert np.allclose(fitted.lights.natural.covariance, 4 * plain.covariance)
 
-    def test_held_out_likelihood_has_one_value_an_object(self, balls: dict[str, ObjectStatistics]) -> None:
-        values = held_out_log_likelihood(balls, TableFitOptions(smoothness=24, max_steps=30, runs=1), channels=1)
+    def test_held_out_likelihood_has_one_value_an_object(
+        self, balls: dict[str, ObjectStatistics]
+    ) -> None:
+        values = held_out_log_likelihood(
+            balls, TableFitOptions(smoothness=24, max_steps=30, runs=1), channels=1
+        )
         assert values.shape == (8,)
         assert np.isfinite(values).all()
 
-    def test_cancelling_ends_the_fit(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+    def test_cancelling_ends_the_fit(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
         with pytest.raises(Cancelled):
             fit_priors(balls, environments, FAST, Monitor(cancelled=lambda: True))
 
-    def test_progress_never_goes_back(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+    def test_progress_never_goes_back(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
         seen: list[float] = []
-        fit_priors(balls, environments, FAST, Monitor(progress=lambda stage, fraction: seen.append(fraction)))
+        fit_priors(
+            balls,
+            environments,
+            FAST,
+            Monitor(progress=lambda stage, fraction: seen.append(fraction)),
+        )
         assert seen == sorted(seen)
         assert seen[-1] == 1
 
-    def test_too_few_objects_is_a_clear_error(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+    def test_too_few_objects_is_a_clear_error(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
         with pytest.raises(InputError, match="at least two"):
             fit_priors({"ball0": balls["ball0"]}, environments, FAST)
 
-    def test_too_few_lights_is_a_clear_error(self, balls: dict[str, ObjectStatistics], environments: np.ndarray) -> None:
+    def test_too_few_lights_is_a_clear_error(
+        self, balls: dict[str, ObjectStatistics], environments: np.ndarray
+    ) -> None:
         plain = replace(FAST, light=replace(FAST.light, laboratory_ridge=(0.0, 0.0)))
         with pytest.raises(InputError, match="too few"):
             fit_priors({name: balls[name] for name in ("ball0", "ball1")}, environments, plain)
@@ -369,48 +476,83 @@ class TestFit:
 
     def test_an_empty_object_is_a_clear_error(self) -> None:
         ball = painted_ball(0)
-        empty = TrainingObject("ball", ball.reflectance * 0, ball.valid, ball.height, ball.natural_light, ball.laboratory_light, ball.mask)
+        empty = TrainingObject(
+            "ball",
+            ball.reflectance * 0,
+            ball.valid,
+            ball.height,
+            ball.natural_light,
+            ball.laboratory_light,
+            ball.mask,
+        )
         with pytest.raises(InputError, match="'ball'"):
             object_statistics(empty)
 
 
 class TestAgainstTheReference:
-    """The reference's constants came from these ten objects; it drew its samples at random, we take all of them."""
+    """The reference's constants came from these ten objects; it drew its samples at random, we take
+    all of them.
+    """
 
-    def test_curvature(self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]) -> None:
+    def test_curvature(
+        self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]
+    ) -> None:
         mixture = fit_scale_mixture(Magnitudes.merged(o.curvature for o in measured.values()))
         x = np.array([0.001, 0.003, 0.01, 0.03, 0.1, 0.3])
         cost = mixture.log_density(np.zeros(1))[0] - mixture.log_density(x)
         nodes = reference["z_curv_lut_low"] + reference["z_curv_lut_step"] * np.arange(20_000)
-        # At 0 the table depends on the very smallest differences; costs are compared from 0.001 on, as slopes.
+        # At 0 the table depends on the very smallest differences; costs are compared from 0.001 on,
+        # as slopes.
         theirs = np.interp(x, nodes, reference["z_curv_lut_cost"])
         assert np.abs((cost - cost[0]) - (theirs - theirs[0])).max() < 0.25
 
-    def test_color_smoothness(self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]) -> None:
-        mixture = fit_color_mixture(ColorCells.merged(o.color_smoothness for o in measured.values()))
+    def test_color_smoothness(
+        self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]
+    ) -> None:
+        mixture = fit_color_mixture(
+            ColorCells.merged(o.color_smoothness for o in measured.values())
+        )
         theirs = reference["a_smooth_whiten"]
         assert np.linalg.norm(mixture.whiten() - theirs) < 0.05 * np.linalg.norm(theirs)
         m = np.array([1e-3, 1e-2, 0.1, 1.0, 3.0])
         nodes = reference["a_smooth_lut_low"] + reference["a_smooth_lut_step"] * np.arange(100_000)
-        assert np.abs(mixture.log_density(m) - np.interp(m, nodes, reference["a_smooth_lut_loglik"])).max() < 0.35
+        assert (
+            np.abs(
+                mixture.log_density(m) - np.interp(m, nodes, reference["a_smooth_lut_loglik"])
+            ).max()
+            < 0.35
+        )
 
-    def test_whitening(self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]) -> None:
+    def test_whitening(
+        self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]
+    ) -> None:
         ours, theirs = fit_whitening(list(measured.values())), reference["a_whiten"]
         assert np.linalg.norm(ours - theirs) < 0.01 * np.linalg.norm(theirs)
 
-    def test_absolute_color(self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]) -> None:
+    def test_absolute_color(
+        self, measured: dict[str, ObjectStatistics], reference: dict[str, np.ndarray]
+    ) -> None:
         histogram = color_histogram(list(measured.values()), reference["a_whiten"])
-        ours, theirs = fit_absolute_table(histogram, TableFitOptions()).table().values, reference["a_abs_cost_RETRAINED"]
+        ours, theirs = (
+            fit_absolute_table(histogram, TableFitOptions()).table().values,
+            reference["a_abs_cost_RETRAINED"],
+        )
         assert np.sqrt(np.mean((ours - theirs) ** 2)) < 0.02
         assert np.abs(ours - theirs).max() < 0.1
 
     def test_light_whitening_formula(self, reference: dict[str, np.ndarray]) -> None:
         for kind in ("color_natural", "color_laboratory", "gray_natural", "gray_laboratory"):
-            theirs = lights.GaussianLight(reference[f"light_{kind}_mu"], reference[f"light_{kind}_Sigma"])
+            theirs = lights.GaussianLight(
+                reference[f"light_{kind}_mu"], reference[f"light_{kind}_Sigma"]
+            )
             assert np.abs(theirs.light().unwhiten - reference[f"light_{kind}_inverse"]).max() < 1e-3
 
-    def test_environments_are_tamer_than_the_objects_light(self, measured: dict[str, ObjectStatistics], shared: Path) -> None:
-        environments = load_natural_lights(shared / "data" / "mit_berkeley_train").transpose(2, 0, 1)
+    def test_environments_are_tamer_than_the_objects_light(
+        self, measured: dict[str, ObjectStatistics], shared: Path
+    ) -> None:
+        environments = load_natural_lights(shared / "data" / "mit_berkeley_train").transpose(
+            2, 0, 1
+        )
         natural = np.array([o.natural_light for o in measured.values()])
         contrast = lights.fit_contrast(lights.fit_light(lights.mirrored(environments)), natural)
         assert contrast.brightness > 1.5 * contrast.color

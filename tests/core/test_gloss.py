@@ -17,15 +17,31 @@ LAMP = np.array([-0.3, 0.4, 0.866]) / np.linalg.norm([-0.3, 0.4, 0.866])
 VIEW = np.array([0.0, 0.0, 1.0])
 
 
-def lit(alpha: float, strength: float | np.ndarray, lamp: float = 2.0, sky: float = 0.4, model: LobeModel = "ggx") -> Decomposition:
-    """A ball under a lamp of irradiance `lamp` and an even sky that is not mirrored; `strength`: of the lobe, 1 is f0 = .04."""
+def lit(
+    alpha: float,
+    strength: float | np.ndarray,
+    lamp: float = 2.0,
+    sky: float = 0.4,
+    model: LobeModel = "ggx",
+) -> Decomposition:
+    """A ball under a lamp of irradiance `lamp` and an even sky that is not mirrored;
+
+    `strength`: of the lobe, 1 is f0 = .04.
+    """
     d = ball()
     normal = d.normal.astype(float)
     inside = d.mask[..., None]
-    gloss = radiance(Ggx(alpha, 0.04), normal, VIEW, directional(LAMP, lamp)) * np.asarray(strength)[..., None] * inside
+    gloss = (
+        radiance(Ggx(alpha, 0.04), normal, VIEW, directional(LAMP, lamp))
+        * np.asarray(strength)[..., None]
+        * inside
+    )
     shading = (lamp / np.pi * np.maximum(normal @ LAMP, 0) + sky)[..., None] * inside * np.ones(3)
     return replace(
-        d, specular=gloss.astype(np.float32), shading=shading, brdf=fit_lobe(gloss, normal, d.mask, options=LobeFitOptions(model))
+        d,
+        specular=gloss.astype(np.float32),
+        shading=shading,
+        brdf=fit_lobe(gloss, normal, d.mask, options=LobeFitOptions(model)),
     )
 
 
@@ -39,7 +55,9 @@ def test_roughness_and_level_are_the_scene_s(strength: float) -> None:
 
 
 def test_the_lamp_s_brightness_does_not_matter() -> None:
-    dim, bright = (gloss_of(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((1.0, 0.4), (8.0, 0.1)))
+    dim, bright = (
+        gloss_of(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((1.0, 0.4), (8.0, 0.1))
+    )
     assert dim == pytest.approx(bright, rel=0.03)
 
 
@@ -58,8 +76,19 @@ def test_both_lobes_of_a_recovered_scene_have_the_same_level() -> None:
     """The convention of the strength differs by f0, the picture that it stands for does not."""
     d = lit(0.2, 1.0)
     models: tuple[LobeModel, LobeModel] = ("ggx", "blinn_phong")
-    fits = [fit_lobe(d.specular, d.normal, d.mask, options=LobeFitOptions(model, recovered=True), shading=d.shading) for model in models]
-    assert fits[0].predicted.max() == pytest.approx(fits[1].predicted.max(), rel=0.25)  # the two forms differ where lobes are wide
+    fits = [
+        fit_lobe(
+            d.specular,
+            d.normal,
+            d.mask,
+            options=LobeFitOptions(model, recovered=True),
+            shading=d.shading,
+        )
+        for model in models
+    ]
+    assert fits[0].predicted.max() == pytest.approx(
+        fits[1].predicted.max(), rel=0.25
+    )  # the two forms differ where lobes are wide
     levels = [gloss_of(replace(d, brdf=fit)).specular for fit in fits]
     assert levels[0] == pytest.approx(levels[1])
     assert levels[0] == pytest.approx(1.0, rel=0.7)
@@ -79,7 +108,9 @@ def test_without_a_fit_nothing_is_said() -> None:
 def test_an_upper_bound_is_called_one() -> None:
     d = lit(0.2, 1.0)
     assert d.brdf is not None
-    narrow = replace(d.brdf, determined=False, reason="narrow", alpha=0.01, alpha_interval=Interval(0.004, 0.01))
+    narrow = replace(
+        d.brdf, determined=False, reason="narrow", alpha=0.01, alpha_interval=Interval(0.004, 0.01)
+    )
     gloss = gloss_of(replace(d, brdf=narrow))
     assert gloss.roughness == pytest.approx(0.1)
     assert (gloss.roughness_source, gloss.specular) == (BOUND, gloss_of(d).specular)
@@ -101,7 +132,9 @@ def test_gloss_that_differs_between_paints_becomes_a_texture() -> None:
 
 @pytest.mark.parametrize("alpha", [0.1, 0.6])
 def test_even_gloss_has_no_texture(alpha: float) -> None:
-    """Neither where the lobe covers the object, noise included, nor where a small highlight says nothing of the rest."""
+    """Neither where the lobe covers the object, noise included, nor where a small highlight says
+    nothing of the rest.
+    """
     d = lit(alpha, 1.0)
     noise = np.random.default_rng(0).normal(0, 0.05, d.mask.shape)[..., None] * d.specular
     assert specular_variation(replace(d, specular=np.maximum(d.specular + noise, 0))) is None

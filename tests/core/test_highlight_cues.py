@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from isc_core.separation.highlight_cues import Steps, far_from_borders, noise_level, paint_mixing, ramp, roughness, steps_of
+from isc_core.separation.highlight_cues import (
+    Steps,
+    far_from_borders,
+    noise_level,
+    paint_mixing,
+    ramp,
+    roughness,
+    steps_of,
+)
 
 
 def blob(height: int = 90, width: int = 110, radius: float = 0.35) -> np.ndarray:
@@ -15,19 +23,24 @@ def blob(height: int = 90, width: int = 110, radius: float = 0.35) -> np.ndarray
 WHOLE = np.ones((90, 110), bool)
 
 
-# --- ramp -------------------------------------------------------------------------------------------------------------------------------
+# --- ramp -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("ends", [(0.2, 0.6), (0.6, 0.2), (-1.0, 3.0)])
 def test_ramps_rise_from_the_first_end_to_the_second(ends: tuple[float, float]) -> None:
     along = ramp(np.linspace(ends[0], ends[1], 101), ends)
-    assert along[0] == 0 and along[-1] == 1 and along[50] == pytest.approx(0.5) and (np.diff(along) > 0).all()
+    assert (
+        along[0] == 0
+        and along[-1] == 1
+        and along[50] == pytest.approx(0.5)
+        and (np.diff(along) > 0).all()
+    )
     beyond = 10 * (ends[1] - ends[0])
     assert ramp(ends[0] - beyond, ends) == 0 and ramp(ends[1] + beyond, ends) == 1
     assert along[1] < 0.001 and along[-2] > 0.999, "flat at both ends"
 
 
-# --- noise ------------------------------------------------------------------------------------------------------------------------------
+# --- noise ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("deviation", [0.001, 0.02])
@@ -53,7 +66,7 @@ def test_noise_outside_does_not_count() -> None:
     assert noise_level(image, mask) == pytest.approx(0.1, rel=0.06)
 
 
-# --- borders ----------------------------------------------------------------------------------------------------------------------------
+# --- borders --------------------------------------------------------------------------------------
 
 
 def test_steps_are_counted_in_units_of_a_border() -> None:
@@ -96,9 +109,13 @@ def test_trust_is_low_beside_a_step_of_chroma_only() -> None:
     mask = blob() > 0.05
     trust = far_from_borders(steps_of([(np.log(chroma), 0.5)], mask, 0), mask, blur=1.5, unit=0.6)
     assert trust[45, 53:57].max() < 0.9 and trust[45, 54:56].max() < 0.7
-    assert trust[45, :45][mask[45, :45]].min() > 0.999 and trust[45, 66:][mask[45, 66:]].min() > 0.999
+    assert (
+        trust[45, :45][mask[45, :45]].min() > 0.999 and trust[45, 66:][mask[45, 66:]].min() > 0.999
+    )
     assert not trust[~mask].any() and trust.min() >= 0 and trust.max() <= 1
-    light = far_from_borders(steps_of([(np.log(0.5 + 0 * chroma), 0.5)], mask, 0), mask, blur=1.5, unit=0.6)
+    light = far_from_borders(
+        steps_of([(np.log(0.5 + 0 * chroma), 0.5)], mask, 0), mask, blur=1.5, unit=0.6
+    )
     assert np.array_equal(light, mask)
 
 
@@ -106,14 +123,23 @@ def test_a_higher_step_is_trusted_less() -> None:
     def beside(step: float) -> float:
         layer = np.zeros((30, 40))
         layer[:, 20:] = step
-        return float(far_from_borders(steps_of([(layer, 1.0)], np.ones((30, 40), bool), 0), np.ones((30, 40), bool), 1.5, 0.2)[15, 20])
+        return float(
+            far_from_borders(
+                steps_of([(layer, 1.0)], np.ones((30, 40), bool), 0),
+                np.ones((30, 40), bool),
+                1.5,
+                0.2,
+            )[15, 20]
+        )
 
     trusts = [beside(step) for step in (0.0, 0.2, 0.5, 1.0, 3.0)]
-    assert trusts[0] == 1 and (np.diff(trusts[:4]) < 0).all() and trusts[4] == pytest.approx(trusts[3])
+    assert (
+        trusts[0] == 1 and (np.diff(trusts[:4]) < 0).all() and trusts[4] == pytest.approx(trusts[3])
+    )
     assert trusts[3] < 0.3
 
 
-# --- roughness --------------------------------------------------------------------------------------------------------------------------
+# --- roughness ------------------------------------------------------------------------------------
 
 
 def test_roughness_orders_light_texture_and_noise() -> None:
@@ -132,7 +158,11 @@ def test_roughness_is_known_in_each_place() -> None:
     layer = np.where(np.arange(110) < 55, 0.5 * np.roll(blob(radius=0.15), -27, axis=1), noise)
     over_all, here = roughness(layer, np.ones((90, 110), np.float32), WHOLE, 4.0, 1.5)
     assert here.shape == layer.shape and np.isfinite(here).all() and here.min() >= 0
-    assert here[35:55, 18:38].max() < 0.4 and here[:, 75:].min() > 0.7 and here[45, 28] < over_all < here[45, 80]
+    assert (
+        here[35:55, 18:38].max() < 0.4
+        and here[:, 75:].min() > 0.7
+        and here[45, 28] < over_all < here[45, 80]
+    )
 
 
 def test_roughness_of_a_share_is_the_same_and_borders_do_not_count() -> None:
@@ -141,14 +171,16 @@ def test_roughness_of_a_share_is_the_same_and_borders_do_not_count() -> None:
     trust[:, 80:] = 0
     printed = layer.copy()
     printed[:, 84:] += np.random.default_rng(3).random((90, 26))
-    plain, bordered = (roughness(example, trust, WHOLE, 4.0, 1.5)[0] for example in (layer, printed))
+    plain, bordered = (
+        roughness(example, trust, WHOLE, 4.0, 1.5)[0] for example in (layer, printed)
+    )
     assert bordered == pytest.approx(plain, abs=0.02)
     assert roughness(3 * layer, trust, WHOLE, 4.0, 1.5)[0] == pytest.approx(plain, rel=1e-4)
     mask = np.arange(110) < 82
     assert roughness(printed, trust, WHOLE & mask, 4.0, 1.5)[0] == pytest.approx(plain, abs=0.02)
 
 
-# --- paint mixing -----------------------------------------------------------------------------------------------------------------------
+# --- paint mixing ---------------------------------------------------------------------------------
 
 PAINT = np.array([0.6, 0.3, 0.15])
 RATIO = PAINT.min() / np.ptp(PAINT)
@@ -157,7 +189,9 @@ RATIO = PAINT.min() / np.ptp(PAINT)
 def mixing_of(image: np.ndarray, scale: float = 4.0) -> np.ndarray:
     """Paint mixing (H, W) of an image (H, W, 3) of the one paint and white."""
     chroma = np.ptp(image, axis=2)
-    return paint_mixing(image.min(axis=2) - RATIO * chroma, chroma, np.full(chroma.shape, RATIO), WHOLE, scale)
+    return paint_mixing(
+        image.min(axis=2) - RATIO * chroma, chroma, np.full(chroma.shape, RATIO), WHOLE, scale
+    )
 
 
 def test_white_paint_is_mixed_and_light_is_not() -> None:

@@ -8,16 +8,35 @@ import pytest
 
 from isc_core.errors import InputError
 from isc_core.exr import write_channels
-from isc_core.highlight_set import SeparationTruth, list_shen_zheng, load_laboratory, load_rendered, load_shen_zheng
+from isc_core.highlight_set import (
+    SeparationTruth,
+    list_shen_zheng,
+    load_laboratory,
+    load_rendered,
+    load_shen_zheng,
+)
 from isc_core.metrics import mse, psnr
 from tests.core.ball_scene import ball
 from tests.core.command_line import write_image
 
-OBJECTS = ("apple", "box", "cup1", "dinosaur", "frog1", "panther", "paper1", "phone", "squirrel", "teabag2")
+OBJECTS = (
+    "apple",
+    "box",
+    "cup1",
+    "dinosaur",
+    "frog1",
+    "panther",
+    "paper1",
+    "phone",
+    "squirrel",
+    "teabag2",
+)
 
 
 def assert_fits(truth: SeparationTruth) -> None:
-    assert truth.image.shape == truth.diffuse.shape == truth.specular.shape == (*truth.mask.shape, 3)
+    assert (
+        truth.image.shape == truth.diffuse.shape == truth.specular.shape == (*truth.mask.shape, 3)
+    )
     assert truth.mask.any() and truth.mask.dtype == bool and truth.clipped.shape == truth.mask.shape
     for layer in (truth.image, truth.diffuse, truth.specular):
         assert np.isfinite(layer).all() and layer.min() >= 0
@@ -31,7 +50,9 @@ def test_shen_zheng_is_what_was_published(shared: Path) -> None:
         truth = load_shen_zheng(folder, name)
         assert_fits(truth)
         assert truth.mask.all() and truth.coded
-        assert psnr(truth.diffuse, truth.image) == pytest.approx(anchors[name]["input_baseline"]["psnr"], abs=1e-5)
+        assert psnr(truth.diffuse, truth.image) == pytest.approx(
+            anchors[name]["input_baseline"]["psnr"], abs=1e-5
+        )
 
 
 @pytest.mark.parametrize("name", OBJECTS)
@@ -51,12 +72,18 @@ def test_rendered_scenes_are_read_in_both_forms(tmp_path: Path) -> None:
     for file in ("maps.exr", "truth.exr"):
         folder = tmp_path / file
         folder.mkdir()
-        layers = {f"{name}.{c}": getattr(scene, name)[..., i] for name in ("image", "diffuse") for i, c in enumerate("RGB")}
+        layers = {
+            f"{name}.{c}": getattr(scene, name)[..., i]
+            for name in ("image", "diffuse")
+            for i, c in enumerate("RGB")
+        }
         write_channels(folder / file, layers | {"mask.A": scene.mask.astype(np.float32)})
     plain = tmp_path / "plain"
     plain.mkdir()
     for name in ("image", "diffuse"):
-        write_channels(plain / f"{name}.exr", {c: getattr(scene, name)[..., i] for i, c in enumerate("RGB")})
+        write_channels(
+            plain / f"{name}.exr", {c: getattr(scene, name)[..., i] for i, c in enumerate("RGB")}
+        )
     write_image(plain / "mask.png", np.where(scene.mask, 255, 0).astype(np.uint8))
     for folder in tmp_path.iterdir():
         truth = load_rendered(folder)

@@ -21,20 +21,38 @@ def pixels(count: int = 400, seed: int = 2) -> tuple[np.ndarray, np.ndarray, np.
 GRID = HueGrid((60, 80), 9.0, 12)
 
 
-# --- hue --------------------------------------------------------------------------------------------------------------------------------
+# --- hue ------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", [np.float32, np.float64])
 def test_hues_are_those_of_the_colour_circle(kind: type) -> None:
     image: np.ndarray = np.random.default_rng(0).random((20, 30, 3)).astype(kind)
     found = hues_of(image)
-    expected = np.array([[6 * colorsys.rgb_to_hsv(*map(float, pixel))[0] for pixel in row] for row in image])
-    assert found.dtype == kind and np.abs(found - expected).max() < 1e-5 * (6 if kind is np.float32 else 1e-6)
+    expected = np.array(
+        [[6 * colorsys.rgb_to_hsv(*map(float, pixel))[0] for pixel in row] for row in image]
+    )
+    assert found.dtype == kind and np.abs(found - expected).max() < 1e-5 * (
+        6 if kind is np.float32 else 1e-6
+    )
     assert found.min() >= 0 and found.max() < 6
 
 
 def test_pure_colours_have_whole_hues() -> None:
-    image = np.array([[[1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1], [1, 0, 1], [0.4, 0.4, 0.4], [0, 0, 0]]], float)
+    image = np.array(
+        [
+            [
+                [1, 0, 0],
+                [1, 1, 0],
+                [0, 1, 0],
+                [0, 1, 1],
+                [0, 0, 1],
+                [1, 0, 1],
+                [0.4, 0.4, 0.4],
+                [0, 0, 0],
+            ]
+        ],
+        float,
+    )
     assert hues_of(image)[0].tolist() == [0, 1, 2, 3, 4, 5, 0, 0]
 
 
@@ -50,7 +68,7 @@ def test_just_below_red_stays_on_the_circle() -> None:
     assert 0 <= found[0, 0] < 6
 
 
-# --- the grid ---------------------------------------------------------------------------------------------------------------------------
+# --- the grid -------------------------------------------------------------------------------------
 
 
 def test_every_pixel_lies_among_the_cells() -> None:
@@ -83,24 +101,39 @@ def test_hues_are_round() -> None:
     hue = 6 * (GRID.hues - 1 + np.array([0.0, 0.25, 0.999])) / GRID.hues
     beyond = np.array([0.0, 0.25, 0.999])
     found = GRID.places(np.full(3, 20.0), np.full(3, 20.0), hue).read(table)
-    assert found == pytest.approx((1 - beyond) * table[0, 0, -1] + beyond * table[0, 0, 0], abs=1e-5)
+    assert found == pytest.approx(
+        (1 - beyond) * table[0, 0, -1] + beyond * table[0, 0, 0], abs=1e-5
+    )
 
 
 def test_votes_are_conserved() -> None:
     rng = np.random.default_rng(3)
-    rows, columns = 20 + 15 * rng.random(300), 20 + 30 * rng.random(300)  # nothing is blurred over the rim
+    rows, columns = (
+        20 + 15 * rng.random(300),
+        20 + 30 * rng.random(300),
+    )  # nothing is blurred over the rim
     bins, weight = rng.integers(0, 7, 300), rng.random(300).astype(np.float32)
-    near, everywhere = GRID.histograms(GRID.places(rows, columns, 6 * rng.random(300)), bins, 7, weight)
+    near, everywhere = GRID.histograms(
+        GRID.places(rows, columns, 6 * rng.random(300)), bins, 7, weight
+    )
     of_bins = np.bincount(bins, weight, 7)
     assert near.shape == (*GRID.shape, 7) and everywhere.shape == (GRID.hues, 7) and near.min() >= 0
-    # Blurring over places doubles the votes in each direction, so that a pixel amid its like finds as many as a cell has.
+    # Blurring over places doubles the votes in each direction, so that a pixel amid its like finds
+    # as many as a cell has.
     assert np.allclose(near.sum(axis=(0, 1, 2)), 4 * of_bins, rtol=1e-5)
-    assert np.allclose(everywhere.sum(axis=0), of_bins + 20 * GRID.hues * of_bins / of_bins.sum(), rtol=1e-5)
+    assert np.allclose(
+        everywhere.sum(axis=0), of_bins + 20 * GRID.hues * of_bins / of_bins.sum(), rtol=1e-5
+    )
 
 
 def test_a_vote_reaches_its_neighbours_alone() -> None:
     grid = HueGrid((60, 80), 10.0, 12)
-    near, _ = grid.histograms(grid.places(np.array([30.0]), np.array([40.0]), np.array([0.0])), np.array([2]), 4, np.ones(1, np.float32))
+    near, _ = grid.histograms(
+        grid.places(np.array([30.0]), np.array([40.0]), np.array([0.0])),
+        np.array([2]),
+        4,
+        np.ones(1, np.float32),
+    )
     blurred = np.zeros((*grid.shape, 4))
     for i, down in zip((2, 3, 4), (0.5, 1.0, 0.5), strict=True):
         for j, across in zip((3, 4, 5), (0.5, 1.0, 0.5), strict=True):
@@ -110,15 +143,23 @@ def test_a_vote_reaches_its_neighbours_alone() -> None:
 
 
 def test_no_votes_at_all() -> None:
-    near, everywhere = GRID.histograms(GRID.places(*pixels(5)), np.zeros(5, int), 4, np.zeros(5, np.float32))
-    assert not near.any() and np.allclose(everywhere, everywhere[0, 0]) and np.isfinite(quantile(everywhere, 0.5)).all()
+    near, everywhere = GRID.histograms(
+        GRID.places(*pixels(5)), np.zeros(5, int), 4, np.zeros(5, np.float32)
+    )
+    assert (
+        not near.any()
+        and np.allclose(everywhere, everywhere[0, 0])
+        and np.isfinite(quantile(everywhere, 0.5)).all()
+    )
 
 
 def test_turning_all_hues_by_a_cell_turns_the_votes() -> None:
     rows, columns, hue = pixels()
     bins, weight = np.arange(400) % 5, np.ones(400, np.float32)
     near, everywhere = GRID.histograms(GRID.places(rows, columns, hue), bins, 5, weight)
-    turned, turned_everywhere = GRID.histograms(GRID.places(rows, columns, (hue + 6 / GRID.hues) % 6), bins, 5, weight)
+    turned, turned_everywhere = GRID.histograms(
+        GRID.places(rows, columns, (hue + 6 / GRID.hues) % 6), bins, 5, weight
+    )
     assert np.allclose(np.roll(near, 1, axis=2), turned, atol=1e-4)
     assert np.allclose(np.roll(everywhere, 1, axis=0), turned_everywhere, atol=1e-4)
 
@@ -130,10 +171,13 @@ def test_pixels_of_other_hues_have_no_say() -> None:
     places: Places = GRID.places(60 * rng.random(1000), 80 * rng.random(1000), hue)
     near, _ = GRID.histograms(places, np.where(hue == 1, 20, 70), 100, np.ones(1000, np.float32))
     found = places.read(quantile(near, 0.5))
-    assert np.abs(found[hue == 1] - 0.205).max() < 0.006 and np.abs(found[hue == 4] - 0.705).max() < 0.006
+    assert (
+        np.abs(found[hue == 1] - 0.205).max() < 0.006
+        and np.abs(found[hue == 4] - 0.705).max() < 0.006
+    )
 
 
-# --- quantiles --------------------------------------------------------------------------------------------------------------------------
+# --- quantiles ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("share", [0.05, 0.25, 0.5, 0.99])

@@ -12,7 +12,9 @@ LIGHT = np.array([1.15, 1.0, 0.85])
 PAINTS = np.array([[0.6, 0.15, 0.1], [0.1, 0.5, 0.15], [0.15, 0.2, 0.6], [0.5, 0.45, 0.1]])
 
 
-def ball(paints: np.ndarray, light: np.ndarray, gloss: float, size: int = 120) -> tuple[np.ndarray, np.ndarray]:
+def ball(
+    paints: np.ndarray, light: np.ndarray, gloss: float, size: int = 120
+) -> tuple[np.ndarray, np.ndarray]:
     """A ball with one sector for each paint, which all meet under the highlight."""
     y, x = (np.mgrid[:size, :size] - (size - 1) / 2) / (0.46 * size)
     mask = x**2 + y**2 < 1
@@ -24,7 +26,13 @@ def ball(paints: np.ndarray, light: np.ndarray, gloss: float, size: int = 120) -
 
 
 def angle(colour: np.ndarray, other: np.ndarray) -> float:
-    return float(np.degrees(np.arccos(np.clip(colour @ other / np.linalg.norm(colour) / np.linalg.norm(other), -1, 1))))
+    return float(
+        np.degrees(
+            np.arccos(
+                np.clip(colour @ other / np.linalg.norm(colour) / np.linalg.norm(other), -1, 1)
+            )
+        )
+    )
 
 
 @pytest.mark.parametrize("light", [np.ones(3), LIGHT, LIGHT[::-1], np.array([0.9, 1.2, 0.9])])
@@ -56,8 +64,12 @@ def test_white_where_nothing_can_be_said(gloss):
 def test_exposure_turning_and_surroundings_do_not_matter():
     image, mask = ball(PAINTS, LIGHT, 0.5)
     found = estimate_illuminant(image, mask)
-    np.testing.assert_allclose(estimate_illuminant(image * 37, mask).colour, found.colour, atol=1e-9)
-    np.testing.assert_allclose(estimate_illuminant(np.rot90(image), np.rot90(mask)).colour, found.colour, atol=2e-3)
+    np.testing.assert_allclose(
+        estimate_illuminant(image * 37, mask).colour, found.colour, atol=1e-9
+    )
+    np.testing.assert_allclose(
+        estimate_illuminant(np.rot90(image), np.rot90(mask)).colour, found.colour, atol=2e-3
+    )
     around = np.where(mask[..., None], image, 9.0)
     np.testing.assert_array_equal(estimate_illuminant(around, mask).colour, found.colour)
 
@@ -72,7 +84,10 @@ def test_clipped_pixels_say_nothing():
 
 def test_less_is_believed_the_less_is_usual():
     image, mask = ball(PAINTS, LIGHT, 0.5)
-    near, far = (estimate_illuminant(image, mask, options=IlluminantOptions(usual=usual)) for usual in (0.005, 0.2))
+    near, far = (
+        estimate_illuminant(image, mask, options=IlluminantOptions(usual=usual))
+        for usual in (0.005, 0.2)
+    )
     assert near.confidence < far.confidence
     assert angle(near.colour, np.ones(3)) < angle(far.colour, np.ones(3))
 
@@ -85,7 +100,9 @@ def test_whitened_and_back(dtype):
     np.testing.assert_allclose(tinted(white, LIGHT), image, rtol=4 * np.finfo(dtype).eps)
     np.testing.assert_array_equal(whitened(image, np.ones(3)), image)
     layers = white * dtype(0.25), white * dtype(0.75)
-    np.testing.assert_allclose(sum(tinted(layer, LIGHT) for layer in layers), image, rtol=8 * np.finfo(dtype).eps)
+    np.testing.assert_allclose(
+        sum(tinted(layer, LIGHT) for layer in layers), image, rtol=8 * np.finfo(dtype).eps
+    )
 
 
 def test_the_benchmark_relights_exactly_and_knows_the_best_answer():
@@ -108,7 +125,11 @@ def test_what_does_not_fit_is_refused():
     for arrays in ((image[..., 0], mask), (image, mask[1:]), (image, np.zeros_like(mask))):
         with pytest.raises(InputError, match="the light's colour needs"):
             estimate_illuminant(*arrays)
-    for options in (IlluminantOptions(usual=0), IlluminantOptions(doubt=-1), IlluminantOptions(enough=2)):
+    for options in (
+        IlluminantOptions(usual=0),
+        IlluminantOptions(doubt=-1),
+        IlluminantOptions(enough=2),
+    ):
         with pytest.raises(InputError, match="usual must be"):
             estimate_illuminant(image, mask, options=options)
     for colour in (np.array([1.0, 0, 1]), np.ones(4), np.array([np.nan, 1, 1])):

@@ -1,4 +1,6 @@
-"""Structural similarity against its definition and published figures; sparsification and ranks against what is known by hand."""
+"""Structural similarity against its definition and published figures; sparsification and ranks
+against what is known by hand.
+"""
 
 import json
 from pathlib import Path
@@ -7,7 +9,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from isc_core.image_metrics import highlight_region, rank_correlation, sparsification, ssim, ssim_volume
+from isc_core.image_metrics import (
+    highlight_region,
+    rank_correlation,
+    sparsification,
+    ssim,
+    ssim_volume,
+)
 from isc_core.photo import read_linear
 from isc_core.separation import shen_2013
 
@@ -18,21 +26,31 @@ def pair(shape: tuple[int, ...] = (23, 19, 3), seed: int = 0) -> tuple[np.ndarra
     return truth, np.clip(truth + 0.2 * rng.normal(size=shape), 0, 1)
 
 
-# --- structural similarity --------------------------------------------------------------------------------------------------------------
+# --- structural similarity ------------------------------------------------------------------------
 
 
-def by_the_letter(truth: np.ndarray, estimate: np.ndarray, taps: list[np.ndarray], at: tuple[int, ...]) -> float:
-    """The similarity at one pixel: weights, means and biased covariances written out; beyond the border the border's value."""
+def by_the_letter(
+    truth: np.ndarray, estimate: np.ndarray, taps: list[np.ndarray], at: tuple[int, ...]
+) -> float:
+    """The similarity at one pixel: weights, means and biased covariances written out; beyond the
+    border the border's value.
+    """
     weight = taps[0]
     for axis in taps[1:]:
         weight = weight[..., None] * axis
     sides = zip(taps, at, truth.shape, strict=True)
-    around = np.ix_(*(np.clip(np.arange(len(w)) - len(w) // 2 + place, 0, size - 1) for w, place, size in sides))
+    around = np.ix_(
+        *(np.clip(np.arange(len(w)) - len(w) // 2 + place, 0, size - 1) for w, place, size in sides)
+    )
     t, u = truth[around], estimate[around]
     mean_t, mean_u = (weight * t).sum(), (weight * u).sum()
     v_t, v_u = (weight * (t - mean_t) ** 2).sum(), (weight * (u - mean_u) ** 2).sum()
     v_tu = (weight * (t - mean_t) * (u - mean_u)).sum()
-    return (2 * mean_t * mean_u + 1e-4) * (2 * v_tu + 9e-4) / ((mean_t**2 + mean_u**2 + 1e-4) * (v_t + v_u + 9e-4))
+    return (
+        (2 * mean_t * mean_u + 1e-4)
+        * (2 * v_tu + 9e-4)
+        / ((mean_t**2 + mean_u**2 + 1e-4) * (v_t + v_u + 9e-4))
+    )
 
 
 @pytest.mark.parametrize("volume", [False, True])
@@ -41,7 +59,9 @@ def test_similarity_by_the_letter(volume: bool) -> None:
     taps = np.exp(-(np.arange(-5, 6.0) ** 2) / (2 * 1.5**2))
     taps /= taps.sum()
     window = [taps, taps, taps if volume else np.ones(1)]
-    expected = np.mean([by_the_letter(truth, estimate, window, at) for at in np.ndindex(truth.shape)])
+    expected = np.mean(
+        [by_the_letter(truth, estimate, window, at) for at in np.ndindex(truth.shape)]
+    )
     assert (ssim_volume if volume else ssim)(truth, estimate) == pytest.approx(expected, rel=1e-10)
 
 
@@ -49,7 +69,10 @@ def test_similarity_by_the_letter(volume: bool) -> None:
 def test_published_similarity(shared: Path, name: str, printed: float) -> None:
     """The input against the truth, and Shen & Zheng's answer, as measured with the toolbox."""
     anchors = json.loads((shared / "anchors" / "specular_removal.json").read_text())["shen"][name]
-    image, truth = (read_linear(shared / "data" / "highlight" / file, "linear") for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    image, truth = (
+        read_linear(shared / "data" / "highlight" / file, "linear")
+        for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     assert ssim_volume(truth, image) == pytest.approx(printed, abs=5e-4)
     assert ssim_volume(truth, image) == pytest.approx(anchors["input_baseline"]["ssim"], abs=1e-7)
     assert 0.005 < ssim_volume(truth, image) - ssim(truth, image) < 0.04
@@ -64,8 +87,13 @@ def test_similarity_is_one_for_equals_and_less_for_others() -> None:
     truth, estimate = pair()
     for measure in (ssim, ssim_volume):
         assert measure(truth, truth) == pytest.approx(1, abs=1e-12)
-        assert measure(truth, estimate) == pytest.approx(measure(estimate, truth)) and measure(truth, estimate) < 0.99
-        assert measure(255 * truth, 255 * estimate, peak=255) == pytest.approx(measure(truth, estimate))
+        assert (
+            measure(truth, estimate) == pytest.approx(measure(estimate, truth))
+            and measure(truth, estimate) < 0.99
+        )
+        assert measure(255 * truth, 255 * estimate, peak=255) == pytest.approx(
+            measure(truth, estimate)
+        )
 
 
 def test_similarity_counts_inside_the_mask() -> None:
@@ -88,16 +116,23 @@ def test_similarity_refuses_what_it_cannot_compare() -> None:
         ssim_volume(truth, estimate, np.zeros(truth.shape[:2], bool))
 
 
-# --- highlights -------------------------------------------------------------------------------------------------------------------------
+# --- highlights -----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["animals", "cups"])
 def test_highlights_are_those_of_the_published_figures(shared: Path, name: str) -> None:
-    anchors = json.loads((shared / "anchors" / "specular_removal.json").read_text())["shen"][name]["input_baseline"]
-    image, truth = (read_linear(shared / "data" / "highlight" / file, "linear").astype(float) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    anchors = json.loads((shared / "anchors" / "specular_removal.json").read_text())["shen"][name][
+        "input_baseline"
+    ]
+    image, truth = (
+        read_linear(shared / "data" / "highlight" / file, "linear").astype(float)
+        for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     region = highlight_region(image - truth, np.ones(image.shape[:2], bool))
     assert region.mean() == pytest.approx(anchors["highlight_frac"], abs=1e-6)
-    assert np.square(image - truth)[region].mean() == pytest.approx(anchors["mse_highlight"], rel=1e-5)
+    assert np.square(image - truth)[region].mean() == pytest.approx(
+        anchors["mse_highlight"], rel=1e-5
+    )
 
 
 def test_no_specular_light_is_no_highlight() -> None:
@@ -112,7 +147,7 @@ def test_no_specular_light_is_no_highlight() -> None:
         highlight_region(spot, np.zeros((6, 7), bool))
 
 
-# --- confidence -------------------------------------------------------------------------------------------------------------------------
+# --- confidence -----------------------------------------------------------------------------------
 
 
 def test_sparsification_by_hand() -> None:
@@ -142,12 +177,18 @@ def test_ranks_like_everybody_elses() -> None:
     a = rng.integers(0, 9, 300).astype(float)
     b = np.exp(-a) + 0.3 * rng.random(300)
     assert rank_correlation(a, b) == pytest.approx(stats.spearmanr(a, b).statistic, abs=1e-12)
-    assert rank_correlation(a, a**3) == pytest.approx(1) and rank_correlation(a, -a) == pytest.approx(-1)
+    assert rank_correlation(a, a**3) == pytest.approx(1) and rank_correlation(
+        a, -a
+    ) == pytest.approx(-1)
     assert rank_correlation(a, np.ones(300)) == 0
 
 
 @pytest.mark.parametrize("measure", [sparsification, rank_correlation])
 def test_rows_must_fit(measure: object) -> None:
-    for a, b in ((np.ones(3), np.ones(4)), (np.ones(0), np.ones(0)), (np.ones((2, 2)), np.ones((2, 2)))):
+    for a, b in (
+        (np.ones(3), np.ones(4)),
+        (np.ones(0), np.ones(0)),
+        (np.ones((2, 2)), np.ones((2, 2))),
+    ):
         with pytest.raises(ValueError, match="rows"):
             measure(a, b)  # type: ignore[operator]

@@ -1,4 +1,6 @@
-"""Patch filling: what it must continue, what it must not touch or read, and what it does without any source patch."""
+"""Patch filling: what it must continue, what it must not touch or read, and what it does without
+any source patch.
+"""
 
 import numpy as np
 import pytest

@@ -1,4 +1,6 @@
-"""The project's own separator: what it must leave alone, what it must find, and its figures on photos whose layers are known."""
+"""The project's own separator: what it must leave alone, what it must find, and its figures on
+photos whose layers are known.
+"""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,7 +23,9 @@ from tests.core.separation_scenes import PAINTS, assert_layers_hold, error_ratio
 
 @dataclass(frozen=True)
 class Scene:
-    """A shaded disc of (height, width) pixels with a little noise: image and true diffuse (H, W, 3), true specular (H, W), mask."""
+    """A shaded disc of (height, width) pixels with a little noise: image and true diffuse (H, W,
+    3), true specular (H, W), mask.
+    """
 
     image: np.ndarray
     diffuse: np.ndarray
@@ -29,17 +33,33 @@ class Scene:
     mask: np.ndarray
 
 
-def disc(height: int = 192, width: int = 240) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def disc(
+    height: int = 192, width: int = 240
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Places x, y of the pixels, the mask and its shading."""
-    y, x = np.mgrid[-1 + 1 / height : 1 - 1 / height : height * 1j, -1 + 1 / width : 1 - 1 / width : width * 1j]
+    y, x = np.mgrid[
+        -1 + 1 / height : 1 - 1 / height : height * 1j, -1 + 1 / width : 1 - 1 / width : width * 1j
+    ]
     mask = x**2 + y**2 < 0.9
     return x, y, mask, (0.35 + 0.65 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))) * mask
 
 
-def lit(diffuse: np.ndarray, mask: np.ndarray, spots: list[tuple[float, float]], height: float = 0.5, noise: float = 0.002) -> Scene:
+def lit(
+    diffuse: np.ndarray,
+    mask: np.ndarray,
+    spots: list[tuple[float, float]],
+    height: float = 0.5,
+    noise: float = 0.002,
+) -> Scene:
     """`diffuse` (H, W, 3) under highlights at the spots (x, y)."""
     x, y, _, _ = disc(*mask.shape)
-    specular = sum((height * np.exp(-((x - u) ** 2 + (y - v) ** 2) / 0.015) for u, v in spots), np.zeros(mask.shape)) * mask
+    specular = (
+        sum(
+            (height * np.exp(-((x - u) ** 2 + (y - v) ** 2) / 0.015) for u, v in spots),
+            np.zeros(mask.shape),
+        )
+        * mask
+    )
     grain = noise * np.random.default_rng(0).standard_normal(diffuse.shape)
     image = np.where(mask[..., None], np.maximum(diffuse + specular[..., None] + grain, 0), 0)
     return Scene(image, np.where(mask[..., None], diffuse, 0), specular, mask)
@@ -48,33 +68,46 @@ def lit(diffuse: np.ndarray, mask: np.ndarray, spots: list[tuple[float, float]],
 SPOTS = [(0.5 * np.cos(t), 0.5 * np.sin(t)) for t in (-2 * np.pi / 3, 0.0, 2 * np.pi / 3)]
 
 
-def sectors(paints: np.ndarray = PAINTS, height: int = 192, width: int = 240, glossy: bool = True) -> Scene:
+def sectors(
+    paints: np.ndarray = PAINTS, height: int = 192, width: int = 240, glossy: bool = True
+) -> Scene:
     """Three paints in sectors, each with a highlight."""
     x, y, mask, shading = disc(height, width)
     paint = paints[np.digitize(np.arctan2(y, x), [-np.pi / 3, np.pi / 3])]
     return lit(paint * shading[..., None], mask, SPOTS if glossy else [])
 
 
-def printed(white: tuple[float, float, float], spots: list[tuple[float, float]]) -> tuple[Scene, np.ndarray]:
+def printed(
+    white: tuple[float, float, float], spots: list[tuple[float, float]]
+) -> tuple[Scene, np.ndarray]:
     """Red paint with words of white paint, and where the words are (H, W) bool."""
     _, _, mask, shading = disc()
     letters = np.zeros(mask.shape, np.uint8)
     for line, word in enumerate(("TEXT OF", "WHITE", "PAINT")):
-        cv2.putText(letters, word, (55, 65 + 35 * line), cv2.FONT_HERSHEY_SIMPLEX, 1, 255, 4, cv2.LINE_AA)
+        cv2.putText(
+            letters, word, (55, 65 + 35 * line), cv2.FONT_HERSHEY_SIMPLEX, 1, 255, 4, cv2.LINE_AA
+        )
     share = letters[..., None] / 255
-    return lit(((1 - share) * PAINTS[0] + share * np.array(white)) * shading[..., None], mask, spots), mask & (letters > 0)
+    return lit(
+        ((1 - share) * PAINTS[0] + share * np.array(white)) * shading[..., None], mask, spots
+    ), mask & (letters > 0)
 
 
 def change(split: Separation, image: np.ndarray, mask: np.ndarray) -> float:
     """Root mean square of what was removed over that of the photo."""
-    return float(np.sqrt(np.mean(split.specular[mask].astype(float) ** 2) / np.mean(image[mask].astype(float) ** 2)))
+    return float(
+        np.sqrt(
+            np.mean(split.specular[mask].astype(float) ** 2)
+            / np.mean(image[mask].astype(float) ** 2)
+        )
+    )
 
 
 def test_it_is_the_recommended_method() -> None:
     assert BEST == METHODS[-1] == "isc" and list(VARIANTS) == ["improved"]
 
 
-# --- finds ------------------------------------------------------------------------------------------------------------------------------
+# --- finds ----------------------------------------------------------------------------------------
 
 
 def test_highlights_on_strong_paint_are_found() -> None:
@@ -82,7 +115,9 @@ def test_highlights_on_strong_paint_are_found() -> None:
     split = separate("isc", scene.image, scene.mask)
     assert_layers_hold(split, scene.image, scene.mask)
     assert error_ratio(split, scene.image, scene.diffuse, scene.mask) < 0.02
-    assert np.mean((split.specular[..., 0] - scene.specular) ** 2) < 0.02 * np.mean(scene.specular**2)
+    assert np.mean((split.specular[..., 0] - scene.specular) ** 2) < 0.02 * np.mean(
+        scene.specular**2
+    )
     assert not split.residual.any()
 
 
@@ -105,7 +140,9 @@ def test_what_is_around_does_not_matter() -> None:
     padded = np.pad(wild, [(700, 40), (3, 800), (0, 0)], constant_values=9.0)
     wide = separate("isc", padded, np.pad(scene.mask, [(700, 40), (3, 800)]))
     inside = np.s_[700:-40, 3:-800]
-    assert np.array_equal(wide.diffuse[inside], split.diffuse) and np.array_equal(wide.confidence[inside], split.confidence)
+    assert np.array_equal(wide.diffuse[inside], split.diffuse) and np.array_equal(
+        wide.confidence[inside], split.confidence
+    )
     assert not wide.diffuse[:700].any() and not wide.confidence[:700].any()
 
 
@@ -113,7 +150,9 @@ def test_the_same_twice_and_the_photo_untouched() -> None:
     scene = sectors()
     before = scene.image.copy()
     one, two = (separate("isc", scene.image, scene.mask) for _ in range(2))
-    assert np.array_equal(one.diffuse, two.diffuse) and np.array_equal(one.confidence, two.confidence)
+    assert np.array_equal(one.diffuse, two.diffuse) and np.array_equal(
+        one.confidence, two.confidence
+    )
     assert np.array_equal(scene.image, before)
 
 
@@ -122,10 +161,19 @@ def test_which_way_the_photo_is_held_matters_little(turn: str) -> None:
     scene = sectors()
 
     def turned(layer: np.ndarray) -> np.ndarray:
-        return {"mirrored": layer[:, ::-1], "upside down": layer[::-1], "transposed": layer.swapaxes(0, 1)}[turn]
+        return {
+            "mirrored": layer[:, ::-1],
+            "upside down": layer[::-1],
+            "transposed": layer.swapaxes(0, 1),
+        }[turn]
 
-    split, other = separate("isc", scene.image, scene.mask), separate("isc", turned(scene.image).copy(), turned(scene.mask).copy())
-    difference = np.sqrt(np.mean((turned(split.specular) - other.specular) ** 2) / np.mean(split.specular**2))
+    split, other = (
+        separate("isc", scene.image, scene.mask),
+        separate("isc", turned(scene.image).copy(), turned(scene.mask).copy()),
+    )
+    difference = np.sqrt(
+        np.mean((turned(split.specular) - other.specular) ** 2) / np.mean(split.specular**2)
+    )
     assert difference < 0.03
 
 
@@ -134,15 +182,25 @@ def test_which_channel_is_which_does_not_matter() -> None:
     scene = sectors()
     split = separate("isc", scene.image, scene.mask)
     swapped = separate("isc", scene.image[..., [1, 2, 0]].copy(), scene.mask)
-    assert np.sqrt(np.mean((swapped.specular - split.specular) ** 2) / np.mean(split.specular**2)) < 0.03
+    assert (
+        np.sqrt(np.mean((swapped.specular - split.specular) ** 2) / np.mean(split.specular**2))
+        < 0.03
+    )
 
 
 @pytest.mark.parametrize("size", [(1280, 1280), (1303, 1297)])
 def test_large_photos_are_judged_alike(size: tuple[int, int]) -> None:
-    """On averages of blocks, whether or not they fit the photo: what is found there is what the photo at half the size shows."""
+    """On averages of blocks, whether or not they fit the photo: what is found there is what the
+    photo at half the size shows.
+    """
     small, large = sectors(height=640, width=640), sectors(height=size[0], width=size[1])
     told: list[float] = []
-    split = separate("isc", large.image, large.mask, monitor=Monitor(lambda stage, fraction: told.append(fraction)))
+    split = separate(
+        "isc",
+        large.image,
+        large.mask,
+        monitor=Monitor(lambda stage, fraction: told.append(fraction)),
+    )
     assert error_ratio(split, large.image, large.diffuse, large.mask) < 0.02
     assert_layers_hold(split, large.image, large.mask)
     assert len(told) >= 3 and told == sorted(told)
@@ -159,7 +217,7 @@ def test_thin_objects_in_large_photos() -> None:
     assert_layers_hold(separate("isc", image, mask), image, mask)
 
 
-# --- leaves alone -----------------------------------------------------------------------------------------------------------------------
+# --- leaves alone ---------------------------------------------------------------------------------
 
 PALE = {
     "white": np.full((3, 3), 0.8),
@@ -186,7 +244,9 @@ def test_strong_paint_without_highlights_stays_as_it_is() -> None:
 def test_white_print_of_the_same_hue_is_no_highlight(white: tuple[float, float, float]) -> None:
     scene, _ = printed(white, spots=[])
     assert change(separate("isc", scene.image, scene.mask), scene.image, scene.mask) < 0.001
-    assert change(separate("yang_2010", scene.image, scene.mask), scene.image, scene.mask) > 0.3, "to colour alone it is one"
+    assert change(separate("yang_2010", scene.image, scene.mask), scene.image, scene.mask) > 0.3, (
+        "to colour alone it is one"
+    )
 
 
 def test_white_print_stays_beside_highlights_that_go() -> None:
@@ -205,11 +265,15 @@ def test_without_colours_to_compare_nothing_is_removed(kind: str) -> None:
     if kind == "rounded grey":
         image = np.rint(255 * image) / 255
     elif kind.startswith("one"):
-        image = np.where(scene.mask[..., None], [0.5, 0.5, 0.5] if kind == "one grey" else [0.6, 0.3, 0.1], 0.0)
+        image = np.where(
+            scene.mask[..., None], [0.5, 0.5, 0.5] if kind == "one grey" else [0.6, 0.3, 0.1], 0.0
+        )
     split = separate("isc", image, scene.mask)
     assert not split.specular.any() and np.array_equal(split.diffuse, image.astype(np.float32))
     trust = split.confidence[scene.mask]
-    assert trust.max() < 1 and (kind.startswith("one") or rank_correlation(trust, image[scene.mask].mean(axis=1)) < -0.95)
+    assert trust.max() < 1 and (
+        kind.startswith("one") or rank_correlation(trust, image[scene.mask].mean(axis=1)) < -0.95
+    )
 
 
 def test_what_no_display_shows_is_no_highlight() -> None:
@@ -223,7 +287,7 @@ def test_what_no_display_shows_is_no_highlight() -> None:
     assert all(share == 0 or share >= 0.99 / 512 for share in found), found
 
 
-# --- clipped ----------------------------------------------------------------------------------------------------------------------------
+# --- clipped --------------------------------------------------------------------------------------
 
 
 def test_clipped_highlights_are_explained() -> None:
@@ -234,7 +298,11 @@ def test_clipped_highlights_are_explained() -> None:
     split, blind = separate("isc", image, scene.mask, clipped), separate("isc", image, scene.mask)
     assert_layers_hold(split, image, scene.mask)
     assert not split.confidence[clipped].any() and split.confidence[scene.mask & ~clipped].all()
-    assert not split.residual[~clipped].any() and split.residual.max() <= 0 and split.residual.min() < -0.02
+    assert (
+        not split.residual[~clipped].any()
+        and split.residual.max() <= 0
+        and split.residual.min() < -0.02
+    )
     errors = [np.mean((s.diffuse - scene.diffuse)[clipped] ** 2) for s in (split, blind)]
     nothing = np.mean((scene.image - scene.diffuse)[clipped] ** 2)
     assert errors[0] < 0.1 * nothing and errors[0] < errors[1]
@@ -242,17 +310,28 @@ def test_clipped_highlights_are_explained() -> None:
 
 def test_nothing_clipped_is_no_news() -> None:
     scene = sectors()
-    one, two = separate("isc", scene.image, scene.mask), separate("isc", scene.image, scene.mask, np.zeros_like(scene.mask))
-    assert np.array_equal(one.diffuse, two.diffuse) and np.array_equal(one.confidence, two.confidence)
+    one, two = (
+        separate("isc", scene.image, scene.mask),
+        separate("isc", scene.image, scene.mask, np.zeros_like(scene.mask)),
+    )
+    assert np.array_equal(one.diffuse, two.diffuse) and np.array_equal(
+        one.confidence, two.confidence
+    )
 
 
-# --- prior ------------------------------------------------------------------------------------------------------------------------------
+# --- prior ----------------------------------------------------------------------------------------
 
 
 def test_a_prior_of_one_half_says_nothing() -> None:
     scene = sectors()
-    split, told = (separate("isc", scene.image, scene.mask, prior=prior) for prior in (None, np.full(scene.mask.shape, 0.5)))
-    assert np.abs(split.specular - told.specular).max() < 1e-6 and np.abs(split.confidence - told.confidence).max() < 1e-6
+    split, told = (
+        separate("isc", scene.image, scene.mask, prior=prior)
+        for prior in (None, np.full(scene.mask.shape, 0.5))
+    )
+    assert (
+        np.abs(split.specular - told.specular).max() < 1e-6
+        and np.abs(split.confidence - told.confidence).max() < 1e-6
+    )
 
 
 def test_a_prior_of_zero_forbids_where_it_is_zero() -> None:
@@ -267,16 +346,26 @@ def test_a_prior_of_zero_forbids_where_it_is_zero() -> None:
 
 def test_what_was_taken_off_costs_trust() -> None:
     scene = sectors()
-    split, kept = (separate("isc", scene.image, scene.mask, prior=prior) for prior in (None, np.zeros(scene.mask.shape)))
+    split, kept = (
+        separate("isc", scene.image, scene.mask, prior=prior)
+        for prior in (None, np.zeros(scene.mask.shape))
+    )
     removed = split.specular[..., 0] > 0.05
-    assert removed.sum() > 1000 and (split.confidence[removed] < 0.9 * kept.confidence[removed]).all()
+    assert (
+        removed.sum() > 1000 and (split.confidence[removed] < 0.9 * kept.confidence[removed]).all()
+    )
     untouched = scene.mask & (split.specular[..., 0] == 0)
-    assert untouched.sum() > 1000 and np.array_equal(split.confidence[untouched], kept.confidence[untouched])
+    assert untouched.sum() > 1000 and np.array_equal(
+        split.confidence[untouched], kept.confidence[untouched]
+    )
 
 
 def test_more_probable_highlights_are_taken_off_more() -> None:
     scene = sectors()
-    removed = [separate("isc", scene.image, scene.mask, prior=np.full(scene.mask.shape, p)).specular for p in (0, 0.1, 0.4, 0.5, 0.8, 1)]
+    removed = [
+        separate("isc", scene.image, scene.mask, prior=np.full(scene.mask.shape, p)).specular
+        for p in (0, 0.1, 0.4, 0.5, 0.8, 1)
+    ]
     for less, more in zip(removed[:-1], removed[1:], strict=True):
         assert (more >= less - 1e-6).all() and more.sum() > less.sum()
 
@@ -286,15 +375,22 @@ def test_a_true_prior_helps() -> None:
     scene, _ = printed((0.75, 0.72, 0.71), spots=[(-0.45, -0.55)])
     prior = np.where(scene.specular > 0.02, 0.95, 0.05)
     split, told = (separate("isc", scene.image, scene.mask, prior=p) for p in (None, prior))
-    assert error_ratio(told, scene.image, scene.diffuse, scene.mask) < error_ratio(split, scene.image, scene.diffuse, scene.mask) - 0.02
+    assert (
+        error_ratio(told, scene.image, scene.diffuse, scene.mask)
+        < error_ratio(split, scene.image, scene.diffuse, scene.mask) - 0.02
+    )
 
 
 def test_a_prior_counts_in_the_mask_alone_and_goes_with_the_photo() -> None:
     scene = sectors()
     outside = np.where(scene.mask, 0.5, np.nan)
     assert np.abs(separate("isc", scene.image, scene.mask, prior=outside).specular).max() > 0.2
-    padded = separate("isc", np.pad(scene.image, [(5, 9), (7, 0), (0, 0)]), np.pad(scene.mask, [(5, 9), (7, 0)]),
-                      prior=np.pad(np.where(disc()[0] < 0, 0.0, 0.5), [(5, 9), (7, 0)]))  # fmt: skip
+    padded = separate(
+        "isc",
+        np.pad(scene.image, [(5, 9), (7, 0), (0, 0)]),
+        np.pad(scene.mask, [(5, 9), (7, 0)]),
+        prior=np.pad(np.where(disc()[0] < 0, 0.0, 0.5), [(5, 9), (7, 0)]),
+    )
     assert not padded.specular[5:-9, 7:][disc()[0] < 0].any() and padded.specular.max() > 0.2
 
 
@@ -319,7 +415,7 @@ def test_a_prior_for_nobody_is_refused() -> None:
         isc.separate(scene.image, scene.mask, prior=prior[1:])
 
 
-# --- options ----------------------------------------------------------------------------------------------------------------------------
+# --- options --------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -349,18 +445,39 @@ def test_options_that_make_no_sense(field: str, value: object, message: str) -> 
 def test_options_do_what_they_say() -> None:
     scene = sectors()
     usual, lower, higher = (
-        float(separate("isc", scene.image, scene.mask, changes={"low_quantile": q}).specular.sum()) for q in (0.25, 0.05, 0.45)
+        float(separate("isc", scene.image, scene.mask, changes={"low_quantile": q}).specular.sum())
+        for q in (0.25, 0.05, 0.45)
     )
     assert lower > usual > higher
-    never: dict[str, object] = {"colourful": (2.0, 3.0), "coloured": (2.0, 3.0), "clear": (1e6, 2e6)}
+    never: dict[str, object] = {
+        "colourful": (2.0, 3.0),
+        "coloured": (2.0, 3.0),
+        "clear": (1e6, 2e6),
+    }
     by_groups = separate("isc", scene.image, scene.mask, changes=never).specular.sum()
     assert by_groups < usual
-    assert separate("isc", scene.image, scene.mask, changes=never | {"present": (1e6, 2e6)}).specular.sum() == 0
+    assert (
+        separate(
+            "isc", scene.image, scene.mask, changes=never | {"present": (1e6, 2e6)}
+        ).specular.sum()
+        == 0
+    )
 
 
-# --- photos whose layers are known ------------------------------------------------------------------------------------------------------
+# --- photos whose layers are known ----------------------------------------------------------------
 
-OBJECTS = ("apple", "box", "cup1", "dinosaur", "frog1", "panther", "paper1", "phone", "squirrel", "teabag2")
+OBJECTS = (
+    "apple",
+    "box",
+    "cup1",
+    "dinosaur",
+    "frog1",
+    "panther",
+    "paper1",
+    "phone",
+    "squirrel",
+    "teabag2",
+)
 
 
 @dataclass(frozen=True)
@@ -371,9 +488,14 @@ class Answer:
     split: Separation
 
     def errors(self) -> tuple[np.ndarray, np.ndarray]:
-        """Squared error (n,) of the diffuse layer at the mask's pixels, and that of leaving the photo as it is."""
+        """Squared error (n,) of the diffuse layer at the mask's pixels, and that of leaving the
+        photo as it is.
+        """
         layers = self.split.diffuse, self.truth.image
-        one, two = (((layer - self.truth.diffuse)[self.truth.mask].astype(float) ** 2).mean(axis=1) for layer in layers)
+        one, two = (
+            ((layer - self.truth.diffuse)[self.truth.mask].astype(float) ** 2).mean(axis=1)
+            for layer in layers
+        )
         return one, two
 
 
@@ -391,15 +513,21 @@ def test_layers_hold_on_photos(answers: dict[str, Answer]) -> None:
 
 
 # What is asked of the structural similarity, .987 and .975, is not reached: .9859 and .9742.
-@pytest.mark.parametrize(("name", "decibels", "similarity"), [("animals", 38.5, 0.9855), ("cups", 40.0, 0.9738)])
-def test_figures_on_photos_of_shen_and_zheng(answers: dict[str, Answer], name: str, decibels: float, similarity: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "decibels", "similarity"), [("animals", 38.5, 0.9855), ("cups", 40.0, 0.9738)]
+)
+def test_figures_on_photos_of_shen_and_zheng(
+    answers: dict[str, Answer], name: str, decibels: float, similarity: float
+) -> None:
     truth, split = answers[name].truth, answers[name].split
     assert psnr(truth.diffuse, split.diffuse) >= decibels
     assert ssim_volume(truth.diffuse, split.diffuse) >= similarity
 
 
 @pytest.mark.parametrize("name", OBJECTS)
-def test_no_worse_than_doing_nothing_in_the_laboratory(answers: dict[str, Answer], name: str) -> None:
+def test_no_worse_than_doing_nothing_in_the_laboratory(
+    answers: dict[str, Answer], name: str
+) -> None:
     error, nothing = answers[name].errors()
     assert error.mean() <= {"apple": 0.12, "teabag2": 0.9}.get(name, 1.001) * nothing.mean()
 
@@ -407,7 +535,10 @@ def test_no_worse_than_doing_nothing_in_the_laboratory(answers: dict[str, Answer
 @pytest.mark.parametrize("name", ["apple", "cups", "animals"])
 def test_the_least_confident_pixels_hold_the_error(answers: dict[str, Answer], name: str) -> None:
     answer = answers[name]
-    assert sparsification(answer.errors()[0], answer.split.confidence[answer.truth.mask]).removed(0.2) >= 0.5
+    assert (
+        sparsification(answer.errors()[0], answer.split.confidence[answer.truth.mask]).removed(0.2)
+        >= 0.5
+    )
 
 
 @pytest.mark.parametrize("name", ["animals", "cups", *OBJECTS])
@@ -424,5 +555,8 @@ KNOWN = {("natural", "teabag2"): 0.025}
 @pytest.mark.parametrize("name", OBJECTS)
 def test_photos_without_highlights_are_left_alone(shared: Path, light: str, name: str) -> None:
     folder = shared / "data/mit_berkeley_train" / light / name
-    image, mask = read_linear(folder / "diffuse.png", "linear"), read_linear(folder / "mask.png", "linear")[..., 0] > 0
+    image, mask = (
+        read_linear(folder / "diffuse.png", "linear"),
+        read_linear(folder / "mask.png", "linear")[..., 0] > 0,
+    )
     assert change(separate("isc", image, mask), image, mask) < KNOWN.get((light, name), 0.005)

@@ -1,4 +1,6 @@
-"""Joint MDR on scenes with known parts: grey paint under a lamp, which colour cannot tell from a highlight, and matt objects."""
+"""Joint MDR on scenes with known parts: grey paint under a lamp, which colour cannot tell from a
+highlight, and matt objects.
+"""
 
 from dataclasses import replace
 
@@ -26,10 +28,24 @@ def grey_ball(gloss: float, alpha: float = 0.1) -> Decomposition:
     d = ball((92, 100), 42.0, (46, 50))
     inside = d.mask[..., None]
     reflectance = np.where(inside, 0.25 + 0.6 * d.reflectance[..., :1], 0) * np.ones(3, np.float32)
-    shine = radiance(Ggx(alpha, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(LAMP, max(gloss, 1e-6)))
-    diffuse, specular = reflectance * d.shading, np.where(inside, shine if gloss else 0, 0).astype(np.float32)
+    shine = radiance(
+        Ggx(alpha, 0.04),
+        d.normal.astype(float),
+        np.array([0.0, 0, 1]),
+        directional(LAMP, max(gloss, 1e-6)),
+    )
+    diffuse, specular = (
+        reflectance * d.shading,
+        np.where(inside, shine if gloss else 0, 0).astype(np.float32),
+    )
     scale = np.float32(1 / (diffuse + specular).max())
-    return replace(d, image=scale * (diffuse + specular), diffuse=scale * diffuse, specular=scale * specular, reflectance=reflectance)
+    return replace(
+        d,
+        image=scale * (diffuse + specular),
+        diffuse=scale * diffuse,
+        specular=scale * specular,
+        reflectance=reflectance,
+    )
 
 
 def photo_of(d: Decomposition) -> Photo:
@@ -38,7 +54,9 @@ def photo_of(d: Decomposition) -> Photo:
 
 
 def task_of(d: Decomposition) -> Task:
-    """With the true shape and light, so that nothing but the separation is asked for; or without them."""
+    """With the true shape and light, so that nothing but the separation is asked for; or without
+    them.
+    """
     photo = photo_of(d)
     truth = Known(d.height.astype(float), light_to_reference(d.illumination))
     return Task(photo, photo, Settings(illumination="laboratory"), truth)
@@ -59,7 +77,9 @@ def test_a_highlight_on_grey_paint_is_taken_off(glossy: tuple[Decomposition, Ans
     nothing = float(np.square(d.specular)[d.mask].mean())
     assert error(d, mdr(task_of(d))) > 0.5 * nothing
     assert error(d, answer) < 0.5 * nothing
-    assert answer.status["joint"].startswith("highlights that colour does not show were taken off, and")
+    assert answer.status["joint"].startswith(
+        "highlights that colour does not show were taken off, and"
+    )
 
 
 def test_the_layers_sum_up_and_are_not_negative(glossy: tuple[Decomposition, Answer]) -> None:

@@ -42,7 +42,9 @@ def started(*arguments: object, before: str = "") -> Process:
     return subprocess.Popen(command, cwd=ROOT, stdin=pipe, stdout=pipe, stderr=pipe, text=True)
 
 
-def followed(process: Process, react: Callable[[Event, Process], None] = lambda event, process: None) -> tuple[int, list[Event], str]:
+def followed(
+    process: Process, react: Callable[[Event, Process], None] = lambda event, process: None
+) -> tuple[int, list[Event], str]:
     """Exit code, events and standard error; `react` is called with each event."""
     assert process.stdout is not None and process.stderr is not None and process.stdin is not None
     with process:
@@ -71,12 +73,18 @@ def stages(events: list[Event]) -> list[str]:
 
 def test_a_run_is_told_from_start_to_end(tmp_path: Path) -> None:
     output = tmp_path / "out"
-    code, events, errors = followed(started("decompose", ball_photo(tmp_path), "--model", "naive", "--arrays", "-o", output))
+    code, events, errors = followed(
+        started("decompose", ball_photo(tmp_path), "--model", "naive", "--arrays", "-o", output)
+    )
     assert (code, errors) == (0, "")
     assert stages(events)[0] == "starting" and {"preparing", "writing arrays"} < set(stages(events))
     fractions = [event["fraction"] for event in events[:-1]]
     assert fractions == sorted(fractions) and fractions[0] == 0 and fractions[-1] == 1
-    assert events[-1] == {"event": "done", "output": str(output), "lines": [f"look at {output / 'preview.png'}"]}
+    assert events[-1] == {
+        "event": "done",
+        "output": str(output),
+        "lines": [f"look at {output / 'preview.png'}"],
+    }
     load(output)
 
 
@@ -84,7 +92,9 @@ def test_a_run_is_told_from_start_to_end(tmp_path: Path) -> None:
 def test_a_refusal_is_told_as_the_last_event(tmp_path: Path, words: list[str]) -> None:
     code, events, errors = followed(started("separate", *words, "-o", tmp_path / "out"))
     assert (code, errors) == (2, "")
-    assert [event["event"] for event in events] == ["progress", "failed"] and events[-1]["code"] == 2
+    assert [event["event"] for event in events] == ["progress", "failed"] and events[-1][
+        "code"
+    ] == 2
     assert "\n" not in events[-1]["message"] and words[-1] in events[-1]["message"]
     assert list(tmp_path.iterdir()) == []
 
@@ -99,7 +109,9 @@ def test_other_commands_speak_so_too(tmp_path: Path) -> None:
         ["arrays", tmp_path / "result"],
     ):
         code, events, _ = followed(started(*words))
-        assert (code, events[-1]["event"], events[-1]["output"]) == (0, "done", str(words[-1])), words
+        assert (code, events[-1]["event"], events[-1]["output"]) == (0, "done", str(words[-1])), (
+            words
+        )
         assert Path(events[-1]["output"]).exists()
     assert "progress" not in json.loads((tmp_path / "edit" / "edit.json").read_text())["parameters"]
 
@@ -118,7 +130,14 @@ def at(stage: str, stop: Callable[[Process], None]) -> Callable[[Event, Process]
 
 @pytest.mark.parametrize("stop", [cancel, disappear])
 def test_a_cancelled_solve_leaves_nothing(tmp_path: Path, stop: Callable[[Process], None]) -> None:
-    process = started("decompose", ball_photo(tmp_path, 110.0), "--engine", "numpy", "-o", tmp_path / "new" / "out")
+    process = started(
+        "decompose",
+        ball_photo(tmp_path, 110.0),
+        "--engine",
+        "numpy",
+        "-o",
+        tmp_path / "new" / "out",
+    )
     code, events, errors = followed(process, at("shape and light", stop))
     assert (code, events[-1], errors) == (130, {"event": "cancelled"}, "")
     assert [entry.name for entry in tmp_path.iterdir()] == ["ball.png"]
@@ -134,14 +153,20 @@ def test_a_start_can_be_cancelled(tmp_path: Path) -> None:
 @pytest.mark.parametrize("ignored", [False, True])
 def test_work_that_does_not_listen_is_interrupted(tmp_path: Path, ignored: bool) -> None:
     """Also where the program's own parent has told it to ignore Ctrl-C."""
-    before = SLEEPY + ("import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)" if ignored else "")
-    process = started("mask", "photo.png", "--box", "1,1,9,9", "-o", tmp_path / "mask.png", before=before)
+    before = SLEEPY + (
+        "import signal; signal.signal(signal.SIGINT, signal.SIG_IGN)" if ignored else ""
+    )
+    process = started(
+        "mask", "photo.png", "--box", "1,1,9,9", "-o", tmp_path / "mask.png", before=before
+    )
     code, events, errors = followed(process, at("sleeping", cancel))
     assert (code, events[-1], errors) == (130, {"event": "cancelled"}, "")
 
 
 def test_work_that_cannot_be_interrupted_ends_with_its_program(tmp_path: Path) -> None:
-    process = started("mask", "photo.png", "--box", "1,1,9,9", "-o", tmp_path / "mask.png", before=STUBBORN)
+    process = started(
+        "mask", "photo.png", "--box", "1,1,9,9", "-o", tmp_path / "mask.png", before=STUBBORN
+    )
     code, events, _ = followed(process, at("sleeping", disappear))
     assert (code, events[-1]["event"]) == (130, "progress")
 
@@ -167,4 +192,8 @@ def test_a_listener_that_goes_deaf_does_not_stop_the_work(tmp_path: Path) -> Non
 def test_what_breaks_bounds_is_a_failure_with_its_lines(capsys: pytest.CaptureFixture[str]) -> None:
     speaker = JsonSpeaker(sys.stdout)
     speaker.rejected(["one", "two"], 1)
-    assert json.loads(capsys.readouterr().out) == {"event": "failed", "message": "one; two", "code": 1}
+    assert json.loads(capsys.readouterr().out) == {
+        "event": "failed",
+        "message": "one; two",
+        "code": 1,
+    }

@@ -14,7 +14,9 @@ from tests.core.separation_scenes import assert_layers_hold, read
 
 
 def plate() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true diffuse (both (H, W, 3)) and mask of two shaded paints side by side with a white highlight on each."""
+    """Image, true diffuse (both (H, W, 3)) and mask of two shaded paints side by side with a white
+    highlight on each.
+    """
     y, x = np.mgrid[:60, :100].astype(float)
     specular = sum(0.4 * np.exp(-((x - at) ** 2 + (y - 30) ** 2) / 60) for at in (25, 75))
     paint = np.where((x < 50)[..., None], [0.7, 0.3, 0.1], [0.2, 0.3, 0.6])
@@ -27,17 +29,26 @@ def scene_of(image: np.ndarray, options: Kim2013Options) -> kim_2013._Scene:
     return kim_2013._scene(image, mask, float(image.min(axis=2).mean()), options)
 
 
-FIGURES = [("animals", "paper", 32.7), ("cups", "paper", 32.2), ("animals", "improved", 38.0), ("cups", "improved", 39.7)]
+FIGURES = [
+    ("animals", "paper", 32.7),
+    ("cups", "paper", 32.2),
+    ("animals", "improved", 38.0),
+    ("cups", "improved", 39.7),
+]
 
 
 @pytest.mark.parametrize(("name", "variant", "psnr"), FIGURES)
 def test_figures(shared: Path, name: str, variant: str, psnr: float) -> None:
-    image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    image, truth = (
+        read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     split = kim_2013.separate(image, np.ones(image.shape[:2], bool), VARIANTS[variant])
     assert -10 * np.log10(np.mean((split.diffuse - truth) ** 2)) == pytest.approx(psnr, abs=0.1)
 
 
-@pytest.mark.parametrize(("name", "at_most"), [("apple", 0.13), ("teabag2", 1.001), ("squirrel", 1.001)])
+@pytest.mark.parametrize(
+    ("name", "at_most"), [("apple", 0.13), ("teabag2", 1.001), ("squirrel", 1.001)]
+)
 def test_improved_helps_or_leaves_alone(shared: Path, name: str, at_most: float) -> None:
     folder = shared / "data/mit_berkeley_train/laboratory" / name
     image, truth = read(folder / "original.png"), read(folder / "diffuse.png")
@@ -46,7 +57,9 @@ def test_improved_helps_or_leaves_alone(shared: Path, name: str, at_most: float)
     for variant, options in VARIANTS.items():
         split = kim_2013.separate(image, mask, options)
         assert_layers_hold(split, image, mask)
-        errors[variant] = np.mean((split.diffuse - truth)[mask] ** 2) / np.mean((image - truth)[mask] ** 2)
+        errors[variant] = np.mean((split.diffuse - truth)[mask] ** 2) / np.mean(
+            (image - truth)[mask] ** 2
+        )
     assert errors["improved"] <= at_most < errors["paper"]
 
 
@@ -74,7 +87,9 @@ def test_the_colour_term_is_least_at_its_target() -> None:
     paints = random.random((20, 3))
     paints /= np.linalg.norm(paints, axis=1, keepdims=True)
     pull, target = kim_2013._colour_term(scene_of(image, Kim2013Options()), paints)
-    for colour, paint, k, s_a, low in zip(image.reshape(-1, 3), paints, pull.flat, target.flat, image.min(axis=2).flat, strict=True):
+    for colour, paint, k, s_a, low in zip(
+        image.reshape(-1, 3), paints, pull.flat, target.flat, image.min(axis=2).flat, strict=True
+    ):
         (_, best), *_ = np.linalg.lstsq(np.stack([paint, np.ones(3)], axis=1), colour, rcond=None)
         assert s_a == pytest.approx(np.clip(best, 0, low), abs=1e-9)
 
@@ -92,7 +107,10 @@ def test_sweeps_reach_the_least_energy_within_the_bounds() -> None:
     scene = scene_of(image, options)
     start, target, pull = random.random((6, 7)), random.random((6, 7)), random.random((6, 7)) + 0.05
     s = kim_2013._smoothed(start, target, pull, scene, options)
-    weights = [options.smoothness / np.hypot(np.diff(start, axis=axis) / options.gradient, 1) for axis in (0, 1)]
+    weights = [
+        options.smoothness / np.hypot(np.diff(start, axis=axis) / options.gradient, 1)
+        for axis in (0, 1)
+    ]
     slope = pull * (s - target)
     for axis, weight in enumerate(weights):
         pad = [(1, 1) if k == axis else (0, 0) for k in (0, 1)]
@@ -119,7 +137,9 @@ def test_scale_and_surroundings_do_not_matter(variant: str) -> None:
     image, _, mask = plate()
     mask[:, 90:] = False
     split = kim_2013.separate(image, mask, VARIANTS[variant])
-    padded = np.pad(np.where(mask[..., None], image, np.nan), [(6, 9), (8, 7), (0, 0)], constant_values=np.inf)
+    padded = np.pad(
+        np.where(mask[..., None], image, np.nan), [(6, 9), (8, 7), (0, 0)], constant_values=np.inf
+    )
     wide = kim_2013.separate(1000 * padded, np.pad(mask, [(6, 9), (8, 7)]), VARIANTS[variant])
     assert np.allclose(wide.diffuse[6:-9, 8:-7], 1000 * split.diffuse, rtol=1e-4, atol=1e-2)
 
@@ -145,14 +165,21 @@ def test_clipped_cores_are_filled_from_around() -> None:
     split = kim_2013.separate(image, mask, clipped=clipped)
     assert_layers_hold(split, image, mask)
     assert not split.confidence[clipped].any()
-    assert np.mean((split.diffuse - diffuse)[clipped] ** 2) < 0.2 * np.mean((image - diffuse)[clipped] ** 2)
+    assert np.mean((split.diffuse - diffuse)[clipped] ** 2) < 0.2 * np.mean(
+        (image - diffuse)[clipped] ** 2
+    )
     assert not kim_2013.separate(image, mask, clipped=mask).specular.any()
 
 
 def test_progress_and_cancel() -> None:
     image, _, mask = plate()
     heard: list[float] = []
-    kim_2013.separate(image, mask, Kim2013Options(rounds=3), monitor=Monitor(lambda _, fraction: heard.append(fraction)))
+    kim_2013.separate(
+        image,
+        mask,
+        Kim2013Options(rounds=3),
+        monitor=Monitor(lambda _, fraction: heard.append(fraction)),
+    )
     assert len(heard) == 6 and heard == sorted(heard) and heard[-1] <= 1
     with pytest.raises(Cancelled):
         kim_2013.separate(image, mask, monitor=Monitor(cancelled=lambda: True))
@@ -163,7 +190,15 @@ def test_refuses_what_it_cannot_use() -> None:
     with pytest.raises(InputError, match="no colour"):
         kim_2013.separate(np.repeat(image[..., :1], 3, axis=2), mask)
     counts = [("patch", 0), ("rounds", -1), ("sweeps", -1)]
-    positive = [(name, 0) for name in ("reach", "purity", "trust", "prior", "gradient", "hue", "fade")]
-    for name, value in [*counts, *positive, ("base", -1), ("smoothness", np.nan), ("bright_saturation", 2)]:
+    positive = [
+        (name, 0) for name in ("reach", "purity", "trust", "prior", "gradient", "hue", "fade")
+    ]
+    for name, value in [
+        *counts,
+        *positive,
+        ("base", -1),
+        ("smoothness", np.nan),
+        ("bright_saturation", 2),
+    ]:
         with pytest.raises(InputError, match=name):
             kim_2013.separate(image, mask, Kim2013Options(**{name: value}))

@@ -1,4 +1,6 @@
-"""How a photo's light looks: what the network's answer must not depend on, and what the shipped weights can do."""
+"""How a photo's light looks: what the network's answer must not depend on, and what the shipped
+weights can do.
+"""
 
 from pathlib import Path
 
@@ -13,14 +15,26 @@ from isc_core.sirfs.frames import real_sh
 from tests.core.lit_balls import SIDE, ball, under_lamps
 
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
-LAYERS = {"local": (15, 7), "whole": (21, 8), "lamps": (8, 3), "places": (8, len(PLACES)), "light": (8, 16)}
+LAYERS = {
+    "local": (15, 7),
+    "whole": (21, 8),
+    "lamps": (8, 3),
+    "places": (8, len(PLACES)),
+    "light": (8, 16),
+}
 
 
 def small_network(rng: np.random.Generator) -> LampNetwork:
     """Two levels, random weights."""
-    weights = tuple(rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32) for inputs, outputs in SHAPES)
+    weights = tuple(
+        rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32)
+        for inputs, outputs in SHAPES
+    )
     biases = tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in SHAPES)
-    layers = {name: (rng.normal(0, shape[0] ** -0.5, shape), rng.normal(0, 0.1, shape[1])) for name, shape in LAYERS.items()}
+    layers = {
+        name: (rng.normal(0, shape[0] ** -0.5, shape), rng.normal(0, 0.1, shape[1]))
+        for name, shape in LAYERS.items()
+    }
     return LampNetwork(weights, biases, rng.normal(size=10), rng.uniform(0.5, 1, 10), layers)
 
 
@@ -33,11 +47,17 @@ def photo(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
 
 def off(one: np.ndarray, other: np.ndarray) -> float:
     """Degrees between two directions."""
-    return float(np.degrees(np.arccos(np.clip(one @ other / np.linalg.norm(one) / np.linalg.norm(other), -1, 1))))
+    return float(
+        np.degrees(
+            np.arccos(np.clip(one @ other / np.linalg.norm(one) / np.linalg.norm(other), -1, 1))
+        )
+    )
 
 
 def numbers(lamps: Glance) -> np.ndarray:
-    return np.concatenate([[lamps.none, lamps.one, lamps.several], lamps.places, lamps.light, lamps.deviations])
+    return np.concatenate(
+        [[lamps.none, lamps.one, lamps.several], lamps.places, lamps.light, lamps.deviations]
+    )
 
 
 def test_places_are_unit_vectors_evenly_before_the_object() -> None:
@@ -51,36 +71,53 @@ def test_the_answer_is_one_of_probabilities_whatever_the_exposure() -> None:
     rng = np.random.default_rng(0)
     network, (image, mask) = small_network(rng), photo(rng)
     found = glance_at(image, mask, network)
-    assert found.none + found.one + found.several == pytest.approx(1) and found.places.sum() == pytest.approx(1)
+    assert found.none + found.one + found.several == pytest.approx(
+        1
+    ) and found.places.sum() == pytest.approx(1)
     assert min(found.none, found.one, found.several, found.places.min(), found.deviations.min()) > 0
-    np.testing.assert_allclose(numbers(glance_at(8 * image, mask, network)), numbers(found), rtol=1e-4, atol=1e-6)
+    np.testing.assert_allclose(
+        numbers(glance_at(8 * image, mask, network)), numbers(found), rtol=1e-4, atol=1e-6
+    )
 
 
 def test_the_photo_mirrored_has_its_light_mirrored() -> None:
     rng = np.random.default_rng(3)
     network, (image, mask) = small_network(rng), photo(rng)
-    found, mirrored = glance_at(image, mask, network), glance_at(image[:, ::-1], mask[:, ::-1], network)
+    found, mirrored = (
+        glance_at(image, mask, network),
+        glance_at(image[:, ::-1], mask[:, ::-1], network),
+    )
     assert (mirrored.none, mirrored.one) == pytest.approx((found.none, found.one))
     normal, _ = ball()
     row = slice(SIDE // 3, SIDE // 3 + 1)
-    seen, other = (real_sh(normal[row, 20:-20])[..., 1:] @ lamps.light for lamps in (found, mirrored))
+    seen, other = (
+        real_sh(normal[row, 20:-20])[..., 1:] @ lamps.light for lamps in (found, mirrored)
+    )
     np.testing.assert_allclose(other[:, ::-1], seen, atol=1e-6)
-    assert off(mirrored.direction * (-1, 1, 1), found.direction) < 5  # places lie on a spiral, which has no mirror image
+    assert (
+        off(mirrored.direction * (-1, 1, 1), found.direction) < 5
+    )  # places lie on a spiral, which has no mirror image
 
 
 def test_what_is_outside_the_mask_and_the_number_of_threads_change_nothing() -> None:
     rng = np.random.default_rng(1)
     network, (image, mask) = small_network(rng), photo(rng)
     found = numbers(glance_at(image, mask, network))
-    padded = np.pad(np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9)
+    padded = np.pad(
+        np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9
+    )
     for threads in (1, 3):
         with threadpool_limits(threads):
-            np.testing.assert_array_equal(numbers(glance_at(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found)
+            np.testing.assert_array_equal(
+                numbers(glance_at(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found
+            )
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-30, 1.0])
 def test_photos_without_anything_in_them_are_judged_too(level: float) -> None:
-    assert np.isfinite(numbers(glance_at(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool)))).all()
+    assert np.isfinite(
+        numbers(glance_at(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool)))
+    ).all()
 
 
 def test_the_cone_holds_two_thirds_of_the_places() -> None:
@@ -89,20 +126,31 @@ def test_the_cone_holds_two_thirds_of_the_places() -> None:
         places = np.exp(sharp * (PLACES @ toward))
         glance = Glance(0, 1, 0, places / places.sum(), np.zeros(8), np.ones(8))
         assert off(glance.direction, toward) < 3
-        # Of a density exp(k cos) 1 - e^(-k (1 - cos)) lies within an angle; the network's places are blurred by one of k = 1 / 8 degrees^2.
+        # Of a density exp(k cos) 1 - e^(-k (1 - cos)) lies within an angle; the network's places
+        # are blurred by one of k = 1 / 8 degrees^2.
         wide, blur = (np.arccos(1 + np.log(0.32) / k) for k in (sharp, np.radians(8) ** -2))
         assert glance.cone == pytest.approx(np.degrees(np.sqrt(wide**2 - blur**2)), rel=0.1)
 
 
 def test_a_cone_is_never_a_point_and_one_that_is_half_the_sky_tells_nothing() -> None:
     sure, unsure = (np.exp(k * PLACES[:, 2]) for k in (400, 1))
-    found = [Glance(0, 1, 0, places / places.sum(), np.zeros(8), np.ones(8)) for places in (sure, unsure)]
+    found = [
+        Glance(0, 1, 0, places / places.sum(), np.zeros(8), np.ones(8)) for places in (sure, unsure)
+    ]
     assert found[0].cone == 4 and found[0].determined and not found[1].determined
     assert not Glance(0.6, 0.4, 0, found[0].places, np.zeros(8), np.ones(8)).determined
 
 
 @pytest.mark.parametrize(
-    "toward", [(-0.5, 0.5, 0.7), (0.6, 0.3, 0.7), (0.1, 0.8, 0.6), (0.2, 0.1, 0.9), (-0.7, -0.1, 0.5), (0.3, -0.6, 0.7)]
+    "toward",
+    [
+        (-0.5, 0.5, 0.7),
+        (0.6, 0.3, 0.7),
+        (0.1, 0.8, 0.6),
+        (0.2, 0.1, 0.9),
+        (-0.7, -0.1, 0.5),
+        (0.3, -0.6, 0.7),
+    ],
 )
 def test_the_lamp_of_a_painted_ball_is_found(toward: tuple[float, float, float]) -> None:
     found = glance_at(*under_lamps(toward))
@@ -111,7 +159,9 @@ def test_the_lamp_of_a_painted_ball_is_found(toward: tuple[float, float, float])
 
 
 def test_three_lamps_are_several_and_smooth_light_is_none() -> None:
-    assert glance_at(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))).several > 0.7
+    assert (
+        glance_at(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))).several > 0.7
+    )
     normal, mask = ball()
     smooth = np.exp(0.5 * normal[..., 1:2] + 0.2 * normal[..., :1]) * (0.5, 0.3, 0.2)
     assert glance_at((smooth * mask[..., None]).astype(np.float32), mask).none > 0.5
@@ -128,7 +178,12 @@ def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     parts |= {"middle": network.middle, "scale": network.scale}
     for name, (matrix, added) in network.layers.items():
         parts |= {f"{name}_weight": matrix, f"{name}_bias": added}
-    for wrong in ({"local_weight": np.ones((9, 7))}, {"lamps_bias": np.ones(4)}, {"bias01": np.ones(3)}, {"weight00": np.ones((9, 3, 4))}):
+    for wrong in (
+        {"local_weight": np.ones((9, 7))},
+        {"lamps_bias": np.ones(4)},
+        {"bias01": np.ones(3)},
+        {"weight00": np.ones((9, 3, 4))},
+    ):
         np.savez(bad, **(parts | wrong))
         with pytest.raises(InputError, match="not the weights"):
             read_lamp_network(bad)

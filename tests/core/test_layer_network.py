@@ -1,4 +1,6 @@
-"""The layer network: its arithmetic against other people's, what it must not depend on, and what the shipped weights can do."""
+"""The layer network: its arithmetic against other people's, what it must not depend on, and what
+the shipped weights can do.
+"""
 
 import numpy as np
 import pytest
@@ -7,15 +9,26 @@ from scipy import ndimage
 from isc_core.errors import InputError
 from isc_core.separation import separate
 from isc_core.separation.convolutions import convolved, from_blocks, to_blocks
-from isc_core.separation.layer_network import LayerNetwork, NetworkOptions, log_ratio, read_network, shipped_network
+from isc_core.separation.layer_network import (
+    LayerNetwork,
+    NetworkOptions,
+    log_ratio,
+    read_network,
+    shipped_network,
+)
 from isc_core.separation.light_tint import held_to_light
 
 
 def small_network(rng):
     """Two levels, random weights."""
     shapes = [(16, 4), (4, 4), (4, 6), (6, 6), (10, 4), (4, 4), (4, 16)]
-    weights = tuple(rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32) for inputs, outputs in shapes)
-    return LayerNetwork(weights, tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in shapes))
+    weights = tuple(
+        rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32)
+        for inputs, outputs in shapes
+    )
+    return LayerNetwork(
+        weights, tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in shapes)
+    )
 
 
 def ball(side=160, paint=(0.5, 0.5, 0.5), gloss=1.0):
@@ -34,9 +47,16 @@ def test_convolution_is_correlation_with_zeros_around():
     rng = np.random.default_rng(0)
     layer, weight, bias = rng.normal(size=(7, 9, 3)), rng.normal(size=(9, 3, 2)), rng.normal(size=2)
     expected = [
-        sum(ndimage.correlate(layer[..., i], weight[:, i, o].reshape(3, 3), mode="constant") for i in range(3)) + bias[o] for o in range(2)
+        sum(
+            ndimage.correlate(layer[..., i], weight[:, i, o].reshape(3, 3), mode="constant")
+            for i in range(3)
+        )
+        + bias[o]
+        for o in range(2)
     ]
-    assert np.allclose(convolved(layer, weight, bias), np.stack(expected, -1), atol=5e-5)  # steps of 2^-20 of the largest factors
+    assert np.allclose(
+        convolved(layer, weight, bias), np.stack(expected, -1), atol=5e-5
+    )  # steps of 2^-20 of the largest factors
 
 
 def test_blocks_of_pixels_go_there_and_back():
@@ -48,22 +68,36 @@ def test_blocks_of_pixels_go_there_and_back():
 
 def test_exposure_and_mirror_images_change_nothing():
     rng = np.random.default_rng(1)
-    network, image, mask = small_network(rng), rng.uniform(0.01, 1, (64, 32, 3)).astype(np.float32), rng.random((64, 32)) > 0.2
+    network, image, mask = (
+        small_network(rng),
+        rng.uniform(0.01, 1, (64, 32, 3)).astype(np.float32),
+        rng.random((64, 32)) > 0.2,
+    )
     y, log_error = network(image, mask)
     brighter, _ = network(8 * image, mask)
     mirrored, mirrored_error = network(image[:, ::-1], mask[:, ::-1])
     assert y.min() >= 0 and y.std() > 0.01
     assert np.allclose(y, brighter, atol=1e-5)
-    assert np.allclose(y, mirrored[:, ::-1], atol=1e-5) and np.allclose(log_error, mirrored_error[:, ::-1], atol=1e-5)
+    assert np.allclose(y, mirrored[:, ::-1], atol=1e-5) and np.allclose(
+        log_error, mirrored_error[:, ::-1], atol=1e-5
+    )
 
 
 def test_what_is_outside_the_mask_is_not_looked_at():
     rng = np.random.default_rng(2)
-    network, image, mask = small_network(rng), rng.uniform(0.01, 1, (70, 50, 3)).astype(np.float32), np.zeros((70, 50), bool)
+    network, image, mask = (
+        small_network(rng),
+        rng.uniform(0.01, 1, (70, 50, 3)).astype(np.float32),
+        np.zeros((70, 50), bool),
+    )
     mask[5:60, 8:41] = True
     found, error = log_ratio(image, mask, network, NetworkOptions(long_side=40))
-    padded = np.pad(np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9)
-    again, _ = log_ratio(padded, np.pad(mask, ((13, 4), (3, 21))), network, NetworkOptions(long_side=40))
+    padded = np.pad(
+        np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9
+    )
+    again, _ = log_ratio(
+        padded, np.pad(mask, ((13, 4), (3, 21))), network, NetworkOptions(long_side=40)
+    )
     assert np.array_equal(found, again[13:-4, 3:-21])
     assert not found[~mask].any() and (error[mask] > 0).all()
 
@@ -74,7 +108,9 @@ def test_a_highlight_on_grey_paint_is_found_where_colour_tells_nothing():
     left = np.abs(split.diffuse - diffuse)[mask].mean()
     assert left < 0.5 * np.abs(image - diffuse)[mask].mean()
     assert np.abs(separate("isc", image, mask).diffuse - image)[mask].max() < 1e-3
-    assert np.allclose((split.diffuse + split.specular + split.residual)[mask], image[mask], atol=1e-6)
+    assert np.allclose(
+        (split.diffuse + split.specular + split.residual)[mask], image[mask], atol=1e-6
+    )
 
 
 @pytest.mark.parametrize("side", [60, 160, 420])
@@ -111,12 +147,18 @@ def test_light_that_is_white_stays_and_green_light_on_green_paint_goes_back():
     kept = held_to_light(paint + green, paint, 1.0)
     level = (paint + green - kept)[0, 0]
     costs = [np.square((level[0] + d - green) / paint[0, 0]).sum() for d in (-0.001, 0, 0.001)]
-    assert np.ptp(level) < 1e-6 and costs[1] == min(costs), "the white light whose diffuse layer differs least in its logarithm"
+    assert np.ptp(level) < 1e-6 and costs[1] == min(costs), (
+        "the white light whose diffuse layer differs least in its logarithm"
+    )
 
 
 def test_the_mirror_image_is_asked_only_where_that_is_wanted():
     rng = np.random.default_rng(5)
-    network, image, mask = small_network(rng), rng.uniform(0.01, 1, (32, 32, 3)).astype(np.float32), np.ones((32, 32), bool)
+    network, image, mask = (
+        small_network(rng),
+        rng.uniform(0.01, 1, (32, 32, 3)).astype(np.float32),
+        np.ones((32, 32), bool),
+    )
     one, _ = network(image, mask, mirrored=False)
     other, _ = network(image[:, ::-1], mask, mirrored=False)
     assert np.allclose(network(image, mask)[0], 0.5 * (one + other[:, ::-1]), atol=1e-6)

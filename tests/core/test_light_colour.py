@@ -1,4 +1,6 @@
-"""Photos under coloured light: what a model makes of them under white light, with the colour put back."""
+"""Photos under coloured light: what a model makes of them under white light, with the colour put
+back.
+"""
 
 from dataclasses import replace
 
@@ -31,8 +33,12 @@ def task_of(photo: Photo, light_colour: str = "estimate") -> Task:
 def seen_by(task: Task) -> Answer:
     """A model that separates and says that everything is evenly lit, with a white lobe."""
     split = separate("isc", task.maps.image, task.maps.mask)
-    lamp = LobeLight(np.array([0.0, 0, 1]), 2.0, np.ones(3), Interval(0.5 * np.ones(3), 2 * np.ones(3)))
-    brdf = LobeFit("ggx", True, "", 0.2, Interval(0.1, 0.3), (lamp,), None, None, 1.0, split.specular)
+    lamp = LobeLight(
+        np.array([0.0, 0, 1]), 2.0, np.ones(3), Interval(0.5 * np.ones(3), 2 * np.ones(3))
+    )
+    brdf = LobeFit(
+        "ggx", True, "", 0.2, Interval(0.1, 0.3), (lamp,), None, None, 1.0, split.specular
+    )
     return Answer(split, np.zeros(task.maps.mask.shape), np.zeros((9, 3)), {"reason": "made"}, brdf)
 
 
@@ -48,17 +54,26 @@ def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> N
     assert seen[0].one_scale and np.allclose(seen[0].working.image, photo.image / colour, atol=1e-6)
     split, white = answer.split, seen_by(seen[0]).split
     np.testing.assert_allclose(split.specular, white.specular * colour, atol=1e-6)
-    assert np.abs(split.diffuse + split.specular + split.residual - photo.image)[photo.mask].max() < 1e-5 * photo.image.max()
+    assert (
+        np.abs(split.diffuse + split.specular + split.residual - photo.image)[photo.mask].max()
+        < 1e-5 * photo.image.max()
+    )
     shading = np.exp(light_from_reference(answer.light)[0] * np.sqrt(1 / (4 * np.pi)))
     np.testing.assert_allclose(shading, colour)
     assert answer.brdf is not None and np.allclose(answer.brdf.lights[0].strength_light, colour)
     said = answer.status["light_colour"]
-    assert said["used"] == "estimate" and said["determined"] and np.allclose(said["estimate"], colour, atol=1e-4)
+    assert (
+        said["used"] == "estimate"
+        and said["determined"]
+        and np.allclose(said["estimate"], colour, atol=1e-4)
+    )
     assert answer.status["reason"] == "made"
 
 
 @pytest.mark.parametrize(("paints", "asked"), [(PAINTS, "white"), (PAINTS[:1], "estimate")])
-def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(paints: np.ndarray, asked: str) -> None:
+def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
+    paints: np.ndarray, asked: str
+) -> None:
     photo = photo_of(paints, LIGHT)
     answer, usual = under_light(task_of(photo, asked), seen_by), seen_by(task_of(photo))
     np.testing.assert_array_equal(answer.split.diffuse, usual.split.diffuse)
@@ -74,7 +89,11 @@ def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() 
     assert estimate_illuminant(photo.image, photo.mask).too_strong
     np.testing.assert_allclose(answer.split.confidence, 0.5 * usual.split.confidence)
     said = answer.status["light_colour"]
-    assert said["used"] == "white" and "strongly coloured" in said["help"] and "too strong" in said["reason"]
+    assert (
+        said["used"] == "white"
+        and "strongly coloured" in said["help"]
+        and "too strong" in said["reason"]
+    )
 
 
 def test_layers_that_are_known_already_are_taken_along() -> None:
@@ -91,14 +110,20 @@ def test_layers_that_are_known_already_are_taken_along() -> None:
 
 @pytest.mark.parametrize("model", ["joint", "mbp"])
 def test_the_identities_hold_in_the_end(model: str) -> None:
-    d = decompose(photo_of(PAINTS, LIGHT, size=64), Settings(model=model, light_colour="estimate", confidence_weights=model == "joint"))
+    d = decompose(
+        photo_of(PAINTS, LIGHT, size=64),
+        Settings(model=model, light_colour="estimate", confidence_weights=model == "joint"),
+    )
     assert d.identity_errors().broken() == ()
     assert d.provenance.status["light_colour"]["used"] == "estimate"
     assert d.provenance.settings["light_colour"] == "estimate"
 
 
 def test_options_that_mean_nothing_to_a_model_are_refused() -> None:
-    for settings in (Settings(model="sirfs", light_colour="estimate"), Settings(model="mbp", confidence_weights=True)):
+    for settings in (
+        Settings(model="sirfs", light_colour="estimate"),
+        Settings(model="mbp", confidence_weights=True),
+    ):
         with pytest.raises(InputError, match="means nothing to"):
             settings.check()
     with pytest.raises(InputError, match="unknown light colour"):

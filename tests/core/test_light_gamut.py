@@ -34,7 +34,9 @@ def test_less_strong_light_is_told_on_grey(light: np.ndarray) -> None:
 
 @pytest.mark.parametrize("light", [np.ones(3), np.array([1.1, 1.0, 0.9])])
 @pytest.mark.parametrize("paints", [PAINTS, *(paint[None] for paint in PAINTS), GREY])
-def test_a_lamp_s_light_is_not_where_highlights_show_it(paints: np.ndarray, light: np.ndarray) -> None:
+def test_a_lamp_s_light_is_not_where_highlights_show_it(
+    paints: np.ndarray, light: np.ndarray
+) -> None:
     assert not estimate_illuminant(*ball(paints, light, 0.5)).too_strong
 
 
@@ -42,16 +44,22 @@ def test_many_paints_without_highlights_hold_white_and_one_does_not() -> None:
     white = np.ones(3)
     assert not estimate_illuminant(*ball(PAINTS, white, 0.0)).too_strong
     assert not estimate_illuminant(*ball(GREY, white, 0.0)).too_strong
-    assert estimate_illuminant(*ball(PAINTS[:1], white, 0.0)).too_strong  # as grey paint under red light
+    assert estimate_illuminant(
+        *ball(PAINTS[:1], white, 0.0)
+    ).too_strong  # as grey paint under red light
 
 
 def test_the_distance_is_that_of_the_hull() -> None:
     paint = np.array([[0.6, 0.3, 0.3]])
     place = 3 * paint[0] / paint.sum() @ PLANE
-    assert distance_of_white(np.repeat(paint, 100, axis=0)) == pytest.approx(np.linalg.norm(place), rel=2e-3)  # of 64 directions
+    assert distance_of_white(np.repeat(paint, 100, axis=0)) == pytest.approx(
+        np.linalg.norm(place), rel=2e-3
+    )  # of 64 directions
     around = np.repeat(np.eye(3) + 0.1, 100, axis=0)
     assert distance_of_white(around) < 0
-    assert distance_of_white(around * [1.0, 1.0, 5.0]) == pytest.approx(distance_of_white(around[:, ::-1] * [5.0, 1.0, 1.0]), rel=1e-9)
+    assert distance_of_white(around * [1.0, 1.0, 5.0]) == pytest.approx(
+        distance_of_white(around[:, ::-1] * [5.0, 1.0, 1.0]), rel=1e-9
+    )
     assert distance_of_white(np.zeros((100, 3))) == 0
 
 
@@ -68,4 +76,6 @@ def test_units_and_few_colours_say_nothing() -> None:
     assert not without_white(red[:5], np.zeros((5, 3)))
     colour, change = lines(np.array([0.6, 0.1, 0.1]), np.ones(3), 50_000)
     few = slice(None, None, 100)
-    assert share_toward_white(colour, change) == pytest.approx(share_toward_white(colour[few], change[few]), abs=0.02)
+    assert share_toward_white(colour, change) == pytest.approx(
+        share_toward_white(colour[few], change[few]), abs=0.02
+    )

@@ -1,4 +1,6 @@
-"""What SIRFS expects of the light: what the photo shows at first sight, or the lights of all photos."""
+"""What SIRFS expects of the light: what the photo shows at first sight, or the lights of all
+photos.
+"""
 
 import numpy as np
 import pytest
@@ -14,7 +16,9 @@ def found(toward: tuple[float, float, float], grey: bool = False, **settings: st
     """A painted ball under one lamp, explained."""
     image, mask = under_lamps(toward)
     image = image.mean(axis=2, keepdims=True).repeat(3, axis=2) if grey else image
-    photo = Photo(image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file"))
+    photo = Photo(
+        image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file")
+    )
     return decompose(photo, Settings(model="mdr", threads=1, **settings))  # type: ignore[arg-type]
 
 
@@ -27,15 +31,23 @@ def error(d: Decomposition) -> float:
 @pytest.mark.parametrize("grey", [False, True])
 def test_a_ball_is_rounder_in_the_light_that_was_seen(grey: bool) -> None:
     toward = (-0.7, 0.2, 0.6)
-    seen, usual = (found(toward, grey, shape_prior="outline", light_prior=prior) for prior in ("seen", "usual"))
+    seen, usual = (
+        found(toward, grey, shape_prior="outline", light_prior=prior) for prior in ("seen", "usual")
+    )
     assert seen.identity_errors().broken() == ()
     assert error(seen) < 0.9 * error(usual)
-    assert seen.provenance.settings["light_prior"] == "seen" and usual.provenance.settings["light_prior"] == "usual"
+    assert (
+        seen.provenance.settings["light_prior"] == "seen"
+        and usual.provenance.settings["light_prior"] == "usual"
+    )
     assert seen.provenance.status["lamps"] == usual.provenance.status["lamps"]
 
 
 def test_the_laboratory_s_light_is_known() -> None:
-    one, other = (found((0.5, 0.5, 0.7), illumination="laboratory", light_prior=prior) for prior in ("seen", "usual"))
+    one, other = (
+        found((0.5, 0.5, 0.7), illumination="laboratory", light_prior=prior)
+        for prior in ("seen", "usual")
+    )
     np.testing.assert_array_equal(one.height, other.height)
     np.testing.assert_array_equal(one.illumination, other.illumination)
 

@@ -14,7 +14,9 @@ SYSTEMS = [np.random.default_rng(n).normal(size=(n, n)) for n in (1, 2, 9, 27)]
 def test_the_answer_solves_the_equations(matrix: np.ndarray) -> None:
     right = np.arange(3.0 * len(matrix)).reshape(-1, 3)
     np.testing.assert_allclose(matrix @ solved(matrix, right), right, atol=1e-9)
-    np.testing.assert_allclose(solved(matrix, np.eye(len(matrix))), np.linalg.inv(matrix), rtol=1e-6)
+    np.testing.assert_allclose(
+        solved(matrix, np.eye(len(matrix))), np.linalg.inv(matrix), rtol=1e-6
+    )
 
 
 def test_a_zero_in_the_way_is_walked_around_and_a_singular_matrix_refused() -> None:
@@ -25,7 +27,9 @@ def test_a_zero_in_the_way_is_walked_around_and_a_singular_matrix_refused() -> N
 
 
 @pytest.mark.parametrize("kind", ["natural", "laboratory"])
-def test_the_precision_of_light_is_its_covariance_s_inverse_on_any_number_of_threads(kind: str) -> None:
+def test_the_precision_of_light_is_its_covariance_s_inverse_on_any_number_of_threads(
+    kind: str,
+) -> None:
     found = []
     for threads in (1, 3):
         with threadpool_limits(threads):

@@ -13,7 +13,9 @@ from isc_core.photo import read_photo, srgb_to_linear
 
 
 def scene(h: int = 120, w: int = 160) -> tuple[np.ndarray, np.ndarray]:
-    """(photo codes (H, W, 3) uint8, truth (H, W) bool): a red shaded disc on a noisy blue-green background."""
+    """(photo codes (H, W, 3) uint8, truth (H, W) bool): a red shaded disc on a noisy blue-green
+    background.
+    """
     rng = np.random.default_rng(3)
     y, x = np.mgrid[:h, :w]
     truth = ((x - 0.5 * w) ** 2 + (y - 0.5 * h) ** 2) < (0.3 * h) ** 2
@@ -120,5 +122,7 @@ def test_cut_out_of_a_black_photo(tmp_path: Path) -> None:
 
 
 def test_cut_out_of_a_real_photo(shared: Path, tmp_path: Path) -> None:
-    found = cut_out(shared / "data" / "highlight" / "fish.ppm", (60, 60, 500, 360), tmp_path / "mask.png")
+    found = cut_out(
+        shared / "data" / "highlight" / "fish.ppm", (60, 60, 500, 360), tmp_path / "mask.png"
+    )
     assert found.any() and (tmp_path / "mask.png").exists()

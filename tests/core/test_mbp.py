@@ -1,4 +1,6 @@
-"""The models that separate, on a scene with known parts: identities, the order of their steps, and nothing invented on a matt object."""
+"""The models that separate, on a scene with known parts: identities, the order of their steps, and
+nothing invented on a matt object.
+"""
 
 from dataclasses import replace
 
@@ -22,13 +24,19 @@ LAMP /= np.linalg.norm(LAMP)
 
 
 def glossy(shape: tuple[int, int] = (76, 90), radius: float = 34.0) -> Decomposition:
-    """The ball of one red paint, without a pattern, under the gloss of a lamp: alpha .15, strength x light 1.5."""
+    """The ball of one red paint, without a pattern, under the gloss of a lamp: alpha .15, strength
+    x light 1.5.
+    """
     d = ball(shape, radius, (shape[0] / 2, shape[1] / 2))
     inside = d.mask[..., None]
     reflectance = np.where(inside, [0.52, 0.12, 0.07], 0).astype(np.float32)
-    gloss = radiance(Ggx(0.15, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(LAMP, 1.5))
+    gloss = radiance(
+        Ggx(0.15, 0.04), d.normal.astype(float), np.array([0.0, 0, 1]), directional(LAMP, 1.5)
+    )
     diffuse, specular = reflectance * d.shading, np.where(inside, gloss, 0).astype(np.float32)
-    return replace(d, image=diffuse + specular, diffuse=diffuse, specular=specular, reflectance=reflectance)
+    return replace(
+        d, image=diffuse + specular, diffuse=diffuse, specular=specular, reflectance=reflectance
+    )
 
 
 def photo_of(d: Decomposition, image: np.ndarray) -> Photo:
@@ -44,7 +52,11 @@ def truth_of(d: Decomposition) -> Evidence:
 @pytest.mark.parametrize("full_size", [False, True])
 def test_the_identities_hold_and_the_layers_are_the_scene_s(model: str, full_size: bool) -> None:
     d = glossy()
-    found = decompose(photo_of(d, d.image), Settings(model=model, max_size=60, full_size=full_size), evidence=truth_of(d))
+    found = decompose(
+        photo_of(d, d.image),
+        Settings(model=model, max_size=60, full_size=full_size),
+        evidence=truth_of(d),
+    )
     assert found.identity_errors().broken() == ()
     assert found.mask.shape == (d.mask.shape if full_size else found.mask.shape)
     assert min(found.diffuse.min(), found.specular.min()) >= 0
@@ -98,14 +110,22 @@ def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
 def test_where_nobody_looked_for_highlights_the_object_is_not_called_matt(model: str) -> None:
     d = glossy((52, 60), 23.0)
-    found = decompose(photo_of(d, d.image), Settings(model=model, separator="none"), evidence=truth_of(d))
+    found = decompose(
+        photo_of(d, d.image), Settings(model=model, separator="none"), evidence=truth_of(d)
+    )
     assert found.brdf is None and found.provenance.status["gloss"] == NOT_LOOKED_FOR
 
 
 def test_an_overexposed_object_is_not_called_matt() -> None:
     d = glossy((52, 60), 23.0)
-    photo = photo_of(d, np.where(d.mask[..., None], np.minimum(40 * d.image, 1 - 1e-3 * d.normal[..., :1]), 0))
-    found = decompose(replace(photo, clipped=d.mask & (photo.image.min(-1) > 0.9)), Settings(model="mdr"), evidence=truth_of(d))
+    photo = photo_of(
+        d, np.where(d.mask[..., None], np.minimum(40 * d.image, 1 - 1e-3 * d.normal[..., :1]), 0)
+    )
+    found = decompose(
+        replace(photo, clipped=d.mask & (photo.image.min(-1) > 0.9)),
+        Settings(model="mdr"),
+        evidence=truth_of(d),
+    )
     assert found.provenance.status["gloss"] == HIDDEN
     assert any("too bright" in line for line in found.provenance.status["doubts"])
 
@@ -119,7 +139,9 @@ def test_the_exposure_of_a_float_file_does_not_matter() -> None:
     dim, usual, bright = found
     assert usual.brdf is not None and usual.brdf.alpha is not None
     for other, factor in ((dim, 2.0**-10), (bright, 2.0**10)):
-        assert other.brdf is not None and other.brdf.alpha == pytest.approx(usual.brdf.alpha, rel=1e-4)
+        assert other.brdf is not None and other.brdf.alpha == pytest.approx(
+            usual.brdf.alpha, rel=1e-4
+        )
         cosine = (other.normal * usual.normal).sum(-1)[d.mask]
         assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 1
         assert other.identity_errors().broken() == ()
@@ -132,12 +154,18 @@ def test_a_mask_without_an_inside_is_refused_before_the_work() -> None:
     speckled = d.mask & (np.indices(d.mask.shape).sum(0) % 2 == 0)
     stages: list[str] = []
     with pytest.raises(InputError, match="2 x 2"):
-        decompose(replace(photo_of(d, d.image), mask=speckled), Settings(), monitor=Monitor(lambda stage, share: stages.append(stage)))
+        decompose(
+            replace(photo_of(d, d.image), mask=speckled),
+            Settings(),
+            monitor=Monitor(lambda stage, share: stages.append(stage)),
+        )
     assert stages == []
 
 
 def test_it_is_the_reflectance_that_is_separated() -> None:
-    """With the true shading, without its hue: the layers are those of image / shading, times the shading."""
+    """With the true shading, without its hue: the layers are those of image / shading, times the
+    shading.
+    """
     d = glossy()
     split = split_reflectance(d.image, d.shading, d.mask, None, "isc")
     inside = d.mask[..., None]
@@ -152,7 +180,9 @@ def test_it_is_the_reflectance_that_is_separated() -> None:
 
 def test_how_sirfs_shares_out_brightness_does_not_matter() -> None:
     d = glossy()
-    usual, brighter = (split_reflectance(d.image, factor * d.shading, d.mask, None, "isc") for factor in (1, 8))
+    usual, brighter = (
+        split_reflectance(d.image, factor * d.shading, d.mask, None, "isc") for factor in (1, 8)
+    )
     assert np.allclose(usual.diffuse, brighter.diffuse, atol=1e-6)
     assert usual.specular.any()
 
@@ -161,7 +191,9 @@ def test_a_light_of_the_wrong_hue_gives_no_highlights_of_that_hue() -> None:
     """SIRFS may explain yellow paint as orange paint under blue light; highlights stay white."""
     d = glossy()
     blue = d.shading * np.array([0.5, 0.8, 2.5], np.float32)
-    usual, wrong = (split_reflectance(d.image, shading, d.mask, None, "isc") for shading in (d.shading, blue))
+    usual, wrong = (
+        split_reflectance(d.image, shading, d.mask, None, "isc") for shading in (d.shading, blue)
+    )
     assert usual.specular.any()
     assert np.allclose(usual.specular, wrong.specular, atol=1e-5)
     assert np.ptp(wrong.specular, axis=-1).max() < 1e-6

@@ -47,7 +47,9 @@ def sampled(image: Image.Image, uv: np.ndarray) -> np.ndarray:
 
 
 def gltf(blob: bytes) -> dict:
-    """The JSON part of a .glb, read by the format's own words: header of 12 bytes, then length, type, text."""
+    """The JSON part of a .glb, read by the format's own words: header of 12 bytes, then length,
+    type, text.
+    """
     magic, version, total = struct.unpack_from("<4sII", blob)
     length, kind = struct.unpack_from("<I4s", blob, 12)
     assert (magic, version, total, kind) == (b"glTF", 2, len(blob), b"JSON")
@@ -59,7 +61,11 @@ def test_it_stands_in_the_axes_of_gltf() -> None:
     mesh = reopened(built(ball(), rim=0))
     assert np.ptp(mesh.vertices, axis=0).max() == pytest.approx(0.1, rel=0.02)
     assert np.abs(mesh.bounds.sum(0)).max() < 1e-6  # centred
-    outward = mesh.vertices - [mesh.vertices[:, 0].mean(), mesh.vertices[:, 1].mean(), mesh.vertices[:, 2].max() - 40 * 0.1 / 79]
+    outward = mesh.vertices - [
+        mesh.vertices[:, 0].mean(),
+        mesh.vertices[:, 1].mean(),
+        mesh.vertices[:, 2].max() - 40 * 0.1 / 79,
+    ]
     outward /= np.linalg.norm(outward, axis=-1, keepdims=True)
     assert np.abs(outward - mesh.vertex_normals).max() < 0.02
     right, top = mesh.vertices[:, 0].argmax(), mesh.vertices[:, 1].argmax()
@@ -74,7 +80,13 @@ def test_all_vertices_are_used_and_only_whole_cells() -> None:
     mask[0] = mask[3, 4] = mask[6, :3] = False
     mask[0, 8] = True  # a pixel that hangs on by one side: no cell holds it
     d = ball()
-    result = build_mesh(np.arange(63.0).reshape(7, 9), d.normal[:7, :9], mask, np.ones((7, 9, 3)), MeshOptions(rim=0))
+    result = build_mesh(
+        np.arange(63.0).reshape(7, 9),
+        d.normal[:7, :9],
+        mask,
+        np.ones((7, 9, 3)),
+        MeshOptions(rim=0),
+    )
     cells = mask[:-1, :-1] & mask[1:, :-1] & mask[:-1, 1:] & mask[1:, 1:]
     assert len(result.mesh.faces) == 2 * cells.sum()
     assert set(np.unique(result.mesh.faces)) == set(range(len(result.mesh.vertices)))
@@ -85,13 +97,24 @@ def test_pixels_and_world_are_related_as_described() -> None:
     d = ball()
     result = built(d, metres_per_pixel=0.002, rim=0)
     row, column = 30, 80
-    place = np.array([column - result.origin[0], result.origin[1] - row, d.height[row, column] - result.origin[2]]) * 0.002
+    place = (
+        np.array(
+            [
+                column - result.origin[0],
+                result.origin[1] - row,
+                d.height[row, column] - result.origin[2],
+            ]
+        )
+        * 0.002
+    )
     assert np.abs(result.mesh.vertices - place).max(-1).min() < 1e-9
     assert result.describe()["metres_per_pixel"] == 0.002
 
 
 def test_the_texture_is_the_right_way_round() -> None:
-    """One coloured corner: it must be found at the mesh's top left, and the file's v must count from the top."""
+    """One coloured corner: it must be found at the mesh's top left, and the file's v must count
+    from the top.
+    """
     d = ball((40, 60), 100, (20, 30))
     paint = np.full((40, 60, 3), 0.2)
     paint[:8, :8] = [0.9, 0.0, 0.0]
@@ -113,7 +136,13 @@ def accessor(blob: bytes, attribute: str) -> np.ndarray:
     entry = tree["accessors"][tree["meshes"][0]["primitives"][0]["attributes"][attribute]]
     view = tree["bufferViews"][entry["bufferView"]]
     width = {"VEC2": 2, "VEC3": 3}[entry["type"]]
-    start = 20 + struct.unpack_from("<I", blob, 12)[0] + 8 + view.get("byteOffset", 0) + entry.get("byteOffset", 0)
+    start = (
+        20
+        + struct.unpack_from("<I", blob, 12)[0]
+        + 8
+        + view.get("byteOffset", 0)
+        + entry.get("byteOffset", 0)
+    )
     return np.frombuffer(blob, "<f4", entry["count"] * width, start).reshape(-1, width)
 
 
@@ -180,7 +209,9 @@ def test_spikes_at_the_rim_go_and_a_ball_stays() -> None:
 
 
 def test_a_steep_rim_has_no_teeth() -> None:
-    """From the side, a ball's outline must be about as long as its great circle, not climb and fall at each step of the grid."""
+    """From the side, a ball's outline must be about as long as its great circle, not climb and fall
+    at each step of the grid.
+    """
     d = ball((300, 300), 140, (150, 150))
     lengths = {}
     for rim in (0, 3):
@@ -202,10 +233,14 @@ def test_a_large_map_is_thinned_to_the_number_of_faces_asked_for() -> None:
 
 
 def test_the_normal_map_holds_what_a_thinned_mesh_lacks() -> None:
-    """Fine waves on a ball: mesh and map together give the recovered normals, rebuilt here as glTF prescribes; the mesh alone does not."""
+    """Fine waves on a ball: mesh and map together give the recovered normals, rebuilt here as glTF
+    prescribes; the mesh alone does not.
+    """
     d = ball((150, 190), 70, (73, 91))
     rows, columns = np.mgrid[:150, :190]
-    normal = d.normal + np.stack([0.25 * np.sin(1.9 * columns), 0.2 * np.cos(2.3 * rows), 0 * rows], -1)
+    normal = d.normal + np.stack(
+        [0.25 * np.sin(1.9 * columns), 0.2 * np.cos(2.3 * rows), 0 * rows], -1
+    )
     normal = np.where(d.mask[..., None] & (normal[..., 2:] > 0.3), normal, d.normal)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     result = built(replace(d, normal=normal), max_faces=3_000, rim=0)
@@ -215,10 +250,15 @@ def test_the_normal_map_holds_what_a_thinned_mesh_lacks() -> None:
     local = texture(mesh.visual.material.normalTexture) / 127.5 - 1
     for face in mesh.faces[::7]:
         weights = np.array([0.2, 0.5, 0.3])
-        pixel = np.stack([mesh.visual.uv[face, 0] * 190 - 0.5, (1 - mesh.visual.uv[face, 1]) * 150 - 0.5], -1)
+        pixel = np.stack(
+            [mesh.visual.uv[face, 0] * 190 - 0.5, (1 - mesh.visual.uv[face, 1]) * 150 - 0.5], -1
+        )
         column, row = np.rint(weights @ pixel).astype(int)
         weights = np.linalg.solve(np.vstack([pixel.T, np.ones(3)]), [column, row, 1])
-        base, tangent = weights @ mesh.vertex_normals[face], tangent_of(mesh.vertices[face], mesh.visual.uv[face])
+        base, tangent = (
+            weights @ mesh.vertex_normals[face],
+            tangent_of(mesh.vertices[face], mesh.visual.uv[face]),
+        )
         base /= np.linalg.norm(base)
         tangent -= base * (tangent @ base)
         tangent /= np.linalg.norm(tangent)
@@ -230,7 +270,9 @@ def test_the_normal_map_holds_what_a_thinned_mesh_lacks() -> None:
 
 
 def test_normals_are_interpolated_on_the_triangles_that_are_drawn() -> None:
-    """A cell is split from top left to bottom right: the top right corner has no say below that line."""
+    """A cell is split from top left to bottom right: the top right corner has no say below that
+    line.
+    """
     corners = np.array([[[0.0], [1.0]], [[0.0], [0.0]]])
     values = _interpolated(corners, (5, 5), 4)[..., 0]
     rows, columns = np.mgrid[:5, :5]
@@ -248,7 +290,10 @@ def test_a_mesh_with_a_vertex_at_each_pixel_lacks_nothing() -> None:
     result = built(d)
     assert result.stride == 1
     mesh = reopened(result)
-    row, column = (np.rint(part).astype(int) for part in ((1 - mesh.visual.uv[:, 1]) * 96 - 0.5, mesh.visual.uv[:, 0] * 120 - 0.5))
+    row, column = (
+        np.rint(part).astype(int)
+        for part in ((1 - mesh.visual.uv[:, 1]) * 96 - 0.5, mesh.visual.uv[:, 0] * 120 - 0.5)
+    )
     assert np.abs(mesh.vertex_normals - d.normal[row, column]).max() < 1e-5
     assert (texture(mesh.visual.material.normalTexture) == [128, 128, 255]).all()
 
@@ -263,7 +308,9 @@ def test_the_material_is_what_was_asked_for() -> None:
     assert result.describe()["roughness"] == {"value": 0.4, "source": "not fitted"}
 
 
-def glossy(specular: float, variation: np.ndarray | None = None, roughness: float = 0.3) -> MeshResult:
+def glossy(
+    specular: float, variation: np.ndarray | None = None, roughness: float = 0.3
+) -> MeshResult:
     """The ball's mesh with a fitted gloss whose level for the base colour is `specular`."""
     d = ball()
     k = built(d).reflectance_scale
@@ -279,7 +326,9 @@ def test_a_fitted_gloss_is_in_the_file(level: float) -> None:
     assert tree["extensionsUsed"] == ["KHR_materials_specular"]
     assert material["pbrMetallicRoughness"]["roughnessFactor"] == 0.3
     extension = material["extensions"]["KHR_materials_specular"]
-    assert extension["specularFactor"] * max(extension.get("specularColorFactor", [1])) == pytest.approx(level)
+    assert extension["specularFactor"] * max(
+        extension.get("specularColorFactor", [1])
+    ) == pytest.approx(level)
     assert extension["specularFactor"] <= 1
     described = result.describe()
     assert described["roughness"] == {"value": 0.3, "source": "fitted"}
@@ -309,11 +358,16 @@ def test_a_gloss_that_varies_is_a_texture_in_the_alpha_channel() -> None:
 def test_an_unknown_gloss_is_not_shown(source: str) -> None:
     """Without the extension viewers would show plastic."""
     d = ball()
-    result = build_mesh(d.height, d.normal, d.mask, d.reflectance, gloss=Gloss(0.3, None, source, source))
+    result = build_mesh(
+        d.height, d.normal, d.mask, d.reflectance, gloss=Gloss(0.3, None, source, source)
+    )
     tree = gltf(result.glb())
     assert tree["extensionsUsed"] == ["KHR_materials_specular"]
     assert tree["materials"][0]["extensions"] == {"KHR_materials_specular": {"specularFactor": 0.0}}
-    assert (result.describe()["specular"]["value"], result.describe()["specular"]["source"]) == (0.0, source)
+    assert (result.describe()["specular"]["value"], result.describe()["specular"]["source"]) == (
+        0.0,
+        source,
+    )
 
 
 def test_equal_maps_give_equal_bytes() -> None:
@@ -361,8 +415,15 @@ def test_blender_opens_it_upright(tmp_path: Path) -> None:
     thing = next(o for o in bpy.data.objects if o.type == "MESH")
     places = np.array([thing.matrix_world @ v.co for v in thing.data.vertices])
     assert len(places) == len(result.mesh.vertices)
-    assert np.ptp(places, axis=0) == pytest.approx(np.ptp(result.mesh.vertices, axis=0)[[0, 2, 1]], rel=1e-4)
-    normals = np.array([thing.matrix_world.to_3x3() @ thing.data.corner_normals[i].vector for i in range(len(thing.data.loops))])
+    assert np.ptp(places, axis=0) == pytest.approx(
+        np.ptp(result.mesh.vertices, axis=0)[[0, 2, 1]], rel=1e-4
+    )
+    normals = np.array(
+        [
+            thing.matrix_world.to_3x3() @ thing.data.corner_normals[i].vector
+            for i in range(len(thing.data.loops))
+        ]
+    )
     loops = np.array([loop.vertex_index for loop in thing.data.loops])
     expected = (places - [0, places[:, 1].min() + 40 * result.metres_per_pixel, 0])[loops]
     expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
@@ -374,7 +435,9 @@ def test_blender_opens_it_upright(tmp_path: Path) -> None:
     assert shader.inputs["Normal"].is_linked
 
 
-@pytest.mark.parametrize(("level", "varies"), [(0.4, False), (3.0, False), (0.0, False), (0.4, True)])
+@pytest.mark.parametrize(
+    ("level", "varies"), [(0.4, False), (3.0, False), (0.0, False), (0.4, True)]
+)
 def test_blender_gets_the_fitted_gloss(tmp_path: Path, level: float, varies: bool) -> None:
     """Blender's level of 0.5 is the extension's 1."""
     bpy = pytest.importorskip("bpy", reason="needs the bpy module (extra `blender`)")

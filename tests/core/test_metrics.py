@@ -1,4 +1,6 @@
-"""The errors: zero at the truth, blind to exactly what they should be blind to, and equal to the reference's numbers."""
+"""The errors: zero at the truth, blind to exactly what they should be blind to, and equal to the
+reference's numbers.
+"""
 
 import json
 import math
@@ -42,7 +44,9 @@ def directions(count: int, seed: int = 0) -> np.ndarray:
 
 @pytest.fixture
 def truth() -> MitBerkeleyObject:
-    """A dome under a coloured light, made by our own formulas, with a hole and an irregular border in its height."""
+    """A dome under a coloured light, made by our own formulas, with a hole and an irregular border
+    in its height.
+    """
     rng = np.random.default_rng(5)
     rows, columns = np.mgrid[:61, :73].astype(float)
     inside = np.hypot(rows - 30, columns - 36) < 27
@@ -52,7 +56,17 @@ def truth() -> MitBerkeleyObject:
     normal = np.where(np.isfinite(truth_normal(height)), truth_normal(height), [0.0, 0.0, 1.0])
     shading = np.exp(reference_basis(normal) @ light) * inside[..., None]
     reflectance = rng.uniform(0.1, 0.9, (*inside.shape, 3)) * inside[..., None]
-    return MitBerkeleyObject("dome", "natural", shading * reflectance, inside, inside, height, shading, reflectance, light)
+    return MitBerkeleyObject(
+        "dome",
+        "natural",
+        shading * reflectance,
+        inside,
+        inside,
+        height,
+        shading,
+        reflectance,
+        light,
+    )
 
 
 def answer(truth: MitBerkeleyObject) -> dict[str, Any]:
@@ -78,8 +92,16 @@ def test_light_round_trip() -> None:
 @pytest.mark.parametrize("channels", [1, 3])
 def test_both_conventions_shade_alike(channels: int) -> None:
     light, normal = np.random.default_rng(2).normal(size=(9, channels)), directions(500)
-    assert np.abs(real_sh(normal) @ light - reference_basis(normal) @ light_to_reference(light)).max() < 1e-12
-    assert np.abs(reference_basis(normal) @ light - real_sh(normal) @ light_from_reference(light)).max() < 1e-12
+    assert (
+        np.abs(real_sh(normal) @ light - reference_basis(normal) @ light_to_reference(light)).max()
+        < 1e-12
+    )
+    assert (
+        np.abs(
+            reference_basis(normal) @ light - real_sh(normal) @ light_from_reference(light)
+        ).max()
+        < 1e-12
+    )
 
 
 def test_normal_round_trip_and_meaning() -> None:
@@ -95,8 +117,12 @@ def test_reference_basis_is_the_printed_one() -> None:
     c1, c2, c3, c4, c5 = 0.429043, 0.511664, 0.743125, 0.886227, 0.247708
     down, right = np.array([0, -0.6, 0.8]), np.array([0.6, 0, 0.8])
     tilted = c3 * 0.64 - c5
-    assert reference_basis(down) == pytest.approx([c4, 0, 1.6 * c2, 1.2 * c2, 0, 0, tilted, 0.96 * c1, 0.36 * c1], abs=1e-15)
-    assert reference_basis(right) == pytest.approx([c4, 1.2 * c2, 1.6 * c2, 0, 0, 0.96 * c1, tilted, 0, -0.36 * c1], abs=1e-15)
+    assert reference_basis(down) == pytest.approx(
+        [c4, 0, 1.6 * c2, 1.2 * c2, 0, 0, tilted, 0.96 * c1, 0.36 * c1], abs=1e-15
+    )
+    assert reference_basis(right) == pytest.approx(
+        [c4, 1.2 * c2, 1.6 * c2, 0, 0, 0.96 * c1, tilted, 0, -0.36 * c1], abs=1e-15
+    )
 
 
 def test_real_sh_is_orthonormal_and_ordered() -> None:
@@ -104,7 +130,9 @@ def test_real_sh_is_orthonormal_and_ordered() -> None:
     z, weight = np.polynomial.legendre.leggauss(6)
     phi = np.arange(12) * np.pi / 6
     ring = np.sqrt(1 - z * z)[:, None]
-    points = np.stack([ring * np.cos(phi), ring * np.sin(phi), np.broadcast_to(z[:, None], (6, 12))], axis=-1)
+    points = np.stack(
+        [ring * np.cos(phi), ring * np.sin(phi), np.broadcast_to(z[:, None], (6, 12))], axis=-1
+    )
     basis = real_sh(points).reshape(-1, 9)
     gram = basis.T @ (basis * np.repeat(weight * np.pi / 6, 12)[:, None])
     assert np.abs(gram - np.eye(9)).max() < 1e-14
@@ -159,14 +187,24 @@ def test_angular_error_of_a_rotation(angle: float) -> None:
 @given(st.floats(1e-3, 1e3))
 def test_scale_is_free(scale: float) -> None:
     rng = np.random.default_rng(4)
-    truth, estimate, mask = rng.random((47, 53, 3)), rng.random((47, 53, 3)), rng.random((47, 53)) > 0.2
-    assert scaled_mse(truth, scale * estimate) == pytest.approx(scaled_mse(truth, estimate), rel=1e-10)
-    assert lmse(truth, scale * estimate, mask) == pytest.approx(lmse(truth, estimate, mask), rel=1e-10)
+    truth, estimate, mask = (
+        rng.random((47, 53, 3)),
+        rng.random((47, 53, 3)),
+        rng.random((47, 53)) > 0.2,
+    )
+    assert scaled_mse(truth, scale * estimate) == pytest.approx(
+        scaled_mse(truth, estimate), rel=1e-10
+    )
+    assert lmse(truth, scale * estimate, mask) == pytest.approx(
+        lmse(truth, estimate, mask), rel=1e-10
+    )
     assert lmse(truth, scale * truth, mask) == pytest.approx(0, abs=1e-13)
 
 
 def test_scaled_mse_counts_white_balance() -> None:
-    """Two channels of one and two against one of ones: the best scale is .6, the mean square (.4^2 + .2^2) / 2."""
+    """Two channels of one and two against one of ones: the best scale is .6, the mean square (.4^2
+    + .2^2) / 2.
+    """
     assert scaled_mse(np.ones((5, 2)), np.broadcast_to([1.0, 2.0], (5, 2))) == pytest.approx(0.1)
 
 
@@ -179,7 +217,11 @@ def test_lmse_by_the_letter() -> None:
         for j0 in (0, 9):
             for i in range(i0, 50, 20):
                 for j in range(j0, 33, 20):
-                    tb, ub, mb = t[i : i + 20, j : j + 20], u[i : i + 20, j : j + 20], m[i : i + 20, j : j + 20]
+                    tb, ub, mb = (
+                        t[i : i + 20, j : j + 20],
+                        u[i : i + 20, j : j + 20],
+                        m[i : i + 20, j : j + 20],
+                    )
                     a = (mb * tb * ub).sum() / max(np.finfo(float).eps, (mb * ub * ub).sum())
                     error += (mb * (tb - a * ub) ** 2).sum()
                     total += (mb * tb**2).sum()
@@ -194,7 +236,10 @@ def test_lmse_is_local_and_blind_outside() -> None:
     assert lmse(truth, outside, mask) == pytest.approx(0, abs=1e-14)
     assert lmse(truth, np.zeros_like(truth), mask) == pytest.approx(1)
     drift = truth * np.linspace(0.2, 2, 64)[:, None, None]
-    assert lmse(truth, drift, mask) < 0.3 * scaled_mse(truth[mask], drift[mask]) / np.square(truth[mask]).mean()
+    assert (
+        lmse(truth, drift, mask)
+        < 0.3 * scaled_mse(truth[mask], drift[mask]) / np.square(truth[mask]).mean()
+    )
     small = lmse(rng.random((6, 5)), rng.random((6, 5)), np.ones((6, 5), bool))
     assert 0 < small < 1
 
@@ -210,7 +255,9 @@ def test_light_error_forgives_exposure_but_not_colour() -> None:
 
 
 def test_light_error_matches_the_definition() -> None:
-    """One constant light of value 1 against exp(b3 of the reference's basis), on the probe grid written out."""
+    """One constant light of value 1 against exp(b3 of the reference's basis), on the probe grid
+    written out.
+    """
     linear = np.zeros((9, 1))
     linear[1] = 1
     values = []
@@ -222,7 +269,9 @@ def test_light_error_matches_the_definition() -> None:
     estimate = np.array(values)
     scale = estimate.sum() / np.square(estimate).sum()
     expected = np.square(scale * estimate - 1).mean()
-    assert light_error(np.zeros((9, 1)), light_from_reference(linear)) == pytest.approx(expected, rel=1e-12)
+    assert light_error(np.zeros((9, 1)), light_from_reference(linear)) == pytest.approx(
+        expected, rel=1e-12
+    )
 
 
 def test_mse_and_psnr() -> None:
@@ -292,7 +341,9 @@ def test_unknown_pixels_are_not_compared(truth: MitBerkeleyObject) -> None:
 
 @pytest.mark.parametrize("edge", [np.s_[0], np.s_[-1], np.s_[:, 0], np.s_[:, -1]])
 def test_the_frame_of_the_crop_is_not_compared(truth: MitBerkeleyObject, edge: Any) -> None:
-    """On a crop that the object fills, wrong values on the outermost pixels cost nothing; one pixel further in they do."""
+    """On a crop that the object fills, wrong values on the outermost pixels cost nothing; one pixel
+    further in they do.
+    """
     maps = ("image", "valid", "mask", "height", "shading", "reflectance")
     filled = replace(truth, **{name: getattr(truth, name)[15:29, 20:45] for name in maps})
     wrong = answer(filled) | {"shading": filled.shading.copy()}
@@ -315,7 +366,10 @@ def test_refuses_a_misshapen_or_unfinished_answer(truth: MitBerkeleyObject) -> N
 
 
 def test_flat_and_unlit_equals_the_reference_that_stalled_there(shared: Path) -> None:
-    """The reference program stops at its start on teabag2 (laboratory): flat, no light. Its six errors are ours."""
+    """The reference program stops at its start on teabag2 (laboratory): flat, no light.
+
+    Its six errors are ours.
+    """
     anchors = json.loads((shared / "anchors" / "sirfs_reference.json").read_text())
     expected = anchors["results"]["laboratory/diffuse"]["teabag2"]
     truth = load_object(shared / "data" / "mit_berkeley_train", "teabag2", "laboratory")

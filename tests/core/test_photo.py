@@ -1,4 +1,6 @@
-"""Reading photos: exact values from every kind of file, the mask's rules, resizing in linear light, and one clear line for bad input."""
+"""Reading photos: exact values from every kind of file, the mask's rules, resizing in linear light,
+and one clear line for bad input.
+"""
 
 import io
 import os
@@ -41,14 +43,27 @@ def object_mask(h: int = H, w: int = W) -> np.ndarray:
 def codes(peak: int = 255, channels: int = 3, seed: int = 0) -> np.ndarray:
     """Random codes from 1/4 of `peak` upward on the object, without symmetry; black outside."""
     values = np.random.default_rng(seed).integers(peak // 4, peak, (H, W, channels), endpoint=True)
-    return np.where(object_mask()[..., None], values, 0).astype(np.uint8 if peak < 256 else np.uint16)
+    return np.where(object_mask()[..., None], values, 0).astype(
+        np.uint8 if peak < 256 else np.uint16
+    )
 
 
 def png(values: np.ndarray, bits: int, colour: int, extra: bytes = b"") -> bytes:
-    """A PNG of our own making, independent of the libraries under test: (H, W, C) codes of 8 or 16 bits."""
-    rows = b"".join(b"\0" + row.astype(">u2" if bits == 16 else np.uint8).tobytes() for row in values)
+    """A PNG of our own making, independent of the libraries under test:
+
+    (H, W, C) codes of 8 or 16 bits.
+    """
+    rows = b"".join(
+        b"\0" + row.astype(">u2" if bits == 16 else np.uint8).tobytes() for row in values
+    )
     header = struct.pack(">IIBBBBB", values.shape[1], values.shape[0], bits, colour, 0, 0, 0)
-    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + extra + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", header)
+        + extra
+        + chunk(b"IDAT", zlib.compress(rows))
+        + chunk(b"IEND", b"")
+    )
 
 
 def chunk(kind: bytes, data: bytes) -> bytes:
@@ -56,7 +71,9 @@ def chunk(kind: bytes, data: bytes) -> bytes:
 
 
 def write_exr(path: Path, channels: dict[str, np.ndarray], **header: object) -> Path:
-    OpenEXR.File(header, {name: np.ascontiguousarray(plane) for name, plane in channels.items()}).write(str(path))
+    OpenEXR.File(
+        header, {name: np.ascontiguousarray(plane) for name, plane in channels.items()}
+    ).write(str(path))
     return path
 
 
@@ -76,7 +93,9 @@ def arrayed(path: Path, values: np.ndarray) -> Path:
 
 
 def opencv(path: Path, rgb: np.ndarray, *options: int) -> Path:
-    assert cv2.imwrite(str(path), rgb[..., [2, 1, 0, 3][: rgb.shape[2]]] if rgb.ndim == 3 else rgb, options)
+    assert cv2.imwrite(
+        str(path), rgb[..., [2, 1, 0, 3][: rgb.shape[2]]] if rgb.ndim == 3 else rgb, options
+    )
     return path
 
 
@@ -90,7 +109,7 @@ def refused(path: Path, *words: str, mask: Path | None = None, transfer: str = "
         assert word in message
 
 
-# --- the curve --------------------------------------------------------------------------------------------------------------------------
+# --- the curve ------------------------------------------------------------------------------------
 
 
 def test_srgb_curve_has_the_standard_values() -> None:
@@ -104,7 +123,7 @@ def test_srgb_curve_is_inverted(x: float) -> None:
     assert float(srgb_to_linear(linear_to_srgb(x))) == pytest.approx(x, rel=2e-6, abs=1e-9)
 
 
-# --- exact values from every kind of file -----------------------------------------------------------------------------------------------
+# --- exact values from every kind of file ---------------------------------------------------------
 
 
 def test_8_bit_png_is_decoded_by_the_srgb_curve(tmp_path: Path) -> None:
@@ -116,7 +135,11 @@ def test_8_bit_png_is_decoded_by_the_srgb_curve(tmp_path: Path) -> None:
     assert (photo.clipped == (stored == 255).any(axis=2)).all() and photo.clipped.any()
     assert photo.code_value == pytest.approx(1 / 255 / 12.92)
     assert photo.scale == 1 and photo.original.size == (W, H)
-    assert (photo.original.bit_depth, photo.original.transfer, photo.original.mask_from) == (8, "srgb", "black border")
+    assert (photo.original.bit_depth, photo.original.transfer, photo.original.mask_from) == (
+        8,
+        "srgb",
+        "black border",
+    )
     assert len(photo.original.sha256) == 64
 
 
@@ -162,7 +185,10 @@ def test_one_bit_png_as_a_mask(tmp_path: Path) -> None:
     mask = saved(tmp_path / "m.png", Image.fromarray(object_mask()))
     assert Image.open(mask).mode == "1"
     assert (read_photo(photo, mask).mask == object_mask()).all()
-    refused(saved(tmp_path / "b.png", Image.fromarray(object_mask())), "every pixel inside the mask is the same")
+    refused(
+        saved(tmp_path / "b.png", Image.fromarray(object_mask())),
+        "every pixel inside the mask is the same",
+    )
 
 
 @pytest.mark.parametrize("name", ["a.bmp", "a.ppm", "a.tif", "lzw.tif"])
@@ -176,7 +202,9 @@ def test_other_lossless_8_bit_files(tmp_path: Path, name: str) -> None:
 def test_jpeg(tmp_path: Path) -> None:
     smooth = cv2.GaussianBlur(codes(), (0, 0), 3) // 2 + 60
     mask = saved(tmp_path / "m.png", Image.fromarray(object_mask()))
-    photo = read_photo(saved(tmp_path / "a.jpg", Image.fromarray(smooth), quality=98, subsampling=0), mask)
+    photo = read_photo(
+        saved(tmp_path / "a.jpg", Image.fromarray(smooth), quality=98, subsampling=0), mask
+    )
     assert np.abs(linear_to_srgb(photo.image) * 255 - smooth).max() < 6
     grey = read_photo(saved(tmp_path / "g.jpg", Image.fromarray(smooth[..., 0]), quality=98), mask)
     assert (grey.image[..., 0] == grey.image[..., 2]).all()
@@ -184,11 +212,17 @@ def test_jpeg(tmp_path: Path) -> None:
 
 def test_black_background_of_a_jpeg(tmp_path: Path) -> None:
     y, x = np.mgrid[:200, :220]
-    stored = np.where(object_mask(200, 220), 90 + 40 * np.sin(x / 30) + 30 * np.cos(y / 25), 0).astype(np.uint8)
-    photo = read_photo(saved(tmp_path / "a.jpg", Image.fromarray(np.dstack([stored] * 3)), quality=90))
+    stored = np.where(
+        object_mask(200, 220), 90 + 40 * np.sin(x / 30) + 30 * np.cos(y / 25), 0
+    ).astype(np.uint8)
+    photo = read_photo(
+        saved(tmp_path / "a.jpg", Image.fromarray(np.dstack([stored] * 3)), quality=90)
+    )
     wrong = photo.mask ^ object_mask(200, 220)
     assert not wrong[cv2.erode(object_mask(200, 220).astype(np.uint8), np.ones((3, 3))) > 0].any()
-    assert not wrong[cv2.dilate(object_mask(200, 220).astype(np.uint8), np.ones((17, 17))) == 0].any()
+    assert not wrong[
+        cv2.dilate(object_mask(200, 220).astype(np.uint8), np.ones((17, 17))) == 0
+    ].any()
 
 
 @pytest.mark.parametrize("peak", [1023, 4095, 65535])
@@ -196,7 +230,9 @@ def test_black_background_of_a_jpeg(tmp_path: Path) -> None:
 def test_16_bit_pnm_uses_the_stated_maximum(tmp_path: Path, peak: int, channels: int) -> None:
     stored = codes(peak, channels)
     header = f"P{5 if channels == 1 else 6}\n# a comment\n{W} {H}\n{peak}\n".encode()
-    photo = read_photo(write(tmp_path / "a.ppm", header + stored.astype(">u2").tobytes()), transfer="linear")
+    photo = read_photo(
+        write(tmp_path / "a.ppm", header + stored.astype(">u2").tobytes()), transfer="linear"
+    )
     assert photo.image == pytest.approx(np.broadcast_to(stored / peak, (H, W, 3)), abs=1e-7)
     assert photo.code_value == pytest.approx(1 / peak)
     assert (photo.clipped == (stored == peak).any(axis=2)).all()
@@ -211,7 +247,11 @@ def test_16_bit_and_float_tiff(tmp_path: Path) -> None:
     assert grey.image[..., 1] == pytest.approx(stored[..., 0] / 65535, abs=1e-7)
     light = (stored / 9999).astype(np.float32)
     photo = read_photo(opencv(tmp_path / "f.tif", light, cv2.IMWRITE_TIFF_COMPRESSION, 1))
-    assert (photo.image == light).all() and photo.original.transfer == "linear" and not photo.clipped.any()
+    assert (
+        (photo.image == light).all()
+        and photo.original.transfer == "linear"
+        and not photo.clipped.any()
+    )
     with_alpha = np.dstack([stored, np.where(object_mask(), 65535, 0).astype(np.uint16)])
     assert read_photo(opencv(tmp_path / "r.tif", with_alpha)).original.mask_from == "alpha"
 
@@ -219,17 +259,27 @@ def test_16_bit_and_float_tiff(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", [np.float16, np.float32])
 def test_exr(tmp_path: Path, kind: type) -> None:
     light: np.ndarray = (codes(65535) / 20000).astype(kind)
-    photo = read_photo(write_exr(tmp_path / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}))
+    photo = read_photo(
+        write_exr(tmp_path / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")})
+    )
     assert (photo.image == light.astype(np.float32)).all()
     assert (photo.mask == object_mask()).all() and not photo.clipped.any()
-    assert photo.original.bit_depth == 8 * np.dtype(kind).itemsize and photo.original.transfer == "linear"
+    assert (
+        photo.original.bit_depth == 8 * np.dtype(kind).itemsize
+        and photo.original.transfer == "linear"
+    )
     grey = read_photo(write_exr(tmp_path / "y.exr", {"Y": light[..., 0]}))
     assert (grey.image == light[..., :1].astype(np.float32)).all()
 
 
 def test_the_exposure_of_an_exr_does_not_matter(tmp_path: Path) -> None:
     light = (codes(65535) / 65535).astype(np.float32)
-    photos = [read_photo(write_exr(tmp_path / "a.exr", {c: k * light[..., i] for i, c in enumerate("RGB")})) for k in (2.0**-9, 2.0**9)]
+    photos = [
+        read_photo(
+            write_exr(tmp_path / "a.exr", {c: k * light[..., i] for i, c in enumerate("RGB")})
+        )
+        for k in (2.0**-9, 2.0**9)
+    ]
     assert (photos[0].mask == photos[1].mask).all()
     assert photos[1].code_value == pytest.approx(2.0**18 * photos[0].code_value)
 
@@ -242,8 +292,13 @@ def test_layers_of_an_exr(tmp_path: Path) -> None:
     refused(write_exr(tmp_path / "b.exr", two), "beauty", "diffuse")
     top = two | {c: 2 * light[..., i] for i, c in enumerate("RGB")}
     assert (read_photo(write_exr(tmp_path / "c.exr", top)).image == 2 * light).all()
-    refused(write_exr(tmp_path / "d.exr", {"U": light[..., 0], "V": light[..., 1]}), "R, G, B", "U, V")
-    parts = [OpenEXR.Part({}, {"RGB": light}, "left"), OpenEXR.Part({}, {"Z": light[..., 0].copy()}, "depth")]
+    refused(
+        write_exr(tmp_path / "d.exr", {"U": light[..., 0], "V": light[..., 1]}), "R, G, B", "U, V"
+    )
+    parts = [
+        OpenEXR.Part({}, {"RGB": light}, "left"),
+        OpenEXR.Part({}, {"Z": light[..., 0].copy()}, "depth"),
+    ]
     OpenEXR.File(parts).write(str(tmp_path / "e.exr"))
     assert (read_photo(tmp_path / "e.exr").image == light).all()
 
@@ -261,7 +316,9 @@ def test_an_exr_fills_its_display_window(tmp_path: Path) -> None:
     window = (np.array([5, 3], np.int32), np.array([5 + W - 1, 3 + H - 1], np.int32))
     frame = (np.array([0, 0], np.int32), np.array([69, 59], np.int32))
     channels = {c: light[..., i] for i, c in enumerate("RGB")}
-    photo = read_photo(write_exr(tmp_path / "a.exr", channels, dataWindow=window, displayWindow=frame))
+    photo = read_photo(
+        write_exr(tmp_path / "a.exr", channels, dataWindow=window, displayWindow=frame)
+    )
     assert photo.image.shape == (60, 70, 3)
     assert (photo.image[3 : 3 + H, 5 : 5 + W] == light).all() and photo.image[:3].max() == 0
 
@@ -274,27 +331,41 @@ def test_radiance_hdr(tmp_path: Path) -> None:
 
 
 def test_numpy_arrays(tmp_path: Path) -> None:
-    """Floats are linear light, integers are codes, the fourth channel is alpha, not multiplied in; the order in memory does not matter."""
+    """Floats are linear light, integers are codes, the fourth channel is alpha, not multiplied in;
+    the order in memory does not matter.
+    """
     stored = codes()
     light = srgb_to_linear(stored / 255)
     mask = arrayed(tmp_path / "mask.npy", object_mask())
     for kind in (np.float32, np.float64, ">f4"):
         photo = read_photo(arrayed(tmp_path / "a.npy", light.astype(kind)), mask)
-        assert np.array_equal(photo.image, light.astype(np.float32)) and np.array_equal(photo.mask, object_mask())
-        assert (photo.original.transfer, photo.original.bit_depth) == ("linear", 32) and not photo.clipped.any()
+        assert np.array_equal(photo.image, light.astype(np.float32)) and np.array_equal(
+            photo.mask, object_mask()
+        )
+        assert (photo.original.transfer, photo.original.bit_depth) == (
+            "linear",
+            32,
+        ) and not photo.clipped.any()
     png_photo = read_photo(write(tmp_path / "a.png", png(stored, 8, 2)), mask)
     photo = read_photo(arrayed(tmp_path / "codes.npy", np.asfortranarray(stored)), mask)
-    assert np.array_equal(photo.image, png_photo.image) and (photo.original.transfer, photo.original.bit_depth) == ("srgb", 8)
+    assert np.array_equal(photo.image, png_photo.image) and (
+        photo.original.transfer,
+        photo.original.bit_depth,
+    ) == ("srgb", 8)
     assert read_raster(arrayed(tmp_path / "16.npy", stored.astype(np.uint16))).peak == 65535
     alpha = np.where(object_mask(), 1.0, 0.25)
     photo = read_photo(arrayed(tmp_path / "rgba.npy", np.dstack([light, alpha])))
-    assert np.array_equal(photo.mask, object_mask()) and np.array_equal(photo.image, light.astype(np.float32))
+    assert np.array_equal(photo.mask, object_mask()) and np.array_equal(
+        photo.image, light.astype(np.float32)
+    )
 
 
 def test_masks_as_numpy_arrays(tmp_path: Path) -> None:
     photo = arrayed(tmp_path / "photo.npy", srgb_to_linear(codes() / 255))
     for values in (object_mask(), 0.8 * object_mask(), object_mask()[..., None] * np.uint8(1)):
-        assert np.array_equal(read_photo(photo, arrayed(tmp_path / "mask.npy", values)).mask, object_mask())
+        assert np.array_equal(
+            read_photo(photo, arrayed(tmp_path / "mask.npy", values)).mask, object_mask()
+        )
 
 
 @pytest.mark.parametrize(
@@ -317,7 +388,9 @@ def test_numpy_arrays_that_are_no_photos(tmp_path: Path, values: np.ndarray, wor
 def test_a_numpy_file_is_believed_only_as_far_as_it_goes(tmp_path: Path) -> None:
     def header_only(*shape: int) -> Path:
         stream = io.BytesIO()
-        np.lib.format.write_array_header_1_0(stream, {"descr": "<f4", "fortran_order": False, "shape": shape})
+        np.lib.format.write_array_header_1_0(
+            stream, {"descr": "<f4", "fortran_order": False, "shape": shape}
+        )
         return write(tmp_path / "a.npy", stream.getvalue() + bytes(64))
 
     refused(header_only(9_000, 9_000, 3), "damaged")
@@ -332,7 +405,9 @@ def test_transfer_can_be_forced(tmp_path: Path) -> None:
     stored = codes()
     path = write(tmp_path / "a.png", png(stored, 8, 2))
     linear = read_photo(path, transfer="linear")
-    assert linear.image == pytest.approx(stored / 255, abs=1e-7) and linear.code_value == pytest.approx(1 / 255)
+    assert linear.image == pytest.approx(
+        stored / 255, abs=1e-7
+    ) and linear.code_value == pytest.approx(1 / 255)
     coded = (stored / 255).astype(np.float32)
     exr = write_exr(tmp_path / "a.exr", {c: coded[..., i] for i, c in enumerate("RGB")})
     assert read_photo(exr, transfer="srgb").image == pytest.approx(srgb_to_linear(coded), abs=1e-6)
@@ -343,7 +418,11 @@ def test_transfer_can_be_forced(tmp_path: Path) -> None:
 @pytest.mark.parametrize("kind", ["jpg", "png", "png16", "tif", "tif16"])
 def test_rotation_flags_are_applied(tmp_path: Path, kind: str, orientation: int) -> None:
     upright = np.full((48, 64, 3), 9, np.uint8)
-    upright[:24, :32], upright[:24, 32:], upright[24:, :32] = (200, 30, 30), (30, 200, 30), (30, 30, 200)
+    upright[:24, :32], upright[:24, 32:], upright[24:, :32] = (
+        (200, 30, 30),
+        (30, 200, 30),
+        (30, 30, 200),
+    )
     undo = {
         1: lambda a: a,
         2: lambda a: a[:, ::-1],
@@ -359,7 +438,15 @@ def test_rotation_flags_are_applied(tmp_path: Path, kind: str, orientation: int)
     exif = Image.Exif()
     exif[0x0112] = orientation
     if kind == "png16":
-        write(path, png(stored.astype(np.uint16) * 257, 16, 2, chunk(b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0"))))
+        write(
+            path,
+            png(
+                stored.astype(np.uint16) * 257,
+                16,
+                2,
+                chunk(b"eXIf", exif.tobytes().removeprefix(b"Exif\0\0")),
+            ),
+        )
     elif kind == "tif16":
         write(path, tiff_16(stored.astype(np.uint16) * 257, orientation))
     else:
@@ -376,19 +463,44 @@ def tiff_16(values: np.ndarray, orientation: int) -> bytes:
     h, w, channels = values.shape
     pixels = values.astype("<u2").tobytes()
     bits_at = 8 + len(pixels)
-    tags = [(256, 4, 1, w), (257, 4, 1, h), (258, 3, 3, bits_at), (259, 3, 1, 1), (262, 3, 1, 2), (273, 4, 1, 8)]
-    tags += [(274, 3, 1, orientation), (277, 3, 1, channels), (278, 4, 1, h), (279, 4, 1, len(pixels)), (284, 3, 1, 1)]
-    directory = struct.pack("<H", len(tags)) + b"".join(struct.pack("<HHII", *tag) for tag in tags) + bytes(4)
-    return b"II*\0" + struct.pack("<I", bits_at + 6) + pixels + struct.pack("<HHH", 16, 16, 16) + directory
+    tags = [
+        (256, 4, 1, w),
+        (257, 4, 1, h),
+        (258, 3, 3, bits_at),
+        (259, 3, 1, 1),
+        (262, 3, 1, 2),
+        (273, 4, 1, 8),
+    ]
+    tags += [
+        (274, 3, 1, orientation),
+        (277, 3, 1, channels),
+        (278, 4, 1, h),
+        (279, 4, 1, len(pixels)),
+        (284, 3, 1, 1),
+    ]
+    directory = (
+        struct.pack("<H", len(tags))
+        + b"".join(struct.pack("<HHII", *tag) for tag in tags)
+        + bytes(4)
+    )
+    return (
+        b"II*\0"
+        + struct.pack("<I", bits_at + 6)
+        + pixels
+        + struct.pack("<HHH", 16, 16, 16)
+        + directory
+    )
 
 
-# --- the mask ---------------------------------------------------------------------------------------------------------------------------
+# --- the mask -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("inside", [1, 128, 255])
 def test_a_mask_file_of_any_brightness(tmp_path: Path, inside: int) -> None:
     photo = write(tmp_path / "a.png", png(codes() + 7, 8, 2))
-    mask = saved(tmp_path / "m.png", Image.fromarray(np.where(object_mask(), inside, 0).astype(np.uint8)))
+    mask = saved(
+        tmp_path / "m.png", Image.fromarray(np.where(object_mask(), inside, 0).astype(np.uint8))
+    )
     result = read_photo(photo, mask)
     assert (result.mask == object_mask()).all() and result.original.mask_from == "file"
     assert result.image[0, 0, 0] > 0  # the photo keeps its background
@@ -403,7 +515,10 @@ def test_masks_of_other_kinds(tmp_path: Path) -> None:
         write(tmp_path / "16.png", png(np.where(inside, 65025, 0)[..., None], 16, 0)),
         write_exr(tmp_path / "m.exr", {"mask.A": soft}),
         saved(tmp_path / "black_on_clear.png", Image.fromarray(clear)),
-        saved(tmp_path / "palette.png", Image.fromarray(np.where(inside, 128, 0).astype(np.uint8)).convert("P")),
+        saved(
+            tmp_path / "palette.png",
+            Image.fromarray(np.where(inside, 128, 0).astype(np.uint8)).convert("P"),
+        ),
     ]
     for file in files:
         assert (read_photo(photo, file).mask == inside).all(), file.name
@@ -463,12 +578,18 @@ def test_bad_masks(tmp_path: Path) -> None:
     refused(saved(tmp_path / "clear.png", clear), "mask is empty")
 
 
-# --- resizing ---------------------------------------------------------------------------------------------------------------------------
+# --- resizing -------------------------------------------------------------------------------------
 
 
 def photo_of(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None) -> Photo:
     source = PhotoSource("", (mask.shape[1], mask.shape[0]), 8, "srgb", "file")
-    return Photo(image.astype(np.float32), mask, 3e-4, np.zeros_like(mask) if clipped is None else clipped, source)
+    return Photo(
+        image.astype(np.float32),
+        mask,
+        3e-4,
+        np.zeros_like(mask) if clipped is None else clipped,
+        source,
+    )
 
 
 def test_nothing_is_enlarged() -> None:
@@ -484,8 +605,12 @@ def test_the_box_obeys_max_size_at_one_scale(max_size: int) -> None:
     ramp = np.dstack([np.mgrid[:401, :733][1]] * 3) + 0.5
     small = photo_of(ramp, mask).resized_to_object(max_size)
     assert max_size - 2 <= max(small.box[2:]) <= max_size
-    assert small.image.shape[:2] == (int(np.ceil(401 * small.scale - 1e-6)), int(np.ceil(733 * small.scale - 1e-6)))
-    # A pixel wholly inside shows the ramp's value at its own centre: no shift, one scale on both axes.
+    assert small.image.shape[:2] == (
+        int(np.ceil(401 * small.scale - 1e-6)),
+        int(np.ceil(733 * small.scale - 1e-6)),
+    )
+    # A pixel wholly inside shows the ramp's value at its own centre: no shift, one scale on both
+    # axes.
     core = cv2.erode(small.mask.astype(np.uint8), np.ones((3, 3))) > 0
     centres = (np.mgrid[: core.shape[0], : core.shape[1]][1] + 0.5) / small.scale
     assert small.image[core, 0] == pytest.approx(centres[core], abs=0.26)
@@ -505,8 +630,12 @@ def test_background_and_object_do_not_mix() -> None:
     mask = object_mask(301, 417)
     image = np.where(mask[..., None], [0.2, 0.3, 0.4], [50.0, 0.0, 9.0])
     small = photo_of(image, mask).resized_to_object(61)
-    assert small.image[small.mask] == pytest.approx(np.broadcast_to([0.2, 0.3, 0.4], (small.mask.sum(), 3)), rel=1e-5)
-    assert small.image[~small.mask] == pytest.approx(np.broadcast_to([50.0, 0.0, 9.0], ((~small.mask).sum(), 3)), rel=1e-5)
+    assert small.image[small.mask] == pytest.approx(
+        np.broadcast_to([0.2, 0.3, 0.4], (small.mask.sum(), 3)), rel=1e-5
+    )
+    assert small.image[~small.mask] == pytest.approx(
+        np.broadcast_to([50.0, 0.0, 9.0], ((~small.mask).sum(), 3)), rel=1e-5
+    )
     assert small.mask.sum() == pytest.approx(mask.sum() * small.scale**2, rel=0.01)
 
 
@@ -514,7 +643,10 @@ def test_clipping_survives_resizing() -> None:
     clipped = np.zeros((200, 240), bool)
     clipped[101, 121] = clipped[2, 2] = True
     small = photo_of(np.ones((200, 240, 3)), object_mask(200, 240), clipped).resized_to_object(24)
-    assert small.clipped.sum() == 1 and small.clipped[int(101.5 * small.scale), int(121.5 * small.scale)]
+    assert (
+        small.clipped.sum() == 1
+        and small.clipped[int(101.5 * small.scale), int(121.5 * small.scale)]
+    )
 
 
 def test_a_long_object_names_the_size_that_it_needs() -> None:
@@ -526,7 +658,7 @@ def test_a_long_object_names_the_size_that_it_needs() -> None:
     assert min(photo.resized_to_object(891).box[2:]) >= 8
 
 
-# --- bad files --------------------------------------------------------------------------------------------------------------------------
+# --- bad files ------------------------------------------------------------------------------------
 
 
 def every_kind(folder: Path) -> list[Path]:
@@ -547,13 +679,19 @@ def every_kind(folder: Path) -> list[Path]:
         write(folder / "strip16.tif", tiff_16(stored.astype(np.uint16) * 257, 1)),
         opencv(folder / "f.tif", light, cv2.IMWRITE_TIFF_COMPRESSION, 1),
         write_exr(folder / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}),
-        write_exr(folder / "raw.exr", {c: light[..., i] for i, c in enumerate("RGB")}, compression=OpenEXR.NO_COMPRESSION),
+        write_exr(
+            folder / "raw.exr",
+            {c: light[..., i] for i, c in enumerate("RGB")},
+            compression=OpenEXR.NO_COMPRESSION,
+        ),
         opencv(folder / "a.hdr", light),
         arrayed(folder / "a.npy", light),
     ]
 
 
-def test_truncated_files_of_every_kind_are_refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_truncated_files_of_every_kind_are_refused(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     for file in every_kind(tmp_path):
         data = file.read_bytes()
         assert read_raster(file).values.shape == (H, W, 3)
@@ -565,7 +703,9 @@ def test_truncated_files_of_every_kind_are_refused(tmp_path: Path, capfd: pytest
     assert capfd.readouterr() == ("", "")
 
 
-def test_damaged_pixels_of_a_png_are_found(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_damaged_pixels_of_a_png_are_found(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     for bits in (8, 16):
         flipped = bytearray(png(codes(255 if bits == 8 else 65535), bits, 2))
         flipped[len(flipped) // 2] ^= 0x10
@@ -584,7 +724,9 @@ def test_files_that_are_no_images(tmp_path: Path) -> None:
     refused(write(tmp_path / "empty.png", b""), "the file is empty")
     refused(write(tmp_path / "text.png", b"These are words.\n" * 9), "known kind")
     refused(write(tmp_path / "head.png", b"\x89PNG\r\n\x1a\n"), "damaged")
-    assert read_raster(saved(tmp_path / "is_a_jpeg.png", Image.fromarray(codes()), format="JPEG")).values.shape == (H, W, 3)
+    assert read_raster(
+        saved(tmp_path / "is_a_jpeg.png", Image.fromarray(codes()), format="JPEG")
+    ).values.shape == (H, W, 3)
 
 
 def test_cmyk_is_refused_with_the_remedy(tmp_path: Path) -> None:
@@ -596,7 +738,10 @@ def test_cmyk_is_refused_with_the_remedy(tmp_path: Path) -> None:
 def test_sizes_are_refused_from_the_header(tmp_path: Path) -> None:
     def header_only(w: int, h: int) -> Path:
         ihdr = chunk(b"IHDR", struct.pack(">IIBBBBB", w, h, 8, 2, 0, 0, 0))
-        return write(tmp_path / "a.png", b"\x89PNG\r\n\x1a\n" + ihdr + chunk(b"IDAT", zlib.compress(b"0")) + chunk(b"IEND", b""))
+        return write(
+            tmp_path / "a.png",
+            b"\x89PNG\r\n\x1a\n" + ihdr + chunk(b"IDAT", zlib.compress(b"0")) + chunk(b"IEND", b""),
+        )
 
     refused(header_only(20_000, 20_000), "20000 x 20000", "100 megapixels")
     refused(header_only(9_000, 9_000), "damaged")  # 81 megapixels pass the limit
@@ -604,23 +749,34 @@ def test_sizes_are_refused_from_the_header(tmp_path: Path) -> None:
     refused(header_only(60_000, 10), "60000 x 10", "crop")
     refused(write(tmp_path / "a.ppm", b"P6 30000 30000 255\n"), "100 megapixels")
     refused(write(tmp_path / "b.ppm", b"P6 30000 30000 65535\n"), "100 megapixels")
-    refused(write(tmp_path / "a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 30000 +X 30000\n"), "100 megapixels")
+    refused(
+        write(tmp_path / "a.hdr", b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 30000 +X 30000\n"),
+        "100 megapixels",
+    )
     buffer = io.BytesIO()
     Image.fromarray(codes()).save(buffer, "bmp")
     data = bytearray(buffer.getvalue())
     data[18:26] = struct.pack("<ii", 30_000, 30_000)
     refused(write(tmp_path / "a.bmp", bytes(data)), "100 megapixels")
     window = (np.array([0, 0], np.int32), np.array([3, 99], np.int32))
-    refused(write_exr(tmp_path / "a.exr", {"Y": np.ones((100, 4), np.float32)}, dataWindow=window), "4 x 100")
+    refused(
+        write_exr(tmp_path / "a.exr", {"Y": np.ones((100, 4), np.float32)}, dataWindow=window),
+        "4 x 100",
+    )
     assert Limits().max_pixels == 100_000_000
 
 
-@pytest.mark.parametrize(("bad", "word"), [(np.nan, "NaN"), (np.inf, "infinite"), (-np.inf, "infinite"), (-0.5, "negative")])
+@pytest.mark.parametrize(
+    ("bad", "word"),
+    [(np.nan, "NaN"), (np.inf, "infinite"), (-np.inf, "infinite"), (-0.5, "negative")],
+)
 def test_unusable_values_of_an_exr(tmp_path: Path, bad: float, word: str) -> None:
     light = (codes(65535) / 65535).astype(np.float32)
     light[2, 3, 1] = bad
     mask = saved(tmp_path / "m.png", Image.fromarray(object_mask()))
-    photo = read_photo(write_exr(tmp_path / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}), mask)
+    photo = read_photo(
+        write_exr(tmp_path / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}), mask
+    )
     assert np.isfinite(photo.image).all() and photo.image.min() == 0
     assert np.isfinite(read_linear(tmp_path / "a.exr")).all()
     light[20, 20:23, 1] = bad
@@ -633,10 +789,14 @@ def test_a_broken_pixel_of_an_exr_is_refused_and_a_lamp_is_not(tmp_path: Path) -
     light = (codes(65535) / 65535).astype(np.float32)
     mask = saved(tmp_path / "m.png", Image.fromarray(object_mask()))
     light[20, 20] = 1e5
-    assert read_photo(write_exr(tmp_path / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}), mask).image.max() == np.float32(1e5)
+    assert read_photo(
+        write_exr(tmp_path / "a.exr", {c: light[..., i] for i, c in enumerate("RGB")}), mask
+    ).image.max() == np.float32(1e5)
     light[20, 20] = 1e30
     refused(
-        write_exr(tmp_path / "b.exr", {c: light[..., i] for i, c in enumerate("RGB")}), "1 pixels inside the mask are brighter", mask=mask
+        write_exr(tmp_path / "b.exr", {c: light[..., i] for i, c in enumerate("RGB")}),
+        "1 pixels inside the mask are brighter",
+        mask=mask,
     )
 
 
@@ -644,16 +804,25 @@ def test_constant_and_black_images(tmp_path: Path) -> None:
     flat = np.full((H, W, 3), (200, 10, 10), np.uint8)
     refused(write(tmp_path / "a.png", png(flat, 8, 2)), "every pixel is the same")
     refused(write(tmp_path / "b.png", png(0 * flat, 8, 2)), "every pixel is black")
-    refused(write(tmp_path / "c.png", png(flat * object_mask()[..., None], 8, 2)), "every pixel inside the mask is the same")
+    refused(
+        write(tmp_path / "c.png", png(flat * object_mask()[..., None], 8, 2)),
+        "every pixel inside the mask is the same",
+    )
     dark = np.where(object_mask()[..., None], 2, 0) * np.ones((1, 1, 3), int)
     refused(write(tmp_path / "d.png", png(dark, 8, 2)), "almost black")
     mask = saved(tmp_path / "m.png", Image.fromarray(~object_mask()))
-    refused(write(tmp_path / "e.png", png(codes(), 8, 2)), "every pixel inside the mask is black", mask=mask)
+    refused(
+        write(tmp_path / "e.png", png(codes(), 8, 2)),
+        "every pixel inside the mask is black",
+        mask=mask,
+    )
     nothing = np.full((H, W), np.nan, np.float32)
     refused(write_exr(tmp_path / "f.exr", {"Y": nothing}), "image is black")
 
 
-def test_the_terminal_stays_clean_for_odd_but_good_files(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_the_terminal_stays_clean_for_odd_but_good_files(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     bad_profile = chunk(b"iCCP", b"x\0\0" + zlib.compress(b"no profile"))
     for bits in (8, 16):
         stored = codes(255 if bits == 8 else 65535)
@@ -661,14 +830,16 @@ def test_the_terminal_stays_clean_for_odd_but_good_files(tmp_path: Path, capfd: 
     assert capfd.readouterr() == ("", "")
 
 
-def test_standard_error_works_after_reading(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_standard_error_works_after_reading(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     read_raster(write(tmp_path / "a.png", png(codes(), 8, 2)))
     refused(write(tmp_path / "b.png", b"\x89PNG\r\n\x1a\n"), "damaged")
     os.write(2, b"still here")
     assert capfd.readouterr().err == "still here"
 
 
-# --- real photos ------------------------------------------------------------------------------------------------------------------------
+# --- real photos ----------------------------------------------------------------------------------
 
 
 def test_the_masked_photos(shared: Path) -> None:
@@ -682,7 +853,9 @@ def test_the_masked_photos(shared: Path) -> None:
         assert parts.max() == 1, file.name
         small = photo.resized_to_object(100)
         assert max(small.box[2:]) <= 100
-        assert small.image[small.mask].mean() == pytest.approx(photo.image[photo.mask].mean(), rel=0.03)
+        assert small.image[small.mask].mean() == pytest.approx(
+            photo.image[photo.mask].mean(), rel=0.03
+        )
 
 
 def test_linear_16_bit_photos_of_mit_berkeley(shared: Path) -> None:
@@ -691,7 +864,9 @@ def test_linear_16_bit_photos_of_mit_berkeley(shared: Path) -> None:
         photo = read_photo(folder / "original.png", folder / "mask.png", transfer="linear")
         stored = cv2.imread(str(folder / "original.png"), cv2.IMREAD_UNCHANGED)[..., ::-1]
         truth = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_UNCHANGED) > 0
-        assert photo.image == pytest.approx(stored / 65535, abs=1e-7) and (photo.mask == truth).all()
+        assert (
+            photo.image == pytest.approx(stored / 65535, abs=1e-7) and (photo.mask == truth).all()
+        )
         found = read_photo(folder / "original.png", transfer="linear").mask
         assert (found & truth).sum() / (found | truth).sum() > 0.97
         assert mask_box(found) == pytest.approx(mask_box(truth), abs=3)

@@ -30,7 +30,9 @@ def prior_set() -> PriorSet:
         return GaussianLight(rng.normal(size=size), covariance(size))
 
     mixture = ScaleMixture(np.geomspace(0.001, 1, 5), rng.dirichlet(np.ones(5)), 0.7)
-    color = ColorScaleMixture(np.geomspace(0.001, 1, 5), rng.dirichlet(np.ones(5)), covariance(3), 2.5)
+    color = ColorScaleMixture(
+        np.geomspace(0.001, 1, 5), rng.dirichlet(np.ones(5)), covariance(3), 2.5
+    )
     return PriorSet(
         curvature=mixture,
         grey_smoothness=dataclasses.replace(mixture, reach=1.3),
@@ -157,7 +159,9 @@ def test_missing_file_and_folder(tmp_path: Path) -> None:
         ("record", np.array("{}"), "record"),
     ],
 )
-def test_wrong_contents(prior_set: PriorSet, tmp_path: Path, name: str, value: Any, message: str) -> None:
+def test_wrong_contents(
+    prior_set: PriorSet, tmp_path: Path, name: str, value: Any, message: str
+) -> None:
     path = tmp_path / "priors.npz"
     save_prior_set(path, prior_set)
     rewrite(path, {name: value})

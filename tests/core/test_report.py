@@ -21,7 +21,10 @@ def panels(sheet: Image.Image, columns: int = 4) -> dict[str, np.ndarray]:
     linear = srgb_to_linear(np.asarray(sheet.convert("RGB")) / 255.0)
     found = {}
     for index, label in enumerate(LABELS[: 8 if columns == 4 else 3]):
-        top, left = HEAD + index // columns * (SIDE + LABEL + GAP), EDGE + index % columns * (SIDE + GAP)
+        top, left = (
+            HEAD + index // columns * (SIDE + LABEL + GAP),
+            EDGE + index % columns * (SIDE + GAP),
+        )
         found[label] = linear[top : top + SIDE, left : left + SIDE]
     return found
 
@@ -42,7 +45,9 @@ def inner() -> np.ndarray:
     return np.hypot(row, column) < 120
 
 
-def test_one_exposure_holds_for_input_diffuse_and_specular(shown: dict[str, np.ndarray], scene: Decomposition) -> None:
+def test_one_exposure_holds_for_input_diffuse_and_specular(
+    shown: dict[str, np.ndarray], scene: Decomposition
+) -> None:
     """Light adds up on the page as it does in the scene."""
     total = shown["diffuse"] + shown["specular"]
     unclipped = inner() & (shown["input"].max(-1) < 0.9)
@@ -58,7 +63,12 @@ def test_reflectance_and_shading_have_their_own_exposure(shown: dict[str, np.nda
 
 def test_the_ball_of_light_is_a_ball_in_that_light(shown: dict[str, np.ndarray]) -> None:
     """The scene is itself a ball: its shading is what the light panel shows, a little larger."""
-    small = np.asarray(Image.fromarray(np.uint8(255 * shown["light"])).resize((356, 356)))[18:338, 18:338] / 255
+    small = (
+        np.asarray(Image.fromarray(np.uint8(255 * shown["light"])).resize((356, 356)))[
+            18:338, 18:338
+        ]
+        / 255
+    )
     assert np.abs(small - shown["shading"])[inner()].max() < 0.04
 
 
@@ -75,7 +85,11 @@ def test_the_relief_is_lit_from_the_upper_left(shown: dict[str, np.ndarray]) -> 
 
 
 def test_contour_lines_show_in_a_dome_and_not_in_a_plain(scene: Decomposition) -> None:
-    flat = replace(scene, height=np.where(scene.mask, 7.0, 0.0), normal=np.broadcast_to([0.0, 0.0, 1.0], scene.normal.shape))
+    flat = replace(
+        scene,
+        height=np.where(scene.mask, 7.0, 0.0),
+        normal=np.broadcast_to([0.0, 0.0, 1.0], scene.normal.shape),
+    )
     dome = panels(contact_sheet(scene))["height"].mean(-1)[160, 60:260]
     plain = panels(contact_sheet(flat))["height"].mean(-1)[160, 60:260]
     assert np.ptp(plain) < 0.01
@@ -83,7 +97,9 @@ def test_contour_lines_show_in_a_dome_and_not_in_a_plain(scene: Decomposition) -
 
 
 def test_no_dark_seam_runs_around_the_object(scene: Decomposition) -> None:
-    """A white object on its card: from the inside out the tone falls once and never below the card's."""
+    """A white object on its card: from the inside out the tone falls once and never below the
+    card's.
+    """
     white = np.where(scene.mask[..., None], 0.8, 0.0)
     row = panels(contact_sheet(replace(scene, reflectance=white)))["reflectance"][160, 160:, 1]
     assert (np.diff(row) < 1e-6).all()
@@ -102,15 +118,37 @@ def test_odd_shapes_can_be_shown(shape: tuple[int, int]) -> None:
     grown = np.ones((*shape, 3))
     flat = np.zeros(shape)
     odd = Decomposition(
-        grown, grown, 0 * grown, 0 * grown, grown, grown, grown / np.sqrt(3), flat, flat == 0, flat, d.illumination, Provenance()
+        grown,
+        grown,
+        0 * grown,
+        0 * grown,
+        grown,
+        grown,
+        grown / np.sqrt(3),
+        flat,
+        flat == 0,
+        flat,
+        d.illumination,
+        Provenance(),
     )
     assert contact_sheet(odd).size == contact_sheet(d).size
 
 
 def test_a_black_result_and_a_long_name_can_be_shown() -> None:
     d = ball()
-    named = replace(d.provenance, input={"name": "a long name " * 40 + ".png"}, status={"loss": float("nan"), "converged": False})
-    black = replace(d, image=0 * d.image, diffuse=0 * d.diffuse, specular=0 * d.specular, shading=0 * d.shading, provenance=named)
+    named = replace(
+        d.provenance,
+        input={"name": "a long name " * 40 + ".png"},
+        status={"loss": float("nan"), "converged": False},
+    )
+    black = replace(
+        d,
+        image=0 * d.image,
+        diffuse=0 * d.diffuse,
+        specular=0 * d.specular,
+        shading=0 * d.shading,
+        provenance=named,
+    )
     sheet = np.asarray(contact_sheet(black))
     assert sheet.shape == np.asarray(contact_sheet(d)).shape
     assert (sheet[:HEAD, -EDGE:] == sheet[0, 0]).all()  # the title ends before the edge
@@ -136,20 +174,39 @@ def comparison_panel(sheet: Image.Image, index: int) -> np.ndarray:
     return srgb_to_linear(np.asarray(sheet)[top : top + SIDE, left : left + SIDE] / 255.0)
 
 
-def test_a_comparison_shows_where_light_was_left_and_where_too_much_was_taken(scene: Decomposition) -> None:
+def test_a_comparison_shows_where_light_was_left_and_where_too_much_was_taken(
+    scene: Decomposition,
+) -> None:
     nothing = Separation(scene.image, 0 * scene.image, scene.residual, scene.confidence)
     exact = Separation(scene.diffuse, scene.specular, scene.residual, scene.confidence)
     black = Separation(0 * scene.image, scene.image, scene.residual, scene.confidence)
-    answers = [Answer(name, "remark", split) for name, split in (("none", nothing), ("exact", exact), ("black", black))]
-    sheet = comparison_sheet("ball", scene.image, scene.mask, answers, (scene.diffuse, scene.specular))
-    assert sheet.width == 2 * EDGE + 6 * SIDE + 5 * GAP and sheet.height == HEAD + 2 * (SIDE + LABEL) + GAP + EDGE
-    photo, diffuse, specular, _, _, left, found, taken, fine, dark, _, over = (comparison_panel(sheet, k) for k in range(12))
+    answers = [
+        Answer(name, "remark", split)
+        for name, split in (("none", nothing), ("exact", exact), ("black", black))
+    ]
+    sheet = comparison_sheet(
+        "ball", scene.image, scene.mask, answers, (scene.diffuse, scene.specular)
+    )
+    assert (
+        sheet.width == 2 * EDGE + 6 * SIDE + 5 * GAP
+        and sheet.height == HEAD + 2 * (SIDE + LABEL) + GAP + EDGE
+    )
+    photo, diffuse, specular, _, _, left, found, taken, fine, dark, _, over = (
+        comparison_panel(sheet, k) for k in range(12)
+    )
     unclipped = inner() & (photo.max(-1) < 0.9)
     assert np.abs(diffuse + specular - photo)[unclipped].max() < 0.02
-    assert np.abs(found - diffuse).max() < 0.01 and np.abs(taken - specular).max() < 0.01 and dark[inner()].max() < 0.01
+    assert (
+        np.abs(found - diffuse).max() < 0.01
+        and np.abs(taken - specular).max() < 0.01
+        and dark[inner()].max() < 0.01
+    )
     highlight = inner() & (specular.mean(-1) > 0.3)
     assert highlight.sum() > 100 and (left[highlight][:, 0] > left[highlight][:, 2] + 0.5).all()
-    assert np.ptp(fine[inner()], axis=0).max() < 0.02 and (over[inner()][:, 2] > over[inner()][:, 0] + 0.3).mean() > 0.8
+    assert (
+        np.ptp(fine[inner()], axis=0).max() < 0.02
+        and (over[inner()][:, 2] > over[inner()][:, 0] + 0.3).mean() > 0.8
+    )
 
 
 def test_a_comparison_without_truth_shows_the_confidence(scene: Decomposition) -> None:
@@ -157,7 +214,10 @@ def test_a_comparison_without_truth_shows_the_confidence(scene: Decomposition) -
     sheet = comparison_sheet("ball", scene.image, scene.mask, [Answer("exact", "", exact)])
     colour, confidence = comparison_panel(sheet, 2), comparison_panel(sheet, 5)
     assert np.abs(colour.sum(-1) - 1)[inner()].max() < 0.05
-    assert np.ptp(confidence[inner()], axis=1).max() < 0.01 and confidence[160, 160, 0] > 0.9 > confidence[160, 30, 0]
+    assert (
+        np.ptp(confidence[inner()], axis=1).max() < 0.01
+        and confidence[160, 160, 0] > 0.9 > confidence[160, 30, 0]
+    )
 
 
 def test_the_title_says_what_was_fitted() -> None:
@@ -165,8 +225,16 @@ def test_the_title_says_what_was_fitted() -> None:
     fit = fit_lobe(d.specular, d.normal, d.mask)
     assert fit.blender_roughness is not None
     assert _title(replace(d, brdf=fit))[1].endswith(f"roughness {fit.blender_roughness:.2f}")
-    doubtful = replace(d.provenance, status=d.provenance.status | {"doubts": ["it looks like a mirror"]})
-    assert "doubtful" in _title(replace(d, provenance=doubtful))[1] and "doubtful" not in _title(d)[1]
-    assert _title(replace(d, brdf=replace(fit, determined=False)))[1].endswith(f"roughness at most {fit.blender_roughness:.2f}")
+    doubtful = replace(
+        d.provenance, status=d.provenance.status | {"doubts": ["it looks like a mirror"]}
+    )
+    assert (
+        "doubtful" in _title(replace(d, provenance=doubtful))[1] and "doubtful" not in _title(d)[1]
+    )
+    assert _title(replace(d, brdf=replace(fit, determined=False)))[1].endswith(
+        f"roughness at most {fit.blender_roughness:.2f}"
+    )
     assert _title(replace(d, brdf=replace(fit, alpha=None)))[1].endswith("gloss undetermined")
-    assert _title(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))[1].endswith("no highlights")
+    assert _title(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))[1].endswith(
+        "no highlights"
+    )

@@ -16,12 +16,34 @@ from isc_core.decomposition import Decomposition, Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.photo import srgb_to_linear
 from isc_core.progress import Monitor
-from isc_core.result_folder import DECOMPOSITION_FILES, SEPARATION_FILES, load, require_writable_result, save, save_separation
+from isc_core.result_folder import (
+    DECOMPOSITION_FILES,
+    SEPARATION_FILES,
+    load,
+    require_writable_result,
+    save,
+    save_separation,
+)
 from tests.core.ball_scene import ball
 
-CHANNELS = [f"{name}.{c}" for name in ("image", "diffuse", "specular", "residual", "reflectance", "shading") for c in "RGB"]
+CHANNELS = [
+    f"{name}.{c}"
+    for name in ("image", "diffuse", "specular", "residual", "reflectance", "shading")
+    for c in "RGB"
+]
 CHANNELS += ["normal.X", "normal.Y", "normal.Z", "height.Z", "mask.A", "confidence.Y"]
-KEYS = ("schema_version", "illumination", "brdf", "settings", "seed", "versions", "timings", "input", "status", "mesh")
+KEYS = (
+    "schema_version",
+    "illumination",
+    "brdf",
+    "settings",
+    "seed",
+    "versions",
+    "timings",
+    "input",
+    "status",
+    "mesh",
+)
 
 
 @pytest.fixture(scope="module")
@@ -48,7 +70,9 @@ def channels(path: Path) -> dict[str, np.ndarray]:
 
 
 def files(folder: Path) -> list[str]:
-    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+    return sorted(
+        path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()
+    )
 
 
 def test_it_holds_what_the_contract_names(saved: Path) -> None:
@@ -189,7 +213,9 @@ def test_equal_results_give_equal_bytes(saved: Path, tmp_path: Path) -> None:
 
 def test_strided_maps_are_written_right(tmp_path: Path) -> None:
     d = ball((24, 30), 9.0, (12, 15))
-    strided = replace(d, height=np.asfortranarray(d.height), image=np.repeat(d.image, 2, axis=1)[:, ::2])
+    strided = replace(
+        d, height=np.asfortranarray(d.height), image=np.repeat(d.image, 2, axis=1)[:, ::2]
+    )
     save(strided, tmp_path / "out")
     assert (load(tmp_path / "out").height == d.height).all()
     assert (load(tmp_path / "out").image == d.image).all()
@@ -197,16 +223,31 @@ def test_strided_maps_are_written_right(tmp_path: Path) -> None:
 
 def test_values_of_numpy_and_infinities_reach_the_json(tmp_path: Path) -> None:
     d = ball((24, 30), 9.0, (12, 15))
-    status = {"loss": np.float32(1.5), "steps": np.int64(3), "bound": float("inf"), "sizes": np.array([1, 2]), "file": Path("a/b")}
+    status = {
+        "loss": np.float32(1.5),
+        "steps": np.int64(3),
+        "bound": float("inf"),
+        "sizes": np.array([1, 2]),
+        "file": Path("a/b"),
+    }
     save(replace(d, provenance=replace(d.provenance, status=status)), tmp_path / "out")
-    assert load(tmp_path / "out").provenance.status == {"loss": 1.5, "steps": 3, "bound": None, "sizes": [1, 2], "file": str(Path("a/b"))}
+    assert load(tmp_path / "out").provenance.status == {
+        "loss": 1.5,
+        "steps": 3,
+        "bound": None,
+        "sizes": [1, 2],
+        "file": str(Path("a/b")),
+    }
 
 
 def test_an_earlier_result_is_replaced_and_what_is_foreign_refused(copy: Path) -> None:
     save(ball((20, 20), 8.0, (10, 10)), copy)
     assert load(copy).mask.shape == (20, 20)
     (copy / "scene.blend").write_text("my work")
-    for attempt in (lambda: save(ball((24, 30), 9.0, (12, 15)), copy), lambda: require_writable_result(copy)):
+    for attempt in (
+        lambda: save(ball((24, 30), 9.0, (12, 15)), copy),
+        lambda: require_writable_result(copy),
+    ):
         with pytest.raises(InputError, match=r"scene\.blend"):
             attempt()
     assert (copy / "scene.blend").read_text() == "my work"
@@ -234,7 +275,9 @@ def test_a_cancelled_save_leaves_nothing(tmp_path: Path, stage: str) -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs limits of processes")
 @pytest.mark.parametrize("limit", [1_000, 150_000])
-def test_a_disk_that_takes_no_more_is_one_clear_line_and_leaves_nothing(tmp_path: Path, limit: int) -> None:
+def test_a_disk_that_takes_no_more_is_one_clear_line_and_leaves_nothing(
+    tmp_path: Path, limit: int
+) -> None:
     """A real write that fails half-way: a process that may write no file beyond a size."""
     script = (
         "import resource, sys\n"
@@ -263,15 +306,23 @@ def damage_json(folder: Path, **changes: object) -> None:
 
 
 def drop_channels(folder: Path) -> None:
-    kept = {name: np.ascontiguousarray(v) for name, v in channels(folder / "maps.exr").items() if name != "shading.G"}
-    with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, kept) as file:
+    kept = {
+        name: np.ascontiguousarray(v)
+        for name, v in channels(folder / "maps.exr").items()
+        if name != "shading.G"
+    }
+    with OpenEXR.File(
+        {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, kept
+    ) as file:
         file.write(str(folder / "maps.exr"))
 
 
 def add_nan(folder: Path) -> None:
     changed = {name: np.array(v) for name, v in channels(folder / "maps.exr").items()}
     changed["height.Z"][3, 3] = np.nan
-    with OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, changed) as file:
+    with OpenEXR.File(
+        {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}, changed
+    ) as file:
         file.write(str(folder / "maps.exr"))
 
 
@@ -281,15 +332,27 @@ DAMAGES = {
     "no maps": (lambda f: (f / "maps.exr").unlink(), "does not exist"),
     "text for maps": (lambda f: (f / "maps.exr").write_text("hello"), "not a readable OpenEXR"),
     "empty maps": (lambda f: (f / "maps.exr").write_bytes(b""), "not a readable OpenEXR"),
-    "maps cut short": (lambda f: (f / "maps.exr").write_bytes((f / "maps.exr").read_bytes()[:2000]), "not a readable OpenEXR"),
+    "maps cut short": (
+        lambda f: (f / "maps.exr").write_bytes((f / "maps.exr").read_bytes()[:2000]),
+        "not a readable OpenEXR",
+    ),
     "no json text": (lambda f: (f / "decomposition.json").write_text("{"), "damaged"),
-    "bytes for json": (lambda f: (f / "decomposition.json").write_bytes(b"\xff\xfe\x00"), "damaged"),
+    "bytes for json": (
+        lambda f: (f / "decomposition.json").write_bytes(b"\xff\xfe\x00"),
+        "damaged",
+    ),
     "a list": (lambda f: (f / "decomposition.json").write_text("[]"), "schema_version"),
     "no version": (lambda f: damage_json(f, schema_version=None), "schema_version"),
     "from the future": (lambda f: damage_json(f, schema_version=99), "newer"),
     "no light": (lambda f: damage_json(f, illumination=None), "illumination"),
-    "half a light": (lambda f: damage_json(f, illumination={"coefficients": [[1, 2, 3]]}), "illumination"),
-    "no light but words": (lambda f: damage_json(f, illumination={"coefficients": [["a"] * 3] * 9}), "illumination"),
+    "half a light": (
+        lambda f: damage_json(f, illumination={"coefficients": [[1, 2, 3]]}),
+        "illumination",
+    ),
+    "no light but words": (
+        lambda f: damage_json(f, illumination={"coefficients": [["a"] * 3] * 9}),
+        "illumination",
+    ),
     "seed of words": (lambda f: damage_json(f, seed="x"), "seed"),
     "a channel lost": (drop_channels, r"shading\.G"),
     "not a number": (add_nan, r"height\.Z"),
@@ -341,5 +404,7 @@ def test_a_black_image_cannot_be_shown(tmp_path: Path) -> None:
 
 def test_the_folder_keeps_the_shared_contract(saved: Path, shared: Path) -> None:
     check = shared / "tools" / "check_result.py"
-    done = subprocess.run([sys.executable, str(check), str(saved)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, str(check), str(saved)], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout

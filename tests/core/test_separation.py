@@ -34,9 +34,15 @@ class MadeOptions:
 
 
 class MadeMethod:
-    """A method whose answer shows what it was given: the specular layer is `share` of the smallest channel's mean over the whole array."""
+    """A method whose answer shows what it was given: the specular layer is `share` of the smallest
+    channel's mean over the whole array.
+    """
 
-    VARIANTS: ClassVar = {"improved": MadeOptions(), "paper": MadeOptions(share=0.25), "sihr": MadeOptions(share=0.1)}
+    VARIANTS: ClassVar = {
+        "improved": MadeOptions(),
+        "paper": MadeOptions(share=0.25),
+        "sihr": MadeOptions(share=0.1),
+    }
 
     @staticmethod
     def separate(
@@ -48,7 +54,12 @@ class MadeMethod:
     ) -> Separation:
         (monitor or Monitor()).report("making", 0.5)
         chosen = options or MadeOptions()
-        return layers.white_layers(image, mask, np.full(mask.shape, chosen.share * float(np.nanmean(image.min(axis=2)))), clipped)
+        return layers.white_layers(
+            image,
+            mask,
+            np.full(mask.shape, chosen.share * float(np.nanmean(image.min(axis=2)))),
+            clipped,
+        )
 
 
 @pytest.fixture
@@ -67,7 +78,11 @@ def framed() -> tuple[np.ndarray, np.ndarray]:
 
 def test_variants_and_changes_reach_the_method(made: str) -> None:
     image, mask = framed()
-    for given, share in (({}, 0.5), ({"variant": "paper"}, 0.25), ({"variant": "paper", "changes": {"share": 0.75}}, 0.75)):
+    for given, share in (
+        ({}, 0.5),
+        ({"variant": "paper"}, 0.25),
+        ({"variant": "paper", "changes": {"share": 0.75}}, 0.75),
+    ):
         assert separate(made, image, mask, **given).specular[mask] == pytest.approx(0.4 * share)  # type: ignore[arg-type]
 
 
@@ -85,7 +100,9 @@ def test_only_the_toolbox_looks_around_the_mask(made: str) -> None:
 def test_progress_is_told_and_a_stop_is_heard(made: str) -> None:
     image, mask = framed()
     told = []
-    separate(made, image, mask, monitor=Monitor(lambda stage, fraction: told.append((stage, fraction))))
+    separate(
+        made, image, mask, monitor=Monitor(lambda stage, fraction: told.append((stage, fraction)))
+    )
     assert told == [("making", 0.5)]
     with pytest.raises(Cancelled):
         separate(made, image, mask, monitor=Monitor(cancelled=lambda: True))
@@ -93,11 +110,17 @@ def test_progress_is_told_and_a_stop_is_heard(made: str) -> None:
 
 def test_unknown_names_are_answered_with_the_known(made: str) -> None:
     image, mask = framed()
-    with pytest.raises(InputError, match=r"unknown separation method 'magic': choose one of none, .*shen_2013"):
+    with pytest.raises(
+        InputError, match=r"unknown separation method 'magic': choose one of none, .*shen_2013"
+    ):
         separate("magic", image, mask)
-    with pytest.raises(InputError, match="made has no variant 'best': choose improved or paper or sihr"):
+    with pytest.raises(
+        InputError, match="made has no variant 'best': choose improved or paper or sihr"
+    ):
         separate(made, image, mask, variant="best")
-    with pytest.raises(InputError, match="made has no option 'level': choose one of levels, share, opening"):
+    with pytest.raises(
+        InputError, match="made has no option 'level': choose one of levels, share, opening"
+    ):
         separate(made, image, mask, changes={"level": 3})
     with pytest.raises(InputError, match="none has no option 'levels': it has none"):
         separate("none", image, mask, changes={"levels": 3})
@@ -117,7 +140,9 @@ def test_every_method_has_the_same_face(method: str) -> None:
             changed = {field.name: getattr(options, field.name) for field in fields(options)}
             assert method_options(method, name, changed) == options
     if method_options(method) is not None:
-        assert method_options(method) == type(method_options(method))(), "the usual options are the improved variant"
+        assert method_options(method) == type(method_options(method))(), (
+            "the usual options are the improved variant"
+        )
 
 
 def test_a_start_does_not_wait_for_the_methods() -> None:
@@ -125,17 +150,26 @@ def test_a_start_does_not_wait_for_the_methods() -> None:
         "import sys; from isc_core.cli import main; main(['separate', '--help']); "
         f"print([m for m in {METHODS[1:]!r} if 'isc_core.separation.' + m in sys.modules], 'numba' in sys.modules)"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     assert done.stdout.splitlines()[-1] == "[] False"
 
 
-# --- options as text --------------------------------------------------------------------------------------------------------------------
+# --- options as text ------------------------------------------------------------------------------
 
 
 def test_options_are_read_as_their_types(made: str) -> None:
     words = ["levels=3", "share= .25", "opening=no", "optimiser=swarm", "threshold=.7", "name=a=b"]
     changes = parse_changes(made, "paper", words)
-    assert changes == {"levels": 3, "share": 0.25, "opening": False, "optimiser": "swarm", "threshold": 0.7, "name": "a=b"}
+    assert changes == {
+        "levels": 3,
+        "share": 0.25,
+        "opening": False,
+        "optimiser": "swarm",
+        "threshold": 0.7,
+        "name": "a=b",
+    }
     assert [type(value) for value in changes.values()] == [int, float, bool, str, float, str]
     assert replace(MadeOptions(), **changes) == method_options(made, "paper", changes)
     assert parse_changes(made, words=["threshold=.7", "threshold=None"]) == {"threshold": None}
@@ -146,7 +180,10 @@ def test_options_are_read_as_their_types(made: str) -> None:
     ("word", "message"),
     [
         ("levels", "--set levels: write it as name=value"),
-        ("level=3", "made has no option 'level': choose one of levels, share, opening, optimiser, threshold, name"),
+        (
+            "level=3",
+            "made has no option 'level': choose one of levels, share, opening, optimiser, threshold, name",
+        ),
         ("levels=3.5", "--set levels of made: '3.5' is not a whole number"),
         ("share=nan", "'nan' is not a number"),
         ("share=", "'' is not a number"),
@@ -161,11 +198,31 @@ def test_options_that_cannot_be_read(made: str, word: str, message: str) -> None
     assert message in str(raised.value)
 
 
-def test_the_command_chooses_variants_and_options(made: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_chooses_variants_and_options(
+    made: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("isc_core.commands.separate.METHODS", separation.METHODS)
     photo, removed = str(write_image(tmp_path / "dim.png", ball_codes() // 2)), []
-    for words in ((), ("--variant", "paper"), ("--variant", "paper", "--set", "levels=3", "--set", "share=0.125")):
-        assert main(["separate", photo, "--method", made, *words, "--quiet", "-o", str(tmp_path / "out")]) == 0
+    for words in (
+        (),
+        ("--variant", "paper"),
+        ("--variant", "paper", "--set", "levels=3", "--set", "share=0.125"),
+    ):
+        assert (
+            main(
+                [
+                    "separate",
+                    photo,
+                    "--method",
+                    made,
+                    *words,
+                    "--quiet",
+                    "-o",
+                    str(tmp_path / "out"),
+                ]
+            )
+            == 0
+        )
         removed.append(read_channels(tmp_path / "out" / "separation.exr")["specular.G"].max())
     assert removed[0] > 0 and removed == pytest.approx([removed[0], removed[0] / 2, removed[0] / 4])
 
@@ -174,22 +231,56 @@ def test_the_command_chooses_variants_and_options(made: str, tmp_path: Path, mon
 RANDOM = {"akashi_2016"}
 
 
-@pytest.mark.parametrize("method", sorted({method for method in METHODS if "sihr" in variants(method)} - RANDOM))
+@pytest.mark.parametrize(
+    "method", sorted({method for method in METHODS if "sihr" in variants(method)} - RANDOM)
+)
 def test_the_command_finds_the_toolbox_figures(shared: Path, tmp_path: Path, method: str) -> None:
-    """PSNR of the diffuse layer, whole frame, stored values: within .2 dB of what the toolbox itself was measured at."""
+    """PSNR of the diffuse layer, whole frame, stored values: within .2 dB of what the toolbox
+    itself was measured at.
+    """
     folder = shared / "data" / "highlight"
     anchors = json.loads((shared / "anchors" / "specular_removal.json").read_text())["shen"]
-    command = ["separate", str(folder / "animals.bmp"), "--transfer", "linear", "--method", method, "--variant", "sihr", "--quiet"]
+    command = [
+        "separate",
+        str(folder / "animals.bmp"),
+        "--transfer",
+        "linear",
+        "--method",
+        method,
+        "--variant",
+        "sihr",
+        "--quiet",
+    ]
     assert main([*command, "-o", str(tmp_path / "out")]) == 0
     maps = read_channels(tmp_path / "out" / "separation.exr")
     diffuse = np.stack([maps[f"diffuse.{c}"] for c in "RGB"], -1)
     measured = anchors["animals"][method.replace("_", "").capitalize()]["psnr"]
-    assert psnr(load_shen_zheng(folder, "animals").diffuse, diffuse) == pytest.approx(measured, abs=0.2)
+    assert psnr(load_shen_zheng(folder, "animals").diffuse, diffuse) == pytest.approx(
+        measured, abs=0.2
+    )
 
 
-@pytest.mark.parametrize(("words", "message"), [(("--variant", "best"), "no variant 'best'"), (("--set", "speed=9"), "no option 'speed'")])
-def test_the_command_refuses_in_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str], words: tuple[str, ...], message: str) -> None:
-    assert main(["separate", str(ball_photo(tmp_path)), "--method", "shen_2013", *words, "-o", str(tmp_path / "out")]) == 2
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [(("--variant", "best"), "no variant 'best'"), (("--set", "speed=9"), "no option 'speed'")],
+)
+def test_the_command_refuses_in_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
+) -> None:
+    assert (
+        main(
+            [
+                "separate",
+                str(ball_photo(tmp_path)),
+                "--method",
+                "shen_2013",
+                *words,
+                "-o",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 2
+    )
     error = capfd.readouterr().err
     assert message in error and error.count("\n") == 1 and not (tmp_path / "out").exists()
 

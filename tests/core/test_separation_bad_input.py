@@ -1,4 +1,6 @@
-"""Whatever a photo is like, every method answers with sound layers or refuses in one line; what must not matter does not."""
+"""Whatever a photo is like, every method answers with sound layers or refuses in one line; what
+must not matter does not.
+"""
 
 from typing import Any
 
@@ -12,7 +14,12 @@ from isc_core.progress import Monitor
 from isc_core.separation import METHODS, variants
 
 # Those that do not judge by colour, and so have an answer for grey photos; the others refuse.
-WITHOUT_COLOUR = {("none", "improved"), ("chaotic_segmentation", "paper"), ("network", "improved"), ("isc", "improved")}
+WITHOUT_COLOUR = {
+    ("none", "improved"),
+    ("chaotic_segmentation", "paper"),
+    ("network", "improved"),
+    ("isc", "improved"),
+}
 EVERY = [(method, variant) for method in METHODS for variant in variants(method)]
 OURS = [(method, variant) for method, variant in EVERY if variant != "sihr"]
 
@@ -24,32 +31,51 @@ ours = pytest.mark.parametrize(("method", "variant"), OURS)
 SHORTER: dict[str, dict[str, object]] = {"akashi_2016": {"iterations": 60, "starts": 1}}
 
 
-def separate(method: str, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None, **options: Any) -> Separation:
+def separate(
+    method: str,
+    image: np.ndarray,
+    mask: np.ndarray,
+    clipped: np.ndarray | None = None,
+    **options: Any,
+) -> Separation:
     return separation.separate(method, image, mask, clipped, changes=SHORTER.get(method), **options)
 
 
 def scene(height: int = 44, width: int = 52) -> tuple[np.ndarray, np.ndarray]:
-    """Two paints on a shaded disc with two highlights, in [0, 1), float64, with a little noise, and the mask."""
+    """Two paints on a shaded disc with two highlights, in [0, 1), float64, with a little noise, and
+    the mask.
+    """
     rng = np.random.default_rng(3)
     y, x = np.mgrid[-1 : 1 : height * 1j, -1 : 1 : width * 1j]
     mask = x**2 + y**2 < 0.9
     shading = 0.3 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
-    specular = 0.4 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.02) + 0.2 * np.exp(-((x + 0.5) ** 2 + (y - 0.1) ** 2) / 0.05)
+    specular = 0.4 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.02) + 0.2 * np.exp(
+        -((x + 0.5) ** 2 + (y - 0.1) ** 2) / 0.05
+    )
     paint = np.where((x > 0.1 * np.sin(9 * y))[..., None], [0.6, 0.25, 0.12], [0.15, 0.3, 0.5])
     noise = 0.004 * rng.random((height, width, 3))
     return (paint * shading[..., None] + specular[..., None] + noise) * mask[..., None], mask
 
 
-def assert_sound(split: Separation, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None) -> None:
+def assert_sound(
+    split: Separation, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None
+) -> None:
     peak = max(float(image[mask].max()), 1e-30)
     for layer in (split.diffuse, split.specular, split.residual, split.confidence):
         assert layer.dtype == np.float32 and layer.shape[:2] == mask.shape
         assert np.isfinite(layer).all() and not layer[~mask].any()
     total = split.diffuse.astype(float) + split.specular + split.residual
     assert np.abs(total - image)[mask].max() <= 1e-5 * peak
-    assert (split.diffuse[mask] >= 0).all() and (split.diffuse[mask] <= image[mask] + 1e-6 * peak).all()
-    assert (split.specular >= 0).all() and split.confidence.min() >= 0 and split.confidence.max() <= 1
-    assert np.abs(split.residual[mask if clipped is None else mask & ~clipped]).max(initial=0) <= 1e-6 * peak
+    assert (split.diffuse[mask] >= 0).all() and (
+        split.diffuse[mask] <= image[mask] + 1e-6 * peak
+    ).all()
+    assert (
+        (split.specular >= 0).all() and split.confidence.min() >= 0 and split.confidence.max() <= 1
+    )
+    assert (
+        np.abs(split.residual[mask if clipped is None else mask & ~clipped]).max(initial=0)
+        <= 1e-6 * peak
+    )
 
 
 def same(a: Separation, b: Separation, tolerance: float) -> None:
@@ -62,7 +88,13 @@ def test_an_ordinary_photo(method: str, variant: str) -> None:
     image, mask = scene()
     before = image.copy()
     told: list[float] = []
-    split = separate(method, image, mask, variant=variant, monitor=Monitor(lambda stage, fraction: told.append(fraction)))
+    split = separate(
+        method,
+        image,
+        mask,
+        variant=variant,
+        monitor=Monitor(lambda stage, fraction: told.append(fraction)),
+    )
     assert_sound(split, image, mask)
     assert method == "none" or split.specular.any()
     assert np.array_equal(image, before)
@@ -79,7 +111,10 @@ def test_the_same_twice(method: str, variant: str) -> None:
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("factor", [2.0, 0.5])
 def test_exposure_does_not_matter(method: str, factor: float) -> None:
-    """Powers of two, so that not even rounding differs. The papers' guards are absolute: this holds for the recommended variant."""
+    """Powers of two, so that not even rounding differs.
+
+    The papers' guards are absolute: this holds for the recommended variant.
+    """
     image, mask = scene()
     split, other = (separate(method, gain * image, mask) for gain in (1.0, factor))
     assert np.abs(other.diffuse / factor - split.diffuse).max() <= 2e-5
@@ -95,7 +130,16 @@ def test_what_is_around_does_not_matter(method: str, variant: str) -> None:
     padded = np.pad(wild, [(9, 4), (0, 13), (0, 0)], constant_values=np.inf)
     wide = separate(method, padded, np.pad(mask, [(9, 4), (0, 13)]), variant=variant)
     inside = np.s_[9:-4, :-13]
-    same(split, Separation(*(layer[inside] for layer in (wide.diffuse, wide.specular, wide.residual, wide.confidence))), 1e-6)
+    same(
+        split,
+        Separation(
+            *(
+                layer[inside]
+                for layer in (wide.diffuse, wide.specular, wide.residual, wide.confidence)
+            )
+        ),
+        1e-6,
+    )
 
 
 @every

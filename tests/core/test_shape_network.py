@@ -1,4 +1,6 @@
-"""How a photo's shape looks: what the network's answer must not depend on, and what the shipped weights can do."""
+"""How a photo's shape looks: what the network's answer must not depend on, and what the shipped
+weights can do.
+"""
 
 from pathlib import Path
 
@@ -10,16 +12,33 @@ from isc_core.errors import InputError
 from isc_core.shape_network import ShapeNetwork, read_shape_network, shape_at
 from tests.core.lit_balls import ball, under_lamps
 
-SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6), (6, 8), (8, 8), (14, 6), (6, 6), (6, 4)]  # three levels down, one up, the answer
+SHAPES = [
+    (16, 4),
+    (4, 4),
+    (4, 6),
+    (6, 6),
+    (6, 8),
+    (8, 8),
+    (14, 6),
+    (6, 6),
+    (6, 4),
+]  # three levels down, one up, the answer
 
 
 def small_network(rng: np.random.Generator) -> ShapeNetwork:
     """Random weights."""
-    weights = tuple(rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32) for inputs, outputs in SHAPES)
-    return ShapeNetwork(weights, tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in SHAPES))
+    weights = tuple(
+        rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32)
+        for inputs, outputs in SHAPES
+    )
+    return ShapeNetwork(
+        weights, tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in SHAPES)
+    )
 
 
-def photo(rng: np.random.Generator, rows: int = 70, columns: int = 50) -> tuple[np.ndarray, np.ndarray]:
+def photo(
+    rng: np.random.Generator, rows: int = 70, columns: int = 50
+) -> tuple[np.ndarray, np.ndarray]:
     mask = np.zeros((rows, columns), bool)
     mask[5:-10, 8:-8] = True
     mask[6:-11, 9:-9] = rng.random((rows - 17, columns - 18)) < 0.9
@@ -32,7 +51,11 @@ def test_normals_and_deviations_are_of_the_object(size: tuple[int, int]) -> None
     network, (image, mask) = small_network(rng), photo(rng, *size)
     seen = shape_at(image, mask, network)
     assert seen.normal.shape == (*size, 3) and seen.deviation.shape == size
-    assert (seen.deviation[mask] > 0).all() and not seen.deviation[~mask].any() and not seen.normal[~mask].any()
+    assert (
+        (seen.deviation[mask] > 0).all()
+        and not seen.deviation[~mask].any()
+        and not seen.normal[~mask].any()
+    )
     bright = shape_at(8 * image, mask, network)
     np.testing.assert_allclose(bright.normal, seen.normal, atol=1e-4)
     np.testing.assert_allclose(bright.deviation, seen.deviation, rtol=1e-4)
@@ -41,7 +64,10 @@ def test_normals_and_deviations_are_of_the_object(size: tuple[int, int]) -> None
 def test_the_photo_mirrored_has_its_shape_mirrored() -> None:
     rng = np.random.default_rng(1)
     network, (image, mask) = small_network(rng), photo(rng)
-    seen, mirrored = shape_at(image, mask, network), shape_at(image[:, ::-1], mask[:, ::-1], network)
+    seen, mirrored = (
+        shape_at(image, mask, network),
+        shape_at(image[:, ::-1], mask[:, ::-1], network),
+    )
     np.testing.assert_allclose(mirrored.normal[:, ::-1] * (-1, 1, 1), seen.normal, atol=1e-5)
     np.testing.assert_allclose(mirrored.deviation[:, ::-1], seen.deviation, rtol=1e-5)
 
@@ -50,7 +76,9 @@ def test_what_is_outside_the_mask_and_the_number_of_threads_change_nothing() -> 
     rng = np.random.default_rng(2)
     network, (image, mask) = small_network(rng), photo(rng)
     seen = shape_at(image, mask, network)
-    padded = np.pad(np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9)
+    padded = np.pad(
+        np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9
+    )
     for threads in (1, 3):
         with threadpool_limits(threads):
             again = shape_at(padded, np.pad(mask, ((13, 4), (3, 21))), network)
@@ -64,7 +92,10 @@ def test_photos_without_anything_in_them_have_a_shape_too(level: float) -> None:
     assert np.isfinite(seen.normal).all() and np.isfinite(seen.deviation).all()
 
 
-@pytest.mark.parametrize("lamps", [[(-0.5, 0.5, 0.7)], [(0.6, 0.1, 0.7)], [(0.1, 0.8, 0.6)], [(-0.7, 0.2, 0.6), (0.7, 0.4, 0.6)]])
+@pytest.mark.parametrize(
+    "lamps",
+    [[(-0.5, 0.5, 0.7)], [(0.6, 0.1, 0.7)], [(0.1, 0.8, 0.6)], [(-0.7, 0.2, 0.6), (0.7, 0.4, 0.6)]],
+)
 def test_a_painted_ball_is_round(lamps: list[tuple[float, float, float]]) -> None:
     seen, (normal, mask) = shape_at(*under_lamps(*lamps)), ball()
     length = np.linalg.norm(seen.normal, axis=-1)
@@ -82,7 +113,11 @@ def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     network = small_network(np.random.default_rng(3))
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}
     parts |= {f"bias{k:02d}": values for k, values in enumerate(network.biases)}
-    for wrong in ({"weight06": np.ones((9, 8, 6))}, {"bias08": np.ones(3)}, {"weight09": np.ones((9, 4, 4)), "bias09": np.ones(4)}):
+    for wrong in (
+        {"weight06": np.ones((9, 8, 6))},
+        {"bias08": np.ones(3)},
+        {"weight09": np.ones((9, 4, 4)), "bias09": np.ones(4)},
+    ):
         np.savez(bad, **(parts | wrong))
         with pytest.raises(InputError, match="not the weights of a shape network"):
             read_shape_network(bad)

@@ -1,4 +1,6 @@
-"""What SIRFS expects of the shape: what the photo shows at first sight, or what its outline alone suggests."""
+"""What SIRFS expects of the shape: what the photo shows at first sight, or what its outline alone
+suggests.
+"""
 
 import numpy as np
 import pytest
@@ -13,7 +15,9 @@ from tests.core.lit_balls import ball, under_lamps
 def found(evidence: Evidence | None = None, cut: int = 0, **settings: str) -> Decomposition:
     """A painted ball under one lamp, explained."""
     image, mask = (part[cut:] for part in under_lamps((-0.7, 0.2, 0.6)))
-    photo = Photo(image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file"))
+    photo = Photo(
+        image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file")
+    )
     return decompose(photo, Settings(model="mdr", threads=1, **settings), evidence=evidence)  # type: ignore[arg-type]
 
 
@@ -27,7 +31,10 @@ def test_a_ball_is_rounder_as_it_was_seen() -> None:
     seen, outline = found(), found(shape_prior="outline")
     assert seen.identity_errors().broken() == ()
     assert error(seen) < 0.8 * error(outline)
-    assert seen.provenance.settings["shape_prior"] == "seen" and outline.provenance.settings["shape_prior"] == "outline"
+    assert (
+        seen.provenance.settings["shape_prior"] == "seen"
+        and outline.provenance.settings["shape_prior"] == "outline"
+    )
 
 
 def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
@@ -43,7 +50,9 @@ def test_what_the_frame_cuts_was_not_seen_whole() -> None:
 
 
 def test_in_the_laboratory_the_outline_is_enough() -> None:
-    one, other = (found(illumination="laboratory", shape_prior=prior) for prior in ("seen", "outline"))
+    one, other = (
+        found(illumination="laboratory", shape_prior=prior) for prior in ("seen", "outline")
+    )
     np.testing.assert_array_equal(one.height, other.height)
 
 

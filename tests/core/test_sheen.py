@@ -21,8 +21,12 @@ def test_plastic_mirrors_a_25th_of_an_even_sky_in_front() -> None:
     facing = replace(d, normal=np.broadcast_to(np.array([0, 0, 1], np.float32), d.normal.shape))
     even = np.broadcast_to(np.array([2.0, 1.0, 0.5]), (16, 32, 3))
     grey = replace(facing, image=np.full_like(d.image, 0.02))
-    assert most_level(grey, 0.3, even) == pytest.approx(0.02 / (0.04 * 2.0), rel=0.1), "the brightest channel decides"
-    assert most_level(grey, 0.3, 2 * even) == pytest.approx(0.5 * most_level(grey, 0.3, even), rel=1e-5)
+    assert most_level(grey, 0.3, even) == pytest.approx(0.02 / (0.04 * 2.0), rel=0.1), (
+        "the brightest channel decides"
+    )
+    assert most_level(grey, 0.3, 2 * even) == pytest.approx(
+        0.5 * most_level(grey, 0.3, even), rel=1e-5
+    )
     assert most_level(grey, 0.3, 0 * even) == np.inf
 
 
@@ -44,7 +48,9 @@ def test_channels_of_zero_tell_nothing_of_the_room() -> None:
     image = d.image.copy()
     rows, columns = np.nonzero(d.mask)
     image[rows[::8], columns[::8], 2] = 0
-    assert most_level(replace(d, image=image), 0.4, sky) == pytest.approx(most_level(d, 0.4, sky), rel=0.1)
+    assert most_level(replace(d, image=image), 0.4, sky) == pytest.approx(
+        most_level(d, 0.4, sky), rel=0.1
+    )
 
 
 @pytest.mark.parametrize("factor", [1.0, 100.0])
@@ -53,10 +59,14 @@ def test_every_file_of_a_result_has_the_same_level(tmp_path: Path, factor: float
     save(d, tmp_path / "out", arrays=True)
     with np.load(tmp_path / "out" / ARRAYS) as arrays:
         level = float(arrays["specular_level"])
-    described = json.loads((tmp_path / "out" / "decomposition.json").read_text(encoding="utf-8"))["mesh"]["specular"]
+    described = json.loads((tmp_path / "out" / "decomposition.json").read_text(encoding="utf-8"))[
+        "mesh"
+    ]["specular"]
     chunk = (tmp_path / "out" / "mesh.glb").read_bytes()
     size = int.from_bytes(chunk[12:16], "little")
-    extension = json.loads(chunk[20 : 20 + size])["materials"][0]["extensions"]["KHR_materials_specular"]
+    extension = json.loads(chunk[20 : 20 + size])["materials"][0]["extensions"][
+        "KHR_materials_specular"
+    ]
     written = extension["specularFactor"] * max(extension.get("specularColorFactor", [1]))
     assert described["source"] == (FITTED if factor == 1 else LOWERED)
     assert level == pytest.approx(described["value"], rel=1e-6) == pytest.approx(written, rel=1e-6)
@@ -65,5 +75,7 @@ def test_every_file_of_a_result_has_the_same_level(tmp_path: Path, factor: float
 def stronger(d: Decomposition, factor: float) -> Decomposition:
     """The fitted lobe with a level that the photo does not bear out."""
     assert d.brdf is not None
-    lights = tuple(replace(light, strength_light=factor * light.strength_light) for light in d.brdf.lights)
+    lights = tuple(
+        replace(light, strength_light=factor * light.strength_light) for light in d.brdf.lights
+    )
     return replace(d, brdf=replace(d.brdf, lights=lights))

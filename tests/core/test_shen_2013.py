@@ -17,13 +17,19 @@ RED, GREEN = np.array([0.7, 0.25, 0.15]), np.array([0.2, 0.6, 0.15])
 
 
 def glossy_scene() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one highlight."""
+    """Image, true specular (H, W) and mask: two paints on a shaded disc under white light, with one
+    highlight.
+    """
     y, x = np.mgrid[-1:1:80j, -1:1:100j]
     mask = x**2 + y**2 < 0.9
     shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
     specular = 0.5 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.02)
     paint = np.where((x > 0)[..., None], RED, GREEN)
-    return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
+    return (
+        (paint * shading[..., None] + specular[..., None]) * mask[..., None],
+        specular * mask,
+        mask,
+    )
 
 
 FIGURES = {"improved": (37.5, 39.5), "paper": (37.3, 39.2), "sihr": (37.5, 38.3)}
@@ -32,7 +38,9 @@ FIGURES = {"improved": (37.5, 39.5), "paper": (37.3, 39.2), "sihr": (37.5, 38.3)
 @pytest.mark.parametrize("variant", list(VARIANTS))
 def test_published_figures(shared: Path, variant: str) -> None:
     for name, psnr in zip(("animals", "cups"), FIGURES[variant], strict=True):
-        image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+        image, truth = (
+            read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp")
+        )
         split = shen_2013.separate(image, np.ones(image.shape[:2], bool), VARIANTS[variant])
         got = -10 * np.log10(np.mean((split.diffuse - truth) ** 2))
         assert got == pytest.approx(psnr, abs=0.06)
@@ -40,7 +48,9 @@ def test_published_figures(shared: Path, variant: str) -> None:
 
 @pytest.mark.parametrize("name", ["animals", "cups"])
 def test_trusted_pixels_err_less(shared: Path, name: str) -> None:
-    image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    image, truth = (
+        read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     split = shen_2013.separate(image, np.ones(image.shape[:2], bool))
     error = ((split.diffuse - truth) ** 2).mean(axis=2).ravel()
     ascending = error[np.argsort(split.confidence.ravel(), kind="stable")]
@@ -92,7 +102,9 @@ def test_the_whole_frame_counts_for_the_toolbox_alone() -> None:
         assert differs == (np.abs(dark.diffuse - bright.diffuse).max() > 1e-3)
         assert_layers_hold(bright, lit, mask)
         for unknown in (np.nan, np.inf):
-            blind = shen_2013.separate(np.where(mask[..., None], image, unknown), mask, VARIANTS[name])
+            blind = shen_2013.separate(
+                np.where(mask[..., None], image, unknown), mask, VARIANTS[name]
+            )
             assert np.allclose(blind.diffuse, dark.diffuse, atol=1e-6)
 
 
@@ -100,7 +112,10 @@ def test_the_specular_layer_fades_in_without_a_jump() -> None:
     image, _, mask = glossy_scene()
     low = image.min(axis=2)
     rim = mask & (low > low[mask].mean()) & (low < 1.02 * low[mask].mean())
-    paper, improved = (shen_2013.separate(image, mask, VARIANTS[name]).specular[rim].max() for name in ("paper", "improved"))
+    paper, improved = (
+        shen_2013.separate(image, mask, VARIANTS[name]).specular[rim].max()
+        for name in ("paper", "improved")
+    )
     assert improved <= 0.04 * paper + 1e-6
 
 
@@ -119,12 +134,18 @@ def test_clipped_highlight_is_filled_from_around() -> None:
     assert clipped.sum() > 20
     split = shen_2013.separate(image, mask, clipped=clipped)
     assert_layers_hold(split, image, mask)
-    assert not split.residual[~clipped].any() and not split.confidence[clipped].any() and split.residual.max() <= 1e-7
+    assert (
+        not split.residual[~clipped].any()
+        and not split.confidence[clipped].any()
+        and split.residual.max() <= 1e-7
+    )
     truth = scene - specular[..., None]
     blind = shen_2013.separate(image, mask)
     error, blind_error = (np.mean((s.diffuse - truth)[clipped] ** 2) for s in (split, blind))
     assert error < 0.1 * blind_error
-    assert np.mean((split.specular[..., 0] - specular)[clipped] ** 2) < 0.05 * np.mean(specular[clipped] ** 2)
+    assert np.mean((split.specular[..., 0] - specular)[clipped] ** 2) < 0.05 * np.mean(
+        specular[clipped] ** 2
+    )
 
 
 def test_fill_carries_a_plane_across_a_hole() -> None:
@@ -164,5 +185,9 @@ def test_refuses_what_it_cannot_use() -> None:
 
 def test_bright_pixels_above_a_black_base_count_in_full() -> None:
     with np.errstate(all="raise"):
-        np.testing.assert_array_equal(fade_in(np.array([0, 1e-3, 1e12], np.float32), 0.0, 0.2), [0, 1, 1])
-        np.testing.assert_allclose(fade_in(np.array([0.4, 0.55, 0.7], np.float32), 0.5, 0.2), [0, 0.5, 1], atol=1e-6)
+        np.testing.assert_array_equal(
+            fade_in(np.array([0, 1e-3, 1e12], np.float32), 0.0, 0.2), [0, 1, 1]
+        )
+        np.testing.assert_allclose(
+            fade_in(np.array([0.4, 0.55, 0.7], np.float32), 0.5, 0.2), [0, 0.5, 1], atol=1e-6
+        )

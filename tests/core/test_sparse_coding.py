@@ -15,7 +15,11 @@ from isc_core.separation import sparse_coding
 from isc_core.separation.sparse_coding import VARIANTS, SparseCodingOptions, separate
 from tests.core.separation_scenes import read
 
-RED, GREEN, PALE_GREEN = np.array([0.8, 0.15, 0.1]), np.array([0.1, 0.6, 0.15]), np.array([0.62, 0.8, 0.64])
+RED, GREEN, PALE_GREEN = (
+    np.array([0.8, 0.15, 0.1]),
+    np.array([0.1, 0.6, 0.15]),
+    np.array([0.62, 0.8, 0.64]),
+)
 
 
 def laboratory(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -26,11 +30,15 @@ def laboratory(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 def left_over(split: Separation, image: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
     """The squared error of the diffuse layer as a share of that of the image itself."""
-    return float(np.square(split.diffuse - truth)[mask].sum() / np.square(image - truth)[mask].sum())
+    return float(
+        np.square(split.diffuse - truth)[mask].sum() / np.square(image - truth)[mask].sum()
+    )
 
 
 def glossy_scene(strength: float = 0.4) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true specular (H, W) and mask: two paints and a pale print on a shaded disc under white light, with one highlight."""
+    """Image, true specular (H, W) and mask: two paints and a pale print on a shaded disc under
+    white light, with one highlight.
+    """
     y, x = np.mgrid[-1:1:100j, -1:1:120j]
     mask = x**2 + y**2 < 0.9
     shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
@@ -38,7 +46,11 @@ def glossy_scene(strength: float = 0.4) -> tuple[np.ndarray, np.ndarray, np.ndar
     paint = np.where((x > 0)[..., None], RED, GREEN)
     print_ = (np.abs(y - 0.3) < 0.08) & (np.abs(x + 0.5) < 0.2)
     paint = np.where(print_[..., None], PALE_GREEN, paint)
-    return (paint * shading[..., None] + specular[..., None]) * mask[..., None], specular * mask, mask
+    return (
+        (paint * shading[..., None] + specular[..., None]) * mask[..., None],
+        specular * mask,
+        mask,
+    )
 
 
 @pytest.mark.parametrize(("name", "most"), [("apple", 0.14), ("teabag2", 0.65), ("paper1", 1.0)])
@@ -49,18 +61,24 @@ def test_laboratory_objects(shared: Path, name: str, most: float) -> None:
 
 @pytest.mark.parametrize(("name", "most"), [("animals", 0.25), ("cups", 0.3)])
 def test_published_images(shared: Path, name: str, most: float) -> None:
-    image, truth = (read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
+    image, truth = (
+        read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp")
+    )
     mask = np.ones(image.shape[:2], bool)
     assert left_over(separate(image, mask), image, truth, mask) <= most
 
 
-@pytest.mark.parametrize("name", ["box", "cup1", "dinosaur", "frog1", "panther", "phone", "squirrel"])
+@pytest.mark.parametrize(
+    "name", ["box", "cup1", "dinosaur", "frog1", "panther", "phone", "squirrel"]
+)
 def test_near_grey_and_textured_objects_are_not_harmed(shared: Path, name: str) -> None:
     image, truth, mask = laboratory(shared, name)
     assert left_over(separate(image, mask), image, truth, mask) <= 1.005
 
 
-@pytest.mark.parametrize(("name", "most"), [("apple", 0.005), ("teabag2", 0.02), ("phone", 0.005), ("panther", 0.005)])
+@pytest.mark.parametrize(
+    ("name", "most"), [("apple", 0.005), ("teabag2", 0.02), ("phone", 0.005), ("panther", 0.005)]
+)
 def test_photos_without_highlights_are_left_alone(shared: Path, name: str, most: float) -> None:
     _, matte, mask = laboratory(shared, name)
     removed = separate(matte, mask).specular[mask]
@@ -70,7 +88,10 @@ def test_photos_without_highlights_are_left_alone(shared: Path, name: str, most:
 def test_both_specular_free_images_beat_each(shared: Path) -> None:
     image, truth, mask = laboratory(shared, "teabag2")
     sf1, sf2, both = (
-        left_over(separate(image, mask, SparseCodingOptions(specular_free=kind)), image, truth, mask) for kind in ("sf1", "sf2", "both")
+        left_over(
+            separate(image, mask, SparseCodingOptions(specular_free=kind)), image, truth, mask
+        )
+        for kind in ("sf1", "sf2", "both")
     )
     assert both < min(sf1, sf2)
 
@@ -78,7 +99,9 @@ def test_both_specular_free_images_beat_each(shared: Path) -> None:
 def test_a_highlight_goes_and_a_pale_print_stays() -> None:
     image, specular, mask = glossy_scene()
     split = separate(image, mask)
-    assert np.mean((split.specular[..., 0] - specular)[mask] ** 2) < 0.03 * np.mean(specular[mask] ** 2)
+    assert np.mean((split.specular[..., 0] - specular)[mask] ** 2) < 0.03 * np.mean(
+        specular[mask] ** 2
+    )
     away = mask & (specular < 1e-3)
     assert split.specular[away].max() < 0.01
     plain = separate(image, mask, VARIANTS["paper"])
@@ -91,8 +114,15 @@ def test_layers_hold(variant: str) -> None:
     image, _, mask = glossy_scene()
     split = separate(image, mask, VARIANTS[variant])
     assert np.abs(split.diffuse + split.specular + split.residual - image)[mask].max() < 1e-6
-    assert (split.diffuse >= 0).all() and (split.diffuse <= image + 1e-6).all() and split.specular.min() >= 0
-    assert all(np.isfinite(layer).all() and not layer[~mask].any() for layer in (split.diffuse, split.specular, split.confidence))
+    assert (
+        (split.diffuse >= 0).all()
+        and (split.diffuse <= image + 1e-6).all()
+        and split.specular.min() >= 0
+    )
+    assert all(
+        np.isfinite(layer).all() and not layer[~mask].any()
+        for layer in (split.diffuse, split.specular, split.confidence)
+    )
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -107,25 +137,38 @@ def test_scale_surroundings_and_transposition_do_not_matter(variant: str) -> Non
 
 
 def test_plain_code_is_the_optimum() -> None:
-    """Against non-negative least squares, which solves the same problem without a penalty: min |A x - y|, x >= 0."""
+    """Against non-negative least squares, which solves the same problem without a penalty: min |A x
+    - y|, x >= 0.
+    """
     image, _, mask = glossy_scene()
     options = replace(VARIANTS["paper"], sparsity=0.0)
     free = sparse_coding._specular_free(image, mask, 0)
     dictionary = sparse_coding._learn(free, mask, options)
     diffuse = sparse_coding._diffuse_of_pixels(image, free, dictionary, options)
-    atoms = sparse_coding._atoms((np.arange(options.hues) + 0.5) / options.hues, dictionary.log_ratio)
+    atoms = sparse_coding._atoms(
+        (np.arange(options.hues) + 0.5) / options.hues, dictionary.log_ratio
+    )
     for y, x in ((50, 40), (40, 75), (65, 30), (20, 60), (41, 77)):
         atom = atoms[int(free.hue[y, x] * options.hues)]
-        code, _ = nnls(np.stack([atom, sparse_coding._HIGHLIGHT], axis=1), sparse_coding._XYZ @ image[y, x])
+        code, _ = nnls(
+            np.stack([atom, sparse_coding._HIGHLIGHT], axis=1), sparse_coding._XYZ @ image[y, x]
+        )
         assert sparse_coding._XYZ @ diffuse[y, x] == pytest.approx(code[0] * atom, abs=1e-9)
 
 
 def test_specular_light_does_not_move_the_specular_free_part() -> None:
     image, specular, mask = glossy_scene()
-    with_light, without = (sparse_coding._specular_free(picture, mask, 0) for picture in (image, image - specular[..., None]))
+    with_light, without = (
+        sparse_coding._specular_free(picture, mask, 0)
+        for picture in (image, image - specular[..., None])
+    )
     assert np.allclose(with_light.alpha, without.alpha, atol=1e-6)
-    assert np.allclose(np.exp(2j * np.pi * with_light.hue)[mask], np.exp(2j * np.pi * without.hue)[mask], atol=1e-5)
-    assert (with_light.brightness - without.brightness)[mask] == pytest.approx(specular[mask] * sparse_coding._WHITE, abs=1e-9)
+    assert np.allclose(
+        np.exp(2j * np.pi * with_light.hue)[mask], np.exp(2j * np.pi * without.hue)[mask], atol=1e-5
+    )
+    assert (with_light.brightness - without.brightness)[mask] == pytest.approx(
+        specular[mask] * sparse_coding._WHITE, abs=1e-9
+    )
 
 
 def test_small_and_odd_masks() -> None:
@@ -135,7 +178,9 @@ def test_small_and_odd_masks() -> None:
     assert np.isfinite(separate(image, single).diffuse).all()
     holes = mask & (np.random.default_rng(0).random(mask.shape) < 0.5)
     assert np.isfinite(separate(image, holes).diffuse).all()
-    noisy = np.maximum(np.round(image * 20) / 255 + np.random.default_rng(1).normal(0, 0.01, image.shape), 0)
+    noisy = np.maximum(
+        np.round(image * 20) / 255 + np.random.default_rng(1).normal(0, 0.01, image.shape), 0
+    )
     for options in VARIANTS.values():
         assert np.isfinite(separate(noisy, mask, options).diffuse).all()
 

@@ -25,10 +25,14 @@ def truth() -> SeparationTruth:
 def answer_with(monkeypatch: pytest.MonkeyPatch, share: float) -> None:
     """Makes every method take off this share of the true highlights, and trust what it left alone."""
 
-    def separate(method: str, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray, *, variant: str) -> Separation:
+    def separate(
+        method: str, image: np.ndarray, mask: np.ndarray, clipped: np.ndarray, *, variant: str
+    ) -> Separation:
         specular = np.float32(share) * ball().specular
         confidence = np.where(mask, 1 / (1 + ball().specular.mean(axis=2)), 0).astype(np.float32)
-        return Separation(np.where(mask[..., None], image - specular, 0), specular, 0 * specular, confidence)
+        return Separation(
+            np.where(mask[..., None], image - specular, 0), specular, 0 * specular, confidence
+        )
 
     monkeypatch.setattr(separation, "separate", separate)
 
@@ -47,7 +51,11 @@ def test_what_is_left_counts_squared(monkeypatch: pytest.MonkeyPatch, share: flo
     row, _ = measure("laboratory", truth(), "shen_2013", "improved")
     for ratio in (row.mse_ratio, row.mse_inside, row.mse_outside, row.specular_ratio):
         assert ratio == pytest.approx((1 - share) ** 2, rel=1e-4)
-    assert row.lmse_specular == pytest.approx(0, abs=1e-9) and row.lmse_diffuse is not None and row.lmse_diffuse > 0
+    assert (
+        row.lmse_specular == pytest.approx(0, abs=1e-9)
+        and row.lmse_diffuse is not None
+        and row.lmse_diffuse > 0
+    )
     assert row.rank == pytest.approx(-1, abs=0.05)
     assert row.removed is not None and row.area is not None and row.removed > 0.9 and row.area < 0.1
     d = ball()
@@ -62,30 +70,58 @@ def test_a_refusal_is_a_row(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(separation, "separate", refuse)
     row, split = measure("laboratory", truth(), "shen_2013", "improved")
     assert split is None and row.refused == "no colour" and row.psnr is None
-    assert "| shen_2013 | improved | refused |" in tables([row]) and "- shen_2013, ball: no colour" in tables([row])
+    assert "| shen_2013 | improved | refused |" in tables(
+        [row]
+    ) and "- shen_2013, ball: no colour" in tables([row])
 
 
 def test_a_photo_without_highlights_has_no_truth_to_miss() -> None:
     d = truth()
-    row, _ = measure("clean", replace(d, image=d.diffuse, specular=0 * d.specular), "shen_2013", "improved")
+    row, _ = measure(
+        "clean", replace(d, image=d.diffuse, specular=0 * d.specular), "shen_2013", "improved"
+    )
     assert row.change is not None and row.change > 0 and row.psnr is None
-    assert f"| shen_2013 | improved | {100 * row.change:.2f} | {100 * row.change:.2f} |" in tables([row])
+    assert f"| shen_2013 | improved | {100 * row.change:.2f} | {100 * row.change:.2f} |" in tables(
+        [row]
+    )
 
 
 def test_the_gain_is_one_less_the_geometric_mean_of_ratios() -> None:
     def row(method: str, image: str, diffuse: float, specular: float) -> Row:
         return Row(
-            "laboratory", image, method, "improved", psnr=30, mse_ratio=diffuse, specular_ratio=specular, lmse_diffuse=1, lmse_specular=1
+            "laboratory",
+            image,
+            method,
+            "improved",
+            psnr=30,
+            mse_ratio=diffuse,
+            specular_ratio=specular,
+            lmse_diffuse=1,
+            lmse_specular=1,
         )
 
-    rows = [row("sparse_coding", "apple", 0.2, 0.5), row("sparse_coding", "paper1", 0.9, 0.5), row("sparse_coding", "phone", 9, 9)]
-    rows += [row("tan_2005", "apple", 0.8, 1), row("tan_2005", "paper1", 0.9, 1), row("tan_2005", "phone", 1, 1)]
-    assert "| tan_2005 | improved | 2 (apple, teabag2, paper1, animals, cups) | 50.0 % | 50.0 % | 0.0 % | 0.0 % |" in tables(rows)
+    rows = [
+        row("sparse_coding", "apple", 0.2, 0.5),
+        row("sparse_coding", "paper1", 0.9, 0.5),
+        row("sparse_coding", "phone", 9, 9),
+    ]
+    rows += [
+        row("tan_2005", "apple", 0.8, 1),
+        row("tan_2005", "paper1", 0.9, 1),
+        row("tan_2005", "phone", 1, 1),
+    ]
+    assert (
+        "| tan_2005 | improved | 2 (apple, teabag2, paper1, animals, cups) | 50.0 % | 50.0 % | 0.0 % | 0.0 % |"
+        in tables(rows)
+    )
     assert "Sparse Coding against" not in tables(rows[3:])
 
 
 def test_rows_come_back_from_disk(tmp_path: Path) -> None:
-    rows = [measure("laboratory", truth(), "none", "improved")[0], Row("clean", "b, c", "tan_2005", "paper", "12ab", refused='says "no"')]
+    rows = [
+        measure("laboratory", truth(), "none", "improved")[0],
+        Row("clean", "b, c", "tan_2005", "paper", "12ab", refused='says "no"'),
+    ]
     write_rows(tmp_path / "rows.csv", rows)
     found = read_rows(tmp_path / "rows.csv")
     assert list(found) == [row.key for row in rows]
@@ -97,24 +133,47 @@ def test_rows_come_back_from_disk(tmp_path: Path) -> None:
 
 
 def test_a_run_is_taken_up_where_it_was_left(
-    shared: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    shared: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     measured: list[str] = []
 
-    def counted(group: str, photo: SeparationTruth, method: str, variant: str) -> tuple[Row, Separation | None]:
+    def counted(
+        group: str, photo: SeparationTruth, method: str, variant: str
+    ) -> tuple[Row, Separation | None]:
         measured.append(method)
         return measure(group, photo, method, variant)
 
     monkeypatch.setattr(specular_removal, "measure", counted)
-    command = ["it", "--data", str(shared / "data"), "-o", str(tmp_path), "--images", "animals", "--variants", "improved"]
-    for methods, expected in (("none", ["none"]), ("shen_2013", ["shen_2013"]), ("none,shen_2013", [])):
+    command = [
+        "it",
+        "--data",
+        str(shared / "data"),
+        "-o",
+        str(tmp_path),
+        "--images",
+        "animals",
+        "--variants",
+        "improved",
+    ]
+    for methods, expected in (
+        ("none", ["none"]),
+        ("shen_2013", ["shen_2013"]),
+        ("none,shen_2013", []),
+    ):
         measured.clear()
         monkeypatch.setattr(sys, "argv", [*command, "--methods", methods])
         specular_removal.main()
         assert measured == expected
     assert (tmp_path / "sheets" / "shen_zheng-animals.png").is_file()
     assert "| none | improved | 30.57 / 0.979 / 0.948 |" in (tmp_path / "tables.md").read_text()
-    monkeypatch.setattr(specular_removal, "source_code", lambda method: "changed" if method == "shen_2013" else source_code(method))
+    monkeypatch.setattr(
+        specular_removal,
+        "source_code",
+        lambda method: "changed" if method == "shen_2013" else source_code(method),
+    )
     specular_removal.main()
     assert measured == ["shen_2013"]
     capsys.readouterr()

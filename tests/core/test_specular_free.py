@@ -46,6 +46,8 @@ def test_the_dark_channel_is_the_least_value_near_by_inside_the_mask() -> None:
     assert dark[3, 3] == low[2, 2]
     assert dark[1, 3] == low[1, 2], "the row outside the mask does not count"
     image, diffuse, disc = glossy_disc()
-    left = np.abs(less_dark_channel(image, disc, 3) - less_dark_channel(diffuse, disc, 3))[disc].mean()
+    left = np.abs(less_dark_channel(image, disc, 3) - less_dark_channel(diffuse, disc, 3))[
+        disc
+    ].mean()
     assert left < 0.5 * np.abs(image - diffuse)[disc].mean(), "most of the highlight is gone"
     assert not less_dark_channel(image, disc)[~disc].any()

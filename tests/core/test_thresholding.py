@@ -1,4 +1,6 @@
-"""Thresholds: the exact optimum against published tables and brute force, the optimisers against it, budgets, bad input."""
+"""Thresholds: the exact optimum against published tables and brute force, the optimisers against
+it, budgets, bad input.
+"""
 
 from itertools import combinations
 
@@ -7,7 +9,16 @@ import pytest
 
 from benchmarks.thresholding import levels
 from isc_core.errors import InputError
-from isc_core.thresholding import OPTIMISERS, OtsuObjective, chaotic_clonal, clonal_selection, exact, maximise, particle_swarm, quantise
+from isc_core.thresholding import (
+    OPTIMISERS,
+    OtsuObjective,
+    chaotic_clonal,
+    clonal_selection,
+    exact,
+    maximise,
+    particle_swarm,
+    quantise,
+)
 from isc_core.thresholding.clonal_selection import ClonalOptions, mutation_rate
 from isc_core.thresholding.particle_swarm import FALLING, SwarmOptions
 
@@ -30,7 +41,9 @@ def between_class_variance(image: np.ndarray, thresholds: tuple[int, ...]) -> fl
     """By its definition, from the pixels."""
     labels = np.searchsorted(thresholds, image.ravel(), side="left")
     classes = [image.ravel()[labels == k] for k in range(len(thresholds) + 1)]
-    return float(sum(len(c) * (c.mean() - image.mean()) ** 2 for c in classes if len(c)) / image.size)
+    return float(
+        sum(len(c) * (c.mean() - image.mean()) ** 2 for c in classes if len(c)) / image.size
+    )
 
 
 @pytest.mark.parametrize("name", OPTIMA)
@@ -63,19 +76,37 @@ def test_exact_beats_every_other_choice() -> None:
     every = np.array(list(combinations(np.arange(0, 256, 13), 3)))
     found = exact(objective, 3)
     assert found.value == pytest.approx(objective(every).max(), rel=1e-12)
-    assert found.value == pytest.approx(between_class_variance(image, tuple(found.thresholds)), rel=1e-10)
+    assert found.value == pytest.approx(
+        between_class_variance(image, tuple(found.thresholds)), rel=1e-10
+    )
 
 
 @pytest.mark.parametrize("optimiser", OPTIMISERS)
 def test_what_every_optimiser_keeps(optimiser: str) -> None:
     objective = OtsuObjective.of(levels("camera"))
-    found, again, other = (maximise(optimiser, objective, 4, evaluations=3000, seed=seed) for seed in (3, 3, 4))
+    found, again, other = (
+        maximise(optimiser, objective, 4, evaluations=3000, seed=seed) for seed in (3, 3, 4)
+    )
     assert found.thresholds.shape == (4,) and np.issubdtype(found.thresholds.dtype, np.integer)
-    assert (np.diff(found.thresholds) >= 0).all() and found.thresholds.min() >= 0 and found.thresholds.max() <= 255
-    assert found.value == objective(found.thresholds[None])[0] <= exact(objective, 4).value * (1 + 1e-12)
-    assert found.evaluations <= 3000 and found.history[-1, 0] == found.evaluations and found.history[-1, 1] == found.value
+    assert (
+        (np.diff(found.thresholds) >= 0).all()
+        and found.thresholds.min() >= 0
+        and found.thresholds.max() <= 255
+    )
+    assert (
+        found.value
+        == objective(found.thresholds[None])[0]
+        <= exact(objective, 4).value * (1 + 1e-12)
+    )
+    assert (
+        found.evaluations <= 3000
+        and found.history[-1, 0] == found.evaluations
+        and found.history[-1, 1] == found.value
+    )
     assert (np.diff(found.history, axis=0) >= 0).all()
-    assert np.array_equal(found.history, again.history) and np.array_equal(found.thresholds, again.thresholds)
+    assert np.array_equal(found.history, again.history) and np.array_equal(
+        found.thresholds, again.thresholds
+    )
     assert optimiser == "exact" or not np.array_equal(found.history, other.history)
 
 
@@ -98,8 +129,15 @@ def test_clonal_selection_finds_the_optimum(optimiser: str) -> None:
 
 def test_swarm_finds_easy_optima_and_comes_close_to_others() -> None:
     easy, hard = (OtsuObjective.of(levels(name)) for name in ("coins", "brick"))
-    assert all(maximise("particle_swarm", easy, 3, seed=s).value == pytest.approx(exact(easy, 3).value, rel=1e-12) for s in range(4))
-    assert min(maximise("particle_swarm", hard, 5, seed=s).value for s in range(4)) > 0.97 * exact(hard, 5).value
+    assert all(
+        maximise("particle_swarm", easy, 3, seed=s).value
+        == pytest.approx(exact(easy, 3).value, rel=1e-12)
+        for s in range(4)
+    )
+    assert (
+        min(maximise("particle_swarm", hard, 5, seed=s).value for s in range(4))
+        > 0.97 * exact(hard, 5).value
+    )
 
 
 def test_swarm_with_falling_inertia_gathers_later() -> None:
@@ -107,9 +145,13 @@ def test_swarm_with_falling_inertia_gathers_later() -> None:
     best = exact(objective, 3).value
 
     def needed(options: SwarmOptions) -> float:
-        found = [particle_swarm.maximise(objective, 3, seed=seed, options=options) for seed in range(4)]
+        found = [
+            particle_swarm.maximise(objective, 3, seed=seed, options=options) for seed in range(4)
+        ]
         assert [f.value for f in found] == pytest.approx([best] * 4, rel=1e-12)
-        return float(np.mean([f.history[np.argmax(f.history[:, 1] >= best * (1 - 1e-12)), 0] for f in found]))
+        return float(
+            np.mean([f.history[np.argmax(f.history[:, 1] >= best * (1 - 1e-12)), 0] for f in found])
+        )
 
     assert needed(FALLING) > 2 * needed(SwarmOptions())
 
@@ -127,16 +169,22 @@ def test_clones_of_better_antibodies_move_less() -> None:
 
 def test_thresholds_stay_in_order_at_the_ends() -> None:
     numbers = clonal_selection.PseudoRandomNumbers(1)
-    clones = clonal_selection._mutated(np.tile([0, 1, 254], (3000, 1)), np.full(3000, 254.0), numbers)
+    clones = clonal_selection._mutated(
+        np.tile([0, 1, 254], (3000, 1)), np.full(3000, 254.0), numbers
+    )
     assert clones.min() == 0 and clones.max() == 254 and (np.diff(clones, axis=1) >= 0).all()
 
 
 @pytest.mark.parametrize("optimiser", OPTIMISERS)
-@pytest.mark.parametrize("image", [np.full((5, 5), 7), np.array([[0, 255]]), np.array([[3, 4, 4, 200]])])
+@pytest.mark.parametrize(
+    "image", [np.full((5, 5), 7), np.array([[0, 255]]), np.array([[3, 4, 4, 200]])]
+)
 def test_fewer_levels_than_classes(optimiser: str, image: np.ndarray) -> None:
     objective = OtsuObjective.of(image)
     found = maximise(optimiser, objective, 5, evaluations=2000)
-    assert np.isfinite(found.value) and found.thresholds.min() >= 0 and found.thresholds.max() <= 254
+    assert (
+        np.isfinite(found.value) and found.thresholds.min() >= 0 and found.thresholds.max() <= 254
+    )
     assert found.value <= image.var() * (1 + 1e-9) + 1e-9
     if optimiser == "exact":
         assert found.value == pytest.approx(image.var(), abs=1e-9)
@@ -168,7 +216,12 @@ def test_refuses_what_it_cannot_use() -> None:
             OtsuObjective.of(image)
     with pytest.raises(InputError, match="finite values"):
         quantise(np.ones(3), 0.0)
-    for options in (ClonalOptions(population=1), ClonalOptions(clone_share=0), ClonalOptions(decay=0), ClonalOptions(replaced_share=1)):
+    for options in (
+        ClonalOptions(population=1),
+        ClonalOptions(clone_share=0),
+        ClonalOptions(decay=0),
+        ClonalOptions(replaced_share=1),
+    ):
         with pytest.raises(InputError):
             chaotic_clonal.maximise(objective, 3, options=options)
     for swarm in (

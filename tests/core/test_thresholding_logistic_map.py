@@ -1,16 +1,27 @@
-"""The logistic map: known orbits and ends, its density, and how uniform and independent the numbers made from it are."""
+"""The logistic map: known orbits and ends, its density, and how uniform and independent the numbers
+made from it are.
+"""
 
 import numpy as np
 import pytest
 from scipy.stats import chisquare, kstest
 
 from isc_core.errors import InputError
-from isc_core.thresholding.logistic_map import DEGENERATE, ChaoticNumbers, bifurcation, density, orbit, uniformised
+from isc_core.thresholding.logistic_map import (
+    DEGENERATE,
+    ChaoticNumbers,
+    bifurcation,
+    density,
+    orbit,
+    uniformised,
+)
 
 
 def dependence(numbers: np.ndarray, lag: int = 1) -> float:
     """The p-value of independence between numbers `lag` apart, on a grid of 16 x 16."""
-    counts = np.histogram2d(numbers[:-lag:2], numbers[lag::2][: len(numbers[:-lag:2])], 16, [[0, 1], [0, 1]])[0]
+    counts = np.histogram2d(
+        numbers[:-lag:2], numbers[lag::2][: len(numbers[:-lag:2])], 16, [[0, 1], [0, 1]]
+    )[0]
     return float(chisquare(counts.ravel()).pvalue)
 
 
@@ -36,7 +47,9 @@ def test_density_and_uniformisation() -> None:
     assert share == pytest.approx(np.diff(2 / np.pi * np.arcsin(np.sqrt(edges))), abs=3e-3)
     middle = np.linspace(0.0005, 0.9995, 1000)
     assert density(middle).mean() == pytest.approx(1, abs=0.03)
-    assert np.histogram(uniformised(values), edges)[0] / len(values) == pytest.approx(0.05, abs=2e-3)
+    assert np.histogram(uniformised(values), edges)[0] / len(values) == pytest.approx(
+        0.05, abs=2e-3
+    )
     # In u, the map is a tent.
     u = uniformised(values)
     assert u[1:1000] == pytest.approx(1 - np.abs(1 - 2 * u[:999]), abs=1e-7)
@@ -48,7 +61,9 @@ def test_numbers_are_uniform_and_independent_where_the_raw_orbit_is_not() -> Non
     assert kstest(numbers, "uniform").pvalue > 1e-3
     for lag in (1, 3, 1023, 1025):
         assert dependence(numbers, lag) > 1e-3
-    apart = numbers[: 1024 * 290].reshape(290, 1024)  # an orbit's own numbers, one refill after the other
+    apart = numbers[: 1024 * 290].reshape(
+        290, 1024
+    )  # an orbit's own numbers, one refill after the other
     pairs = np.histogram2d(apart[:-1:2].ravel(), apart[1::2].ravel(), 16, [[0, 1], [0, 1]])[0]
     assert chisquare(pairs.ravel()).pvalue > 1e-3
     assert dependence(uniformised(orbit(0.1234, 300_000))) < 1e-100
@@ -59,7 +74,9 @@ def test_seeds_repeat_and_differ() -> None:
     assert np.array_equal(first, again)
     assert abs(np.corrcoef(first, other)[0, 1]) < 0.06
     pieces = ChaoticNumbers(1)
-    assert np.array_equal(np.concatenate([pieces.uniform((7, 3)).ravel(), pieces.uniform((979,))]), first[:1000])
+    assert np.array_equal(
+        np.concatenate([pieces.uniform((7, 3)).ravel(), pieces.uniform((979,))]), first[:1000]
+    )
 
 
 @pytest.mark.parametrize("start", DEGENERATE)

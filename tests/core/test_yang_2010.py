@@ -1,4 +1,6 @@
-"""Yang, Wang & Ahuja 2010: published figures, what the filter leaves invariant, and what it must leave alone."""
+"""Yang, Wang & Ahuja 2010: published figures, what the filter leaves invariant, and what it must
+leave alone.
+"""
 
 from pathlib import Path
 
@@ -22,10 +24,14 @@ from tests.core.separation_scenes import (
 )
 
 
-@pytest.mark.parametrize(("name", "published", "improved"), [("animals", 36.46, 37.3), ("cups", 37.50, 38.4)])
+@pytest.mark.parametrize(
+    ("name", "published", "improved"), [("animals", 36.46, 37.3), ("cups", 37.50, 38.4)]
+)
 def test_figures(shared: Path, name: str, published: float, improved: float) -> None:
     image, truth, mask = highlight_photo(shared, name)
-    assert psnr(yang_2010.separate(image, mask, VARIANTS["sihr"]), truth) == pytest.approx(published, abs=0.05)
+    assert psnr(yang_2010.separate(image, mask, VARIANTS["sihr"]), truth) == pytest.approx(
+        published, abs=0.05
+    )
     assert psnr(yang_2010.separate(image, mask), truth) > improved
 
 
@@ -55,12 +61,18 @@ def test_highlights_on_three_paints(variant: str) -> None:
 def test_matte_paint_is_left_alone(variant: str) -> None:
     _, diffuse, mask = glossy_disc()
     split = yang_2010.separate(diffuse, mask, VARIANTS[variant])
-    assert np.sqrt(np.mean(split.specular[mask] ** 2)) < 0.005 * np.sqrt(np.mean(diffuse[mask] ** 2))
+    assert np.sqrt(np.mean(split.specular[mask] ** 2)) < 0.005 * np.sqrt(
+        np.mean(diffuse[mask] ** 2)
+    )
 
 
-@pytest.mark.parametrize(("variant", "scale"), [("improved", 1000.0), ("improved", 1e-5), ("paper", 1.0)])
+@pytest.mark.parametrize(
+    ("variant", "scale"), [("improved", 1000.0), ("improved", 1e-5), ("paper", 1.0)]
+)
 def test_scale_and_surroundings_do_not_matter(variant: str, scale: float) -> None:
-    assert_scale_and_surroundings_do_not_matter(yang_2010.separate, VARIANTS[variant], scale, least=0.4)
+    assert_scale_and_surroundings_do_not_matter(
+        yang_2010.separate, VARIANTS[variant], scale, least=0.4
+    )
 
 
 @pytest.mark.parametrize("variant", list(VARIANTS))
@@ -75,7 +87,9 @@ def test_the_filter_is_a_mean_over_places_and_guide() -> None:
     guide = np.where(np.arange(used.sum()) % 2, 0.4, 0.9)
     grid = yang_2010._grid(used, used, guide, options)
     assert np.allclose(yang_2010._filtered(np.full(len(guide), 0.37), grid), 0.37)
-    assert np.allclose(yang_2010._filtered(guide, grid), guide)  # the two guides are too far apart to mix
+    assert np.allclose(
+        yang_2010._filtered(guide, grid), guide
+    )  # the two guides are too far apart to mix
     smooth = yang_2010._filtered(random.random(len(guide)), grid)
     assert smooth.std() < 0.05 and abs(smooth.mean() - 0.5) < 0.05
 
@@ -90,7 +104,14 @@ def test_refuses_what_it_cannot_use() -> None:
         yang_2010.separate(np.repeat(image[..., :1], 3, axis=2), mask)
     with pytest.raises(InputError, match="mask is empty"):
         yang_2010.separate(image, np.zeros_like(mask))
-    wrongs = [{"spatial_sigma": 0}, {"range_sigma": 0}, {"tolerance": 0}, {"rounds": 0}, {"dark": -1}, {"spatial_sigma": np.inf}]
+    wrongs = [
+        {"spatial_sigma": 0},
+        {"range_sigma": 0},
+        {"tolerance": 0},
+        {"rounds": 0},
+        {"dark": -1},
+        {"spatial_sigma": np.inf},
+    ]
     for wrong in wrongs:
         with pytest.raises(InputError, match="range_sigma"):
             yang_2010.separate(image, mask, Yang2010Options(**wrong))
@@ -102,7 +123,10 @@ def test_refuses_what_it_cannot_use() -> None:
 def test_black_pixels_have_no_chromaticity_in_single_precision_either(variant: str) -> None:
     image, _, mask = glossy_disc()
     image[40:50, 50:60] = 0
-    double, single = (yang_2010.separate(image.astype(kind), mask, VARIANTS[variant]) for kind in (np.float64, np.float32))
+    double, single = (
+        yang_2010.separate(image.astype(kind), mask, VARIANTS[variant])
+        for kind in (np.float64, np.float32)
+    )
     assert double.specular.max() > 0.4 and np.abs(single.specular - double.specular).max() < 1e-4
 
 

@@ -1,4 +1,6 @@
-"""Yoon, Choi & Kweon 2006: published figures, the exact end of its sweeps, and what it must leave alone."""
+"""Yoon, Choi & Kweon 2006: published figures, the exact end of its sweeps, and what it must leave
+alone.
+"""
 
 from pathlib import Path
 
@@ -24,10 +26,14 @@ from tests.core.separation_scenes import (
 )
 
 
-@pytest.mark.parametrize(("name", "published", "improved"), [("animals", 32.896, 37.5), ("cups", 33.296, 37.9)])
+@pytest.mark.parametrize(
+    ("name", "published", "improved"), [("animals", 32.896, 37.5), ("cups", 33.296, 37.9)]
+)
 def test_figures(shared: Path, name: str, published: float, improved: float) -> None:
     image, truth, mask = highlight_photo(shared, name)
-    assert psnr(yoon_2006.separate(image, mask, VARIANTS["sihr"]), truth) == pytest.approx(published, abs=0.01)
+    assert psnr(yoon_2006.separate(image, mask, VARIANTS["sihr"]), truth) == pytest.approx(
+        published, abs=0.01
+    )
     assert psnr(yoon_2006.separate(image, mask), truth) > improved
 
 
@@ -45,7 +51,9 @@ def test_pale_objects_are_left_alone(shared: Path, name: str) -> None:
     assert error_ratio(yoon_2006.separate(image, mask, VARIANTS["sihr"]), image, truth, mask) > 15
 
 
-@pytest.mark.parametrize(("variant", "most"), [("improved", 0.001), ("paper", 0.001), ("sihr", 0.02)])
+@pytest.mark.parametrize(
+    ("variant", "most"), [("improved", 0.001), ("paper", 0.001), ("sihr", 0.02)]
+)
 def test_highlights_on_three_paints(variant: str, most: float) -> None:
     image, diffuse, mask = glossy_disc()
     split = yoon_2006.separate(image, mask, VARIANTS[variant])
@@ -57,13 +65,17 @@ def test_highlights_on_three_paints(variant: str, most: float) -> None:
 def test_matte_paint_is_left_alone(variant: str) -> None:
     _, diffuse, mask = glossy_disc()
     split = yoon_2006.separate(diffuse, mask, VARIANTS[variant])
-    assert np.sqrt(np.mean(split.specular[mask] ** 2)) < 0.005 * np.sqrt(np.mean(diffuse[mask] ** 2))
+    assert np.sqrt(np.mean(split.specular[mask] ** 2)) < 0.005 * np.sqrt(
+        np.mean(diffuse[mask] ** 2)
+    )
 
 
 def noisy_disc() -> tuple[np.ndarray, np.ndarray]:
     image, _, mask = glossy_disc()
     random = np.random.default_rng(5)
-    return np.clip(image + random.normal(0, 0.02, image.shape), 0, None), mask & (random.random(mask.shape) > 0.3)
+    return np.clip(image + random.normal(0, 0.02, image.shape), 0, None), mask & (
+        random.random(mask.shape) > 0.3
+    )
 
 
 def test_sweeps_end_at_the_smallest_ratio_of_each_region() -> None:
@@ -85,7 +97,9 @@ def test_regions_are_those_of_a_flood_fill() -> None:
     yoon_2006._flatten(parent)
     labels, count = ndimage.label(pixels.known)
     assert count > 50
-    both = np.unique(np.stack([parent.reshape(mask.shape)[pixels.known], labels[pixels.known]]), axis=1)
+    both = np.unique(
+        np.stack([parent.reshape(mask.shape)[pixels.known], labels[pixels.known]]), axis=1
+    )
     assert both.shape[1] == count and len(np.unique(both[0])) == count
 
 
@@ -94,12 +108,18 @@ def test_quantiles_of_groups() -> None:
     group, values = random.integers(0, 7, 300) * 10**6, random.random(300)
     found = group_quantile(group, values, 0.35)
     for name in np.unique(group):
-        assert (found[group == name] == np.quantile(values[group == name], 0.35, method="lower")).all()
+        assert (
+            found[group == name] == np.quantile(values[group == name], 0.35, method="lower")
+        ).all()
 
 
-@pytest.mark.parametrize(("variant", "scale"), [("improved", 1000.0), ("improved", 1e-5), ("paper", 1.0)])
+@pytest.mark.parametrize(
+    ("variant", "scale"), [("improved", 1000.0), ("improved", 1e-5), ("paper", 1.0)]
+)
 def test_scale_and_surroundings_do_not_matter(variant: str, scale: float) -> None:
-    assert_scale_and_surroundings_do_not_matter(yoon_2006.separate, VARIANTS[variant], scale, least=0.4)
+    assert_scale_and_surroundings_do_not_matter(
+        yoon_2006.separate, VARIANTS[variant], scale, least=0.4
+    )
 
 
 @pytest.mark.parametrize("variant", list(VARIANTS))
@@ -117,7 +137,15 @@ def test_refuses_what_it_cannot_use() -> None:
         yoon_2006.separate(np.repeat(image[..., :1], 3, axis=2), mask)
     with pytest.raises(InputError, match="mask is empty"):
         yoon_2006.separate(image, np.zeros_like(mask))
-    for name, value in {"colour_step": 0, "dark": -1, "quantile": 2, "cells": 0, "window": 2, "sweeps": -1, "tolerance": -1}.items():
+    for name, value in {
+        "colour_step": 0,
+        "dark": -1,
+        "quantile": 2,
+        "cells": 0,
+        "window": 2,
+        "sweeps": -1,
+        "tolerance": -1,
+    }.items():
         with pytest.raises(InputError, match=name):
             yoon_2006.separate(image, mask, Yoon2006Options(**{name: value}))
     for variant in VARIANTS.values():

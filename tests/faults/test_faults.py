@@ -1,4 +1,6 @@
-"""The short part of benchmarks.faults: after any failure there is a whole output or what was there before, and one line says why."""
+"""The short part of benchmarks.faults: after any failure there is a whole output or what was there
+before, and one line says why.
+"""
 
 import hashlib
 import sys
@@ -18,7 +20,9 @@ from isc_core.exr import write_channels
 from isc_core.photo import read_photo
 from isc_core.pipeline import Settings, decompose
 
-pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="disks are made to fail as Linux has it")
+pytestmark = pytest.mark.skipif(
+    not sys.platform.startswith("linux"), reason="disks are made to fail as Linux has it"
+)
 DECOMPOSE, SEPARATE, _, MASK, _ = COMMANDS
 
 
@@ -32,9 +36,15 @@ def place(tmp_path: Path) -> Path:
     return tmp_path / "place"
 
 
-@pytest.mark.parametrize(("command", "each"), [(MASK, 1), (SEPARATE, 5), (DECOMPOSE, 16)], ids=lambda value: getattr(value, "name", ""))
+@pytest.mark.parametrize(
+    ("command", "each"),
+    [(MASK, 1), (SEPARATE, 5), (DECOMPOSE, 16)],
+    ids=lambda value: getattr(value, "name", ""),
+)
 @pytest.mark.parametrize("earlier", [False, True], ids=["nothing there", "earlier output"])
-def test_every_step_that_writes_may_fail(inputs: Path, place: Path, command: Command, each: int, earlier: bool) -> None:
+def test_every_step_that_writes_may_fail(
+    inputs: Path, place: Path, command: Command, each: int, earlier: bool
+) -> None:
     whole = reference(command, inputs, place)
     found = broken_steps(command, inputs, place, whole, earlier, each)
     assert len(found) > 2 and not any(found), found
@@ -46,7 +56,11 @@ def test_the_breaker_breaks(inputs: Path, place: Path) -> None:
     assert state(MASK, place / MASK.output, whole) == "whole"
     (place / MASK.output).write_bytes(b"half")
     assert state(MASK, place / MASK.output, whole).startswith("WRONG")
-    assert leftovers(place) == [] and one_line(1, "Traceback").startswith("WRONG") and not one_line(2, "isc: error: why\n")
+    assert (
+        leftovers(place) == []
+        and one_line(1, "Traceback").startswith("WRONG")
+        and not one_line(2, "isc: error: why\n")
+    )
 
 
 def test_files_that_may_not_grow(inputs: Path, place: Path) -> None:
@@ -56,7 +70,9 @@ def test_files_that_may_not_grow(inputs: Path, place: Path) -> None:
 
 
 @pytest.mark.parametrize("fault", [small_disks, read_only])
-def test_disks_that_take_nothing(inputs: Path, place: Path, fault: Callable[..., list[str] | None]) -> None:
+def test_disks_that_take_nothing(
+    inputs: Path, place: Path, fault: Callable[..., list[str] | None]
+) -> None:
     found = fault(MASK, inputs, place, reference(MASK, inputs, place))
     if found is None:
         pytest.skip("mounting needs rights that this user does not have")
@@ -84,7 +100,9 @@ def test_a_photo_that_changes_all_the_while(inputs: Path, place: Path, kind: str
 
 
 @pytest.mark.parametrize("kind", ["png", "exr", "npy"])
-def test_the_sum_is_of_the_bytes_that_were_used(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+def test_the_sum_is_of_the_bytes_that_were_used(
+    inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
     """The file is exchanged as soon as it was read: nothing may look at it again."""
     images = [read_photo(inputs / f"{name}.png").image for name in ("photo", "other")]
     paths = [tmp_path / f"{name}.{kind}" for name in ("photo", "other")]
@@ -106,11 +124,19 @@ def test_the_sum_is_of_the_bytes_that_were_used(inputs: Path, tmp_path: Path, mo
 
     monkeypatch.setattr(Path, "read_bytes", exchanged)
     photo = read_photo(paths[0])
-    assert photo.original.sha256 == hashlib.sha256(first).hexdigest() != hashlib.sha256(second).hexdigest()
-    assert np.allclose(photo.image, images[0], atol=1e-6) and not np.allclose(photo.image, images[1], atol=1e-2)
+    assert (
+        photo.original.sha256
+        == hashlib.sha256(first).hexdigest()
+        != hashlib.sha256(second).hexdigest()
+    )
+    assert np.allclose(photo.image, images[0], atol=1e-6) and not np.allclose(
+        photo.image, images[1], atol=1e-2
+    )
 
 
-def test_an_edit_of_a_photo_that_changes_is_refused(inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_edit_of_a_photo_that_changes_is_refused(
+    inputs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """It is read twice: as light, and as the values of its file."""
     photo = tmp_path / "photo.png"
     photo.write_bytes((inputs / "photo.png").read_bytes())
@@ -122,9 +148,21 @@ def test_an_edit_of_a_photo_that_changes_is_refused(inputs: Path, tmp_path: Path
         return found
 
     monkeypatch.setattr("isc_core.commands.edit.read_photo", exchanged)
-    given = ["--photo", str(photo), "--mask", str(inputs / "mask.png"), "--quiet", "-o", str(tmp_path / "out")]
+    given = [
+        "--photo",
+        str(photo),
+        "--mask",
+        str(inputs / "mask.png"),
+        "--quiet",
+        "-o",
+        str(tmp_path / "out"),
+    ]
     code, _, text = run(["edit", str(inputs / "result"), "relight", *given])
-    assert not one_line(code, text) and "changed while it was read" in text and not (tmp_path / "out").exists()
+    assert (
+        not one_line(code, text)
+        and "changed while it was read" in text
+        and not (tmp_path / "out").exists()
+    )
 
 
 def test_a_black_photo_cannot_be_decomposed(inputs: Path) -> None:
@@ -136,7 +174,9 @@ def test_a_black_photo_cannot_be_decomposed(inputs: Path) -> None:
 
 
 def test_a_few_bright_pixels_have_a_step(tmp_path: Path) -> None:
-    """Fewer than a thousandth of the object's: the 99.9th percentile is black, and its logarithm has no floor."""
+    """Fewer than a thousandth of the object's: the 99.9th percentile is black, and its logarithm
+    has no floor.
+    """
     image = np.zeros((60, 60, 3), np.float32)
     image[30, 30] = [0.5, 0.25, 0.125]
     np.save(tmp_path / "spark.npy", np.concatenate([image, np.ones((60, 60, 1), np.float32)], -1))
@@ -158,7 +198,13 @@ def test_a_campaign_goes_on_where_it_was_stopped(
     done.write_text(f"{row}\n{row[:20]}")
     monkeypatch.setattr(sys, "argv", ["faults", "-o", str(tmp_path), "--only", "10,000"])
     pytest.importorskip("distributed")
-    monkeypatch.setattr(faults, "many_images", lambda place, count: many_images(place, count // 100))
+    monkeypatch.setattr(
+        faults, "many_images", lambda place, count: many_images(place, count // 100)
+    )
     assert faults.main() == 1, "what was wrong before is still told"
     text = capsys.readouterr().out
-    assert "| kill -9 | mask | 1 | 1 |" in text and "| 10,000 images in one folder | batch | 1 | 0 |" in text and "WRONG: half" in text
+    assert (
+        "| kill -9 | mask | 1 | 1 |" in text
+        and "| 10,000 images in one folder | batch | 1 | 0 |" in text
+        and "WRONG: half" in text
+    )

@@ -1,4 +1,6 @@
-"""Writing by several processes at once, and after some were killed: one whole result, and nothing left behind."""
+"""Writing by several processes at once, and after some were killed: one whole result, and nothing
+left behind.
+"""
 
 import ctypes
 import os
@@ -41,8 +43,12 @@ def make(folder: Path, content: str) -> None:
 
 def killed(target: Path, *, kind: str = "new_folder", before: str = "", inside: str = KILL) -> None:
     """A process that is killed by force while it writes `target`."""
-    script = KILLED.format(kind=kind, before=before, inside=inside, ours=f", {OURS!r}" if kind == "new_folder" else "")
-    done = subprocess.run([sys.executable, "-c", script, str(target)], cwd=ROOT, check=False, timeout=60)
+    script = KILLED.format(
+        kind=kind, before=before, inside=inside, ours=f", {OURS!r}" if kind == "new_folder" else ""
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(target)], cwd=ROOT, check=False, timeout=60
+    )
     assert done.returncode == -signal.SIGKILL
 
 
@@ -83,9 +89,13 @@ def replace(source, target):
 os.replace = replace
 """
     killed(target, before=before, inside="(partial / 'data.bin').write_text('half')")
-    assert not target.exists() and {path.suffix for path in unfinished(target)} == {".old", ".partial"}
+    assert not target.exists() and {path.suffix for path in unfinished(target)} == {
+        ".old",
+        ".partial",
+    }
     with pytest.raises(ZeroDivisionError), new_folder(target, OURS):
-        raise ZeroDivisionError  # whatever becomes of the next one that writes there, the old one is back
+        # whatever becomes of the next one that writes there, the old one is back
+        raise ZeroDivisionError
     assert (target / "mark.json").read_text() == "old"
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
@@ -116,7 +126,9 @@ def test_the_one_at_work_is_left_alone(tmp_path: Path) -> None:
 def test_who_tidies_while_another_writes_never_spoils_a_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, locks: bool, kept: str
 ) -> None:
-    """As a batch does that begins while a worker of a killed one is at its last image: to remove takes a while."""
+    """As a batch does that begins while a worker of a killed one is at its last image: to remove
+    takes a while.
+    """
     target, begun = tmp_path / "out", []
     make(target, "old")
     if not locks:
@@ -125,7 +137,9 @@ def test_who_tidies_while_another_writes_never_spoils_a_result(
         for name in OURS:
             (partial / name).write_text("new")
         with monkeypatch.context() as patched:
-            patched.setattr(atomic, "_remove", lambda entry: begun.append((entry, os.open(entry, os.O_RDONLY))))
+            patched.setattr(
+                atomic, "_remove", lambda entry: begun.append((entry, os.open(entry, os.O_RDONLY)))
+            )
             remove_unfinished(target)
     for entry, descriptor in begun:
         for name in OURS:
@@ -137,8 +151,12 @@ def test_who_tidies_while_another_writes_never_spoils_a_result(
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
 
 
-def hammered(target: Path, write: Callable[[str], None], read: Callable[[], set[str]], times: int) -> list[str]:
-    """Several threads write `target` at once, and one reads it; what readers saw that was not whole, and what was refused."""
+def hammered(
+    target: Path, write: Callable[[str], None], read: Callable[[], set[str]], times: int
+) -> list[str]:
+    """Several threads write `target` at once, and one reads it; what readers saw that was not
+    whole, and what was refused.
+    """
     trouble: list[str] = []
     done = threading.Event()
 
@@ -234,7 +252,9 @@ def test_a_device_is_never_replaced() -> None:
     assert Path("/dev/null").is_char_device()
 
 
-def test_what_reaches_the_disk_only_at_the_end_may_fail_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_reaches_the_disk_only_at_the_end_may_fail_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Network disks and quotas say at the end only that there was no room."""
 
     def full(descriptor: int) -> None:

@@ -1,4 +1,6 @@
-"""Any name that the disk takes is good for photos, masks and outputs; what is written and printed stays readable."""
+"""Any name that the disk takes is good for photos, masks and outputs; what is written and printed
+stays readable.
+"""
 
 import json
 import os
@@ -57,10 +59,15 @@ def ran(capfd: pytest.CaptureFixture[str], *words: object) -> str:
 
 
 @named
-def test_photo_mask_and_output(tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes) -> None:
+def test_photo_mask_and_output(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes
+) -> None:
     photo = moved(ball_photo(tmp_path), place(tmp_path, name, b".png"))
     codes = ball_codes()
-    mask = moved(write_image(tmp_path / "mask.png", (codes.max(-1) > 0) * codes.dtype.type(65535)), place(tmp_path, name, b".mask.png"))
+    mask = moved(
+        write_image(tmp_path / "mask.png", (codes.max(-1) > 0) * codes.dtype.type(65535)),
+        place(tmp_path, name, b".mask.png"),
+    )
     output = place(tmp_path, name)
     words = (f"./{os.path.relpath(photo, tmp_path)}", "--mask", mask)
     os.chdir(tmp_path)
@@ -73,8 +80,24 @@ def test_photo_mask_and_output(tmp_path: Path, capfd: pytest.CaptureFixture[str]
     described["input"]["name"].encode()
     ran(capfd, "separate", *words, "--method", "shen_2013", "-o", output / "layers")
     assert read_channels(output / "layers" / "separation.exr")
-    ran(capfd, "edit", output / "result", "relight", "--yaw", "40", "--photo", photo, "--mask", mask, "-o", output / "turned")
-    assert "photo" in json.loads((output / "turned" / "edit.json").read_text(encoding="utf-8"))["parameters"]
+    ran(
+        capfd,
+        "edit",
+        output / "result",
+        "relight",
+        "--yaw",
+        "40",
+        "--photo",
+        photo,
+        "--mask",
+        mask,
+        "-o",
+        output / "turned",
+    )
+    assert (
+        "photo"
+        in json.loads((output / "turned" / "edit.json").read_text(encoding="utf-8"))["parameters"]
+    )
     Image.open(output / "turned" / "before_after.png").load()
     ran(capfd, "mask", photo, "--box", "3,3,50,46", "-o", output / f"{output.name[:60]}.png")
     ran(capfd, "arrays", output / "result")
@@ -82,15 +105,28 @@ def test_photo_mask_and_output(tmp_path: Path, capfd: pytest.CaptureFixture[str]
 
 
 @named
-def test_a_photo_of_floats_too(tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes) -> None:
-    ran(capfd, "decompose", ball_photo(tmp_path), "--model", "naive", "--quiet", "-o", tmp_path / "first")
+def test_a_photo_of_floats_too(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes
+) -> None:
+    ran(
+        capfd,
+        "decompose",
+        ball_photo(tmp_path),
+        "--model",
+        "naive",
+        "--quiet",
+        "-o",
+        tmp_path / "first",
+    )
     photo = moved(tmp_path / "first" / "maps" / "diffuse.exr", place(tmp_path, name, b".exr"))
     ran(capfd, "separate", photo, "--method", "none", "--quiet", "-o", tmp_path / "out")
     assert read_channels(tmp_path / "out" / "separation.exr")
 
 
 @named
-def test_a_refusal_names_it_on_one_line(tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes) -> None:
+def test_a_refusal_names_it_on_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes
+) -> None:
     photo = place(tmp_path, name, b".png")
     assert main(["separate", str(photo), "-o", str(tmp_path / "out")]) == 2
     out, err = capfd.readouterr()
@@ -111,13 +147,17 @@ def test_a_terminal_of_any_coding_is_told(tmp_path: Path, coding: str) -> None:
 
 def test_what_can_be_read_stays() -> None:
     assert readable("Grüße 杯 קפה émoji 👩‍🔧.png") == "Grüße 杯 קפה émoji 👩‍🔧.png"
-    assert readable("a\nb\t\x1b\u2028\u202e\udce9\ud800") == "a\\nb\\t\\x1b\\u2028\\u202e\\xe9\\ud800"
+    assert (
+        readable("a\nb\t\x1b\u2028\u202e\udce9\ud800") == "a\\nb\\t\\x1b\\u2028\\u202e\\xe9\\ud800"
+    )
 
 
-# --- names that are the input's own ------------------------------------------------------------------------------------------------------
+# --- names that are the input's own ---------------------------------------------------------------
 
 
-def test_a_mask_never_takes_the_photos_place(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_mask_never_takes_the_photos_place(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     photo = ball_photo(tmp_path)
     before = photo.read_bytes()
     (tmp_path / "link.png").symlink_to(photo)
@@ -128,8 +168,14 @@ def test_a_mask_never_takes_the_photos_place(tmp_path: Path, capfd: pytest.Captu
     assert photo.read_bytes() == before
 
 
-@pytest.mark.parametrize("command", [("decompose", "--model", "naive"), ("separate", "--method", "none")], ids=lambda c: c[0])
-def test_the_photos_own_folder_is_no_output(tmp_path: Path, capfd: pytest.CaptureFixture[str], command: tuple[str, ...]) -> None:
+@pytest.mark.parametrize(
+    "command",
+    [("decompose", "--model", "naive"), ("separate", "--method", "none")],
+    ids=lambda c: c[0],
+)
+def test_the_photos_own_folder_is_no_output(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], command: tuple[str, ...]
+) -> None:
     (tmp_path / "photos").mkdir()
     (tmp_path / "link").symlink_to(tmp_path / "photos")
     photo = ball_photo(tmp_path / "photos")
@@ -139,9 +185,26 @@ def test_the_photos_own_folder_is_no_output(tmp_path: Path, capfd: pytest.Captur
     assert [path.name for path in (tmp_path / "photos").iterdir()] == ["ball.png"]
 
 
-def test_a_result_that_holds_the_photo_is_not_replaced(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """A picture of an earlier result, decomposed into that result's own folder, would be deleted by it."""
-    assert main(["decompose", str(ball_photo(tmp_path)), "--model", "naive", "--quiet", "-o", str(tmp_path / "out")]) == 0
+def test_a_result_that_holds_the_photo_is_not_replaced(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """A picture of an earlier result, decomposed into that result's own folder, would be deleted by
+    it.
+    """
+    assert (
+        main(
+            [
+                "decompose",
+                str(ball_photo(tmp_path)),
+                "--model",
+                "naive",
+                "--quiet",
+                "-o",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 0
+    )
     inside = tmp_path / "out" / "maps" / "diffuse.exr"
     before = inside.read_bytes()
     for command in (("decompose", "--model", "naive"), ("separate", "--method", "none")):

@@ -13,7 +13,9 @@ from benchmarks.fuzzing.case import Case, Target
 from benchmarks.fuzzing.mutation import mutated
 from isc_core.errors import InputError
 
-linux = pytest.mark.skipif(not Path("/proc/self/clear_refs").exists(), reason="limits and sums come from Linux' kernel")
+linux = pytest.mark.skipif(
+    not Path("/proc/self/clear_refs").exists(), reason="limits and sums come from Linux' kernel"
+)
 INPUTS = 250
 
 
@@ -22,11 +24,16 @@ def test_no_reader_lets_anything_but_its_own_error_out(tmp_path: Path) -> None:
     names = list(targets.TARGETS)
     found = Campaign.opened(tmp_path, names, seed=1, inputs=INPUTS)
     found.run(names)
-    told = {path.parent.name: path.read_text(encoding="utf-8") for path in tmp_path.glob("*/finding.json")}
+    told = {
+        path.parent.name: path.read_text(encoding="utf-8")
+        for path in tmp_path.glob("*/finding.json")
+    }
     assert not told, "\n".join(told.values())
     for name, state in found.states.items():
         assert state.done == INPUTS
-        assert INPUTS * 0.2 < state.refused < INPUTS, f"{name}: the damage is too small or too large to say anything"
+        assert INPUTS * 0.2 < state.refused < INPUTS, (
+            f"{name}: the damage is too small or too large to say anything"
+        )
         assert state.most < 2 << 30
     assert table(found.states).count("\n") == len(names) + 1
 
@@ -85,11 +92,18 @@ worker.main()
 
 @linux
 @pytest.mark.parametrize("kind", ["exception", "noise", "memory", "crash", "hang"])
-def test_a_campaign_finds_every_kind_of_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str) -> None:
+def test_a_campaign_finds_every_kind_of_fault(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str
+) -> None:
     script = tmp_path / "faulty.py"
     script.write_text(FAULTY, encoding="utf-8")
     known = {"faulty": Target("faulty", lambda: (Case("a.bin", SOUND, Path.read_bytes),))}
-    for name, value in {"TARGETS": known, "WORKER": (str(script), kind), "HANG": 0.3, "_TRIES": 2}.items():
+    for name, value in {
+        "TARGETS": known,
+        "WORKER": (str(script), kind),
+        "HANG": 0.3,
+        "_TRIES": 2,
+    }.items():
         monkeypatch.setattr(campaign, name, value)
     run = Campaign.opened(tmp_path / "out", ["faulty"], seed=0, inputs=2)
     run.run(["faulty"])
@@ -117,6 +131,8 @@ def test_damage_changes_much_and_stays_small() -> None:
 
 def test_minimising_keeps_the_finding() -> None:
     found = Finding("exception", "somewhere", "")
-    small = minimised(b"abcXdefgh" * 5, found, lambda data: found if b"X" in data else None, tries=1000)
+    small = minimised(
+        b"abcXdefgh" * 5, found, lambda data: found if b"X" in data else None, tries=1000
+    )
     assert small == b"X"
     assert minimised(b"a" * 10_000, found, lambda data: None, tries=5) == b"a" * 10_000

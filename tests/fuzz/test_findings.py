@@ -1,4 +1,6 @@
-"""What fuzzing found, and what files can claim: each kept as a small file that has to be refused in one quiet line."""
+"""What fuzzing found, and what files can claim: each kept as a small file that has to be refused in
+one quiet line.
+"""
 
 import io
 import json
@@ -43,7 +45,9 @@ from synth.validation.folder import FILES, _ours
 def refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Callable[..., None]:
     """Gives a reader a file; it has to raise `InputError` with `words`, and to print nothing."""
 
-    def check(read: Callable[[Path], object], name: str, data: bytes, words: str, **beside: bytes) -> None:
+    def check(
+        read: Callable[[Path], object], name: str, data: bytes, words: str, **beside: bytes
+    ) -> None:
         for other, content in beside.items():
             (tmp_path / other.replace("_", ".")).write_bytes(content)
         (tmp_path / name).write_bytes(data)
@@ -66,16 +70,23 @@ def archive(kind: int = zipfile.ZIP_DEFLATED, **members: bytes) -> bytes:
 def header(text: str, version: int = 1) -> bytes:
     """The start of a `.npy` file with any text in its header."""
     coded_text = text.encode("latin-1")
-    return b"\x93NUMPY" + bytes([version, 0]) + struct.pack("<H" if version == 1 else "<I", len(coded_text)) + coded_text
+    return (
+        b"\x93NUMPY"
+        + bytes([version, 0])
+        + struct.pack("<H" if version == 1 else "<I", len(coded_text))
+        + coded_text
+    )
 
 
-# --- pictures ---------------------------------------------------------------------------------------------------------------------------
+# --- pictures -------------------------------------------------------------------------------------
 
 PLANES = {name: ball()[..., k].astype(np.float32) for k, name in enumerate("RGB")}
 
 
 @pytest.mark.parametrize("read", [read_channels, read_photo])
-def test_damaged_pixels_of_an_exr_are_refused_quietly(refused: Callable[..., None], read: Callable[[Path], object]) -> None:
+def test_damaged_pixels_of_an_exr_are_refused_quietly(
+    refused: Callable[..., None], read: Callable[[Path], object]
+) -> None:
     data = bytearray(exr(PLANES))
     data[-300:-200] = bytes(100)
     refused(read, "a.exr", bytes(data), "readable|damaged")
@@ -108,11 +119,20 @@ def test_deep_exr_and_strange_channels_are_refused(refused: Callable[..., None])
     refused(read_channels, "a.exr", data[:5] + bytes([data[5] | 8]) + data[6:], "deep")
     at = data.index(b"channels\0chlist\0") + 20
     sampling = at + 2 + 8
-    refused(read_channels, "a.exr", data[:sampling] + struct.pack("<ii", 0, 0) + data[sampling + 8 :], "coarsely")
-    refused(read_channels, "a.exr", data[: at + 2] + struct.pack("<i", 7) + data[at + 6 :], "readable")
+    refused(
+        read_channels,
+        "a.exr",
+        data[:sampling] + struct.pack("<ii", 0, 0) + data[sampling + 8 :],
+        "coarsely",
+    )
+    refused(
+        read_channels, "a.exr", data[: at + 2] + struct.pack("<i", 7) + data[at + 6 :], "readable"
+    )
 
 
-def test_the_limit_of_pixels_is_held_before_decoding(refused: Callable[..., None], tmp_path: Path) -> None:
+def test_the_limit_of_pixels_is_held_before_decoding(
+    refused: Callable[..., None], tmp_path: Path
+) -> None:
     few = Limits(max_pixels=400)
     for suffix, pixels in (
         (".png", codes(16)),
@@ -122,15 +142,20 @@ def test_the_limit_of_pixels_is_held_before_decoding(refused: Callable[..., None
         (".hdr", ball().astype(np.float32)),
     ):
         refused(
-            lambda path: read_photo(path, whole_frame=True, limits=few), f"a{suffix}", coded(suffix, pixels), "20 x 24 pixels.*--max-pixels"
+            lambda path: read_photo(path, whole_frame=True, limits=few),
+            f"a{suffix}",
+            coded(suffix, pixels),
+            "20 x 24 pixels.*--max-pixels",
         )
     for name, data in (("a.exr", exr(PLANES)), ("a.npy", array(codes()))):
-        refused(lambda path: read_linear(path, limits=few), name, data, "20 x 24 pixels.*--max-pixels")
+        refused(
+            lambda path: read_linear(path, limits=few), name, data, "20 x 24 pixels.*--max-pixels"
+        )
     (tmp_path / "photo.png").write_bytes(coded(".png", codes()))
     assert read_photo(tmp_path / "photo.png", limits=Limits(max_pixels=480)).mask.any()
 
 
-# --- numbers ----------------------------------------------------------------------------------------------------------------------------
+# --- numbers --------------------------------------------------------------------------------------
 
 HEADERS = {
     "unfinished": "{'descr': '<f4', 'fortran_order': False, 'shape': (",
@@ -146,7 +171,9 @@ HEADERS = {
 
 @pytest.mark.parametrize("case", HEADERS)
 @pytest.mark.parametrize("version", [1, 2])
-def test_headers_of_arrays_are_not_believed(refused: Callable[..., None], case: str, version: int) -> None:
+def test_headers_of_arrays_are_not_believed(
+    refused: Callable[..., None], case: str, version: int
+) -> None:
     data = header(HEADERS[case], version) + bytes(64)
     refused(read_array, "a.npy", data, "not a readable array")
     refused(read_photo, "a.npy", data, "damaged|values of type|an array of shape|objects|pixels")
@@ -172,16 +199,31 @@ def test_a_matrix_may_not_claim_more_than_it_holds(refused: Callable[..., None])
     shape = data.index(struct.pack("<ii", 3, 3))
     data[shape : shape + 8] = struct.pack("<ii", 2**31 - 1, 2**31 - 1)
     for wrapped in (bytes(data), deflated(bytes(data))):
-        refused(lambda path: read_matrix(path, "depth"), "a.mat", wrapped, "not a readable MATLAB file")
+        refused(
+            lambda path: read_matrix(path, "depth"), "a.mat", wrapped, "not a readable MATLAB file"
+        )
     deep: object = np.zeros(2)
     for _ in range(30):
         deep = {"depth": deep}
-    refused(lambda path: read_matrix(path, "depth", "depth"), "a.mat", matlab({"depth": deep}, packed=True), "readable|lacks")
-    refused(lambda path: read_matrix(path, "depth"), "a.mat", matlab({"depth": "text"}, packed=True), "not a readable MATLAB file")
+    refused(
+        lambda path: read_matrix(path, "depth", "depth"),
+        "a.mat",
+        matlab({"depth": deep}, packed=True),
+        "readable|lacks",
+    )
+    refused(
+        lambda path: read_matrix(path, "depth"),
+        "a.mat",
+        matlab({"depth": "text"}, packed=True),
+        "not a readable MATLAB file",
+    )
 
 
 def test_matrices_are_read_as_they_were_written(tmp_path: Path) -> None:
-    values = {"depth": np.arange(6.0).reshape(2, 3), "s": {"a": np.arange(4, dtype=np.int16).reshape(2, 2), "b": "x", "c": {"d": 7.5}}}
+    values = {
+        "depth": np.arange(6.0).reshape(2, 3),
+        "s": {"a": np.arange(4, dtype=np.int16).reshape(2, 2), "b": "x", "c": {"d": 7.5}},
+    }
     for packed in (False, True):
         (tmp_path / "a.mat").write_bytes(matlab(values, packed=packed))
         np.testing.assert_array_equal(read_matrix(tmp_path / "a.mat", "depth"), values["depth"])
@@ -191,21 +233,40 @@ def test_matrices_are_read_as_they_were_written(tmp_path: Path) -> None:
     assert load_natural_lights(tmp_path).shape == (9, 3, 2)
 
 
-def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(refused: Callable[..., None]) -> None:
+def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(
+    refused: Callable[..., None],
+) -> None:
     table = shipped_table()
-    members = {"spread": table.spread, "without": table.without, "highlight": table.highlight, "temperature": np.array(table.temperature)}
+    members = {
+        "spread": table.spread,
+        "without": table.without,
+        "highlight": table.highlight,
+        "temperature": np.array(table.temperature),
+    }
     broken = np.array(table.spread, np.float64)
     broken[0] = np.nan
-    refused(read_table, "a.npz", archive(**{key: array(np.asarray(v)) for key, v in (members | {"spread": broken}).items()}), "a.npz")
+    refused(
+        read_table,
+        "a.npz",
+        archive(**{key: array(np.asarray(v)) for key, v in (members | {"spread": broken}).items()}),
+        "a.npz",
+    )
     weights = {"weight00": np.full((3, 3), np.nan, np.float32), "bias00": np.zeros(3, np.float32)}
     for read in (read_network, read_appearance, read_lamp_network):
-        refused(read, "a.npz", archive(**{key: array(value) for key, value in weights.items()}), "not finite")
+        refused(
+            read,
+            "a.npz",
+            archive(**{key: array(value) for key, value in weights.items()}),
+            "not finite",
+        )
 
 
-# --- descriptions -----------------------------------------------------------------------------------------------------------------------
+# --- descriptions ---------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("text", ["[" * 100_000, "{" * 100_000, '{"a":' * 100_000, "\ufeff{", "1" * 10_000, "", "\0"])
+@pytest.mark.parametrize(
+    "text", ["[" * 100_000, "{" * 100_000, '{"a":' * 100_000, "\ufeff{", "1" * 10_000, "", "\0"]
+)
 def test_json_that_is_none_is_refused(refused: Callable[..., None], text: str) -> None:
     refused(read_json, "a.json", text.encode(), "a.json")
     refused(read_light, "a.json", text.encode(), "a.json")
@@ -222,7 +283,7 @@ def test_what_files_say_cannot_steer_the_terminal(name: str) -> None:
     assert str(InputError("Größe 5 °: “x”")) == "Größe 5 °: “x”"
 
 
-# --- meshes -----------------------------------------------------------------------------------------------------------------------------
+# --- meshes ---------------------------------------------------------------------------------------
 
 CUBE = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 {z}\nv 1 0 1\nv 1 1 1\nv 0 1 1
 f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n"""
@@ -231,20 +292,41 @@ PLY = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty floa
 
 def test_meshes_that_trip_the_loader_are_refused(refused: Callable[..., None]) -> None:
     refused(read_mesh_file, "a.ply", PLY, "a.ply")
-    refused(read_mesh_file, "a.ply", PLY.replace(b"face 1", b"face 1\nproperty list uchar"), "a.ply")
+    refused(
+        read_mesh_file, "a.ply", PLY.replace(b"face 1", b"face 1\nproperty list uchar"), "a.ply"
+    )
     refused(read_mesh_file, "a.obj", CUBE.format(z="1e160").encode(), "a.obj")
     refused(read_mesh_file, "a.obj", CUBE.format(z="1e30").encode(), "deeper than wide")
-    refused(read_mesh_file, "a.stl", b"solid a\nfacet normal 0 0 1\nouter loop\nvertex a b c\nendloop\nendfacet\nendsolid\n", "a.stl")
+    refused(
+        read_mesh_file,
+        "a.stl",
+        b"solid a\nfacet normal 0 0 1\nouter loop\nvertex a b c\nendloop\nendfacet\nendsolid\n",
+        "a.stl",
+    )
     accessor = {"componentType": 5126, "count": 1, "type": "VEC3"}
-    strange = {"asset": {"version": "2.0"}, "accessors": [accessor | {"bufferView": 5}], "bufferViews": [], "meshes": []}
+    strange = {
+        "asset": {"version": "2.0"},
+        "accessors": [accessor | {"bufferView": 5}],
+        "bufferViews": [],
+        "meshes": [],
+    }
     refused(read_mesh_file, "a.glb", glb(json.dumps(strange).encode(), b""), "a.glb")
     for count in (2**31, -1, "many", 1e999):
         claims = {"asset": {"version": "2.0"}, "accessors": [accessor | {"count": count}]}
-        refused(read_mesh_file, "a.glb", glb(json.dumps(claims).encode(), b""), "claims more than|readable")
+        refused(
+            read_mesh_file,
+            "a.glb",
+            glb(json.dumps(claims).encode(), b""),
+            "claims more than|readable",
+        )
 
 
-def test_vertices_that_no_face_uses_are_no_matter(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "a.obj").write_text(CUBE.format(z=1).replace("f", "v 1e300 -1e308 nan\nf", 1), encoding="utf-8")
+def test_vertices_that_no_face_uses_are_no_matter(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "a.obj").write_text(
+        CUBE.format(z=1).replace("f", "v 1e300 -1e308 nan\nf", 1), encoding="utf-8"
+    )
     assert np.abs(read_mesh_file(tmp_path / "a.obj").mesh.vertices).max() <= 1
     assert capfd.readouterr() == ("", "")
 
@@ -256,17 +338,38 @@ def huge_number(text: bytes, key: bytes) -> bytes:
 
 def test_whole_numbers_of_any_length_are_refused(refused: Callable[..., None]) -> None:
     result, scene = data_files._result(), data_files._scene()["scene.json"]
-    beside = {name.replace(".", "_"): data for name, data in result.items() if name != "decomposition.json"}
+    beside = {
+        name.replace(".", "_"): data
+        for name, data in result.items()
+        if name != "decomposition.json"
+    }
     for key in (b"coefficients", b"scale", b"alpha", b"cone_68_degrees"):
         damaged = huge_number(result["decomposition.json"], key)
         refused(lambda path: load(path.parent), "decomposition.json", damaged, "damaged", **beside)
-    refused(lambda path: read_facts(path.parent), "scene.json", huge_number(scene, b"specular_share"), "specular_share")
+    refused(
+        lambda path: read_facts(path.parent),
+        "scene.json",
+        huge_number(scene, b"specular_share"),
+        "specular_share",
+    )
     bounds = b'{"schema_version": 1, "bounds": [{"stage": "a", "metric": "b", "kind": "c", "value": "d", "limit": 1}]}'
     refused(read_bounds, "bounds.json", huge_number(bounds, b"limit"), "has to be a number")
 
 
-@pytest.mark.parametrize("given", [{"scale": 0}, {"scale": "1"}, {"size": [0, 1]}, {"size": "ab"}, {"bit_depth": None}, {"name": 3}])
-def test_what_a_result_says_of_its_photo_is_checked(refused: Callable[..., None], given: dict[str, object]) -> None:
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"scale": 0},
+        {"scale": "1"},
+        {"size": [0, 1]},
+        {"size": "ab"},
+        {"bit_depth": None},
+        {"name": 3},
+    ],
+)
+def test_what_a_result_says_of_its_photo_is_checked(
+    refused: Callable[..., None], given: dict[str, object]
+) -> None:
     result = dict(data_files._result())
     described = json.loads(result.pop("decomposition.json"))
     described["input"] |= given
@@ -280,7 +383,9 @@ def test_what_a_result_says_of_its_photo_is_checked(refused: Callable[..., None]
     )
 
 
-TEXTURED = b"mtllib a.mtl\nusemtl a\n" + CUBE.format(z=1).replace("f ", "vt 0.1 0.2\nf ", 1).encode()
+TEXTURED = (
+    b"mtllib a.mtl\nusemtl a\n" + CUBE.format(z=1).replace("f ", "vt 0.1 0.2\nf ", 1).encode()
+)
 
 
 def test_textures_are_pictures_of_a_bearable_size(refused: Callable[..., None]) -> None:
@@ -293,15 +398,29 @@ def test_textures_are_pictures_of_a_bearable_size(refused: Callable[..., None]) 
     for data in (bomb, program, picture[:70] + bytes(9) + picture[79:]):
         refused(read_mesh_file, "a.obj", TEXTURED, "a.obj|a.png", a_mtl=material, a_png=data)
     for outside in (b"../secret.png", b"/etc/hostname", b"..\\secret.png"):
-        refused(read_mesh_file, "a.obj", TEXTURED, "not in its folder", a_mtl=b"newmtl a\nmap_Kd " + outside + b"\n")
+        refused(
+            read_mesh_file,
+            "a.obj",
+            TEXTURED,
+            "not in its folder",
+            a_mtl=b"newmtl a\nmap_Kd " + outside + b"\n",
+        )
 
 
 @pytest.mark.parametrize("uv", ["nan nan", "1e300 -1e300", "inf 0"])
-def test_texture_coordinates_without_end_are_quiet(tmp_path: Path, capfd: pytest.CaptureFixture[str], uv: str) -> None:
+def test_texture_coordinates_without_end_are_quiet(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], uv: str
+) -> None:
     text = CUBE.format(z=1)
-    faces = "\n".join("f " + " ".join(f"{k}/1" for k in line[2:].split()) for line in text.splitlines() if line.startswith("f"))
+    faces = "\n".join(
+        "f " + " ".join(f"{k}/1" for k in line[2:].split())
+        for line in text.splitlines()
+        if line.startswith("f")
+    )
     vertices = "\n".join(line for line in text.splitlines() if line.startswith("v"))
-    (tmp_path / "a.obj").write_text(f"mtllib a.mtl\nusemtl a\n{vertices}\nvt {uv}\n{faces}\n", encoding="utf-8")
+    (tmp_path / "a.obj").write_text(
+        f"mtllib a.mtl\nusemtl a\n{vertices}\nvt {uv}\n{faces}\n", encoding="utf-8"
+    )
     (tmp_path / "a.mtl").write_bytes(b"newmtl a\nmap_Kd a.png\n")
     (tmp_path / "a.png").write_bytes(coded(".png", codes()))
     found = read_mesh_file(tmp_path / "a.obj", painted=16)
@@ -309,11 +428,18 @@ def test_texture_coordinates_without_end_are_quiet(tmp_path: Path, capfd: pytest
     assert capfd.readouterr() == ("", "")
 
 
-# --- paths and pages --------------------------------------------------------------------------------------------------------------------
+# --- paths and pages ------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
-    "name", ["evidence/../mine.exr", "evidence/a/../../../x.exr", "/etc/x.exr", "evidence/.hidden/x.exr", "evidence\\a\\x.exr"]
+    "name",
+    [
+        "evidence/../mine.exr",
+        "evidence/a/../../../x.exr",
+        "/etc/x.exr",
+        "evidence/.hidden/x.exr",
+        "evidence\\a\\x.exr",
+    ],
 )
 def test_an_earlier_report_names_no_files_but_its_evidence(tmp_path: Path, name: str) -> None:
     report = {"evidence": ["evidence/scene3/diffuse.exr", name]}
@@ -325,7 +451,9 @@ def test_pages_show_names_as_text(monkeypatch: pytest.MonkeyPatch) -> None:
     hostile = "<script>alert('1')</script>\"><img src=x onerror=alert(2)>"
     table = html._table([hostile], [[hostile, hostile]])
     check = SimpleNamespace(passed=False, text=hostile)
-    judged = html._judged(SimpleNamespace(verdicts=(), checks=(check,)), [f"evidence/{hostile}/a.exr"])
+    judged = html._judged(
+        SimpleNamespace(verdicts=(), checks=(check,)), [f"evidence/{hostile}/a.exr"]
+    )
     for part in (table, judged):
         assert "<script" not in part and "<img" not in part
 
@@ -341,8 +469,12 @@ def test_a_mesh_opens_nothing_through_a_link_out_of_its_folder(tmp_path: Path) -
         read_mesh_file(folder / "a.obj")
 
 
-@pytest.mark.parametrize("words", ["decompose {} -o {}", "separate {} -o {}", "mask {} --box 2,2,14,14 -o {}.png"])
-def test_commands_hold_the_limit_of_pixels(tmp_path: Path, capfd: pytest.CaptureFixture[str], words: str) -> None:
+@pytest.mark.parametrize(
+    "words", ["decompose {} -o {}", "separate {} -o {}", "mask {} --box 2,2,14,14 -o {}.png"]
+)
+def test_commands_hold_the_limit_of_pixels(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str], words: str
+) -> None:
     (tmp_path / "a.png").write_bytes(coded(".png", codes()))
     command = words.format(tmp_path / "a.png", tmp_path / "out").split()
     assert main([*command, "--max-pixels", "479"]) == 2

@@ -1,4 +1,6 @@
-"""The laws of benchmarks.properties on a few drawn cases each, always the same; what a long run found; and that laws can fail."""
+"""The laws of benchmarks.properties on a few drawn cases each, always the same; what a long run
+found; and that laws can fail.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -31,11 +33,16 @@ def test_every_kind_of_picture_and_mask_can_be_made(kind: str) -> None:
         for shape in ((1, 1), (2, 7), (16, 9)):
             picture = Picture(kind, mask, *shape, seed=3)
             light, inside = picture.light(), picture.inside()
-            assert light.shape == (*shape, 3) and light.dtype == np.float32 and np.isfinite(light).all() and (light >= 0).all()
+            assert (
+                light.shape == (*shape, 3)
+                and light.dtype == np.float32
+                and np.isfinite(light).all()
+                and (light >= 0).all()
+            )
             assert inside.shape == shape and inside.any() and picture.clipped().shape == shape
 
 
-# --- what long runs found ----------------------------------------------------------------------------------------------------------------
+# --- what long runs found -------------------------------------------------------------------------
 
 
 def test_the_network_gives_the_same_bytes_on_any_number_of_threads() -> None:
@@ -57,7 +64,7 @@ def test_no_error_is_left_when_every_pixel_is_dropped() -> None:
         assert left.min() >= 0 and left[-1] == pytest.approx(0, abs=1e-12)
 
 
-# --- laws that cannot fail are none ------------------------------------------------------------------------------------------------------
+# --- laws that cannot fail are none ---------------------------------------------------------------
 
 
 def law(name: str) -> Law:
@@ -94,12 +101,23 @@ def drifting(function: Callable[..., Any]) -> Callable[..., Any]:
         ("separation scale", separation_laws, "separate", drifting),
         ("decomposition sound", decomposition_laws, "decompose", brighter),
         ("decomposition threads", decomposition_laws, "decompose", drifting),
-        ("edits", tool_laws, "_edit", lambda edit: lambda *words: replace(edit(*words), image=edit(*words).image - 1e30)),
+        (
+            "edits",
+            tool_laws,
+            "_edit",
+            lambda edit: lambda *words: replace(edit(*words), image=edit(*words).image - 1e30),
+        ),
         ("filling", tool_laws, "fill", lambda fill: lambda *words: 2 * fill(*words) + 1),
         ("metrics", tool_laws, "ssim", lambda ssim: lambda *words, **options: 1.5),
     ],
 )
-def test_the_law_can_fail(monkeypatch: pytest.MonkeyPatch, name: str, module: Any, function: str, breaks: Callable[..., Any]) -> None:
+def test_the_law_can_fail(
+    monkeypatch: pytest.MonkeyPatch,
+    name: str,
+    module: Any,
+    function: str,
+    breaks: Callable[..., Any],
+) -> None:
     monkeypatch.setattr(module, function, breaks(getattr(module, function)))
     assert run_chunk(law(name), 0, 4).failure
 
@@ -108,7 +126,10 @@ def test_warnings_of_numbers_are_failures() -> None:
     def warns(case: Picture, notes: Notes) -> None:
         np.log(np.zeros(case.rows))
 
-    assert "divide by zero" in run_chunk(replace(law("photos"), cases=law("light").cases, check=warns), 0, 2).failure
+    assert (
+        "divide by zero"
+        in run_chunk(replace(law("photos"), cases=law("light").cases, check=warns), 0, 2).failure
+    )
 
 
 def test_a_run_goes_on_where_it_was_stopped(tmp_path: Any) -> None:
@@ -118,5 +139,9 @@ def test_a_run_goes_on_where_it_was_stopped(tmp_path: Any) -> None:
         file.write('{"law": "reflectance mo')  # killed while it wrote
     outcomes = run(laws, 30, tmp_path)
     assert outcomes[0] == first[0] and len(outcomes) == 2
-    assert isinstance(outcomes[1], Outcome) and "| photos |" in table(laws, outcomes) and "No law failed" in table(laws, outcomes)
+    assert (
+        isinstance(outcomes[1], Outcome)
+        and "| photos |" in table(laws, outcomes)
+        and "No law failed" in table(laws, outcomes)
+    )
     assert len(run(laws, 30, tmp_path)) == 2

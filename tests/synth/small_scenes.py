@@ -27,22 +27,34 @@ class Seen:
 
 def ball(rows: int = 121, radius: float = 1.0) -> Mesh:
     """A sphere around the origin."""
-    polar, angle = np.linspace(0, np.pi, rows)[:, None], np.linspace(0, 2 * np.pi, 2 * rows - 1)[None]
+    polar, angle = (
+        np.linspace(0, np.pi, rows)[:, None],
+        np.linspace(0, 2 * np.pi, 2 * rows - 1)[None],
+    )
     up = np.broadcast_to(np.cos(polar), (rows, 2 * rows - 1))
-    return swept(radius * np.stack([np.sin(polar) * np.sin(angle), up, np.sin(polar) * np.cos(angle)], -1))
+    return swept(
+        radius * np.stack([np.sin(polar) * np.sin(angle), up, np.sin(polar) * np.cos(angle)], -1)
+    )
 
 
 def skittle() -> Mesh:
     """A body with a deep waist: it shades itself and sends light to itself."""
     polar, angle = np.linspace(0, np.pi, 61)[:, None], np.linspace(0, 2 * np.pi, 121)[None]
     width = 0.9 * np.sin(polar) * (1 - 0.75 * np.exp(-((np.cos(polar) / 0.3) ** 2)))
-    points = np.stack([width * np.sin(angle), np.broadcast_to(np.cos(polar), (61, 121)), width * np.cos(angle)], -1)
+    points = np.stack(
+        [width * np.sin(angle), np.broadcast_to(np.cos(polar), (61, 121)), width * np.cos(angle)],
+        -1,
+    )
     return swept(points).turned(25)
 
 
-def seen(mesh: Mesh, material: Material | None = None, size: int = 24, distance: float = np.inf) -> Seen:
+def seen(
+    mesh: Mesh, material: Material | None = None, size: int = 24, distance: float = np.inf
+) -> Seen:
     """What a camera sees of a mesh that is about 2 units wide."""
-    scene = Scene(mesh, material or Material(GREY, "lambert"), (), Camera(size, size, size / 2.2, distance))
+    scene = Scene(
+        mesh, material or Material(GREY, "lambert"), (), Camera(size, size, size / 2.2, distance)
+    )
     tracer = Tracer(mesh)
     return Seen(find_surface(scene, tracer), tracer)
 
@@ -83,7 +95,11 @@ def materials() -> dict[str, Material]:
 
 
 def mitsuba_camera(size: int, half: float = 1.0, samples: int = 1) -> dict[str, Any]:
-    """A camera of Mitsuba's own: `size` x `size` pixels that see [-half, half]^2 along -z; one sample is the ray through the centre."""
+    """A camera of Mitsuba's own:
+
+    `size` x `size` pixels that see [-half, half]^2 along -z; one sample is the ray through the
+    centre.
+    """
     look = load_mitsuba().ScalarTransform4f().look_at([0, 0, 10], [0, 0, 0], [0, 1, 0])
     wide = look @ load_mitsuba().ScalarTransform4f().scale([half, half, 1])
     film = {
@@ -96,4 +112,11 @@ def mitsuba_camera(size: int, half: float = 1.0, samples: int = 1) -> dict[str, 
     }
     centre: dict[str, Any] = {"type": "stratified", "sample_count": 1, "jitter": False}
     sampler = centre if samples == 1 else {"type": "independent", "sample_count": samples}
-    return {"type": "orthographic", "near_clip": 0.1, "far_clip": 100.0, "to_world": wide, "film": film, "sampler": sampler}
+    return {
+        "type": "orthographic",
+        "near_clip": 0.1,
+        "far_clip": 100.0,
+        "to_world": wide,
+        "film": film,
+        "sampler": sampler,
+    }

@@ -86,7 +86,12 @@ def test_noise_has_the_stated_moments_and_slope() -> None:
     rng = np.random.default_rng(0)
     for field in (smooth_noise(rng, 256, 6), fractal_noise(rng, 256, 2)):
         np.testing.assert_allclose((field.mean(), field.std()), (0, 1), atol=1e-9)
-    spectra = [np.square(np.abs(np.fft.fft(fractal_noise(np.random.default_rng(seed), 256, 2), axis=0))).mean(1) for seed in range(4)]
+    spectra = [
+        np.square(
+            np.abs(np.fft.fft(fractal_noise(np.random.default_rng(seed), 256, 2), axis=0))
+        ).mean(1)
+        for seed in range(4)
+    ]
     power = np.mean(spectra, axis=0)
     lines = np.arange(2, 60)
     slope = np.polyfit(np.log(lines), np.log(power[lines]), 1)[0]
@@ -96,7 +101,9 @@ def test_noise_has_the_stated_moments_and_slope() -> None:
 def test_stretch_is_along_u() -> None:
     field = smooth_noise(np.random.default_rng(1), 256, 12, 5)
     along, down = (np.square(np.diff(field, axis=axis)).mean() for axis in (1, 0))
-    assert abs(np.sqrt(down / along) / (5 / ASPECT) - 1) < 0.1  # in texels, which are ASPECT times as wide as high
+    assert (
+        abs(np.sqrt(down / along) / (5 / ASPECT) - 1) < 0.1
+    )  # in texels, which are ASPECT times as wide as high
 
 
 def test_a_plate_prints_where_it_is_told_also_across_the_seam() -> None:
@@ -135,9 +142,13 @@ def test_an_image_becomes_an_albedo(tmp_path: Path) -> None:
     cv2.imwrite(str(tmp_path / "a.png"), codes)
     albedo = image_albedo(tmp_path / "a.png")
     assert albedo.dtype == np.float32
-    np.testing.assert_allclose(albedo[15, 7], (((188 / 255 + 0.055) / 1.055) ** 2.4, 0, 0), rtol=1e-6)
+    np.testing.assert_allclose(
+        albedo[15, 7], (((188 / 255 + 0.055) / 1.055) ** 2.4, 0, 0), rtol=1e-6
+    )
     np.testing.assert_array_equal(albedo[3, 3], np.float32(0.95))
-    np.testing.assert_allclose(image_albedo(tmp_path / "a.png", "linear")[15, 7, 0], 188 / 255, rtol=1e-6)
+    np.testing.assert_allclose(
+        image_albedo(tmp_path / "a.png", "linear")[15, 7, 0], 188 / 255, rtol=1e-6
+    )
 
 
 def test_a_large_image_is_reduced_by_means(tmp_path: Path) -> None:

@@ -1,4 +1,6 @@
-"""The reflectance models of the core against pixels that Mitsuba rendered: the lobes as its plugin, and its own rough conductor."""
+"""The reflectance models of the core against pixels that Mitsuba rendered: the lobes as its plugin,
+and its own rough conductor.
+"""
 
 import numpy as np
 import pytest
@@ -20,15 +22,35 @@ SIZE, HALF = 24, 1.1
 SUN = np.array([0.6, 0.0, 0.8])
 LAMP = np.array([-1.5, 2.0, 2.5])
 LIGHTS = {
-    "directional": {"type": "directional", "direction": [-0.6, 0.0, -0.8], "irradiance": {"type": "rgb", "value": 1.0}},
-    "point": {"type": "point", "position": [-1.5, 2.0, 2.5], "intensity": {"type": "rgb", "value": 1.0}},
+    "directional": {
+        "type": "directional",
+        "direction": [-0.6, 0.0, -0.8],
+        "irradiance": {"type": "rgb", "value": 1.0},
+    },
+    "point": {
+        "type": "point",
+        "position": [-1.5, 2.0, 2.5],
+        "intensity": {"type": "rgb", "value": 1.0},
+    },
 }
 BLACK, GREY = ({"type": "rgb", "value": [value] * 3} for value in (0.0, 0.5))
 LOBES: dict[str, tuple[dict[str, object], Model]] = {
-    "blinn_phong 8": ({"model": "blinn_phong", "albedo": BLACK, "gloss": 8.0, "strength": 0.3}, BlinnPhong(0.3, 8.0)),
-    "blinn_phong 2000": ({"model": "blinn_phong", "albedo": BLACK, "gloss": 2000.0, "strength": 0.3}, BlinnPhong(0.3, 2000.0)),
-    "ggx .05": ({"model": "ggx", "albedo": BLACK, "gloss": 0.05, "strength": 1.0, "ior": 1.5}, Ggx(0.05, 0.04)),
-    "ggx .6": ({"model": "ggx", "albedo": BLACK, "gloss": 0.6, "strength": 1.0, "ior": 1.5}, Ggx(0.6, 0.04)),
+    "blinn_phong 8": (
+        {"model": "blinn_phong", "albedo": BLACK, "gloss": 8.0, "strength": 0.3},
+        BlinnPhong(0.3, 8.0),
+    ),
+    "blinn_phong 2000": (
+        {"model": "blinn_phong", "albedo": BLACK, "gloss": 2000.0, "strength": 0.3},
+        BlinnPhong(0.3, 2000.0),
+    ),
+    "ggx .05": (
+        {"model": "ggx", "albedo": BLACK, "gloss": 0.05, "strength": 1.0, "ior": 1.5},
+        Ggx(0.05, 0.04),
+    ),
+    "ggx .6": (
+        {"model": "ggx", "albedo": BLACK, "gloss": 0.6, "strength": 1.0, "ior": 1.5},
+        Ggx(0.6, 0.04),
+    ),
     "lambert": ({"model": "lambert", "albedo": GREY}, Lambert(0.5)),
     "oren_nayar": ({"model": "oren_nayar", "albedo": GREY, "sigma": 0.4}, OrenNayar(0.5, 0.4)),
 }
@@ -40,7 +62,15 @@ def rendered(bsdf: dict[str, object], light: dict[str, object], samples: int = 1
     sensor = mitsuba_camera(SIZE, HALF, samples)
     sphere = {"type": "sphere", "bsdf": bsdf}
     integrator = {"type": "direct", "hide_emitters": True}
-    scene = mi.load_dict({"type": "scene", "integrator": integrator, "sphere": sphere, "light": light, "sensor": sensor})
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": integrator,
+            "sphere": sphere,
+            "light": light,
+            "sensor": sensor,
+        }
+    )
     return np.array(mi.render(scene, spp=samples, seed=1))
 
 
@@ -56,7 +86,9 @@ def expected(model: Model, kind: str, normal: np.ndarray) -> np.ndarray:
     toward = np.broadcast_to(SUN, normal.shape) if kind == "directional" else LAMP - normal
     square = (toward**2).sum(axis=1)
     toward = toward / np.sqrt(square)[:, None]
-    irradiance = np.maximum((normal * toward).sum(axis=1), 0) / (1 if kind == "directional" else square)
+    irradiance = np.maximum((normal * toward).sum(axis=1), 0) / (
+        1 if kind == "directional" else square
+    )
     return model.value(normal, np.array([0.0, 0.0, 1.0]), toward) * irradiance
 
 
@@ -74,7 +106,12 @@ def test_each_pixel_of_the_plugin_is_the_models_value(name: str, kind: str) -> N
 @pytest.mark.parametrize("alpha", [0.05, 0.3])
 def test_a_rough_conductor_of_mitsuba_that_mirrors_all_light_is_ggx(alpha: float) -> None:
     inside, normal = sphere_normals()
-    conductor = {"type": "roughconductor", "material": "none", "distribution": "ggx", "alpha": alpha}
+    conductor = {
+        "type": "roughconductor",
+        "material": "none",
+        "distribution": "ggx",
+        "alpha": alpha,
+    }
     picture = rendered(conductor, LIGHTS["directional"])[inside][:, 0]
     value = expected(Ggx(alpha, 1.0), "directional", normal)
     np.testing.assert_allclose(picture, value, atol=1e-4 * value.max())
@@ -82,16 +119,22 @@ def test_a_rough_conductor_of_mitsuba_that_mirrors_all_light_is_ggx(alpha: float
 
 def test_the_plugin_evaluates_either_lobe_alone_and_they_add_up() -> None:
     mi = load_mitsuba()
-    plugin = mi.load_dict({"type": register(), "model": "ggx", "albedo": GREY, "gloss": 0.3, "strength": 0.7})
+    plugin = mi.load_dict(
+        {"type": register(), "model": "ggx", "albedo": GREY, "gloss": 0.3, "strength": 0.7}
+    )
     point = mi.SurfaceInteraction3f()
     point.wi = mi.Vector3f(0.0, 0.6, 0.8)
     light = mi.Vector3f(0.28, 0.0, 0.96)
     parts = [mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection]
     contexts = [mi.BSDFContext(mi.TransportMode.Radiance, int(part)) for part in parts]
-    body, gloss = (float(np.ravel(plugin.eval(context, point, light, True))[0]) for context in contexts)
+    body, gloss = (
+        float(np.ravel(plugin.eval(context, point, light, True))[0]) for context in contexts
+    )
     up, view, toward = np.array([0.0, 0, 1]), np.array([0.0, 0.6, 0.8]), np.array([0.28, 0.0, 0.96])
     assert body == pytest.approx(0.5 / np.pi * 0.96, rel=1e-5)
-    assert gloss == pytest.approx(0.7 * float(Ggx(0.3, 0.04).value(up, view, toward)) * 0.96, rel=1e-5)
+    assert gloss == pytest.approx(
+        0.7 * float(Ggx(0.3, 0.04).value(up, view, toward)) * 0.96, rel=1e-5
+    )
 
 
 @pytest.mark.parametrize("name", ["blinn_phong 8", "ggx .6"])
@@ -99,7 +142,11 @@ def test_under_a_white_sky_mitsuba_sees_the_energy_of_the_lobe(name: str) -> Non
     if not has_llvm():
         pytest.skip("thousands of paths through Python need an LLVM variant")
     parameters, model = LOBES[name]
-    picture = rendered({"type": register(), **parameters}, {"type": "constant", "radiance": {"type": "rgb", "value": 1.0}}, samples=512)
+    picture = rendered(
+        {"type": register(), **parameters},
+        {"type": "constant", "radiance": {"type": "rgb", "value": 1.0}},
+        samples=512,
+    )
     inside, normal = sphere_normals()
     # A pixel near the edge spans many views.
     some = np.flatnonzero(normal[:, 2] > 0.6)[::12]

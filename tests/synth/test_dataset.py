@@ -1,4 +1,6 @@
-"""Data sets on disk: what the files hold, that a run goes on where it stopped, and that nothing of anybody else's is touched."""
+"""Data sets on disk: what the files hold, that a run goes on where it stopped, and that nothing of
+anybody else's is touched.
+"""
 
 import json
 import shutil
@@ -28,7 +30,9 @@ from synth.recipe import Picture, Recipe, photograph
 from synth.sensor import Sensor
 
 # One scene of each split; shapes and lights that are quick to make.
-CHOICES = Choices(shapes=("superquadric", "lathe"), albedos=("uniform", "patches"), lights=("directional", "sh"))
+CHOICES = Choices(
+    shapes=("superquadric", "lathe"), albedos=("uniform", "patches"), lights=("directional", "sh")
+)
 PICTURE = Picture(size=32, samples=4, renderer="arrays", sensor=Sensor(noise=0.01, bits=8))
 RUN = Run(5, 5, CHOICES, PICTURE)
 COLOURS = ("image", "diffuse", "specular", "residual", "reflectance", "shading")
@@ -48,17 +52,26 @@ def root(made: Path, tmp_path: Path) -> Path:
 
 
 def contents(root: Path) -> dict[str, bytes]:
-    return {path.relative_to(root).as_posix(): path.read_bytes() for path in sorted(root.rglob("*")) if path.is_file()}
+    return {
+        path.relative_to(root).as_posix(): path.read_bytes()
+        for path in sorted(root.rglob("*"))
+        if path.is_file()
+    }
 
 
 def test_the_folders_are_those_of_the_plan_and_hold_all_files(made: Path) -> None:
     planned = plan(RUN)
     assert {scene.split for scene in planned} == {"train", "test_materials", "test_lights", "test"}
-    expected = {f"{s.split}/{s.recipe.name}/{name}" for s in planned for name in FILES} | {"manifest.json", "README.md"}
+    expected = {f"{s.split}/{s.recipe.name}/{name}" for s in planned for name in FILES} | {
+        "manifest.json",
+        "README.md",
+    }
     assert set(contents(made)) == expected
     manifest = json.loads((made / "manifest.json").read_text())
     assert manifest["complete"] is True
-    assert [scene["name"] for scene in manifest["scenes"]] == [scene.recipe.name for scene in planned]
+    assert [scene["name"] for scene in manifest["scenes"]] == [
+        scene.recipe.name for scene in planned
+    ]
     assert len(list_scenes(made)) == 5
     assert [folder.parent.name for folder in list_scenes(made, "test_lights")] == ["test_lights"]
 
@@ -66,16 +79,23 @@ def test_the_folders_are_those_of_the_plan_and_hold_all_files(made: Path) -> Non
 def test_maps_keep_their_identities(made: Path) -> None:
     for folder in list_scenes(made):
         channels = read_channels(folder / "maps.exr")
-        assert set(channels) == {f"{layer}.{letter}" for layer, letters in LAYERS.items() for letter in letters}
+        assert set(channels) == {
+            f"{layer}.{letter}" for layer, letters in LAYERS.items() for letter in letters
+        }
         truth = read_truth(folder)
         inside, outside = truth.mask, ~truth.mask
         scale = truth.image[inside].max()
         layers = truth.diffuse + truth.specular + truth.residual
         assert np.abs(truth.image - layers)[inside].max() <= 1e-5 * scale
-        assert np.abs(truth.diffuse - truth.reflectance * truth.shading)[inside].max() <= 1e-5 * scale
+        assert (
+            np.abs(truth.diffuse - truth.reflectance * truth.shading)[inside].max() <= 1e-5 * scale
+        )
         assert np.abs(np.linalg.norm(truth.normal[inside], axis=-1) - 1).max() < 1e-5
         assert (truth.normal[outside] == (0, 0, 1)).all()
-        assert not any(getattr(truth, name)[outside].any() for name in (*COLOURS, "height", "strength", "gloss"))
+        assert not any(
+            getattr(truth, name)[outside].any()
+            for name in (*COLOURS, "height", "strength", "gloss")
+        )
         assert truth.residual[inside].any(), "the sensor's noise is in the residual"
         assert (channels["confidence.Y"] == truth.mask).all()
         fitted = np.exp(real_sh(truth.normal[inside]) @ truth.illumination) - truth.shading[inside]
@@ -103,9 +123,27 @@ def test_the_facts_are_those_of_the_recipe(made: Path) -> None:
     for scene in plan(RUN):
         recipe, folder = scene.recipe, made / scene.split / scene.recipe.name
         facts, truth = read_facts(folder), read_truth(folder)
-        names = (recipe.name, scene.split, recipe.shape.name, recipe.material.name, recipe.light.name, recipe.seed)
-        assert names == (facts.name, facts.split, facts.object, facts.material, facts.light, facts.seed)
-        assert (facts.albedo, facts.model, facts.light_kind) == (recipe.albedo, recipe.model, recipe.light.family)
+        names = (
+            recipe.name,
+            scene.split,
+            recipe.shape.name,
+            recipe.material.name,
+            recipe.light.name,
+            recipe.seed,
+        )
+        assert names == (
+            facts.name,
+            facts.split,
+            facts.object,
+            facts.material,
+            facts.light,
+            facts.seed,
+        )
+        assert (facts.albedo, facts.model, facts.light_kind) == (
+            recipe.albedo,
+            recipe.model,
+            recipe.light.family,
+        )
         assert facts.mask_pixels == truth.mask.sum()
         parts = truth.specular[truth.mask].sum(), truth.diffuse[truth.mask].sum()
         assert facts.specular_share == pytest.approx(parts[0] / sum(parts), rel=1e-4)
@@ -116,13 +154,17 @@ def test_the_photo_is_the_image_a_camera_stored(made: Path) -> None:
     for folder in list_scenes(made):
         photo, truth = read_photo(folder / "photo.png"), read_truth(folder)
         assert (photo.mask == truth.mask).all()
-        assert np.abs(photo.image - truth.image)[truth.mask].max() < 1e-6, "8-bit codes come back to the last bit"
+        assert np.abs(photo.image - truth.image)[truth.mask].max() < 1e-6, (
+            "8-bit codes come back to the last bit"
+        )
 
 
 def test_separations_can_be_judged_on_it(made: Path) -> None:
     folder = list_scenes(made)[0]
     rendered, truth = load_rendered(folder), read_truth(folder)
-    assert np.array_equal(rendered.image, truth.image) and np.array_equal(rendered.diffuse, truth.diffuse)
+    assert np.array_equal(rendered.image, truth.image) and np.array_equal(
+        rendered.diffuse, truth.diffuse
+    )
     assert np.array_equal(rendered.mask, truth.mask)
 
 
@@ -131,16 +173,26 @@ def test_the_description_says_how_and_in_which_frame(made: Path) -> None:
         content = json.loads((made / scene.split / scene.recipe.name / "scene.json").read_text())
         assert content["material"]["convention"] == CONVENTIONS[scene.recipe.model]
         camera = content["camera"]
-        opencv, blender = (np.array(camera["world_to_camera"][name]) for name in ("opencv", "blender"))
+        opencv, blender = (
+            np.array(camera["world_to_camera"][name]) for name in ("opencv", "blender")
+        )
         assert np.allclose(np.diag([1, -1, -1, 1]) @ blender, opencv)
-        assert camera["pixels_per_unit"] > 0 and content["render"]["variant"] and content["versions"]["mitsuba"]
+        assert (
+            camera["pixels_per_unit"] > 0
+            and content["render"]["variant"]
+            and content["versions"]["mitsuba"]
+        )
         assert content["render"]["interreflection"] is False
     assert set(CONVENTIONS) == set(MODELS)
 
 
 @pytest.mark.parametrize("perspective", [False, True])
-def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it(tmp_path: Path, perspective: bool) -> None:
-    """Heights, taken back into space and through the OpenCV matrix, land on the centres of their pixels."""
+def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it(
+    tmp_path: Path, perspective: bool
+) -> None:
+    """Heights, taken back into space and through the OpenCV matrix, land on the centres of their
+    pixels.
+    """
     make_dataset(Run(1, 5, CHOICES, replace(PICTURE, perspective=perspective)), tmp_path / "set")
     folder = list_scenes(tmp_path / "set")[0]
     truth, camera = read_truth(folder), json.loads((folder / "scene.json").read_text())["camera"]
@@ -156,7 +208,9 @@ def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it
     assert (seen[2] > 0).all()
 
 
-def test_the_same_seed_gives_the_same_bytes(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_same_seed_gives_the_same_bytes(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Also where the renderer's kernels were let go in between."""
     monkeypatch.setattr(run_module, "_KERNELS_KEPT", 1)
     make_dataset(replace(RUN, count=2), tmp_path / "again")
@@ -164,10 +218,14 @@ def test_the_same_seed_gives_the_same_bytes(made: Path, tmp_path: Path, monkeypa
     scenes = [name for name in ours if name.endswith(("scene.json", "maps.exr"))]
     assert len(scenes) == 4
     assert all(ours[name] == theirs[name] for name in scenes)
-    assert not any(str(tmp_path).encode() in content for content in ours.values()), "no path is written"
+    assert not any(str(tmp_path).encode() in content for content in ours.values()), (
+        "no path is written"
+    )
 
 
-def test_an_interrupted_run_goes_on(root: Path, made: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_interrupted_run_goes_on(
+    root: Path, made: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folders = list_scenes(root)
     shutil.rmtree(folders[0])
     maps = folders[1] / "maps.exr"
@@ -206,7 +264,9 @@ def test_a_complete_set_is_not_written_again(root: Path, monkeypatch: pytest.Mon
 def test_cancelling_leaves_whole_scenes_only(made: Path, tmp_path: Path, steps: int) -> None:
     asked = iter(range(1000))
     with pytest.raises(Cancelled):
-        make_dataset(replace(RUN, count=2), tmp_path / "set", Monitor(cancelled=lambda: next(asked) >= steps))
+        make_dataset(
+            replace(RUN, count=2), tmp_path / "set", Monitor(cancelled=lambda: next(asked) >= steps)
+        )
     left, whole = contents(tmp_path / "set"), contents(made)
     for name in left:
         if "/" in name:
@@ -218,7 +278,11 @@ def test_cancelling_leaves_whole_scenes_only(made: Path, tmp_path: Path, steps: 
 
 def test_progress_names_the_scene_and_never_goes_back(tmp_path: Path) -> None:
     seen: list[tuple[str, float]] = []
-    make_dataset(replace(RUN, count=2), tmp_path / "set", Monitor(lambda stage, fraction: seen.append((stage, fraction))))
+    make_dataset(
+        replace(RUN, count=2),
+        tmp_path / "set",
+        Monitor(lambda stage, fraction: seen.append((stage, fraction))),
+    )
     texts, fractions = zip(*seen, strict=True)
     assert any(text == "scene 1 of 2" for text in texts)
     assert any(text.startswith("scene 2 of 2, ") and text.endswith(" left") for text in texts)
@@ -239,7 +303,10 @@ def test_a_longer_run_keeps_the_scenes_of_a_shorter_one(root: Path) -> None:
         (replace(RUN, seed=6), "another run (seed 5, not 6)"),
         (replace(RUN, picture=replace(PICTURE, samples=8)), "another run (samples 4, not 8)"),
         (replace(RUN, picture=replace(PICTURE, sensor=Sensor())), "another run (sensor"),
-        (replace(RUN, choices=replace(CHOICES, lights=("sh",))), "another run (lights directional, sh, not sh)"),
+        (
+            replace(RUN, choices=replace(CHOICES, lights=("sh",))),
+            "another run (lights directional, sh, not sh)",
+        ),
     ],
 )
 def test_another_run_is_refused_and_nothing_touched(root: Path, other: Run, message: str) -> None:
@@ -298,7 +365,10 @@ def test_reading_refuses_what_is_not_ours(root: Path, tmp_path: Path) -> None:
     assert set(SPLITS) >= {read_facts(folder).split}
 
 
-@pytest.mark.parametrize("spoil", ["cut", "absent", "changed", "no json", "list", "newer", "foreign", "no light", "no checksum"])
+@pytest.mark.parametrize(
+    "spoil",
+    ["cut", "absent", "changed", "no json", "list", "newer", "foreign", "no light", "no checksum"],
+)
 def test_damaged_scenes_are_refused_in_one_line(root: Path, spoil: str) -> None:
     folder = list_scenes(root)[0]
     maps, text = folder / "maps.exr", folder / "scene.json"
@@ -311,9 +381,13 @@ def test_damaged_scenes_are_refused_in_one_line(root: Path, spoil: str) -> None:
         maps.write_bytes(maps.read_bytes()[:-1] + b"x")
     else:
         spoilt = {
-            "no json": "{", "list": "[]", "newer": json.dumps({**content, "schema_version": 99}), "foreign": json.dumps({"kind": "x"}),
-            "no light": json.dumps({**content, "illumination": {}}), "no checksum": json.dumps({**content, "files": {}}),
-        }  # fmt: skip
+            "no json": "{",
+            "list": "[]",
+            "newer": json.dumps({**content, "schema_version": 99}),
+            "foreign": json.dumps({"kind": "x"}),
+            "no light": json.dumps({**content, "illumination": {}}),
+            "no checksum": json.dumps({**content, "files": {}}),
+        }
         text.write_text(spoilt[spoil])
     with pytest.raises(InputError) as refused:
         read_truth(folder)

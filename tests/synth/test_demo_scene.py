@@ -1,4 +1,6 @@
-"""The demo's render: a photo worth decomposing, the light where it should be, and what the files hold."""
+"""The demo's render: a photo worth decomposing, the light where it should be, and what the files
+hold.
+"""
 
 from pathlib import Path
 
@@ -26,7 +28,9 @@ def test_the_photo_shows_highlights_and_is_exposed(truth: GroundTruth) -> None:
 
 
 def test_light_from_above_left_falls_there(truth: GroundTruth) -> None:
-    """The frame of the lights is the frame of the image: the window of the sky and the key light are on their sides."""
+    """The frame of the lights is the frame of the image: the window of the sky and the key light
+    are on their sides.
+    """
     shading = truth.shading.mean(-1)
     up_left = (truth.normal[..., 0] < -0.4) & (truth.normal[..., 1] > 0.2) & truth.mask
     down_right = (truth.normal[..., 0] > 0.4) & (truth.normal[..., 1] < -0.2) & truth.mask
@@ -48,14 +52,25 @@ def test_the_command_writes_both_files_and_replaces_its_own(tmp_path: Path) -> N
     assert photo.shape == (32, 32, 4)
     assert photo.dtype == np.uint16
     channels = read_channels(folder / "truth.exr")
-    assert {"image.R", "diffuse.G", "specular.B", "reflectance.R", "shading.R", "normal.Z", "height.Z", "mask.A"} <= set(channels)
+    assert {
+        "image.R",
+        "diffuse.G",
+        "specular.B",
+        "reflectance.R",
+        "shading.R",
+        "normal.Z",
+        "height.Z",
+        "mask.A",
+    } <= set(channels)
     np.testing.assert_array_equal(channels["mask.A"] > 0.5, photo[..., 3] > 0)
     coded = photo[..., 2] / 65535  # the red channel of a file in the order blue, green, red
     linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
     np.testing.assert_allclose(linear, np.clip(channels["image.R"], 0, 1), atol=1e-4)
 
 
-def test_the_command_refuses_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_refuses_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "notes.txt").write_text("mine")
     assert main(["-o", str(tmp_path), "--size", "32"]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -1,4 +1,6 @@
-"""Derivatives of a rendered pixel that Dr.Jit carries through the plugin, against the hand-written gradients of `isc_core.brdf`."""
+"""Derivatives of a rendered pixel that Dr.Jit carries through the plugin, against the hand-written
+gradients of `isc_core.brdf`.
+"""
 
 import numpy as np
 import pytest
@@ -32,14 +34,28 @@ def pixels() -> tuple[np.ndarray, np.ndarray]:
 
 
 def derivative(parameters: dict[str, object], name: str) -> np.ndarray:
-    """How a picture (SIZE, SIZE, 3) of a sphere in the sun changes with a parameter of the plugin, by forward differentiation."""
+    """How a picture (SIZE, SIZE, 3) of a sphere in the sun changes with a parameter of the plugin,
+    by forward differentiation.
+    """
     import drjit as dr
 
     mi = load_mitsuba()
     sensor = mitsuba_camera(SIZE)
-    sun = {"type": "directional", "direction": (-SUN).tolist(), "irradiance": {"type": "rgb", "value": 1.0}}
+    sun = {
+        "type": "directional",
+        "direction": (-SUN).tolist(),
+        "irradiance": {"type": "rgb", "value": 1.0},
+    }
     sphere = {"type": "sphere", "bsdf": {"type": register(), **parameters}}
-    scene = mi.load_dict({"type": "scene", "integrator": {"type": "direct"}, "sphere": sphere, "sun": sun, "sensor": sensor})
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "direct"},
+            "sphere": sphere,
+            "sun": sun,
+            "sensor": sensor,
+        }
+    )
     found = mi.traverse(scene)
     key = next(key for key in found.keys() if key.startswith(f"sphere.bsdf.{name}"))  # noqa: SIM118
     change = mi.Float(0.0)
@@ -78,10 +94,18 @@ def test_by_the_exponent(exponent: float) -> None:
 
 def test_by_the_strength() -> None:
     normal = pixels()[1]
-    check({"model": "blinn_phong", "gloss": 20.0, "strength": 0.8}, "strength", BlinnPhong(0.8, 20.0).gradient(normal, VIEW, SUN).strength)
+    check(
+        {"model": "blinn_phong", "gloss": 20.0, "strength": 0.8},
+        "strength",
+        BlinnPhong(0.8, 20.0).gradient(normal, VIEW, SUN).strength,
+    )
 
 
 def test_by_the_albedo() -> None:
     normal = pixels()[1]
     grey = {"type": "rgb", "value": [0.4, 0.4, 0.4]}
-    check({"model": "ggx", "albedo": grey, "gloss": 0.3, "strength": 0.8}, "albedo", Lambert(0.4).gradient(normal, VIEW, SUN).albedo)
+    check(
+        {"model": "ggx", "albedo": grey, "gloss": 0.3, "strength": 0.8},
+        "albedo",
+        Lambert(0.4).gradient(normal, VIEW, SUN).albedo,
+    )

@@ -5,7 +5,15 @@ import pytest
 
 from isc_core.brdf.roughness import fitted_exponent
 from isc_core.errors import InputError
-from synth.finishes import EXPONENTS, FACET_STRENGTHS, FINISHES, STRENGTHS, VARYING, gloss_class, make_material
+from synth.finishes import (
+    EXPONENTS,
+    FACET_STRENGTHS,
+    FINISHES,
+    STRENGTHS,
+    VARYING,
+    gloss_class,
+    make_material,
+)
 from synth.materials import MODELS, Material
 
 WHITE = np.full((2, 3, 3), 0.5)
@@ -18,7 +26,11 @@ def drawn(model: str, count: int, varying: bool | None = None) -> list[Material]
 
 
 def exponent(material: Material) -> np.ndarray:
-    return np.asarray(material.gloss) if material.model == "blinn_phong" else fitted_exponent(material.gloss)
+    return (
+        np.asarray(material.gloss)
+        if material.model == "blinn_phong"
+        else fitted_exponent(material.gloss)
+    )
 
 
 def test_every_model_can_be_drawn() -> None:
@@ -31,11 +43,15 @@ def test_every_model_can_be_drawn() -> None:
 
 @pytest.mark.parametrize("model", FINISHES)
 def test_the_same_seed_draws_the_same_material(model: str) -> None:
-    first, again, other = (make_material(model, WHITE, np.random.default_rng(seed)) for seed in (2, 2, 3))
+    first, again, other = (
+        make_material(model, WHITE, np.random.default_rng(seed)) for seed in (2, 2, 3)
+    )
     for name in ("gloss", "strength", "ior", "sigma"):
         np.testing.assert_array_equal(getattr(first, name), getattr(again, name))
     if model != "lambert":
-        assert any(np.any(getattr(first, name) != getattr(other, name)) for name in ("gloss", "sigma"))
+        assert any(
+            np.any(getattr(first, name) != getattr(other, name)) for name in ("gloss", "sigma")
+        )
 
 
 @pytest.mark.parametrize("model", GLOSSY)
@@ -69,7 +85,10 @@ def test_varying_gloss_is_broader_where_it_is_weaker(model: str) -> None:
         order = np.argsort(strength, axis=None)
         assert (np.diff(shine.ravel()[order]) >= -1e-6 * shine.max()).all()
         spans.append(strength.min() / strength.max())
-        seam, inside = np.abs(strength[:, 0] - strength[:, -1]).mean(), np.abs(np.diff(strength, axis=1)).mean()
+        seam, inside = (
+            np.abs(strength[:, 0] - strength[:, -1]).mean(),
+            np.abs(np.diff(strength, axis=1)).mean(),
+        )
         assert seam <= 3 * inside + 1e-12
     assert min(spans) >= 0.1 - 1e-9
     assert np.median(spans) < 0.8
@@ -78,11 +97,16 @@ def test_varying_gloss_is_broader_where_it_is_weaker(model: str) -> None:
 def test_gloss_varies_one_time_in_four_unless_told() -> None:
     varied = np.mean([np.ndim(material.gloss) == 2 for material in drawn("ggx", 600)])
     assert abs(varied - 0.25) < 4 * np.sqrt(0.25 * 0.75 / 600)
-    assert not any(np.ndim(material.gloss) for model in FINISHES for material in drawn(model, 30, False))
+    assert not any(
+        np.ndim(material.gloss) for model in FINISHES for material in drawn(model, 30, False)
+    )
     assert not any(np.ndim(material.gloss) for material in drawn("roughplastic", 30))
 
 
-@pytest.mark.parametrize(("gloss", "expected"), [(5, "broad"), (29, "broad"), (31, "medium"), (299, "medium"), (301, "sharp")])
+@pytest.mark.parametrize(
+    ("gloss", "expected"),
+    [(5, "broad"), (29, "broad"), (31, "medium"), (299, "medium"), (301, "sharp")],
+)
 def test_classes_by_exponent(gloss: float, expected: str) -> None:
     assert gloss_class(Material(WHITE, "blinn_phong", gloss)) == expected
     assert gloss_class(Material(WHITE, "blinn_phong", np.array([[1.0, gloss, 9000.0]]))) == expected
@@ -91,17 +115,26 @@ def test_classes_by_exponent(gloss: float, expected: str) -> None:
 def test_classes_by_alpha() -> None:
     """Alpha .22 is an exponent of 30, .073 of 300, by the fitted rule."""
     for model in ("ggx", "roughplastic"):
-        found = [gloss_class(Material(WHITE, model, alpha, strength=1.0)) for alpha in (1.0, 0.5, 0.23, 0.21, 0.075, 0.072, 0.01)]
+        found = [
+            gloss_class(Material(WHITE, model, alpha, strength=1.0))
+            for alpha in (1.0, 0.5, 0.23, 0.21, 0.075, 0.072, 0.01)
+        ]
         assert found == ["broad", "broad", "broad", "medium", "medium", "sharp", "sharp"]
 
 
 def test_what_does_not_shine_is_matt() -> None:
-    assert {gloss_class(material) for model in ("lambert", "oren_nayar") for material in drawn(model, 5)} == {"matt"}
+    assert {
+        gloss_class(material) for model in ("lambert", "oren_nayar") for material in drawn(model, 5)
+    } == {"matt"}
     assert gloss_class(Material(WHITE, "ggx", 0.1, strength=0.0)) == "matt"
 
 
 def test_all_classes_are_drawn() -> None:
-    assert {gloss_class(material) for material in drawn("blinn_phong", 60)} == {"broad", "medium", "sharp"}
+    assert {gloss_class(material) for material in drawn("blinn_phong", 60)} == {
+        "broad",
+        "medium",
+        "sharp",
+    }
 
 
 def test_what_cannot_be_made_is_refused() -> None:

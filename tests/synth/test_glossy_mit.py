@@ -1,4 +1,6 @@
-"""The glossy MIT-Berkeley set: the set's own diffuse layer, a gloss that physics tells, files that the set's own readers read."""
+"""The glossy MIT-Berkeley set: the set's own diffuse layer, a gloss that physics tells, files that
+the set's own readers read.
+"""
 
 import argparse
 import json
@@ -59,7 +61,9 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     rng = np.random.default_rng(3)
     y, x = np.meshgrid(np.arange(40.0), np.arange(48.0), indexing="ij")
     inside = ((y - 20) / 17) ** 2 + ((x - 24) / 20) ** 2
-    depth = np.where(inside < 1, 8 * np.sqrt(np.maximum(1.05 - inside, 0)) + 0.5 * np.sin(x / 3), np.nan)
+    depth = np.where(
+        inside < 1, 8 * np.sqrt(np.maximum(1.05 - inside, 0)) + 0.5 * np.sin(x / 3), np.nan
+    )
     mask = (np.isfinite(depth) * 65535).astype(np.uint16)
     reflectance = (rng.uniform(0.2, 0.8, (40, 48, 3)) * 65535).astype(np.uint16)
     light = rng.normal(size=(9, 3)) * 0.2 - 0.3
@@ -71,9 +75,13 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
         cv2.imwrite(str(folder / "mask.png"), mask)
     laboratory = root / "laboratory" / "bump"
     scipy.io.savemat(laboratory / "Z.mat", {"depth": depth})
-    scipy.io.savemat(laboratory / "crop_idx.mat", {"crop_idx1": np.arange(2, 40), "crop_idx2": np.arange(3, 46)})
+    scipy.io.savemat(
+        laboratory / "crop_idx.mat", {"crop_idx1": np.arange(2, 40), "crop_idx2": np.arange(3, 46)}
+    )
     scipy.io.savemat(laboratory / "L.mat", {"color_lights": {"diffuse": light}})
-    scipy.io.savemat(laboratory / "shading_corrected_color.mat", {"shading_correct": np.ones((40, 48, 3))})
+    scipy.io.savemat(
+        laboratory / "shading_corrected_color.mat", {"shading_correct": np.ones((40, 48, 3))}
+    )
     scipy.io.savemat(root / "natural" / "bump" / "L.mat", {"L": light[:, ::-1]})
     return root
 
@@ -84,10 +92,14 @@ def bump(small: Path) -> Source:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {
+        path.relative_to(folder).as_posix(): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
-# --- the gloss --------------------------------------------------------------------------------------------------------------------------
+# --- the gloss ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("exponent", [10.0, 100.0, 1000.0])
@@ -96,16 +108,24 @@ def test_the_gloss_of_an_environment_is_the_integral_of_the_lobe(exponent: float
     sky = np.random.default_rng(1).gamma(1.0, size=(8, 16, 3))
     normal, rows = facing(6), 160
     toward, solid = directions(rows).reshape(-1, 3), solid_angles(rows).reshape(-1, 1)
-    lobe = BlinnPhong(1.0, exponent).value(normal[:, None], VIEW, toward) * np.maximum(normal @ toward.T, 0)
+    lobe = BlinnPhong(1.0, exponent).value(normal[:, None], VIEW, toward) * np.maximum(
+        normal @ toward.T, 0
+    )
     wanted = lobe @ (solid * resampled(sky, rows).reshape(-1, 3))
-    np.testing.assert_allclose(environment_gloss(sky, normal, exponent), wanted, atol=4e-3 * wanted.max())
+    np.testing.assert_allclose(
+        environment_gloss(sky, normal, exponent), wanted, atol=4e-3 * wanted.max()
+    )
 
 
 def test_a_uniform_environment_seen_head_on_gives_the_lobes_energy() -> None:
     """Closed form, see `isc_core.brdf.blinn_phong`: (p + 8) (p + 2^(-p/2)) / ((p + 2) (p + 4))."""
     for exponent in (9.0, 100.0):
-        wanted = (exponent + 8) * (exponent + 2 ** (-exponent / 2)) / ((exponent + 2) * (exponent + 4))
-        np.testing.assert_allclose(environment_gloss(np.ones((16, 32, 3)), VIEW[None], exponent), wanted, rtol=2e-3)
+        wanted = (
+            (exponent + 8) * (exponent + 2 ** (-exponent / 2)) / ((exponent + 2) * (exponent + 4))
+        )
+        np.testing.assert_allclose(
+            environment_gloss(np.ones((16, 32, 3)), VIEW[None], exponent), wanted, rtol=2e-3
+        )
 
 
 def test_a_panel_far_away_is_a_piece_of_an_environment() -> None:
@@ -118,7 +138,9 @@ def test_a_panel_far_away_is_a_piece_of_an_environment() -> None:
 
 
 def test_the_gloss_is_what_mitsuba_renders(bump: Source) -> None:
-    """A z-test at every pixel and channel, corrected for their number; shadows kept out by a tracer that nothing is before."""
+    """A z-test at every pixel and channel, corrected for their number; shadows kept out by a tracer
+    that nothing is before.
+    """
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     from synth.lights import EnvironmentLight
     from synth.materials import Material
@@ -131,22 +153,28 @@ def test_the_gloss_is_what_mitsuba_renders(bump: Source) -> None:
     sky = resampled(np.random.default_rng(2).gamma(2.0, size=(8, 16, 3)), 32)
     surface = surface_of(bump, 40.0)
     material = Material(np.ones((1, 1, 3)), "blinn_phong", gloss=40.0, strength=1.0)
-    lit = light_surface(surface, material, (EnvironmentLight(sky),), nothing, RenderOptions(samples=256, seed=5))
+    lit = light_surface(
+        surface, material, (EnvironmentLight(sky),), nothing, RenderOptions(samples=256, seed=5)
+    )
     gloss = environment_gloss(sky, bump.normal, 40.0)
     z = (lit.specular - gloss) / np.sqrt(lit.specular_variance + (2e-3 * gloss.max()) ** 2)
     assert np.abs(z).max() < 5.5
     assert 0.5 < z.std() < 1.2
-    np.testing.assert_allclose(lit.specular.sum(0), gloss.sum(0), atol=5 * np.sqrt(lit.specular_variance.sum(0).max()))
+    np.testing.assert_allclose(
+        lit.specular.sum(0), gloss.sum(0), atol=5 * np.sqrt(lit.specular_variance.sum(0).max())
+    )
 
 
-# --- the layers -------------------------------------------------------------------------------------------------------------------------
+# --- the layers -----------------------------------------------------------------------------------
 
 
 def test_the_surface_is_where_the_mesh_of_its_heights_is(bump: Source) -> None:
     from synth.shapes.height_field import place_height
 
     vertices = place_height(bump.height).mesh.vertices
-    np.testing.assert_allclose(surface_of(bump, 10.0).position, vertices[: len(bump.normal)], atol=1e-12)
+    np.testing.assert_allclose(
+        surface_of(bump, 10.0).position, vertices[: len(bump.normal)], atol=1e-12
+    )
 
 
 def test_shading_is_the_sets_own_and_a_panel_adds_to_both_layers(bump: Source) -> None:
@@ -154,7 +182,9 @@ def test_shading_is_the_sets_own_and_a_panel_adds_to_both_layers(bump: Source) -
     assert tuple(layers) == LIGHTS
     for name in ("natural", "laboratory"):
         own, with_panel = layers[name], layers[f"{name}-area"]
-        np.testing.assert_allclose(own.shading, np.exp(real_sh(bump.normal) @ bump.lights[name]), rtol=1e-12)
+        np.testing.assert_allclose(
+            own.shading, np.exp(real_sh(bump.normal) @ bump.lights[name]), rtol=1e-12
+        )
         assert own.light_residual == 0 and own.panel is None and with_panel.panel is not None
         assert (with_panel.shading - own.shading).mean() == pytest.approx(0.75 * own.shading.mean())
         added = with_panel.gloss - own.gloss
@@ -163,26 +193,38 @@ def test_shading_is_the_sets_own_and_a_panel_adds_to_both_layers(bump: Source) -
         assert added.max() > own.gloss.max()
 
 
-# --- the files --------------------------------------------------------------------------------------------------------------------------
+# --- the files ------------------------------------------------------------------------------------
 
 
 def pictures(root: Path, name: str = OBJECT) -> dict[str, np.ndarray]:
     folder = root / "laboratory" / name
-    return {path.stem: cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1] for path in folder.glob("*.png") if path.stem != "mask"}
+    return {
+        path.stem: cv2.imread(str(path), cv2.IMREAD_UNCHANGED)[..., ::-1]
+        for path in folder.glob("*.png")
+        if path.stem != "mask"
+    }
 
 
 def test_every_level_and_light_is_a_set_that_the_readers_read(made: Path, dataset: Path) -> None:
     theirs = load_object(dataset, OBJECT, "laboratory", "diffuse")
     for name in root_names(GlossySettings()):
-        assert list_objects(made / name, "laboratory") == list_objects(made / name, "natural") == (OBJECT,)
-        original, diffuse = (load_object(made / name, OBJECT, "laboratory", kind) for kind in ("original", "diffuse"))
+        assert (
+            list_objects(made / name, "laboratory")
+            == list_objects(made / name, "natural")
+            == (OBJECT,)
+        )
+        original, diffuse = (
+            load_object(made / name, OBJECT, "laboratory", kind) for kind in ("original", "diffuse")
+        )
         natural = load_object(made / name, OBJECT, "natural", "diffuse")
         assert original.mask.shape == theirs.mask.shape
         assert (original.mask <= theirs.mask).all()
         assert original.mask.sum() > 0.9 * theirs.mask.sum()
         for read in (original, diffuse, natural):
             np.testing.assert_array_equal(read.valid, original.mask)
-            np.testing.assert_array_equal(read.reflectance[read.mask], theirs.reflectance[read.mask])
+            np.testing.assert_array_equal(
+                read.reflectance[read.mask], theirs.reflectance[read.mask]
+            )
             np.testing.assert_array_equal(read.height[read.mask], theirs.height[read.mask])
             assert np.isnan(read.height[~read.mask]).all()
         np.testing.assert_array_equal(natural.image, diffuse.image)
@@ -191,36 +233,54 @@ def test_every_level_and_light_is_a_set_that_the_readers_read(made: Path, datase
 
 
 def test_the_frame_and_the_crop_are_the_sets_own(made: Path, dataset: Path) -> None:
-    ours, theirs = made / "level-25_natural" / "laboratory" / OBJECT, dataset / "laboratory" / OBJECT
+    ours, theirs = (
+        made / "level-25_natural" / "laboratory" / OBJECT,
+        dataset / "laboratory" / OBJECT,
+    )
     assert (ours / "crop_idx.mat").read_bytes() == (theirs / "crop_idx.mat").read_bytes()
     for file in (path.name for path in ours.glob("*.png")):
-        shape, wanted = (cv2.imread(str(folder / file), cv2.IMREAD_UNCHANGED).shape for folder in (ours, theirs))
+        shape, wanted = (
+            cv2.imread(str(folder / file), cv2.IMREAD_UNCHANGED).shape for folder in (ours, theirs)
+        )
         assert shape == wanted, file
-    assert scipy.io.loadmat(ours / "Z.mat")["depth"].shape == scipy.io.loadmat(theirs / "Z.mat")["depth"].shape
+    assert (
+        scipy.io.loadmat(ours / "Z.mat")["depth"].shape
+        == scipy.io.loadmat(theirs / "Z.mat")["depth"].shape
+    )
 
 
 @pytest.mark.parametrize("light", LIGHTS)
 @pytest.mark.parametrize("level", [10, 25, 50])
 def test_layers_add_up_and_hold_the_share_asked_for(made: Path, level: float, light: str) -> None:
     found = pictures(made / root_name(level, light))
-    original, diffuse, specular = (found[name].astype(int) for name in ("original", "diffuse", "specular"))
+    original, diffuse, specular = (
+        found[name].astype(int) for name in ("original", "diffuse", "specular")
+    )
     np.testing.assert_array_equal(original, diffuse + specular)
     assert specular.sum() / original.sum() == pytest.approx(level / 100, rel=0.01)
     assert original.max() < 65535
     truth = load_object(made / root_name(level, light), OBJECT, "laboratory", "diffuse")
     product = truth.reflectance * truth.shading
     np.testing.assert_allclose(truth.image[truth.mask], product[truth.mask], atol=1.01 * CODE)
-    channels = read_channels(made / root_name(level, light) / "laboratory" / OBJECT / "specular.exr")
+    channels = read_channels(
+        made / root_name(level, light) / "laboratory" / OBJECT / "specular.exr"
+    )
     exact = np.stack([channels[name] for name in "RGB"], -1)
     np.testing.assert_allclose(specular * CODE, exact, atol=0.51 * CODE)
 
 
 @pytest.mark.parametrize("illumination", ["natural", "laboratory"])
-def test_shading_is_that_of_the_light_in_the_file(made: Path, dataset: Path, illumination: str) -> None:
+def test_shading_is_that_of_the_light_in_the_file(
+    made: Path, dataset: Path, illumination: str
+) -> None:
     theirs = load_object(dataset, OBJECT, illumination, "diffuse")
     ours = load_object(made / root_name(50, illumination), OBJECT, "laboratory", "diffuse")
     normal = truth_normal(theirs.height)[ours.mask]
-    np.testing.assert_allclose(ours.shading[ours.mask], np.exp(real_sh(normal) @ light_from_reference(ours.light)), rtol=1e-5)
+    np.testing.assert_allclose(
+        ours.shading[ours.mask],
+        np.exp(real_sh(normal) @ light_from_reference(ours.light)),
+        rtol=1e-5,
+    )
     gain = ours.shading[ours.mask] / np.exp(real_sh(normal) @ light_from_reference(theirs.light))
     np.testing.assert_allclose(gain, gain.mean(), rtol=1e-5)
     if illumination == "natural":
@@ -229,8 +289,16 @@ def test_shading_is_that_of_the_light_in_the_file(made: Path, dataset: Path, ill
 
 
 def test_levels_differ_in_the_specular_layer_only(made: Path) -> None:
-    low, high = (contents(made / root_name(level, "natural-area") / "laboratory" / OBJECT) for level in (10, 50))
-    assert {name for name in low if low[name] != high[name]} == {"original.png", "specular.png", "specular.exr", "object.json"}
+    low, high = (
+        contents(made / root_name(level, "natural-area") / "laboratory" / OBJECT)
+        for level in (10, 50)
+    )
+    assert {name for name in low if low[name] != high[name]} == {
+        "original.png",
+        "specular.png",
+        "specular.exr",
+        "object.json",
+    }
 
 
 def test_separations_are_measured_on_it(made: Path) -> None:
@@ -253,7 +321,7 @@ def test_the_card_says_what_it_is_and_the_record_what_was_measured(made: Path) -
         assert set(record["files"]) == set(LABORATORY_FILES[1:])
 
 
-# --- runs -------------------------------------------------------------------------------------------------------------------------------
+# --- runs -----------------------------------------------------------------------------------------
 
 
 def stopping_after(count: int) -> Monitor:
@@ -272,7 +340,9 @@ def test_equal_seeds_give_equal_files_and_others_other_panels(small: Path, tmp_p
     assert a[f"level-25_natural-area/{png}"] != c[f"level-25_natural-area/{png}"]
 
 
-def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(small: Path, tmp_path: Path) -> None:
+def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(
+    small: Path, tmp_path: Path
+) -> None:
     settings = GlossySettings(levels=(50.0,))
     make_glossy(small, tmp_path / "whole", settings)
     with pytest.raises(Cancelled):
@@ -282,10 +352,16 @@ def test_an_interrupted_run_goes_on_and_a_finished_one_stays_as_it_is(small: Pat
     assert not [name for name in found if "partial" in name]
     assert make_glossy(small, tmp_path / "cut", settings).made == 1
     assert contents(tmp_path / "cut") == contents(tmp_path / "whole")
-    lately = (tmp_path / "cut" / "level-50_natural" / "laboratory" / "bump" / "original.png").stat().st_mtime_ns
+    lately = (
+        (tmp_path / "cut" / "level-50_natural" / "laboratory" / "bump" / "original.png")
+        .stat()
+        .st_mtime_ns
+    )
     again = make_glossy(small, tmp_path / "cut", settings)
     assert (again.made, again.kept) == (0, 1)
-    assert (tmp_path / "cut" / "level-50_natural" / "laboratory" / "bump" / "original.png").stat().st_mtime_ns == lately
+    assert (
+        tmp_path / "cut" / "level-50_natural" / "laboratory" / "bump" / "original.png"
+    ).stat().st_mtime_ns == lately
 
 
 def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path: Path) -> None:
@@ -296,19 +372,28 @@ def test_the_physical_variant_stands_apart_and_has_shadows(small: Path, tmp_path
     outcome = make_glossy(small, tmp_path / "out", settings)
     assert outcome.made == 1 and "physical/level-25_natural" in outcome.roots
     assert contents(tmp_path / "out" / "level-25_natural" / "laboratory") == plain
-    scene = json.loads((tmp_path / "out" / "physical" / "level-25_natural" / "scene.json").read_text(encoding="utf-8"))
+    scene = json.loads(
+        (tmp_path / "out" / "physical" / "level-25_natural" / "scene.json").read_text(
+            encoding="utf-8"
+        )
+    )
     record = scene["objects"]["bump"]
     assert scene["physical"] and record["gloss_noise"] > 0
     assert record["specular_share"] == pytest.approx(0.25, rel=1e-6)
-    exact, shadowed = (load_object(tmp_path / "out" / p / "level-25_natural", "bump", "laboratory", "original") for p in (".", "physical"))
+    exact, shadowed = (
+        load_object(tmp_path / "out" / p / "level-25_natural", "bump", "laboratory", "original")
+        for p in (".", "physical")
+    )
     ratio = (shadowed.shading / exact.shading.clip(1e-9))[exact.mask]
     assert ratio.std() > 0.01
     product = shadowed.reflectance * shadowed.shading
-    diffuse = load_object(tmp_path / "out" / "physical" / "level-25_natural", "bump", "laboratory", "diffuse")
+    diffuse = load_object(
+        tmp_path / "out" / "physical" / "level-25_natural", "bump", "laboratory", "diffuse"
+    )
     np.testing.assert_allclose(diffuse.image[exact.mask], product[exact.mask], atol=1.01 * CODE)
 
 
-# --- bad input --------------------------------------------------------------------------------------------------------------------------
+# --- bad input ------------------------------------------------------------------------------------
 
 
 def test_folders_of_something_else_are_left_alone(small: Path, tmp_path: Path) -> None:
@@ -322,7 +407,11 @@ def test_folders_of_something_else_are_left_alone(small: Path, tmp_path: Path) -
             make_glossy(small, out, settings)
     make_glossy(small, tmp_path / "out", settings)
     before = contents(tmp_path / "out")
-    for other in (GlossySettings(levels=(25.0,), seed=1), GlossySettings(levels=(30.0,)), GlossySettings(levels=(25.0,), exponent=20.0)):
+    for other in (
+        GlossySettings(levels=(25.0,), seed=1),
+        GlossySettings(levels=(30.0,)),
+        GlossySettings(levels=(25.0,), exponent=20.0),
+    ):
         with pytest.raises(InputError, match="holds another run"):
             make_glossy(small, tmp_path / "out", other)
     assert contents(tmp_path / "out") == before
@@ -341,7 +430,9 @@ def test_what_is_missing_is_named(small: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="unknown object 'nut': choose from bump"):
         make_glossy(small, tmp_path / "out", GlossySettings(), ["bump", "nut"])
     with pytest.raises(InputError, match="no folder natural"):
-        make_glossy(_copy(small, tmp_path / "half", "laboratory"), tmp_path / "out", GlossySettings())
+        make_glossy(
+            _copy(small, tmp_path / "half", "laboratory"), tmp_path / "out", GlossySettings()
+        )
     broken = _copy(small, tmp_path / "broken", "laboratory", "natural")
     (broken / "laboratory" / "bump" / "Z.mat").unlink()
     with pytest.raises(InputError, match="Z.mat"):
@@ -386,8 +477,22 @@ def parsed(*words: str) -> argparse.Namespace:
     return parser.parse_args(["glossy-mit", *words])
 
 
-def test_the_command_makes_the_sets_and_says_how_to_measure_on_them(small: Path, tmp_path: Path) -> None:
-    options = parsed(str(small), "-o", str(tmp_path / "out"), "--levels", "20", "--objects", "bump", "--seed", "3", "--exponent", "60")
+def test_the_command_makes_the_sets_and_says_how_to_measure_on_them(
+    small: Path, tmp_path: Path
+) -> None:
+    options = parsed(
+        str(small),
+        "-o",
+        str(tmp_path / "out"),
+        "--levels",
+        "20",
+        "--objects",
+        "bump",
+        "--seed",
+        "3",
+        "--exponent",
+        "60",
+    )
     lines = options.run(options, Monitor())
     assert len(lines) == 1 and "isc evaluate" in lines[0] and "level-20_natural" in lines[0]
     made = tmp_path / "out" / "level-20_laboratory-area"

@@ -11,7 +11,13 @@ from isc_core.exr import write_channels
 from synth.lights import DirectionalLight
 from synth.materials import Material
 from synth.scene import Scene
-from synth.shapes.height_field import HeightField, check_height, mesh_of_height, place_height, read_height
+from synth.shapes.height_field import (
+    HeightField,
+    check_height,
+    mesh_of_height,
+    place_height,
+    read_height,
+)
 from synth.surface import Surface, find_surface
 from synth.tracing import Tracer
 
@@ -49,7 +55,9 @@ def test_normals_at_pixel_centres_are_those_of_central_differences() -> None:
     surface = seen(place_height(height))
     inner = np.zeros_like(surface.mask)
     known = np.isfinite(height)
-    inner[1:-1, 1:-1] = known[1:-1, 1:-1] & known[:-2, 1:-1] & known[2:, 1:-1] & known[1:-1, :-2] & known[1:-1, 2:]
+    inner[1:-1, 1:-1] = (
+        known[1:-1, 1:-1] & known[:-2, 1:-1] & known[2:, 1:-1] & known[1:-1, :-2] & known[1:-1, 2:]
+    )
     down, across = np.gradient(height)
     expected = np.stack([-across, down, np.ones_like(down)], -1)[inner]
     expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
@@ -61,7 +69,9 @@ def test_a_plane_is_a_plane_up_to_its_rim() -> None:
     field = place_height(0.5 * x - 0.25 * y + 3.0)
     mesh = field.mesh
     expected = np.array([-0.5, -0.25, 1.0]) / np.linalg.norm([0.5, 0.25, 1.0])
-    np.testing.assert_allclose(mesh.normals, np.broadcast_to(expected, mesh.normals.shape), atol=1e-12)
+    np.testing.assert_allclose(
+        mesh.normals, np.broadcast_to(expected, mesh.normals.shape), atol=1e-12
+    )
     off = mesh.vertices @ expected
     np.testing.assert_allclose(off, off[0], atol=1e-12)
 
@@ -83,7 +93,9 @@ def test_a_map_comes_back_from_a_file(kind: str, tmp_path: Path) -> None:
     elif kind == "npy":
         np.save(path, height)
     else:
-        write_channels(path, {"height.Z": np.nan_to_num(height), "mask.A": np.isfinite(height).astype(float)})
+        write_channels(
+            path, {"height.Z": np.nan_to_num(height), "mask.A": np.isfinite(height).astype(float)}
+        )
     np.testing.assert_allclose(read_height(path), height, rtol=1e-6)
 
 
@@ -119,10 +131,17 @@ def test_bad_files_are_refused_by_name(tmp_path: Path) -> None:
     for name in ("junk.mat", "junk.npy", "junk.exr"):
         (tmp_path / name).write_bytes(b"nothing of the kind" * 20)
     expected = {
-        "objects.npy": "not a readable array", "several.npy": "several arrays", "other.mat": "'depth'", "colour.exr": "no channel",
-        "empty.npy": "0 pixels", "junk.mat": "not a readable MATLAB", "junk.npy": "not a readable array", "junk.exr": "OpenEXR",
-        "absent.mat": "no such file", "height.png": "are read from",
-    }  # fmt: skip
+        "objects.npy": "not a readable array",
+        "several.npy": "several arrays",
+        "other.mat": "'depth'",
+        "colour.exr": "no channel",
+        "empty.npy": "0 pixels",
+        "junk.mat": "not a readable MATLAB",
+        "junk.npy": "not a readable array",
+        "junk.exr": "OpenEXR",
+        "absent.mat": "no such file",
+        "height.png": "are read from",
+    }
     for name, words in expected.items():
         with pytest.raises(InputError, match=words) as caught:
             read_height(tmp_path / name)

@@ -1,4 +1,6 @@
-"""Random lights: the same for the same seed, on the viewer's side, near white, never negative; files are read as they are."""
+"""Random lights: the same for the same seed, on the viewer's side, near white, never negative;
+files are read as they are.
+"""
 
 from dataclasses import fields
 from pathlib import Path
@@ -14,7 +16,14 @@ from isc_core.exr import write_channels
 from isc_core.sirfs.frames import light_from_reference, real_sh
 from synth.light_rigs import RIGS, make_lights
 from synth.light_rigs.files import read_panorama
-from synth.lights import DirectionalLight, EnvironmentLight, Light, PanelLight, PointLight, lights_as_environment
+from synth.lights import (
+    DirectionalLight,
+    EnvironmentLight,
+    Light,
+    PanelLight,
+    PointLight,
+    lights_as_environment,
+)
 
 INVENTED = ("point", "directional", "area", "sh")
 DRAWS = 40
@@ -58,9 +67,13 @@ def write_panorama(path: Path, picture: np.ndarray) -> Path:
 
 @pytest.mark.parametrize("name", INVENTED)
 def test_the_same_seed_gives_the_same_lights_and_another_one_others(name: str) -> None:
-    first, again, other = (numbers(make_lights(name, np.random.default_rng(seed))) for seed in (7, 7, 8))
+    first, again, other = (
+        numbers(make_lights(name, np.random.default_rng(seed))) for seed in (7, 7, 8)
+    )
     assert all(np.array_equal(a, b) for a, b in zip(first, again, strict=True))
-    assert len(first) != len(other) or not all(np.array_equal(a, b) for a, b in zip(first, other, strict=True))
+    assert len(first) != len(other) or not all(
+        np.array_equal(a, b) for a, b in zip(first, other, strict=True)
+    )
 
 
 @pytest.mark.parametrize("name", INVENTED)
@@ -79,10 +92,17 @@ def test_invented_lights_are_nearly_white_yet_not_all_alike(name: str) -> None:
     assert tint.std(0).min() > 0.003
 
 
-@pytest.mark.parametrize(("name", "kind"), [("point", PointLight), ("directional", DirectionalLight), ("area", PanelLight)])
-def test_lamps_come_alone_or_in_pairs_and_mostly_with_weak_light_from_around(name: str, kind: type) -> None:
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("point", PointLight), ("directional", DirectionalLight), ("area", PanelLight)],
+)
+def test_lamps_come_alone_or_in_pairs_and_mostly_with_weak_light_from_around(
+    name: str, kind: type
+) -> None:
     lamps = [sum(isinstance(light, kind) for light in lights) for lights in draws(name)]
-    around = [[light for light in lights if isinstance(light, EnvironmentLight)] for lights in draws(name)]
+    around = [
+        [light for light in lights if isinstance(light, EnvironmentLight)] for lights in draws(name)
+    ]
     assert set(lamps) == {1, 2}
     share = np.mean([bool(found) for found in around])
     assert share == 1 if name == "area" else 0.55 < share < 0.95
@@ -104,7 +124,9 @@ def test_harmonic_environments_have_contrast_and_no_details() -> None:
 def test_light_comes_from_the_viewers_side(name: str) -> None:
     towards, solid = directions(ROWS), solid_angles(ROWS)
     for lights in draws(name):
-        assert (lights_as_environment(lights, ROWS).mean(-1) * solid * towards[..., 2]).sum() >= -1e-6
+        assert (
+            lights_as_environment(lights, ROWS).mean(-1) * solid * towards[..., 2]
+        ).sum() >= -1e-6
 
 
 def test_natural_lights_give_the_shading_that_the_file_tells(shared: Path) -> None:
@@ -139,7 +161,9 @@ def test_a_panorama_is_turned_until_it_lights_the_viewers_side(tmp_path: Path) -
         (light,) = make_lights("hdr", np.random.default_rng(seed), tmp_path)
         assert isinstance(light, EnvironmentLight)
         assert shading_under(light.radiance, np.array([[0, 0, 1.0]])).mean() >= 0.8 - 1e-6
-        np.testing.assert_allclose(np.sort(light.radiance.mean(-1)), np.sort(plain.mean(-1)), rtol=0.1, atol=0.02)
+        np.testing.assert_allclose(
+            np.sort(light.radiance.mean(-1)), np.sort(plain.mean(-1)), rtol=0.1, atol=0.02
+        )
 
 
 def test_files_that_are_no_environments_are_refused(tmp_path: Path) -> None:

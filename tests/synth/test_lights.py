@@ -1,4 +1,6 @@
-"""Lights: what they cast is what radiometry says, and nothing is lost when they become an environment."""
+"""Lights: what they cast is what radiometry says, and nothing is lost when they become an
+environment.
+"""
 
 from collections.abc import Callable
 
@@ -36,8 +38,12 @@ def irradiance(environment: np.ndarray, normal: np.ndarray) -> np.ndarray:
     ids=["directional", "point", "small panel"],
 )
 @pytest.mark.parametrize("rows", [32, 50])
-def test_small_lights_keep_their_irradiance_in_an_environment(light: Light, across: np.ndarray, rows: int) -> None:
-    """A plane across the beam gets it all, and one turned away by 60 degrees half of it, to the size of a pixel."""
+def test_small_lights_keep_their_irradiance_in_an_environment(
+    light: Light, across: np.ndarray, rows: int
+) -> None:
+    """A plane across the beam gets it all, and one turned away by 60 degrees half of it, to the
+    size of a pixel.
+    """
     picture = lights_as_environment((light,), rows)
     half = np.cross(SLANTED, (1.0, 0, 0))
     half = np.cos(np.pi / 3) * SLANTED + np.sin(np.pi / 3) * half / np.linalg.norm(half)
@@ -46,19 +52,27 @@ def test_small_lights_keep_their_irradiance_in_an_environment(light: Light, acro
 
 
 def test_a_panel_seen_head_on_has_the_irradiance_of_a_rectangle() -> None:
-    """The closed form on the axis of a square: E = 4 L a / w atan(a / w), w = sqrt(1 + a^2), a = half its side / its distance."""
+    """The closed form on the axis of a square:
+
+    E = 4 L a / w atan(a / w), w = sqrt(1 + a^2), a = half its side / its distance.
+    """
     distance, half = 3.0, 1.2
     panel = panel_toward_origin((0, 0, distance), (2 * half, 2 * half), WARM)
     a = half / distance
     root = np.sqrt(1 + a * a)
     wanted = WARM * 4 * (a / root) * np.arctan(a / root)
-    np.testing.assert_allclose(irradiance(lights_as_environment((panel,), 256), np.array([0, 0, 1.0])), wanted, rtol=0.01)
+    np.testing.assert_allclose(
+        irradiance(lights_as_environment((panel,), 256), np.array([0, 0, 1.0])), wanted, rtol=0.01
+    )
 
 
 def test_a_panel_faces_the_origin_with_the_size_asked_for_and_stays_upright() -> None:
     panel = panel_toward_origin((2, 3, 4), (0.5, 1.5), WARM)
     np.testing.assert_allclose(panel.normal, -np.array([2, 3, 4]) / np.sqrt(29), atol=1e-12)
-    np.testing.assert_allclose([panel.area, 2 * np.linalg.norm(panel.right), 2 * np.linalg.norm(panel.up)], [0.75, 0.5, 1.5])
+    np.testing.assert_allclose(
+        [panel.area, 2 * np.linalg.norm(panel.right), 2 * np.linalg.norm(panel.up)],
+        [0.75, 0.5, 1.5],
+    )
     assert panel.right[1] == pytest.approx(0)
     assert panel.up[1] > 0
     assert panel_toward_origin((0, 5, 0), (1, 1), WARM).area == pytest.approx(1)
@@ -75,7 +89,9 @@ def test_an_environment_keeps_its_light_at_any_resolution() -> None:
     for rows in (12, 20, 64):
         picture = lights_as_environment((EnvironmentLight(sky),), rows)
         total = (picture * solid_angles(rows)[..., None]).sum((0, 1))
-        np.testing.assert_allclose(total, (sky * solid_angles(24)[..., None]).sum((0, 1)), rtol=1e-5)
+        np.testing.assert_allclose(
+            total, (sky * solid_angles(24)[..., None]).sum((0, 1)), rtol=1e-5
+        )
 
 
 def test_lights_add_up_and_scale() -> None:
@@ -104,7 +120,10 @@ def test_a_light_is_where_it_stands() -> None:
         (lambda: DirectionalLight(SLANTED, -WARM), "negative"),
         (lambda: PointLight(np.array([0, np.nan, 1]), WARM), "position"),
         (lambda: PointLight(SLANTED, np.ones(4)), "intensity"),
-        (lambda: PanelLight(SLANTED, np.array([1.0, 0, 0]), np.array([1.0, 1, 0]), WARM), "right angles"),
+        (
+            lambda: PanelLight(SLANTED, np.array([1.0, 0, 0]), np.array([1.0, 1, 0]), WARM),
+            "right angles",
+        ),
         (lambda: PanelLight(SLANTED, np.zeros(3), np.array([0, 1.0, 0]), WARM), "right angles"),
         (lambda: EnvironmentLight(np.ones((8, 8, 3))), "shape"),
         (lambda: EnvironmentLight(np.ones((2, 4, 3))), "4 rows"),

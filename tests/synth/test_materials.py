@@ -12,33 +12,48 @@ GREY = np.full((2, 2, 3), 0.5)
 
 
 def centres(rows: int, columns: int) -> np.ndarray:
-    v, u = np.meshgrid((np.arange(rows) + 0.5) / rows, (np.arange(columns) + 0.5) / columns, indexing="ij")
+    v, u = np.meshgrid(
+        (np.arange(rows) + 0.5) / rows, (np.arange(columns) + 0.5) / columns, indexing="ij"
+    )
     return np.stack([u.ravel(), v.ravel()], axis=1)
 
 
 @pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3), (1, 1), (1, 4, 3)])
 def test_texel_centres_give_the_texels(shape: tuple[int, ...]) -> None:
     texture = np.random.default_rng(0).uniform(size=shape)
-    np.testing.assert_allclose(texture_at(texture, centres(*shape[:2])), texture.reshape(-1, *shape[2:]), atol=1e-12)
+    np.testing.assert_allclose(
+        texture_at(texture, centres(*shape[:2])), texture.reshape(-1, *shape[2:]), atol=1e-12
+    )
 
 
 def test_a_plane_is_interpolated_exactly() -> None:
     uv = np.random.default_rng(1).uniform(0.1, 0.9, (200, 2))
     v, u = np.meshgrid((np.arange(16) + 0.5) / 16, (np.arange(16) + 0.5) / 16, indexing="ij")
-    np.testing.assert_allclose(texture_at(2 * u - 3 * v, uv), 2 * uv[:, 0] - 3 * uv[:, 1], atol=1e-12)
+    np.testing.assert_allclose(
+        texture_at(2 * u - 3 * v, uv), 2 * uv[:, 0] - 3 * uv[:, 1], atol=1e-12
+    )
 
 
 def test_u_wraps_around_and_v_stops() -> None:
     texture = np.array([[0.0, 1.0, 2.0, 3.0], [10.0, 11.0, 12.0, 13.0]])
     uv = np.random.default_rng(2).uniform(size=(50, 2))
-    np.testing.assert_allclose(texture_at(texture, uv + (1, 0)), texture_at(texture, uv), atol=1e-12)
+    np.testing.assert_allclose(
+        texture_at(texture, uv + (1, 0)), texture_at(texture, uv), atol=1e-12
+    )
     np.testing.assert_allclose(texture_at(texture, np.array([[0.0, 0.25], [1.0, 0.25]])), 1.5)
-    np.testing.assert_allclose(texture_at(texture, np.array([[0.125, -2.0], [0.125, 0.0], [0.125, 1.0], [0.125, 9.0]])), [0, 0, 10, 10])
+    np.testing.assert_allclose(
+        texture_at(texture, np.array([[0.125, -2.0], [0.125, 0.0], [0.125, 1.0], [0.125, 9.0]])),
+        [0, 0, 10, 10],
+    )
 
 
 def test_a_paint_holds_what_the_material_has_there() -> None:
     rng = np.random.default_rng(3)
-    albedo, gloss, strength = rng.uniform(size=(6, 4, 3)), rng.uniform(5, 500, (3, 5)), rng.uniform(size=(2, 2))
+    albedo, gloss, strength = (
+        rng.uniform(size=(6, 4, 3)),
+        rng.uniform(5, 500, (3, 5)),
+        rng.uniform(size=(2, 2)),
+    )
     material = Material(albedo, "blinn_phong", gloss, strength)
     np.testing.assert_allclose(material.at(centres(6, 4)).albedo, albedo.reshape(-1, 3))
     np.testing.assert_allclose(material.at(centres(3, 5)).gloss, gloss.ravel())

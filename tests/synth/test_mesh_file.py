@@ -1,4 +1,6 @@
-"""Meshes from files: their size, normals and colours come through; whatever cannot be rendered is refused in one line."""
+"""Meshes from files: their size, normals and colours come through; whatever cannot be rendered is
+refused in one line.
+"""
 
 import base64
 import json
@@ -14,7 +16,8 @@ from isc_core.photo import srgb_to_linear
 from synth.shapes import mesh_file
 from synth.shapes.mesh_file import read_mesh, read_mesh_file
 
-# A cube whose eight corners have one texture coordinate each: front to the left half, back to the right.
+# A cube whose eight corners have one texture coordinate each: front to the left half, back to the
+# right.
 CUBE = """
 v -1 -1 1\nv 1 -1 1\nv 1 1 1\nv -1 1 1\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1
 vt 0 0\nvt 0.5 0\nvt 0.5 1\nvt 0 1\nvt 0.6 0\nvt 1 0\nvt 1 1\nvt 0.6 1
@@ -54,7 +57,9 @@ def test_a_ball_of_any_kind_of_file_is_a_smooth_ball(kind: str, tmp_path: Path) 
     ball.apply_translation((100, -50, 7))
     ball.export(tmp_path / f"ball.{kind}")
     mesh = read_mesh(tmp_path / f"ball.{kind}")
-    assert len(mesh.vertices) == len(ball.vertices)  # also where the file repeats them for each face
+    assert len(mesh.vertices) == len(
+        ball.vertices
+    )  # also where the file repeats them for each face
     np.testing.assert_allclose(np.linalg.norm(mesh.vertices, axis=1), 1, atol=1e-3)
     np.testing.assert_allclose(mesh.normals, mesh.vertices, atol=1e-2)
     assert np.ptp(mesh.vertices[:, :2], axis=0).max() == pytest.approx(2)
@@ -69,7 +74,9 @@ def test_a_cube_keeps_its_edges_and_a_prism_of_many_sides_is_round(tmp_path: Pat
     prism = read_mesh(tmp_path / "prism.stl")
     side = np.abs(prism.normals[:, 2]) < 0.5
     radial = prism.vertices[side] * (1, 1, 0)
-    np.testing.assert_allclose(prism.normals[side], radial / np.linalg.norm(radial, axis=1, keepdims=True), atol=0.02)
+    np.testing.assert_allclose(
+        prism.normals[side], radial / np.linalg.norm(radial, axis=1, keepdims=True), atol=0.02
+    )
 
 
 def test_a_mesh_that_is_turned_inside_out_is_turned_back(tmp_path: Path) -> None:
@@ -89,7 +96,9 @@ def test_a_texture_comes_through_linear_and_the_right_way_up(tmp_path: Path) -> 
     np.testing.assert_allclose(read.albedo, srgb_to_linear(picture() / 255), atol=1e-6)
     front = np.isclose(read.mesh.normals[:, 2], 1)
     corner = read.mesh.vertices[front][:, :2] / 2 + 0.5
-    np.testing.assert_allclose(read.mesh.uv[front], np.stack([corner[:, 0] / 2, 1 - corner[:, 1]], -1), atol=1e-6)
+    np.testing.assert_allclose(
+        read.mesh.uv[front], np.stack([corner[:, 0] / 2, 1 - corner[:, 1]], -1), atol=1e-6
+    )
 
 
 def test_colours_of_vertices_are_painted_as_they_are_seen_from_the_front(tmp_path: Path) -> None:
@@ -103,7 +112,9 @@ def test_colours_of_vertices_are_painted_as_they_are_seen_from_the_front(tmp_pat
     mesh, size = read.mesh, len(read.albedo)
     front = mesh.vertices[:, 2] > 0.3
     column, row = np.minimum((mesh.uv[front] * size).astype(int), size - 1).T
-    np.testing.assert_allclose(read.albedo[row, column], srgb_to_linear((mesh.vertices[front] + 1) / 2), atol=0.03)
+    np.testing.assert_allclose(
+        read.albedo[row, column], srgb_to_linear((mesh.vertices[front] + 1) / 2), atol=0.03
+    )
 
 
 def test_pieces_of_different_colours_become_one_painted_mesh(tmp_path: Path) -> None:
@@ -111,7 +122,9 @@ def test_pieces_of_different_colours_become_one_painted_mesh(tmp_path: Path) -> 
     for x, colour in ((-1.5, (1.0, 0.0, 0.0, 1.0)), (1.5, (0.0, 0.25, 0.0, 1.0))):
         ball = trimesh.creation.icosphere(3)
         material = trimesh.visual.material.PBRMaterial(baseColorFactor=colour)
-        ball.visual = trimesh.visual.TextureVisuals(uv=np.zeros((len(ball.vertices), 2)), material=material)
+        ball.visual = trimesh.visual.TextureVisuals(
+            uv=np.zeros((len(ball.vertices), 2)), material=material
+        )
         scene.add_geometry(ball, transform=trimesh.transformations.translation_matrix((x, 0, 0)))
     scene.export(tmp_path / "pair.glb")
     read = read_mesh_file(tmp_path / "pair.glb")
@@ -196,7 +209,9 @@ def test_bad_meshes_are_refused(text: str, words: str, tmp_path: Path) -> None:
     refused(obj(tmp_path, text), words)
 
 
-def test_files_that_are_no_meshes_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_that_are_no_meshes_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     refused(tmp_path / "absent.obj", "no such file")
     refused(tmp_path / "shape.blend", "meshes are read from")
     junk = np.random.default_rng(0).bytes(4000)

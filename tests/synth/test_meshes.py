@@ -41,7 +41,10 @@ def test_the_gourd_is_finite_closed_and_smooth() -> None:
     corners = mesh.vertices[mesh.faces]
     facing = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     solid = np.linalg.norm(facing, axis=-1) > 1e-12
-    agreement = np.einsum("ij,ij->i", facing, mesh.normals[mesh.faces[:, 0]])[solid] / np.linalg.norm(facing, axis=-1)[solid]
+    agreement = (
+        np.einsum("ij,ij->i", facing, mesh.normals[mesh.faces[:, 0]])[solid]
+        / np.linalg.norm(facing, axis=-1)[solid]
+    )
     assert agreement.min() > 0.5
     assert np.quantile(agreement, 0.05) > 0.98
 

@@ -1,4 +1,6 @@
-"""The test of images: right ones pass as often as it says, wrong ones do not, and what shows why is kept."""
+"""The test of images: right ones pass as often as it says, wrong ones do not, and what shows why is
+kept.
+"""
 
 from pathlib import Path
 
@@ -7,11 +9,21 @@ import pytest
 
 from isc_core.errors import InputError
 from isc_core.exr import read_channels
-from synth.validation.pixel_test import PixelTestOptions, PixelTestResult, keep_evidence, pixel_test, pooled
+from synth.validation.pixel_test import (
+    PixelTestOptions,
+    PixelTestResult,
+    keep_evidence,
+    pixel_test,
+    pooled,
+)
 
 
-def noisy(rng: np.random.Generator, shape: tuple[int, ...], samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """The mean of samples around 0 whose spread varies from pixel to pixel, and its estimated variance."""
+def noisy(
+    rng: np.random.Generator, shape: tuple[int, ...], samples: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The mean of samples around 0 whose spread varies from pixel to pixel, and its estimated
+    variance.
+    """
     sigma = np.exp(rng.normal(size=shape))
     drawn = rng.normal(size=(samples, *shape)) * sigma
     return drawn.mean(0), drawn.var(0, ddof=1) / samples
@@ -24,12 +36,17 @@ def verdict(difference: np.ndarray, variance: np.ndarray, **options: float) -> P
 @pytest.mark.parametrize("samples", [4, 64])
 def test_right_images_are_rejected_no_more_often_than_stated(samples: int) -> None:
     rng = np.random.default_rng(1)
-    results = [verdict(*noisy(rng, (24, 24), samples), level=0.1, samples=samples) for _ in range(400)]
+    results = [
+        verdict(*noisy(rng, (24, 24), samples), level=0.1, samples=samples) for _ in range(400)
+    ]
     rejected = np.mean([not result.accepted for result in results])
-    # 400 coins of .1 show .1 +- .045 (3 sigma); the pixels' own part of the level, one half, is exact, which needs a lower bound too.
+    # 400 coins of .1 show .1 +- .045 (3 sigma); the pixels' own part of the level, one half, is
+    # exact, which needs a lower bound too.
     assert rejected < 0.145
     assert 0.05 - 0.033 < np.mean([result.beyond > 0 for result in results]) < 0.05 + 0.033
-    assert np.mean([abs(result.bias) > result.global_threshold for result in results]) < 0.025 + 0.025
+    assert (
+        np.mean([abs(result.bias) > result.global_threshold for result in results]) < 0.025 + 0.025
+    )
 
 
 def test_a_normal_law_in_place_of_students_rejects_right_images() -> None:
@@ -41,7 +58,9 @@ def test_a_normal_law_in_place_of_students_rejects_right_images() -> None:
 def test_z_of_pixels_is_normal_whatever_the_number_of_samples() -> None:
     difference, variance = noisy(np.random.default_rng(3), (200, 200), 5)
     z = verdict(difference, variance, samples=5).z
-    np.testing.assert_allclose([z.mean(), z.std(), (np.abs(z) > 1.96).mean()], [0, 1, 0.05], atol=0.02)
+    np.testing.assert_allclose(
+        [z.mean(), z.std(), (np.abs(z) > 1.96).mean()], [0, 1, 0.05], atol=0.02
+    )
 
 
 @pytest.mark.parametrize("share", [0.05, -0.05])
@@ -104,7 +123,9 @@ def test_pooling_keeps_means_and_their_variance() -> None:
 def test_evidence_is_kept_of_rejections_only(tmp_path: Path) -> None:
     variance = np.ones((8, 8, 3))
     difference = np.zeros((8, 8, 3))
-    assert keep_evidence(tmp_path / "why", difference, variance, verdict(difference, variance)) is None
+    assert (
+        keep_evidence(tmp_path / "why", difference, variance, verdict(difference, variance)) is None
+    )
     assert not (tmp_path / "why").exists()
     difference[1, 2, 0], variance[4, 4] = 50, 0
     difference[4, 4, 1] = 1e-3  # infinite z
@@ -112,7 +133,9 @@ def test_evidence_is_kept_of_rejections_only(tmp_path: Path) -> None:
         path = keep_evidence(tmp_path / "why", difference, variance, verdict(difference, variance))
     assert path is not None
     channels = read_channels(path)
-    assert set(channels) == {f"{name}.{letter}" for name in ("difference", "variance", "z") for letter in "RGB"}
+    assert set(channels) == {
+        f"{name}.{letter}" for name in ("difference", "variance", "z") for letter in "RGB"
+    }
     assert channels["z.R"][1, 2] == pytest.approx(50)
     assert channels["z.G"][4, 4] > 1e29
     assert all(np.isfinite(plane).all() for plane in channels.values())
@@ -131,7 +154,9 @@ def test_evidence_is_kept_of_rejections_only(tmp_path: Path) -> None:
         (np.zeros((0, 4)), np.zeros((0, 4))),
     ],
 )
-def test_images_that_cannot_be_tested_are_refused(difference: np.ndarray, variance: np.ndarray) -> None:
+def test_images_that_cannot_be_tested_are_refused(
+    difference: np.ndarray, variance: np.ndarray
+) -> None:
     with pytest.raises(InputError):
         pixel_test(difference, variance)
 

@@ -1,4 +1,6 @@
-"""Recipes: a member of a family is the same wherever it appears, a scene whenever it is made; what is held out is never trained on."""
+"""Recipes: a member of a family is the same wherever it appears, a scene whenever it is made; what
+is held out is never trained on.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +20,9 @@ from synth.sensor import Sensor
 from synth.shapes import SHAPES
 
 SMALL = Picture(size=32, samples=4, renderer="arrays")
-RECIPE = Recipe(7, Part("lathe", 3), Part("blinn_phong", 2), "blinn_phong", "print", Part("area", 1), SMALL)
+RECIPE = Recipe(
+    7, Part("lathe", 3), Part("blinn_phong", 2), "blinn_phong", "print", Part("area", 1), SMALL
+)
 ASPECTS = ("shape", "material", "light")
 
 
@@ -37,7 +41,9 @@ def pools() -> Pools:
 @pytest.fixture(scope="module")
 def names(pools: Pools) -> dict[str, dict[str, set[str]]]:
     """The members that 3000 scenes show, by split and aspect."""
-    found: dict[str, dict[str, set[str]]] = {split: {aspect: set() for aspect in ASPECTS} for split in SPLITS}
+    found: dict[str, dict[str, set[str]]] = {
+        split: {aspect: set() for aspect in ASPECTS} for split in SPLITS
+    }
     for seed in range(3000):
         recipe = pools.recipe(seed, SMALL, Sources())
         for aspect in ASPECTS:
@@ -47,9 +53,13 @@ def names(pools: Pools) -> dict[str, dict[str, set[str]]]:
 
 def test_a_member_is_the_same_in_every_scene() -> None:
     one = build(RECIPE)
-    other = build(replace(RECIPE, seed=8, material=Part("ggx", 4), model="ggx", light=Part("sh", 0)))
+    other = build(
+        replace(RECIPE, seed=8, material=Part("ggx", 4), model="ggx", light=Part("sh", 0))
+    )
     assert np.array_equal(one.mesh.vertices, other.mesh.vertices)
-    assert one.camera.pixels_per_unit != other.camera.pixels_per_unit, "framing belongs to the scene"
+    assert one.camera.pixels_per_unit != other.camera.pixels_per_unit, (
+        "framing belongs to the scene"
+    )
     repainted = build(replace(RECIPE, shape=Part("blobby", 0), light=Part("sh", 0)))
     assert np.array_equal(one.material.albedo, repainted.material.albedo)
     assert np.array_equal(one.material.gloss, repainted.material.gloss)
@@ -58,16 +68,25 @@ def test_a_member_is_the_same_in_every_scene() -> None:
 
 
 def test_members_of_a_family_differ() -> None:
-    meshes = [build(replace(RECIPE, shape=Part("lathe", number))).mesh.vertices for number in range(3)]
+    meshes = [
+        build(replace(RECIPE, shape=Part("lathe", number))).mesh.vertices for number in range(3)
+    ]
     assert not np.array_equal(meshes[0], meshes[1])
     assert not np.array_equal(meshes[1], meshes[2])
-    paints = [build(replace(RECIPE, material=Part("blinn_phong", number))).material.albedo for number in range(2)]
+    paints = [
+        build(replace(RECIPE, material=Part("blinn_phong", number))).material.albedo
+        for number in range(2)
+    ]
     assert not np.array_equal(paints[0], paints[1])
 
 
 def test_streams_of_a_member_and_of_a_scene_are_independent() -> None:
     part = Part("lathe", 3)
-    drawn = [part.generator("shape").random(4), part.generator("light").random(4), Part("blobby", 3).generator("shape").random(4)]
+    drawn = [
+        part.generator("shape").random(4),
+        part.generator("light").random(4),
+        Part("blobby", 3).generator("shape").random(4),
+    ]
     drawn += [np.random.default_rng(RECIPE.stream(number)).random(4) for number in range(4)]
     assert len({tuple(values) for values in drawn}) == len(drawn)
     assert np.array_equal(part.generator("shape").random(4), drawn[0])
@@ -76,7 +95,9 @@ def test_streams_of_a_member_and_of_a_scene_are_independent() -> None:
 @pytest.mark.parametrize("perspective", [False, True])
 def test_the_object_fills_the_picture(perspective: bool) -> None:
     for shape in SHAPES:
-        recipe = replace(RECIPE, shape=Part(shape, 1), picture=replace(SMALL, size=200, perspective=perspective))
+        recipe = replace(
+            RECIPE, shape=Part(shape, 1), picture=replace(SMALL, size=200, perspective=perspective)
+        )
         scene = build(recipe)
         assert scene.camera.perspective == perspective
         distance = scene.camera.distance
@@ -104,12 +125,20 @@ def test_the_same_recipe_gives_the_same_truth_well_exposed() -> None:
     scene_darker, darker = photograph(brighter)
     assert np.quantile(darker.diffuse[darker.mask], 0.995) == pytest.approx(0.3, rel=1e-5)
     gain = radiance(scene) / radiance(scene_darker)
-    assert np.allclose(gain, (one.diffuse[one.mask] / darker.diffuse[darker.mask]).mean(), rtol=1e-4), "the lights are those of the maps"
+    assert np.allclose(
+        gain, (one.diffuse[one.mask] / darker.diffuse[darker.mask]).mean(), rtol=1e-4
+    ), "the lights are those of the maps"
 
 
 def test_an_object_that_mirrors_more_than_it_scatters_is_not_burnt_out() -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
-    dark = replace(RECIPE, shape=Part("height_field", 15), material=Part("blinn_phong", 17), albedo="grey", light=Part("sh", 3))
+    dark = replace(
+        RECIPE,
+        shape=Part("height_field", 15),
+        material=Part("blinn_phong", 17),
+        albedo="grey",
+        light=Part("sh", 3),
+    )
     burnt = photograph(replace(dark, picture=replace(SMALL, exposure=0.75)))[1]
     truth = photograph(dark)[1]
     assert (burnt.image[burnt.mask] > 1).mean() > 0.3
@@ -126,30 +155,48 @@ def test_the_sensor_works_on_the_scene_of_the_seed() -> None:
 
 
 def test_what_is_held_out_is_never_in_train(names: dict[str, dict[str, set[str]]]) -> None:
-    own = {"test_objects": {"shape"}, "test_materials": {"material"}, "test_lights": {"light"}, "test": set(ASPECTS)}
+    own = {
+        "test_objects": {"shape"},
+        "test_materials": {"material"},
+        "test_lights": {"light"},
+        "test": set(ASPECTS),
+    }
     assert set(own) | {"train"} == set(SPLITS)
     for split, held_out in own.items():
         for aspect in ASPECTS:
             shared = names[split][aspect] & names["train"][aspect]
-            assert not shared if aspect in held_out else names[split][aspect] <= names["train"][aspect], (split, aspect)
+            assert (
+                not shared if aspect in held_out else names[split][aspect] <= names["train"][aspect]
+            ), (split, aspect)
 
 
 def test_train_and_test_show_every_family(names: dict[str, dict[str, set[str]]]) -> None:
     for split in SPLITS:
-        for aspect, families in {"shape": SHAPES, "material": MODELS, "light": ("point", "directional", "area", "sh")}.items():
-            assert {name.rstrip("0123456789") for name in names[split][aspect]} == set(families), (split, aspect)
+        for aspect, families in {
+            "shape": SHAPES,
+            "material": MODELS,
+            "light": ("point", "directional", "area", "sh"),
+        }.items():
+            assert {name.rstrip("0123456789") for name in names[split][aspect]} == set(families), (
+                split,
+                aspect,
+            )
 
 
 def test_held_out_materials_have_every_albedo_and_most_are_glossy(pools: Pools) -> None:
     recipes = [pools.recipe(seed, SMALL, Sources()) for seed in range(1000)]
-    held_out = {recipe.albedo for recipe in recipes if pools.split_of(recipe.seed) == "test_materials"}
+    held_out = {
+        recipe.albedo for recipe in recipes if pools.split_of(recipe.seed) == "test_materials"
+    }
     assert held_out == set(ALBEDOS)
     assert 0.1 < np.mean([recipe.model in MATT for recipe in recipes]) < 0.25
 
 
 def test_a_scene_depends_on_its_seed_alone(pools: Pools) -> None:
     again = make_pools(Choices(), Sources())
-    assert [pools.recipe(seed, SMALL, Sources()) for seed in (3, 99)] == [again.recipe(seed, SMALL, Sources()) for seed in (3, 99)]
+    assert [pools.recipe(seed, SMALL, Sources()) for seed in (3, 99)] == [
+        again.recipe(seed, SMALL, Sources()) for seed in (3, 99)
+    ]
     assert pools.split_of(13) == pools.split_of(3) == "test_objects"
 
 
@@ -182,19 +229,39 @@ def test_splits_that_cannot_be_made_are_left_out_or_refused() -> None:
         ({"shapes": ("lathe", "lathe")}, "once"),
     ],
 )
-def test_unknown_names_are_refused_with_the_known_ones(choices: dict[str, tuple[str, ...]], message: str) -> None:
+def test_unknown_names_are_refused_with_the_known_ones(
+    choices: dict[str, tuple[str, ...]], message: str
+) -> None:
     with pytest.raises(InputError) as refused:
         Choices(**choices)
     assert message in str(refused.value)
 
 
-@pytest.mark.parametrize("choices", [{"shapes": ("mesh",)}, {"shapes": ("height",)}, {"albedos": ("image",)}, {"lights": ("natural",)}])
+@pytest.mark.parametrize(
+    "choices",
+    [
+        {"shapes": ("mesh",)},
+        {"shapes": ("height",)},
+        {"albedos": ("image",)},
+        {"lights": ("natural",)},
+    ],
+)
 def test_families_of_files_need_their_files(choices: dict[str, tuple[str, ...]]) -> None:
     with pytest.raises(InputError, match="read from"):
         make_pools(Choices(**choices), Sources())
 
 
-@pytest.mark.parametrize("wrong", [{"size": 4}, {"size": 5000}, {"samples": 1}, {"bounces": 9}, {"exposure": 0.0}, {"exposure": np.nan}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"size": 4},
+        {"size": 5000},
+        {"samples": 1},
+        {"bounces": 9},
+        {"exposure": 0.0},
+        {"exposure": np.nan},
+    ],
+)
 def test_impossible_pictures_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError):
         Picture(**wrong)
@@ -204,5 +271,7 @@ def test_natural_lights_are_told_apart_by_their_number(shared: Path) -> None:
     sources = Sources(natural_lights=shared / "data" / "mit_berkeley_train")
     lights = make_pools(Choices(lights=("natural",)), sources).light
     assert len(lights) > 100
-    one, other = (radiance(build(replace(RECIPE, light=m.part, sources=sources))) for m in lights[:2])
+    one, other = (
+        radiance(build(replace(RECIPE, light=m.part, sources=sources))) for m in lights[:2]
+    )
     assert not np.allclose(one, other)

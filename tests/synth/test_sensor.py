@@ -13,13 +13,28 @@ from synth.truth import GroundTruth
 
 def truth_of(diffuse: np.ndarray, specular: np.ndarray, mask: np.ndarray) -> GroundTruth:
     """A truth whose layers are given, (H, W, 3) each, and whose other maps do not matter here."""
-    diffuse, specular = (np.where(mask[..., None], layer, 0).astype(np.float32) for layer in (diffuse, specular))
+    diffuse, specular = (
+        np.where(mask[..., None], layer, 0).astype(np.float32) for layer in (diffuse, specular)
+    )
     nothing, plane = np.zeros_like(diffuse), np.zeros(mask.shape, np.float32)
     return GroundTruth(
-        image=diffuse + specular, diffuse=diffuse, specular=specular, residual=nothing, reflectance=diffuse, shading=np.ones_like(diffuse),
-        normal=nothing, height=plane, mask=mask, strength=plane, gloss=plane, shading_variance=nothing, specular_variance=nothing,
-        illumination=np.zeros((9, 3)), light_fit_residual=0.0, environment=np.zeros((4, 8, 3)),
-    )  # fmt: skip
+        image=diffuse + specular,
+        diffuse=diffuse,
+        specular=specular,
+        residual=nothing,
+        reflectance=diffuse,
+        shading=np.ones_like(diffuse),
+        normal=nothing,
+        height=plane,
+        mask=mask,
+        strength=plane,
+        gloss=plane,
+        shading_variance=nothing,
+        specular_variance=nothing,
+        illumination=np.zeros((9, 3)),
+        light_fit_residual=0.0,
+        environment=np.zeros((4, 8, 3)),
+    )
 
 
 def glossy(size: int = 64) -> GroundTruth:
@@ -31,16 +46,27 @@ def glossy(size: int = 64) -> GroundTruth:
 
 
 def flat(value: float, size: int = 256) -> GroundTruth:
-    return truth_of(np.full((size, size, 3), value), np.zeros((size, size, 3)), np.ones((size, size), bool))
+    return truth_of(
+        np.full((size, size, 3), value), np.zeros((size, size, 3)), np.ones((size, size), bool)
+    )
 
 
 @pytest.mark.parametrize(
-    "sensor", [Sensor(), Sensor(noise=0.05), Sensor(bits=8), Sensor(noise=0.01, bits=16), Sensor(clip=False, noise=0.1)]
+    "sensor",
+    [
+        Sensor(),
+        Sensor(noise=0.05),
+        Sensor(bits=8),
+        Sensor(noise=0.01, bits=16),
+        Sensor(clip=False, noise=0.1),
+    ],
 )
 def test_the_layers_add_up_and_nothing_else_is_touched(sensor: Sensor) -> None:
     truth = glossy()
     seen = observe(truth, sensor, np.random.default_rng(1))
-    assert np.abs(seen.diffuse + seen.specular + seen.residual - seen.image).max() <= 1e-6 * max(1, seen.image.max() / 4)
+    assert np.abs(seen.diffuse + seen.specular + seen.residual - seen.image).max() <= 1e-6 * max(
+        1, seen.image.max() / 4
+    )
     assert {seen.image.dtype, seen.residual.dtype} == {np.dtype(np.float32)}
     assert seen.image.min() >= 0
     assert not seen.image[~truth.mask].any()
@@ -51,7 +77,10 @@ def test_the_layers_add_up_and_nothing_else_is_touched(sensor: Sensor) -> None:
 
 
 def test_the_same_seed_gives_the_same_noise() -> None:
-    first, again, other = (observe(glossy(), Sensor(noise=0.02), np.random.default_rng(seed)).image for seed in (3, 3, 4))
+    first, again, other = (
+        observe(glossy(), Sensor(noise=0.02), np.random.default_rng(seed)).image
+        for seed in (3, 3, 4)
+    )
     np.testing.assert_array_equal(first, again)
     assert (first != other).any()
 
@@ -75,7 +104,11 @@ def test_only_light_above_full_scale_is_clipped() -> None:
 
 def test_the_layers_of_clipped_light_add_up_exactly_however_bright_it_was() -> None:
     rng = np.random.default_rng(4)
-    truth = truth_of(rng.uniform(0, 0.9, (64, 64, 3)), np.exp(rng.uniform(0, 12, (64, 64, 3))), np.ones((64, 64), bool))
+    truth = truth_of(
+        rng.uniform(0, 0.9, (64, 64, 3)),
+        np.exp(rng.uniform(0, 12, (64, 64, 3))),
+        np.ones((64, 64), bool),
+    )
     seen = observe(truth, Sensor(), rng)
     assert (seen.image == 1).all()
     np.testing.assert_array_equal(seen.diffuse + seen.specular + seen.residual, seen.image)
@@ -84,7 +117,9 @@ def test_the_layers_of_clipped_light_add_up_exactly_however_bright_it_was() -> N
 @pytest.mark.parametrize("level", [0.1, 0.5, 0.8])
 def test_noise_has_mean_zero_and_the_stated_variance(level: float) -> None:
     noise = 0.02
-    error = observe(flat(level), Sensor(noise=noise), np.random.default_rng(7)).residual.astype(float)
+    error = observe(flat(level), Sensor(noise=noise), np.random.default_rng(7)).residual.astype(
+        float
+    )
     count, variance = error.size, noise**2 * (level + READ**2)
     assert abs(error.mean()) < 5 * np.sqrt(variance / count)
     assert abs(error.var() / variance - 1) < 5 * np.sqrt(2 / count)
@@ -106,7 +141,9 @@ def test_codes_are_the_nearest_ones(bits: int) -> None:
     seen = observe(truth, Sensor(bits=bits), np.random.default_rng(0)).image
     coded = linear_to_srgb(seen.astype(float)) * peak
     assert np.abs(coded - np.rint(coded)).max() < 0.01
-    assert np.abs(coded - linear_to_srgb(np.minimum(truth.image.astype(float), 1)) * peak).max() < 0.51
+    assert (
+        np.abs(coded - linear_to_srgb(np.minimum(truth.image.astype(float), 1)) * peak).max() < 0.51
+    )
     steps = np.unique(seen[seen < 1])
     assert (len(steps) <= peak) if bits == 8 else (len(steps) > 256)
 
@@ -118,9 +155,13 @@ def test_a_photo_reads_back_within_half_a_code(bits: int, tmp_path: Path) -> Non
     photo = read_photo(tmp_path / "photo.png")
     np.testing.assert_array_equal(photo.mask, truth.mask)
     assert (photo.original.bit_depth, photo.original.mask_from) == (bits, "alpha")
-    error = linear_to_srgb(photo.image.astype(float)) - linear_to_srgb(np.minimum(truth.image.astype(float), 1))
+    error = linear_to_srgb(photo.image.astype(float)) - linear_to_srgb(
+        np.minimum(truth.image.astype(float), 1)
+    )
     assert np.abs(error).max() < 0.501 / (2**bits - 1)
-    np.testing.assert_array_equal(photo.clipped, (linear_to_srgb(truth.image) > 1 - 0.5 / (2**bits - 1)).any(-1))
+    np.testing.assert_array_equal(
+        photo.clipped, (linear_to_srgb(truth.image) > 1 - 0.5 / (2**bits - 1)).any(-1)
+    )
 
 
 @pytest.mark.parametrize("bits", [8, 16])

@@ -1,4 +1,6 @@
-"""Random objects: closed, smooth, of the promised size and pose; the same from the same seed; textured without a seam before the viewer."""
+"""Random objects: closed, smooth, of the promised size and pose; the same from the same seed;
+textured without a seam before the viewer.
+"""
 
 from functools import cache
 
@@ -30,7 +32,11 @@ def made(name: str, seed: int) -> Mesh:
 
 
 def corners(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return mesh.vertices[mesh.faces[:, 0]], mesh.vertices[mesh.faces[:, 1]], mesh.vertices[mesh.faces[:, 2]]
+    return (
+        mesh.vertices[mesh.faces[:, 0]],
+        mesh.vertices[mesh.faces[:, 1]],
+        mesh.vertices[mesh.faces[:, 2]],
+    )
 
 
 def facing(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
@@ -46,7 +52,9 @@ def assert_closed(mesh: Mesh) -> None:
     solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     solid.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=9)
     whole = solid.faces
-    solid.update_faces((whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0]))
+    solid.update_faces(
+        (whole[:, 0] != whole[:, 1]) & (whole[:, 1] != whole[:, 2]) & (whole[:, 2] != whole[:, 0])
+    )
     assert solid.is_watertight
     assert solid.volume > 0.01
 
@@ -65,7 +73,9 @@ def test_normals_are_unit_and_those_of_the_faces(name: str) -> None:
         mesh = made(name, seed)
         np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-6)
         normal, solid = facing(mesh)
-        agreement = np.stack([(mesh.normals[mesh.faces[:, i]] * normal).sum(1) for i in range(3)])[:, solid]
+        agreement = np.stack([(mesh.normals[mesh.faces[:, i]] * normal).sum(1) for i in range(3)])[
+            :, solid
+        ]
         assert agreement.min() > 0.1  # at the edge of a slab, which is a crease on one side
         assert np.quantile(agreement, 0.03) > 0.95
 
@@ -84,7 +94,10 @@ def test_the_same_seed_makes_the_same_object_and_another_seed_another(name: str)
     for part in ("vertices", "normals", "uv", "faces"):
         np.testing.assert_array_equal(getattr(again, part), getattr(made(name, 3), part))
     other = made(name, 4)
-    assert other.vertices.shape != again.vertices.shape or np.abs(other.vertices - again.vertices).max() > 0.01
+    assert (
+        other.vertices.shape != again.vertices.shape
+        or np.abs(other.vertices - again.vertices).max() > 0.01
+    )
 
 
 @every
@@ -95,13 +108,21 @@ def test_textures_have_no_seam_on_the_side_that_is_seen(name: str) -> None:
         normal, solid = facing(mesh)
         front = mesh.uv[mesh.faces[solid & (normal[:, 2] > 0.1)]]
         jumps = np.linalg.norm(front - np.roll(front, 1, axis=1), axis=-1)
-        # Around a corner of an outline, which is a few columns wide, the wall's texture turns with the outline.
-        assert jumps.max() < (0.25 if name == "extruded" else 0.08) and np.quantile(jumps, 0.99) < 0.05
-        assert front.reshape(-1, 2).std(0).min() > 0.05  # and what is drawn is not squeezed to a line
+        # Around a corner of an outline, which is a few columns wide, the wall's texture turns with
+        # the outline.
+        assert (
+            jumps.max() < (0.25 if name == "extruded" else 0.08) and np.quantile(jumps, 0.99) < 0.05
+        )
+        assert (
+            front.reshape(-1, 2).std(0).min() > 0.05
+        )  # and what is drawn is not squeezed to a line
 
 
 def test_unknown_shapes_are_refused_with_the_known_ones() -> None:
-    with pytest.raises(InputError, match="unknown shape 'teapot': choose superquadric, blobby, displaced, lathe, extruded, height_field"):
+    with pytest.raises(
+        InputError,
+        match="unknown shape 'teapot': choose superquadric, blobby, displaced, lathe, extruded, height_field",
+    ):
         make_shape("teapot", np.random.default_rng(0))
 
 
@@ -126,16 +147,22 @@ def test_an_ellipsoid_has_the_normals_and_the_volume_of_one() -> None:
     axes = np.array([1.0, 0.7, 0.5])
     mesh = Superquadric((1.0, 0.7, 0.5), 1, 1).mesh()
     expected = mesh.vertices / axes**2
-    np.testing.assert_allclose(mesh.normals, expected / np.linalg.norm(expected, axis=1, keepdims=True), atol=1e-9)
+    np.testing.assert_allclose(
+        mesh.normals, expected / np.linalg.norm(expected, axis=1, keepdims=True), atol=1e-9
+    )
     a, b, c = corners(mesh)
-    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(4 / 3 * np.pi * axes.prod(), rel=1e-3)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(
+        4 / 3 * np.pi * axes.prod(), rel=1e-3
+    )
 
 
 def test_blobs_satisfy_their_equation_and_one_alone_is_a_ball() -> None:
     centres = np.array([[0.4, 0, 0], [-0.3, 0.2, 0.1]])
     shapes = np.stack([np.eye(3) / 0.6, np.eye(3) / 0.5])
     vertices = Blobs(centres, shapes, 3.0).mesh().vertices
-    far = np.stack([((vertices - c) @ shape.T) ** 2 for c, shape in zip(centres, shapes, strict=True)]).sum(-1)
+    far = np.stack(
+        [((vertices - c) @ shape.T) ** 2 for c, shape in zip(centres, shapes, strict=True)]
+    ).sum(-1)
     np.testing.assert_allclose(np.exp(3 * (1 - far)).sum(0), 1, atol=1e-9)
     ball = Blobs(centres[:1], shapes[:1], 3.0).mesh()
     np.testing.assert_allclose(np.linalg.norm(ball.vertices - centres[0], axis=1), 0.6, atol=1e-9)
@@ -169,7 +196,9 @@ def test_a_bottle_whose_neck_is_too_narrow_for_a_wall_is_solid(seed: int) -> Non
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_extruded_outline_is_seen_whole_from_its_middle(kind: str) -> None:
     for seed in range(30):
-        outline, normal, tightest = smooth_outline(random_polygon(kind, np.random.default_rng(seed)), 0.05)
+        outline, normal, tightest = smooth_outline(
+            random_polygon(kind, np.random.default_rng(seed)), 0.05
+        )
         assert (outline * normal).sum(1).min() > 0
         assert tightest > 0.01
 
@@ -191,7 +220,9 @@ def test_every_kind_of_relief_is_there_and_moderate(style: str) -> None:
 
 def test_smooth_fields_have_mean_0_variance_1_and_the_asked_wavelength() -> None:
     line = np.stack([np.linspace(0, 40, 4001), np.zeros(4001)], -1)
-    fields = np.stack([smooth_field(line, np.random.default_rng(seed), 0.5, spread=0) for seed in range(60)])
+    fields = np.stack(
+        [smooth_field(line, np.random.default_rng(seed), 0.5, spread=0) for seed in range(60)]
+    )
     assert abs(fields.mean()) < 0.1
     assert fields.var() == pytest.approx(1, abs=0.1)
     # Of waves in all directions of the plane the mean squared slope along a line is (2 pi f)^2 / 2.

@@ -34,7 +34,8 @@ def test_a_ball_through_an_orthographic_camera() -> None:
     depth = np.sqrt(np.maximum(1 - square, 0))
     exact = np.stack([x, y, depth], -1)[surface.mask]
     np.testing.assert_allclose(surface.position[:, :2], exact[:, :2], atol=1e-5)
-    # A chord lies below its arc by 1 - cos(half the angle): what a mesh can show, seen along a slanting ray.
+    # A chord lies below its arc by 1 - cos(half the angle): what a mesh can show, seen along a
+    # slanting ray.
     chord = 1 - np.cos(np.pi / (rows - 1))
     assert (np.abs(surface.position[:, 2] - exact[:, 2]) * exact[:, 2]).max() < 2 * chord + 1e-5
     inner = exact[:, 2] > 0.3
@@ -51,7 +52,9 @@ def test_pictures_of_points_keep_their_order() -> None:
     assert picture.dtype == np.float32
     np.testing.assert_allclose(picture[..., 0][surface.mask], x[surface.mask], atol=1e-5)
     np.testing.assert_allclose(picture[..., 1][surface.mask], y[surface.mask], atol=1e-5)
-    np.testing.assert_array_equal(picture[~surface.mask], np.broadcast_to((7, 8, 9), picture[~surface.mask].shape))
+    np.testing.assert_array_equal(
+        picture[~surface.mask], np.broadcast_to((7, 8, 9), picture[~surface.mask].shape)
+    )
     assert surface.image(surface.paint.gloss).shape == (SIZE, SIZE)
 
 
@@ -60,9 +63,12 @@ def test_a_pinhole_sees_less_of_a_ball_and_its_rays_meet() -> None:
     surface = seen(ball(181), size=SIZE, distance=distance).surface
     eye = np.array([0.0, 0, distance])
     toward = eye - surface.position
-    np.testing.assert_allclose(surface.view, toward / np.linalg.norm(toward, axis=1, keepdims=True), atol=1e-5)
+    np.testing.assert_allclose(
+        surface.view, toward / np.linalg.norm(toward, axis=1, keepdims=True), atol=1e-5
+    )
     np.testing.assert_allclose(np.linalg.norm(surface.position, axis=1), 1, atol=1e-3)
-    # The outline is where the line of sight touches: all that is seen lies before the polar plane z = 1 / distance.
+    # The outline is where the line of sight touches: all that is seen lies before the polar plane z
+    # = 1 / distance.
     assert surface.position[:, 2].min() > 1 / distance - 1e-3
     # That circle appears on the plane z = 0 with the radius of a tangent from the eye.
     radius = distance / np.sqrt(distance**2 - 1) * SCALE
@@ -109,12 +115,19 @@ def test_paint_coarser_than_pixels_stays_sharp_but_at_edges() -> None:
 
 
 def test_paint_is_not_taken_from_what_lies_behind() -> None:
-    """A small white ball before a large black one: at its outline the footprint covers both, the paint is that of the nearer one."""
+    """A small white ball before a large black one: at its outline the footprint covers both, the
+    paint is that of the nearer one.
+    """
     small, large = ball(61, 0.4), ball(61, 1.0)
     vertices = np.concatenate([small.vertices + (0, 0, 1.5), large.vertices])
     u = np.concatenate([np.full(len(small.uv), 0.25), np.full(len(large.uv), 0.75)])
     faces = np.concatenate([small.faces, large.faces + len(small.vertices)])
-    both = Mesh(vertices, np.concatenate([small.normals, large.normals]), np.stack([u, np.full_like(u, 0.5)], -1), faces)
+    both = Mesh(
+        vertices,
+        np.concatenate([small.normals, large.normals]),
+        np.stack([u, np.full_like(u, 0.5)], -1),
+        faces,
+    )
     half = np.zeros((2, 4, 3))
     half[:, :2] = 1
     surface = seen(both, Material(half, "lambert"), size=SIZE).surface

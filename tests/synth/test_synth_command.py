@@ -1,4 +1,6 @@
-"""The command `isc synth` as a user calls it, and how `isc` finds commands of packages that build on it."""
+"""The command `isc synth` as a user calls it, and how `isc` finds commands of packages that build
+on it.
+"""
 
 import json
 import subprocess
@@ -14,12 +16,26 @@ from isc_core.cli import main
 from isc_core.exr import write_channels
 
 ROOT = Path(__file__).resolve().parents[2]
-QUICK = ("--size", "32", "--samples", "4", "--renderer", "arrays", "--shapes", "superquadric", "--albedos", "uniform", "--quiet")
+QUICK = (
+    "--size",
+    "32",
+    "--samples",
+    "4",
+    "--renderer",
+    "arrays",
+    "--shapes",
+    "superquadric",
+    "--albedos",
+    "uniform",
+    "--quiet",
+)
 TETRAHEDRON = "v 1 1 1\nv -1 -1 1\nv -1 1 -1\nv 1 -1 -1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 
 def synth(out: Path | None, *arguments: str, count: int = 1) -> int:
-    return main(["synth", "--count", str(count), *arguments, *(() if out is None else ("-o", str(out)))])
+    return main(
+        ["synth", "--count", str(count), *arguments, *(() if out is None else ("-o", str(out)))]
+    )
 
 
 def refusal(capsys: pytest.CaptureFixture[str]) -> str:
@@ -31,29 +47,46 @@ def refusal(capsys: pytest.CaptureFixture[str]) -> str:
 
 def isolated(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     start = f"import sys; sys.modules['mitsuba'] = sys.modules['drjit'] = None; {code}"
-    return subprocess.run([sys.executable, "-c", start, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-c", start, *arguments],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 def test_help_needs_no_mitsuba_and_running_says_what_to_install(tmp_path: Path) -> None:
     start = "from isc_core.cli import main; sys.exit(main(sys.argv[1:]))"
     shown = isolated(start, "synth", "--help")
     assert shown.returncode == 0, shown.stderr
-    assert {"--count", "--natural-lights", "--renderer"} <= set(shown.stdout.replace(",", " ").split())
+    assert {"--count", "--natural-lights", "--renderer"} <= set(
+        shown.stdout.replace(",", " ").split()
+    )
     refused = isolated(start, "synth", "--count", "1", "-o", str(tmp_path / "set"))
     assert refused.returncode == 2
-    assert refused.stderr == "isc: error: rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'`\n"
+    assert (
+        refused.stderr
+        == "isc: error: rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'`\n"
+    )
     assert not (tmp_path / "set").exists()
 
 
 def test_the_parser_loads_no_renderer() -> None:
     code = "import sys; from isc_core.commands import build_parser; build_parser(); sys.exit(bool({'mitsuba', 'drjit'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
-def test_a_command_that_cannot_be_imported_refuses_alone(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_command_that_cannot_be_imported_refuses_alone(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     broken = EntryPoint("paint", "no_such_package.commands.paint", "isc.commands")
-    monkeypatch.setattr(commands, "entry_points", lambda group: [broken] if group == "isc.commands" else [])
+    monkeypatch.setattr(
+        commands, "entry_points", lambda group: [broken] if group == "isc.commands" else []
+    )
     assert main(["--help"]) == 0
     assert "paint" in capsys.readouterr().out
     assert main(["separate", "--help"]) == 0
@@ -63,10 +96,14 @@ def test_a_command_that_cannot_be_imported_refuses_alone(monkeypatch: pytest.Mon
         assert refusal(capsys).endswith("install it with `pip install 'isc3d[no_such_package]'`")
 
 
-def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     (tmp_path / "broken_command.py").write_text("1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(commands, "entry_points", lambda group: [EntryPoint("paint", "broken_command", group)])
+    monkeypatch.setattr(
+        commands, "entry_points", lambda group: [EntryPoint("paint", "broken_command", group)]
+    )
     with pytest.raises(ZeroDivisionError):
         commands.build_parser()
 
@@ -103,7 +140,9 @@ def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(monkeypatc
         (("bake",), "invalid choice: 'bake'"),
     ],
 )
-def test_bad_input_ends_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str) -> None:
+def test_bad_input_ends_in_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
+) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     assert synth(tmp_path / "set", *arguments) == 2
     assert message in refusal(capsys)
@@ -121,7 +160,11 @@ def test_a_run_makes_scenes_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFi
     loud = [argument for argument in QUICK if argument != "--quiet"]
     assert synth(out, *loud, "--bits", "8", "--noise", "0.01") == 0
     shown = capsys.readouterr()
-    assert "1 scenes made" in shown.out and "README.md" in shown.out and "isc: scene 1 of 1" in shown.err
+    assert (
+        "1 scenes made" in shown.out
+        and "README.md" in shown.out
+        and "isc: scene 1 of 1" in shown.err
+    )
     assert synth(out, *loud, "--bits", "8", "--noise", "0.01", count=2) == 0
     assert "1 scenes made, 1 were there already" in capsys.readouterr().out
     assert synth(out, *loud, "--bits", "16", "--noise", "0.01", count=2) == 2
@@ -135,15 +178,35 @@ def test_slow_rendering_is_explained_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, quiet: bool
 ) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
-    monkeypatch.setattr("synth.commands.synth.slower_without", lambda: "libLLVM 15 is too old: install libllvm19")
+    monkeypatch.setattr(
+        "synth.commands.synth.slower_without", lambda: "libLLVM 15 is too old: install libllvm19"
+    )
     assert synth(tmp_path / "set", *(QUICK if quiet else QUICK[:-1])) == 0
-    assert capsys.readouterr().err.count("isc: libLLVM 15 is too old: install libllvm19\n") == (not quiet)
+    assert capsys.readouterr().err.count("isc: libLLVM 15 is too old: install libllvm19\n") == (
+        not quiet
+    )
 
 
 def test_the_command_in_the_readme_makes_the_same_scenes(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
-    assert synth(tmp_path / "one", *QUICK, "--exposure", "0.4", "--clip", "--lights", "sh", "--perspective") == 0
-    line = next(line.strip() for line in (tmp_path / "one" / "README.md").read_text().splitlines() if line.startswith("    isc synth"))
+    assert (
+        synth(
+            tmp_path / "one",
+            *QUICK,
+            "--exposure",
+            "0.4",
+            "--clip",
+            "--lights",
+            "sh",
+            "--perspective",
+        )
+        == 0
+    )
+    line = next(
+        line.strip()
+        for line in (tmp_path / "one" / "README.md").read_text().splitlines()
+        if line.startswith("    isc synth")
+    )
     assert main([*line.replace("DIR", str(tmp_path / "other")).split()[1:], "--quiet"]) == 0
     ours, theirs = (next((tmp_path / name).glob("*/*/scene.json")) for name in ("one", "other"))
     assert ours.read_bytes() == theirs.read_bytes()
@@ -152,7 +215,10 @@ def test_the_command_in_the_readme_makes_the_same_scenes(tmp_path: Path) -> None
 def test_files_of_the_user_come_in(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     (tmp_path / "solid.obj").write_text(TETRAHEDRON)
-    assert synth(tmp_path / "set", "--mesh", str(tmp_path / "solid.obj"), "--splits", "test_objects") == 2
+    assert (
+        synth(tmp_path / "set", "--mesh", str(tmp_path / "solid.obj"), "--splits", "test_objects")
+        == 2
+    )
     assert "test_objects cannot be made" in refusal(capsys)
     sky = np.full((8, 16), 0.5, np.float32)
     (tmp_path / "lights").mkdir()
@@ -167,7 +233,11 @@ def test_files_of_the_user_come_in(tmp_path: Path, capsys: pytest.CaptureFixture
     assert content["object"]["id"] == "mesh00" and content["light"]["id"] == "hdr00"
     assert "_image0" in content["material"]["id"]
     assert np.allclose(content["albedo"]["mean"], (0.25, 0.5, 0.25), atol=1e-3)
-    text = (tmp_path / "set" / "README.md").read_text() + (tmp_path / "set" / "manifest.json").read_text() + json.dumps(content)
+    text = (
+        (tmp_path / "set" / "README.md").read_text()
+        + (tmp_path / "set" / "manifest.json").read_text()
+        + json.dumps(content)
+    )
     assert str(tmp_path) not in text and "derived from them" in text
 
 
@@ -175,17 +245,30 @@ def test_a_painted_mesh_keeps_its_paint(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     (tmp_path / "solid.obj").write_text("mtllib solid.mtl\nusemtl red\n" + TETRAHEDRON)
     (tmp_path / "solid.mtl").write_text("newmtl red\nKd 0.5 0.1 0.1\n")
-    assert synth(tmp_path / "set", *QUICK[:6], "--quiet", "--mesh", str(tmp_path / "solid.obj")) == 0
+    assert (
+        synth(tmp_path / "set", *QUICK[:6], "--quiet", "--mesh", str(tmp_path / "solid.obj")) == 0
+    )
     content = json.loads(next((tmp_path / "set").glob("train/*/scene.json")).read_text())
     red, green, blue = content["albedo"]["mean"]
-    assert content["albedo"]["family"] == "mesh" and red > 2 * green and green == pytest.approx(blue)
+    assert (
+        content["albedo"]["family"] == "mesh" and red > 2 * green and green == pytest.approx(blue)
+    )
 
 
 def test_interrupting_ends_with_130(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     code = "import sys; from isc_core.cli import main; sys.exit(main(sys.argv[1:]))"
-    arguments = ["synth", "--count", "50", "-o", str(tmp_path / "set"), *(a for a in QUICK if a != "--quiet")]
-    process = subprocess.Popen([sys.executable, "-c", code, *arguments], cwd=ROOT, stderr=subprocess.PIPE, text=True)
+    arguments = [
+        "synth",
+        "--count",
+        "50",
+        "-o",
+        str(tmp_path / "set"),
+        *(a for a in QUICK if a != "--quiet"),
+    ]
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, *arguments], cwd=ROOT, stderr=subprocess.PIPE, text=True
+    )
     assert process.stderr is not None
     for line in process.stderr:
         if "scene 2 of 50" in line:

@@ -43,7 +43,8 @@ def test_hits_are_those_of_a_ball(sphere: Tracer) -> None:
     inner = hits.valid & (passes < 0.95)
     along = -(origins * directions).sum(1) - np.sqrt(np.maximum(1 - passes**2, 0))
     exact = origins + along[:, None] * directions
-    # A facet's middle lies below the ball by the square of its angle over 8, and more along a slanting ray.
+    # A facet's middle lies below the ball by the square of its angle over 8, and more along a
+    # slanting ray.
     np.testing.assert_allclose(hits.position[inner], exact[inner], atol=1e-3)
     np.testing.assert_allclose(hits.normal[inner], exact[inner], atol=1e-3)
     np.testing.assert_allclose(np.linalg.norm(hits.normal[inner], axis=1), 1, atol=1e-9)
@@ -62,8 +63,13 @@ def test_normals_from_inside_face_the_ray(sphere: Tracer) -> None:
 def test_what_is_beyond_the_light_is_not_in_its_way(sphere: Tracer) -> None:
     origins = np.tile([0.0, 0.0, 3.0], (4, 1))
     directions = np.array([[0.0, 0, -1], [0, 0, -1], [0, 0, -1], [0, 1, 0]])
-    np.testing.assert_array_equal(sphere.blocked(origins, directions, np.array([1.9, 2.1, np.inf, np.inf])), [False, True, True, False])
-    np.testing.assert_array_equal(sphere.blocked(origins, directions, np.inf), [True, True, True, False])
+    np.testing.assert_array_equal(
+        sphere.blocked(origins, directions, np.array([1.9, 2.1, np.inf, np.inf])),
+        [False, True, True, False],
+    )
+    np.testing.assert_array_equal(
+        sphere.blocked(origins, directions, np.inf), [True, True, True, False]
+    )
 
 
 def test_lifted_rays_leave_the_surface_and_do_not_pass_through_it(sphere: Tracer) -> None:
@@ -77,7 +83,12 @@ def test_lifted_rays_leave_the_surface_and_do_not_pass_through_it(sphere: Tracer
 def test_no_rays_are_no_error(sphere: Tracer) -> None:
     none = np.zeros((0, 3))
     hits = sphere.hits(none, none)
-    assert [part.shape for part in (hits.valid, hits.position, hits.normal, hits.uv)] == [(0,), (0, 3), (0, 3), (0, 2)]
+    assert [part.shape for part in (hits.valid, hits.position, hits.normal, hits.uv)] == [
+        (0,),
+        (0, 3),
+        (0, 3),
+        (0, 2),
+    ]
     assert sphere.blocked(none, none, np.inf).shape == (0,)
 
 
@@ -86,4 +97,6 @@ def test_a_waist_hides_itself() -> None:
     below, up = np.array([[0.0, 0.0, 5.0]]), np.array([[0.0, 0.0, -1.0]])
     assert tracer.blocked(below, up, np.inf).all()
     hit = tracer.hits(below, up)
-    assert tracer.blocked(hit.position + LIFT * hit.normal, np.array([[0.0, 1.0, 0.0]]), np.inf).all()
+    assert tracer.blocked(
+        hit.position + LIFT * hit.normal, np.array([[0.0, 1.0, 0.0]]), np.inf
+    ).all()

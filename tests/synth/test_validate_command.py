@@ -1,4 +1,6 @@
-"""`isc validate` on small rendered scenes: what it writes, what it accepts and rejects, and how it refuses bad input."""
+"""`isc validate` on small rendered scenes: what it writes, what it accepts and rejects, and how it
+refuses bad input.
+"""
 
 import json
 import shutil
@@ -37,8 +39,34 @@ VOID = {"meta", "img", "rect", "line", "br"}
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("validate") / "scenes"
-    chosen = ["--shapes", "superquadric", "--materials", "blinn_phong", "--albedos", "uniform,patches", "--lights", "directional,area"]
-    assert main(["synth", "-o", str(folder), "--count", str(SCENES), "--size", "24", "--samples", "8", *chosen, "--quiet"]) == 0
+    chosen = [
+        "--shapes",
+        "superquadric",
+        "--materials",
+        "blinn_phong",
+        "--albedos",
+        "uniform,patches",
+        "--lights",
+        "directional,area",
+    ]
+    assert (
+        main(
+            [
+                "synth",
+                "-o",
+                str(folder),
+                "--count",
+                str(SCENES),
+                "--size",
+                "24",
+                "--samples",
+                "8",
+                *chosen,
+                "--quiet",
+            ]
+        )
+        == 0
+    )
     return folder
 
 
@@ -61,7 +89,9 @@ class Page(HTMLParser):
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append(tag)
-        self.links += [value or "" for name, value in attrs if name in ("src", "href", "xlink:href", "data")]
+        self.links += [
+            value or "" for name, value in attrs if name in ("src", "href", "xlink:href", "data")
+        ]
         if tag not in VOID:
             self.open.append(tag)
 
@@ -80,24 +110,51 @@ def test_a_whole_report(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFix
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
     text = (out / "report.html").read_text(encoding="utf-8")
     page = Page(text)
-    assert "http://" not in text and "https://" not in text and "url(" not in text and "script" not in page.tags and "link" not in page.tags
-    assert all(link.startswith("data:image/png;base64,") for link in page.links) and len(page.links) >= 12
-    assert "svg" in page.tags and "Error budget" in page.words and "What limits the chain most" in page.words
+    assert (
+        "http://" not in text
+        and "https://" not in text
+        and "url(" not in text
+        and "script" not in page.tags
+        and "link" not in page.tags
+    )
+    assert (
+        all(link.startswith("data:image/png;base64,") for link in page.links)
+        and len(page.links) >= 12
+    )
+    assert (
+        "svg" in page.tags
+        and "Error budget" in page.words
+        and "What limits the chain most" in page.words
+    )
     content = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert content["accepted"] and len(content["scenes"]) == 1 and len(content["budget"]) == 8
     for scene in content["scenes"]:
         assert set(scene["chain"]["swapped"]) == {
-            "nothing", "diffuse", "shape", "light", "diffuse+shape", "diffuse+light", "shape+light", "diffuse+shape+light",
-        }  # fmt: skip
+            "nothing",
+            "diffuse",
+            "shape",
+            "light",
+            "diffuse+shape",
+            "diffuse+light",
+            "shape+light",
+            "diffuse+shape+light",
+        }
     for found in content["budget"]:
-        total = sum(share["share"]["value"] for share in found["shares"].values()) + found["rest"]["value"]
+        total = (
+            sum(share["share"]["value"] for share in found["shares"].values())
+            + found["rest"]["value"]
+        )
         assert total == pytest.approx(1)
-    assert [check["passed"] for check in content["checks"]] == [True] * 3  # two identities, one render
+    assert [check["passed"] for check in content["checks"]] == [
+        True
+    ] * 3  # two identities, one render
     summary = (out / "summary.md").read_text(encoding="utf-8")
     assert "## Error budget" in summary and len(summary) < 8000
 
 
-def test_bounds_that_are_kept_and_bounds_that_break(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bounds_that_are_kept_and_bounds_that_break(
+    dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out, bounds = tmp_path / "report", tmp_path / "bounds.json"
     stage = ("--stages", "separation", "--renders", "0", "--separator", "shen_2013")
     assert validate(dataset, out, *stage, "--bounds", "none", "--update-bounds", str(bounds)) == 0
@@ -116,29 +173,68 @@ def test_bounds_that_are_kept_and_bounds_that_break(dataset: Path, tmp_path: Pat
         assert "diffuse.R" in read_channels(out / name)
     assert "Rejected" in Page((out / "report.html").read_text(encoding="utf-8")).words
 
-    assert validate(dataset, out, *stage, "--bounds", "none") == 0  # replaces the report with its evidence
+    assert (
+        validate(dataset, out, *stage, "--bounds", "none") == 0
+    )  # replaces the report with its evidence
     assert sorted(path.name for path in out.iterdir()) == sorted(FILES)
 
 
 def test_two_runs_measure_the_same_and_any_number_of_threads(dataset: Path, tmp_path: Path) -> None:
     found = []
     for name, threads in (("one", "1"), ("two", "2")):
-        assert validate(dataset, tmp_path / name, "--stages", "separation", "--bounds", "none", "--renders", "0", "--threads", threads) == 0
+        assert (
+            validate(
+                dataset,
+                tmp_path / name,
+                "--stages",
+                "separation",
+                "--bounds",
+                "none",
+                "--renders",
+                "0",
+                "--threads",
+                threads,
+            )
+            == 0
+        )
         content = json.loads((tmp_path / name / "report.json").read_text(encoding="utf-8"))
-        found.append((content["figures"], [scene["stages"]["separation"]["scores"] for scene in content["scenes"]]))
+        found.append(
+            (
+                content["figures"],
+                [scene["stages"]["separation"]["scores"] for scene in content["scenes"]],
+            )
+        )
     assert found[0] == found[1]
 
 
 def test_a_split_and_a_drawn_sample(dataset: Path, tmp_path: Path) -> None:
     content = {}
-    for name, more in (("split", ("--split", "train")), ("drawn", ("--scenes", "3", "--seed", "4"))):
-        assert validate(dataset, tmp_path / name, "--stages", "separation", "--bounds", "none", "--renders", "0", *more) == 0
+    for name, more in (
+        ("split", ("--split", "train")),
+        ("drawn", ("--scenes", "3", "--seed", "4")),
+    ):
+        assert (
+            validate(
+                dataset,
+                tmp_path / name,
+                "--stages",
+                "separation",
+                "--bounds",
+                "none",
+                "--renders",
+                "0",
+                *more,
+            )
+            == 0
+        )
         content[name] = json.loads((tmp_path / name / "report.json").read_text(encoding="utf-8"))
     assert {scene["facts"]["split"] for scene in content["split"]["scenes"]} == {"train"}
     assert len(content["drawn"]["scenes"]) == 3
 
 
-def test_bad_input_is_refused_and_nothing_is_written(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_refused_and_nothing_is_written(
+    dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.txt").write_text("precious", encoding="utf-8")
     (tmp_path / "empty").mkdir()
@@ -164,7 +260,9 @@ def test_bad_input_is_refused_and_nothing_is_written(dataset: Path, tmp_path: Pa
     assert [path.name for path in (tmp_path / "mine").iterdir()] == ["thesis.txt"]
 
 
-def test_a_damaged_scene_is_refused(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_damaged_scene_is_refused(
+    dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     copy = tmp_path / "copy"
     shutil.copytree(dataset, copy)
     maps = next(copy.glob("*/*/maps.exr"))
@@ -173,7 +271,9 @@ def test_a_damaged_scene_is_refused(dataset: Path, tmp_path: Path, capsys: pytes
     assert "maps.exr" in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
-def test_a_shading_that_is_wrong_by_a_few_per_cent_is_rejected_with_its_maps(dataset: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_shading_that_is_wrong_by_a_few_per_cent_is_rejected_with_its_maps(
+    dataset: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = sorted(dataset.glob("*/*/scene.json"))[0].parent
     assert not needs_files(folder) and read_recipe(folder).name == folder.name
     assert check_shading(folder, 0.01).passed
@@ -192,25 +292,53 @@ def test_a_shading_that_is_wrong_by_a_few_per_cent_is_rejected_with_its_maps(dat
 def test_text_from_outside_cannot_become_markup() -> None:
     evil = '<script>alert("x")</script>&'
     rng = np.random.default_rng(2)
-    facts = SceneFacts(evil, evil, evil, evil, evil, evil, evil, evil, evil, 0.1, 500, 0, Path(evil))
+    facts = SceneFacts(
+        evil, evil, evil, evil, evil, evil, evil, evil, evil, 0.1, 500, 0, Path(evil)
+    )
 
     def scores() -> Scores:
         return Scores(*rng.uniform(0.1, 1, 6))
 
     def scene(name: str) -> SceneResult:
         chain = ChainScores(tuple(scores() for _ in COMBINATIONS), scores(), scores(), 0.1)
-        return SceneResult(replace(facts, albedo=name), (StageResult("sirfs", scores(), 1.0),), chain)
+        return SceneResult(
+            replace(facts, albedo=name), (StageResult("sirfs", scores(), 1.0),), chain
+        )
 
     scenes = tuple(scene(name) for name in (evil, "b", evil, "b"))
     options = RunOptions(stages=find_stages(("sirfs",)))
     figures, budgets = all_figures(options.stages, scenes, 0), all_budgets(scenes, 0)
     verdicts = (Verdict(Bound("sirfs", evil, evil, evil, 1.0), figures[0].interval, True),)
-    outcome = Outcome(evil, evil, options, scenes, figures, budgets, (RenderCheck(evil, evil, 2.0, 1.0),), verdicts, (evil,))
-    text = html_module.page(outcome, [Case(CHAIN, "worst", evil, evil, (Picture(evil, np.zeros((4, 4, 3))),))], [evil])
+    outcome = Outcome(
+        evil,
+        evil,
+        options,
+        scenes,
+        figures,
+        budgets,
+        (RenderCheck(evil, evil, 2.0, 1.0),),
+        verdicts,
+        (evil,),
+    )
+    text = html_module.page(
+        outcome, [Case(CHAIN, "worst", evil, evil, (Picture(evil, np.zeros((4, 4, 3))),))], [evil]
+    )
     page = Page(text)
-    assert "<script" not in text and text.count("&lt;script&gt;") > 10 and page.words.count("<script>") > 10
-    assert page.tags.count("rect") == 19 + 8 and "Rejected: 1 of 1 bounds broken, 1 of 1 checks of the data failed." in page.words
-    assert json.loads(json.dumps(to_json(outcome, [evil]), allow_nan=False))["scenes"][0]["facts"]["name"] == evil
+    assert (
+        "<script" not in text
+        and text.count("&lt;script&gt;") > 10
+        and page.words.count("<script>") > 10
+    )
+    assert (
+        page.tags.count("rect") == 19 + 8
+        and "Rejected: 1 of 1 bounds broken, 1 of 1 checks of the data failed." in page.words
+    )
+    assert (
+        json.loads(json.dumps(to_json(outcome, [evil]), allow_nan=False))["scenes"][0]["facts"][
+            "name"
+        ]
+        == evil
+    )
 
 
 def test_a_cancelled_report_leaves_nothing(tmp_path: Path) -> None:

@@ -24,13 +24,22 @@ from synth.validation.separation_stage import SEPARATION, SeparationScores, scor
 from synth.validation.sirfs_stage import SIRFS, run_sirfs, score_sirfs, show_sirfs, with_normals
 from synth.validation.slices import EVERYTHING, Slice, all_slices
 from synth.validation.stages import Metric, StageOptions, all_stages, find_stages, given
-from synth.validation.substitution import COMBINATIONS, METRICS, TRUTHS, ChainScores, budget, chain_value
+from synth.validation.substitution import (
+    COMBINATIONS,
+    METRICS,
+    TRUTHS,
+    ChainScores,
+    budget,
+    chain_value,
+)
 
 SIZE = 40
 
 
 def sphere(share: float = 0.3, grey: bool = False) -> GroundTruth:
-    """A sphere whose shading is exactly exp(SH(normal)), two colours, and a highlight of `share` of white."""
+    """A sphere whose shading is exactly exp(SH(normal)), two colours, and a highlight of `share` of
+    white.
+    """
     radius = 0.42 * SIZE
     axis = np.arange(SIZE) + 0.5 - SIZE / 2
     x, y = np.meshgrid(axis, -axis)
@@ -39,23 +48,61 @@ def sphere(share: float = 0.3, grey: bool = False) -> GroundTruth:
     normal = np.where(mask[..., None], np.stack([x, y, z], -1) / radius, (0, 0, 1))
     light = np.zeros((9, 3))
     light[0], light[1], light[2], light[3] = -2.0, 0.3, 0.5, -0.4
-    colors = np.array([[0.5, 0.5, 0.5], [0.2, 0.2, 0.2]]) if grey else np.array([[0.6, 0.2, 0.15], [0.15, 0.3, 0.6]])
+    colors = (
+        np.array([[0.5, 0.5, 0.5], [0.2, 0.2, 0.2]])
+        if grey
+        else np.array([[0.6, 0.2, 0.15], [0.15, 0.3, 0.6]])
+    )
     inside = mask[..., None]
     reflectance = np.where(inside, colors[(x + y > 0).astype(int)], 0)
     shading = np.where(inside, np.exp(real_sh(normal) @ light), 0)
-    specular = np.where(inside, share * np.maximum(normal @ np.array([0.3, 0.4, 0.866]), 0)[..., None] ** 60 * np.ones(3), 0)
+    specular = np.where(
+        inside,
+        share * np.maximum(normal @ np.array([0.3, 0.4, 0.866]), 0)[..., None] ** 60 * np.ones(3),
+        0,
+    )
     diffuse, nothing = reflectance * shading, np.zeros((SIZE, SIZE, 3), np.float32)
     flat, height = np.zeros((SIZE, SIZE), np.float32), np.where(mask, z, 0)
     layers = (diffuse + specular, diffuse, specular, nothing, reflectance, shading, normal, height)
-    image, diffuse, specular, residual, reflectance, shading, normal, height = (np.asarray(layer, np.float32) for layer in layers)
+    image, diffuse, specular, residual, reflectance, shading, normal, height = (
+        np.asarray(layer, np.float32) for layer in layers
+    )
     return GroundTruth(
-        image, diffuse, specular, residual, reflectance, shading, normal, height, mask, flat, flat, nothing, nothing, light, 0.0,
+        image,
+        diffuse,
+        specular,
+        residual,
+        reflectance,
+        shading,
+        normal,
+        height,
+        mask,
+        flat,
+        flat,
+        nothing,
+        nothing,
+        light,
+        0.0,
         np.zeros((4, 8, 3)),
-    )  # fmt: skip
+    )
 
 
 def facts(name: str, **changes: object) -> SceneFacts:
-    base = SceneFacts(name, "train", "o", "m", "l", "patches", "ggx", "sharp", "point", 0.1, 900, 0, Path("nowhere"))
+    base = SceneFacts(
+        name,
+        "train",
+        "o",
+        "m",
+        "l",
+        "patches",
+        "ggx",
+        "sharp",
+        "point",
+        0.1,
+        900,
+        0,
+        Path("nowhere"),
+    )
     return replace(base, **changes)
 
 
@@ -67,16 +114,30 @@ def chain(error: dict[frozenset[str], float]) -> ChainScores:
 
 def test_a_perfect_separation_has_no_error() -> None:
     truth = sphere()
-    scores = score_separation(truth, Separation(truth.diffuse, truth.specular, truth.residual, np.ones((SIZE, SIZE), np.float32)))
-    assert replace(scores, lmse_diffuse=0, lmse_specular=0) == SeparationScores(0, 0, 0, 0, 120, 120, 0, None, None)
-    assert scores.lmse_diffuse == pytest.approx(0, abs=1e-30) and scores.lmse_specular == pytest.approx(0, abs=1e-30)
+    scores = score_separation(
+        truth,
+        Separation(
+            truth.diffuse, truth.specular, truth.residual, np.ones((SIZE, SIZE), np.float32)
+        ),
+    )
+    assert replace(scores, lmse_diffuse=0, lmse_specular=0) == SeparationScores(
+        0, 0, 0, 0, 120, 120, 0, None, None
+    )
+    assert scores.lmse_diffuse == pytest.approx(
+        0, abs=1e-30
+    ) and scores.lmse_specular == pytest.approx(0, abs=1e-30)
 
 
 def test_doing_nothing_has_a_ratio_of_one_and_all_highlights_as_error() -> None:
     truth = sphere()
-    scores = score_separation(truth, Separation(truth.image, 0 * truth.image, truth.residual, np.ones((SIZE, SIZE), np.float32)))
+    scores = score_separation(
+        truth,
+        Separation(truth.image, 0 * truth.image, truth.residual, np.ones((SIZE, SIZE), np.float32)),
+    )
     assert scores.mse_ratio == pytest.approx(1, rel=1e-6)
-    assert scores.mse_diffuse == pytest.approx(np.square(truth.specular[truth.mask].astype(float)).mean(), rel=1e-5)
+    assert scores.mse_diffuse == pytest.approx(
+        np.square(truth.specular[truth.mask].astype(float)).mean(), rel=1e-5
+    )
     assert scores.lmse_specular == pytest.approx(1)
 
 
@@ -86,29 +147,46 @@ def test_confidence_that_knows_the_error_ranks_and_removes_it() -> None:
     knowing = Separation(truth.image, 0 * truth.image, truth.residual, -squared)
     wrong = replace(knowing, confidence=squared)
     good, bad = score_separation(truth, knowing), score_separation(truth, wrong)
-    assert good.rank is not None and bad.rank is not None and good.removed is not None and bad.removed is not None
+    assert (
+        good.rank is not None
+        and bad.rank is not None
+        and good.removed is not None
+        and bad.removed is not None
+    )
     assert good.rank < -0.9 and bad.rank > 0.9 and good.removed > 0.9 > 0.1 > bad.removed
 
 
 def test_of_a_matt_scene_only_what_was_taken_counts() -> None:
     truth = sphere(share=0.0)
-    left = Separation(truth.diffuse, truth.specular, truth.residual, np.ones((SIZE, SIZE), np.float32))
+    left = Separation(
+        truth.diffuse, truth.specular, truth.residual, np.ones((SIZE, SIZE), np.float32)
+    )
     assert score_separation(truth, left) == SeparationScores(taken=0.0)
-    robbed = score_separation(truth, replace(left, diffuse=0.9 * truth.diffuse, specular=0.1 * truth.diffuse))
+    robbed = score_separation(
+        truth, replace(left, diffuse=0.9 * truth.diffuse, specular=0.1 * truth.diffuse)
+    )
     assert robbed.taken == pytest.approx(0.1, rel=1e-5) and robbed.mse_ratio is None
 
 
 def test_the_exact_answer_has_no_error() -> None:
     truth = sphere()
     inputs = given(truth, TRUTHS)
-    exact = with_normals(inputs, truth.height.astype(float), truth.normal.astype(float), truth.illumination)
+    exact = with_normals(
+        inputs, truth.height.astype(float), truth.normal.astype(float), truth.illumination
+    )
     scores = score_sirfs(truth, exact)
-    assert scores.height == 0 and max(scores.shading, scores.reflectance, scores.rs_mse, scores.light) < 1e-10 and scores.normal < 1e-3
+    assert (
+        scores.height == 0
+        and max(scores.shading, scores.reflectance, scores.rs_mse, scores.light) < 1e-10
+        and scores.normal < 1e-3
+    )
 
 
 def test_with_all_truths_nothing_is_solved_and_only_the_pixel_grid_errs() -> None:
     truth = sphere()
-    scores = score_sirfs(truth, run_sirfs(given(truth, TRUTHS), StageOptions(), Monitor(cancelled=lambda: True)))
+    scores = score_sirfs(
+        truth, run_sirfs(given(truth, TRUTHS), StageOptions(), Monitor(cancelled=lambda: True))
+    )
     assert scores.height == 0 and scores.light < 1e-20
     assert scores.normal < 0.05 and chain_value(scores, "images") < 2e-3
 
@@ -158,12 +236,17 @@ def test_the_budget_is_the_mean_over_orders_and_adds_up() -> None:
             before = frozenset(order[: order.index(share.truth)])
             saved.append(error[before] - error[before | {share.truth}])
         assert share.share.value == pytest.approx(np.mean(saved) / error[frozenset()])
-        assert share.alone.value == pytest.approx(error[frozenset({share.truth})] / error[frozenset()])
+        assert share.alone.value == pytest.approx(
+            error[frozenset({share.truth})] / error[frozenset()]
+        )
     assert sum(share.share.value for share in found.shares) + found.rest.value == pytest.approx(1)
 
 
 def test_a_stage_that_causes_nothing_gets_nothing() -> None:
-    scenes = [chain({frozenset(t): 0.2 if "diffuse" in t else 0.8 for t in COMBINATIONS}) for _ in range(3)]
+    scenes = [
+        chain({frozenset(t): 0.2 if "diffuse" in t else 0.8 for t in COMBINATIONS})
+        for _ in range(3)
+    ]
     found = budget(METRICS[0], scenes, 0)
     assert [share.share.value for share in found.shares] == pytest.approx([0.75, 0, 0])
     assert found.rest.value == pytest.approx(0.25) and found.error.value == pytest.approx(0.8)
@@ -172,7 +255,10 @@ def test_a_stage_that_causes_nothing_gets_nothing() -> None:
 
 def test_truths_that_hand_an_error_over_have_no_share_of_it() -> None:
     scenes = [chain(dict.fromkeys(map(frozenset, COMBINATIONS), 0.5))]
-    players = {metric.name: tuple(share.truth for share in budget(metric, scenes, 0).shares) for metric in METRICS}
+    players = {
+        metric.name: tuple(share.truth for share in budget(metric, scenes, 0).shares)
+        for metric in METRICS
+    }
     assert players["height"] == ("diffuse", "light") and players["light"] == ("diffuse", "shape")
     assert players["average"] == ("diffuse",) and players["images"] == TRUTHS
     assert budget(METRICS[0], scenes, 0).rest.low is None
@@ -186,7 +272,12 @@ def test_intervals_hold_the_mean_about_as_often_as_they_say(geometric: bool) -> 
     held = 0
     for trial in range(300):
         drawn = rng.normal(1.0, 0.5, 30)
-        found = mean_interval(list(np.exp(drawn) if geometric else drawn), geometric=geometric, seed=trial, resamples=400)
+        found = mean_interval(
+            list(np.exp(drawn) if geometric else drawn),
+            geometric=geometric,
+            seed=trial,
+            resamples=400,
+        )
         assert found.low is not None and found.high is not None
         true = np.exp(1.0) if geometric else 1.0
         held += found.low <= true <= found.high
@@ -194,7 +285,9 @@ def test_intervals_hold_the_mean_about_as_often_as_they_say(geometric: bool) -> 
 
 
 def test_means_of_one_scene_have_no_interval_and_zero_stays_zero() -> None:
-    assert mean_interval([0.3], geometric=True, seed=0) == Interval(pytest.approx(0.3), None, None, 1)
+    assert mean_interval([0.3], geometric=True, seed=0) == Interval(
+        pytest.approx(0.3), None, None, 1
+    )
     assert mean_interval([0.0, 0.0], geometric=True, seed=0) == Interval(0, 0, 0, 2)
     for bad in ([], [np.nan]):
         with pytest.raises(ValueError):
@@ -205,34 +298,61 @@ def test_every_kind_of_slice_holds_every_scene_once() -> None:
     rng = np.random.default_rng(0)
     scenes = [
         facts(
-            f"s{k}", gloss_class=("matt", "sharp")[k % 2], specular_share=float(rng.uniform(0, 0.5)), mask_pixels=int(rng.integers(50, 900))
+            f"s{k}",
+            gloss_class=("matt", "sharp")[k % 2],
+            specular_share=float(rng.uniform(0, 0.5)),
+            mask_pixels=int(rng.integers(50, 900)),
         )
         for k in range(17)
     ]
     found = all_slices(scenes)
     assert found[0] == Slice(EVERYTHING, EVERYTHING, tuple(range(17)))
     kinds = {group.kind for group in found}
-    assert kinds == {EVERYTHING, "gloss", "specular share", "mask size"}  # what is the same everywhere is no slice
+    assert kinds == {
+        EVERYTHING,
+        "gloss",
+        "specular share",
+        "mask size",
+    }  # what is the same everywhere is no slice
     for kind in kinds:
-        assert sorted(k for group in found if group.kind == kind for k in group.members) == list(range(17))
-    sizes = [np.mean([scenes[k].mask_pixels for k in group.members]) for group in found if group.kind == "mask size"]
+        assert sorted(k for group in found if group.kind == kind for k in group.members) == list(
+            range(17)
+        )
+    sizes = [
+        np.mean([scenes[k].mask_pixels for k in group.members])
+        for group in found
+        if group.kind == "mask size"
+    ]
     assert sizes == sorted(sizes) and len(sizes) == 3
 
 
 def results(values: list[float | None]) -> list[SceneResult]:
-    scores = [SeparationScores(0.1, 0.1, 0.1, 0.1, 20.0, 20.0, value, 0.5, -0.5) for value in values]
-    return [SceneResult(facts(f"s{k}"), (StageResult("separation", found, 0.1),)) for k, found in enumerate(scores)]
+    scores = [
+        SeparationScores(0.1, 0.1, 0.1, 0.1, 20.0, 20.0, value, 0.5, -0.5) for value in values
+    ]
+    return [
+        SceneResult(facts(f"s{k}"), (StageResult("separation", found, 0.1),))
+        for k, found in enumerate(scores)
+    ]
 
 
 def test_figures_pass_over_scenes_where_a_metric_is_not_defined() -> None:
     found = all_figures((SEPARATION,), results([0.5, None, 0.5]), 0)
     ratio = next(f for f in found if f.metric.name == "mse_ratio" and f.group.kind == EVERYTHING)
     assert ratio.interval.scenes == 2 and ratio.interval.value == pytest.approx(0.5)
-    assert scene_value(results([None])[0], "separation", "mse_ratio") is None and scene_value(results([0.5])[0], CHAIN, "images") is None
+    assert (
+        scene_value(results([None])[0], "separation", "mse_ratio") is None
+        and scene_value(results([0.5])[0], CHAIN, "images") is None
+    )
 
 
 def figure(metric: Metric, low: float, high: float, scenes: int = 9) -> Figure:
-    return Figure("separation", metric, Slice(EVERYTHING, EVERYTHING, tuple(range(scenes))), Interval((low + high) / 2, low, high, scenes))
+    return Figure(
+        "separation",
+        metric,
+        Slice(EVERYTHING, EVERYTHING, tuple(range(scenes))),
+        Interval((low + high) / 2, low, high, scenes),
+    )
 
 
 @pytest.mark.parametrize(
@@ -246,23 +366,32 @@ def figure(metric: Metric, low: float, high: float, scenes: int = 9) -> Figure:
         ("psnr_diffuse", 20, 22, 15, False),
     ],
 )
-def test_a_bound_breaks_only_where_the_whole_interval_is_beyond(name: str, low: float, high: float, limit: float, broken: bool) -> None:
+def test_a_bound_breaks_only_where_the_whole_interval_is_beyond(
+    name: str, low: float, high: float, limit: float, broken: bool
+) -> None:
     bound = Bound("separation", name, EVERYTHING, EVERYTHING, limit)
     verdicts = judge([bound], [figure(SEPARATION.metric(name), low, high)])
     assert [verdict.broken for verdict in verdicts] == [broken]
     assert judge([bound], [figure(SEPARATION.metric(name), low, high, FEWEST - 1)]) == ()
-    assert judge([replace(bound, stage="none such")], [figure(SEPARATION.metric(name), low, high)]) == ()
+    assert (
+        judge([replace(bound, stage="none such")], [figure(SEPARATION.metric(name), low, high)])
+        == ()
+    )
 
 
 def test_a_run_keeps_its_own_bounds_and_they_survive_the_file(tmp_path: Path) -> None:
-    figures = all_figures((SEPARATION,), results(list(np.random.default_rng(1).uniform(0.2, 0.9, 12))), 0)
+    figures = all_figures(
+        (SEPARATION,), results(list(np.random.default_rng(1).uniform(0.2, 0.9, 12))), 0
+    )
     bounds = bounds_from(figures)
     assert len(bounds) == len(SEPARATION.metrics) - 1  # no scene is matt
     write_bounds(tmp_path / "bounds.json", bounds)
     assert read_bounds(tmp_path / "bounds.json") == bounds
     assert not any(verdict.broken for verdict in judge(bounds, figures))
     worse = all_figures((SEPARATION,), results([0.95] * 12), 0)
-    assert [verdict.bound.metric for verdict in judge(bounds, worse) if verdict.broken] == ["mse_ratio"]
+    assert [verdict.bound.metric for verdict in judge(bounds, worse) if verdict.broken] == [
+        "mse_ratio"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -291,18 +420,29 @@ def test_identities_hold_and_one_wrong_pixel_is_found() -> None:
 
 
 def test_the_chain_runs_every_combination_and_reuses_the_stage_by_itself() -> None:
-    found = measure_scene(facts("s"), sphere(), all_stages(), StageOptions(separator="none"), Monitor())
+    found = measure_scene(
+        facts("s"), sphere(), all_stages(), StageOptions(separator="none"), Monitor()
+    )
     assert found.chain is not None and not found.refused
     assert found.chain.under(("diffuse",)) == found.scores(SIRFS.name)
-    assert found.chain.under(()) == found.chain.untouched  # with the separator "none" the photo is the diffuse image
+    assert (
+        found.chain.under(()) == found.chain.untouched
+    )  # with the separator "none" the photo is the diffuse image
     assert found.chain.under(("diffuse", "shape", "light")).height == 0
     assert len(found.chain.swapped) == 8
-    assert measure_scene(facts("s"), sphere(), (SEPARATION,), StageOptions(separator="none"), Monitor()).chain is None
+    assert (
+        measure_scene(
+            facts("s"), sphere(), (SEPARATION,), StageOptions(separator="none"), Monitor()
+        ).chain
+        is None
+    )
 
 
 def test_a_scene_that_a_stage_refuses_is_kept_with_the_reason() -> None:
     truth = sphere()
-    found = measure_scene(facts("s"), replace(truth, diffuse=0 * truth.diffuse), (SIRFS,), StageOptions(), Monitor())
+    found = measure_scene(
+        facts("s"), replace(truth, diffuse=0 * truth.diffuse), (SIRFS,), StageOptions(), Monitor()
+    )
     assert "black" in found.refused and found.stages == ()
 
 

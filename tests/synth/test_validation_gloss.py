@@ -14,24 +14,39 @@ from synth.materials import Material
 from synth.rendering import RenderOptions
 from synth.scene import Scene
 from synth.truth import GroundTruth, render_truth
-from synth.validation.lobe_stage import GLOSS, GlossScores, gloss_maps, run_gloss, score_gloss, show_gloss
+from synth.validation.lobe_stage import (
+    GLOSS,
+    GlossScores,
+    gloss_maps,
+    run_gloss,
+    score_gloss,
+    show_gloss,
+)
 from synth.validation.stages import StageOptions, given
 from tests.synth.small_scenes import ball
 
 SUN = DirectionalLight(np.array([-0.3, 0.4, np.sqrt(0.75)]), np.full(3, 2.0))
-SKY = EnvironmentLight(np.broadcast_to(np.linspace(1.2, 0.4, 16)[:, None, None], (16, 32, 3)).copy())
+SKY = EnvironmentLight(
+    np.broadcast_to(np.linspace(1.2, 0.4, 16)[:, None, None], (16, 32, 3)).copy()
+)
 RED = np.broadcast_to(np.array([0.5, 0.1, 0.1]), (2, 2, 3))
 
 
 def rendered(material: Material, light: Light) -> GroundTruth:
-    return render_truth(Scene(ball(), material, (light,), Camera(96, 96, 42)), RenderOptions(samples=64))
+    return render_truth(
+        Scene(ball(), material, (light,), Camera(96, 96, 42)), RenderOptions(samples=64)
+    )
 
 
 def scores(truth: GroundTruth) -> GlossScores:
     return score_gloss(truth, run_gloss(given(truth, GLOSS.needs), StageOptions(), Monitor()))
 
 
-@pytest.mark.parametrize("material", [Material(RED, "ggx", 0.2, 1.0), Material(RED, "blinn_phong", 50.0, 0.1)], ids=["ggx", "blinn_phong"])
+@pytest.mark.parametrize(
+    "material",
+    [Material(RED, "ggx", 0.2, 1.0), Material(RED, "blinn_phong", 50.0, 0.1)],
+    ids=["ggx", "blinn_phong"],
+)
 def test_the_roughness_of_a_ball_in_the_sun_is_found(material: Material) -> None:
     found = scores(rendered(material, SUN))
     assert found.determined == 1 and found.alpha_factor is not None and found.explained is not None
@@ -48,7 +63,11 @@ def test_nothing_is_told_of_a_matt_ball_and_under_a_smooth_sky() -> None:
 def test_what_it_shows_and_keeps() -> None:
     truth = rendered(Material(RED, "ggx", 0.2, 1.0), SUN)
     answer = run_gloss(given(truth, GLOSS.needs), StageOptions(), Monitor())
-    assert [picture.caption for picture in show_gloss(truth, answer)] == ["photo", "specular, true", "specular, of the fit"]
+    assert [picture.caption for picture in show_gloss(truth, answer)] == [
+        "photo",
+        "specular, true",
+        "specular, of the fit",
+    ]
     np.testing.assert_allclose(gloss_maps(answer)["specular.R"], truth.specular[..., 0], atol=1e-6)
     with pytest.raises(ValueError, match="known shape"):
         run_gloss(replace(given(truth, GLOSS.needs), height=None), StageOptions(), Monitor())

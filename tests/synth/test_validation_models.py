@@ -1,4 +1,6 @@
-"""The stage "models": the models' own answers, each found once; means and shares that follow from the scenes; tables by material."""
+"""The stage "models": the models' own answers, each found once; means and shares that follow from
+the scenes; tables by material.
+"""
 
 import importlib
 import json
@@ -34,7 +36,14 @@ from synth.validation.gains import all_gains
 from synth.validation.html import page
 from synth.validation.markdown import summary
 from synth.validation.model_tables import model_findings, model_tables
-from synth.validation.models_stage import PLAIN, TRUE_DIFFUSE, Variants, models_stage, run_models, score_models
+from synth.validation.models_stage import (
+    PLAIN,
+    TRUE_DIFFUSE,
+    Variants,
+    models_stage,
+    run_models,
+    score_models,
+)
 from synth.validation.outcome import Outcome
 from synth.validation.run import RunOptions, SceneResult, StageResult, measure_scene
 from synth.validation.separation_stage import SEPARATION
@@ -46,23 +55,59 @@ EVERY = StageOptions(models=("mbp", "joint", "mdr"))
 
 @pytest.fixture(autouse=True)
 def small_solves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SIRFS solved at 24 pixels instead of 256, and not to the end: what is tested here does not depend on it."""
+    """SIRFS solved at 24 pixels instead of 256, and not to the end: what is tested here does not
+    depend on it.
+    """
     monkeypatch.setattr(shape, "RecoverOptions", partial(RecoverOptions, solve_size=24, margin=6))
-    monkeypatch.setattr(shape, "SolverOptions", partial(SolverOptions, lbfgs=LbfgsOptions(evaluations=25)))
+    monkeypatch.setattr(
+        shape, "SolverOptions", partial(SolverOptions, lbfgs=LbfgsOptions(evaluations=25))
+    )
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("models") / "scenes"
-    chosen = ["--shapes", "superquadric", "--materials", "lambert,ggx", "--albedos", "patches", "--lights", "sh"]
-    assert main(["synth", "-o", str(folder), "--count", "3", "--size", "32", "--samples", "8", *chosen, "--quiet"]) == 0
+    chosen = [
+        "--shapes",
+        "superquadric",
+        "--materials",
+        "lambert,ggx",
+        "--albedos",
+        "patches",
+        "--lights",
+        "sh",
+    ]
+    assert (
+        main(
+            [
+                "synth",
+                "-o",
+                str(folder),
+                "--count",
+                "3",
+                "--size",
+                "32",
+                "--samples",
+                "8",
+                *chosen,
+                "--quiet",
+            ]
+        )
+        == 0
+    )
     return folder
 
 
 def alone(truth: GroundTruth, model: str) -> Answer:
     """A model on the photo, as `isc decompose` calls it."""
     h, w = truth.mask.shape
-    photo = Photo(truth.image, truth.mask, 2 * BLACK, np.zeros((h, w), bool), PhotoSource("", (w, h), 16, "linear", "file"))
+    photo = Photo(
+        truth.image,
+        truth.mask,
+        2 * BLACK,
+        np.zeros((h, w), bool),
+        PhotoSource("", (w, h), 16, "linear", "file"),
+    )
     return solve(Task(photo, photo, Settings(model, EVERY.separator, threads=1)))
 
 
@@ -79,7 +124,17 @@ def scene(name: str, true: float, mdr: float, **changes: object) -> SceneResult:
 def outcome_of(scenes: tuple[SceneResult, ...]) -> Outcome:
     stages = (models_stage(("mdr",)),)
     options = RunOptions(stages=stages, settings=StageOptions(models=("mdr",)))
-    return Outcome("d", "c", options, scenes, all_figures(stages, scenes, 0), (), (), (), gains=all_gains(scenes, 0))
+    return Outcome(
+        "d",
+        "c",
+        options,
+        scenes,
+        all_figures(stages, scenes, 0),
+        (),
+        (),
+        (),
+        gains=all_gains(scenes, 0),
+    )
 
 
 def ends(interval: Interval) -> tuple[float, float]:
@@ -100,18 +155,29 @@ def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
         energies.append((before, after))
         return True
 
-    left = np.log(np.where(truth.mask, truth.image.mean(axis=2), 1) / np.where(truth.mask, truth.diffuse.mean(axis=2), 1))
-    joint = importlib.import_module("isc_core.models.joint")  # the package has a function of that name
-    seen = np.repeat((left + 1.0 * (left > 0.5))[..., None], 3, axis=2)  # so that joint goes beyond MDR
+    left = np.log(
+        np.where(truth.mask, truth.image.mean(axis=2), 1)
+        / np.where(truth.mask, truth.diffuse.mean(axis=2), 1)
+    )
+    joint = importlib.import_module(
+        "isc_core.models.joint"
+    )  # the package has a function of that name
+    seen = np.repeat(
+        (left + 1.0 * (left > 0.5))[..., None], 3, axis=2
+    )  # so that joint goes beyond MDR
     monkeypatch.setattr(joint, "log_ratio", lambda *given: (seen, None))
     monkeypatch.setattr(joint, "lowers_energy", kept)
     answers = dict(run_models(given(truth, ("diffuse",)), EVERY, Monitor()).items())
     for name in (PLAIN, *SEPARATING_MODELS):
         model = "sirfs" if name == PLAIN else name
         found, direct = answers[name], alone(truth, model)
-        np.testing.assert_allclose(found.height[truth.mask], direct.height[truth.mask], atol=1e-6, err_msg=model)
+        np.testing.assert_allclose(
+            found.height[truth.mask], direct.height[truth.mask], atol=1e-6, err_msg=model
+        )
         remade = (found.reflectance * found.shading)[truth.mask]
-        np.testing.assert_allclose(remade, direct.split.diffuse[truth.mask], atol=1e-5, err_msg=model)
+        np.testing.assert_allclose(
+            remade, direct.split.diffuse[truth.mask], atol=1e-5, err_msg=model
+        )
     assert np.array_equal(answers["mbp"].height, answers[PLAIN].height)
     assert not np.array_equal(answers[PLAIN].height, answers["mdr"].height)
     assert not np.allclose(answers["joint"].reflectance, answers["mdr"].reflectance, rtol=0.05)
@@ -129,15 +195,21 @@ def test_the_photo_is_separated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(layers, "separate", counted)
     stages = (SEPARATION, models_stage(EVERY.models))
     found = measure_scene(facts("s"), sphere(), stages, EVERY, Monitor())
-    assert not found.refused and [method for method in calls if method != "none"] == [EVERY.separator]
+    assert not found.refused and [method for method in calls if method != "none"] == [
+        EVERY.separator
+    ]
     calls.clear()
-    assert not measure_scene(facts("s"), sphere(), stages[1:], EVERY, Monitor()).refused  # without the stage before it, too
+    assert not measure_scene(
+        facts("s"), sphere(), stages[1:], EVERY, Monitor()
+    ).refused  # without the stage before it, too
     assert [method for method in calls if method != "none"] == [EVERY.separator]
 
 
 def test_a_perfect_separation_makes_mdr_the_true_diffuse_layer_s_equal() -> None:
     truth = sphere()
-    perfect = Separation(truth.diffuse, truth.specular, truth.residual, truth.mask.astype(np.float32))
+    perfect = Separation(
+        truth.diffuse, truth.specular, truth.residual, truth.mask.astype(np.float32)
+    )
     options = StageOptions(models=("mdr",))
     answers = run_models(replace(given(truth, ("diffuse",)), split=perfect), options, Monitor())
     assert answers.mdr is not None and answers.joint is None and answers.mbp is None
@@ -148,29 +220,49 @@ def test_a_perfect_separation_makes_mdr_the_true_diffuse_layer_s_equal() -> None
 
 def test_errors_count_relative_to_plain_sirfs() -> None:
     truth = sphere()
-    normal, light, zero = truth.normal.astype(float), truth.illumination, np.zeros_like(truth.height)
+    normal, light, zero = (
+        truth.normal.astype(float),
+        truth.illumination,
+        np.zeros_like(truth.height),
+    )
     right = Estimate(truth.height, normal, truth.shading, truth.reflectance, light)
     ones = np.where(truth.mask[..., None], np.ones(3), 0)
     flat = Estimate(zero, np.broadcast_to([0.0, 0, 1], normal.shape), ones, ones, 0 * light)
     scores = score_models(truth, Variants(plain=flat, true_diffuse=flat, mdr=right))
     assert scores.true_diffuse == relative(1, 1, 1, 1, 1, 1)
-    assert scores.mdr is not None and max(vars(scores.mdr).values()) < 1e-3 and scores.plain.height > 1
-    assert score_models(truth, Variants(plain=right, true_diffuse=right)).true_diffuse.height == 1  # none has an error
+    assert (
+        scores.mdr is not None and max(vars(scores.mdr).values()) < 1e-3 and scores.plain.height > 1
+    )
+    assert (
+        score_models(truth, Variants(plain=right, true_diffuse=right)).true_diffuse.height == 1
+    )  # none has an error
 
 
 def test_means_and_shares_follow_from_the_scenes() -> None:
-    scenes = tuple(scene(f"s{k}", true, mdr) for k, (true, mdr) in enumerate([(0.4, 0.7), (0.5, 0.8), (0.6, 0.9)]))
+    scenes = tuple(
+        scene(f"s{k}", true, mdr)
+        for k, (true, mdr) in enumerate([(0.4, 0.7), (0.5, 0.8), (0.6, 0.9)])
+    )
     outcome = outcome_of(scenes)
-    mean = {name: exp(sum(map(log, values)) / 3) for name, values in (("true", (0.4, 0.5, 0.6)), ("mdr", (0.7, 0.8, 0.9)))}
-    (figure,) = [f for f in outcome.figures if f.metric.name == "mdr.average" and f.group.kind == "all"]
+    mean = {
+        name: exp(sum(map(log, values)) / 3)
+        for name, values in (("true", (0.4, 0.5, 0.6)), ("mdr", (0.7, 0.8, 0.9)))
+    }
+    (figure,) = [
+        f for f in outcome.figures if f.metric.name == "mdr.average" and f.group.kind == "all"
+    ]
     assert figure.interval.value == pytest.approx(mean["mdr"])
     low, high = ends(figure.interval)
     assert 0.7 <= low < mean["mdr"] < high <= 0.9
     (gain,) = [g for g in outcome.gains if g.error == "average" and g.group.kind == "all"]
     assert gain.share.value == pytest.approx((1 - mean["mdr"]) / (1 - mean["true"]))
     low, high = ends(gain.share)
-    assert 0.25 - 1e-9 <= low < gain.share.value < high <= 0.5 + 1e-9  # of the worst scene and of the best
-    assert any(text.startswith("mdr has 0.796 [") and "40 %" in text for text in model_findings(outcome))
+    assert (
+        0.25 - 1e-9 <= low < gain.share.value < high <= 0.5 + 1e-9
+    )  # of the worst scene and of the best
+    assert any(
+        text.startswith("mdr has 0.796 [") and "40 %" in text for text in model_findings(outcome)
+    )
 
 
 def test_no_share_of_a_gain_that_is_not_there_and_no_interval_of_one_that_is_not_sure() -> None:
@@ -185,10 +277,19 @@ def test_no_share_of_a_gain_that_is_not_there_and_no_interval_of_one_that_is_not
 
 def test_tables_have_a_row_for_every_model_and_material_and_escape_names() -> None:
     evil = "<script>alert(1)</script>"
-    outcome = outcome_of((scene("a", 0.5, 0.8), scene("b", 0.5, 0.9, model=evil), scene("c", 0.5, 1.0)))
+    outcome = outcome_of(
+        (scene("a", 0.5, 0.8), scene("b", 0.5, 0.9, model=evil), scene("c", 0.5, 1.0))
+    )
     tables = {table.kind: table for table in model_tables(outcome)}
-    assert [row[0] for row in tables["all"].rows] == ["plain SIRFS", "mdr", "SIRFS on the true diffuse layer"]
-    assert [row[:3] for row in tables["material"].rows if row[2] == "mdr"] == [(evil, "1", "mdr"), ("ggx", "2", "mdr")]
+    assert [row[0] for row in tables["all"].rows] == [
+        "plain SIRFS",
+        "mdr",
+        "SIRFS on the true diffuse layer",
+    ]
+    assert [row[:3] for row in tables["material"].rows if row[2] == "mdr"] == [
+        (evil, "1", "mdr"),
+        ("ggx", "2", "mdr"),
+    ]
     assert all(len(row) == len(table.heading) for table in tables.values() for row in table.rows)
     assert tables["material"].rows[0][3] == "0.9; 20 %"
     text = page(outcome, [], [])
@@ -217,43 +318,84 @@ def test_the_command_compares_models_by_material(dataset: Path, tmp_path: Path) 
     content = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert content["settings"]["models"] == ["joint"] and "--models joint" in content["command"]
     scores = {own["facts"]["model"]: own["stages"]["models"]["scores"] for own in content["scenes"]}
-    assert set(scores) == {"lambert", "ggx"} and all(set(found) == {"plain", "true_diffuse", "joint"} for found in scores.values())
+    assert set(scores) == {"lambert", "ggx"} and all(
+        set(found) == {"plain", "true_diffuse", "joint"} for found in scores.values()
+    )
     whole = _figures(content, "all", "all")
     for error in ("average", "height", "normal", "shading", "reflectance", "rs_mse", "light"):
         expected = np.exp(np.mean([np.log(found["joint"][error]) for found in scores.values()]))
         assert whole[f"joint.{error}"]["value"] == pytest.approx(expected)
-    assert _figures(content, "material", "lambert")["true_diffuse.average"]["value"] == pytest.approx(1)  # nothing to separate there
-    assert _figures(content, "material", "ggx")["true_diffuse.average"]["value"] == pytest.approx(scores["ggx"]["true_diffuse"]["average"])
+    assert _figures(content, "material", "lambert")["true_diffuse.average"][
+        "value"
+    ] == pytest.approx(1)  # nothing to separate there
+    assert _figures(content, "material", "ggx")["true_diffuse.average"]["value"] == pytest.approx(
+        scores["ggx"]["true_diffuse"]["average"]
+    )
     assert "## Models beside plain SIRFS" in (out / "summary.md").read_text(encoding="utf-8")
-    assert "reflectance, joint" in (out / "report.html").read_text(encoding="utf-8")  # scenes to look at
+    assert "reflectance, joint" in (out / "report.html").read_text(
+        encoding="utf-8"
+    )  # scenes to look at
 
 
 def _figures(content: dict[str, Any], kind: str, value: str) -> dict[str, Any]:
     """The stage's intervals over a slice, by metric."""
-    own = [f for f in content["figures"] if f["stage"] == "models" and f["slice"] == {"kind": kind, "value": value}]
+    own = [
+        f
+        for f in content["figures"]
+        if f["stage"] == "models" and f["slice"] == {"kind": kind, "value": value}
+    ]
     return {figure["metric"]["name"]: figure["interval"] for figure in own}
 
 
 def test_without_models_there_is_no_such_stage(dataset: Path, tmp_path: Path) -> None:
-    more = ("--stages", "separation", "--scenes", "1", "--renders", "0", "--bounds", "none", "--quiet")
+    more = (
+        "--stages",
+        "separation",
+        "--scenes",
+        "1",
+        "--renders",
+        "0",
+        "--bounds",
+        "none",
+        "--quiet",
+    )
     assert main(["validate", str(dataset), "-o", str(tmp_path / "out"), *more]) == 0
     content = json.loads((tmp_path / "out" / "report.json").read_text(encoding="utf-8"))
-    assert content["gains"] == [] and content["settings"]["models"] == [] and {f["stage"] for f in content["figures"]} == {"separation"}
+    assert (
+        content["gains"] == []
+        and content["settings"]["models"] == []
+        and {f["stage"] for f in content["figures"]} == {"separation"}
+    )
 
 
 @pytest.mark.parametrize("wrong", ["magic", "sirfs", ","])
-def test_an_unknown_model_is_refused(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: str) -> None:
-    assert main(["validate", str(dataset), "-o", str(tmp_path / "out"), "--models", wrong, "--quiet"]) == 2
+def test_an_unknown_model_is_refused(
+    dataset: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], wrong: str
+) -> None:
+    assert (
+        main(["validate", str(dataset), "-o", str(tmp_path / "out"), "--models", wrong, "--quiet"])
+        == 2
+    )
     told = capsys.readouterr().err
-    assert told.startswith("isc: error: ") and told.count("\n") == 1 and not (tmp_path / "out").exists()
+    assert (
+        told.startswith("isc: error: ")
+        and told.count("\n") == 1
+        and not (tmp_path / "out").exists()
+    )
 
 
 @pytest.mark.parametrize("stage", ["models", CHAIN])
 def test_evidence_of_a_broken_bound_is_kept(dataset: Path, tmp_path: Path, stage: str) -> None:
     settings = StageOptions(models=("mdr",))
-    options = RunOptions(stages=(*find_stages(None), models_stage(settings.models)), settings=settings)
+    options = RunOptions(
+        stages=(*find_stages(None), models_stage(settings.models)), settings=settings
+    )
     folder = sorted(dataset.glob("*/*/scene.json"))[0].parent
     shown = SceneResult(facts("s", folder=folder))
     names = write_evidence(tmp_path / "kept", shown, stage, options, Monitor())
-    assert names == (("truth.exr", "models.exr") if stage == "models" else ("truth.exr", "chain_separation.exr", "chain_sirfs.exr"))
+    assert names == (
+        ("truth.exr", "models.exr")
+        if stage == "models"
+        else ("truth.exr", "chain_separation.exr", "chain_sirfs.exr")
+    )
     assert all((tmp_path / "kept" / name).is_file() for name in names)

@@ -13,7 +13,10 @@ from synth.variant import llvm_is_usable, load_mitsuba, slower_without
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize(("major", "usable"), [(-1, False), (14, False), (15, False), (18, False), (19, True), (21, True)])
+@pytest.mark.parametrize(
+    ("major", "usable"),
+    [(-1, False), (14, False), (15, False), (18, False), (19, True), (21, True)],
+)
 def test_only_a_recent_llvm_is_trusted(major: int, usable: bool) -> None:
     assert llvm_is_usable(major) is usable
 
@@ -33,7 +36,9 @@ def test_without_mitsuba_the_message_names_the_extra(monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.parametrize("found", [-1, 15])
-def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package(found: int) -> None:
+def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package(
+    found: int,
+) -> None:
     """In a process of its own: a variant, once set, stays."""
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     code = (
@@ -46,7 +51,9 @@ def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package
         "assert hits.valid.all() and variant.load_mitsuba().variant() == 'scalar_rgb'\n"
         "print(variant.slower_without())\n"
     )
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.count("\n") == 1
     assert "libllvm19" in done.stdout

@@ -1,4 +1,6 @@
-"""Lobes from specular images: how rough an object is, how strong its gloss, where its lights stand, and how sure that is."""
+"""Lobes from specular images: how rough an object is, how strong its gloss, where its lights stand,
+and how sure that is.
+"""
 
 from .fit import fit_lobe
 from .result import Interval, LobeFit, LobeFitOptions, LobeLight

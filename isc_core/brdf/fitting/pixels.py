@@ -1,8 +1,10 @@
-"""The pixels that a lobe is fitted to: all bright ones, some of the dark ones, and how far each is believed.
+"""The pixels that a lobe is fitted to: all bright ones, some of the dark ones, and how far each is
+believed.
 
-Equation: the deviation of a pixel of specular light s is sigma = sqrt(floor^2 + (relative s)^2), floor being a share of the peak; its
-weight is its confidence times the number of pixels that it stands for. Pixels are taken at even steps along their order in brightness,
-the same for the same picture.
+Equation: the deviation of a pixel of specular light s is sigma = sqrt(floor^2 + (relative s)^2),
+floor being a share of the peak; its weight is its confidence times the number of pixels that it
+stands for. Pixels are taken at even steps along their order in brightness, the same for the same
+picture.
 
 Citation: W. G. Cochran, "Sampling techniques", 3rd edition (1977) (systematic sampling; no DOI).
 
@@ -21,9 +23,12 @@ _PEAK_PIXELS = 5  # the peak is the mean of that many: one hot pixel is no highl
 
 @dataclass(frozen=True)
 class Pixels:
-    """N pixels: `normal` (N, 3), `place` (N, 3) (zeros where not known), `colour` (N, 3) and its mean `value` (N,), `sigma` and `weight`
-    (N,), `clipped` (N,) bool, `cell` (N, 2): rows and columns. `peak` of the highlight; `dark`: as good as no light; `bright`: how many
-    pixels of the picture reach half of the peak; `peak_clipped`: the share of the pixels of the peak that are clipped."""
+    """N pixels: `normal` (N, 3), `place` (N, 3) (zeros where not known), `colour` (N, 3) and its
+    mean `value` (N,), `sigma` and `weight` (N,), `clipped` (N,) bool, `cell` (N, 2): rows and
+    columns. `peak` of the highlight; `dark`: as good as no light; `bright`: how many pixels of the
+    picture reach half of the peak; `peak_clipped`: the share of the pixels of the peak that are
+    clipped.
+    """
 
     normal: np.ndarray
     place: np.ndarray
@@ -40,7 +45,10 @@ class Pixels:
 
 
 def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixels:
-    """At most about `most` of the pixels inside. `noise`: the floor as a share of the peak, and the relative part."""
+    """At most about `most` of the pixels inside.
+
+    `noise`: the floor as a share of the peak, and the relative part.
+    """
     inside = seen.inside
     value = seen.specular[inside].mean(axis=1)
     order = np.argsort(-value, kind="stable")

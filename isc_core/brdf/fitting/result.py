@@ -24,11 +24,14 @@ FOUND = "determined"
 
 @dataclass(frozen=True)
 class LobeFitOptions:
-    """`model`: of the lobe. `most_lights`: 1 to 3. `most_pixels`: that are looked at, >= 100. `normal_error`: of the normals, degrees,
-    [0, 90): 0 for exact ones, about 15 for recovered ones; it widens the intervals. `floor`: deviation of the specular light as a share of
-    its peak; `relative`: as a share of itself. `darkest`: radiance >= 0 that is no highlight yet. `thresholded`: the specular image is a
-    separator's, which sees only what rises above an unknown level. `recovered`: normals and shading too were recovered from the
-    same photo, see `recovered`. Raises `InputError` outside these."""
+    """`model`: of the lobe. `most_lights`: 1 to 3. `most_pixels`: that are looked at, >= 100.
+    `normal_error`: of the normals, degrees, [0, 90): 0 for exact ones, about 15 for recovered ones;
+    it widens the intervals. `floor`: deviation of the specular light as a share of its peak;
+    `relative`: as a share of itself. `darkest`: radiance >= 0 that is no highlight yet.
+    `thresholded`: the specular image is a separator's, which sees only what rises above an unknown
+    level. `recovered`: normals and shading too were recovered from the same photo, see `recovered`.
+    Raises `InputError` outside these.
+    """
 
     model: LobeModel = "ggx"
     most_lights: int = 3
@@ -45,13 +48,22 @@ class LobeFitOptions:
             raise InputError(f"unknown lobe {self.model!r}: choose {', '.join(CONVENTION)}")
         if not 1 <= self.most_lights <= 3 or self.most_pixels < 100:
             raise InputError("most_lights has to be 1 to 3 and most_pixels at least 100")
-        if not (0 <= self.normal_error < 90 and 0 < self.floor < 1 and 0 <= self.relative < 1 and self.darkest >= 0):
-            raise InputError("normal_error has to be within [0, 90), floor within (0, 1), relative within [0, 1), darkest 0 or more")
+        if not (
+            0 <= self.normal_error < 90
+            and 0 < self.floor < 1
+            and 0 <= self.relative < 1
+            and self.darkest >= 0
+        ):
+            raise InputError(
+                "normal_error has to be within [0, 90), floor within (0, 1), relative within [0, 1), darkest 0 or more"
+            )
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Holds the truth with a probability of 68 %: from `low` to `high`; numbers, or arrays of the same shape."""
+    """Holds the truth with a probability of 68 %: from `low` to `high`; numbers, or arrays of the
+    same shape.
+    """
 
     low: float | np.ndarray
     high: float | np.ndarray
@@ -59,9 +71,11 @@ class Interval:
 
 @dataclass(frozen=True)
 class LobeLight:
-    """One light. `direction` (3,): unit, x right, y up, z toward the viewer; it lies within `cone` degrees with a probability of 68 %.
-    `strength_light` (3,): the lobe's strength times the light's irradiance on a plane across its beam, linear RGB; only this product can
-    be known. Unit: the photo's radiance x sr (W / m^2 where the photo is in W / (m^2 sr)). `interval`: of it."""
+    """One light. `direction` (3,): unit, x right, y up, z toward the viewer; it lies within `cone`
+    degrees with a probability of 68 %. `strength_light` (3,): the lobe's strength times the light's
+    irradiance on a plane across its beam, linear RGB; only this product can be known. Unit: the
+    photo's radiance x sr (W / m^2 where the photo is in W / (m^2 sr)). `interval`: of it.
+    """
 
     direction: np.ndarray
     cone: float
@@ -71,13 +85,15 @@ class LobeLight:
 
 @dataclass(frozen=True)
 class LobeFit:
-    """A lobe and its lights. `model`: what alpha means, in words. `determined`: whether alpha is; else `reason` says why not.
+    """A lobe and its lights. `model`: what alpha means, in words. `determined`: whether alpha is;
+    else `reason` says why not.
 
-    `alpha`: None where it is not known at all; where the highlight is narrower than a pixel, or clipped, the upper bound.
-    `alpha_interval`: likewise. `lights`: the brightest first; none where there is no specular light, no lobe explains it, or an environment
-    was given. `strength`, `strength_interval`: of the lobe (3,), where an environment was given, else None. `explained`: share of the
-    squared specular image, in [0, 1].
-    `predicted`: (H, W, 3) float32, the specular image of the fit, 0 outside the mask; what a separator left out is in it.
+    `alpha`: None where it is not known at all; where the highlight is narrower than a pixel, or
+    clipped, the upper bound. `alpha_interval`: likewise. `lights`: the brightest first; none where
+    there is no specular light, no lobe explains it, or an environment was given. `strength`,
+    `strength_interval`: of the lobe (3,), where an environment was given, else None. `explained`:
+    share of the squared specular image, in [0, 1]. `predicted`: (H, W, 3) float32, the specular
+    image of the fit, 0 outside the mask; what a separator left out is in it.
     """
 
     model: str
@@ -138,4 +154,8 @@ class LobeFit:
 
 
 def _pair(interval: Interval | None) -> list[Any] | None:
-    return None if interval is None else [np.asarray(interval.low).tolist(), np.asarray(interval.high).tolist()]
+    return (
+        None
+        if interval is None
+        else [np.asarray(interval.low).tolist(), np.asarray(interval.high).tolist()]
+    )

@@ -1,11 +1,13 @@
 """Whether a light without any peak explains a specular image as well as lamps do.
 
-Equation: a mirror-like gloss under the radiance sum_j c_j p_j(r) of degree 4 in the mirrored view r = 2 n_z n - v shows F(n) times it; the
-c_j are found by re-weighted least squares with the loss of `lamps`. p_j: the monomials x^a y^b z^c, c <= 1, 25 of them, which span the
-spherical harmonics to that degree. A rough gloss under a smooth light is such a picture too: roughness only makes it smoother.
+Equation: a mirror-like gloss under the radiance sum_j c_j p_j(r) of degree 4 in the mirrored view r
+= 2 n_z n - v shows F(n) times it; the c_j are found by re-weighted least squares with the loss of
+`lamps`. p_j: the monomials x^a y^b z^c, c <= 1, 25 of them, which span the spherical harmonics to
+that degree. A rough gloss under a smooth light is such a picture too: roughness only makes it
+smoother.
 
-Citation: R. Ramamoorthi, P. Hanrahan, "A signal-processing framework for inverse rendering", SIGGRAPH 2001, doi:10.1145/383259.383271
-(what a light's frequencies leave of the lobe).
+Citation: R. Ramamoorthi, P. Hanrahan, "A signal-processing framework for inverse rendering",
+SIGGRAPH 2001, doi:10.1145/383259.383271 (what a light's frequencies leave of the lobe).
 
 Limits: lobes with an alpha above about .35 are nearly that smooth themselves.
 """
@@ -26,14 +28,22 @@ def smooth_loss(pixels: Pixels) -> float:
     normal = pixels.normal
     mirrored = 2 * normal[:, 2:] * normal - np.array([0.0, 0, 1])
     x, y, z = mirrored.T
-    columns = [x**a * y**b * z**c for c in (0, 1) for a in range(_DEGREE + 1) for b in range(_DEGREE + 1) if a + b + c <= _DEGREE]
+    columns = [
+        x**a * y**b * z**c
+        for c in (0, 1)
+        for a in range(_DEGREE + 1)
+        for b in range(_DEGREE + 1)
+        if a + b + c <= _DEGREE
+    ]
     basis = np.stack(columns, axis=1) * (sky_response(normal) / pixels.sigma)[:, None]
     target, weight = pixels.value / pixels.sigma, pixels.weight
     left = target
     for _ in range(_STEPS):
         matrix = product(basis, weight, basis)
         matrix += _RIDGE * float(np.trace(matrix)) / len(matrix) * np.eye(len(matrix))
-        left = basis @ np.linalg.solve(matrix, product(basis, weight, target[:, None])[:, 0]) - target
+        left = (
+            basis @ np.linalg.solve(matrix, product(basis, weight, target[:, None])[:, 0]) - target
+        )
         left = np.where(pixels.clipped & (left > 0), 0, left)
         weight = pixels.weight / np.sqrt(1 + left**2)
     return float(pixels.weight @ (2 * (np.sqrt(1 + left**2) - 1)))

@@ -1,12 +1,13 @@
 """Where to look for lights: the peaks of the specular light as a function of the normal.
 
-Problem: the least squares need a start near the light. For an orthographic view and a far light the lobe is highest near the normal that
-equals the half vector, l = 2 (v . h) h - v.
+Problem: the least squares need a start near the light. For an orthographic view and a far light the
+lobe is highest near the normal that equals the half vector, l = 2 (v . h) h - v.
 
-Equation: normals are laid out on a disc by Lambert's equal-area map, (x, y) / sqrt(1 + z); the mean specular light of each cell, blurred
-together with its number of pixels, has its maximum at h.
+Equation: normals are laid out on a disc by Lambert's equal-area map, (x, y) / sqrt(1 + z); the mean
+specular light of each cell, blurred together with its number of pixels, has its maximum at h.
 
-Citation: J. P. Snyder, "Map projections: a working manual", USGS Professional Paper 1395 (1987), doi:10.3133/pp1395.
+Citation: J. P. Snyder, "Map projections: a working manual", USGS Professional Paper 1395 (1987),
+doi:10.3133/pp1395.
 
 Limits: normals that no pixel has are empty cells; cells are 3 degrees wide.
 """
@@ -18,9 +19,13 @@ _CELLS = 41
 _BLUR, _APART = 1.0, 5.0  # cells
 
 
-def bright_half_vectors(normal: np.ndarray, value: np.ndarray, weight: np.ndarray, count: int) -> list[np.ndarray]:
-    """Unit normals (3,) around which `value` (N,), which may be negative, is highest on the average, the highest first; the last is that of
-    the brightest pixel. `normal` (N, 3), `weight` (N,)."""
+def bright_half_vectors(
+    normal: np.ndarray, value: np.ndarray, weight: np.ndarray, count: int
+) -> list[np.ndarray]:
+    """Unit normals (3,) around which `value` (N,), which may be negative, is highest on the
+    average, the highest first; the last is that of the brightest pixel. `normal` (N, 3), `weight`
+    (N,).
+    """
     flat = normal[:, :2] / np.sqrt(1 + np.clip(normal[:, 2], 0, 1))[:, None]
     cell = np.clip(np.floor((flat + 1) / 2 * _CELLS).astype(int), 0, _CELLS - 1)
     index = cell[:, 0] * _CELLS + cell[:, 1]
@@ -32,7 +37,11 @@ def bright_half_vectors(normal: np.ndarray, value: np.ndarray, weight: np.ndarra
     found = []
     for _ in range(count - 1):
         best = np.unravel_index(int(np.argmax(mean)), mean.shape)
-        near = np.exp(-((cell - best) ** 2).sum(axis=1) / (2 * (1.5 * _BLUR) ** 2)) * weight * np.maximum(value, 0)
+        near = (
+            np.exp(-((cell - best) ** 2).sum(axis=1) / (2 * (1.5 * _BLUR) ** 2))
+            * weight
+            * np.maximum(value, 0)
+        )
         middle = near @ normal
         length = float(np.linalg.norm(middle))
         if length > 0:
@@ -42,5 +51,7 @@ def bright_half_vectors(normal: np.ndarray, value: np.ndarray, weight: np.ndarra
 
 
 def light_of_half_vector(half: np.ndarray) -> np.ndarray:
-    """The direction (3,) of the light whose half vector with the view (0, 0, 1) is the unit vector `half` (3,)."""
+    """The direction (3,) of the light whose half vector with the view (0, 0, 1) is the unit vector
+    `half` (3,).
+    """
     return 2 * half[2] * half - np.array([0.0, 0, 1])

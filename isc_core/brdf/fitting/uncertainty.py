@@ -1,14 +1,15 @@
 """How sure a least squares fit is whose errors are not independent.
 
-Equation: with the scores g_i = w_i r_i J_i summed over blocks B of neighbouring pixels, and H = sum w_i J_i J_i^T,
+Equation: with the scores g_i = w_i r_i J_i summed over blocks B of neighbouring pixels, and H = sum
+w_i J_i J_i^T,
 
     covariance = H^-1 (sum_B g_B g_B^T) H^-1 b / (b - p),      b blocks that count, p parameters.
 
-Errors within a block may depend on each other in any way; a block is about as wide as a highlight, since what is wrong there (normals, the
-separation, the lobe's form) is wrong all over it.
+Errors within a block may depend on each other in any way; a block is about as wide as a highlight,
+since what is wrong there (normals, the separation, the lobe's form) is wrong all over it.
 
-Citation: K.-Y. Liang and S. L. Zeger, "Longitudinal data analysis using generalized linear models", Biometrika 73(1) (1986), 13-22,
-doi:10.1093/biomet/73.1.13 (the sandwich over clusters).
+Citation: K.-Y. Liang and S. L. Zeger, "Longitudinal data analysis using generalized linear models",
+Biometrika 73(1) (1986), 13-22, doi:10.1093/biomet/73.1.13 (the sandwich over clusters).
 
 Limits: a fit that errs alike everywhere does not know of it: `normal_error` has to tell.
 """
@@ -21,8 +22,12 @@ from .pixels import Pixels
 _FEWEST = 4.0  # blocks; a highlight is at least cut in four
 
 
-def covariance(jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray, pixels: Pixels) -> np.ndarray:
-    """(P, P), of the columns of the jacobian (N, P) of the residual (N,), both in sigmas, with weights (N,)."""
+def covariance(
+    jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray, pixels: Pixels
+) -> np.ndarray:
+    """(P, P), of the columns of the jacobian (N, P) of the residual (N,), both in sigmas, with
+    weights (N,).
+    """
     bread = _inverse(product(jacobian, weight, jacobian))
     side = max(3.0, float(np.sqrt(pixels.bright / np.pi)))
     cell = np.floor(pixels.cell / side).astype(int)
@@ -41,7 +46,11 @@ def naive_variance(jacobian: np.ndarray, weight: np.ndarray, column: int) -> flo
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Of a symmetric matrix that may be singular: columns without any effect get no variance, not an infinite one."""
+    """Of a symmetric matrix that may be singular: columns without any effect get no variance, not
+    an infinite one.
+    """
     scale = np.sqrt(np.maximum(np.diag(matrix), 0))
     scale = np.where(scale > 1e-12 * max(float(scale.max()), 1e-300), scale, np.inf)
-    return np.asarray(np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)) / np.outer(scale, scale)
+    return np.asarray(
+        np.linalg.pinv(matrix / np.outer(scale, scale), rcond=1e-12, hermitian=True)
+    ) / np.outer(scale, scale)

@@ -1,10 +1,12 @@
-"""Which reflectances are likely at all: a smooth density over whitened log colour, fitted to a histogram.
+"""Which reflectances are likely at all: a smooth density over whitened log colour, fitted to a
+histogram.
 
-Minimises over tables f   sum p f + log sum exp(-f) + (c / nodes) sum sqrt(|second derivatives of f|^2 + 1e-5),
-the negative log likelihood of the histogram p and a robust thin-plate energy. J. T. Barron, J. Malik (2015), "Shape,
-illumination, and reflectance from shading", doi:10.1109/TPAMI.2014.2377712. The problem is convex; f is written as the sum
-of the levels of a pyramid whose finest level is 0 (see `absolute_table`), which lets L-BFGS (D. C. Liu, J. Nocedal 1989,
-doi:10.1007/BF01589116) move large and small features alike.
+Minimises over tables f   sum p f + log sum exp(-f) + (c / nodes) sum sqrt(|second derivatives of
+f|^2 + 1e-5), the negative log likelihood of the histogram p and a robust thin-plate energy. J. T.
+Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
+doi:10.1109/TPAMI.2014.2377712. The problem is convex; f is written as the sum of the levels of a
+pyramid whose finest level is 0 (see `absolute_table`), which lets L-BFGS (D. C. Liu, J. Nocedal
+1989, doi:10.1007/BF01589116) move large and small features alike.
 
 Limits: where the data say nothing the table rises along straight lines to the border of its range.
 """
@@ -31,9 +33,10 @@ def _ignore(loss: float) -> None:
 class TableFitOptions:
     """How a table is fitted.
 
-    `smoothness`: the constant c. `levels`: levels of the pyramid, the frozen finest one included. `memory`: pairs that L-BFGS
-    keeps. `tolerance`: stop when the last five losses lie within this share of the present one. `runs`: restarts from the result,
-    with an empty memory. `max_steps`: of each run.
+    `smoothness`: the constant c. `levels`: levels of the pyramid, the frozen finest one included.
+    `memory`: pairs that L-BFGS keeps. `tolerance`: stop when the last five losses lie within this
+    share of the present one. `runs`: restarts from the result, with an empty memory. `max_steps`:
+    of each run.
     """
 
     smoothness: float = 512.0
@@ -44,17 +47,29 @@ class TableFitOptions:
     max_steps: int = 1000
 
 
-def fit_absolute_table(histogram: np.ndarray, options: TableFitOptions, on_step: Callable[[float], None] = _ignore) -> CoarseTable:
+def fit_absolute_table(
+    histogram: np.ndarray, options: TableFitOptions, on_step: Callable[[float], None] = _ignore
+) -> CoarseTable:
     """The table for `histogram` p ((n,) * d, sum 1), in half precision if d > 1.
 
     `on_step` receives the loss after every step and may raise to stop.
     """
     problem = _Problem(histogram, options)
     unknowns = np.zeros(problem.size, np.float32)
-    search = LbfgsOptions(options.memory, options.max_steps, 4 * options.max_steps, options.tolerance, gradient_tolerance=0.0)
+    search = LbfgsOptions(
+        options.memory,
+        options.max_steps,
+        4 * options.max_steps,
+        options.tolerance,
+        gradient_tolerance=0.0,
+    )
     for _ in range(options.runs):
         minimise(problem.loss, unknowns, search, NumpyAlgebra(), lambda _, loss: on_step(loss))
-    return CoarseTable.of(problem.coarse(unknowns), histogram.shape[0], np.float16 if histogram.ndim > 1 else np.float32)
+    return CoarseTable.of(
+        problem.coarse(unknowns),
+        histogram.shape[0],
+        np.float16 if histogram.ndim > 1 else np.float32,
+    )
 
 
 class _Problem:
@@ -84,13 +99,18 @@ class _Problem:
         return total
 
     def loss(self, unknowns: np.ndarray, gradient: np.ndarray) -> float:
-        """The loss at `unknowns`; writes its gradient. Fields are float32, sums over them float64."""
+        """The loss at `unknowns`; writes its gradient.
+
+        Fields are float32, sums over them float64.
+        """
         f = synthesise(self.matrices[0], self.coarse(unknowns))
         value, slope = _negative_log_likelihood(f, self.histogram)
         bending, bending_slope = roughness(f)
         bending_slope *= np.float32(self.weight)
         slope += bending_slope
-        for transposed, part in zip(self.transposed, np.split(gradient, self.ends[:-1]), strict=True):
+        for transposed, part in zip(
+            self.transposed, np.split(gradient, self.ends[:-1]), strict=True
+        ):
             slope = synthesise(transposed, slope)
             part[:] = slope.ravel()
         return value + self.weight * bending
@@ -102,5 +122,7 @@ def _negative_log_likelihood(f: np.ndarray, histogram: np.ndarray) -> tuple[floa
     partition = density.sum(dtype=float)
     density *= np.float32(-1 / partition)
     density += histogram
-    value = np.einsum("i,i->", histogram.ravel(), f.ravel(), dtype=float) + np.log(partition) - lowest
+    value = (
+        np.einsum("i,i->", histogram.ravel(), f.ravel(), dtype=float) + np.log(partition) - lowest
+    )
     return float(value), density

@@ -1,8 +1,9 @@
 """The cost of an absolute (whitened, log) reflectance as a table that stays small in a file.
 
-The full table of n nodes an axis is an upsampling by two of a coarse one: insert zeros, then filter with (1, 4, 6, 4, 1) / 8
-along each axis, zero padded (P. J. Burt, E. H. Adelson 1983, doi:10.1109/TCOM.1983.1095851). Only the coarse one is stored.
-The model: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
+The full table of n nodes an axis is an upsampling by two of a coarse one: insert zeros, then filter
+with (1, 4, 6, 4, 1) / 8 along each axis, zero padded (P. J. Burt, E. H. Adelson 1983,
+doi:10.1109/TCOM.1983.1095851). Only the coarse one is stored. The model: J. T. Barron, J. Malik
+(2015), doi:10.1109/TPAMI.2014.2377712.
 """
 
 import itertools
@@ -18,7 +19,8 @@ LOW, HIGH = -7.0, 4.0
 
 @dataclass(frozen=True)
 class CoarseTable:
-    """A table of n = `nodes` a side as the upsampling of `base + coarse`, less its minimum; `coarse` is (ceil(n/2),) * d, least 0.
+    """A table of n = `nodes` a side as the upsampling of `base + coarse`, less its minimum;
+    `coarse` is (ceil(n/2),) * d, least 0.
 
     So a short float type keeps its digits where the cost is low, that is, where reflectances are.
     """
@@ -43,7 +45,12 @@ def synthesis_matrix(nodes: int, dtype: type = np.float64) -> scipy.sparse.csr_m
     """The upsampling of one axis from ceil(nodes/2) to `nodes` values."""
     coarse = -(-nodes // 2)
     taps = {-2: 0.125, -1: 0.5, 0: 0.75, 1: 0.5, 2: 0.125}
-    rows = [(2 * k + o, k, tap) for k in range(coarse) for o, tap in taps.items() if 0 <= 2 * k + o < nodes]
+    rows = [
+        (2 * k + o, k, tap)
+        for k in range(coarse)
+        for o, tap in taps.items()
+        if 0 <= 2 * k + o < nodes
+    ]
     row, column, value = zip(*rows, strict=True)
     return scipy.sparse.csr_matrix((np.array(value, dtype), (row, column)), shape=(nodes, coarse))
 
@@ -51,14 +58,16 @@ def synthesis_matrix(nodes: int, dtype: type = np.float64) -> scipy.sparse.csr_m
 def synthesise(matrix: scipy.sparse.spmatrix, values: np.ndarray) -> np.ndarray:
     """Applies `matrix` (n, m) along every axis of `values` (m, ..., m)."""
     for _ in range(values.ndim):
-        # Each turn treats the first axis and puts it last, so that after all turns the axes are in order again.
+        # Each turn treats the first axis and puts it last, so that after all turns the axes are in
+        # order again.
         turned = matrix @ values.reshape(values.shape[0], -1)
         values = np.ascontiguousarray(np.moveaxis(turned.reshape(-1, *values.shape[1:]), 0, -1))
     return values
 
 
 def splat(points: np.ndarray, nodes: int, weights: np.ndarray) -> np.ndarray:
-    """Histogram (nodes,) * d of `points` (n, d) over [-7, 4]^d with multilinear weights; points outside are moved to the border.
+    """Histogram (nodes,) * d of `points` (n, d) over [-7, 4]^d with multilinear weights; points
+    outside are moved to the border.
 
     `weights` (n,) is what each point adds in all.
     """
@@ -76,7 +85,8 @@ def splat(points: np.ndarray, nodes: int, weights: np.ndarray) -> np.ndarray:
 
 
 def log_likelihood(table: np.ndarray, histogram: np.ndarray) -> float:
-    """Mean log probability of `histogram` (sums to 1) under the distribution exp(-table) / sum exp(-table) over the nodes.
+    """Mean log probability of `histogram` (sums to 1) under the distribution exp(-table) / sum
+    exp(-table) over the nodes.
 
     On objects that the table was not fitted to, this is what its smoothness is chosen by.
     """

@@ -1,12 +1,14 @@
-"""The Gaussian scale mixture of a colour difference: p(x) = sum_k w_k N(x; 0, v_k S), x in R^3, det S = 1.
+"""The Gaussian scale mixture of a colour difference: p(x) = sum_k w_k N(x; 0, v_k S), x in R^3, det
+S = 1.
 
-With fixed log-spaced variances v_k both the weights and the shared covariance S have closed-form steps of expectation
-maximisation (A. P. Dempster, N. M. Laird, D. B. Rubin 1977, doi:10.1111/j.2517-6161.1977.tb01600.x):
-S ~ sum_i (sum_k r_ik / v_k) x_i x_i^T with responsibilities r. The model: J. T. Barron, J. Malik (2015),
-doi:10.1109/TPAMI.2014.2377712.
+With fixed log-spaced variances v_k both the weights and the shared covariance S have closed-form
+steps of expectation maximisation (A. P. Dempster, N. M. Laird, D. B. Rubin 1977,
+doi:10.1111/j.2517-6161.1977.tb01600.x): S ~ sum_i (sum_k r_ik / v_k) x_i x_i^T with
+responsibilities r. The model: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
 
-The samples enter as cells of (direction, log length), each with its count and the sum of x x^T: m = x^T S^-1 x / 2 of a cell
-is exactly its members' mean for every S, and what is lost is of second order in the cell's size.
+The samples enter as cells of (direction, log length), each with its count and the sum of x x^T: m =
+x^T S^-1 x / 2 of a cell is exactly its members' mean for every S, and what is lost is of second
+order in the cell's size.
 """
 
 from collections.abc import Iterable
@@ -27,7 +29,10 @@ _PER_DECADE_OF_M = 300
 
 @dataclass(frozen=True)
 class ColorCells:
-    """Cells of colour differences: `counts` (n,) and `moments` (n, 3, 3), the sum of x x^T over each cell's members."""
+    """Cells of colour differences:
+
+    `counts` (n,) and `moments` (n, 3, 3), the sum of x x^T over each cell's members.
+    """
 
     counts: np.ndarray
     moments: np.ndarray
@@ -41,18 +46,25 @@ class ColorCells:
         moments = np.empty((len(used), 3, 3))
         for a in range(3):
             for b in range(a, 3):
-                moments[:, a, b] = moments[:, b, a] = np.bincount(cell, x[:, a] * x[:, b], len(used))
+                moments[:, a, b] = moments[:, b, a] = np.bincount(
+                    cell, x[:, a] * x[:, b], len(used)
+                )
         return ColorCells(counts, moments)
 
     @staticmethod
     def merged(parts: Iterable["ColorCells"]) -> "ColorCells":
         """The cells of all samples of `parts` (at least one), not merged where they coincide."""
         all_parts = list(parts)
-        return ColorCells(np.concatenate([p.counts for p in all_parts]), np.concatenate([p.moments for p in all_parts]))
+        return ColorCells(
+            np.concatenate([p.counts for p in all_parts]),
+            np.concatenate([p.moments for p in all_parts]),
+        )
 
 
 def _cell_index(x: np.ndarray) -> np.ndarray:
-    """Cell of each sample: a face of the cube (of three, as x and -x are alike), two steps on it, a step of log length."""
+    """Cell of each sample: a face of the cube (of three, as x and -x are alike), two steps on it, a
+    step of log length.
+    """
     rows = np.arange(len(x))
     face = np.abs(x).argmax(axis=1)
     largest = x[rows, face]
@@ -60,7 +72,9 @@ def _cell_index(x: np.ndarray) -> np.ndarray:
     index = face
     for turn in (1, 2):
         ratio = x[rows, (face + turn) % 3] * scale
-        index = index * _DIRECTIONS + np.minimum((ratio + 1) * (_DIRECTIONS / 2), _DIRECTIONS - 1).astype(np.int64)
+        index = index * _DIRECTIONS + np.minimum(
+            (ratio + 1) * (_DIRECTIONS / 2), _DIRECTIONS - 1
+        ).astype(np.int64)
     with np.errstate(divide="ignore"):
         length = (np.log10(np.abs(largest)) - _DECADES[0]) * _PER_DECADE
     lengths = (_DECADES[1] - _DECADES[0]) * _PER_DECADE
@@ -69,7 +83,9 @@ def _cell_index(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ColorScaleMixture:
-    """`variances` v_k and `weights` w_k (K,), `covariance` S (3, 3) with det 1, and `reach`, the largest m it was fitted to."""
+    """`variances` v_k and `weights` w_k (K,), `covariance` S (3, 3) with det 1, and `reach`, the
+    largest m it was fitted to.
+    """
 
     variances: np.ndarray
     weights: np.ndarray
@@ -82,7 +98,10 @@ class ColorScaleMixture:
         return (vectors / np.sqrt(values)) @ vectors.T
 
     def log_density(self, m: np.ndarray) -> np.ndarray:
-        """log p as a function of m >= 0; same shape as `m`. The densest reachable m never underflows: max v is 32."""
+        """log p as a function of m >= 0; same shape as `m`.
+
+        The densest reachable m never underflows: max v is 32.
+        """
         return np.log(_densities(np.asarray(m, float), self.variances) @ self.weights)
 
     def table(self) -> CostTable:
@@ -92,8 +111,11 @@ class ColorScaleMixture:
         return CostTable(0.0, self.reach / (TABLE_NODES - 1), log_density[0] - log_density)
 
 
-def fit_color_mixture(cells: ColorCells, iterations: int = 200, inner: int = 5) -> ColorScaleMixture:
-    """The mixture of highest likelihood after `iterations` steps on the weights, every `inner`-th one also on the covariance.
+def fit_color_mixture(
+    cells: ColorCells, iterations: int = 200, inner: int = 5
+) -> ColorScaleMixture:
+    """The mixture of highest likelihood after `iterations` steps on the weights, every `inner`-th
+    one also on the covariance.
 
     The samples must span all three dimensions.
     """
@@ -111,8 +133,12 @@ def fit_color_mixture(cells: ColorCells, iterations: int = 200, inner: int = 5) 
     return ColorScaleMixture(VARIANCES.copy(), weights, covariance, reach)
 
 
-def _distance_histogram(cells: ColorCells, covariance: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells of like m thrown together: the bin of each cell, and of each bin its count of samples and their mean m."""
+def _distance_histogram(
+    cells: ColorCells, covariance: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Cells of like m thrown together: the bin of each cell, and of each bin its count of samples
+    and their mean m.
+    """
     m = _half_distance(cells, covariance)
     with np.errstate(divide="ignore"):
         fine = np.maximum(_PER_DECADE_OF_M * (np.log10(m) + 12), 0).astype(np.int64)

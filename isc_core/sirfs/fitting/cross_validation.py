@@ -1,6 +1,8 @@
-"""How likely the fitted reflectance statistics find objects that they have not seen: what smoothness is chosen by.
+"""How likely the fitted reflectance statistics find objects that they have not seen: what
+smoothness is chosen by.
 
-Leave-one-object-out cross-validation (M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x) of the table of absolute colour.
+Leave-one-object-out cross-validation (M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x) of the
+table of absolute colour.
 """
 
 from collections.abc import Mapping
@@ -15,11 +17,16 @@ from .statistics import ObjectStatistics
 
 
 def held_out_log_likelihood(
-    statistics: Mapping[str, ObjectStatistics], options: TableFitOptions, channels: int = 3, monitor: Monitor | None = None
+    statistics: Mapping[str, ObjectStatistics],
+    options: TableFitOptions,
+    channels: int = 3,
+    monitor: Monitor | None = None,
 ) -> np.ndarray:
-    """Mean log likelihood of each object's pixels under the table fitted to all the others, (objects,), in order of name.
+    """Mean log likelihood of each object's pixels under the table fitted to all the others,
+    (objects,), in order of name.
 
-    Nodes of the grid are the outcomes: figures are comparable between `options`, not between numbers of `channels`.
+    Nodes of the grid are the outcomes: figures are comparable between `options`, not between
+    numbers of `channels`.
     """
     monitor = monitor or Monitor()
     names = sorted(statistics)
@@ -29,7 +36,10 @@ def held_out_log_likelihood(
         rest = [statistics[other] for other in names if other != name]
         if channels == 3:
             whiten = fit_whitening(rest)
-            seen, unseen = color_histogram(rest, whiten), color_histogram([statistics[name]], whiten)
+            seen, unseen = (
+                color_histogram(rest, whiten),
+                color_histogram([statistics[name]], whiten),
+            )
         else:
             seen, unseen = grey_histogram(rest), grey_histogram([statistics[name]])
         likelihoods.append(log_likelihood(fit_absolute_table(seen, options).table().values, unseen))

@@ -1,8 +1,9 @@
 """Fits every prior of SIRFS to a selection of training objects.
 
-The recipe is that of J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
-doi:10.1109/TPAMI.2014.2377712; each statistic has its own module beside this one. Objects count alike in the statistics of
-absolute colour, pixels (pairs of pixels) alike in those of smoothness. No random numbers.
+The recipe is that of J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from
+shading", doi:10.1109/TPAMI.2014.2377712; each statistic has its own module beside this one. Objects
+count alike in the statistics of absolute colour, pixels (pairs of pixels) alike in those of
+smoothness. No random numbers.
 """
 
 import itertools
@@ -28,13 +29,14 @@ from .whitening import parsimony_whitening
 class LightFitOptions:
     """How the light priors are fitted.
 
-    `natural_contrast`: the factors on the environments' coefficients; None fits them to the training objects' natural lights.
-    Likelihood asks for 2.6 in brightness (1.9 if colour shares the factor); held-out accuracy is best nearer 1.6
-    in brightness and 0.7 in colour, the default.
-    `split_contrast`: with a factor each for brightness and colour.
-    `mirror`: lights also count with left and right exchanged. `permute_natural`, `permute_laboratory`: with every order of the
-    channels. `laboratory_ridge`: see `fit_light`; ten lights leave many directions unseen, so that a held-out one is much likelier
-    with some. `floor`: added where the solver whitens, see `GaussianLight`.
+    `natural_contrast`: the factors on the environments' coefficients; None fits them to the
+    training objects' natural lights. Likelihood asks for 2.6 in brightness (1.9 if colour shares
+    the factor); held-out accuracy is best nearer 1.6 in brightness and 0.7 in colour, the default.
+    `split_contrast`: with a factor each for brightness and colour. `mirror`: lights also count with
+    left and right exchanged. `permute_natural`, `permute_laboratory`: with every order of the
+    channels. `laboratory_ridge`: see `fit_light`; ten lights leave many directions unseen, so that
+    a held-out one is much likelier with some. `floor`: added where the solver whitens, see
+    `GaussianLight`.
     """
 
     natural_contrast: Contrast | None = field(default_factory=lambda: Contrast(1.6, 0.7))
@@ -48,17 +50,21 @@ class LightFitOptions:
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How the priors are fitted. `components`: of the mixtures of one number. `iterations`: of expectation maximisation, for all.
+    """How the priors are fitted. `components`: of the mixtures of one number. `iterations`: of
+    expectation maximisation, for all.
 
-    `whiten_floor`: see `whitening`. `light`: the lights. `absolute`, `grey_absolute`: the tables of absolute reflectance; the grey
-    one's smoothness is where held-out objects are likeliest, and being of 256 numbers it can be fitted closely.
+    `whiten_floor`: see `whitening`. `light`: the lights. `absolute`, `grey_absolute`: the tables of
+    absolute reflectance; the grey one's smoothness is where held-out objects are likeliest, and
+    being of 256 numbers it can be fitted closely.
     """
 
     components: int = 40
     iterations: int = 200
     whiten_floor: float = 0.01
     absolute: TableFitOptions = field(default_factory=TableFitOptions)
-    grey_absolute: TableFitOptions = field(default_factory=lambda: TableFitOptions(smoothness=24.0, tolerance=1e-7, max_steps=3000))
+    grey_absolute: TableFitOptions = field(
+        default_factory=lambda: TableFitOptions(smoothness=24.0, tolerance=1e-7, max_steps=3000)
+    )
     light: LightFitOptions = field(default_factory=LightFitOptions)
 
     def with_fitted_contrast(self) -> "FitOptions":
@@ -66,8 +72,12 @@ class FitOptions:
         return replace(self, light=replace(self.light, natural_contrast=None))
 
 
-# As published: the lights as they are, no ridge, the table's constant 512 (Barron & Malik 2015). The defaults are ours.
-RECIPE = FitOptions(light=LightFitOptions(natural_contrast=Contrast(), laboratory_ridge=(0.0, 0.0)), absolute=TableFitOptions(512.0))
+# As published: the lights as they are, no ridge, the table's constant 512 (Barron & Malik 2015).
+# The defaults are ours.
+RECIPE = FitOptions(
+    light=LightFitOptions(natural_contrast=Contrast(), laboratory_ridge=(0.0, 0.0)),
+    absolute=TableFitOptions(512.0),
+)
 
 
 def fit_priors(
@@ -76,10 +86,11 @@ def fit_priors(
     options: FitOptions | None = None,
     monitor: Monitor | None = None,
 ) -> PriorSet:
-    """The priors of the objects in `statistics` (name to `collect_statistics`' result), to which order does not matter.
+    """The priors of the objects in `statistics` (name to `collect_statistics`' result), to which
+    order does not matter.
 
-    `natural_lights`: (9, 3, n), lights of environments in the reference's convention. Raises `InputError` where there are fewer
-    than two objects, and `Cancelled` through `monitor`.
+    `natural_lights`: (9, 3, n), lights of environments in the reference's convention. Raises
+    `InputError` where there are fewer than two objects, and `Cancelled` through `monitor`.
     """
     options, monitor = options or FitOptions(), monitor or Monitor()
     if len(statistics) < 2:
@@ -87,22 +98,50 @@ def fit_priors(
     names = tuple(sorted(statistics))
     objects = [statistics[name] for name in names]
     monitor.report("smoothness of shape and reflectance", 0.0)
-    curvature = fit_scale_mixture(Magnitudes.merged(o.curvature for o in objects), options.components, options.iterations)
-    grey_smoothness = fit_scale_mixture(Magnitudes.merged(o.grey_smoothness for o in objects), options.components, options.iterations)
-    color_smoothness = fit_color_mixture(ColorCells.merged(o.color_smoothness for o in objects), options.iterations)
+    curvature = fit_scale_mixture(
+        Magnitudes.merged(o.curvature for o in objects), options.components, options.iterations
+    )
+    grey_smoothness = fit_scale_mixture(
+        Magnitudes.merged(o.grey_smoothness for o in objects),
+        options.components,
+        options.iterations,
+    )
+    color_smoothness = fit_color_mixture(
+        ColorCells.merged(o.color_smoothness for o in objects), options.iterations
+    )
     monitor.report("lights", 0.2)
     lights, contrast = fit_lights(objects, natural_lights, options.light)
     whiten = fit_whitening(objects, options.whiten_floor)
-    grey_absolute = fit_absolute_table(grey_histogram(objects), options.grey_absolute, _steps("absolute grey", monitor.part(0.25, 0.3)))
-    absolute = fit_absolute_table(color_histogram(objects, whiten), options.absolute, _steps("absolute colour", monitor.part(0.3, 1.0)))
+    grey_absolute = fit_absolute_table(
+        grey_histogram(objects),
+        options.grey_absolute,
+        _steps("absolute grey", monitor.part(0.25, 0.3)),
+    )
+    absolute = fit_absolute_table(
+        color_histogram(objects, whiten),
+        options.absolute,
+        _steps("absolute colour", monitor.part(0.3, 1.0)),
+    )
     silhouette = fit_silhouette([o.outline for o in objects])
     record = FitRecord(names, contrast, _as_text(options))
     monitor.report("priors fitted", 1.0)
-    return PriorSet(curvature, grey_smoothness, color_smoothness, whiten, absolute, grey_absolute, silhouette, lights, record)
+    return PriorSet(
+        curvature,
+        grey_smoothness,
+        color_smoothness,
+        whiten,
+        absolute,
+        grey_absolute,
+        silhouette,
+        lights,
+        record,
+    )
 
 
 def _steps(stage: str, monitor: Monitor) -> Callable[[float], None]:
-    """Reports the steps of a table's fit; how many there will be is not known, so the fraction closes in on 1."""
+    """Reports the steps of a table's fit; how many there will be is not known, so the fraction
+    closes in on 1.
+    """
     count = itertools.count(1)
 
     def on_step(loss: float) -> None:
@@ -116,8 +155,12 @@ def fit_whitening(objects: Sequence[ObjectStatistics], floor: float = 0.01) -> n
     return parsimony_whitening(np.mean([o.second_moment() for o in objects], axis=0), floor)
 
 
-def color_histogram(objects: Sequence[ObjectStatistics], whiten: np.ndarray, nodes: int = COLOR_NODES) -> np.ndarray:
-    """The histogram (nodes, nodes, nodes) of whitened log reflectance, sum 1, every object counting alike."""
+def color_histogram(
+    objects: Sequence[ObjectStatistics], whiten: np.ndarray, nodes: int = COLOR_NODES
+) -> np.ndarray:
+    """The histogram (nodes, nodes, nodes) of whitened log reflectance, sum 1, every object counting
+    alike.
+    """
     return _histogram([o.log_reflectance @ whiten.T for o in objects], nodes)
 
 
@@ -131,14 +174,26 @@ def _histogram(points: Sequence[np.ndarray], nodes: int) -> np.ndarray:
     return splat(np.concatenate(points).astype(float), nodes, np.concatenate(weights))
 
 
-def fit_lights(objects: Sequence[ObjectStatistics], natural_lights: np.ndarray, options: LightFitOptions) -> tuple[Lights, Contrast]:
+def fit_lights(
+    objects: Sequence[ObjectStatistics], natural_lights: np.ndarray, options: LightFitOptions
+) -> tuple[Lights, Contrast]:
     """The light priors and the factors on the contrast of `natural_lights` (9, 3, n)."""
-    environments = fit_light(_augmented(natural_lights.transpose(2, 0, 1), options.mirror, options.permute_natural), floor=options.floor)
+    environments = fit_light(
+        _augmented(natural_lights.transpose(2, 0, 1), options.mirror, options.permute_natural),
+        floor=options.floor,
+    )
     contrast = options.natural_contrast
     if contrast is None:
-        contrast = fit_contrast(environments, np.array([o.natural_light for o in objects]), options.split_contrast)
-    laboratory = _augmented(np.array([o.laboratory_light for o in objects]), options.mirror, options.permute_laboratory)
-    return Lights(scaled(environments, contrast), fit_light(laboratory, options.laboratory_ridge, options.floor)), contrast
+        contrast = fit_contrast(
+            environments, np.array([o.natural_light for o in objects]), options.split_contrast
+        )
+    laboratory = _augmented(
+        np.array([o.laboratory_light for o in objects]), options.mirror, options.permute_laboratory
+    )
+    return Lights(
+        scaled(environments, contrast),
+        fit_light(laboratory, options.laboratory_ridge, options.floor),
+    ), contrast
 
 
 def _augmented(lights: np.ndarray, mirror: bool, permute: bool) -> np.ndarray:
@@ -153,7 +208,12 @@ def _as_text(options: FitOptions) -> dict[str, str]:
     for entry in fields(options):
         value = getattr(options, entry.name)
         if isinstance(value, TableFitOptions | LightFitOptions):
-            text.update({f"{entry.name}.{inner.name}": str(getattr(value, inner.name)) for inner in fields(value)})
+            text.update(
+                {
+                    f"{entry.name}.{inner.name}": str(getattr(value, inner.name))
+                    for inner in fields(value)
+                }
+            )
         else:
             text[entry.name] = str(value)
     return text

@@ -1,8 +1,9 @@
-"""How surfaces lean behind their silhouettes, measured on objects of known shape: the profile of the `silhouette` term.
+"""How surfaces lean behind their silhouettes, measured on objects of known shape: the profile of
+the `silhouette` term.
 
-For every pixel with a known normal, u is its relative depth behind the silhouette and x, y are the normal's components in the image
-plane along and across the outward direction. In each of `BINS` bins of u: mean = E[x], spread^2 = (Var[x] + E[y^2]) / 2.
-Objects count alike.
+For every pixel with a known normal, u is its relative depth behind the silhouette and x, y are the
+normal's components in the image plane along and across the outward direction. In each of `BINS`
+bins of u: mean = E[x], spread^2 = (Var[x] + E[y^2]) / 2. Objects count alike.
 """
 
 from collections.abc import Sequence
@@ -19,7 +20,10 @@ BINS = 16
 
 @dataclass(frozen=True)
 class OutlineMoments:
-    """One object's shares: of its pixels in each bin, and of the sums of x, x^2 and y^2 there; (4, BINS)."""
+    """One object's shares: of its pixels in each bin, and of the sums of x, x^2 and y^2 there;
+
+    (4, BINS).
+    """
 
     sums: np.ndarray
 
@@ -32,7 +36,9 @@ class OutlineMoments:
         along = (normal[..., 0] * down + normal[..., 1] * right)[known]
         across = (normal[..., 1] * down - normal[..., 0] * right)[known]
         which = np.minimum((u[known] * BINS).astype(int), BINS - 1)
-        sums = [np.bincount(which, w, BINS) for w in (np.ones(len(which)), along, along**2, across**2)]
+        sums = [
+            np.bincount(which, w, BINS) for w in (np.ones(len(which)), along, along**2, across**2)
+        ]
         return cls(np.stack(sums) / max(len(which), 1))
 
 
@@ -44,5 +50,7 @@ def fit_silhouette(objects: Sequence[OutlineMoments]) -> SilhouetteProfile:
     mean = along / n
     variance = (along2 / n - mean**2 + across2 / n) / 2
     bins = np.arange(BINS)
-    filled = (np.interp(bins, bins[seen], v[seen]) for v in (mean, np.sqrt(np.maximum(variance, 1e-4))))
+    filled = (
+        np.interp(bins, bins[seen], v[seen]) for v in (mean, np.sqrt(np.maximum(variance, 1e-4)))
+    )
     return SilhouetteProfile(*filled)

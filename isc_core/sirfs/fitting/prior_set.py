@@ -1,6 +1,7 @@
 """The fitted priors in compact form: a few numbers each, from which the solver's tables follow.
 
-Everything of Barron & Malik (2015), doi:10.1109/TPAMI.2014.2377712, for colour and grey photos in natural and laboratory light.
+Everything of Barron & Malik (2015), doi:10.1109/TPAMI.2014.2377712, for colour and grey photos in
+natural and laboratory light.
 """
 
 from dataclasses import dataclass, field
@@ -19,7 +20,9 @@ ILLUMINATIONS = ("natural", "laboratory")
 
 @dataclass(frozen=True)
 class Lights:
-    """A light prior for each kind of photo, in colour (27 coefficients); those for grey photos follow."""
+    """A light prior for each kind of photo, in colour (27 coefficients); those for grey photos
+    follow.
+    """
 
     natural: GaussianLight
     laboratory: GaussianLight
@@ -27,7 +30,9 @@ class Lights:
 
 @dataclass(frozen=True)
 class FitRecord:
-    """Where a set comes from: the training objects' names, the factors on the environments' contrast, the options as text."""
+    """Where a set comes from: the training objects' names, the factors on the environments'
+    contrast, the options as text.
+    """
 
     objects: tuple[str, ...] = ()
     natural_contrast: Contrast = field(default_factory=Contrast)
@@ -36,7 +41,10 @@ class FitRecord:
 
 @dataclass(frozen=True)
 class PriorSet:
-    """All priors, compact. `parsimony_whiten` is (3, 3); the grey tables live in plain log reflectance."""
+    """All priors, compact.
+
+    `parsimony_whiten` is (3, 3); the grey tables live in plain log reflectance.
+    """
 
     curvature: ScaleMixture
     grey_smoothness: ScaleMixture
@@ -49,9 +57,15 @@ class PriorSet:
     record: FitRecord
 
     def priors(self, illumination: str = "natural", channels: int = 3) -> Priors:
-        """The solver's tables. `illumination`: "natural" or "laboratory"; `channels`: 3 or 1. Raises `InputError` for others."""
+        """The solver's tables.
+
+        `illumination`: "natural" or "laboratory"; `channels`: 3 or 1. Raises `InputError` for
+        others.
+        """
         if illumination not in ILLUMINATIONS:
-            raise InputError(f"unknown illumination '{illumination}': use one of {', '.join(ILLUMINATIONS)}")
+            raise InputError(
+                f"unknown illumination '{illumination}': use one of {', '.join(ILLUMINATIONS)}"
+            )
         if channels not in (1, 3):
             raise InputError(f"priors are for 1 or 3 channels, not {channels}")
         light = self.lights.natural if illumination == "natural" else self.lights.laboratory

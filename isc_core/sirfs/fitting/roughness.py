@@ -1,10 +1,13 @@
-"""How much a table bends: the sum over interior nodes of sqrt(|second derivatives|^2 + e), a robust thin-plate energy.
+"""How much a table bends: the sum over interior nodes of sqrt(|second derivatives|^2 + e), a robust
+thin-plate energy.
 
-|.|^2 = sum_a f_aa^2 + 2 sum_{a<b} f_ab^2, f_aa by (1, -2, 1), f_ab by (1, 0, -1)/2 on both axes, each smoothed by (1, 2, 1)/4 on
-the other axes. Thin plates: J. Duchon (1977), doi:10.1007/BFb0086566; as a prior on absolute colour: J. T. Barron, J. Malik
-(2015), doi:10.1109/TPAMI.2014.2377712.
+|.|^2 = sum_a f_aa^2 + 2 sum_{a<b} f_ab^2, f_aa by (1, -2, 1), f_ab by (1, 0, -1)/2 on both axes,
+each smoothed by (1, 2, 1)/4 on the other axes. Thin plates: J. Duchon (1977),
+doi:10.1007/BFb0086566; as a prior on absolute colour: J. T. Barron, J. Malik (2015),
+doi:10.1109/TPAMI.2014.2377712.
 
-Two engines hold the same formula: plain NumPy for any number of axes, and compiled rows for the three of colour.
+Two engines hold the same formula: plain NumPy for any number of axes, and compiled rows for the
+three of colour.
 """
 
 import itertools
@@ -23,7 +26,10 @@ _SECOND = (1.0, -2.0, 1.0)
 
 
 def roughness(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.ndarray]:
-    """The energy and its gradient (shape and type of `f`); `f` has at least 3 nodes on each of its axes."""
+    """The energy and its gradient (shape and type of `f`);
+
+    `f` has at least 3 nodes on each of its axes.
+    """
     if numba is not None and f.ndim == 3 and f.dtype == np.float32:
         gradient = np.zeros_like(f)
         return float(_rows(f, np.float32(softening), gradient)), gradient
@@ -63,7 +69,9 @@ def _spread(g: np.ndarray, taps: Taps) -> np.ndarray:
 
 
 def _rows_python(f, softening, gradient):  # type: ignore[no-untyped-def]
-    """One row along the last axis at a time: the six products of filters on the first two axes, then the filters on the last."""
+    """One row along the last axis at a time: the six products of filters on the first two axes,
+    then the filters on the last.
+    """
     n0, n1, n2 = f.shape
     q, h = np.float32(0.25), np.float32(0.5)
     two, eighth, sixteenth = np.float32(2), np.float32(0.125), np.float32(0.0625)
@@ -77,8 +85,16 @@ def _rows_python(f, softening, gradient):  # type: ignore[no-untyped-def]
             m0, m1, m2 = f[i, j - 1], f[i, j], f[i, j + 1]
             c0, c1, c2 = f[i + 1, j - 1], f[i + 1, j], f[i + 1, j + 1]
             for k in range(n2):
-                left, middle, right = a0[k] + two * m0[k] + c0[k], a1[k] + two * m1[k] + c1[k], a2[k] + two * m2[k] + c2[k]
-                above, here, below = a0[k] + two * a1[k] + a2[k], m0[k] + two * m1[k] + m2[k], c0[k] + two * c1[k] + c2[k]
+                left, middle, right = (
+                    a0[k] + two * m0[k] + c0[k],
+                    a1[k] + two * m1[k] + c1[k],
+                    a2[k] + two * m2[k] + c2[k],
+                )
+                above, here, below = (
+                    a0[k] + two * a1[k] + a2[k],
+                    m0[k] + two * m1[k] + m2[k],
+                    c0[k] + two * c1[k] + c2[k],
+                )
                 b[0, k] = sixteenth * (left + two * middle + right)
                 b[1, k] = eighth * (below - above)
                 b[2, k] = eighth * (right - left)
@@ -92,11 +108,21 @@ def _rows_python(f, softening, gradient):  # type: ignore[no-untyped-def]
                 fxx = q * (b[3, k - 1] + two * b[3, k] + b[3, k + 1])
                 fyy = q * (b[4, k - 1] + two * b[4, k] + b[4, k + 1])
                 fxy = q * (b[5, k - 1] + two * b[5, k] + b[5, k + 1])
-                root = np.sqrt(fxx * fxx + fyy * fyy + fzz * fzz + two * (fxy * fxy + fxz * fxz + fyz * fyz) + softening)
+                root = np.sqrt(
+                    fxx * fxx
+                    + fyy * fyy
+                    + fzz * fzz
+                    + two * (fxy * fxy + fxz * fxz + fyz * fyz)
+                    + softening
+                )
                 roots[k] = root
                 inverse = np.float32(1) / root
                 t[0, k], t[3, k], t[4, k] = fzz * inverse, fxx * inverse, fyy * inverse
-                t[1, k], t[2, k], t[5, k] = two * fxz * inverse, two * fyz * inverse, two * fxy * inverse
+                t[1, k], t[2, k], t[5, k] = (
+                    two * fxz * inverse,
+                    two * fyz * inverse,
+                    two * fxy * inverse,
+                )
             for k in range(1, n2 - 1):
                 total += roots[k]
             _add_transposed(t, b, gradient, i, j)
@@ -109,7 +135,8 @@ def _add_transposed_python(t, b, gradient, i, j):  # type: ignore[no-untyped-def
     q, h, two = np.float32(0.25), np.float32(0.5), np.float32(2)
     eighth, sixteenth = np.float32(0.125), np.float32(0.0625)
     for k in range(n2):
-        # The padding that the filters on the last axis need is the zeros at both ends of t, and one more beyond.
+        # The padding that the filters on the last axis need is the zeros at both ends of t, and one
+        # more beyond.
         down, up = max(k - 1, 0), min(k + 1, n2 - 1)
         b[0, k] = sixteenth * (t[0, down] - two * t[0, k] + t[0, up])
         b[1, k] = eighth * h * (t[1, down] - t[1, up])

@@ -1,4 +1,6 @@
-"""What the fit of the priors needs of each training object, condensed once so that any selection of objects is fitted fast."""
+"""What the fit of the priors needs of each training object, condensed once so that any selection of
+objects is fitted fast.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,8 +20,8 @@ from .scale_mixture import Magnitudes
 class TrainingObject:
     """An object whose intrinsic characteristics are known.
 
-    `reflectance`: (H, W, 3) linear. `valid`: (H, W) bool, where the reflectance can be trusted. `height`: (H, W) pixels, toward the
-    viewer, NaN where unknown. `mask`: (H, W) bool, the object.
+    `reflectance`: (H, W, 3) linear. `valid`: (H, W) bool, where the reflectance can be trusted.
+    `height`: (H, W) pixels, toward the viewer, NaN where unknown. `mask`: (H, W) bool, the object.
     `natural_light`, `laboratory_light`: (9, 3), in the reference's convention (`sirfs.priors`).
     """
 
@@ -36,9 +38,9 @@ class TrainingObject:
 class ObjectStatistics:
     """One object's share in every prior.
 
-    `curvature`, `grey_smoothness`, `color_smoothness`: differences over neighbouring pixels. `log_reflectance` (n, 3) float32 and
-    `grey_log_reflectance` (n, 1): all valid pixels; grey is the mean of the channels. `outline`:
-    leaning behind the silhouette. The lights are (9, 3).
+    `curvature`, `grey_smoothness`, `color_smoothness`: differences over neighbouring pixels.
+    `log_reflectance` (n, 3) float32 and `grey_log_reflectance` (n, 1): all valid pixels; grey is
+    the mean of the channels. `outline`: leaning behind the silhouette. The lights are (9, 3).
     """
 
     curvature: Magnitudes
@@ -57,7 +59,10 @@ class ObjectStatistics:
 
 
 def object_statistics(training: TrainingObject) -> ObjectStatistics:
-    """Condenses one object. Pixels with a channel at or below 0 are left out. Raises `InputError` where nothing is left."""
+    """Condenses one object.
+
+    Pixels with a channel at or below 0 are left out. Raises `InputError` where nothing is left.
+    """
     valid = training.valid & (training.reflectance > 0).all(axis=-1)
     positive = np.where(valid[..., None], training.reflectance, 1.0)
     log_reflectance, log_grey = np.log(positive), np.log(positive.mean(axis=-1))
@@ -65,7 +70,9 @@ def object_statistics(training: TrainingObject) -> ObjectStatistics:
     bends = pair_differences(curvature, np.isfinite(curvature))
     steps = pair_differences(log_reflectance, valid)
     if len(bends) == 0 or len(steps) == 0:
-        raise InputError(f"training object '{training.name}' has no neighbouring valid pixels: leave it out")
+        raise InputError(
+            f"training object '{training.name}' has no neighbouring valid pixels: leave it out"
+        )
     return ObjectStatistics(
         curvature=Magnitudes.of(bends),
         grey_smoothness=Magnitudes.of(pair_differences(log_grey, valid)),
@@ -78,7 +85,9 @@ def object_statistics(training: TrainingObject) -> ObjectStatistics:
     )
 
 
-def collect_statistics(objects: Mapping[str, TrainingObject], monitor: Monitor | None = None) -> dict[str, ObjectStatistics]:
+def collect_statistics(
+    objects: Mapping[str, TrainingObject], monitor: Monitor | None = None
+) -> dict[str, ObjectStatistics]:
     """`object_statistics` of each object, under its name."""
     monitor = monitor or Monitor()
     collected = {}

@@ -1,7 +1,9 @@
-"""The linear map that makes log reflectances comparable: white, of unit size, and still anchored at log 1 = 0.
+"""The linear map that makes log reflectances comparable: white, of unit size, and still anchored at
+log 1 = 0.
 
-W ~ (C + floor I)^(-1/2) with C the mean of a a^T over the training log reflectances, NOT centred, scaled so that the
-whitened data have unit root mean square. J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
+W ~ (C + floor I)^(-1/2) with C the mean of a a^T over the training log reflectances, NOT centred,
+scaled so that the whitened data have unit root mean square. J. T. Barron, J. Malik (2015),
+doi:10.1109/TPAMI.2014.2377712.
 """
 
 import numpy as np

@@ -1,4 +1,6 @@
-"""The thesis' figures of background, framework and applications, and its tables of documentation: what has to hold in them."""
+"""The thesis' figures of background, framework and applications, and its tables of documentation:
+what has to hold in them.
+"""
 
 import itertools
 from collections.abc import Iterator
@@ -36,7 +38,14 @@ from isc_core.sirfs.frames import light_to_reference
 from tests.core.ball_scene import ball
 from tests.core.separation_scenes import glossy_disc
 
-MODULES = (introduction_items, background_items, framework_items, filter_items, application_items, catalogue_items)
+MODULES = (
+    introduction_items,
+    background_items,
+    framework_items,
+    filter_items,
+    application_items,
+    catalogue_items,
+)
 ITEMS = {item.name: item for module in MODULES for item in module.ITEMS}
 
 
@@ -45,9 +54,16 @@ def known_ball(name: str = "ball") -> Subject:
     d = ball((64, 64), 28.0, (31.5, 31.5))
     height = np.where(d.mask, d.height, np.nan)
     truth = MitBerkeleyObject(
-        name, "natural", d.image.astype(float), d.mask, d.mask, height, d.shading.astype(float), d.reflectance.astype(float),
+        name,
+        "natural",
+        d.image.astype(float),
+        d.mask,
+        d.mask,
+        height,
+        d.shading.astype(float),
+        d.reflectance.astype(float),
         light_to_reference(d.illumination),
-    )  # fmt: skip
+    )
     return Subject(name, "synthetic", d.image, d.mask, d.diffuse, d.specular, truth)
 
 
@@ -69,14 +85,22 @@ class Known(Context):
 
 @pytest.fixture
 def context(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Context:
-    """A quick run in which the models answer with the ball's truth: what they find has tests of its own."""
+    """A quick run in which the models answer with the ball's truth: what they find has tests of its
+    own.
+    """
     answer = ball((64, 64), 28.0, (31.5, 31.5))
 
     def decomposed(*given: object, **also: object) -> Decomposition:
         del given, also
         return answer
 
-    for module in (introduction_items, background_items, framework_items, application_items, catalogue_items):
+    for module in (
+        introduction_items,
+        background_items,
+        framework_items,
+        application_items,
+        catalogue_items,
+    ):
         monkeypatch.setattr(module, "decomposed", decomposed)
     monkeypatch.setattr(application_items, "DIRECTIONS", application_items.DIRECTIONS[:1])
     return Known(tmp_path, quick=True)
@@ -103,8 +127,12 @@ def labels(figure: Figure) -> Iterator[tuple[float, float, float, float]]:
             yield axes.title.get_window_extent(canvas.get_renderer()).extents
 
 
-@pytest.mark.parametrize("name", [name for name in ITEMS if name.startswith("figure") and ITEMS[name].make is not None])
-def test_figures_are_made_with_their_titles_apart_and_in_the_picture(name: str, context: Context) -> None:
+@pytest.mark.parametrize(
+    "name", [name for name in ITEMS if name.startswith("figure") and ITEMS[name].make is not None]
+)
+def test_figures_are_made_with_their_titles_apart_and_in_the_picture(
+    name: str, context: Context
+) -> None:
     answer = made(name, context)
     assert answer.figures
     assert answer.text
@@ -112,9 +140,15 @@ def test_figures_are_made_with_their_titles_apart_and_in_the_picture(name: str, 
         assert figure.get_figwidth() == 7.0
         boxes = list(labels(figure))
         right, top = figure.bbox.extents[2:]
-        assert all(box[0] >= -2 and box[1] >= -2 and box[2] <= right + 2 and box[3] <= top + 2 for box in boxes)
+        assert all(
+            box[0] >= -2 and box[1] >= -2 and box[2] <= right + 2 and box[3] <= top + 2
+            for box in boxes
+        )
         for one, other in itertools.combinations(boxes, 2):
-            overlap = min(one[2], other[2]) - max(one[0], other[0]), min(one[3], other[3]) - max(one[1], other[1])
+            overlap = (
+                min(one[2], other[2]) - max(one[0], other[0]),
+                min(one[3], other[3]) - max(one[1], other[1]),
+            )
             assert min(overlap) < 1
 
 
@@ -137,7 +171,9 @@ def test_reflectance_models_obey_what_the_table_says_of_them() -> None:
     assert not keeps["Phong, plain, exponent 1"]
 
 
-def test_characteristics_are_those_of_a_saved_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_characteristics_are_those_of_a_saved_result(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert catalogue_items.check_characteristics(ball(), tmp_path / "all") == ()
     monkeypatch.setattr(catalogue_items, "CHARACTERISTICS", catalogue_items.CHARACTERISTICS[1:])
     missing = catalogue_items.check_characteristics(ball(), tmp_path / "fewer")
@@ -162,18 +198,24 @@ def test_white_highlights_are_not_left_in_the_exact_images() -> None:
 def test_a_lobe_is_largest_where_light_is_mirrored_to() -> None:
     views = np.linspace(-89, 89, 179)
     for incident in (0, 30, 60):
-        curve = background_items.lobe(Phong(exponent=50.0), incident, views) / np.cos(np.deg2rad(views))
+        curve = background_items.lobe(Phong(exponent=50.0), incident, views) / np.cos(
+            np.deg2rad(views)
+        )
         assert views[np.argmax(curve)] == incident
     sharp, _ = background_items.phong_sphere(48, 100.0)
     soft, mask = background_items.phong_sphere(48, 5.0)
-    assert np.allclose(soft["sum"][mask], (soft["ambient"] + soft["diffuse"] + soft["specular"])[mask])
+    assert np.allclose(
+        soft["sum"][mask], (soft["ambient"] + soft["diffuse"] + soft["specular"])[mask]
+    )
     assert sharp["specular"][mask].sum() < soft["specular"][mask].sum() / 5
 
 
 def test_smooth_light_is_modelled_better_by_harmonics_than_by_one_lamp() -> None:
     true, models, _ = background_items.shading_models(known_ball())
     inside = true.any(axis=2)
-    smooth, lamp, constant = (float(np.square((model - true)[inside]).mean()) for model in models.values())
+    smooth, lamp, constant = (
+        float(np.square((model - true)[inside]).mean()) for model in models.values()
+    )
     assert smooth < 0.1 * lamp
     assert lamp < 0.5 * constant
 
@@ -187,7 +229,10 @@ def test_closed_forms_look_as_their_shape_and_light_say() -> None:
         expected = introduction_items._ALBEDO * np.maximum(normal @ introduction_items.LIGHT, 0)
         assert np.abs(expected - shaded.image[..., 0])[known].mean() < 0.02
     ball_, method = introduction_items.sphere(64), "sfs-ikeuchi-horn"
-    assert introduction_items.recover(ball_, method).mean_angle < 0.4 * introduction_items.recover(ball_, "naive").mean_angle
+    assert (
+        introduction_items.recover(ball_, method).mean_angle
+        < 0.4 * introduction_items.recover(ball_, "naive").mean_angle
+    )
 
 
 def test_chance_is_told_from_difference() -> None:
@@ -196,10 +241,17 @@ def test_chance_is_told_from_difference() -> None:
     apart = alike.copy()
     apart[:, 0, :, : BINS // 2] *= 9
     apart /= apart.sum(axis=-1, keepdims=True)
-    assert (filter_items.chance(apart, 0) == pytest.approx(2 / 2**8)) and (filter_items.chance(alike, 0) > 0.02).mean() > 0.7
-    assert ((filter_items.distances(apart) > filter_items.distances(alike)) & (filter_items.distances(apart) < 1)).all()
+    assert (filter_items.chance(apart, 0) == pytest.approx(2 / 2**8)) and (
+        filter_items.chance(alike, 0) > 0.02
+    ).mean() > 0.7
+    assert (
+        (filter_items.distances(apart) > filter_items.distances(alike))
+        & (filter_items.distances(apart) < 1)
+    ).all()
     many = np.concatenate([apart, apart])
-    assert (filter_items.chance(many, 0) <= 4 / 4096).all(), "beyond twelve subjects exchanges are drawn at random"
+    assert (filter_items.chance(many, 0) <= 4 / 4096).all(), (
+        "beyond twelve subjects exchanges are drawn at random"
+    )
     assert np.allclose(filter_items.holm(np.array([0.01, 0.5, 0.02])), [0.03, 0.5, 0.04])
 
 
@@ -213,7 +265,9 @@ def test_the_light_of_a_ball_is_found_to_a_degree() -> None:
 
 def test_edits_do_what_was_asked_for_and_nothing_else(context: Context) -> None:
     answer = made("figure-4.50", context)
-    diffuse, specular = (column(answer, f"of the {layer} layer (%)") for layer in ("diffuse", "specular"))
+    diffuse, specular = (
+        column(answer, f"of the {layer} layer (%)") for layer in ("diffuse", "specular")
+    )
     assert diffuse["nothing asked for"] == specular["nothing asked for"] == 0
     for name in diffuse:
         if name != "nothing asked for":

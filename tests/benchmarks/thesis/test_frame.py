@@ -49,9 +49,15 @@ def test_an_item_leaves_a_page_numbers_a_picture_and_a_record(tmp_path: Path) ->
     context = Context(tmp_path / "out", data=tmp_path, quick=True, seed=5)
     record = write_item(item(), drawn(2), context, 1.25)
     assert record.files == ("table-9.1.md", "table-9.1.csv", "table-9.1.png", "table-9.1-2.png")
-    assert read_record(context.output, "table-9.1") == record and is_complete(context.output, "table-9.1", context.fingerprint)
+    assert read_record(context.output, "table-9.1") == record and is_complete(
+        context.output, "table-9.1", context.fingerprint
+    )
     with (context.output / "table-9.1.csv").open(encoding="utf-8") as stream:
-        assert list(csv.reader(stream)) == [list(TABLE.header), ["apple", "3", repr(1 / 3)], ["pear", "4", "1e-07"]]
+        assert list(csv.reader(stream)) == [
+            list(TABLE.header),
+            ["apple", "3", repr(1 / 3)],
+            ["pear", "4", "1e-07"],
+        ]
     assert cv2.imread(str(context.output / "table-9.1-2.png")).shape == (165, 220, 3)
     page = (context.output / "table-9.1.md").read_text(encoding="utf-8")
     for part in (
@@ -63,9 +69,18 @@ def test_an_item_leaves_a_page_numbers_a_picture_and_a_record(tmp_path: Path) ->
         "| apple | 3 | 0.3333 |",
     ):
         assert part in page
-    assert "`isc thesis table 9.1 --data ROOT --quick --seed 5`" in page and "error \\| x" in page.replace("error | x", "error \\| x")
-    assert str(tmp_path) not in page + (context.output / "records" / "table-9.1.json").read_text(encoding="utf-8")
-    assert {path.suffix for path in context.output.iterdir() if path.is_file()} == {".md", ".csv", ".png"}
+    assert (
+        "`isc thesis table 9.1 --data ROOT --quick --seed 5`" in page
+        and "error \\| x" in page.replace("error | x", "error \\| x")
+    )
+    assert str(tmp_path) not in page + (context.output / "records" / "table-9.1.json").read_text(
+        encoding="utf-8"
+    )
+    assert {path.suffix for path in context.output.iterdir() if path.is_file()} == {
+        ".md",
+        ".csv",
+        ".png",
+    }
 
 
 def test_a_table_without_a_figure_gets_a_picture_of_itself(tmp_path: Path) -> None:
@@ -75,7 +90,11 @@ def test_a_table_without_a_figure_gets_a_picture_of_itself(tmp_path: Path) -> No
     picture = cv2.imread(str(tmp_path / "table-9.1.png"))
     assert picture.shape[1] >= 440 and 0.5 < (picture > 200).mean() < 1, "a page with letters on it"
     page = (tmp_path / "table-9.1.md").read_text(encoding="utf-8")
-    assert "![" not in page and "(table-9.1.png)" in page and "The thesis' abstract gives no claim for this." in page
+    assert (
+        "![" not in page
+        and "(table-9.1.png)" in page
+        and "The thesis' abstract gives no claim for this." in page
+    )
 
 
 def test_files_of_an_earlier_run_do_not_stay_beside_the_new_ones(tmp_path: Path) -> None:
@@ -101,15 +120,21 @@ def test_rows_are_computed_once_and_only_for_the_same_run(tmp_path: Path) -> Non
 
     context = Context(tmp_path)
     first = context.rows("key", compute)
-    assert first[0] == {"call": 1, "value": 0.1, "none": None} and context.rows("key", compute) == first == Context(tmp_path).rows(
+    assert first[0] == {"call": 1, "value": 0.1, "none": None} and context.rows(
         "key", compute
-    )
+    ) == first == Context(tmp_path).rows("key", compute)
     assert len(calls) == 1
-    for other in (replace(context, seed=1), replace(context, quick=True), replace(context, fresh_since=4e9)):
+    for other in (
+        replace(context, seed=1),
+        replace(context, quick=True),
+        replace(context, fresh_since=4e9),
+    ):
         other.rows("key", compute)
     context.rows("another key", compute)
     assert len(calls) == 5
-    next((tmp_path / WORK / "rows").glob("another-key-*")).write_text('{"call": 1', encoding="utf-8")
+    next((tmp_path / WORK / "rows").glob("another-key-*")).write_text(
+        '{"call": 1', encoding="utf-8"
+    )
     context.rows("another key", compute)
     assert len(calls) == 6, "a damaged file has to be computed anew"
 
@@ -127,7 +152,11 @@ def test_a_failing_item_does_not_stop_the_others_and_is_named(tmp_path: Path) ->
 
     wanted = [item("9.1"), item("9.2", fails), item("9.3")]
     outcome = make_items(wanted, Context(tmp_path))
-    assert (outcome.made, outcome.kept, outcome.failed) == (2, 0, (("table 9.2", "no data for this one"),))
+    assert (outcome.made, outcome.kept, outcome.failed) == (
+        2,
+        0,
+        (("table 9.2", "no data for this one"),),
+    )
     again = make_items(wanted, Context(tmp_path))
     assert (again.made, again.kept) == (0, 2), "what is complete must not be made again"
     assert make_items(wanted, Context(tmp_path), again=True).made == 2
@@ -150,8 +179,14 @@ def test_a_cancelled_run_leaves_whole_items_and_goes_on_there(tmp_path: Path) ->
 
     wanted = [makes(number) for number in ("9.1", "9.2", "9.3")]
     with pytest.raises(Cancelled):
-        make_items(wanted, Context(tmp_path, monitor=Monitor(cancelled=lambda: len(made) >= stop["after"])))
-    assert sorted(path.name for path in tmp_path.glob("table*")) == ["table-9.1.csv", "table-9.1.md", "table-9.1.png"]
+        make_items(
+            wanted, Context(tmp_path, monitor=Monitor(cancelled=lambda: len(made) >= stop["after"]))
+        )
+    assert sorted(path.name for path in tmp_path.glob("table*")) == [
+        "table-9.1.csv",
+        "table-9.1.md",
+        "table-9.1.png",
+    ]
     assert not list(tmp_path.rglob("*.partial"))
     made.clear()
     outcome = make_items(wanted, Context(tmp_path))
@@ -166,10 +201,15 @@ def test_progress_names_the_item_and_only_grows(tmp_path: Path) -> None:
             context.monitor.report("step", step / 4)
         return drawn()
 
-    make_items([item("9.1", make), item("9.2", make)], Context(tmp_path, monitor=Monitor(lambda *said: heard.append(said))))
+    make_items(
+        [item("9.1", make), item("9.2", make)],
+        Context(tmp_path, monitor=Monitor(lambda *said: heard.append(said))),
+    )
     shares = [fraction for _, fraction in heard]
     assert shares == sorted(shares) and shares[0] >= 0 and shares[-1] <= 1
-    assert heard[0][0] == "table 9.1 (1 of 2)" and re.fullmatch(r"table 9\.2 \(2 of 2\): step, \d+ s left", heard[-1][0])
+    assert heard[0][0] == "table 9.1 (1 of 2)" and re.fullmatch(
+        r"table 9\.2 \(2 of 2\): step, \d+ s left", heard[-1][0]
+    )
 
 
 def test_the_index_has_every_claim_and_every_item(tmp_path: Path) -> None:
@@ -178,14 +218,23 @@ def test_the_index_has_every_claim_and_every_item(tmp_path: Path) -> None:
     text = index([item(), item("9.2"), illustration], {"table-9.1": record})
     assert all(claim in text for claim in ABSTRACT)
     assert f"| {MDR_HEIGHT} | 3.1 % on two images. | partly | [table 9.1](table-9.1.md) |" in text
-    assert "[9.1](table-9.1.md)" in text and "9.2 | A table | not made yet" in text and "not regenerable: nothing is computed in it" in text
+    assert (
+        "[9.1](table-9.1.md)" in text
+        and "9.2 | A table | not made yet" in text
+        and "not regenerable: nothing is computed in it" in text
+    )
     assert "glossy-mit" in text and "1 of 3 are here" in text
 
 
 def test_a_damaged_record_counts_as_none(tmp_path: Path) -> None:
     write_item(item(), drawn(), Context(tmp_path), 1.0)
     path = tmp_path / "records" / "table-9.1.json"
-    for content in ("{", "[]", json.dumps({"schema_version": 1}), json.dumps({"schema_version": 99})):
+    for content in (
+        "{",
+        "[]",
+        json.dumps({"schema_version": 1}),
+        json.dumps({"schema_version": 99}),
+    ):
         path.write_text(content, encoding="utf-8")
         assert read_record(tmp_path, "table-9.1") is None
     assert "not made" in next(iter(states([item()], tmp_path)))
@@ -193,16 +242,24 @@ def test_a_damaged_record_counts_as_none(tmp_path: Path) -> None:
 
 def test_all_numbers_of_the_thesis_are_listed() -> None:
     tables = {*(f"2.{n}" for n in range(1, 4)), *(f"4.{n}" for n in range(1, 23))}
-    figures = {f"{chapter}.{n}" for chapter, last in ((1, 5), (2, 5), (3, 12), (4, 51)) for n in range(1, last + 1)}
+    figures = {
+        f"{chapter}.{n}"
+        for chapter, last in ((1, 5), (2, 5), (3, 12), (4, 51))
+        for n in range(1, last + 1)
+    }
     assert {one.number for one in items() if one.kind == "table"} == tables
     assert {one.number for one in items() if one.kind == "figure"} == figures
     assert {one.name for one in items() if one.make is None} == {"figure-1.1", "figure-3.1"}
     assert all(one.reason for one in items() if one.make is None)
 
 
-@pytest.mark.parametrize(("number", "nearest"), [("4.23", "4.22, 4.21, 4.20"), ("3.1", "2.1, 4.1"), ("cat", "")])
+@pytest.mark.parametrize(
+    ("number", "nearest"), [("4.23", "4.22, 4.21, 4.20"), ("3.1", "2.1, 4.1"), ("cat", "")]
+)
 def test_an_unknown_number_names_the_nearest(number: str, nearest: str) -> None:
-    with pytest.raises(InputError, match=f"there is no table '{number}': the nearest are {re.escape(nearest)}"):
+    with pytest.raises(
+        InputError, match=f"there is no table '{number}': the nearest are {re.escape(nearest)}"
+    ):
         find("table", number)
 
 
@@ -226,14 +283,20 @@ def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path, refused: Refusa
     output = tmp_path / "out"
     (tmp_path / "empty").mkdir()
     assert "the nearest are" in refused("table", "4.99", "-o", output)
-    assert "holds nothing known here" in refused("figure", "3.5", "--data", tmp_path / "empty", "-o", output)
-    assert "is not a folder" in refused("figure", "3.5", "--data", tmp_path / "absent", "-o", output)
+    assert "holds nothing known here" in refused(
+        "figure", "3.5", "--data", tmp_path / "empty", "-o", output
+    )
+    assert "is not a folder" in refused(
+        "figure", "3.5", "--data", tmp_path / "absent", "-o", output
+    )
     assert "cannot be made again" in refused("figure", "1.1", "-o", output)
     assert "say what to make" in refused()
     assert not output.exists()
 
 
-def test_missing_libraries_are_named_with_the_remedy(tmp_path: Path, refused: Refusal, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_libraries_are_named_with_the_remedy(
+    tmp_path: Path, refused: Refusal, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     assert "isc3d[" in refused("figure", "1.4", "--quick", "-o", tmp_path / "out")
     monkeypatch.setitem(sys.modules, "matplotlib", None)
@@ -241,17 +304,27 @@ def test_missing_libraries_are_named_with_the_remedy(tmp_path: Path, refused: Re
 
 
 def test_the_other_commands_need_no_matplotlib() -> None:
-    done = run_isc("separate", "--help", before="import sys; sys.modules.update(matplotlib=None, skimage=None, mitsuba=None)")
+    done = run_isc(
+        "separate",
+        "--help",
+        before="import sys; sys.modules.update(matplotlib=None, skimage=None, mitsuba=None)",
+    )
     assert done.returncode == 0
 
 
 def test_an_interrupt_ends_with_130_and_the_same_command_goes_on(tmp_path: Path) -> None:
     arguments = ("thesis", "table", "4.2", "--quick", "-o", tmp_path / "out")
-    process = subprocess.Popen(isc_command(*arguments), cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        isc_command(*arguments), cwd=ROOT, stderr=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     assert process.stderr is not None
     for line in process.stderr:
         if "ClonalG on camera, 3" in line:
             process.send_signal(signal.SIGINT)
     assert process.wait(120) == 130
     kept = list((tmp_path / "out").rglob("*.jsonl"))
-    assert kept and not list((tmp_path / "out").glob("table-*")) and not list(tmp_path.rglob("*.partial"))
+    assert (
+        kept
+        and not list((tmp_path / "out").glob("table-*"))
+        and not list(tmp_path.rglob("*.partial"))
+    )

@@ -1,4 +1,6 @@
-"""The thesis' tables of separations and frameworks, on small painted balls whose layers, shape and light are known exactly."""
+"""The thesis' tables of separations and frameworks, on small painted balls whose layers, shape and
+light are known exactly.
+"""
 
 import itertools
 from collections.abc import Iterator
@@ -53,7 +55,15 @@ def painted_ball(name: str, kind: str, paint: tuple[float, float, float], gloss:
     image = diffuse + specular
     reflectance = np.where(mask[..., None], np.array(paint), 0.0)
     truth = MitBerkeleyObject(
-        name, "laboratory", image.astype(float), mask & (image > 0).all(-1), mask, height, shading, reflectance, light_to_reference(light)
+        name,
+        "laboratory",
+        image.astype(float),
+        mask & (image > 0).all(-1),
+        mask,
+        height,
+        shading,
+        reflectance,
+        light_to_reference(light),
     )
     return Subject(name, kind, image, mask, diffuse, specular, truth)
 
@@ -64,11 +74,17 @@ class Balls(Context):
 
     def subjects(self, kind: str) -> tuple[Subject, ...]:
         """Red and blue."""
-        return tuple(painted_ball(f"ball {number}", kind, paint, 0 if kind == "matt" else 0.4) for number, paint in enumerate(PAINTS))
+        return tuple(
+            painted_ball(f"ball {number}", kind, paint, 0 if kind == "matt" else 0.4)
+            for number, paint in enumerate(PAINTS)
+        )
 
     def photos(self) -> tuple[Subject, ...]:
         """The glossy ones, nothing known."""
-        return tuple(replace(s, kind="photo", diffuse=None, specular=None, truth=None) for s in self.subjects("specular"))
+        return tuple(
+            replace(s, kind="photo", diffuse=None, specular=None, truth=None)
+            for s in self.subjects("specular")
+        )
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +94,9 @@ def context(tmp_path_factory: pytest.TempPathFactory) -> Context:
 
 def perfect(subject: Subject) -> Separation:
     diffuse, specular = separations.layers(subject)
-    return Separation(diffuse, specular, np.zeros_like(diffuse), np.ones(subject.mask.shape, np.float32))
+    return Separation(
+        diffuse, specular, np.zeros_like(diffuse), np.ones(subject.mask.shape, np.float32)
+    )
 
 
 @pytest.mark.parametrize("kind", ["specular", "matt"])
@@ -88,7 +106,11 @@ def test_the_truth_scores_perfectly(context: Context, kind: str) -> None:
     assert found["mse"] == found["specular_mse"] == 0
     assert found["ssim"] == pytest.approx(1)
     assert found["lmse"] == pytest.approx(0, abs=1e-9)
-    assert found["specular_lmse"] is None if kind == "matt" else found["specular_lmse"] == pytest.approx(0, abs=1e-9)
+    assert (
+        found["specular_lmse"] is None
+        if kind == "matt"
+        else found["specular_lmse"] == pytest.approx(0, abs=1e-9)
+    )
     assert layer_tables.decibels(0) == np.inf
 
 
@@ -97,37 +119,54 @@ def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Conte
         for item in items.ITEMS:
             assert item.make is not None
             made = item.make(context)
-            of_layers = [table for table in made.tables if not table.caption.startswith("Runs that")]
-            assert all(NOTHING.label in [cell for row in table.rows for cell in row[:2]] for table in of_layers), item.number
+            of_layers = [
+                table for table in made.tables if not table.caption.startswith("Runs that")
+            ]
+            assert all(
+                NOTHING.label in [cell for row in table.rows for cell in row[:2]]
+                for table in of_layers
+            ), item.number
     runs = layer_tables.run_all(context, "specular", ())
     assert layer_tables.relative(runs, NOTHING.label, "specular", DIFFUSE, 0) == "1"
     for layer in (DIFFUSE, SPECULAR):
         error = layer_tables.means(runs[NOTHING.label], layer[0])
-        true = {s.name: float(np.mean(separations.layers(s)[1][s.mask].astype(float) ** 2)) for s in context.subjects("specular")}
-        assert error == pytest.approx(true, rel=1e-4)  # leaving the highlight costs exactly the highlight, in both layers
+        true = {
+            s.name: float(np.mean(separations.layers(s)[1][s.mask].astype(float) ** 2))
+            for s in context.subjects("specular")
+        }
+        assert error == pytest.approx(
+            true, rel=1e-4
+        )  # leaving the highlight costs exactly the highlight, in both layers
     matt = layer_tables.run_all(context, "matt", ())
     assert layer_tables.relative(matt, NOTHING.label, "matt", DIFFUSE, 0) == "0.00"
 
 
 def test_every_search_marks_the_pixels_of_the_exact_one(context: Context) -> None:
     subject = context.subjects("specular")[0]
-    exact = next(way for way in segmentation_items.WAYS if way.label == "exact search, as published")
+    exact = next(
+        way for way in segmentation_items.WAYS if way.label == "exact search, as published"
+    )
     marked = separations.highlights(subject, exact, 0)
     assert 0 < marked.sum() < subject.mask.sum() / 2
     for way in segmentation_items.WAYS[:3]:
         assert (separations.highlights(subject, way, 3) == marked).all(), way.label
 
 
-def test_runs_are_repeated_with_other_seeds_and_taken_up_again(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_runs_are_repeated_with_other_seeds_and_taken_up_again(
+    context: Context, monkeypatch: pytest.MonkeyPatch
+) -> None:
     subject = context.subjects("specular")[0]
     way = next(way for way in segmentation_items.WAYS if way.label == "CS, as published")
     first = separations.measured(context, subject, way, 3)
     assert [run.run for run in first] == [0, 1, 2]
-    assert all(run.search is not None and run.seconds is not None and run.search > 0 and run.seconds > 0 for run in first)
-    assert all(run.exact for run in first)
-    assert segmentation_items.hits({way.label: {subject.name: [first[0], replace(first[1], exact=False)]}}).rows == (
-        (way.label, 2, "50 %"),
+    assert all(
+        run.search is not None and run.seconds is not None and run.search > 0 and run.seconds > 0
+        for run in first
     )
+    assert all(run.exact for run in first)
+    assert segmentation_items.hits(
+        {way.label: {subject.name: [first[0], replace(first[1], exact=False)]}}
+    ).rows == ((way.label, 2, "50 %"),)
     assert way.options(1) == {"optimiser": "chaotic_clonal", "seed": 1}
     monkeypatch.setattr(separations, "split", lambda *_: pytest.fail("computed again"))
     assert separations.measured(context, subject, way, 3) == first
@@ -135,12 +174,19 @@ def test_runs_are_repeated_with_other_seeds_and_taken_up_again(context: Context,
 
 def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -> None:
     subject = context.subjects("specular")[0]
-    grey = replace(subject, name="grey", image=np.repeat(subject.image.mean(2, keepdims=True), 3, 2))
+    grey = replace(
+        subject, name="grey", image=np.repeat(subject.image.mean(2, keepdims=True), 3, 2)
+    )
     way = Way("CS, improved", separations.SEGMENTATION)
     found = separations.measured(context, grey, way)
     assert found[0].refused and found[0].mse is None
     table = layer_tables.by_subject(
-        {NOTHING.label: {"grey": separations.measured(context, grey, NOTHING)}, way.label: {"grey": found}}, "specular", DIFFUSE
+        {
+            NOTHING.label: {"grey": separations.measured(context, grey, NOTHING)},
+            way.label: {"grey": found},
+        },
+        "specular",
+        DIFFUSE,
     )
     assert table.rows[1][2] == "refused"
 
@@ -156,7 +202,9 @@ def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -
         (None, "cannot be told"),
     ],
 )
-def test_a_claim_of_ten_per_cent_holds_only_where_the_interval_says_so(found: Ratio | None, holds: str) -> None:
+def test_a_claim_of_ten_per_cent_holds_only_where_the_interval_says_so(
+    found: Ratio | None, holds: str
+) -> None:
     assert gain("ten per cent less", 0.1, found, "error").holds == holds
 
 
@@ -183,7 +231,9 @@ def test_sirfs_is_what_all_are_relative_to(rows: list[estimates.Row]) -> None:
     assert table.rows[0] == ("SIRFS", *["1"] * len(estimates.METRICS))
     of = {(row.subject.split()[0], row.framework): row for row in rows}
     plain, bound = of["matt", "SIRFS"], of["matt", BOUND.label]
-    assert bound.errors == pytest.approx(plain.errors, rel=1e-4)  # without a highlight the photo is the diffuse image
+    assert bound.errors == pytest.approx(
+        plain.errors, rel=1e-4
+    )  # without a highlight the photo is the diffuse image
     assert all(row.seconds > 0 and row.evaluations > 0 for row in rows)
 
 
@@ -194,7 +244,9 @@ def test_a_separation_afterwards_changes_reflectance_alone(rows: list[estimates.
     assert glossy["SIRFS-MBP"]["reflectance"] < 0.8 * glossy["SIRFS"]["reflectance"]
 
 
-def test_an_estimate_is_kept_with_its_maps(context: Context, rows: list[estimates.Row], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_estimate_is_kept_with_its_maps(
+    context: Context, rows: list[estimates.Row], monkeypatch: pytest.MonkeyPatch
+) -> None:
     del rows
     monkeypatch.setattr(estimates, "make_runner", lambda *_: pytest.fail("computed again"))
     subject = estimates.known(context, ("specular",))[0]
@@ -208,18 +260,34 @@ def test_the_true_maps_score_perfectly_and_fill_the_first_row_of_a_sheet(context
     light = light_from_reference(truth.light)
     normal = np.nan_to_num(truth_normal(truth.height))
     found = score(
-        truth, height=np.nan_to_num(truth.height), normal=normal, shading=truth.shading, reflectance=truth.reflectance, light=light
+        truth,
+        height=np.nan_to_num(truth.height),
+        normal=normal,
+        shading=truth.shading,
+        reflectance=truth.reflectance,
+        light=light,
     )
-    assert found.height == pytest.approx(0) and found.reflectance == pytest.approx(0) and found.light == pytest.approx(0)
+    assert (
+        found.height == pytest.approx(0)
+        and found.reflectance == pytest.approx(0)
+        and found.light == pytest.approx(0)
+    )
     assert found.normal == pytest.approx(0, abs=1e-6)
 
 
 def test_figures_are_numbered_without_a_gap_and_none_is_drawn_twice() -> None:
-    assert [item.number for item in sheets_items.ITEMS] == [f"4.{number}" for number in range(10, 49)]
+    assert [item.number for item in sheets_items.ITEMS] == [
+        f"4.{number}" for number in range(10, 49)
+    ]
     assert len({item.title for item in sheets_items.ITEMS}) == 39
     subjects = [painted_ball(name, "specular", PAINTS[0], 0.4) for name in "ab"]
     shown = [sheets_items.turn(index, subjects, 2) for index in range(4)]
-    assert [(subject.name, which) for subject, which in shown] == [("a", 0), ("b", 0), ("a", 1), ("b", 1)]
+    assert [(subject.name, which) for subject, which in shown] == [
+        ("a", 0),
+        ("b", 0),
+        ("a", 1),
+        ("b", 1),
+    ]
     for few in ([], subjects):
         with pytest.raises(InputError, match="too few"):
             sheets_items.turn(4, few, 2)
@@ -228,12 +296,23 @@ def test_figures_are_numbered_without_a_gap_and_none_is_drawn_twice() -> None:
 def test_sheets_have_a_row_for_the_truth_and_for_each_method(context: Context) -> None:
     made = {item.number: item.make for item in sheets_items.ITEMS}
     pictures = []
-    for number in ("4.16", "4.18"):  # the first subject as published, and, as there are only two, improved
+    for number in (
+        "4.16",
+        "4.18",
+    ):  # the first subject as published, and, as there are only two, improved
         make = made[number]
         assert make is not None
         (figure,) = make(context).figures
         assert len(figure.axes) == 5 * 3
-        pictures.append(np.concatenate([np.ravel(np.asarray(axes.images[0].get_array())) for axes in figure.axes if axes.images]))
+        pictures.append(
+            np.concatenate(
+                [
+                    np.ravel(np.asarray(axes.images[0].get_array()))
+                    for axes in figure.axes
+                    if axes.images
+                ]
+            )
+        )
     assert pictures[0].shape != pictures[1].shape or (pictures[0] != pictures[1]).any()
 
 
@@ -259,7 +338,12 @@ def test_pictures_are_cut_to_the_object_and_compared_at_one_scale() -> None:
 
 def test_every_number_of_the_tables_is_there_once() -> None:
     def numbers() -> Iterator[str]:
-        for module in (segmentation_items, removal_items, sparse_coding_items, characteristics_items):
+        for module in (
+            segmentation_items,
+            removal_items,
+            sparse_coding_items,
+            characteristics_items,
+        ):
             yield from (item.number for item in module.ITEMS)
 
     assert list(itertools.chain(numbers())) == [f"4.{number}" for number in range(5, 23)]

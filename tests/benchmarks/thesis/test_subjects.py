@@ -1,4 +1,6 @@
-"""The images of `isc thesis`: layers that add up, truths that fit the metrics, public data in either layout, smaller copies."""
+"""The images of `isc thesis`: layers that add up, truths that fit the metrics, public data in
+either layout, smaller copies.
+"""
 
 import os
 from dataclasses import replace
@@ -22,9 +24,13 @@ def own_score(truth: MitBerkeleyObject) -> Scores:
     """The errors of the truth as an answer."""
     normal = np.nan_to_num(truth_normal(truth.height))
     return score(
-        truth, height=np.nan_to_num(truth.height), normal=normal, shading=truth.shading, reflectance=truth.reflectance,
+        truth,
+        height=np.nan_to_num(truth.height),
+        normal=normal,
+        shading=truth.shading,
+        reflectance=truth.reflectance,
         light=light_from_reference(truth.light),
-    )  # fmt: skip
+    )
 
 
 def layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
@@ -36,13 +42,31 @@ def layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
 def check(subject: Subject) -> None:
     """What holds for every subject with layers."""
     diffuse, specular = layers(subject)
-    assert subject.image.dtype == np.float32 and subject.image.shape == (*subject.mask.shape, 3) and (subject.image >= 0).all()
+    assert (
+        subject.image.dtype == np.float32
+        and subject.image.shape == (*subject.mask.shape, 3)
+        and (subject.image >= 0).all()
+    )
     assert max(subject.mask.shape) <= QUICK_SIZE and subject.mask.any()
-    # The laboratory's photos were taken one by one: their layers add up to the photo within its noise.
-    assert np.abs(diffuse + specular - subject.image)[subject.mask].mean() < 0.02 * subject.image[subject.mask].mean()
+    # The laboratory's photos were taken one by one: their layers add up to the photo within its
+    # noise.
+    assert (
+        np.abs(diffuse + specular - subject.image)[subject.mask].mean()
+        < 0.02 * subject.image[subject.mask].mean()
+    )
     if subject.truth is not None:
         scores = own_score(subject.truth)
-        assert max(scores.height, scores.normal, scores.shading, scores.reflectance, scores.rs_mse, scores.light) < 1e-6
+        assert (
+            max(
+                scores.height,
+                scores.normal,
+                scores.shading,
+                scores.reflectance,
+                scores.rs_mse,
+                scores.light,
+            )
+            < 1e-6
+        )
 
 
 @pytest.fixture(scope="module")
@@ -69,12 +93,16 @@ def test_what_is_rendered_is_kept_and_the_same(rendered: Context) -> None:
     first = rendered.subjects("synthetic")
     before = {path: path.stat().st_mtime_ns for path in rendered.output.rglob("*.npz")}
     second = Context(rendered.output, quick=True).subjects("synthetic")
-    assert before and before == {path: path.stat().st_mtime_ns for path in rendered.output.rglob("*.npz")}
+    assert before and before == {
+        path: path.stat().st_mtime_ns for path in rendered.output.rglob("*.npz")
+    }
     assert all(np.array_equal(a.image, b.image) for a, b in zip(first, second, strict=True))
 
 
 def test_stand_ins_for_photos_tell_no_truth(rendered: Context) -> None:
-    assert all(s.truth is None and s.diffuse is None and s.specular is None for s in rendered.photos())
+    assert all(
+        s.truth is None and s.diffuse is None and s.specular is None for s in rendered.photos()
+    )
 
 
 def test_rendering_stops_when_asked(tmp_path: Path) -> None:
@@ -88,13 +116,18 @@ def test_public_data_in_each_layout(shared: Path, tmp_path: Path) -> None:
     data = shared / "data"
     (tmp_path / "MIT-Berkeley-Laboratory").symlink_to(data / "mit_berkeley_train" / "laboratory")
     (tmp_path / "MIT-Berkeley-Natural").symlink_to(data / "mit_berkeley_train" / "natural")
-    found = {root: Context(tmp_path / "out", root, quick=True) for root in (data, data / "mit_berkeley_train", tmp_path)}
+    found = {
+        root: Context(tmp_path / "out", root, quick=True)
+        for root in (data, data / "mit_berkeley_train", tmp_path)
+    }
     for context in found.values():
         context.check()
         names = [subject.name for subject in context.subjects("specular")]
         assert names[:2] == ["apple", "teabag2"]
         assert [subject.name for subject in context.subjects("matt")] == ["apple", "teabag2"]
-    photos = [[subject.name for subject in context.photos()] for context in list(found.values())[:2]]
+    photos = [
+        [subject.name for subject in context.photos()] for context in list(found.values())[:2]
+    ]
     assert photos[0] == photos[1] == ["Bag", "Banana"]
     for subject in (*found[data].subjects("specular"), *found[data].subjects("matt")):
         check(subject)
@@ -111,8 +144,19 @@ def test_photos_with_ground_truth_are_linear_and_whole(shared: Path, tmp_path: P
 
 def test_the_fingerprint_follows_the_data(shared: Path, tmp_path: Path) -> None:
     plain, with_data = Context(tmp_path), Context(tmp_path, shared / "data")
-    assert plain.fingerprint != with_data.fingerprint == Context(tmp_path, shared / "data").fingerprint
-    assert len({plain.fingerprint, replace(plain, seed=1).fingerprint, replace(plain, quick=True).fingerprint}) == 3
+    assert (
+        plain.fingerprint != with_data.fingerprint == Context(tmp_path, shared / "data").fingerprint
+    )
+    assert (
+        len(
+            {
+                plain.fingerprint,
+                replace(plain, seed=1).fingerprint,
+                replace(plain, quick=True).fingerprint,
+            }
+        )
+        == 3
+    )
 
 
 def test_a_folder_without_known_data_is_refused(tmp_path: Path) -> None:
@@ -122,13 +166,27 @@ def test_a_folder_without_known_data_is_refused(tmp_path: Path) -> None:
 
 
 def plane(size: int) -> Subject:
-    """A tilted plane whose height rises by a third of a pixel each column, half of it outside the mask."""
+    """A tilted plane whose height rises by a third of a pixel each column, half of it outside the
+    mask.
+    """
     mask = np.zeros((size, size), bool)
     mask[size // 4 : -size // 4, size // 4 : -size // 4] = True
     columns = np.broadcast_to(np.arange(size) / 3, (size, size))
     height = np.where(mask, columns, np.nan)
-    image = np.where(mask[..., None], 0.2 + 0.001 * columns[..., None] * np.ones(3), 0).astype(np.float32)
-    truth = MitBerkeleyObject("plane", "laboratory", image.astype(float), mask, mask, height, image + 0.1, image + 0.2, np.zeros((9, 3)))
+    image = np.where(mask[..., None], 0.2 + 0.001 * columns[..., None] * np.ones(3), 0).astype(
+        np.float32
+    )
+    truth = MitBerkeleyObject(
+        "plane",
+        "laboratory",
+        image.astype(float),
+        mask,
+        mask,
+        height,
+        image + 0.1,
+        image + 0.2,
+        np.zeros((9, 3)),
+    )
     return Subject("plane", "specular", image, mask, 0.75 * image, 0.25 * image, truth)
 
 
@@ -136,9 +194,17 @@ def test_a_smaller_copy_keeps_light_and_slope() -> None:
     subject = plane(240)
     small = shrunk(subject, QUICK_SIZE)
     assert small.mask.shape == (80, 80) and small.truth is not None and subject.truth is not None
-    assert small.image[small.mask].mean() == pytest.approx(subject.image[subject.mask].mean(), rel=1e-4)
-    assert np.allclose(np.diff(small.truth.height, axis=1)[small.truth.mask[:, 1:] & small.truth.mask[:, :-1]], 1 / 3)
-    assert np.array_equal(np.isfinite(small.truth.height), small.mask) and small.truth.valid.sum() == small.mask.sum()
+    assert small.image[small.mask].mean() == pytest.approx(
+        subject.image[subject.mask].mean(), rel=1e-4
+    )
+    assert np.allclose(
+        np.diff(small.truth.height, axis=1)[small.truth.mask[:, 1:] & small.truth.mask[:, :-1]],
+        1 / 3,
+    )
+    assert (
+        np.array_equal(np.isfinite(small.truth.height), small.mask)
+        and small.truth.valid.sum() == small.mask.sum()
+    )
     assert np.allclose(sum(layers(small)), small.image, atol=1e-6)
     # No light of the background gets into the object.
     assert small.image[small.mask].min() >= subject.image[subject.mask].min()

@@ -1,4 +1,6 @@
-"""The thesis' tables of thresholds: exact rows against all candidates, statistics against their definitions, items as they are made."""
+"""The thesis' tables of thresholds: exact rows against all candidates, statistics against their
+definitions, items as they are made.
+"""
 
 from itertools import combinations
 from pathlib import Path
@@ -13,7 +15,15 @@ from benchmarks.thesis.context import Context
 from benchmarks.thesis.item import Made
 from benchmarks.thesis.registry import find
 from benchmarks.thesis.thresholding_items import exhaustive
-from benchmarks.thesis.thresholding_runs import all_runs, holm, iterations, objective, rank_sum, runs, share_interval
+from benchmarks.thesis.thresholding_runs import (
+    all_runs,
+    holm,
+    iterations,
+    objective,
+    rank_sum,
+    runs,
+    share_interval,
+)
 from benchmarks.thresholding import COUNTS, IMAGES
 from isc_core.thresholding import OtsuObjective, exact
 
@@ -47,7 +57,9 @@ def test_the_exact_table_has_every_image_and_its_known_optimum(context: Context)
     assert known["camera", 4] == pytest.approx(5313.813, abs=1e-3)
     assert "46 100 145 182" in {row[2] for row in table.rows}
     assert set(known) == {(name, count) for name in IMAGES[:3] for count in COUNTS}
-    assert all(0 < float(row[4]) < 100 for row in table.rows) and {row[3] for row in check.rows} == {"yes"}
+    assert all(0 < float(row[4]) < 100 for row in table.rows) and {
+        row[3] for row in check.rows
+    } == {"yes"}
     # More classes never lie closer together.
     assert all(known[name, 3] < known[name, 4] < known[name, 5] for name in IMAGES[:3])
 
@@ -56,21 +68,31 @@ def test_runs_are_kept_differ_by_seed_and_never_beat_the_optimum(context: Contex
     found = all_runs(context, ("PSO", "CS"))
     for (_, image, count), each in found.items():
         best = exact(objective(image), count).value
-        assert (each.values <= best * (1 + 1e-12)).all() and each.thresholds.shape == (len(each.values), count)
+        assert (each.values <= best * (1 + 1e-12)).all() and each.thresholds.shape == (
+            len(each.values),
+            count,
+        )
         assert each.values == pytest.approx(objective(image)(each.thresholds), rel=1e-12)
         assert np.array_equal(np.isfinite(each.needed), each.values >= best * (1 - 1e-12))
     before = {path: path.stat().st_mtime_ns for path in context.output.rglob("*.jsonl")}
     runs(Context(context.output, quick=True), "PSO", "camera", 5)
-    assert before and before == {path: path.stat().st_mtime_ns for path in context.output.rglob("*.jsonl")}, "they were computed anew"
+    assert before and before == {
+        path: path.stat().st_mtime_ns for path in context.output.rglob("*.jsonl")
+    }, "they were computed anew"
     assert len(set(found["PSO", "camera", 5].values.tolist())) > 1, "every run started alike"
 
 
 def test_tables_of_runs_fit_the_runs(context: Context) -> None:
-    objectives, thresholds, times = (made(context, "table", number) for number in ("4.2", "4.3", "4.4"))
+    objectives, thresholds, times = (
+        made(context, "table", number) for number in ("4.2", "4.3", "4.4")
+    )
     assert [verdict.claim for verdict in objectives.verdicts] == [CHAOS_FINDS_OPTIMUM, CHAOS_HELPS]
     chaotic = all_runs(context, ("CS",))
     hits = sum(each.hits for each in chaotic.values())
-    assert f"{hits} of {sum(len(each.values) for each in chaotic.values())} runs" in objectives.verdicts[0].here
+    assert (
+        f"{hits} of {sum(len(each.values) for each in chaotic.values())} runs"
+        in objectives.verdicts[0].here
+    )
     cells = {(row[0], row[1]): row for row in objectives.tables[1].rows}
     assert cells["moon", 4][7] == f"{chaotic['CS', 'moon', 4].values.mean():.3f}"
     assert all(len(table.rows) == 9 for table in (*thresholds.tables, *times.tables))
@@ -84,7 +106,9 @@ def test_figures_are_drawn(context: Context, number: str) -> None:
 
 
 def test_uniform_numbers_and_one_orbit_are_told_apart(context: Context) -> None:
-    one, many, pseudo = ([float(cell) for cell in row[1:]] for row in made(context, "figure", "3.8").tables[0].rows)
+    one, many, pseudo = (
+        [float(cell) for cell in row[1:]] for row in made(context, "figure", "3.8").tables[0].rows
+    )
     assert many[2] == pseudo[2] == 0 < one[2]
     assert many[0] < 100 and pseudo[0] < 100
 
@@ -101,5 +125,7 @@ def test_statistics_are_what_they_are_called() -> None:
 
 
 def test_another_seed_is_another_run(context: Context, tmp_path: Path) -> None:
-    one, other = (runs(Context(tmp_path, quick=True, seed=seed), "PSO", "camera", 5) for seed in (0, 100))
+    one, other = (
+        runs(Context(tmp_path, quick=True, seed=seed), "PSO", "camera", 5) for seed in (0, 100)
+    )
     assert not np.array_equal(one.thresholds, other.thresholds)

@@ -33,9 +33,16 @@ def random_units(*shape: int, seed: int = 0) -> np.ndarray:
 
 
 def lit_triples(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Normals, views and lights (count, 3), half of the lights near the mirror direction so that narrow lobes are seen."""
+    """Normals, views and lights (count, 3), half of the lights near the mirror direction so that
+    narrow lobes are seen.
+    """
     normal = random_units(count, seed=seed)
-    view, light = ((lambda d: d * np.sign((d * normal).sum(-1, keepdims=True)))(random_units(count, seed=seed + k)) for k in (1, 2))
+    view, light = (
+        (lambda d: d * np.sign((d * normal).sum(-1, keepdims=True)))(
+            random_units(count, seed=seed + k)
+        )
+        for k in (1, 2)
+    )
     mirror = 2 * (view * normal).sum(-1, keepdims=True) * normal - view
     near = mirror + 0.1 * random_units(count, seed=seed + 3)
     light = np.where(np.arange(count)[:, None] % 2 == 0, light, near)

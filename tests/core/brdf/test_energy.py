@@ -19,7 +19,9 @@ EXPONENTS = (5.0, 9.0, 30.0, 200.0, 2000.0)
 
 
 def even_sum(model: Model, cos_view: float, count: int = 700) -> float:
-    """The same integral over even steps in the light's cosine and azimuth: slow, but it shares nothing with the half vectors."""
+    """The same integral over even steps in the light's cosine and azimuth: slow, but it shares
+    nothing with the half vectors.
+    """
     cosine, azimuth = (np.arange(count) + 0.5) / count, (np.arange(count) + 0.5) * 2 * np.pi / count
     light = polar_units(cosine[:, None], azimuth)
     values = model.value(UP, light, polar_units(np.array(cos_view)))
@@ -40,7 +42,9 @@ def test_normalised_phong_keeps_its_strength_along_the_normal(exponent: float) -
 
 @pytest.mark.parametrize("exponent", EXPONENTS)
 def test_normalised_blinn_phong_keeps_a_little_too_much(exponent: float) -> None:
-    """The usual factor is an approximation: the closed form along the normal lies above 1, by 7.5 % at most."""
+    """The usual factor is an approximation: the closed form along the normal lies above 1, by 7.5 %
+    at most.
+    """
     model = BlinnPhong(1.0, exponent)
     exact = (exponent + 8) * (exponent + 2 ** (-exponent / 2)) / ((exponent + 2) * (exponent + 4))
     assert directional_albedo(model, 1.0) == pytest.approx(exact, abs=1e-9)
@@ -50,7 +54,10 @@ def test_normalised_blinn_phong_keeps_a_little_too_much(exponent: float) -> None
 
 @pytest.mark.parametrize("exponent", [0.0, 1.0, *EXPONENTS])
 def test_conserving_blinn_phong_keeps_no_more_than_its_strength(exponent: float) -> None:
-    kept = [float(directional_albedo(BlinnPhong(0.9, exponent, "conserving"), cos_view)) for cos_view in VIEWS]
+    kept = [
+        float(directional_albedo(BlinnPhong(0.9, exponent, "conserving"), cos_view))
+        for cos_view in VIEWS
+    ]
     assert kept[0] == pytest.approx(0.9, abs=1e-9)
     assert max(kept) <= 0.9 + 1e-9
 
@@ -60,7 +67,9 @@ def test_ggx_facets_cover_the_surface_once(alpha: float) -> None:
     abscissa, weight = np.polynomial.legendre.leggauss(400)
     polar = np.pi / 2 * ((abscissa + 1) / 2) ** 3
     step = np.pi / 2 * 1.5 * ((abscissa + 1) / 2) ** 2 * weight
-    covered = (2 * np.pi * np.sin(polar) * np.cos(polar) * density(alpha, np.cos(polar)) * step).sum()
+    covered = (
+        2 * np.pi * np.sin(polar) * np.cos(polar) * density(alpha, np.cos(polar)) * step
+    ).sum()
     assert covered == pytest.approx(1, abs=1e-9)
 
 
@@ -72,33 +81,63 @@ def test_ggx_never_outshines_a_white_sky(alpha: float) -> None:
 
 
 def test_ggx_of_alpha_one_has_a_closed_form() -> None:
-    """D is 1 / pi, and along the normal f cos = cos / (2 pi (1 + cos)), whose integral is 1 - log 2."""
+    """D is 1 / pi, and along the normal f cos = cos / (2 pi (1 + cos)), whose integral is 1 - log
+    2.
+    """
     assert directional_albedo(Ggx(1.0, 1.0), 1.0) == pytest.approx(1 - np.log(2), abs=1e-9)
 
 
 def test_oren_nayar_along_the_normal_has_a_closed_form() -> None:
-    assert directional_albedo(OrenNayar(1.0, 0.5), 1.0) == pytest.approx(1 - 0.5 * 0.25 / 0.58, abs=1e-9)
-    assert max(directional_albedo(OrenNayar(1.0, sigma), cos_view) for sigma in (0.1, 0.5, 1.5) for cos_view in VIEWS) <= 1.02
+    assert directional_albedo(OrenNayar(1.0, 0.5), 1.0) == pytest.approx(
+        1 - 0.5 * 0.25 / 0.58, abs=1e-9
+    )
+    assert (
+        max(
+            directional_albedo(OrenNayar(1.0, sigma), cos_view)
+            for sigma in (0.1, 0.5, 1.5)
+            for cos_view in VIEWS
+        )
+        <= 1.02
+    )
 
 
 @pytest.mark.parametrize(
-    "model", [OrenNayar(0.9, 0.6), Phong(1.0, 20.0), BlinnPhong(1.0, 20.0, "plain"), Phong(1.0, 9.0, False), Ggx(0.3, 0.2)], ids=str
+    "model",
+    [
+        OrenNayar(0.9, 0.6),
+        Phong(1.0, 20.0),
+        BlinnPhong(1.0, 20.0, "plain"),
+        Phong(1.0, 9.0, False),
+        Ggx(0.3, 0.2),
+    ],
+    ids=str,
 )
 def test_half_vectors_and_even_steps_agree(model: Model) -> None:
     for cos_view in (0.9, 0.4):
-        assert directional_albedo(model, cos_view) == pytest.approx(even_sum(model, cos_view), rel=2e-4)
+        assert directional_albedo(model, cos_view) == pytest.approx(
+            even_sum(model, cos_view), rel=2e-4
+        )
 
 
 def test_the_nodes_are_enough() -> None:
-    models: dict[Model, float] = {Phong(1.0, 2000.0): 1e-6, BlinnPhong(1.0, 2000.0): 1e-6, Ggx(0.03, 1.0): 1e-6, OrenNayar(1.0, 0.5): 1e-4}
+    models: dict[Model, float] = {
+        Phong(1.0, 2000.0): 1e-6,
+        BlinnPhong(1.0, 2000.0): 1e-6,
+        Ggx(0.03, 1.0): 1e-6,
+        OrenNayar(1.0, 0.5): 1e-4,
+    }
     for model, tolerance in models.items():
         for cos_view in (1.0, 0.5, 0.174):
-            assert directional_albedo(model, cos_view) == pytest.approx(directional_albedo(model, cos_view, 150), abs=tolerance)
+            assert directional_albedo(model, cos_view) == pytest.approx(
+                directional_albedo(model, cos_view, 150), abs=tolerance
+            )
 
 
 def test_coloured_paint_has_a_channel_each() -> None:
     kept = directional_albedo(GLOSSY_PAINT, 0.8)
-    body, gloss = (directional_albedo(lobe, 0.8) for lobe in (GLOSSY_PAINT.body, GLOSSY_PAINT.interface))
+    body, gloss = (
+        directional_albedo(lobe, 0.8) for lobe in (GLOSSY_PAINT.body, GLOSSY_PAINT.interface)
+    )
     assert np.allclose(kept, np.array([0.7, 0.3, 0.1]) * body + gloss)
 
 

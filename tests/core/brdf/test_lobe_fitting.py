@@ -1,4 +1,6 @@
-"""Lobes are found again in images that were made of them, and what cannot be known is said to be unknown."""
+"""Lobes are found again in images that were made of them, and what cannot be known is said to be
+unknown.
+"""
 
 import json
 from dataclasses import replace
@@ -32,7 +34,9 @@ COLOUR = np.array([3.0, 2.5, 2.0])
 
 def ball(size: int = 96) -> tuple[np.ndarray, np.ndarray]:
     """Normals (size, size, 3) and mask of an ellipsoid that nearly fills the picture."""
-    y, x = np.meshgrid(np.linspace(1, -1, size) / 0.9, np.linspace(-1, 1, size) / 0.9, indexing="ij")
+    y, x = np.meshgrid(
+        np.linspace(1, -1, size) / 0.9, np.linspace(-1, 1, size) / 0.9, indexing="ij"
+    )
     square = x * x + y * y
     mask = square < 0.97
     normal = np.dstack([x, 0.8 * y, np.sqrt(np.where(mask, 1 - square, 1))])
@@ -61,15 +65,27 @@ def test_the_response_is_that_of_the_brdf_and_its_gradient_that_of_differences(m
     for alpha in (0.05, 0.2, 0.6):
         lobe = Ggx(alpha, 0.04) if model == "ggx" else BlinnPhong(1.0, 2 / alpha**2 - 2)
         answer = respond(model, normal, KEY, alpha)  # type: ignore[arg-type]
-        np.testing.assert_allclose(answer.value, radiance(lobe, normal, VIEW, directional(KEY, 1.0))[:, 0], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            answer.value,
+            radiance(lobe, normal, VIEW, directional(KEY, 1.0))[:, 0],
+            rtol=1e-9,
+            atol=1e-12,
+        )
         step = 1e-6
         up, down = (respond(model, normal, KEY, alpha * np.exp(s)).value for s in (step, -step))  # type: ignore[arg-type]
         scale = answer.value.max()
-        np.testing.assert_allclose(answer.by_log_alpha, (up - down) / (2 * step), rtol=1e-5, atol=1e-6 * scale)
+        np.testing.assert_allclose(
+            answer.by_log_alpha, (up - down) / (2 * step), rtol=1e-5, atol=1e-6 * scale
+        )
         for across in (np.array([0.8, 0, 0.6]), np.cross(KEY, [0.8, 0, 0.6])):
             turned = [KEY + s * across for s in (step, -step)]
             up, down = (respond(model, normal, t / np.linalg.norm(t), alpha).value for t in turned)  # type: ignore[arg-type]
-            np.testing.assert_allclose(answer.by_light @ across, (up - down) / (2 * step), rtol=1e-4, atol=1e-5 * scale / alpha)
+            np.testing.assert_allclose(
+                answer.by_light @ across,
+                (up - down) / (2 * step),
+                rtol=1e-4,
+                atol=1e-5 * scale / alpha,
+            )
 
 
 @pytest.mark.parametrize("alpha", [0.05, 0.1, 0.25, 0.45])
@@ -118,8 +134,19 @@ def test_the_intervals_grow_with_the_noise_and_hold_the_truth() -> None:
     specular += 0.5 * specular.max()  # so that noise takes nothing below zero
     for noise in (0.02, 0.1):
         for seed in range(10):
-            drawn = np.random.default_rng(seed).normal(size=specular.shape) * noise * 2 / 3 * specular.max()
-            fit = fit_lobe(np.maximum(specular + drawn, 0), normal, mask, options=LobeFitOptions(most_lights=1, most_pixels=1500))
+            drawn = (
+                np.random.default_rng(seed).normal(size=specular.shape)
+                * noise
+                * 2
+                / 3
+                * specular.max()
+            )
+            fit = fit_lobe(
+                np.maximum(specular + drawn, 0),
+                normal,
+                mask,
+                options=LobeFitOptions(most_lights=1, most_pixels=1500),
+            )
             assert fit.alpha_interval is not None
             inside.append(fit.alpha_interval.low < 0.2 < fit.alpha_interval.high)
             widths.append(np.log(fit.alpha_interval.high / fit.alpha_interval.low))
@@ -148,7 +175,10 @@ def test_pixels_without_confidence_and_clipped_ones_do_not_spoil_the_fit() -> No
 
 def test_without_specular_light_nothing_is_invented() -> None:
     normal, mask = ball()
-    for fit in (fit_lobe(np.zeros(normal.shape), normal, mask), fit_lobe(np.ones(normal.shape), normal, np.zeros_like(mask))):
+    for fit in (
+        fit_lobe(np.zeros(normal.shape), normal, mask),
+        fit_lobe(np.ones(normal.shape), normal, np.zeros_like(mask)),
+    ):
         assert fit.reason == NO_LIGHT and not fit.determined
         assert fit.alpha is None and fit.lights == () and not fit.predicted.any()
 
@@ -176,7 +206,9 @@ def test_the_response_to_an_environment_is_the_sum_over_its_pixels() -> None:
     sky = 0.2 + rng.random((16, 32, 3)).cumsum(1) / 16
     sky[4, 17] += 30
     normal = np.array([[0.0, 0, 1], [0.3, 0.4, np.sqrt(0.75)], [-0.6, 0.0, 0.8]])
-    lights = environment(directions(16).reshape(-1, 3), solid_angles(16).ravel(), sky.reshape(-1, 3))
+    lights = environment(
+        directions(16).reshape(-1, 3), solid_angles(16).ravel(), sky.reshape(-1, 3)
+    )
     for model, lobe in (("ggx", Ggx(0.4)), ("blinn_phong", BlinnPhong(1.0, 2 / 0.4**2 - 2))):
         found = respond_to(surroundings(sky), model, normal, 0.4)  # type: ignore[arg-type]
         np.testing.assert_allclose(found, radiance(lobe, normal, VIEW, lights), rtol=0.05)
@@ -199,7 +231,9 @@ def test_under_a_known_environment_strength_and_alpha_are_found() -> None:
 
 def test_under_an_even_environment_alpha_is_undetermined() -> None:
     normal, mask = ball(48)
-    mask &= normal[..., 2] > 0.6  # toward grazing angles the gloss of rough surfaces does look different
+    mask &= (
+        normal[..., 2] > 0.6
+    )  # toward grazing angles the gloss of rough surfaces does look different
     sky = np.ones((16, 32, 3))
     specular = np.zeros(normal.shape)
     specular[mask] = respond_to(surroundings(sky), "ggx", normal[mask], 0.3)
@@ -251,14 +285,23 @@ def test_what_does_not_fit_together_is_refused() -> None:
 
 def test_it_can_be_cancelled() -> None:
     with pytest.raises(Cancelled):
-        fit_lobe(*seen(Ggx(0.2), directional(KEY, COLOUR), 24), monitor=Monitor(cancelled=lambda: True))
+        fit_lobe(
+            *seen(Ggx(0.2), directional(KEY, COLOUR), 24), monitor=Monitor(cancelled=lambda: True)
+        )
 
 
-def whole_chain(alpha: float, strength: float = 1.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Specular image, cut off at a level as separators do, wavy normals, mask, and the shading of a white matt surface."""
+def whole_chain(
+    alpha: float, strength: float = 1.0
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Specular image, cut off at a level as separators do, wavy normals, mask, and the shading of a
+    white matt surface.
+    """
     specular, normal, mask = seen(Ggx(alpha), directional(KEY, np.pi * strength))
     shading = np.where(
-        mask[..., None], radiance(BlinnPhong(0, 1), normal, VIEW, directional(KEY)) + np.maximum(normal @ KEY, 0)[..., None], 0
+        mask[..., None],
+        radiance(BlinnPhong(0, 1), normal, VIEW, directional(KEY))
+        + np.maximum(normal @ KEY, 0)[..., None],
+        0,
     )
     row, column = np.indices(mask.shape)
     wavy = normal + 0.2 * np.dstack([np.sin(row / 3), np.cos(column / 4), 0 * row])
@@ -268,7 +311,9 @@ def whole_chain(alpha: float, strength: float = 1.0) -> tuple[np.ndarray, np.nda
 
 
 @pytest.mark.parametrize("alpha", [0.1, 0.2, 0.4])
-def test_what_was_recovered_from_one_photo_gives_alpha_by_the_brightness_of_the_highlight(alpha: float) -> None:
+def test_what_was_recovered_from_one_photo_gives_alpha_by_the_brightness_of_the_highlight(
+    alpha: float,
+) -> None:
     specular, normal, mask, shading = whole_chain(alpha)
     fit = fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=shading)
     assert fit.determined and fit.alpha is not None
@@ -284,7 +329,10 @@ def test_what_the_outline_says_helps_where_the_normals_are_wrong() -> None:
     flat /= np.linalg.norm(flat, axis=-1, keepdims=True)
     true = seen(Ggx(0.2), directional(KEY, np.pi))[1]
     options = LobeFitOptions(recovered=True)
-    without, helped = (fit_lobe(specular, flat, mask, options=options, shading=shading, outline=outline) for outline in (None, true))
+    without, helped = (
+        fit_lobe(specular, flat, mask, options=options, shading=shading, outline=outline)
+        for outline in (None, true)
+    )
     assert angle(helped.direction, KEY) < angle(without.direction, KEY) - 5
     with pytest.raises(InputError, match="outline"):
         fit_lobe(specular, flat, mask, options=options, shading=shading, outline=true[1:])
@@ -300,17 +348,29 @@ def test_where_the_lamp_seems_to_stand_is_believed_and_the_picture_stays() -> No
     specular, normal, mask, shading = whole_chain(0.2)
     options, toward = LobeFitOptions(recovered=True), np.array([0.6, -0.1, np.sqrt(1 - 0.37)])
     glance = seen_at_first_sight(toward)
-    without, told = (fit_lobe(specular, normal, mask, options=options, shading=shading, glance=seen) for seen in (None, glance))
+    without, told = (
+        fit_lobe(specular, normal, mask, options=options, shading=shading, glance=seen)
+        for seen in (None, glance)
+    )
     assert angle(told.direction, toward) < 1 and told.lights[0].cone == pytest.approx(glance.cone)
     assert told.alpha == without.alpha and told.explained == without.explained
     np.testing.assert_array_equal(told.predicted, without.predicted)
-    known = fit_lobe(specular, normal, mask, options=options, shading=shading, glance=glance, light_direction=KEY)
+    known = fit_lobe(
+        specular, normal, mask, options=options, shading=shading, glance=glance, light_direction=KEY
+    )
     assert angle(known.direction, KEY) < 1e-4 and known.lights[0].cone == 0
 
 
 def test_a_light_that_looks_smooth_leaves_the_roughness_open() -> None:
     specular, normal, mask, shading = whole_chain(0.2)
-    fit = fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, glance=seen_at_first_sight(KEY, 0.7))
+    fit = fit_lobe(
+        specular,
+        normal,
+        mask,
+        options=LobeFitOptions(recovered=True),
+        shading=shading,
+        glance=seen_at_first_sight(KEY, 0.7),
+    )
     assert not fit.determined and fit.alpha is None and "smooth" in fit.reason
 
 
@@ -320,27 +380,48 @@ def test_the_recovered_fit_does_not_depend_on_the_exposure() -> None:
     dim = fit_lobe(specular, normal, mask, options=options, shading=shading)
     bright = fit_lobe(50 * specular, normal, mask, options=options, shading=50 * shading)
     assert bright.alpha == pytest.approx(dim.alpha, rel=1e-9)
-    np.testing.assert_allclose(bright.strength_light, 50 * np.asarray(dim.strength_light), rtol=1e-9)
+    np.testing.assert_allclose(
+        bright.strength_light, 50 * np.asarray(dim.strength_light), rtol=1e-9
+    )
 
 
 @pytest.mark.parametrize("shown", [0.5, 0.2, 0.1])
 @pytest.mark.parametrize("alpha", [0.1, 0.2])
-def test_a_highlight_brighter_than_the_photo_could_show_gives_an_upper_bound(alpha: float, shown: float) -> None:
+def test_a_highlight_brighter_than_the_photo_could_show_gives_an_upper_bound(
+    alpha: float, shown: float
+) -> None:
     specular, normal, mask, shading = whole_chain(alpha)
     white = shown * specular.max()
     cut, clipped = np.minimum(specular, white), (specular >= white).any(-1)
-    fit = fit_lobe(cut, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, clipped=clipped)
-    assert (fit.determined, fit.reason) == (False, CLIPPED) and fit.alpha is not None and fit.alpha_interval is not None
+    fit = fit_lobe(
+        cut, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, clipped=clipped
+    )
+    assert (
+        (fit.determined, fit.reason) == (False, CLIPPED)
+        and fit.alpha is not None
+        and fit.alpha_interval is not None
+    )
     assert fit.alpha_interval.low < alpha < fit.alpha_interval.high == fit.alpha
     assert angle(fit.direction, KEY) < 25
     one_hot = np.zeros_like(mask)
     one_hot[np.unravel_index(specular.sum(-1).argmax(), mask.shape)] = True
-    assert fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, clipped=one_hot).determined
+    assert fit_lobe(
+        specular,
+        normal,
+        mask,
+        options=LobeFitOptions(recovered=True),
+        shading=shading,
+        clipped=one_hot,
+    ).determined
 
 
 def test_where_no_lobe_explains_the_light_none_and_no_lamps_are_made_up() -> None:
     _, normal, mask = seen(Ggx(0.2), directional(KEY, np.pi))
-    noise = np.where(mask[..., None], np.random.default_rng(3).uniform(size=(*mask.shape, 1)) ** 40 * np.ones(3), 0)
+    noise = np.where(
+        mask[..., None],
+        np.random.default_rng(3).uniform(size=(*mask.shape, 1)) ** 40 * np.ones(3),
+        0,
+    )
     fit = fit_lobe(noise, normal, mask)
     assert (fit.reason, fit.determined, fit.alpha, fit.lights) == (UNLIKE, False, None, ())
     assert not fit.predicted.any() and fit.explained < 0.25
@@ -360,12 +441,19 @@ def test_normals_are_blurred_by_blocks_as_by_pixels(size: int) -> None:
     mask &= np.arange(size) < 0.7 * size
     normal += 0.2 * np.random.default_rng(1).normal(size=normal.shape)
     width = 0.3 * np.sqrt(mask.sum())
-    wanted = np.dstack([gaussian_filter(np.where(mask, normal[..., k], 0), width, mode="constant") for k in range(3)])
+    wanted = np.dstack(
+        [
+            gaussian_filter(np.where(mask, normal[..., k], 0), width, mode="constant")
+            for k in range(3)
+        ]
+    )
     wanted /= np.linalg.norm(wanted, axis=-1, keepdims=True)
     found = blurred_normals(normal, mask)
     assert np.degrees(np.arccos(np.clip((found * wanted).sum(-1)[mask], -1, 1))).max() < 0.5
     np.testing.assert_array_equal(found[~mask], np.broadcast_to(VIEW, found[~mask].shape))
-    padded = blurred_normals(np.pad(normal, [(3, 5), (7, 0), (0, 0)]), np.pad(mask, [(3, 5), (7, 0)]))
+    padded = blurred_normals(
+        np.pad(normal, [(3, 5), (7, 0), (0, 0)]), np.pad(mask, [(3, 5), (7, 0)])
+    )
     np.testing.assert_array_equal(padded[3:-5, 7:], found)
 
 
@@ -379,23 +467,36 @@ def test_recovered_images_need_their_shading() -> None:
 def test_a_separators_level_is_found() -> None:
     specular, normal, mask = seen(Ggx(0.15), directional(KEY, COLOUR))
     cut = np.maximum(specular - 0.15 * specular.max(), 0)
-    known, unknown = (fit_lobe(cut, normal, mask, options=LobeFitOptions(thresholded=t)) for t in (True, False))
+    known, unknown = (
+        fit_lobe(cut, normal, mask, options=LobeFitOptions(thresholded=t)) for t in (True, False)
+    )
     assert known.alpha == pytest.approx(0.15, rel=0.1)
-    assert unknown.alpha is None or abs(np.log(unknown.alpha / 0.15)) > abs(np.log(known.alpha / 0.15))  # type: ignore[operator]
+    assert unknown.alpha is None or abs(np.log(unknown.alpha / 0.15)) > abs(
+        np.log(known.alpha / 0.15)
+    )  # type: ignore[operator]
 
 
 def test_a_near_light_is_told_from_a_far_one() -> None:
     _, mask = ball()
     row, column = np.indices(mask.shape)
     radius = 48 * 0.9
-    depth = np.sqrt(np.maximum(0, 1 - ((column - 47.5) / radius) ** 2 - ((47.5 - row) / radius) ** 2))
-    round_normal = np.where(mask[..., None], np.dstack([(column - 47.5) / radius, (47.5 - row) / radius, depth]), VIEW)
+    depth = np.sqrt(
+        np.maximum(0, 1 - ((column - 47.5) / radius) ** 2 - ((47.5 - row) / radius) ** 2)
+    )
+    round_normal = np.where(
+        mask[..., None], np.dstack([(column - 47.5) / radius, (47.5 - row) / radius, depth]), VIEW
+    )
     round_normal /= np.linalg.norm(round_normal, axis=-1, keepdims=True)
     place = np.dstack([(column - 47.5) / radius, (47.5 - row) / radius, depth - 0.5])
     toward = 3 * KEY - place
     distance = np.linalg.norm(toward, axis=-1)
     arriving = toward / distance[..., None]
-    value = Ggx(0.15).value(round_normal, VIEW, arriving) * np.maximum((round_normal * arriving).sum(-1), 0) * 9 / distance**2
+    value = (
+        Ggx(0.15).value(round_normal, VIEW, arriving)
+        * np.maximum((round_normal * arriving).sum(-1), 0)
+        * 9
+        / distance**2
+    )
     specular = np.where(mask, value, 0)[..., None] * np.ones(3)
     far = fit_lobe(specular, round_normal, mask)
     near = fit_lobe(specular, round_normal, mask, height=depth * radius)
@@ -419,7 +520,12 @@ def test_the_jacobian_of_the_whole_model_is_that_of_differences(thresholded: boo
         there = _measured(problem, _moved(lamps, change, problem))
         active = (here.weight > 0) & (there.weight > 0)
         slope = (there.residual - here.residual)[active] / step
-        np.testing.assert_allclose(slope, here.jacobian[active, column_number], rtol=2e-3, atol=1e-3 * np.abs(slope).max() + 1e-5)
+        np.testing.assert_allclose(
+            slope,
+            here.jacobian[active, column_number],
+            rtol=2e-3,
+            atol=1e-3 * np.abs(slope).max() + 1e-5,
+        )
 
 
 def test_a_rendered_highlight_is_found() -> None:
@@ -433,7 +539,12 @@ def test_a_rendered_highlight_is_found() -> None:
     from synth.truth import render_truth
 
     material = Material(np.full((2, 2, 3), 0.4), "ggx", 0.18, 0.8)
-    scene = Scene(make_shape("blobby", np.random.default_rng(2)), material, (DirectionalLight(KEY, COLOUR),), Camera(64, 64, 28))
+    scene = Scene(
+        make_shape("blobby", np.random.default_rng(2)),
+        material,
+        (DirectionalLight(KEY, COLOUR),),
+        Camera(64, 64, 28),
+    )
     truth = render_truth(scene, RenderOptions(samples=8))
     fit = fit_lobe(truth.specular, truth.normal, truth.mask, height=truth.height)
     assert fit.determined

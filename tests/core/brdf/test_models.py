@@ -1,4 +1,6 @@
-"""The reflectance models: derivatives, symmetry, the horizon, and the published formulas where they have a simple form."""
+"""The reflectance models: derivatives, symmetry, the horizon, and the published formulas where they
+have a simple form.
+"""
 
 from dataclasses import fields, replace
 
@@ -16,7 +18,17 @@ from isc_core.brdf.oren_nayar import OrenNayar
 from isc_core.brdf.phong import Phong
 from isc_core.errors import InputError
 
-from .directions_at import GLOSSY_PAINT, LOBES, PLAIN, RECIPROCAL, UP, lit_triples, polar_units, random_units, turned
+from .directions_at import (
+    GLOSSY_PAINT,
+    LOBES,
+    PLAIN,
+    RECIPROCAL,
+    UP,
+    lit_triples,
+    polar_units,
+    random_units,
+    turned,
+)
 
 
 def name(model: object) -> str:
@@ -28,11 +40,15 @@ def numbers(gradient: object) -> list[str]:
 
 
 def assert_derivatives(model: Lobe, gradient: object, geometry: tuple[np.ndarray, ...]) -> None:
-    """Central differences of `value` by each parameter of the gradient, to 1e-5 of the largest derivative."""
+    """Central differences of `value` by each parameter of the gradient, to 1e-5 of the largest
+    derivative.
+    """
     for parameter in numbers(gradient):
         here = getattr(model, parameter)
         step = 1e-5 * max(abs(here), 1e-2)
-        up, down = (replace(model, **{parameter: here + sign * step}).value(*geometry) for sign in (1, -1))  # type: ignore[type-var]
+        up, down = (
+            replace(model, **{parameter: here + sign * step}).value(*geometry) for sign in (1, -1)
+        )  # type: ignore[type-var]
         found, expected = getattr(gradient, parameter), (up - down) / (2 * step)
         assert np.abs(expected).max() > 0
         assert np.abs(found - expected).max() <= 1e-5 * np.abs(expected).max(), parameter
@@ -46,7 +62,11 @@ INSIDE = [
     Ggx(0.02, 0.5),
     Ggx(0.9, 0.9),
     *(Phong(0.6, p, normal) for p in (2.0, 31.0, 900.0) for normal in (True, False)),
-    *(BlinnPhong(0.6, p, scale) for p in (2.0, 47.0, 2000.0) for scale in ("plain", "normalised", "conserving")),  # type: ignore[arg-type]
+    *(
+        BlinnPhong(0.6, p, scale)
+        for p in (2.0, 47.0, 2000.0)
+        for scale in ("plain", "normalised", "conserving")
+    ),  # type: ignore[arg-type]
 ]
 
 
@@ -54,7 +74,11 @@ INSIDE = [
 def test_gradients_are_the_values_derivatives(model: Lobe) -> None:
     geometry = lit_triples(400)
     gradient = model.gradient(*geometry)
-    assert numbers(gradient) == [part.name for part in fields(model) if part.type != "bool" and part.name not in ("scale", "normalised")]  # type: ignore[arg-type]
+    assert numbers(gradient) == [
+        part.name
+        for part in fields(model)
+        if part.type != "bool" and part.name not in ("scale", "normalised")
+    ]  # type: ignore[arg-type]
     assert_derivatives(model, gradient, geometry)
 
 
@@ -66,15 +90,25 @@ def test_gradients_of_coloured_paint() -> None:
         for parameter in numbers(slopes):
             here, step = getattr(inner, parameter), 1e-6
             changed = [replace(inner, **{parameter: here + sign * step}) for sign in (1, -1)]
-            up, down = (replace(GLOSSY_PAINT, **{lobe: other}).value(*geometry) for other in changed)  # type: ignore[arg-type]
+            up, down = (
+                replace(GLOSSY_PAINT, **{lobe: other}).value(*geometry) for other in changed
+            )  # type: ignore[arg-type]
             expected, found = (up - down) / (2 * step), getattr(slopes, parameter)
             found = found if found.ndim == 2 else found[:, None]
-            assert np.abs(found - expected).max() <= 1e-5 * np.abs(expected).max(), (lobe, parameter)
+            assert np.abs(found - expected).max() <= 1e-5 * np.abs(expected).max(), (
+                lobe,
+                parameter,
+            )
     step = 1e-6
     for channel in range(3):
         shift = step * np.eye(3)[channel]
-        up, down = (replace(GLOSSY_PAINT, colour=GLOSSY_PAINT.colour + sign * shift).value(*geometry) for sign in (1, -1))
-        assert np.allclose((up - down)[:, channel] / (2 * step), gradient.colour, rtol=1e-5, atol=1e-7)
+        up, down = (
+            replace(GLOSSY_PAINT, colour=GLOSSY_PAINT.colour + sign * shift).value(*geometry)
+            for sign in (1, -1)
+        )
+        assert np.allclose(
+            (up - down)[:, channel] / (2 * step), gradient.colour, rtol=1e-5, atol=1e-7
+        )
         assert not np.delete(up - down, channel, axis=1).any()
 
 
@@ -99,7 +133,10 @@ def test_plain_lobes_are_not_reciprocal(model: Model) -> None:
 @pytest.mark.parametrize("model", [*LOBES, GLOSSY_PAINT], ids=name)
 def test_below_the_horizon_nothing_leaves(model: Lobe | Dichromatic) -> None:
     cosine = np.array([1, 0.5, 1e-3, 1e-7, 1e-12, 0, -1e-12, -1e-3, -1])
-    view, light = polar_units(cosine)[:, None, None], polar_units(cosine[:, None], np.array([0, 1.0, np.pi]))[None]
+    view, light = (
+        polar_units(cosine)[:, None, None],
+        polar_units(cosine[:, None], np.array([0, 1.0, np.pi]))[None],
+    )
     value = model.value(UP, view, light)
     above = (cosine > 1e-9)[:, None, None] & (cosine > 1e-9)[None, :, None] & np.ones(3, bool)
     assert np.isfinite(value).all() and (value >= 0).all() and not value[~above].any()
@@ -119,7 +156,9 @@ def test_opposite_directions_have_no_half_vector_and_give_zero(model: Model) -> 
 
 
 def test_directions_broadcast_and_parameters_with_them() -> None:
-    normal, view, light = (random_units(*shape, seed=seed) for seed, shape in enumerate([(5, 7), (7,), (4, 1, 1)]))
+    normal, view, light = (
+        random_units(*shape, seed=seed) for seed, shape in enumerate([(5, 7), (7,), (4, 1, 1)])
+    )
     alpha = np.linspace(0.1, 0.9, 7)
     whole = Ggx(alpha, 0.1).value(normal, view, light)
     assert whole.shape == (4, 5, 7)
@@ -130,10 +169,24 @@ def test_directions_broadcast_and_parameters_with_them() -> None:
 
 def test_oren_nayar_is_its_published_form() -> None:
     rng = np.random.default_rng(3)
-    a, b, azimuth = rng.uniform(0, 1.5, 200), rng.uniform(0, 1.5, 200), rng.uniform(0, 2 * np.pi, 200)
+    a, b, azimuth = (
+        rng.uniform(0, 1.5, 200),
+        rng.uniform(0, 1.5, 200),
+        rng.uniform(0, 2 * np.pi, 200),
+    )
     value = OrenNayar(0.6, 0.5).value(UP, polar_units(np.cos(a)), polar_units(np.cos(b), azimuth))
     first, second = 1 - 0.5 * 0.25 / 0.58, 0.45 * 0.25 / 0.34
-    published = 0.6 / np.pi * (first + second * np.maximum(0, np.cos(azimuth)) * np.sin(np.maximum(a, b)) * np.tan(np.minimum(a, b)))
+    published = (
+        0.6
+        / np.pi
+        * (
+            first
+            + second
+            * np.maximum(0, np.cos(azimuth))
+            * np.sin(np.maximum(a, b))
+            * np.tan(np.minimum(a, b))
+        )
+    )
     assert np.allclose(value, published, rtol=1e-9)
     assert np.allclose(OrenNayar(0.6, 0.0).value(UP, UP, polar_units(np.cos(b))), 0.6 / np.pi)
 
@@ -143,9 +196,13 @@ def test_plain_lobes_give_the_published_radiance() -> None:
     cos_light = (normal * light).sum(-1)
     mirrored = 2 * cos_light[:, None] * normal - light
     phong = Phong(0.5, 30.0, normalised=False).value(normal, view, light) * cos_light
-    assert np.allclose(phong, 0.5 * np.maximum((mirrored * view).sum(-1), 0) ** 30, rtol=1e-6, atol=1e-12)
+    assert np.allclose(
+        phong, 0.5 * np.maximum((mirrored * view).sum(-1), 0) ** 30, rtol=1e-6, atol=1e-12
+    )
     blinn = BlinnPhong(0.5, 30.0, "plain").value(normal, view, light) * cos_light
-    assert np.allclose(blinn, 0.5 * (normal * half_vector(view, light)).sum(-1) ** 30, rtol=1e-6, atol=1e-12)
+    assert np.allclose(
+        blinn, 0.5 * (normal * half_vector(view, light)).sum(-1) ** 30, rtol=1e-6, atol=1e-12
+    )
 
 
 def test_ggx_is_the_product_of_its_published_factors() -> None:
@@ -154,7 +211,13 @@ def test_ggx_is_the_product_of_its_published_factors() -> None:
     fresnel = 0.04 + 0.96 * (1 - angles.deviation) ** 5
     tangents = [np.sqrt(1 / cosine**2 - 1) for cosine in (angles.view, angles.light)]
     hidden = [2 / (1 + np.sqrt(1 + (0.3 * tangent) ** 2)) for tangent in tangents]
-    published = density(0.3, angles.half) * hidden[0] * hidden[1] * fresnel / (4 * angles.view * angles.light)
+    published = (
+        density(0.3, angles.half)
+        * hidden[0]
+        * hidden[1]
+        * fresnel
+        / (4 * angles.view * angles.light)
+    )
     assert np.allclose(Ggx(0.3, 0.04).value(normal, view, light), published, rtol=1e-9)
     assert np.allclose(visible(0.3, angles.view), hidden[0], rtol=1e-9)
 
@@ -184,13 +247,21 @@ def test_dichromatic_is_colour_times_body_plus_white() -> None:
         (Dichromatic, {"colour": np.array([0.5, 0.5, -0.1])}, "colour"),
     ],
 )
-def test_impossible_parameters_are_refused(model: type, changes: dict[str, object], words: str) -> None:
+def test_impossible_parameters_are_refused(
+    model: type, changes: dict[str, object], words: str
+) -> None:
     with pytest.raises(InputError, match=words):
         model(**changes)
 
 
 @pytest.mark.parametrize(
-    ("light", "words"), [(2 * UP, "length 1"), (np.zeros(3), "length 1"), (np.full(3, np.nan), "length 1"), (np.ones(2), "shape")]
+    ("light", "words"),
+    [
+        (2 * UP, "length 1"),
+        (np.zeros(3), "length 1"),
+        (np.full(3, np.nan), "length 1"),
+        (np.ones(2), "shape"),
+    ],
 )
 def test_unfit_directions_are_refused(light: np.ndarray, words: str) -> None:
     with pytest.raises(InputError, match=words):

@@ -29,9 +29,15 @@ def test_a_matt_sphere_under_one_light_is_the_clamped_cosine() -> None:
 
 
 def test_lights_add_up() -> None:
-    normal, lights = random_units(50), Lights(random_units(3, seed=7), np.random.default_rng(1).uniform(0, 2, (3, 3)))
+    normal, lights = (
+        random_units(50),
+        Lights(random_units(3, seed=7), np.random.default_rng(1).uniform(0, 2, (3, 3))),
+    )
     together = radiance(GLOSSY_PAINT, normal, UP, lights)
-    alone = [radiance(GLOSSY_PAINT, normal, UP, directional(*pair)) for pair in zip(lights.directions, lights.irradiance, strict=True)]
+    alone = [
+        radiance(GLOSSY_PAINT, normal, UP, directional(*pair))
+        for pair in zip(lights.directions, lights.irradiance, strict=True)
+    ]
     assert together.shape == (50, 3) and together.max() > 0
     assert np.allclose(together, sum(alone))
 
@@ -46,7 +52,9 @@ def test_a_white_sky_shows_what_a_surface_keeps() -> None:
 
 
 def test_a_cosine_sky_on_a_matt_surface_has_a_closed_form() -> None:
-    """Radiance 1 + cos of the angle from the top: the irradiance is pi (1 + 2/3 n_z), as order 1 harmonics say."""
+    """Radiance 1 + cos of the angle from the top: the irradiance is pi (1 + 2/3 n_z), as order 1
+    harmonics say.
+    """
     directions, weights = sky(60)
     light = environment(directions, weights, np.repeat(1 + directions[:, 2:], 3, axis=1))
     normal = polar_units(np.array([1.0, 0.8, 0.3]))

@@ -1,4 +1,6 @@
-"""Small made scenes with everything known, and priors made from formulas, for tests of the SIRFS objective and its solver."""
+"""Small made scenes with everything known, and priors made from formulas, for tests of the SIRFS
+objective and its solver.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -19,7 +21,8 @@ BRIGHTNESS = (-0.8, -0.9, -1.1)
 PALETTE = np.array([[0.55, 0.2, 0.12], [0.15, 0.35, 0.5], [0.6, 0.55, 0.4]])
 # As on a half ball: at relative depth u the normal leans outward by 1 - u.
 PROFILE = SilhouetteProfile(np.linspace(0.95, 0.05, 10), np.linspace(0.1, 0.4, 10))
-# A light from the upper left: constants of the reference's basis (down, right, toward the viewer), one column a channel.
+# A light from the upper left: constants of the reference's basis (down, right, toward the viewer),
+# one column a channel.
 LIGHT = np.array(
     [
         [-1.0, -1.1, -1.3],
@@ -44,7 +47,11 @@ def mixture_cost(x: np.ndarray, shares: np.ndarray, scales: np.ndarray) -> np.nd
 
 def symmetric_table(widest: float, scales: tuple[float, ...]) -> CostTable:
     x = np.linspace(-widest, widest, 20001)
-    return CostTable(-widest, float(x[1] - x[0]), mixture_cost(x, np.full(len(scales), 1 / len(scales)), np.array(scales)))
+    return CostTable(
+        -widest,
+        float(x[1] - x[0]),
+        mixture_cost(x, np.full(len(scales), 1 / len(scales)), np.array(scales)),
+    )
 
 
 def square_table(widest: float, scales: tuple[float, ...]) -> CostTable:
@@ -72,13 +79,22 @@ def made_priors(channels: int = 3, seed: int = 0) -> Priors:
     table = 8 * (table - table.min()) / np.ptp(table)
     smooth = square_table(6.0, (0.03, 0.3)) if channels == 3 else symmetric_table(4.0, (0.03, 0.3))
     return Priors(
-        channels, symmetric_table(2.0, (0.01, 0.1)), smooth, near_identity(1.0), near_identity(0.8), AbsoluteTable(-7.0, 4.0, table), light
+        channels,
+        symmetric_table(2.0, (0.01, 0.1)),
+        smooth,
+        near_identity(1.0),
+        near_identity(0.8),
+        AbsoluteTable(-7.0, 4.0, table),
+        light,
     )
 
 
 @dataclass(frozen=True)
 class Scene:
-    """A rendered bumpy blob: `image` (H, W, C) linear, `mask` (H, W), the true `height` (H, W) and `light` (9, C)."""
+    """A rendered bumpy blob:
+
+    `image` (H, W, C) linear, `mask` (H, W), the true `height` (H, W) and `light` (9, C).
+    """
 
     image: np.ndarray
     mask: np.ndarray
@@ -86,17 +102,30 @@ class Scene:
     light: np.ndarray
 
 
-def blob(shape: tuple[int, int] = (64, 72), channels: int = 3, *, bumps: float = 1.0, one_color: bool = False) -> Scene:
+def blob(
+    shape: tuple[int, int] = (64, 72),
+    channels: int = 3,
+    *,
+    bumps: float = 1.0,
+    one_color: bool = False,
+) -> Scene:
     """A blob that fills most of the frame, under `LIGHT`, painted in three colours."""
     rows, columns = np.mgrid[: shape[0], : shape[1]].astype(float)
     size = min(shape)
-    y, x = (rows - shape[0] / 2 + 0.3) / (0.4 * size), (columns - shape[1] / 2 - 0.4) / (0.42 * size)
+    y, x = (
+        (rows - shape[0] / 2 + 0.3) / (0.4 * size),
+        (columns - shape[1] / 2 - 0.4) / (0.42 * size),
+    )
     radius = np.hypot(x, y) / (1 + 0.06 * np.cos(3 * np.arctan2(y, x)))
     mask = radius < 1
-    height = 0.35 * size * np.sqrt(np.maximum(1.001 - np.minimum(radius, 1) ** 2, 0)) + bumps * np.sin(rows / 5) * np.cos(columns / 6)
+    height = 0.35 * size * np.sqrt(
+        np.maximum(1.001 - np.minimum(radius, 1) ** 2, 0)
+    ) + bumps * np.sin(rows / 5) * np.cos(columns / 6)
     n1, n2, n3 = np.moveaxis(normals(height), -1, 0)
     light = LIGHT[:, :channels]
-    color = PALETTE[np.where(x + 0.3 * y > 0.25, 0, np.where(y > 0.1, 1, 2)) * (not one_color), :channels]
+    color = PALETTE[
+        np.where(x + 0.3 * y > 0.25, 0, np.where(y > 0.1, 1, 2)) * (not one_color), :channels
+    ]
     image = color * np.exp(np.einsum("khw,kc->hwc", basis(n1, n2, n3), light))
     return Scene(np.where(mask[..., None], image, 0), mask, np.where(mask, height, 0), light)
 
@@ -108,7 +137,17 @@ def weights(**changes: float) -> Weights:
 
 def only(term: str) -> Weights:
     """A set in which only `term` counts."""
-    names = ("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "silhouette", "shading_only")
+    names = (
+        "smoothness",
+        "parsimony",
+        "absolute",
+        "curvature",
+        "slant",
+        "contour",
+        "light",
+        "silhouette",
+        "shading_only",
+    )
     none = dict.fromkeys(names, 0.0)
     return weights(**(none | {term: 3.0} if term in none else none))
 
@@ -123,7 +162,10 @@ def make_problem(
     holes: bool = False,
     outline: bool = False,
 ) -> Problem:
-    """The SIRFS problem of `scene`; `holes` makes some pixels of the mask invalid, `outline` adds what the silhouette says."""
+    """The SIRFS problem of `scene`;
+
+    `holes` makes some pixels of the mask invalid, `outline` adds what the silhouette says.
+    """
     valid = scene.mask.copy()
     if holes:
         valid &= np.random.default_rng(3).random(valid.shape) > 0.05
@@ -131,7 +173,17 @@ def make_problem(
     priors = priors or made_priors(scene.image.shape[2])
     field = silhouette_field(scene.mask, PROFILE) if outline else None
     contour = occluding_contour(scene.mask)
-    return Problem(log_image, valid, scene.mask, contour, priors, chosen or weights(), observation, shading_only, silhouette=field)
+    return Problem(
+        log_image,
+        valid,
+        scene.mask,
+        contour,
+        priors,
+        chosen or weights(),
+        observation,
+        shading_only,
+        silhouette=field,
+    )
 
 
 def some_trust(shape: tuple[int, ...]) -> np.ndarray:
@@ -140,7 +192,9 @@ def some_trust(shape: tuple[int, ...]) -> np.ndarray:
     return np.maximum(trust, 0)
 
 
-def random_state(shape: tuple[int, int], channels: int, seed: int, size: float = 3.0) -> tuple[np.ndarray, np.ndarray]:
+def random_state(
+    shape: tuple[int, int], channels: int, seed: int, size: float = 3.0
+) -> tuple[np.ndarray, np.ndarray]:
     """A smooth random height with slopes of up to about 1, and a light near the prior's mean."""
     rng = np.random.default_rng(seed)
     height = ndimage.gaussian_filter(rng.normal(size=shape), 3.0, mode="nearest")

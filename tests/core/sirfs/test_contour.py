@@ -1,4 +1,6 @@
-"""The occluding contour: on the rim, pointing outward, blind to padding, absent where the frame cuts the object."""
+"""The occluding contour: on the rim, pointing outward, blind to padding, absent where the frame
+cuts the object.
+"""
 
 import numpy as np
 import pytest
@@ -21,7 +23,9 @@ def test_a_disc_points_outward() -> None:
     sine = (contour.down * away[1] - contour.right * away[0]) / radius
     error = np.degrees(np.arctan2(sine, cosine))
     assert np.abs(error).mean() < 4 and abs(error.mean()) < 0.5
-    assert np.abs(error).max() < 9  # the window sees the pixels' stairs: where they turn it is off by so much
+    assert (
+        np.abs(error).max() < 9
+    )  # the window sees the pixels' stairs: where they turn it is off by so much
     np.testing.assert_allclose(np.hypot(contour.down, contour.right), 1, atol=1e-12)
 
 

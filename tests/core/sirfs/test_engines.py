@@ -13,7 +13,9 @@ from isc_core.workers import Workers
 
 from .small_problems import blob, make_problem, random_state, some_trust, weights
 
-numba_engine = pytest.importorskip("isc_core.sirfs.numba_engine", reason="needs numba", exc_type=ImportError)
+numba_engine = pytest.importorskip(
+    "isc_core.sirfs.numba_engine", reason="needs numba", exc_type=ImportError
+)
 
 KINDS = {
     "colour": (3, False),
@@ -28,15 +30,27 @@ KINDS = {
 def problem_of(kind: str) -> Problem:
     channels, shading_only = KINDS[kind]
     scene = blob((70, 62), channels)
-    seen = DepthObservation(np.where(np.random.default_rng(1).random(scene.mask.shape) < 0.3, np.nan, scene.height))
-    problem = make_problem(scene, weights(silhouette=2.0), shading_only=shading_only, observation=seen, holes=True, outline=True)
+    seen = DepthObservation(
+        np.where(np.random.default_rng(1).random(scene.mask.shape) < 0.3, np.nan, scene.height)
+    )
+    problem = make_problem(
+        scene,
+        weights(silhouette=2.0),
+        shading_only=shading_only,
+        observation=seen,
+        holes=True,
+        outline=True,
+    )
     return replace(problem, trust=some_trust(scene.mask.shape) if "trusted" in kind else None)
 
 
 def states(problem: Problem, dtype: type[np.floating]) -> list[tuple[np.ndarray, np.ndarray]]:
     shape, channels = problem.valid.shape, problem.priors.channels
     flat = (np.zeros(shape, dtype), np.zeros((9, channels), dtype))
-    made = [random_state(shape, channels, seed, size) for seed, size in enumerate((0.3, 1, 1, 2, 3, 3, 4, 5, 8))]  # type: ignore[arg-type]
+    made = [
+        random_state(shape, channels, seed, size)
+        for seed, size in enumerate((0.3, 1, 1, 2, 3, 3, 4, 5, 8))
+    ]  # type: ignore[arg-type]
     return [flat, *((z.astype(dtype), light.astype(dtype)) for z, light in made)]
 
 
@@ -58,9 +72,14 @@ def test_same_numbers_in_float64(kind: str) -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_same_numbers_in_float32_but_for_jumps_between_table_cells(kind: str) -> None:
-    """Slopes of tabulated costs jump from cell to cell: a pair whose last bit puts it in the next cell moves its few pixels alone."""
+    """Slopes of tabulated costs jump from cell to cell: a pair whose last bit puts it in the next
+    cell moves its few pixels alone.
+    """
     problem = problem_of(kind)
-    plain, compiled = NumpyEngine(problem, np.float32), numba_engine.NumbaEngine(problem, np.float32)
+    plain, compiled = (
+        NumpyEngine(problem, np.float32),
+        numba_engine.NumbaEngine(problem, np.float32),
+    )
     for height, light in states(problem, np.float32):
         want, have = plain.evaluate(height, light), compiled.evaluate(height, light)
         assert have.height_gradient.dtype == np.float32
@@ -79,7 +98,13 @@ def test_result_of_an_evaluation_is_the_same_bytes_on_any_threads() -> None:
     for threads in (1, 2, 3, 5):
         with Workers(threads) as workers:
             result = numba_engine.NumbaEngine(problem, np.float32, workers).evaluate(height, light)
-            results.append((repr(result.terms), result.height_gradient.tobytes(), result.light_gradient.tobytes()))
+            results.append(
+                (
+                    repr(result.terms),
+                    result.height_gradient.tobytes(),
+                    result.light_gradient.tobytes(),
+                )
+            )
     assert len(set(results)) == 1
 
 
@@ -89,7 +114,14 @@ def test_a_whole_solve_is_the_same_bytes_on_any_threads() -> None:
     results = []
     for threads in (1, 2):
         result = solve(problem, SolverOptions(threads=threads, lbfgs=short, engine="numba"))
-        results.append((result.height.tobytes(), result.light.tobytes(), repr(result.terms), result.evaluations))
+        results.append(
+            (
+                result.height.tobytes(),
+                result.light.tobytes(),
+                repr(result.terms),
+                result.evaluations,
+            )
+        )
     assert results[0] == results[1]
 
 
@@ -108,12 +140,21 @@ def test_a_step_too_far_costs_infinitely_much(of: str, bad: float) -> None:
 def test_tiny_problems(shape: tuple[int, int]) -> None:
     """Every pixel valid, no contour, fewer rows than threads."""
     scene = blob(shape)
-    scene = replace(scene, image=np.full((*shape, 3), 0.3) + np.arange(shape[0])[:, None, None] * 0.01, mask=np.ones(shape, bool))
+    scene = replace(
+        scene,
+        image=np.full((*shape, 3), 0.3) + np.arange(shape[0])[:, None, None] * 0.01,
+        mask=np.ones(shape, bool),
+    )
     problem = make_problem(scene)
     height, light = random_state(shape, 3, 4, 0.5)
     with Workers(4) as workers:
         have = numba_engine.NumbaEngine(problem, np.float64, workers).evaluate(height, light)
     want = NumpyEngine(problem).evaluate(height, light)
     assert have.terms.total == pytest.approx(want.terms.total, rel=1e-10)
-    np.testing.assert_allclose(have.height_gradient, want.height_gradient, rtol=0, atol=1e-9 * np.abs(want.height_gradient).max() + 1e-14)
+    np.testing.assert_allclose(
+        have.height_gradient,
+        want.height_gradient,
+        rtol=0,
+        atol=1e-9 * np.abs(want.height_gradient).max() + 1e-14,
+    )
     assert apart(have.light_gradient, want.light_gradient) < 1e-10

@@ -14,7 +14,18 @@ from isc_core.sirfs.tables import CostTable
 
 from .small_problems import blob, make_problem, only, random_state, some_trust, weights
 
-TERMS = ("smoothness", "parsimony", "absolute", "curvature", "slant", "contour", "light", "silhouette", "observation", "shading_only")
+TERMS = (
+    "smoothness",
+    "parsimony",
+    "absolute",
+    "curvature",
+    "slant",
+    "contour",
+    "light",
+    "silhouette",
+    "observation",
+    "shading_only",
+)
 OF_HEIGHT = set(TERMS) - {"light"}
 OF_LIGHT = {"smoothness", "parsimony", "absolute", "light", "shading_only"}
 STEP = 1e-7
@@ -31,7 +42,9 @@ def make_engine(name: str, problem: Problem) -> Engine:
 
 
 def coarser(table: CostTable) -> CostTable:
-    """Every hundredth node: cells so wide that a difference's two ends hardly ever lie in two of them."""
+    """Every hundredth node: cells so wide that a difference's two ends hardly ever lie in two of
+    them.
+    """
     return CostTable(table.low, 100 * table.step, table.values[::100])
 
 
@@ -41,7 +54,11 @@ def problem_of(term: str, channels: int) -> Problem:
     everything = term in ("all", "all, some trusted less")
     if term == "observation" or everything:
         rng = np.random.default_rng(8)
-        heights = np.where(rng.random(scene.mask.shape) < 0.4, np.nan, scene.height + rng.normal(size=scene.mask.shape))
+        heights = np.where(
+            rng.random(scene.mask.shape) < 0.4,
+            np.nan,
+            scene.height + rng.normal(size=scene.mask.shape),
+        )
         seen = DepthObservation(heights, sigma=1.5, weight=4.0)
     problem = make_problem(
         scene,
@@ -52,8 +69,12 @@ def problem_of(term: str, channels: int) -> Problem:
         outline=term == "silhouette" or everything,
     )
     priors = problem.priors
-    priors = replace(priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness))
-    return replace(problem, priors=priors, trust=some_trust(scene.mask.shape) if "trusted" in term else None)
+    priors = replace(
+        priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness)
+    )
+    return replace(
+        problem, priors=priors, trust=some_trust(scene.mask.shape) if "trusted" in term else None
+    )
 
 
 def directions(shape: tuple[int, int]) -> list[np.ndarray]:
@@ -65,8 +86,13 @@ def directions(shape: tuple[int, int]) -> list[np.ndarray]:
     return [white, 5 * ndimage.gaussian_filter(smooth, 2.0), frame]
 
 
-def difference(engine: Engine, height: np.ndarray, light: np.ndarray, dz: np.ndarray, dl: np.ndarray) -> float:
-    ends = [engine.evaluate(height + sign * STEP * dz, light + sign * STEP * dl).terms.total for sign in (1, -1)]
+def difference(
+    engine: Engine, height: np.ndarray, light: np.ndarray, dz: np.ndarray, dl: np.ndarray
+) -> float:
+    ends = [
+        engine.evaluate(height + sign * STEP * dz, light + sign * STEP * dl).terms.total
+        for sign in (1, -1)
+    ]
     return (ends[0] - ends[1]) / (2 * STEP)
 
 
@@ -88,7 +114,9 @@ def test_gradient_is_the_slope(term: str, engine: str, channels: int) -> None:
     for dz in directions(shape):
         slope = float((d_height * dz).sum())
         size = float(np.linalg.norm(d_height * dz))
-        assert difference(of_term, height, light, dz, flat_light) == pytest.approx(slope, rel=1e-5, abs=1e-5 * size + 1e-12)
+        assert difference(of_term, height, light, dz, flat_light) == pytest.approx(
+            slope, rel=1e-5, abs=1e-5 * size + 1e-12
+        )
     if term in OF_HEIGHT:
         assert np.abs(d_height).max() > 1e-7
     rng = np.random.default_rng(6)
@@ -96,20 +124,28 @@ def test_gradient_is_the_slope(term: str, engine: str, channels: int) -> None:
         dl = rng.normal(size=light.shape)
         slope = float((d_light * dl).sum())
         size = float(np.linalg.norm(d_light * dl))
-        assert difference(of_term, height, light, flat_height, dl) == pytest.approx(slope, rel=1e-5, abs=1e-5 * size + 1e-9)
+        assert difference(of_term, height, light, flat_height, dl) == pytest.approx(
+            slope, rel=1e-5, abs=1e-5 * size + 1e-9
+        )
     assert (np.abs(d_light).max() > 1e-5) == (term in OF_LIGHT or term not in TERMS)
 
 
 @pytest.mark.parametrize("shading_only", [False, True])
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
 def test_what_trust_means(engine: str, shading_only: bool) -> None:
-    """None is 1; half of it everywhere asks half as much of pairs and nothing else; 0 leaves a pixel's reflectance out."""
+    """None is 1; half of it everywhere asks half as much of pairs and nothing else; 0 leaves a
+    pixel's reflectance out.
+    """
     problem = make_problem(blob((30, 34)), shading_only=shading_only)
     height, light = random_state((30, 34), 3, 4)
     doubtful = some_trust((30, 34)) == 0
 
     def terms(trust: np.ndarray | None, valid: np.ndarray = problem.valid) -> Terms:
-        return make_engine(engine, replace(problem, trust=trust, valid=valid)).evaluate(height, light).terms
+        return (
+            make_engine(engine, replace(problem, trust=trust, valid=valid))
+            .evaluate(height, light)
+            .terms
+        )
 
     whole, half = terms(None), terms(np.full((30, 34), 0.5))
     assert terms(np.ones((30, 34))) == whole

@@ -6,13 +6,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.sirfs.lbfgs import Algebra, LbfgsOptions, Minimisation, NumpyAlgebra, _Memory, minimise
+from isc_core.sirfs.lbfgs import (
+    Algebra,
+    LbfgsOptions,
+    Minimisation,
+    NumpyAlgebra,
+    _Memory,
+    minimise,
+)
 from isc_core.workers import Workers
 
-EXACT = LbfgsOptions(loss_tolerance=0.0, gradient_tolerance=1e-9, step_tolerance=0.0, evaluations=5000)
+EXACT = LbfgsOptions(
+    loss_tolerance=0.0, gradient_tolerance=1e-9, step_tolerance=0.0, evaluations=5000
+)
 
 
-def quadratic(condition: float, size: int = 30) -> tuple[Callable[[np.ndarray, np.ndarray], float], np.ndarray]:
+def quadratic(
+    condition: float, size: int = 30
+) -> tuple[Callable[[np.ndarray, np.ndarray], float], np.ndarray]:
     rng = np.random.default_rng(1)
     basis = np.linalg.qr(rng.normal(size=(size, size)))[0]
     matrix = (basis * np.geomspace(1, condition, size)) @ basis.T
@@ -58,7 +69,13 @@ def test_put_down_and_taken_up_it_goes_on_as_if_it_had_never_stopped() -> None:
     minimisation = Minimisation(rosenbrock, parts, EXACT, NumpyAlgebra())
     stops = [minimisation.run(evaluations=most) for most in (20, 20, 50)]
     assert [stop.reason for stop in stops] == ["evaluations"] * 3
-    assert 20 <= stops[0].evaluations == stops[1].evaluations < stops[2].evaluations < 50 + EXACT.trials
+    assert (
+        20
+        <= stops[0].evaluations
+        == stops[1].evaluations
+        < stops[2].evaluations
+        < 50 + EXACT.trials
+    )
     assert minimisation.run() == expected
     assert minimisation.run() == expected, "at its end it stays there"
     np.testing.assert_array_equal(parts, whole)
@@ -67,7 +84,13 @@ def test_put_down_and_taken_up_it_goes_on_as_if_it_had_never_stopped() -> None:
 def test_losses_fall_and_the_result_is_what_the_last_point_gives() -> None:
     losses: list[float] = []
     x = np.tile([-1.2, 1.0], 10)
-    result = minimise(rosenbrock, x, replace(EXACT, evaluations=60), NumpyAlgebra(), lambda _, loss: losses.append(loss))
+    result = minimise(
+        rosenbrock,
+        x,
+        replace(EXACT, evaluations=60),
+        NumpyAlgebra(),
+        lambda _, loss: losses.append(loss),
+    )
     assert all(later < earlier for earlier, later in zip(losses[:-1], losses[1:], strict=True))
     assert len(losses) == result.iterations
     assert result.loss == losses[-1] == rosenbrock(x, np.empty_like(x))
@@ -83,8 +106,12 @@ def test_losses_fall_and_the_result_is_what_the_last_point_gives() -> None:
         ({"evaluations": 7}, "evaluations", False),
     ],
 )
-def test_every_stopping_rule_is_reached(changes: dict[str, float], reason: str, converged: bool) -> None:
-    result = minimise(rosenbrock, np.tile([-1.2, 1.0], 10), replace(EXACT, **changes), NumpyAlgebra())
+def test_every_stopping_rule_is_reached(
+    changes: dict[str, float], reason: str, converged: bool
+) -> None:
+    result = minimise(
+        rosenbrock, np.tile([-1.2, 1.0], 10), replace(EXACT, **changes), NumpyAlgebra()
+    )
     assert (result.reason, result.converged) == (reason, converged)
     if reason == "iterations":
         assert result.iterations == 7
@@ -169,5 +196,11 @@ def test_compiled_algebra_follows_the_same_path() -> None:
     algebras: list[Algebra] = [NumpyAlgebra(), CompiledAlgebra(Workers(2))]
     paths: list[list[float]] = [[], []]
     for algebra, path in zip(algebras, paths, strict=True):
-        minimise(rosenbrock, np.tile([-1.2, 1.0], 10), replace(EXACT, iterations=20), algebra, lambda _, loss, path=path: path.append(loss))
+        minimise(
+            rosenbrock,
+            np.tile([-1.2, 1.0], 10),
+            replace(EXACT, iterations=20),
+            algebra,
+            lambda _, loss, path=path: path.append(loss),
+        )
     np.testing.assert_allclose(paths[0], paths[1], rtol=1e-8)

@@ -1,4 +1,6 @@
-"""The pyramid is what its definition says, its adjoints are adjoint, and the compiled steps are the same."""
+"""The pyramid is what its definition says, its adjoints are adjoint, and the compiled steps are the
+same.
+"""
 
 import numpy as np
 import pytest
@@ -16,7 +18,10 @@ def down_as_written(fine: np.ndarray) -> np.ndarray:
         for j in range(columns):
             for di in range(-1, 3):
                 for dj in range(-1, 3):
-                    r, c = np.clip(2 * i + di, 0, fine.shape[0] - 1), np.clip(2 * j + dj, 0, fine.shape[1] - 1)
+                    r, c = (
+                        np.clip(2 * i + di, 0, fine.shape[0] - 1),
+                        np.clip(2 * j + dj, 0, fine.shape[1] - 1),
+                    )
                     out[i, j] += TAPS[di + 1] * TAPS[dj + 1] * fine[r, c]
     return out
 
@@ -32,7 +37,9 @@ def test_up_is_the_adjoint_of_down(shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(1)
     fine = rng.normal(size=shape)
     coarse = rng.normal(size=down(fine).shape)
-    assert float((down(fine) * coarse).sum()) == pytest.approx(float((fine * up(coarse, shape)).sum()), rel=1e-12, abs=1e-12)
+    assert float((down(fine) * coarse).sum()) == pytest.approx(
+        float((fine * up(coarse, shape)).sum()), rel=1e-12, abs=1e-12
+    )
 
 
 def test_a_step_up_doubles_heights() -> None:
@@ -59,8 +66,12 @@ def test_levels_halve_and_stop_at_the_smallest() -> None:
 
 @pytest.mark.parametrize("shape", SHAPES)
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-13), (np.float32, 1e-5)])
-def test_compiled_steps_equal_numpy(shape: tuple[int, int], dtype: type[np.floating], tolerance: float) -> None:
-    kernels = pytest.importorskip("isc_core.sirfs.vector_kernels", reason="needs numba", exc_type=ImportError)
+def test_compiled_steps_equal_numpy(
+    shape: tuple[int, int], dtype: type[np.floating], tolerance: float
+) -> None:
+    kernels = pytest.importorskip(
+        "isc_core.sirfs.vector_kernels", reason="needs numba", exc_type=ImportError
+    )
     rng = np.random.default_rng(3)
     fine = rng.normal(size=shape).astype(dtype)
     want = down(fine)

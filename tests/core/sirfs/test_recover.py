@@ -1,4 +1,6 @@
-"""Recovery from a photo: blind to the photo's frame and scale, at home with cut objects, grey photos and what is known beforehand."""
+"""Recovery from a photo: blind to the photo's frame and scale, at home with cut objects, grey
+photos and what is known beforehand.
+"""
 
 from dataclasses import replace
 
@@ -22,7 +24,15 @@ OPTIONS = RecoverOptions(solve_size=0, solver=SOLVER)
 
 
 def run(scene: Scene, options: RecoverOptions = OPTIONS, known: Known | None = None) -> Recovered:
-    return recover(scene.image, scene.mask, FLOOR, made_priors(scene.image.shape[2]), weights(), options, known=known)
+    return recover(
+        scene.image,
+        scene.mask,
+        FLOOR,
+        made_priors(scene.image.shape[2]),
+        weights(),
+        options,
+        known=known,
+    )
 
 
 def cropped(scene: Scene, part: tuple[slice, slice]) -> Scene:
@@ -31,12 +41,19 @@ def cropped(scene: Scene, part: tuple[slice, slice]) -> Scene:
 
 def padded(scene: Scene, rows: tuple[int, int], columns: tuple[int, int]) -> Scene:
     image = np.pad(scene.image, (rows, columns, (0, 0)))
-    return Scene(image, np.pad(scene.mask, (rows, columns)), np.pad(scene.height, (rows, columns)), scene.light)
+    return Scene(
+        image,
+        np.pad(scene.mask, (rows, columns)),
+        np.pad(scene.height, (rows, columns)),
+        scene.light,
+    )
 
 
 def box(mask: np.ndarray, margin: int) -> tuple[slice, slice]:
     rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
-    return slice(rows[0] - margin, rows[-1] + 1 + margin), slice(columns[0] - margin, columns[-1] + 1 + margin)
+    return slice(rows[0] - margin, rows[-1] + 1 + margin), slice(
+        columns[0] - margin, columns[-1] + 1 + margin
+    )
 
 
 def angles(a: np.ndarray, b: np.ndarray, where: np.ndarray) -> np.ndarray:
@@ -58,7 +75,10 @@ def test_recovers_shape_and_light(channels: int) -> None:
     assert np.isfinite(result.height).all() and np.isfinite(result.light).all()
     assert abs(result.height[scene.mask].mean()) < 1e-9
     where = inner(scene.mask)
-    assert angles(result.height, scene.height, where).mean() < 0.7 * angles(0 * scene.height, scene.height, where).mean()
+    assert (
+        angles(result.height, scene.height, where).mean()
+        < 0.7 * angles(0 * scene.height, scene.height, where).mean()
+    )
 
 
 @pytest.mark.parametrize("solve_size", [0, 40])
@@ -108,7 +128,8 @@ def test_a_cut_object_works_and_bends_over_nowhere_along_the_cut() -> None:
 def test_a_larger_photo_gives_the_same_shape_larger(factor: int) -> None:
     scene = blob()
     image, mask, height = (
-        np.kron(a, np.ones((factor, factor, 1)[: a.ndim])).astype(a.dtype) for a in (scene.image, scene.mask, scene.height)
+        np.kron(a, np.ones((factor, factor, 1)[: a.ndim])).astype(a.dtype)
+        for a in (scene.image, scene.mask, scene.height)
     )
     large = Scene(image, mask, height, scene.light)
     side = max(part.stop - part.start for part in box(scene.mask, 0))
@@ -127,7 +148,9 @@ def test_solving_at_another_size_keeps_the_shape() -> None:
     plain, small = run(scene), run(scene, replace(OPTIONS, solve_size=50))
     assert max(small.solved_shape) < max(plain.solved_shape)
     where = inner(scene.mask, 3)
-    assert np.ptp(small.height[scene.mask]) == pytest.approx(np.ptp(plain.height[scene.mask]), rel=0.25)
+    assert np.ptp(small.height[scene.mask]) == pytest.approx(
+        np.ptp(plain.height[scene.mask]), rel=0.25
+    )
     assert np.median(angles(small.height, plain.height, where)) < 12
 
 
@@ -148,9 +171,13 @@ def test_what_is_known_comes_back_as_it_was_given(solve_size: int) -> None:
 def test_depth_with_holes_pulls_the_height(solve_size: int, offset: float) -> None:
     scene = blob()
     target = scene.height + 5 * np.sin(np.arange(72) / 12)
-    seen = np.where(np.random.default_rng(0).random(scene.mask.shape) < 0.3, np.nan, target + offset)
+    seen = np.where(
+        np.random.default_rng(0).random(scene.mask.shape) < 0.3, np.nan, target + offset
+    )
     seen[:, 36:][~scene.mask[:, 36:]] = -300.0  # what a sensor sees behind the object
-    options = replace(OPTIONS, solve_size=solve_size, solver=replace(SOLVER, lbfgs=LbfgsOptions(iterations=200)))
+    options = replace(
+        OPTIONS, solve_size=solve_size, solver=replace(SOLVER, lbfgs=LbfgsOptions(iterations=200))
+    )
     plain = run(scene, options)
     pulled = run(scene, options, Known(depth=DepthObservation(seen, sigma=1.0, weight=300.0)))
     assert np.isfinite(pulled.height).all()
@@ -173,7 +200,9 @@ def test_a_line_one_pixel_wide(solve_size: int) -> None:
     mask = np.zeros((120, 9), bool)
     mask[5:115, 4] = True
     image = np.where(mask[..., None], np.linspace(0.2, 0.6, 120)[:, None, None], 0) * np.ones(3)
-    result = run(Scene(image, mask, 0.0 * mask, blob().light), replace(OPTIONS, solve_size=solve_size))
+    result = run(
+        Scene(image, mask, 0.0 * mask, blob().light), replace(OPTIONS, solve_size=solve_size)
+    )
     assert np.isfinite(result.height).all() and np.isfinite(result.terms.total)
 
 
@@ -182,10 +211,21 @@ def test_shape_from_shading_mode() -> None:
     result = run(scene, replace(OPTIONS, shading_only=True), Known(light=scene.light))
     assert result.terms.shading_only > 0 and result.terms.smoothness == 0
     where = inner(scene.mask)
-    assert angles(result.height, scene.height, where).mean() < 0.6 * angles(0 * scene.height, scene.height, where).mean()
+    assert (
+        angles(result.height, scene.height, where).mean()
+        < 0.6 * angles(0 * scene.height, scene.height, where).mean()
+    )
 
 
 def test_cancel() -> None:
     scene = blob()
     with pytest.raises(Cancelled):
-        recover(scene.image, scene.mask, FLOOR, made_priors(), weights(), OPTIONS, monitor=Monitor(cancelled=lambda: True))
+        recover(
+            scene.image,
+            scene.mask,
+            FLOOR,
+            made_priors(),
+            weights(),
+            OPTIONS,
+            monitor=Monitor(cancelled=lambda: True),
+        )

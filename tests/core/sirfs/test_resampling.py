@@ -3,7 +3,12 @@
 import numpy as np
 import pytest
 
-from isc_core.sirfs.resampling import nearest_samples, resample_height, resample_inside, resampled_shape
+from isc_core.sirfs.resampling import (
+    nearest_samples,
+    resample_height,
+    resample_inside,
+    resampled_shape,
+)
 
 FACTORS = [0.2, 0.37, 0.5, 0.99, 1.0, 1.4, 2.0, 3.3]
 
@@ -39,9 +44,13 @@ def test_a_constant_stays_and_no_background_bleeds_in(factor: float) -> None:
 
 @pytest.mark.parametrize("factor", FACTORS)
 def test_ramps_are_exact(factor: float) -> None:
-    """But where new pixels end within old ones: half an old pixel then stands for its middle, and a few hundredths are lost."""
+    """But where new pixels end within old ones: half an old pixel then stands for its middle, and a
+    few hundredths are lost.
+    """
     i, j = np.mgrid[:40, :46].astype(float)
-    out, share = resample_inside(np.stack([i, 2 * j - 3 * i], axis=-1), np.ones((40, 46), bool), factor)
+    out, share = resample_inside(
+        np.stack([i, 2 * j - 3 * i], axis=-1), np.ones((40, 46), bool), factor
+    )
     rows, columns = np.meshgrid(places(out.shape[0], 40), places(out.shape[1], 46), indexing="ij")
     inner = (rows >= 0) & (rows <= 39) & (columns >= 0) & (columns <= 45)
     np.testing.assert_allclose(share, 1, rtol=1e-12)
@@ -68,7 +77,9 @@ def test_heights_scale_with_the_size(factor: float) -> None:
     true_factor = np.sqrt(shape[0] * shape[1] / i.size)
     inner = (rows > 10) & (rows < 69) & (columns > 10) & (columns < 79)
     plane = resample_height(0.5 * i - 0.2 * j, shape)
-    np.testing.assert_allclose(plane[inner], true_factor * (0.5 * rows - 0.2 * columns)[inner], atol=1e-4)
+    np.testing.assert_allclose(
+        plane[inner], true_factor * (0.5 * rows - 0.2 * columns)[inner], atol=1e-4
+    )
     ball = resample_height(np.sqrt(120.0**2 - (i - 40) ** 2 - (j - 45) ** 2), shape)
     true = np.sqrt(120.0**2 - (rows - 40) ** 2 - (columns - 45) ** 2) * true_factor
     np.testing.assert_allclose(ball[inner], true[inner], atol=1e-4 * factor)
@@ -76,14 +87,18 @@ def test_heights_scale_with_the_size(factor: float) -> None:
 
 @pytest.mark.parametrize("factor", [1 / 0.2137, 1 / 0.61])
 def test_a_grid_whose_last_pixels_reach_beyond_the_photo_does_not_drift(factor: float) -> None:
-    """At scale 0.61, 237 rows make 145, the last of them not full: the two shapes alone do not tell the scale."""
+    """At scale 0.61, 237 rows make 145, the last of them not full: the two shapes alone do not tell
+    the scale.
+    """
     shape = (237, 301)
     small = tuple(int(np.ceil(n / factor)) for n in shape)
     i, j = np.mgrid[: small[0], : small[1]].astype(float)
     rows, columns = np.mgrid[: shape[0], : shape[1]].astype(float)
     inner = (slice(20, -20), slice(20, -20))
     wanted = 0.5 * rows - 0.2 * columns + (0.5 - 0.2) * (0.5 - 0.5 * factor)
-    np.testing.assert_allclose(resample_height(0.5 * i - 0.2 * j, shape, factor)[inner], wanted[inner], atol=2e-3)
+    np.testing.assert_allclose(
+        resample_height(0.5 * i - 0.2 * j, shape, factor)[inner], wanted[inner], atol=2e-3
+    )
     back = nearest_samples(nearest_samples(i, shape, factor), small, 1 / factor)
     np.testing.assert_array_equal(back[:-1], i[:-1])
 

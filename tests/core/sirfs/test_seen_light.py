@@ -32,7 +32,9 @@ def test_the_look_is_made_of_orthonormal_functions_without_a_constant() -> None:
 def test_the_look_of_a_mirrored_light_is_the_mirrored_look() -> None:
     odd = np.array([1, 1, -1, -1, 1, 1, -1, 1])
     light = np.random.default_rng(1).normal(size=9)
-    np.testing.assert_allclose(LOOK @ (light * np.concatenate([[1], odd])), odd * (LOOK @ light), atol=1e-12)
+    np.testing.assert_allclose(
+        LOOK @ (light * np.concatenate([[1], odd])), odd * (LOOK @ light), atol=1e-12
+    )
 
 
 @pytest.mark.parametrize("channels", [1, 3])
@@ -57,10 +59,16 @@ def test_colour_and_brightness_are_not_looked_at() -> None:
     usual = prior(3)
     told = seen_light(usual, SEEN, np.full(8, 0.05))
     values = np.linalg.eigvalsh(told.covariance)
-    assert values.min() > 0 and (np.linalg.eigvalsh(usual.covariance - told.covariance) > -1e-12).all()
-    # Which way the channels differ, the prior holds to be independent of what they have in common only roughly.
+    assert (
+        values.min() > 0 and (np.linalg.eigvalsh(usual.covariance - told.covariance) > -1e-12).all()
+    )
+    # Which way the channels differ, the prior holds to be independent of what they have in common
+    # only roughly.
     before, after = (light.mean.reshape(3, 9) for light in (usual, told))
-    assert np.abs((after - after.mean(0)) - (before - before.mean(0))).max() < 0.3 * np.abs(after - before).max()
+    assert (
+        np.abs((after - after.mean(0)) - (before - before.mean(0))).max()
+        < 0.3 * np.abs(after - before).max()
+    )
 
 
 def test_a_light_of_the_prior_is_left_alone() -> None:

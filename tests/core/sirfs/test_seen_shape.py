@@ -1,4 +1,6 @@
-"""What was seen of the normals, as a prior of SIRFS' shape: heights that are known, and a ball that shading alone leaves open."""
+"""What was seen of the normals, as a prior of SIRFS' shape: heights that are known, and a ball that
+shading alone leaves open.
+"""
 
 import numpy as np
 import pytest
@@ -63,7 +65,15 @@ def test_sirfs_takes_the_shape_that_was_seen() -> None:
     def error(seen: SeenShape | None) -> float:
         options = RecoverOptions(solve_size=96, solver=SolverOptions(threads=1))
         found = recover(image, mask, 1e-3, priors, weights, options, seen=seen)
-        return float(np.degrees(np.arccos(np.clip((normal_from_reference(normals(found.height)) * normal).sum(-1)[mask], -1, 1))).mean())
+        return float(
+            np.degrees(
+                np.arccos(
+                    np.clip(
+                        (normal_from_reference(normals(found.height)) * normal).sum(-1)[mask], -1, 1
+                    )
+                )
+            ).mean()
+        )
 
     flat = np.where(mask[..., None], np.array([0, 0, 1.0]), 0)
     right, wrong = (SeenShape(kind, np.where(mask, 0.1, 0)) for kind in (normal, flat))

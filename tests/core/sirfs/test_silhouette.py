@@ -1,10 +1,17 @@
-"""What the outline says of the inside: outward at the rim, nothing outside, and true on a half ball."""
+"""What the outline says of the inside: outward at the rim, nothing outside, and true on a half
+ball.
+"""
 
 import numpy as np
 import pytest
 
 from isc_core.sirfs.priors import SilhouetteProfile
-from isc_core.sirfs.silhouette import outline_coordinates, outline_normals, silhouette_cost, silhouette_field
+from isc_core.sirfs.silhouette import (
+    outline_coordinates,
+    outline_normals,
+    silhouette_cost,
+    silhouette_field,
+)
 from isc_core.sirfs.stencils import normals
 
 
@@ -75,7 +82,9 @@ def test_a_dome_scales_with_its_outline_and_does_not_end_where_the_photo_does() 
     assert large.max() == pytest.approx(2 * small.max(), rel=0.03)
     mask, _, _ = disc()
     cut = silhouette_field(mask[:, :41], profile).dome
-    np.testing.assert_allclose(cut[20:60, 36:], silhouette_field(mask, profile).dome[20:60, 36:41], atol=1)
+    np.testing.assert_allclose(
+        cut[20:60, 36:], silhouette_field(mask, profile).dome[20:60, 36:41], atol=1
+    )
     for other in (np.zeros((5, 6), bool), np.ones((5, 6), bool), np.eye(7, dtype=bool)):
         assert np.isfinite(silhouette_field(other, profile).dome).all()
 

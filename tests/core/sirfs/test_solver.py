@@ -49,7 +49,9 @@ def hemisphere(size: int = 56, radius: float = 22.0) -> Scene:
     height = np.sqrt(np.maximum(radius**2 - i * i - j * j, 0.3 * radius))
     from isc_core.sirfs.illumination import basis
 
-    shading = np.exp(np.einsum("khw,kc->hwc", basis(*np.moveaxis(normals(height), -1, 0)), scene.light))
+    shading = np.exp(
+        np.einsum("khw,kc->hwc", basis(*np.moveaxis(normals(height), -1, 0)), scene.light)
+    )
     image = np.where(mask[..., None], shading * np.array([0.5, 0.4, 0.3]), 0)
     return Scene(image, mask, np.where(mask, height, 0), scene.light)
 
@@ -60,7 +62,11 @@ def test_loss_falls_and_what_is_returned_belongs_together(engine: str, channels:
     scene = blob(channels=channels)
     problem = make_problem(scene)
     result = solve(problem, replace(QUICK, engine=engine, single=False))
-    start = NumpyEngine(problem).evaluate(np.zeros(scene.mask.shape), np.zeros((9, channels))).terms.total
+    start = (
+        NumpyEngine(problem)
+        .evaluate(np.zeros(scene.mask.shape), np.zeros((9, channels)))
+        .terms.total
+    )
     assert result.terms.total < start - 1
     assert result.height.dtype == result.light.dtype == np.float64
     assert result.height.shape == scene.mask.shape and result.light.shape == (9, channels)
@@ -82,7 +88,9 @@ def test_the_engines_find_the_same_optimum() -> None:
     problem = make_problem(blob((48, 52)))
     full = LbfgsOptions()
     losses = [
-        solve(problem, SolverOptions(engine=engine, single=single, threads=1, lbfgs=full)).terms.total
+        solve(
+            problem, SolverOptions(engine=engine, single=single, threads=1, lbfgs=full)
+        ).terms.total
         for engine, single in (("numpy", False), ("numba", False), ("numba", True))
     ]
     assert np.ptp(losses) < 0.005 * abs(losses[0])
@@ -108,10 +116,14 @@ def test_known_shape_is_kept_exactly_and_its_light_is_found() -> None:
 def test_when_all_is_known_it_is_only_evaluated() -> None:
     scene = blob((84, 82))
     problem = make_problem(scene)
-    result = solve(problem, replace(QUICK, single=False), known_height=scene.height, known_light=scene.light)
+    result = solve(
+        problem, replace(QUICK, single=False), known_height=scene.height, known_light=scene.light
+    )
     np.testing.assert_array_equal(result.height, scene.height)
     np.testing.assert_array_equal(result.light, scene.light)
-    assert result.terms.total == pytest.approx(NumpyEngine(problem).evaluate(scene.height, scene.light).terms.total, rel=1e-9)
+    assert result.terms.total == pytest.approx(
+        NumpyEngine(problem).evaluate(scene.height, scene.light).terms.total, rel=1e-9
+    )
     assert result.converged and result.iterations == 0
 
 
@@ -122,14 +134,22 @@ def test_shape_from_shading_finds_a_hemisphere() -> None:
     flat = np.zeros(scene.mask.shape)
     assert angle_error(result.height, scene) < 0.4 * angle_error(flat, scene)
     assert shape_error(result.height, scene) < 0.4 * shape_error(flat, scene)
-    assert result.terms.smoothness == result.terms.parsimony == result.terms.absolute == 0 < result.terms.shading_only
+    assert (
+        result.terms.smoothness
+        == result.terms.parsimony
+        == result.terms.absolute
+        == 0
+        < result.terms.shading_only
+    )
 
 
 def test_depth_with_holes_pulls_the_height() -> None:
     """What was seen is another shape than shading tells, 37 px nearer."""
     scene = blob()
     target = scene.height + 5 * np.sin(np.arange(72) / 12)
-    seen = np.where(scene.mask & (np.random.default_rng(0).random(scene.mask.shape) < 0.5), target + 37, np.nan)
+    seen = np.where(
+        scene.mask & (np.random.default_rng(0).random(scene.mask.shape) < 0.5), target + 37, np.nan
+    )
     hole = (slice(22, 28), slice(34, 40))
     seen[hole] = np.nan
     errors = []
@@ -160,7 +180,11 @@ def test_cancel_before_the_start_evaluates_nothing(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(NumpyEngine, "evaluate", fail)
     with pytest.raises(Cancelled):
-        solve(make_problem(blob()), replace(QUICK, engine="numpy"), monitor=Monitor(cancelled=lambda: True))
+        solve(
+            make_problem(blob()),
+            replace(QUICK, engine="numpy"),
+            monitor=Monitor(cancelled=lambda: True),
+        )
 
 
 @pytest.mark.parametrize("size", [(60, 60), (90, 84), (170, 165)])
@@ -168,7 +192,11 @@ def test_progress_rises_from_0_to_1(size: tuple[int, int]) -> None:
     seen: list[tuple[str, float]] = []
     few = LbfgsOptions(iterations=6)
     options = SolverOptions(threads=1, lbfgs=few)
-    solve(make_problem(blob(size)), options, monitor=Monitor(lambda stage, fraction: seen.append((stage, fraction))))
+    solve(
+        make_problem(blob(size)),
+        options,
+        monitor=Monitor(lambda stage, fraction: seen.append((stage, fraction))),
+    )
     fractions = [f for _, f in seen]
     assert len(fractions) >= 7
     assert fractions == sorted(fractions)
@@ -185,7 +213,10 @@ def test_any_number_of_levels_goes_with_any_size(levels: int) -> None:
 @pytest.mark.parametrize("name", ["known_height", "known_light"])
 def test_what_is_known_must_be_numbers(name: str) -> None:
     scene = blob()
-    known = {"known_height": np.where(scene.mask, scene.height, np.nan), "known_light": np.full((9, 3), np.nan)}
+    known = {
+        "known_height": np.where(scene.mask, scene.height, np.nan),
+        "known_light": np.full((9, 3), np.nan),
+    }
     with pytest.raises(InputError, match="holes"):
         solve(make_problem(scene), **{name: known[name]})  # type: ignore[arg-type]
 
@@ -210,16 +241,27 @@ def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
     unmoved = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(iterations=0))
     flat = solve(plain, unmoved)
     assert not flat.height.any() and np.abs(flat.light).max() < 1e-12
-    begun = solve(replace(plain, weights=replace(plain.weights, starts=(Start(dome=0.5, light=0.5),))), unmoved)
+    begun = solve(
+        replace(plain, weights=replace(plain.weights, starts=(Start(dome=0.5, light=0.5),))),
+        unmoved,
+    )
     inner = ndimage.binary_erosion(scene.mask, iterations=4)
-    np.testing.assert_allclose(begun.height[inner], field.dome[inner] / 2, atol=0.15 * begun.height.max())
+    np.testing.assert_allclose(
+        begun.height[inner], field.dome[inner] / 2, atol=0.15 * begun.height.max()
+    )
     np.testing.assert_allclose(begun.light, unstack(plain.priors.light.offset, 3) / 2, atol=1e-9)
-    seen = replace(plain, weights=replace(plain.weights, starts=(Start(dome=1),)), observation=DepthObservation(scene.height))
+    seen = replace(
+        plain,
+        weights=replace(plain.weights, starts=(Start(dome=1),)),
+        observation=DepthObservation(scene.height),
+    )
     assert not solve(seen, unmoved).height.any(), "what was seen decides, not the outline"
 
 
 def test_of_several_starts_the_one_that_leads_deeper_goes_on() -> None:
-    """A light far from any likely one is a bad start; which of the starts stands first does not matter."""
+    """A light far from any likely one is a bad start; which of the starts stands first does not
+    matter.
+    """
     problem = make_problem(hemisphere())
     good, bad = Start(), Start(light=40)
     options = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(evaluations=60))
@@ -239,8 +281,13 @@ def test_the_start_that_goes_on_ends_where_it_would_have_ended_alone() -> None:
     problem = make_problem(hemisphere())
     good, bad = Start(), Start(light=40)
     for tolerance in (1e-4, 0.5):
-        options = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(loss_tolerance=tolerance, evaluations=150))
-        alone, chosen = (solve(replace(problem, weights=replace(problem.weights, starts=s)), options) for s in ((good,), (good, bad)))
+        options = SolverOptions(
+            threads=1, single=False, lbfgs=LbfgsOptions(loss_tolerance=tolerance, evaluations=150)
+        )
+        alone, chosen = (
+            solve(replace(problem, weights=replace(problem.weights, starts=s)), options)
+            for s in ((good,), (good, bad))
+        )
         np.testing.assert_array_equal(chosen.height, alone.height)
         np.testing.assert_array_equal(chosen.light, alone.light)
         assert (chosen.terms, chosen.reason) == (alone.terms, alone.reason)
@@ -250,8 +297,15 @@ def test_trying_starts_can_be_cancelled_and_does_not_pretend_to_advance() -> Non
     problem = make_problem(hemisphere())
     problem = replace(problem, weights=replace(problem.weights, starts=(Start(), Start(light=1))))
     seen: list[tuple[str, float]] = []
-    solve(problem, SolverOptions(threads=1), monitor=Monitor(lambda stage, share: seen.append((stage, share))))
-    shares, losses = [share for _, share in seen], [float(stage.split()[-1]) for stage, _ in seen if "loss" in stage]
+    solve(
+        problem,
+        SolverOptions(threads=1),
+        monitor=Monitor(lambda stage, share: seen.append((stage, share))),
+    )
+    shares, losses = (
+        [share for _, share in seen],
+        [float(stage.split()[-1]) for stage, _ in seen if "loss" in stage],
+    )
     assert shares == sorted(shares)
     assert losses == sorted(losses, reverse=True), "the loss that is told is the lowest so far"
     with pytest.raises(Cancelled):

@@ -1,9 +1,18 @@
-"""Derivatives of heights: exact on quadratics, adjoint to their adjoints, right on a plane and a sphere."""
+"""Derivatives of heights: exact on quadratics, adjoint to their adjoints, right on a plane and a
+sphere.
+"""
 
 import numpy as np
 import pytest
 
-from isc_core.sirfs.stencils import DERIVATIVES, Stencil, derivative, derivative_adjoint, fold_border, normals
+from isc_core.sirfs.stencils import (
+    DERIVATIVES,
+    Stencil,
+    derivative,
+    derivative_adjoint,
+    fold_border,
+    normals,
+)
 from isc_core.sirfs.surface import geometry, pair_slices
 from isc_core.sirfs.tables import CostTable
 
@@ -14,7 +23,9 @@ def test_adjoints(stencil: Stencil, shape: tuple[int, int]) -> None:
     rng = np.random.default_rng(0)
     height, gradient = rng.normal(size=(2, *shape))
     forward = float((derivative(np.pad(height, 1, mode="edge"), stencil) * gradient).sum())
-    assert forward == pytest.approx(float((height * derivative_adjoint(gradient, stencil)).sum()), rel=1e-12, abs=1e-13)
+    assert forward == pytest.approx(
+        float((height * derivative_adjoint(gradient, stencil)).sum()), rel=1e-12, abs=1e-13
+    )
 
 
 def test_fold_border_is_the_adjoint_of_replicating_it() -> None:
@@ -27,7 +38,9 @@ def test_fold_border_is_the_adjoint_of_replicating_it() -> None:
 def test_derivatives_of_a_quadratic_are_exact() -> None:
     i, j = np.mgrid[:9, :11].astype(float)
     height = 0.3 * i * i - 0.2 * j * j + 0.7 * i * j + 2 * i - 3 * j
-    zi, zj, zii, zjj, zij = (derivative(np.pad(height, 1, mode="edge"), s)[1:-1, 1:-1] for s in DERIVATIVES)
+    zi, zj, zii, zjj, zij = (
+        derivative(np.pad(height, 1, mode="edge"), s)[1:-1, 1:-1] for s in DERIVATIVES
+    )
     np.testing.assert_allclose(zi, (0.6 * i + 0.7 * j + 2)[1:-1, 1:-1], atol=1e-12)
     np.testing.assert_allclose(zj, (-0.4 * j + 0.7 * i - 3)[1:-1, 1:-1], atol=1e-12)
     np.testing.assert_allclose(zii, 0.6, atol=1e-12)
@@ -39,7 +52,11 @@ def test_normals_of_a_plane() -> None:
     """A surface that rises downward and to the right faces up and to the left."""
     i, j = np.mgrid[:8, :8].astype(float)
     inner = normals(0.5 * i + 0.25 * j)[1:-1, 1:-1]
-    np.testing.assert_allclose(inner, np.broadcast_to(np.array([-0.5, -0.25, 1]) / np.sqrt(1 + 0.25 + 0.0625), inner.shape), atol=1e-14)
+    np.testing.assert_allclose(
+        inner,
+        np.broadcast_to(np.array([-0.5, -0.25, 1]) / np.sqrt(1 + 0.25 + 0.0625), inner.shape),
+        atol=1e-14,
+    )
 
 
 def test_normals_and_curvature_of_a_sphere() -> None:
