@@ -3,7 +3,7 @@
   python -m benchmarks.doubts SCENES... [--photos DIR...] [--data ROOT...] [--only NAME...]
       [--appearance FILE] [--lamps FILE]
 
-SCENES: of `python -m benchmarks.doubt_scenes`. `--photos`: folders of photos with masks; `--data`:
+SCENES: of `python -m training.data.rendered_scenes`. `--photos`: folders of photos with masks; `--data`:
 sets like MIT-Berkeley's, their laboratory photos as they are and without gloss. `--only`: those of
 these families of shapes and objects of sets. A Markdown table; what is doubted of the photos is
 named below it. Of "rig" scenes, one lamp and then several are lit.
@@ -17,13 +17,13 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.doubt_scenes import scenes_in
 from isc_core.appearance import AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
 from isc_core.datasets import list_objects, load_object
 from isc_core.errors import InputError
 from isc_core.lamp_network import LampNetwork, glance_at, read_lamp_network, shipped_lamp_network
 from isc_core.models.doubts import CLEAR, SEVERAL, doubts_of
 from isc_core.photo import read_photo
+from training.data.rendered_scenes import scenes_in
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ class Case:
 
 
 def scenes(folder: Path, only: list[str]) -> Iterator[Case]:
-    """Those of `benchmarks.doubt_scenes`."""
+    """Those of `training.data.rendered_scenes`."""
     for scene in scenes_in(folder):
         layers = scene.layers
         if only and scene.shape not in only:

@@ -8,7 +8,7 @@ diffuse image.
 
 Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them.
 `--networks`: a network for each object that has not seen it, `OBJECT.npz` of
-`benchmarks.layer_network_training`; without it the shipped one, which has. `--roundings`: each
+`training.networks.layer_network`; without it the shipped one, which has. `--roundings`: each
 photo is measured as often, its values changed by some 1e-7 of themselves but for the first time:
 SIRFS has many minima, and the last digit decides between them. Writes OUT/rows.jsonl, a row a run,
 which is not run again, and OUT/tables.md: geometric means of errors relative to plain SIRFS with

@@ -16,7 +16,7 @@ averaged over the photo and its mirror image.
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28 (the encoder); pooled moments: A. Babenko, V. Lempitsky,
 "Aggregating local deep features for image retrieval", ICCV 2015, doi:10.1109/ICCV.2015.150.
-Weights, training scenes and loss are our own: `python -m benchmarks.appearance_training`.
+Weights, training scenes and loss are our own: `python -m training.networks.appearance`.
 
 Limits: measured in docs/methods/doubts.md. A mirror of surroundings without detail looks like
 paint, and two lamps may look like two bumps.

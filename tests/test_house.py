@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("isc_core", "synth", "blender_addon", "benchmarks")
+PACKAGES = ("isc_core", "synth", "blender_addon", "training", "benchmarks")
 
 # Where image, EXR and mesh libraries may be imported: where files become arrays and arrays become
 # files.
@@ -23,9 +23,10 @@ EDGES = {"photo", "mask", "exr", "decomposition", "result_folder", "mesh", "repo
 RENDERERS = {"mitsuba", "drjit"}
 BLENDER = {"bpy", "mathutils", "bmesh"}
 FORBIDDEN = {
-    "isc_core": {"isc_core", "synth", "blender_addon", "benchmarks"} | RENDERERS | BLENDER,
-    "synth": {"blender_addon", "benchmarks"} | BLENDER,
-    "blender_addon": {"synth", "benchmarks"} | RENDERERS,
+    "isc_core": {"isc_core", "synth", "blender_addon", "training", "benchmarks"} | RENDERERS | BLENDER,
+    "synth": {"blender_addon", "training", "benchmarks"} | BLENDER,
+    "blender_addon": {"synth", "training", "benchmarks"} | RENDERERS,
+    "training": {"blender_addon", "benchmarks"} | BLENDER,
     "benchmarks": set(),  # the closed loop measures what Blender renders
 }
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "marshal", "shelve"}

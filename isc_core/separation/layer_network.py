@@ -14,7 +14,7 @@ photo and its mirror image are averaged. How coloured the light may be that is t
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
-Weights, training scenes and loss are our own: `python -m benchmarks.layer_network_training`.
+Weights, training scenes and loss are our own: `python -m training.networks.layer_network`.
 
 Limits: it knows lamps, panels and skies on opaque objects of one piece. What no colour and no form
 tells (a veil over everything) stays.

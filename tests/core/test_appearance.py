@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from benchmarks.surroundings import PLACES, make_surroundings
+from training.data.environments import PLACES, make_surroundings
 from isc_core.appearance import (
     GLASS,
     KINDS,

@@ -1,10 +1,10 @@
 """Fits the network of `isc_core.shape_network`.
 
-  python -m benchmarks.shape_network_training OBJECTS... [--measured DIR] [--leave NAME...] [--start
+  python -m training.networks.shape_network OBJECTS... [--measured DIR] [--leave NAME...] [--start
   STATE.pt] [--steps N] -o SHAPE.npz
 
-OBJECTS, `--measured`: of `benchmarks.unlit_objects`; every picture lights one of them anew
-(`benchmarks.relit_objects`), most after a linear map of space that makes it flatter or deeper,
+OBJECTS, `--measured`: of `training.data.traced_objects`; every picture lights one of them anew
+(`training.data.relighting`), most after a linear map of space that makes it flatter or deeper,
 narrower, and leaning; one picture in four is of a measured object, where there are any. `--leave`:
 shapes that the network must not see, because it will be measured on them. It begins with the
 encoder of the lamp network that ships. Needs PyTorch (`pip install 'isc3d[training]'`), which
@@ -25,14 +25,14 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from benchmarks.appearance_training import sensed
-from benchmarks.drawing import log_uniform
-from benchmarks.layer_network_training import Block, arrays_of, encoder_of, inputs
-from benchmarks.network_fitting import optimised
-from benchmarks.relit_objects import NONE, ONE, SEVERAL, Lit, Relit, draw_photo
-from benchmarks.unlit_objects import SIZE, objects_in
 from isc_core.lamp_network import shipped_lamp_network
 from isc_core.shape_network import CELL, LONG_SIDE, SURE, UNSURE
+from training.data.random_draws import log_uniform
+from training.data.relighting import NONE, ONE, SEVERAL, Lit, Relit, draw_photo
+from training.data.traced_objects import SIZE, objects_in
+from training.loop import optimised
+from training.networks.appearance import sensed
+from training.networks.layer_network import Block, arrays_of, encoder_of, inputs
 
 _SIDE = 128  # of the pictures that it learns from
 _OBJECT = 0.9 * SIZE  # of an unlit object, its longer side
@@ -259,7 +259,7 @@ def main() -> None:
 
     objects = [relit for folder in given.objects for relit in seen(folder)]
     if not objects:
-        parser.error("there is nothing to learn from: make objects with benchmarks.unlit_objects")
+        parser.error("there is nothing to learn from: make objects with training.data.traced_objects")
     given.output.parent.mkdir(parents=True, exist_ok=True)
     network = fit(objects, [] if given.measured is None else seen(given.measured), given)
     np.savez_compressed(given.output, **network.arrays())  # type: ignore[arg-type]

@@ -1,8 +1,8 @@
 """Objects of which it is known what each of many lamps would reach: to be lit anew, by any of them,
 whenever a network learns from one.
 
-  python -m benchmarks.unlit_objects -o DIR [--count N] [--first K] [--groups]
-  python -m benchmarks.unlit_objects -o DIR --data ROOT
+  python -m training.data.traced_objects -o DIR [--count N] [--first K] [--groups]
+  python -m training.data.traced_objects -o DIR --data ROOT
 
 DIR/NUMBER.npz: mask (SIZE, SIZE); normals (SIZE, SIZE, 3) and albedos (PAINTS, SIZE, SIZE, 3)
 float16; toward (LAMPS, 3) float32, unit vectors to far lamps before the object; reached (LAMPS,

@@ -1,4 +1,4 @@
-"""`benchmarks.unlit_objects` under light that is drawn anew each time: gloss, lamps and smooth
+"""`training.data.traced_objects` under light that is drawn anew each time: gloss, lamps and smooth
 light, in a few milliseconds a picture.
 
 Equation: of a far lamp toward l, with the half vector h between l and the viewer,
@@ -25,8 +25,8 @@ import numpy as np
 from isc_core.environment import directions
 from synth.light_rigs.harmonics import smooth_pattern, turned_to_front
 
-from .drawing import log_uniform
-from .unlit_objects import LAMPS, WIDEST, Unlit
+from .random_draws import log_uniform
+from .traced_objects import LAMPS, WIDEST, Unlit
 
 NONE, ONE, SEVERAL = range(3)  # lamps
 _SKY = 2 / LAMPS * (1 - math.cos(math.radians(WIDEST)))  # what each direction stands for, over pi

@@ -7,17 +7,17 @@ import pytest
 
 pytest.importorskip("mitsuba")
 
-from benchmarks import doubt_scenes
-from benchmarks.doubt_scenes import KINDS, SIZE, Given, make_scene
-from benchmarks.surroundings import PLACES, ROWS, make_surroundings
 from isc_core.environment import solid_angles
 from synth.meshes import Mesh, write_ply
 from synth.shapes import make_shape
+from training.data import rendered_scenes
+from training.data.environments import PLACES, ROWS, make_surroundings
+from training.data.rendered_scenes import KINDS, SIZE, Given, make_scene
 
 
 @pytest.fixture(autouse=True)
 def _few_samples(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doubt_scenes, "SAMPLES", 4)
+    monkeypatch.setattr(rendered_scenes, "SAMPLES", 4)
 
 
 @pytest.mark.parametrize("kind", KINDS)

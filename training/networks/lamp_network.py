@@ -1,9 +1,9 @@
 """Fits the network of `isc_core.lamp_network`.
 
-  python -m benchmarks.lamp_network_training OBJECTS [--leave NAME...] [--steps N] -o LAMPS.npz
+  python -m training.networks.lamp_network OBJECTS [--leave NAME...] [--steps N] -o LAMPS.npz
 
-OBJECTS: of `benchmarks.unlit_objects`; every picture lights one of them anew
-(`benchmarks.relit_objects`): by smooth light alone, by one lamp, or by two to four. `--leave`:
+OBJECTS: of `training.data.traced_objects`; every picture lights one of them anew
+(`training.data.relighting`): by smooth light alone, by one lamp, or by two to four. `--leave`:
 families of shapes that the network must not see, because it will be measured on them. It begins
 with the encoder of the layer network that ships. Needs PyTorch (`pip install 'isc3d[training]'`),
 which nothing else of ISC does.
@@ -25,17 +25,17 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from benchmarks.appearance_training import sensed
-from benchmarks.drawing import log_uniform
-from benchmarks.layer_network_training import arrays_of, encoder_of, inputs
-from benchmarks.network_fitting import optimised
-from benchmarks.relit_objects import NONE, ONE, SEVERAL, Relit, draw_photo
-from benchmarks.unlit_objects import SIZE, objects_in
 from isc_core.glance import PLACES
 from isc_core.lamp_network import CELL, LONG_SIDE, SURE, UNSURE
 from isc_core.separation.layer_network import shipped_network
 from isc_core.sirfs.frames import real_sh
 from isc_core.sirfs.seen_light import FRONT, LOOK
+from training.data.random_draws import log_uniform
+from training.data.relighting import NONE, ONE, SEVERAL, Relit, draw_photo
+from training.data.traced_objects import SIZE, objects_in
+from training.loop import optimised
+from training.networks.appearance import sensed
+from training.networks.layer_network import arrays_of, encoder_of, inputs
 
 _SIDE = 128  # of the pictures that it learns from
 _OBJECT = 0.9 * SIZE  # of an unlit object, its longer side
@@ -274,7 +274,7 @@ def main() -> None:
         Relit.of(unlit) for unlit in objects_in(given.objects) if unlit.shape not in given.leave
     ]
     if not objects:
-        parser.error("there is nothing to learn from: make objects with benchmarks.unlit_objects")
+        parser.error("there is nothing to learn from: make objects with training.data.traced_objects")
     given.output.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(given.output, **fit(objects, given).arrays())  # type: ignore[arg-type]
 

@@ -9,8 +9,16 @@ import pytest
 
 pytest.importorskip("mitsuba")
 
-from benchmarks.relit_objects import NONE, ONE, SEVERAL, Relit, draw_photo
-from benchmarks.unlit_objects import GROUP, LAMPS, SIZE, Unlit, make_group, make_object, objects_in
+from training.data.relighting import NONE, ONE, SEVERAL, Relit, draw_photo
+from training.data.traced_objects import (
+    GROUP,
+    LAMPS,
+    SIZE,
+    Unlit,
+    make_group,
+    make_object,
+    objects_in,
+)
 
 
 @pytest.fixture(scope="module")

@@ -22,7 +22,7 @@ from isc_core.datasets import list_objects, load_object
 from isc_core.exr import read_channels
 from isc_core.photo import averaged
 
-from .drawing import log_uniform
+from .random_draws import log_uniform
 
 SIZE, CROP = 192, 160
 _LONG_SIDE = 176  # of an object that is larger

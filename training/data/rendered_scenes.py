@@ -1,7 +1,7 @@
 """Photos of things that ISC's assumptions hold for, and of things they do not: mirrors, glass,
 several lamps.
 
-  python -m benchmarks.doubt_scenes -o DIR [--count N] [--first K] [--kinds KIND...] [--hdr DIR]
+  python -m training.data.rendered_scenes -o DIR [--count N] [--first K] [--kinds KIND...] [--hdr DIR]
   [--meshes DIR]
 
 DIR/KIND_NUMBER.npz: layers (K, SIZE, SIZE, 3) float16 linear, whose sum is the photo; mask, shape,
@@ -31,7 +31,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.surroundings import PLACES, make_surroundings
 from isc_core.atomic import new_file
 from isc_core.errors import InputError
 from synth.albedos import ALBEDOS, make_albedo
@@ -43,6 +42,7 @@ from synth.recipe import camera_around
 from synth.shapes import SHAPES, make_shape
 from synth.shapes.mesh_file import read_mesh_file
 from synth.variant import load_mitsuba
+from training.data.environments import PLACES, make_surroundings
 
 SIZE, SAMPLES = 192, 64
 KINDS = ("lamp", "place", "matt", "mirror", "glass", "lamps", "rig")

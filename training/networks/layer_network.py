@@ -1,6 +1,6 @@
 """Fits the network of `isc_core.separation.layer_network`.
 
-  python -m benchmarks.layer_network_training --scenes DIR [--data ROOT --glossy DIR... [--leave
+  python -m training.networks.layer_network --scenes DIR [--data ROOT --glossy DIR... [--leave
   a,b]] -o NETWORK.npz [--steps N]
 
 `--scenes`: a folder of `isc synth`. `--data`, `--glossy`: the MIT-Berkeley set and what `isc synth
@@ -29,7 +29,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from benchmarks.layer_network_samples import Subject, draw, photographed, rendered
+from training.data.layered_objects import Subject, draw, photographed, rendered
 
 WIDTHS = (32, 48, 64, 96, 128)
 _DARK, _MARGIN = 0.03, 2.0  # as in layer_network

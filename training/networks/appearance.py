@@ -1,9 +1,9 @@
 """Fits the network of `isc_core.appearance`.
 
-  python -m benchmarks.appearance_training SCENES... --synth DIR [--data ROOT --glossy DIR...]
+  python -m training.networks.appearance SCENES... --synth DIR [--data ROOT --glossy DIR...]
   [--leave NAME...] -o APPEARANCE.npz
 
-SCENES: of `benchmarks.doubt_scenes`; `--synth`: a run of `isc synth`, whose training scenes are
+SCENES: of `training.data.rendered_scenes`; `--synth`: a run of `isc synth`, whose training scenes are
 ordinary; `--data`, `--glossy`: the MIT-Berkeley set and what `isc synth glossy-mit` made of it,
 ordinary too; `--leave`: families of shapes, objects of the set and surroundings that the network
 must not see, because it will be measured on them (`benchmarks.doubts`). `--start`: a layer network,
@@ -33,15 +33,15 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from benchmarks.doubt_scenes import scenes_in
-from benchmarks.drawing import log_uniform
-from benchmarks.layer_network_training import arrays_of, encoder_of, inputs
 from isc_core.appearance import GLASS, KINDS, LAMPS, LONG_SIDE, MIRROR, ORDINARY
 from isc_core.box import mask_slices
 from isc_core.datasets import list_objects, load_object
 from isc_core.exr import read_channels
 from isc_core.photo import averaged
 from isc_core.separation.layer_network import read_network, shipped_network
+from training.data.random_draws import log_uniform
+from training.data.rendered_scenes import scenes_in
+from training.networks.layer_network import arrays_of, encoder_of, inputs
 
 _SIDE = 160  # of the pictures that it learns from
 _ALLOWED = {
@@ -81,7 +81,7 @@ class Subject:
 
 
 def rendered(folder: Path) -> Iterator[Subject]:
-    """The scenes of `benchmarks.doubt_scenes`."""
+    """The scenes of `training.data.rendered_scenes`."""
     for scene in scenes_in(folder):
         truth = (
             scene.kind
@@ -387,7 +387,7 @@ def main() -> None:
     ]
     if not subjects:
         parser.error(
-            "there is nothing to learn from: make scenes with benchmarks.doubt_scenes and isc synth"
+            "there is nothing to learn from: make scenes with training.data.rendered_scenes and isc synth"
         )
     given.output.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(given.output, **fit(subjects, given).arrays())  # type: ignore[arg-type]
