@@ -23,7 +23,7 @@ FAULT = 1  # of this program, not of what it was given
 
 def main(arguments: list[str] | None = None) -> int:
     """Runs the command, with the arguments of the process if None, and returns its exit code."""
-    command_line = importlib.import_module(f"{_package()}.command_line")
+    command_line = importlib.import_module(f"{_package()}.headless_command")
     return int(command_line.main(_own_arguments() if arguments is None else arguments))
 
 

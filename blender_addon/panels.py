@@ -9,7 +9,7 @@ from typing import Any
 
 import bpy
 
-from .operators.run import active
+from .operators.worker_run import active
 from .scene.build import Built, find
 from .scene.copies import sharers
 from .scene.material import dichromatic_node

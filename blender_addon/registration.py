@@ -6,9 +6,10 @@ from typing import Any
 import bpy
 from bpy.app.handlers import persistent
 
-from . import operators, panels, preferences, properties
+from . import operators, panels
 from .operators.modal import show
-from .operators.run import active, end_active
+from .operators.worker_run import active, end_active
+from .settings import preferences, properties
 
 _CLASSES = (
     preferences.ISC_AP_preferences,

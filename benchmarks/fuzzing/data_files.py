@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import scipy.io
 
-from blender_addon.arrays import read_result
+from blender_addon.files.result_arrays import read_result
 from isc_core.appearance import read_appearance
 from isc_core.batch.item import Recipe
 from isc_core.batch.manifest import Manifest
@@ -32,7 +32,7 @@ from isc_core.separation.layer_network import read_network
 from isc_core.sirfs.prior_file import load_prior_set
 from synth.dataset.reading import list_scenes, read_facts, read_truth
 from synth.shapes.height_field import read_height
-from synth.validation.bounds import read_bounds
+from synth.validation.measurement.bounds import read_bounds
 
 from .case import Case, Target
 from .pictures import ball, coded, codes

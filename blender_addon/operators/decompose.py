@@ -12,15 +12,15 @@ from bpy.props import IntProperty
 
 from isc_core.errors import InputError
 
-from ..arrays import ARRAYS
-from ..preferences import choices, new_folder, worker_environment
+from ..files.result_arrays import ARRAYS
 from ..scene.build import find
 from ..scene.copies import is_copy, original_of
+from ..settings.preferences import choices, new_folder, worker_environment
 from .modal import WorkerOperator
 from .request import Request, pictures_of, remembered, request_from_settings
 from .result import build_in_one_step
-from .run import Run, active, require_idle
-from .tasks import decompose
+from .run_steps import decompose
+from .worker_run import Run, active, require_idle
 
 
 def run_of(context: Any, request: Request) -> Run:

@@ -19,8 +19,8 @@ from isc_core.errors import InputError
 
 from ..scene.build import Built, find
 from ..scene.copies import is_copy
+from ..scene.export_material import stand_in
 from ..scene.provenance import KEY, ROLE
-from ..scene.stand_in import stand_in
 
 _FILES = ("mesh.glb", "maps.exr", "decomposition.json", "preview.png")
 

@@ -15,12 +15,12 @@ from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
 from isc_core.errors import InputError
 
-from ..photo_files import examine
-from ..preferences import choices, new_folder, worker_environment
+from ..files.image_export import examine
+from ..settings.preferences import choices, new_folder, worker_environment
 from .modal import WorkerOperator
 from .request import named
-from .run import Run, active, remove, require_idle
-from .tasks import cut_out
+from .run_steps import cut_out
+from .worker_run import Run, active, remove, require_idle
 
 _MASK_OF = "isc_mask_of"
 _LEAST = 8

@@ -15,8 +15,8 @@ import bpy
 
 from isc_core.errors import InputError
 
-from ..messages import keep_report
-from .run import Run, active, begin, end_active
+from .messages import keep_report
+from .worker_run import Run, active, begin, end_active
 
 SECONDS = 0.1
 _PANELS = {"VIEW_3D", "IMAGE_EDITOR"}

@@ -11,7 +11,7 @@ import bpy
 
 from isc_core.errors import InputError
 
-from ..photo_files import Picture, examine
+from ..files.image_export import Picture, examine
 from ..scene.build import SHADOWS, BuildOptions
 from ..scene.provenance import KEY, SOURCE_IMAGE
 

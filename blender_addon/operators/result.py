@@ -10,13 +10,13 @@ from bpy.props import StringProperty
 
 from isc_core.errors import InputError
 
-from ..arrays import ARRAYS, read_result
-from ..preferences import choices, new_folder, worker_environment
+from ..files.result_arrays import ARRAYS, read_result
 from ..scene.build import Built, build, find
+from ..settings.preferences import choices, new_folder, worker_environment
 from .modal import WorkerOperator
 from .request import Request, build_options, named, remember, request_from_json
-from .run import Run, require_idle
-from .tasks import complete
+from .run_steps import complete
+from .worker_run import Run, require_idle
 
 
 def build_in_one_step(context: Any, folder: Path, request: Request | None = None) -> str:

@@ -141,7 +141,9 @@ def part(name: str) -> Any:
 def begin_run() -> Any:
     """What the button does, without its window."""
     request = part("operators.request").request_from_settings(bpy.data.scenes[0])
-    return part("operators.run").begin(part("operators.decompose").run_of(bpy.context, request))
+    return part("operators.worker_run").begin(
+        part("operators.decompose").run_of(bpy.context, request)
+    )
 
 
 def tick(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:

@@ -11,10 +11,10 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..arrays import Result
-from .back import close_back
-from .background import show_photo
+from ..files.result_arrays import Result
 from .camera import ensure_camera, frame_as_photo
+from .camera_background import show_photo
+from .closed_back import close_back
 from .collection import ensure_collection, ensure_scene, put, show_as_photographed
 from .copies import COPY, OBJECT, material_of
 from .displacement import displace, flattened, undo_displacement

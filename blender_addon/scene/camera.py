@@ -6,7 +6,7 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ..arrays import Result
+from ..files.result_arrays import Result
 from .collection import put
 from .mesh import metres_per_pixel
 from .provenance import find, label, mark

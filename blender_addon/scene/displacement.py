@@ -12,7 +12,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..arrays import Result
+from ..files.result_arrays import Result
 from .images import DATA, ensure_image
 from .mesh import UV, Geometry, metres_per_pixel
 from .provenance import find, label, mark

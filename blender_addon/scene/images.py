@@ -10,7 +10,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..arrays import Result
+from ..files.result_arrays import Result
 from .provenance import find, label, mark
 
 COLOR, DATA = "Linear Rec.709", "Non-Color"

@@ -14,7 +14,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..arrays import Result
+from ..files.result_arrays import Result
 
 UV, NORMAL, CONFIDENCE = "UVMap", "custom_normal", "confidence"
 

@@ -18,7 +18,7 @@ import bpy
 
 from isc_core.errors import InputError
 
-from ..arrays import Result
+from ..files.result_arrays import Result
 
 KEY, ROLE = "isc_key", "isc_role"
 PHOTO_HASH, SOURCE_IMAGE, SPECULAR_LEVEL = (

@@ -23,7 +23,7 @@ def blender() -> Any:
 def addon(blender: Any) -> Iterator[Any]:
     """Blender with the add-on registered; no run is left behind."""
     import blender_addon
-    from blender_addon.operators.run import end_active
+    from blender_addon.operators.worker_run import end_active
 
     blender_addon.register()
     yield blender

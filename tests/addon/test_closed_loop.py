@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from benchmarks import closed_loop
-from benchmarks.closed_loop_cases import Relit
-from blender_addon.arrays import Result, read_result
+from benchmarks.blender import closed_loop
+from benchmarks.blender.closed_loop_cases import Relit
+from blender_addon.files.result_arrays import Result, read_result
 from isc_core.environment import directions, shading_under
 from isc_core.metrics import psnr
 
@@ -47,7 +47,7 @@ def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(
     """A shallow dome has no shadows under light from the front: matt radiance is albedo *
     irradiance / pi.
     """
-    from benchmarks.closed_loop_renders import Look, picture
+    from benchmarks.blender.renders import Look, picture
 
     toward, irradiance, height = (
         np.array([0.48, -0.36, 0.8]),
@@ -82,7 +82,7 @@ def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(
 
 
 def test_materials_that_shine_by_themselves_are_found(result: Result) -> None:
-    from benchmarks.closed_loop_renders import shining
+    from benchmarks.blender.renders import shining
     from blender_addon.scene import BuildOptions, build
 
     assert shining(build(result, BuildOptions(specular_from="image")).material)

@@ -116,7 +116,7 @@ def test_imports_of_the_core_become_relative_and_nothing_else_changes(
         "import isc_core.errors as e\n",
         "from isc_core import errors\n",
         "from isc_core.photo import read_photo\n",  # not for Blender's own process
-        "from blender_addon.worker import start\n",
+        "from blender_addon.worker.process import start\n",
         "import scipy.ndimage\n",
         "def f():\n    import cv2\n",
     ],

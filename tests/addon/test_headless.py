@@ -274,7 +274,7 @@ def test_a_host_that_had_set_signals_itself_is_no_trouble() -> None:
 
 def test_a_fault_is_not_taken_for_success(tmp_path: Path) -> None:
     """Blender itself ends with 0 after a script that raised."""
-    code = "import runpy, sys, blender_addon.command_line as c; c.main = None; sys.argv = ['headless']; "
+    code = "import runpy, sys, blender_addon.headless_command as c; c.main = None; sys.argv = ['headless']; "
     code += "runpy.run_module('blender_addon.headless', run_name='__main__')"
     done = subprocess.run(
         [sys.executable, "-c", code],

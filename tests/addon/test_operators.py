@@ -13,16 +13,17 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon import operators, preferences, presets, properties  # noqa: E402
-from blender_addon.messages import in_words, notes_of  # noqa: E402
+from blender_addon import operators  # noqa: E402
 from blender_addon.operators import request as requests  # noqa: E402
 from blender_addon.operators.decompose import run_of  # noqa: E402
 from blender_addon.operators.mask import box_of  # noqa: E402
+from blender_addon.operators.messages import in_words, notes_of  # noqa: E402
 from blender_addon.operators.request import request_from_settings  # noqa: E402
-from blender_addon.operators.run import Run, begin  # noqa: E402
-from blender_addon.panels import wrapped  # noqa: E402
+from blender_addon.operators.worker_run import Run, begin  # noqa: E402
+from blender_addon.panels import wrapped
 from blender_addon.scene.build import BuildOptions, find  # noqa: E402
-from blender_addon.worker import Update  # noqa: E402
+from blender_addon.settings import preferences, presets, properties  # noqa: E402
+from blender_addon.worker.process import Update  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 from isc_core.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.separation import METHODS  # noqa: E402

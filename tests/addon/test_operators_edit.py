@@ -15,13 +15,13 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from mathutils import Vector  # noqa: E402 (after the skip)
 
-from blender_addon.arrays import read_result  # noqa: E402
+from blender_addon.files.result_arrays import read_result  # noqa: E402
 from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # noqa: E402
 from blender_addon.operators.export import write  # noqa: E402
 from blender_addon.scene.build import BuildOptions, Built, build, find  # noqa: E402
 from blender_addon.scene.copies import sharers  # noqa: E402
+from blender_addon.scene.export_material import recoloured  # noqa: E402
 from blender_addon.scene.material import dichromatic_node, set_specular_gain  # noqa: E402
-from blender_addon.scene.stand_in import recoloured  # noqa: E402
 from isc_core.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 

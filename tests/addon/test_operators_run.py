@@ -15,10 +15,12 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 import blender_addon  # noqa: E402 (after the skip)
-from blender_addon.operators import tasks  # noqa: E402
+from blender_addon.files.image_export import Picture  # noqa: E402
+from blender_addon.operators import run_steps as tasks  # noqa: E402
 from blender_addon.operators.modal import WorkerOperator, advance  # noqa: E402
 from blender_addon.operators.request import Method  # noqa: E402
-from blender_addon.operators.run import (
+from blender_addon.operators.run_steps import cut_out, decompose  # noqa: E402
+from blender_addon.operators.worker_run import (
     Made,
     Run,
     WorkFailed,
@@ -27,10 +29,8 @@ from blender_addon.operators.run import (
     end_active,
     follow,
     remove,
-)  # noqa: E402
-from blender_addon.operators.tasks import cut_out, decompose  # noqa: E402
-from blender_addon.photo_files import Picture  # noqa: E402
-from blender_addon.worker import Update, Worker, WorkerEnvironment, start  # noqa: E402
+)
+from blender_addon.worker.process import Update, Worker, WorkerEnvironment, start  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 
 # A package in place of `isc_core` that takes its time, or dies.
@@ -458,11 +458,11 @@ import sys, time
 from pathlib import Path
 import bpy, blender_addon
 blender_addon.register()
-from blender_addon.operators.run import Made, Run, begin
+from blender_addon.operators.worker_run import Made, Run, begin
 from blender_addon.operators.request import Method
-from blender_addon.operators.tasks import decompose
-from blender_addon.photo_files import Picture
-from blender_addon.worker import WorkerEnvironment
+from blender_addon.operators.run_steps import decompose
+from blender_addon.files.image_export import Picture
+from blender_addon.worker.process import WorkerEnvironment
 environment = WorkerEnvironment(Path(sys.executable), (Path({str(environment.search[0])!r}),), Path({str(tmp_path / "cache")!r}))
 folder = Path({str(tmp_path / "run")!r})
 folder.mkdir()

@@ -11,7 +11,7 @@ import pytest
 
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
-from blender_addon.photo_files import (  # noqa: E402 (after the skip)
+from blender_addon.files.image_export import (  # noqa: E402 (after the skip)
     Picture,
     codes,
     examine,

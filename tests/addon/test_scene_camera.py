@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.arrays import Result, read_result
+from blender_addon.files.result_arrays import Result, read_result
 from tests.addon.scene_fixture import bump, write_result
 from tests.addon.scene_render import pixels, render
 

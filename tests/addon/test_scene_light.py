@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.arrays import Result, read_result
+from blender_addon.files.result_arrays import Result, read_result
 from isc_core.environment import directions, shading_under
 from tests.addon.scene_render import render
 

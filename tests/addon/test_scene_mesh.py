@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.arrays import Result, read_result
+from blender_addon.files.result_arrays import Result, read_result
 from isc_core.mesh import MeshOptions
 from tests.addon.scene_fixture import bump, write_result
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from blender_addon.sources import Source, find_sources, output_files
+from blender_addon.headless_sources import Source, find_sources, output_files
 from isc_core.errors import InputError
 
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.worker import (
+from blender_addon.worker.process import (
     Job,
     Update,
     Worker,
@@ -215,7 +215,7 @@ def test_the_worker_ends_when_its_program_does(tmp_path: Path, cache: Path) -> N
     photo, mask = ball_arrays(tmp_path)
     program = (
         "import os, sys, time\nfrom pathlib import Path\n"
-        "from blender_addon.worker import Job, WorkerEnvironment, start\n"
+        "from blender_addon.worker.process import Job, WorkerEnvironment, start\n"
         "photo, mask, output, cache = map(Path, sys.argv[1:])\n"
         f"environment = WorkerEnvironment(Path(sys.executable), (Path({str(ROOT)!r}),), cache)\n"
         "worker = start(Job(photo, output, mask, 'sirfs', 'none', 'natural', 64), environment)\n"
@@ -414,7 +414,7 @@ def test_a_program_that_kills_and_leaves_at_once_leaves_nothing(
 ) -> None:
     environment = stand_in(STUBBORN)
     program = (
-        "import sys, time\nfrom pathlib import Path\nfrom blender_addon.worker import Job, WorkerEnvironment, start\n"
+        "import sys, time\nfrom pathlib import Path\nfrom blender_addon.worker.process import Job, WorkerEnvironment, start\n"
         "search, cache, output = map(Path, sys.argv[1:])\n"
         "worker = start(Job(output, output, None, '', '', '', 0), WorkerEnvironment(Path(sys.executable), (search,), cache))\n"
         "while worker.poll().stage != 'asleep': time.sleep(0.01)\n"

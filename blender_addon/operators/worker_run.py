@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 from isc_core.errors import InputError
 
-from ..worker import Update, Worker
+from ..worker.process import Update, Worker
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from ..arrays import ARRAYS
-from ..messages import in_words, notes_of
-from ..photo_files import Picture, hand_over, hand_over_mask
-from ..worker import Job, Update, Worker, WorkerEnvironment, box_mask, start, start_arrays
+from ..files.image_export import Picture, hand_over, hand_over_mask
+from ..files.result_arrays import ARRAYS
+from ..worker.process import Job, Update, Worker, WorkerEnvironment, box_mask, start, start_arrays
+from .messages import in_words, notes_of
 from .request import Method
-from .run import Made, Script, WorkFailed, during, follow
+from .worker_run import Made, Script, WorkFailed, during, follow
 
 _HANDING_OVER = "handing the photo over"
 RESULT = "result"

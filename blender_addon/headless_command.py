@@ -30,7 +30,7 @@ def main(arguments: Sequence[str]) -> int:
     try:
         options = _parser().parse_args(arguments)
         _require_blender()
-        from .batch import run
+        from .headless_batch import run
 
         with Interrupts() as interrupts, ProgressBar(sys.stderr, quiet=options.quiet) as bar:
             said = run(options, interrupts.monitor(bar))

@@ -13,9 +13,10 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from .worker import WorkerEnvironment
+from ..worker.process import WorkerEnvironment
 
-ADDON = __package__ or ""
+# The add-on's package is the parent of this one.
+ADDON = (__package__ or "").rpartition(".")[0]
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,7 @@ def worker_environment(chosen: Choices) -> WorkerEnvironment:
 
     Raises `InputError` if `isc_core` is not there.
     """
-    inside = Path(__file__).resolve().parent
+    inside = Path(__file__).resolve().parents[1]
     place = importlib.util.find_spec("isc_core") if not (inside / "isc_core").is_dir() else None
     if place is not None and place.submodule_search_locations:
         inside = Path(place.submodule_search_locations[0]).resolve().parent

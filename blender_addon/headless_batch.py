@@ -17,16 +17,16 @@ from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from isc_core.status_lines import status_lines
 
-from .arrays import ARRAYS, DESCRIPTION, read_description
-from .messages import notes_of
+from .files.result_arrays import ARRAYS, DESCRIPTION, read_description
+from .headless_sources import Source, find_sources, output_files
+from .operators.messages import notes_of
 from .operators.request import Method, Request
 from .operators.result import build_in_one_step
-from .preferences import choices, worker_environment
 from .registration import register
 from .scene.build import BuildOptions
 from .scene.provenance import find
-from .sources import Source, find_sources, output_files
-from .worker import Job, Worker, start, start_arrays
+from .settings.preferences import choices, worker_environment
+from .worker.process import Job, Worker, start, start_arrays
 
 _POLL_SECONDS = 0.05
 _FORMATS = {".png": ("PNG", "16"), ".exr": ("OPEN_EXR", "32")}
