@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..sirfs.stencils import normals
+from ..shading.surface_stencils import normals
 from .light_direction import estimate_light
 from .light_fit import fit_light
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ..sirfs.contour import occluding_contour
+from ..shading.occluding_contour import occluding_contour
 from .box import Box
 from .estimate import BaselineEstimate, from_log_shading, grey_log_shading
 from .poisson import integrate

@@ -11,7 +11,7 @@ light from everywhere.
 import numpy as np
 
 from ..errors import InputError
-from ..sirfs.illumination import basis
+from ..shading.irradiance_basis import basis
 
 
 def fit_light(

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage, sparse
 
-from ..linear import solved
+from ..numerics.linear import solved
 
 _COARSEST = 60
 _DAMPING = 0.7

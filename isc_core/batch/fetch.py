@@ -16,7 +16,7 @@ from types import ModuleType
 from typing import Any
 
 from ..errors import InputError
-from ..limits import Limits
+from ..io.limits import Limits
 
 _BLOCK = 1 << 20
 

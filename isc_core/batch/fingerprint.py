@@ -1,6 +1,6 @@
 """Whether a result is there already: what it was made of stands in it.
 
-A result's `decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends
+A result's `scene.decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends
 on: the content of photo and mask, the settings, the coding, the priors, the version. How many
 threads worked on it, where its files lay and when it was made do not count.
 """
@@ -10,10 +10,10 @@ import json
 from dataclasses import asdict
 from pathlib import Path
 
-from ..arrays_file import ARRAYS
 from ..errors import InputError
-from ..json_files import read_json
-from ..result_folder import DECOMPOSITION_FILES
+from ..io.json_files import read_json
+from ..result_files.arrays_file import ARRAYS
+from ..result_files.result_folder import DECOMPOSITION_FILES
 from .item import Job
 
 

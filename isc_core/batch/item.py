@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from ..decompose.settings import Settings
 from ..errors import InputError
-from ..limits import USUAL, Limits
-from ..models.settings import Settings
-from ..photo import TRANSFERS
+from ..io.limits import USUAL, Limits
+from ..photo.photo import TRANSFERS
 
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 
@@ -32,7 +32,7 @@ Options = tuple[tuple[str, str | int | bool], ...]
 class Recipe:
     """How an image is decomposed.
 
-    `settings`: see `pipeline.Settings`; `transfer`: one of `photo.TRANSFERS`.
+    `settings`: see `decompose.pipeline.Settings`; `transfer`: one of `photo.photo.TRANSFERS`.
     """
 
     settings: Settings = field(default_factory=Settings)

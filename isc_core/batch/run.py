@@ -10,9 +10,9 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import Cancelled, InputError
-from ..limits import USUAL, Limits
+from ..io.limits import USUAL, Limits
 from ..progress import Monitor
-from ..sirfs.prior_file import load_prior_set
+from ..sirfs.priors.prior_file import load_prior_set
 from .engine import Crew, connected, dashboard, require_dask, worked
 from .fetch import is_url, sha256
 from .item import SKIPPED, Item, Job, Outcome, Plan, Recipe

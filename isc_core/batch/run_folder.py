@@ -19,8 +19,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from ..atomic import remove_unfinished_in
 from ..errors import InputError
+from ..io.atomic import remove_unfinished_in
 from .names import OWN_FILES
 
 

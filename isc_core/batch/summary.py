@@ -14,7 +14,7 @@ from contextlib import ExitStack
 from itertools import islice
 from urllib.parse import quote
 
-from ..atomic import new_file
+from ..io.atomic import new_file
 from .item import FAILED
 from .journal import Entry, Journal
 from .run_folder import RunFolder

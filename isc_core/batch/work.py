@@ -14,14 +14,14 @@ from functools import lru_cache
 from pathlib import Path, PurePath
 
 from .. import __version__
+from ..decompose.pipeline import decompose
 from ..errors import Cancelled, InputError
-from ..photo import read_photo
-from ..pipeline import decompose
+from ..photo.photo import read_photo
 from ..progress import Monitor
-from ..report import thumbnail
-from ..result_folder import require_room, save
-from ..sirfs.fitting.prior_set import PriorSet
-from ..sirfs.prior_file import load_prior_set
+from ..result_files.contact_sheet import thumbnail
+from ..result_files.result_folder import require_room, save
+from ..sirfs.priors.prior_file import load_prior_set
+from ..sirfs.priors.prior_set import PriorSet
 from .attempts import attempt
 from .fetch import is_url, local_copy, sha256
 from .fingerprint import fingerprint, is_finished

@@ -26,14 +26,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..brdf.model import check_range
-from ..decomposition import Decomposition
-from ..environment import environment_from_shading
 from ..errors import InputError
-from .edited import MOST_GAIN, Edited, edited, light_color, luminance, white_of
-from .light_direction import explain_specular
-from .lights import DirectionalLight
-from .lobes import USUAL_EXPONENT, Lobe, known_lobe, lobe_in, lobe_under, strength_of
+from ..imaging.luminance import luminance, white_of
+from ..lobe_fitting.light_direction import explain_specular
+from ..scene.decomposition import Decomposition
+from ..shading.brdf.model import check_range
+from ..shading.environment_map import environment_from_shading
+from ..shading.lights import DirectionalLight
+from ..shading.lobe_rendering import USUAL_EXPONENT, Lobe, lobe_in, lobe_under
+from .edited import MOST_GAIN, Edited, edited, light_color
+from .lobes import known_lobe, strength_of
 
 METHODS = ("remap", "render")
 _SKY_ROWS = 16

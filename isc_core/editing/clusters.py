@@ -15,11 +15,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..decomposition import Decomposition
 from ..errors import InputError
+from ..imaging.guided_filter import affine_fit
+from ..imaging.luminance import white_of
+from ..scene.decomposition import Decomposition
 from .chroma import to_oklab
-from .edited import light_color, white_of
-from .guided import affine_fit
+from .edited import light_color
 
 LARGEST_COUNT = 12
 _LIGHTNESS, _DARK = 0.2, 0.15  # the weight of L; below the second the ratios are mostly noise

@@ -20,11 +20,12 @@ clipped, so is the edit.
 import numpy as np
 from scipy import ndimage
 
-from ..decomposition import Decomposition
 from ..errors import InputError
-from ..photo import Photo, mask_box
-from .edited import Edited, white_of
-from .guided import affine_fit, window_means
+from ..imaging.guided_filter import affine_fit, window_means
+from ..imaging.luminance import white_of
+from ..photo.photo import Photo, mask_box
+from ..scene.decomposition import Decomposition
+from .edited import Edited
 
 _EPSILON = 1e-3  # of the white's square: contrasts below a thirtieth of the white tell little
 _CHUNK = 1_000_000  # pixels at a time

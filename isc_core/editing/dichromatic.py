@@ -18,9 +18,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy import ndimage
 
-from ..brdf.model import check_range
-from ..decomposition import Decomposition
-from .edited import MOST_GAIN, Edited, edited, white_of
+from ..imaging.luminance import white_of
+from ..scene.decomposition import Decomposition
+from ..shading.brdf.model import check_range
+from .edited import MOST_GAIN, Edited, edited
 
 
 @dataclass(frozen=True)

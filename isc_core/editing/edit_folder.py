@@ -17,14 +17,15 @@ from typing import Any
 
 import numpy as np
 
-from ..atomic import new_folder, require_writable
-from ..decomposition import Decomposition
-from ..exr import read_channels, write_channels
-from ..photo import Photo, Raster, recoded, write_png
-from ..report import Panel, Shown, edit_sheet
+from ..imaging.luminance import white_of
+from ..io.atomic import new_folder, require_writable
+from ..io.exr import read_channels, write_channels
+from ..photo.photo import Photo, Raster, recoded, write_png
+from ..result_files.contact_sheet import Panel, Shown, edit_sheet
+from ..scene.decomposition import Decomposition
 from .clusters import Clusters
 from .compositing import composite
-from .edited import Edited, light_color, white_of
+from .edited import Edited, light_color
 
 FILES = ("edit.json", "edited.png", "edited.exr", "before_after.png", "clusters.png")
 _FADED = 0.06

@@ -16,11 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..decomposition import Decomposition
+from ..imaging.luminance import luminance
+from ..scene.decomposition import Decomposition
 
 MOST_GAIN = 1e6  # of any layer that is made stronger
 _MOST_LIGHT = 1e30  # far from what single precision cannot hold
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
 
 
 @dataclass(frozen=True)
@@ -62,11 +62,6 @@ def edited(
     return Edited(np.where(same, d.image, total), new_diffuse, new_specular, notes)
 
 
-def luminance(color: np.ndarray) -> np.ndarray:
-    """(...) of linear Rec.709 (..., 3), float64."""
-    return np.asarray(color, float) @ LUMINANCE
-
-
 def light_color(d: Decomposition) -> np.ndarray:
     """(3,) the mean colour of the light on the object, of luminance 1. One photo leaves open how
     much of a tint is light and how much is paint; `reflectance * light_color` is the paint as the
@@ -76,15 +71,6 @@ def light_color(d: Decomposition) -> np.ndarray:
     return np.maximum(mean, 1e-3 * mean.max()) / float(
         luminance(np.maximum(mean, 1e-3 * mean.max()))
     )
-
-
-def white_of(layer: np.ndarray, mask: np.ndarray, percentile: float = 99.5) -> float:
-    """The layer's white: this percentile of its brightest channel over the lit pixels of the mask;
-    1 if none is lit.
-    """
-    bright = layer[mask].max(-1)
-    lit = bright[bright > 0]
-    return float(np.percentile(lit, percentile)) if lit.size else 1.0
 
 
 def _layer(values: np.ndarray, mask: np.ndarray) -> np.ndarray:

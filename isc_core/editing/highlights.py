@@ -13,11 +13,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..decomposition import Decomposition
 from ..errors import InputError
-from .edited import Edited, edited, luminance
-from .lights import DirectionalLight
-from .lobes import Lobe, known_lobe, lobe_under, strength_of
+from ..imaging.luminance import luminance
+from ..scene.decomposition import Decomposition
+from ..shading.lights import DirectionalLight
+from ..shading.lobe_rendering import Lobe, lobe_under
+from .edited import Edited, edited
+from .lobes import known_lobe, strength_of
 
 
 def add_highlight(

@@ -18,11 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..brdf.model import check_range
-from ..decomposition import Decomposition
 from ..errors import InputError
+from ..imaging.luminance import luminance, white_of
+from ..scene.decomposition import Decomposition
+from ..shading.brdf.model import check_range
 from .chroma import from_oklab, to_oklab
-from .edited import Edited, edited, light_color, luminance, white_of
+from .edited import Edited, edited, light_color
 
 
 @dataclass(frozen=True)

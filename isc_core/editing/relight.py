@@ -24,15 +24,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..brdf.model import check_range
-from ..brdf.shading import sh_shading
-from ..decomposition import Decomposition
-from ..environment import environment_from_shading, resampled, shading_under
 from ..errors import InputError
-from .edited import Edited, edited, light_color, luminance
-from .light_direction import explain_specular
-from .lights import DirectionalLight
-from .lobes import Lobe, known_lobe, lobe_in, lobe_under, strength_of
+from ..imaging.luminance import luminance
+from ..lobe_fitting.light_direction import explain_specular
+from ..scene.decomposition import Decomposition
+from ..shading.brdf.model import check_range
+from ..shading.environment_map import environment_from_shading, resampled, shading_under
+from ..shading.lights import DirectionalLight
+from ..shading.lobe_rendering import Lobe, lobe_in, lobe_under
+from ..shading.radiance import sh_shading
+from .edited import Edited, edited, light_color
+from .lobes import known_lobe, strength_of
 
 HIGHLIGHTS = ("auto", "keep", "scale", "remove", "render")
 _MOST = 4.0  # times: how much brighter scaling makes a highlight

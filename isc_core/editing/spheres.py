@@ -6,8 +6,8 @@ the light's shading of that normal, and a lobe's on top where one is given.
 
 import numpy as np
 
-from .light_direction import lobe_light
-from .lights import DirectionalLight
+from ..lobe_fitting.light_direction import lobe_light
+from ..shading.lights import DirectionalLight
 
 
 def sphere_normals(size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -28,10 +28,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled import compiled
 from ..errors import InputError
+from ..numerics.jit import compiled
+from ..numerics.thread_pool import Workers
 from ..progress import Monitor
-from ..workers import Workers
 from .walsh_hadamard import PATCH, opponent, project, strongest
 
 

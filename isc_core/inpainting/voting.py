@@ -8,7 +8,7 @@ s the upper quartile of all d, l_p a loss that the caller may add. Citation: see
 
 import numpy as np
 
-from ..compiled import compiled
+from ..numerics.jit import compiled
 from .coherency_sensitive_hashing import Matches, Patches
 
 # Weights below exp(-60) are as good as none, but must not vanish: where all patches match badly

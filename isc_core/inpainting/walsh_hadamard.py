@@ -22,8 +22,8 @@ from functools import partial
 
 import numpy as np
 
-from ..compiled import compiled
-from ..workers import Workers
+from ..numerics.jit import compiled
+from ..numerics.thread_pool import Workers
 
 PATCH = 8
 _CELLS = PATCH * PATCH

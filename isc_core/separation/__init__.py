@@ -15,14 +15,13 @@ from types import ModuleType
 
 import numpy as np
 
-from ..box import mask_slices
-from ..decomposition import Separation
 from ..errors import InputError
+from ..imaging.bounding_box import mask_slices
 from ..progress import Monitor
-from .checks import check_arrays
+from ..scene.decomposition import Separation
+from .support.checks import check_arrays
 
-METHODS = (
-    "none",
+PUBLISHED = (
     "tan_2005",
     "mallick_2006",
     "yoon_2006",
@@ -31,6 +30,10 @@ METHODS = (
     "kim_2013",
     "shen_2013",
     "akashi_2016",
+)
+METHODS = (
+    "none",
+    *PUBLISHED,
     "chaotic_segmentation",
     "sparse_coding",
     "network",
@@ -123,7 +126,8 @@ def _module(method: str) -> ModuleType:
         raise InputError(
             f"unknown separation method {method!r}: choose one of {', '.join(METHODS)}"
         )
-    return importlib.import_module(f".{method}", __package__)
+    folder = ".published" if method in PUBLISHED else ""
+    return importlib.import_module(f"{folder}.{method}", __package__)
 
 
 def _placed(layer: np.ndarray, part: tuple[slice, slice], shape: tuple[int, ...]) -> np.ndarray:

@@ -32,8 +32,8 @@ from typing import Literal
 import numpy as np
 from scipy import ndimage
 
-from ..decomposition import Separation
 from ..errors import InputError
+from ..imaging.channels import largest, smallest
 from ..inpainting.coherency_sensitive_hashing import (
     CshOptions,
     CshSearch,
@@ -44,11 +44,11 @@ from ..inpainting.patch_fill import PatchFillOptions, fill_patches
 from ..inpainting.pull_push import fill
 from ..inpainting.voting import vote
 from ..progress import Monitor
+from ..scene.decomposition import Separation
 from ..thresholding import OPTIMISERS, OtsuObjective, maximise, quantise
-from .channels import largest, smallest
-from .checks import check_arrays, require_colour
-from .evidence import colour_evidence
-from .layers import diffuse_layers, white_layers
+from .support.checks import check_arrays, require_colour
+from .support.layers import diffuse_layers, white_layers
+from .support.saturation_gate import saturation_gate
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def separate(
         return diffuse_layers(
             inside, mask, np.where(specular[..., None], filled * peak, inside), clipped
         )
-    share = colour_evidence(scaled, known | specular) * peak if options.guard else peak
+    share = saturation_gate(scaled, known | specular) * peak if options.guard else peak
     if share == 0:
         return white_layers(inside, mask, np.zeros(mask.shape), clipped)
     removed = share * _white_light(scaled, known, specular, options, monitor.part(0.1, 1.0))

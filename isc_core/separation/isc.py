@@ -43,16 +43,17 @@ from functools import cached_property
 import numpy as np
 from scipy import ndimage
 
-from ..decomposition import Separation
-from ..enlarging import enlarged
 from ..errors import InputError
+from ..imaging.channels import largest, smallest
+from ..imaging.smoothing import masked_gaussian, weighted_gaussian
+from ..imaging.upsampling import enlarged
 from ..progress import Monitor
-from .channels import largest, smallest
-from .checks import check_arrays
-from .edge_aware import Paths
-from .evidence import colour_evidence
-from .filter_statistics import highlight_prior
-from .highlight_cues import (
+from ..scene.decomposition import Separation
+from .sparse_coding import grouped_specular
+from .support.checks import check_arrays
+from .support.edge_aware import Paths
+from .support.filter_statistics import highlight_prior
+from .support.highlight_cues import (
     Steps,
     far_from_borders,
     noise_level,
@@ -61,10 +62,9 @@ from .highlight_cues import (
     roughness,
     steps_of,
 )
-from .hue_grid import HueGrid, Places, hue_of, quantile
-from .layers import white_layers
-from .smoothing import masked_gaussian, weighted_gaussian
-from .sparse_coding import grouped_specular
+from .support.hue_grid import HueGrid, Places, hue_of, quantile
+from .support.layers import white_layers
+from .support.saturation_gate import saturation_gate
 
 # Objects longer than this are judged on averages of blocks, in pixels.
 _LONGEST = 640
@@ -537,5 +537,5 @@ def _confidence(photo: _Photo, specular: np.ndarray) -> np.ndarray:
 
     On a pale object colour tells little, and e is up to three times as large.
     """
-    error = (specular + 0.3 * photo.low) * (3 - 2 * colour_evidence(photo.image, photo.mask))
+    error = (specular + 0.3 * photo.low) * (3 - 2 * saturation_gate(photo.image, photo.mask))
     return np.where(photo.mask, np.exp(-error / photo.base), 0).astype(np.float32)

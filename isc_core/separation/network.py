@@ -20,14 +20,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..decomposition import Separation
 from ..errors import InputError
+from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
+from ..networks.layers import STRIDE
 from ..progress import Monitor
-from .checks import check_arrays
-from .convolutions import STRIDE
-from .layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
-from .layers import diffuse_layers
-from .light_tint import held_to_light
+from ..scene.decomposition import Separation
+from .support.checks import check_arrays
+from .support.layers import diffuse_layers
+from .support.light_tint import held_to_light
 
 _UNIT = 0.1  # of the mean light: an error of this size halves the confidence
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from ..decomposition import Separation
-from .checks import check_arrays
+from ..scene.decomposition import Separation
+from .support.checks import check_arrays
 
 
 def separate(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None) -> Separation:

@@ -38,13 +38,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from ..compiled import compiled
-from ..decomposition import Separation
 from ..errors import InputError
+from ..imaging.smoothing import masked_gaussian
+from ..numerics.jit import compiled
 from ..progress import Monitor
-from .checks import check_arrays, require_colour
-from .layers import diffuse_layers, white_layers
-from .smoothing import masked_gaussian
+from ..scene.decomposition import Separation
+from .support.checks import check_arrays, require_colour
+from .support.layers import diffuse_layers, white_layers
 
 # Linear Rec.709 to CIE XYZ, and what a specular light of 1 in each channel is there: its length and
 # direction (the highlight atom).

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from ..compiled import drop_broken, ensure_cache_folder
+from ..numerics.jit import drop_broken, ensure_cache_folder
 from ..progress import Monitor
 from .solver import compiled_engine_available
 

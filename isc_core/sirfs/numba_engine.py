@@ -9,12 +9,13 @@ from functools import partial
 
 import numpy as np
 
-from ..workers import Workers
+from ..numerics.thread_pool import Workers
+from ..shading.irradiance_basis import C1, C2, C3, C4, C5
+from ..shading.surface_stencils import fold_border
 from . import kernels, reflectance, surface
-from .illumination import C1, C2, C3, C4, C5, light_cost
+from .illumination import light_cost
+from .priors.tabulated_potential import TabulatedPotential
 from .problem import PAIR_OFFSETS, Evaluation, Problem, Terms
-from .stencils import fold_border
-from .tables import CostTable
 
 _ROWS_A_BLOCK = 16
 _MOST_BLOCKS = 16
@@ -35,7 +36,7 @@ def _unfold_light_gradient(sums: np.ndarray) -> np.ndarray:
     return gradient
 
 
-def _from_zero(table: CostTable) -> tuple[float, np.ndarray]:
+def _from_zero(table: TabulatedPotential) -> tuple[float, np.ndarray]:
     """The part of `table` that arguments above 0 need: where its first node is, and its costs."""
     first = min(max(int(np.floor(-table.low / table.step)), 0), len(table.values) - 2)
     return table.low + first * table.step, table.values[first:]

@@ -4,8 +4,9 @@ is held against.
 
 import numpy as np
 
+from ..shading.irradiance_basis import basis, basis_adjoint
 from . import reflectance, surface
-from .illumination import basis, basis_adjoint, light_cost
+from .illumination import light_cost
 from .problem import Evaluation, Problem, Terms
 from .silhouette import silhouette_cost
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .contour import Contour
-from .priors import Priors
+from ..shading.occluding_contour import Contour
+from .priors.priors import Priors
 from .settings import Weights
 from .silhouette import SilhouetteField
 

@@ -10,13 +10,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ..imaging.framing import continued
+from ..imaging.resampling import height_scale, resample_height, resample_inside
 from ..progress import Monitor
-from .contour import Contour, occluding_contour
-from .framing import continued
-from .priors import Priors
+from ..scene.normal_estimate import NormalEstimate
+from ..shading.occluding_contour import Contour, occluding_contour
+from .normal_prior import expected_field
+from .priors.priors import Priors
 from .problem import DepthObservation, Problem, Terms
-from .resampling import height_scale, resample_height, resample_inside
-from .seen_shape import SeenShape, expected_field
 from .settings import Weights
 from .solver import SolverOptions, solve
 
@@ -114,7 +115,7 @@ def recover(
     options: RecoverOptions | None = None,
     *,
     trust: np.ndarray | None = None,
-    seen: SeenShape | None = None,
+    seen: NormalEstimate | None = None,
     known: Known | None = None,
     monitor: Monitor | None = None,
 ) -> Recovered:
@@ -142,7 +143,7 @@ def recover(
         None if trust is None else window.cut(trust, 0),
         None
         if seen is None
-        else SeenShape(window.cut(seen.normal, 0), window.cut(seen.deviation, 0)),
+        else NormalEstimate(window.cut(seen.normal, 0), window.cut(seen.deviation, 0)),
     )
     problem = scene.problem(factor)
     given = (
@@ -221,7 +222,7 @@ class _Scene:
     known: Known
     window: _Window
     trust: np.ndarray | None
-    seen: SeenShape | None
+    seen: NormalEstimate | None
 
     def problem(self, factor: float) -> Problem:
         """The problem at `factor` times the image's scale."""
@@ -249,7 +250,7 @@ class _Scene:
             seen = (
                 None
                 if seen is None
-                else SeenShape(
+                else NormalEstimate(
                     *(
                         resample_inside(m, self.inside, factor)[0]
                         for m in (seen.normal, seen.deviation)

@@ -19,7 +19,7 @@ from itertools import product
 import numpy as np
 from scipy import ndimage
 
-from .priors import AbsoluteTable, Priors
+from .priors.priors import AbsoluteTable, Priors
 from .problem import PAIR_OFFSETS
 from .settings import Weights
 from .surface import pair_slices

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from .priors import SilhouetteProfile
+from .priors.priors import SilhouetteProfile
 
 _STEPS = 257
 _STEEPEST = 0.99  # of an in-plane part of a normal

@@ -17,11 +17,11 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..linear import solved
+from ..numerics.lbfgs import Algebra, LbfgsOptions, LbfgsResult, Minimisation, NumpyAlgebra
+from ..numerics.linear import solved
+from ..numerics.thread_pool import Workers
 from ..progress import Monitor
-from ..workers import Workers
 from .illumination import stack, unstack
-from .lbfgs import Algebra, LbfgsOptions, LbfgsResult, Minimisation, NumpyAlgebra
 from .numpy_engine import NumpyEngine
 from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
@@ -96,7 +96,7 @@ def thread_count(options: SolverOptions) -> int:
     return min(options.threads or allowed, MOST_THREADS)
 
 
-class _Tools:
+class Backend:
     """The engine and its algebra, chosen once for a solve."""
 
     def __init__(self, options: SolverOptions, workers: Workers) -> None:
@@ -150,7 +150,7 @@ class _Tools:
             down(fine, coarse)
 
 
-class _Unknowns:
+class ParameterVector:
     """One vector that holds the pyramid levels and the whitened light, or only what is not known
     beforehand.
     """
@@ -158,7 +158,7 @@ class _Unknowns:
     def __init__(
         self,
         problem: Problem,
-        tools: _Tools,
+        tools: Backend,
         levels: int | None,
         known_height: np.ndarray | None,
         known_light: np.ndarray | None,
@@ -250,8 +250,8 @@ def solve(
                 "a given shape or light has holes or infinite values: fill them, or give the shape as depth"
             )
     with Workers(thread_count(options)) as workers:
-        tools = _Tools(options, workers)
-        unknowns = _Unknowns(problem, tools, options.levels, known_height, known_light)
+        tools = Backend(options, workers)
+        unknowns = ParameterVector(problem, tools, options.levels, known_height, known_light)
         monitor.report("shape and light", 0.0)
         if unknowns.x.size:
             begun = _begun(
@@ -271,7 +271,7 @@ def solve(
 
 
 def _begun(
-    unknowns: _Unknowns,
+    unknowns: ParameterVector,
     starts: Sequence[Start],
     options: LbfgsOptions,
     algebra: Algebra,

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from .contour import Contour
+from ..shading.occluding_contour import Contour
+from ..shading.surface_stencils import DERIVATIVES, derivative, derivative_adjoint
+from .priors.tabulated_potential import TabulatedPotential
 from .problem import PAIR_OFFSETS, DepthObservation
-from .stencils import DERIVATIVES, derivative, derivative_adjoint
-from .tables import CostTable
 
 SOFT_DIFFERENCE = 1e-8
 SLANT_SOFTNESS = 0.01
@@ -83,7 +83,7 @@ def pair_slices(down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice
 
 
 def curvature_cost(
-    curvature: np.ndarray, valid: np.ndarray, table: CostTable, weight: float
+    curvature: np.ndarray, valid: np.ndarray, table: TabulatedPotential, weight: float
 ) -> tuple[float, np.ndarray]:
     """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`,
     both (H, W).

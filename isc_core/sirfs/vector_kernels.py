@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from numba import njit
 
-from ..workers import Workers
+from ..numerics.thread_pool import Workers
 from .pyramid import TAPS
 
 _compiled = njit(

@@ -19,13 +19,13 @@ from isc_core.batch.item import DONE, FAILED, SKIPPED, Recipe
 from isc_core.batch.journal import Journal
 from isc_core.batch.run import run_batch
 from isc_core.batch.summary import PAGE
+from isc_core.decompose.pipeline import decompose
+from isc_core.decompose.settings import Settings
 from isc_core.errors import Cancelled, InputError
-from isc_core.limits import Limits
-from isc_core.models.settings import Settings
-from isc_core.photo import read_photo
-from isc_core.pipeline import decompose
+from isc_core.io.limits import Limits
+from isc_core.photo.photo import read_photo
 from isc_core.progress import Monitor
-from isc_core.result_folder import DECOMPOSITION_FILES, load, save
+from isc_core.result_files.result_folder import DECOMPOSITION_FILES, load, save
 from tests.batch.conftest import HERE, QUICK, batch, rows
 from tests.batch.tasks import obedient
 from tests.core.command_line import ball_codes, write_image

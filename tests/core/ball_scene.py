@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from isc_core.decomposition import Decomposition, Provenance
-from isc_core.sirfs.frames import real_sh
+from isc_core.scene.decomposition import Decomposition, Provenance
+from isc_core.shading.spherical_harmonics import real_sh
 
 LIGHT = np.array(
     [

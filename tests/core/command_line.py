@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from isc_core.photo import linear_to_srgb
+from isc_core.photo.photo import linear_to_srgb
 from tests.core.ball_scene import ball
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -51,5 +51,5 @@ def isc_command(*arguments: object, before: str = "") -> list[str]:
     return [
         sys.executable,
         "-c",
-        f"{before}\nimport sys\nfrom isc_core.cli import main\nsys.exit(main({words!r}))",
+        f"{before}\nimport sys\nfrom isc_core.cli.main import main\nsys.exit(main({words!r}))",
     ]

@@ -8,8 +8,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from isc_core.box import mask_slices
-from isc_core.decomposition import Separation
+from isc_core.imaging.bounding_box import mask_slices
+from isc_core.scene.decomposition import Separation
 
 PAINTS = np.array([[0.7, 0.2, 0.1], [0.15, 0.55, 0.2], [0.1, 0.25, 0.6]])
 

@@ -9,8 +9,8 @@ import pytest
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.separation import akashi_2016
-from isc_core.separation.akashi_2016 import VARIANTS, Akashi2016Options, separate
+from isc_core.separation.published import akashi_2016
+from isc_core.separation.published.akashi_2016 import VARIANTS, Akashi2016Options, separate
 from tests.core.separation_scenes import read
 
 RED, GREEN = np.array([0.8, 0.15, 0.1]), np.array([0.1, 0.6, 0.15])

@@ -8,19 +8,19 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from training.data.environments import PLACES, make_surroundings
-from isc_core.appearance import (
+from isc_core.errors import InputError
+from isc_core.networks.scene_classifier import (
     GLASS,
     KINDS,
     LAMPS,
     MIRROR,
     ORDINARY,
     AppearanceNetwork,
-    kinds_of,
+    classify_scene,
     read_appearance,
 )
-from isc_core.errors import InputError
 from tests.core.lit_balls import mirror_ball, under_lamps
+from training.data.environments import PLACES, make_surroundings
 
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
 
@@ -56,38 +56,38 @@ def shares(kinds: dict[str, float]) -> np.ndarray:
 def test_the_answer_is_one_of_probabilities_whatever_the_exposure_and_the_side() -> None:
     rng = np.random.default_rng(0)
     network, (image, mask) = small_network(rng), photo(rng)
-    found = shares(kinds_of(image, mask, network))
+    found = shares(classify_scene(image, mask, network))
     assert found.min() > 0 and found.sum() == pytest.approx(1)
-    np.testing.assert_allclose(shares(kinds_of(8 * image, mask, network)), found, rtol=1e-4)
+    np.testing.assert_allclose(shares(classify_scene(8 * image, mask, network)), found, rtol=1e-4)
     np.testing.assert_allclose(
-        shares(kinds_of(image[:, ::-1], mask[:, ::-1], network)), found, rtol=1e-9
+        shares(classify_scene(image[:, ::-1], mask[:, ::-1], network)), found, rtol=1e-9
     )
 
 
 def test_what_is_outside_the_mask_and_the_number_of_threads_change_nothing() -> None:
     rng = np.random.default_rng(1)
     network, (image, mask) = small_network(rng), photo(rng)
-    found = shares(kinds_of(image, mask, network))
+    found = shares(classify_scene(image, mask, network))
     padded = np.pad(
         np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9
     )
     for threads in (1, 3):
         with threadpool_limits(threads):
             np.testing.assert_array_equal(
-                shares(kinds_of(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found
+                shares(classify_scene(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found
             )
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-30, 1.0])
 def test_photos_without_anything_in_them_are_judged_too(level: float) -> None:
-    found = shares(kinds_of(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool)))
+    found = shares(classify_scene(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool)))
     assert np.isfinite(found).all() and found.sum() == pytest.approx(1)
 
 
 @pytest.mark.parametrize("place", PLACES)
 def test_mirrors_look_like_mirrors(place: str) -> None:
     found = [
-        kinds_of(*mirror_ball(make_surroundings(place, np.random.default_rng([9, k]))))
+        classify_scene(*mirror_ball(make_surroundings(place, np.random.default_rng([9, k]))))
         for k in range(10)
     ]
     assert sum(kinds[MIRROR] + kinds[GLASS] > 0.5 for kinds in found) >= (
@@ -96,8 +96,11 @@ def test_mirrors_look_like_mirrors(place: str) -> None:
 
 
 def test_paint_under_one_lamp_is_ordinary_and_under_three_it_is_not() -> None:
-    assert kinds_of(*under_lamps((-0.5, 0.5, 0.7)))[ORDINARY] > 0.7
-    assert kinds_of(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7)))[LAMPS] > 0.8
+    assert classify_scene(*under_lamps((-0.5, 0.5, 0.7)))[ORDINARY] > 0.7
+    assert (
+        classify_scene(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7)))[LAMPS]
+        > 0.8
+    )
 
 
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:

@@ -12,18 +12,18 @@ import numpy as np
 import pytest
 import trimesh
 
-from isc_core.arrays_file import ARRAYS, arrays_of
-from isc_core.brdf.fitting import fit_lobe
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.shading import directional, radiance
-from isc_core.cli import main
-from isc_core.decomposition import COLOR_MAPS, Decomposition
-from isc_core.environment import shading_under
+from isc_core.cli.main import main
 from isc_core.errors import InputError
-from isc_core.gloss import gloss_of
-from isc_core.mesh import MeshOptions, MeshResult, build_mesh
-from isc_core.result_folder import load, require_room, save
-from isc_core.sirfs.frames import real_sh
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting.specular_level import gloss_of
+from isc_core.result_files.arrays_file import ARRAYS, arrays_of
+from isc_core.result_files.mesh import MeshOptions, MeshResult, build_mesh
+from isc_core.result_files.result_folder import load, require_room, save
+from isc_core.scene.decomposition import COLOR_MAPS, Decomposition
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.environment_map import shading_under
+from isc_core.shading.radiance import directional, radiance
+from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.ball_scene import ball
 
 Arrays = dict[str, np.ndarray]

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from isc_core import atomic
-from isc_core.atomic import new_file, new_folder, require_writable
 from isc_core.errors import Cancelled, InputError
+from isc_core.io import atomic
+from isc_core.io.atomic import new_file, new_folder, require_writable
 
 OURS = ("mark.json", "data.bin", "maps/one.bin")
 
@@ -179,7 +179,7 @@ def test_asking_whether_it_is_writable_leaves_no_trace(tmp_path: Path) -> None:
 def test_ctrl_c_in_a_real_process_leaves_nothing(tmp_path: Path) -> None:
     script = (
         "import os, signal, sys\n"
-        "from isc_core.atomic import new_folder\n"
+        "from isc_core.io.atomic import new_folder\n"
         # A job in the background of a script inherits that interrupts are ignored.
         "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
         "with new_folder(sys.argv[1], ('mark.json',)) as partial:\n"

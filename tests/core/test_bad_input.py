@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from isc_core.cli import main
-from isc_core.exr import write_channels
+from isc_core.cli.main import main
+from isc_core.io.exr import write_channels
 from tests.core.command_line import ball_codes, ball_photo, run_isc, write_image
 
 Maker = Callable[[Path], list[object]]

@@ -14,8 +14,12 @@ from isc_core.baselines.light_direction import estimate_light
 from isc_core.baselines.light_fit import fit_light
 from isc_core.baselines.poisson import integrate
 from isc_core.errors import InputError
-from isc_core.sirfs.frames import normal_from_reference, normal_to_reference, reference_basis
-from isc_core.sirfs.stencils import normals
+from isc_core.shading.spherical_harmonics import (
+    normal_from_reference,
+    normal_to_reference,
+    reference_basis,
+)
+from isc_core.shading.surface_stencils import normals
 
 SIZE = 100
 

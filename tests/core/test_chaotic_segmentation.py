@@ -9,9 +9,9 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.decomposition import Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Separation
 from isc_core.separation.chaotic_segmentation import (
     VARIANTS,
     ChaoticSegmentationOptions,

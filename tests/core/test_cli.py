@@ -16,19 +16,19 @@ import numpy as np
 import pytest
 
 from isc_core import __version__
-from isc_core.cli import main
-from isc_core.commands import build_parser
-from isc_core.datasets import load_object
+from isc_core.cli.commands import build_parser
+from isc_core.cli.interface.terminal import Interrupts, ProgressBar
+from isc_core.cli.main import main
+from isc_core.datasets.mit_berkeley import load_object
 from isc_core.errors import Cancelled, InputError
-from isc_core.evaluation_runner import RunnerOptions, make_runner
-from isc_core.evidence_files import CODE, read_height, read_light
-from isc_core.exr import read_channels, write_channels
-from isc_core.photo import linear_to_srgb, read_photo
+from isc_core.evaluation.runner import RunnerOptions, make_runner
+from isc_core.io.exr import read_channels, write_channels
+from isc_core.photo.photo import linear_to_srgb, read_photo
 from isc_core.progress import Monitor
-from isc_core.result_folder import load
+from isc_core.result_files.known_inputs import CODE, read_height, read_light
+from isc_core.result_files.result_folder import load
 from isc_core.separation import BEST, separate
-from isc_core.sirfs.prior_file import load_prior_set, shipped_prior_set
-from isc_core.terminal import Interrupts, ProgressBar
+from isc_core.sirfs.priors.prior_file import load_prior_set, shipped_prior_set
 from tests.core.ball_scene import LIGHT
 from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, run_isc, write_image
 from tests.core.separation_scenes import glossy_disc
@@ -620,7 +620,7 @@ def test_trouble_with_the_machine_is_one_line(
     def fail(arguments: list[str], speaker: object) -> int:
         raise error
 
-    monkeypatch.setattr("isc_core.cli._run", fail)
+    monkeypatch.setattr("isc_core.cli.main._run", fail)
     assert main([]) == 2
     text = capsys.readouterr().err
     assert words in text and text.count("\n") == 1
@@ -652,7 +652,7 @@ def through_terminal(script: str) -> str:
 
 def test_a_terminal_shows_one_line_that_is_wiped_at_the_end() -> None:
     text = through_terminal(
-        "import sys; from isc_core.terminal import ProgressBar\n"
+        "import sys; from isc_core.cli.interface.terminal import ProgressBar\n"
         "with ProgressBar(sys.stderr) as bar:\n"
         "    bar('separating', 0.25); bar('shape and light, loss 46.100', 0.5); bar('maps ' + 99 * '.', 0.4)\n"
     )
@@ -667,7 +667,7 @@ def test_a_terminal_shows_one_line_that_is_wiped_at_the_end() -> None:
 def test_a_terminal_is_not_redrawn_for_every_step() -> None:
     start = time.monotonic()
     text = through_terminal(
-        "import sys; from isc_core.terminal import ProgressBar\n"
+        "import sys; from isc_core.cli.interface.terminal import ProgressBar\n"
         "with ProgressBar(sys.stderr) as bar:\n"
         "    for k in range(20000): bar(f'shape and light, loss {k}', k / 20000)\n"
     )
@@ -691,7 +691,7 @@ def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
     """
     pytest.importorskip("numba")
     check = (
-        "import os, numba; from isc_core.compiled import ensure_cache_folder; ensure_cache_folder()\n"
+        "import os, numba; from isc_core.numerics.jit import ensure_cache_folder; ensure_cache_folder()\n"
         "from isc_core.sirfs import kernels; print(kernels.forward_rows.stats.cache_path)"
     )
     environment = {

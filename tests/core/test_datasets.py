@@ -10,10 +10,15 @@ import numpy as np
 import pytest
 import scipy.io
 
-from isc_core.datasets import ILLUMINATIONS, list_objects, load_natural_lights, load_object
+from isc_core.datasets.mit_berkeley import (
+    ILLUMINATIONS,
+    list_objects,
+    load_natural_lights,
+    load_object,
+)
 from isc_core.errors import InputError
-from isc_core.metrics import truth_normal
-from isc_core.sirfs.frames import reference_basis
+from isc_core.evaluation.metrics import truth_normal
+from isc_core.shading.spherical_harmonics import reference_basis
 
 TRAINING = (
     "apple",

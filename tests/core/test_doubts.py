@@ -5,12 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.appearance import GLASS, KINDS, LAMPS, MIRROR, ORDINARY
-from isc_core.decomposition import Separation
-from isc_core.glance import PLACES, Glance
-from isc_core.models import Answer, doubts
-from isc_core.models.doubts import doubted, doubts_of, doubts_of_photo, share_in_blocks
-from isc_core.photo import Photo, PhotoSource
+from isc_core.decompose import assumption_checks as doubts
+from isc_core.decompose.assumption_checks import (
+    doubts_of,
+    doubts_of_photo,
+    share_in_blocks,
+    with_warnings,
+)
+from isc_core.decompose.models import Answer
+from isc_core.networks.scene_classifier import GLASS, KINDS, LAMPS, MIRROR, ORDINARY
+from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.scene.decomposition import Separation
+from isc_core.scene.light_estimate import PLACES, LightEstimate
 
 SIZE = 20
 SURE, MIRRORED = (
@@ -19,9 +25,9 @@ SURE, MIRRORED = (
 )
 
 
-def lit_by(several: float) -> Glance:
+def lit_by(several: float) -> LightEstimate:
     """One lamp or, with a probability of `several`, more."""
-    return Glance(
+    return LightEstimate(
         0.0, 1 - several, several, np.full(len(PLACES), 1 / len(PLACES)), np.zeros(8), np.ones(8)
     )
 
@@ -70,9 +76,9 @@ def test_each_kind_has_its_line(kinds: dict[str, float], several: float, words: 
 def test_a_doubt_leaves_the_confidence_left_for_paint(
     monkeypatch: pytest.MonkeyPatch, kinds: dict[str, float], several: float, left: float
 ) -> None:
-    monkeypatch.setattr(doubts, "kinds_of", lambda image, mask: kinds)
+    monkeypatch.setattr(doubts, "classify_scene", lambda image, mask: kinds)
     photo, answer = answered()
-    found = doubted(photo, answer, lit_by(several))
+    found = with_warnings(photo, answer, lit_by(several))
     assert (
         found.status["converged"]
         and found.status["kinds"] == kinds
@@ -83,7 +89,7 @@ def test_a_doubt_leaves_the_confidence_left_for_paint(
 
 
 def test_the_status_tells_how_likely_each_kind_is() -> None:
-    found = doubted(*answered(), lit_by(0.25)).status
+    found = with_warnings(*answered(), lit_by(0.25)).status
     assert list(found["kinds"]) == list(KINDS) and sum(found["kinds"].values()) == pytest.approx(
         1, abs=1e-3
     )
@@ -94,7 +100,7 @@ def test_much_that_is_too_bright_is_said() -> None:
     photo, answer = answered()
     assert doubts_of_photo(photo) == []
     clipped = photo.mask & (np.indices(photo.mask.shape)[0] > SIZE / 2)
-    lines = doubted(replace(photo, clipped=clipped), answer, lit_by(0.2)).status["doubts"]
+    lines = with_warnings(replace(photo, clipped=clipped), answer, lit_by(0.2)).status["doubts"]
     assert any("too bright for the photo" in line and "%" in line for line in lines)
 
 

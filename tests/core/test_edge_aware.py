@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.separation.edge_aware import Paths
+from isc_core.separation.support.edge_aware import Paths
 
 
 def open_paths(height: int, width: int, reach: float) -> Paths:

@@ -8,10 +8,10 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.cli import main
-from isc_core.exr import read_channels, write_channels
-from isc_core.photo import linear_to_srgb
-from isc_core.result_folder import save
+from isc_core.cli.main import main
+from isc_core.io.exr import read_channels, write_channels
+from isc_core.photo.photo import linear_to_srgb
+from isc_core.result_files.result_folder import save
 from tests.core.ball_scene import LIGHT, ball
 
 FILES = {"edit.json", "edited.png", "edited.exr", "before_after.png"}

@@ -7,22 +7,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.brdf.fitting import LobeFit
-from isc_core.decomposition import Decomposition
 from isc_core.editing.blinn_phong_extension import Gloss, change_gloss, remapped
 from isc_core.editing.chroma import from_oklab, to_oklab
 from isc_core.editing.clusters import find_clusters
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers, masked_blur
-from isc_core.editing.edited import LUMINANCE, light_color, luminance, white_of
+from isc_core.editing.edited import light_color
 from isc_core.editing.highlights import add_highlight
-from isc_core.editing.light_direction import explain_specular
-from isc_core.editing.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
-from isc_core.editing.lobes import Lobe, lobe_in, lobe_under
 from isc_core.editing.recolour import Paint, recolour
 from isc_core.editing.relight import NewLight, Relighting, relight
-from isc_core.environment import directions, solid_angles
 from isc_core.errors import InputError
-from isc_core.sirfs.frames import real_sh
+from isc_core.imaging.luminance import LUMINANCE, luminance, white_of
+from isc_core.lobe_fitting.light_direction import explain_specular
+from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.lobe_fit import LobeFit
+from isc_core.shading.environment_map import directions, solid_angles
+from isc_core.shading.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
+from isc_core.shading.lobe_rendering import Lobe, lobe_in, lobe_under
+from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.ball_scene import LIGHT, ball
 
 

@@ -9,15 +9,22 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.decomposition import Decomposition, Provenance
 from isc_core.editing.compositing import composite
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from isc_core.editing.edit_folder import Original, Record, Sheet, save_edit
 from isc_core.editing.edited import Edited
 from isc_core.editing.recolour import Paint, recolour
 from isc_core.errors import InputError
-from isc_core.exr import read_channels, write_channels
-from isc_core.photo import Photo, PhotoSource, linear_to_srgb, read_linear, read_photo, read_raster
+from isc_core.io.exr import read_channels, write_channels
+from isc_core.photo.photo import (
+    Photo,
+    PhotoSource,
+    linear_to_srgb,
+    read_linear,
+    read_photo,
+    read_raster,
+)
+from isc_core.scene.decomposition import Decomposition, Provenance
 from tests.core.ball_scene import ball
 
 SCALE = 0.5

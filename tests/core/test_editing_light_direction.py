@@ -1,4 +1,4 @@
-"""The optimal light direction: found again where one light made the picture, doubted where none
+"""The optimal light direction: found again where one light made the picture, with_warnings where none
 did.
 """
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.brdf.fitting.result import NO_LIGHT, LobeFit
-from isc_core.decomposition import Decomposition
-from isc_core.editing.light_direction import explain_shading, explain_specular, lobe_light
-from isc_core.editing.lights import DirectionalLight, toward
 from isc_core.editing.spheres import render_sphere
+from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, lobe_light
+from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.lobe_fit import NO_LIGHT, LobeFit
+from isc_core.shading.lights import DirectionalLight, toward
 from tests.core.ball_scene import ball
 
 LIGHTS = [(0.4, 0.5, 0.77), (-0.7, 0.2, 0.5), (0.1, 0.9, 0.3), (0.0, 0.0, 1.0), (0.8, -0.3, -0.2)]

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from isc_core.environment import (
+from isc_core.shading.environment_map import (
     directions,
     environment_from_shading,
     resampled,
     shading_under,
     solid_angles,
 )
-from isc_core.sirfs.frames import real_sh
+from isc_core.shading.spherical_harmonics import real_sh
 
 
 def facing_normals(count: int) -> np.ndarray:

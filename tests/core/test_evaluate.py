@@ -10,14 +10,14 @@ import pytest
 import scipy.io
 
 from isc_core.baselines import retinex
-from isc_core.datasets import MitBerkeleyObject, load_object
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_object
 from isc_core.errors import Cancelled, InputError
-from isc_core.evaluate import Estimate, EvaluationReport, evaluate, paired_bootstrap
-from isc_core.evaluation_runner import RunnerOptions, make_runner
-from isc_core.metrics import truth_normal
+from isc_core.evaluation.evaluate import Estimate, EvaluationReport, evaluate, paired_bootstrap
+from isc_core.evaluation.metrics import truth_normal
+from isc_core.evaluation.runner import RunnerOptions, make_runner
 from isc_core.progress import Monitor
-from isc_core.sirfs.frames import light_from_reference, reference_basis
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.shading.spherical_harmonics import light_from_reference, reference_basis
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
 
 def write_set(root: Path) -> Path:

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from isc_core.separation.evidence import colour_evidence
-from isc_core.separation.highlight_cues import ramp
+from isc_core.separation.support.highlight_cues import ramp
+from isc_core.separation.support.saturation_gate import saturation_gate
 
 
 @pytest.mark.parametrize(
@@ -16,18 +16,18 @@ def test_evidence_rises_with_saturation_and_not_with_exposure(
 ) -> None:
     colour = np.array([1.0, 1 - saturation / 2, 1 - saturation])
     image = scale * np.random.default_rng(0).random((20, 30, 1)) * colour
-    assert colour_evidence(image, np.ones((20, 30), bool)) == pytest.approx(expected, abs=1e-9)
+    assert saturation_gate(image, np.ones((20, 30), bool)) == pytest.approx(expected, abs=1e-9)
 
 
 def test_only_usable_pixels_count() -> None:
     image = np.broadcast_to([1.0, 0.5, 0.2], (10, 10, 3)).copy()
     image[5:] = 3.0
     usable = np.zeros((10, 10), bool)
-    assert colour_evidence(image, usable) == 0
+    assert saturation_gate(image, usable) == 0
     usable[:5] = True
-    assert colour_evidence(image, usable) == 1
+    assert saturation_gate(image, usable) == 1
     usable[5:] = True
-    assert colour_evidence(image, usable) == 0
+    assert saturation_gate(image, usable) == 0
 
 
 def test_the_step_is_smooth_and_rises() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from benchmarks.filter_statistics import (
+from benchmarks.separation.filter_statistics import (
     Outcome,
     Sample,
     calibrated,
@@ -17,7 +17,7 @@ from benchmarks.filter_statistics import (
 )
 from isc_core.errors import InputError
 from isc_core.separation import separate
-from isc_core.separation.filter_statistics import (
+from isc_core.separation.support.filter_statistics import (
     BINS,
     FILTERS,
     FilterTable,

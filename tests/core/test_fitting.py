@@ -8,30 +8,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.datasets import load_natural_lights
+from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import Cancelled, InputError
-from isc_core.progress import Monitor
-from isc_core.sirfs.fitting import absolute_table, lights, roughness
-from isc_core.sirfs.fitting.absolute_color import TableFitOptions, fit_absolute_table
-from isc_core.sirfs.fitting.color_mixture import ColorCells, fit_color_mixture
-from isc_core.sirfs.fitting.cross_validation import held_out_log_likelihood
-from isc_core.sirfs.fitting.fit import (
+from isc_core.prior_fitting import roughness
+from isc_core.prior_fitting.absolute_color import TableFitOptions, fit_absolute_table
+from isc_core.prior_fitting.cross_validation import held_out_log_likelihood
+from isc_core.prior_fitting.fit import (
     FitOptions,
     LightFitOptions,
     color_histogram,
     fit_priors,
     fit_whitening,
 )
-from isc_core.sirfs.fitting.pairs import pair_differences
-from isc_core.sirfs.fitting.scale_mixture import Magnitudes, ScaleMixture, fit_scale_mixture
-from isc_core.sirfs.fitting.statistics import (
+from isc_core.prior_fitting.pairs import pair_differences
+from isc_core.prior_fitting.statistics import (
     ObjectStatistics,
     TrainingObject,
     collect_statistics,
     object_statistics,
 )
-from isc_core.sirfs.fitting.training import read_training_objects
-from isc_core.sirfs.fitting.whitening import parsimony_whitening
+from isc_core.prior_fitting.training_objects import read_training_objects
+from isc_core.prior_fitting.whitening import parsimony_whitening
+from isc_core.progress import Monitor
+from isc_core.sirfs.priors import absolute_table, lights
+from isc_core.sirfs.priors.color_mixture import ColorCells, fit_color_mixture
+from isc_core.sirfs.priors.scale_mixture import Magnitudes, ScaleMixture, fit_scale_mixture
 
 FAST = FitOptions(
     iterations=20,

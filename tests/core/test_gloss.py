@@ -5,12 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.brdf.fitting import Interval, LobeFit, LobeFitOptions, fit_lobe
-from isc_core.brdf.fitting.response import LobeModel
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.shading import directional, radiance
-from isc_core.decomposition import Decomposition
-from isc_core.gloss import BOUND, FITTED, NONE_FOUND, NOT_FITTED, gloss_of, specular_variation
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting.specular_level import (
+    BOUND,
+    FITTED,
+    NONE_FOUND,
+    NOT_FITTED,
+    gloss_of,
+    specular_variation,
+)
+from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeModel
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.radiance import directional, radiance
 from tests.core.ball_scene import ball
 
 LAMP = np.array([-0.3, 0.4, 0.866]) / np.linalg.norm([-0.3, 0.4, 0.866])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from isc_core.separation.highlight_cues import (
+from isc_core.separation.support.highlight_cues import (
     Steps,
     far_from_borders,
     noise_level,

@@ -6,16 +6,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.errors import InputError
-from isc_core.exr import write_channels
-from isc_core.highlight_set import (
+from isc_core.datasets.highlight_set import (
     SeparationTruth,
     list_shen_zheng,
     load_laboratory,
     load_rendered,
     load_shen_zheng,
 )
-from isc_core.metrics import mse, psnr
+from isc_core.errors import InputError
+from isc_core.evaluation.metrics import mse, psnr
+from isc_core.io.exr import write_channels
 from tests.core.ball_scene import ball
 from tests.core.command_line import write_image
 

@@ -5,7 +5,7 @@ import colorsys
 import numpy as np
 import pytest
 
-from isc_core.separation.hue_grid import HueGrid, Places, hue_of, quantile
+from isc_core.separation.support.hue_grid import HueGrid, Places, hue_of, quantile
 
 
 def hues_of(image: np.ndarray) -> np.ndarray:

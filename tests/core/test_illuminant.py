@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from benchmarks.illuminant import markdown, measure, relit
+from benchmarks.separation.illuminant import markdown, measure, relit
+from isc_core.datasets.highlight_set import SeparationTruth
 from isc_core.errors import InputError
-from isc_core.highlight_set import SeparationTruth
-from isc_core.illuminant import Illuminant, IlluminantOptions, estimate_illuminant, tinted, whitened
+from isc_core.illuminant.illuminant import (
+    Illuminant,
+    IlluminantOptions,
+    estimate_illuminant,
+    tinted,
+    whitened,
+)
 
 LIGHT = np.array([1.15, 1.0, 0.85])
 PAINTS = np.array([[0.6, 0.15, 0.1], [0.1, 0.5, 0.15], [0.15, 0.2, 0.6], [0.5, 0.45, 0.1]])

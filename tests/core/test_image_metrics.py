@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from isc_core.image_metrics import (
+from isc_core.evaluation.image_metrics import (
     highlight_region,
     rank_correlation,
     sparsification,
     ssim,
     ssim_volume,
 )
-from isc_core.photo import read_linear
-from isc_core.separation import shen_2013
+from isc_core.photo.photo import read_linear
+from isc_core.separation.published import shen_2013
 
 
 def pair(shape: tuple[int, ...] = (23, 19, 3), seed: int = 0) -> tuple[np.ndarray, np.ndarray]:

@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.decomposition import Separation
+from isc_core.datasets.highlight_set import SeparationTruth, load_laboratory, load_shen_zheng
 from isc_core.errors import InputError
-from isc_core.highlight_set import SeparationTruth, load_laboratory, load_shen_zheng
-from isc_core.image_metrics import rank_correlation, sparsification, ssim_volume
-from isc_core.metrics import psnr
-from isc_core.photo import read_linear
+from isc_core.evaluation.image_metrics import rank_correlation, sparsification, ssim_volume
+from isc_core.evaluation.metrics import psnr
+from isc_core.photo.photo import read_linear
 from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Separation
 from isc_core.separation import BEST, METHODS, isc, separate
 from isc_core.separation.isc import VARIANTS, IscOptions
 from tests.core.separation_scenes import PAINTS, assert_layers_hold, error_ratio

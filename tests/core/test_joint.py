@@ -7,15 +7,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.shading import directional, radiance
-from isc_core.decomposition import Decomposition
-from isc_core.models import Settings, Task
-from isc_core.models.joint import Doubt, JointOptions, doubt, joint, repaint
-from isc_core.models.mdr import mdr
-from isc_core.models.task import Answer
-from isc_core.photo import Photo, PhotoSource
-from isc_core.sirfs.frames import light_to_reference
+from isc_core.decompose.joint import JointOptions, ResidualHighlights, doubt, joint, repaint
+from isc_core.decompose.mdr import mdr
+from isc_core.decompose.models import Settings, Task
+from isc_core.decompose.task import Answer
+from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.scene.decomposition import Decomposition
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.radiance import directional, radiance
+from isc_core.shading.spherical_harmonics import light_to_reference
 from isc_core.sirfs.recover import Known
 from tests.core.ball_scene import ball
 
@@ -123,7 +123,7 @@ def test_paint_is_continued_under_the_highlight() -> None:
     shading = np.linspace(0.5, 1, 40)[None, :, None] * np.ones((40, 40, 3))
     diffuse = np.where(mask[..., None], 0.4 * shading, 0)
     image = diffuse + 0.3 * doubtful[..., None]
-    found = repaint(Doubt(image, doubtful), shading, image, mask)
+    found = repaint(ResidualHighlights(image, doubtful), shading, image, mask)
     np.testing.assert_allclose(found, diffuse, atol=1e-6)
 
 

@@ -9,20 +9,20 @@ from typing import Any
 
 import pytest
 
-from isc_core.json_progress import JsonSpeaker
-from isc_core.result_folder import load, save
+from isc_core.cli.interface.json_progress import JsonSpeaker
+from isc_core.result_files.result_folder import load, save
 from tests.core.ball_scene import ball
 from tests.core.command_line import ROOT, ball_photo, isc_command
 
 Event = dict[str, Any]
 Process = subprocess.Popen[str]
-SLEEPY = """import time, isc_core.commands.mask as m
+SLEEPY = """import time, isc_core.cli.commands.mask as m
 def run(options, monitor):
     monitor.report("sleeping", 0.5)
     return [str(time.sleep(0.01)) for _ in range(6000)]
 m.run = run
 """
-STUBBORN = """import time, isc_core.commands.mask as m, isc_core.json_progress as j
+STUBBORN = """import time, isc_core.cli.commands.mask as m, isc_core.cli.interface.json_progress as j
 j._PATIENCE_SECONDS = (0.2, 0.2)
 def run(options, monitor):
     monitor.report("sleeping", 0.5)

@@ -8,8 +8,8 @@ import pytest
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.separation import kim_2013
-from isc_core.separation.kim_2013 import VARIANTS, Kim2013Options
+from isc_core.separation.published import kim_2013
+from isc_core.separation.published.kim_2013 import VARIANTS, Kim2013Options
 from tests.core.separation_scenes import assert_layers_hold, read
 
 

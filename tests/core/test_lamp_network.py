@@ -9,9 +9,9 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
-from isc_core.glance import PLACES, Glance
-from isc_core.lamp_network import LampNetwork, glance_at, read_lamp_network
-from isc_core.sirfs.frames import real_sh
+from isc_core.networks.light_network import LampNetwork, predict_light, read_lamp_network
+from isc_core.scene.light_estimate import PLACES, LightEstimate
+from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.lit_balls import SIDE, ball, under_lamps
 
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
@@ -54,7 +54,7 @@ def off(one: np.ndarray, other: np.ndarray) -> float:
     )
 
 
-def numbers(lamps: Glance) -> np.ndarray:
+def numbers(lamps: LightEstimate) -> np.ndarray:
     return np.concatenate(
         [[lamps.none, lamps.one, lamps.several], lamps.places, lamps.light, lamps.deviations]
     )
@@ -70,13 +70,13 @@ def test_places_are_unit_vectors_evenly_before_the_object() -> None:
 def test_the_answer_is_one_of_probabilities_whatever_the_exposure() -> None:
     rng = np.random.default_rng(0)
     network, (image, mask) = small_network(rng), photo(rng)
-    found = glance_at(image, mask, network)
+    found = predict_light(image, mask, network)
     assert found.none + found.one + found.several == pytest.approx(
         1
     ) and found.places.sum() == pytest.approx(1)
     assert min(found.none, found.one, found.several, found.places.min(), found.deviations.min()) > 0
     np.testing.assert_allclose(
-        numbers(glance_at(8 * image, mask, network)), numbers(found), rtol=1e-4, atol=1e-6
+        numbers(predict_light(8 * image, mask, network)), numbers(found), rtol=1e-4, atol=1e-6
     )
 
 
@@ -84,8 +84,8 @@ def test_the_photo_mirrored_has_its_light_mirrored() -> None:
     rng = np.random.default_rng(3)
     network, (image, mask) = small_network(rng), photo(rng)
     found, mirrored = (
-        glance_at(image, mask, network),
-        glance_at(image[:, ::-1], mask[:, ::-1], network),
+        predict_light(image, mask, network),
+        predict_light(image[:, ::-1], mask[:, ::-1], network),
     )
     assert (mirrored.none, mirrored.one) == pytest.approx((found.none, found.one))
     normal, _ = ball()
@@ -102,21 +102,21 @@ def test_the_photo_mirrored_has_its_light_mirrored() -> None:
 def test_what_is_outside_the_mask_and_the_number_of_threads_change_nothing() -> None:
     rng = np.random.default_rng(1)
     network, (image, mask) = small_network(rng), photo(rng)
-    found = numbers(glance_at(image, mask, network))
+    found = numbers(predict_light(image, mask, network))
     padded = np.pad(
         np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9
     )
     for threads in (1, 3):
         with threadpool_limits(threads):
             np.testing.assert_array_equal(
-                numbers(glance_at(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found
+                numbers(predict_light(padded, np.pad(mask, ((13, 4), (3, 21))), network)), found
             )
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-30, 1.0])
 def test_photos_without_anything_in_them_are_judged_too(level: float) -> None:
     assert np.isfinite(
-        numbers(glance_at(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool)))
+        numbers(predict_light(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool)))
     ).all()
 
 
@@ -124,21 +124,22 @@ def test_the_cone_holds_two_thirds_of_the_places() -> None:
     toward = np.array([0.3, 0.0, np.sqrt(0.91)])
     for sharp in (6, 12, 25):
         places = np.exp(sharp * (PLACES @ toward))
-        glance = Glance(0, 1, 0, places / places.sum(), np.zeros(8), np.ones(8))
-        assert off(glance.direction, toward) < 3
+        light_estimate = LightEstimate(0, 1, 0, places / places.sum(), np.zeros(8), np.ones(8))
+        assert off(light_estimate.direction, toward) < 3
         # Of a density exp(k cos) 1 - e^(-k (1 - cos)) lies within an angle; the network's places
         # are blurred by one of k = 1 / 8 degrees^2.
         wide, blur = (np.arccos(1 + np.log(0.32) / k) for k in (sharp, np.radians(8) ** -2))
-        assert glance.cone == pytest.approx(np.degrees(np.sqrt(wide**2 - blur**2)), rel=0.1)
+        assert light_estimate.cone == pytest.approx(np.degrees(np.sqrt(wide**2 - blur**2)), rel=0.1)
 
 
 def test_a_cone_is_never_a_point_and_one_that_is_half_the_sky_tells_nothing() -> None:
     sure, unsure = (np.exp(k * PLACES[:, 2]) for k in (400, 1))
     found = [
-        Glance(0, 1, 0, places / places.sum(), np.zeros(8), np.ones(8)) for places in (sure, unsure)
+        LightEstimate(0, 1, 0, places / places.sum(), np.zeros(8), np.ones(8))
+        for places in (sure, unsure)
     ]
     assert found[0].cone == 4 and found[0].determined and not found[1].determined
-    assert not Glance(0.6, 0.4, 0, found[0].places, np.zeros(8), np.ones(8)).determined
+    assert not LightEstimate(0.6, 0.4, 0, found[0].places, np.zeros(8), np.ones(8)).determined
 
 
 @pytest.mark.parametrize(
@@ -153,18 +154,19 @@ def test_a_cone_is_never_a_point_and_one_that_is_half_the_sky_tells_nothing() ->
     ],
 )
 def test_the_lamp_of_a_painted_ball_is_found(toward: tuple[float, float, float]) -> None:
-    found = glance_at(*under_lamps(toward))
+    found = predict_light(*under_lamps(toward))
     assert found.one > 0.5
     assert off(found.direction, np.array(toward)) < 15
 
 
 def test_three_lamps_are_several_and_smooth_light_is_none() -> None:
     assert (
-        glance_at(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))).several > 0.7
+        predict_light(*under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))).several
+        > 0.7
     )
     normal, mask = ball()
     smooth = np.exp(0.5 * normal[..., 1:2] + 0.2 * normal[..., :1]) * (0.5, 0.3, 0.2)
-    assert glance_at((smooth * mask[..., None]).astype(np.float32), mask).none > 0.5
+    assert predict_light((smooth * mask[..., None]).astype(np.float32), mask).none > 0.5
 
 
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:

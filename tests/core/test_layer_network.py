@@ -7,16 +7,16 @@ import pytest
 from scipy import ndimage
 
 from isc_core.errors import InputError
-from isc_core.separation import separate
-from isc_core.separation.convolutions import convolved, from_blocks, to_blocks
-from isc_core.separation.layer_network import (
+from isc_core.networks.layer_network import (
     LayerNetwork,
     NetworkOptions,
     log_ratio,
     read_network,
     shipped_network,
 )
-from isc_core.separation.light_tint import held_to_light
+from isc_core.networks.layers import convolved, depth_to_space, space_to_depth
+from isc_core.separation import separate
+from isc_core.separation.support.light_tint import held_to_light
 
 
 def small_network(rng):
@@ -61,9 +61,9 @@ def test_convolution_is_correlation_with_zeros_around():
 
 def test_blocks_of_pixels_go_there_and_back():
     layer = np.arange(4 * 6 * 3.0).reshape(4, 6, 3)
-    blocks = to_blocks(layer)
+    blocks = space_to_depth(layer)
     assert np.array_equal(blocks[1, 2].reshape(3, 2, 2), layer[2:4, 4:6].transpose(2, 0, 1))
-    assert np.array_equal(from_blocks(blocks), layer)
+    assert np.array_equal(depth_to_space(blocks), layer)
 
 
 def test_exposure_and_mirror_images_change_nothing():

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.brdf.fitting import Interval, LobeFit, LobeLight
-from isc_core.decomposition import Separation
+from isc_core.decompose.light_colour import under_light
+from isc_core.decompose.models import Answer, Settings, Task
+from isc_core.decompose.pipeline import decompose
 from isc_core.errors import InputError
-from isc_core.illuminant import estimate_illuminant
-from isc_core.models import Answer, Settings, Task
-from isc_core.models.light_colour import under_light
-from isc_core.photo import Photo, PhotoSource
-from isc_core.pipeline import decompose
+from isc_core.illuminant.illuminant import estimate_illuminant
+from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.scene.decomposition import Separation
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeLight
 from isc_core.separation import separate
-from isc_core.sirfs.frames import light_from_reference
+from isc_core.shading.spherical_harmonics import light_from_reference
 from tests.core.test_illuminant import LIGHT, PAINTS, ball
 
 

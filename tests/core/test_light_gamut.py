@@ -5,8 +5,8 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from isc_core.illuminant import estimate_illuminant
-from isc_core.light_gamut import PLANE, distance_of_white, share_toward_white, without_white
+from isc_core.illuminant.gamut import PLANE, distance_of_white, share_toward_white, without_white
+from isc_core.illuminant.illuminant import estimate_illuminant
 from tests.core.test_illuminant import PAINTS, ball
 
 GREY = np.full((1, 3), 0.4)

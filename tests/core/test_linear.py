@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from isc_core.linear import solved
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.numerics.linear import solved
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
 SYSTEMS = [np.random.default_rng(n).normal(size=(n, n)) for n in (1, 2, 9, 27)]
 

@@ -8,8 +8,8 @@ import pytest
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.separation import mallick_2006
-from isc_core.separation.mallick_2006 import VARIANTS, Mallick2006Options
+from isc_core.separation.published import mallick_2006
+from isc_core.separation.published.mallick_2006 import VARIANTS, Mallick2006Options
 from tests.core.separation_scenes import assert_layers_hold, read
 
 

@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.shading import directional, radiance
-from isc_core.decomposition import Decomposition
+from isc_core.decompose.lobe import HIDDEN, MATT, NOT_LOOKED_FOR
+from isc_core.decompose.mbp import split_reflectance
+from isc_core.decompose.pipeline import Evidence, Settings, decompose
 from isc_core.errors import InputError
-from isc_core.models.lobe import HIDDEN, MATT, NOT_LOOKED_FOR
-from isc_core.models.mbp import split_reflectance
-from isc_core.photo import Photo, PhotoSource
-from isc_core.pipeline import Evidence, Settings, decompose
+from isc_core.photo.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Decomposition
 from isc_core.separation import separate
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.radiance import directional, radiance
 from tests.core.ball_scene import ball
 
 LAMP = np.array([-0.42, 0.5, 0.757])

@@ -14,12 +14,19 @@ import trimesh
 from PIL import Image
 from scipy import ndimage
 
-from isc_core.decomposition import Decomposition
 from isc_core.errors import InputError
-from isc_core.gloss import BOUND, FITTED, NOT_FITTED, Gloss
-from isc_core.mesh import MeshOptions, MeshResult, _interpolated, base_color, build_mesh, limit_rim
-from isc_core.photo import srgb_to_linear
-from isc_core.sirfs.frames import real_sh
+from isc_core.lobe_fitting.specular_level import BOUND, FITTED, NOT_FITTED, Gloss
+from isc_core.photo.photo import srgb_to_linear
+from isc_core.result_files.mesh import (
+    MeshOptions,
+    MeshResult,
+    _interpolated,
+    base_color,
+    build_mesh,
+    limit_rim,
+)
+from isc_core.scene.decomposition import Decomposition
+from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.ball_scene import LIGHT, ball
 
 

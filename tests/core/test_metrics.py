@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isc_core.datasets import MitBerkeleyObject, load_object
-from isc_core.metrics import (
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_object
+from isc_core.evaluation.metrics import (
     Scores,
     angular_error,
     geometric_mean,
@@ -27,7 +27,7 @@ from isc_core.metrics import (
     score,
     truth_normal,
 )
-from isc_core.sirfs.frames import (
+from isc_core.shading.spherical_harmonics import (
     light_from_reference,
     light_to_reference,
     normal_from_reference,

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from isc_core.sirfs.fitting.outline import BINS, OutlineMoments, fit_silhouette
+from isc_core.prior_fitting.silhouette import BINS, OutlineMoments, fit_silhouette
 from isc_core.sirfs.silhouette import silhouette_cost, silhouette_field
 
 

@@ -18,8 +18,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from isc_core.errors import InputError
-from isc_core.limits import Limits
-from isc_core.photo import (
+from isc_core.io.limits import Limits
+from isc_core.photo.photo import (
     Photo,
     PhotoSource,
     linear_to_srgb,

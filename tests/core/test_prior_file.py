@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from isc_core.errors import InputError
-from isc_core.sirfs.fitting.absolute_table import CoarseTable
-from isc_core.sirfs.fitting.color_mixture import ColorScaleMixture
-from isc_core.sirfs.fitting.lights import Contrast, GaussianLight
-from isc_core.sirfs.fitting.prior_set import FitRecord, Lights, PriorSet
-from isc_core.sirfs.fitting.scale_mixture import ScaleMixture
-from isc_core.sirfs.prior_file import load_prior_set, save_prior_set, shipped_prior_set
-from isc_core.sirfs.priors import SilhouetteProfile
+from isc_core.sirfs.priors.absolute_table import CoarseTable
+from isc_core.sirfs.priors.color_mixture import ColorScaleMixture
+from isc_core.sirfs.priors.lights import Contrast, GaussianLight
+from isc_core.sirfs.priors.prior_file import load_prior_set, save_prior_set, shipped_prior_set
+from isc_core.sirfs.priors.prior_set import FitRecord, Lights, PriorSet
+from isc_core.sirfs.priors.priors import SilhouetteProfile
+from isc_core.sirfs.priors.scale_mixture import ScaleMixture
 
 
 @pytest.fixture

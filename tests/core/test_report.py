@@ -6,10 +6,16 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from isc_core.brdf.fitting import fit_lobe
-from isc_core.decomposition import Decomposition, Provenance, Separation
-from isc_core.photo import srgb_to_linear
-from isc_core.report import Answer, _title, comparison_sheet, contact_sheet, separation_sheet
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.photo.photo import srgb_to_linear
+from isc_core.result_files.contact_sheet import (
+    Answer,
+    _title,
+    comparison_sheet,
+    contact_sheet,
+    separation_sheet,
+)
+from isc_core.scene.decomposition import Decomposition, Provenance, Separation
 from tests.core.ball_scene import ball
 
 LABELS = ("input", "diffuse", "specular", "reflectance", "shading", "normals", "height", "light")

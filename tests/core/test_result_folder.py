@@ -11,12 +11,11 @@ import OpenEXR
 import pytest
 from PIL import Image
 
-from isc_core.brdf.fitting import LobeFit, fit_lobe
-from isc_core.decomposition import Decomposition, Separation
 from isc_core.errors import Cancelled, InputError
-from isc_core.photo import srgb_to_linear
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.photo.photo import srgb_to_linear
 from isc_core.progress import Monitor
-from isc_core.result_folder import (
+from isc_core.result_files.result_folder import (
     DECOMPOSITION_FILES,
     SEPARATION_FILES,
     load,
@@ -24,6 +23,8 @@ from isc_core.result_folder import (
     save,
     save_separation,
 )
+from isc_core.scene.decomposition import Decomposition, Separation
+from isc_core.scene.lobe_fit import LobeFit
 from tests.core.ball_scene import ball
 
 CHANNELS = [
@@ -282,7 +283,7 @@ def test_a_disk_that_takes_no_more_is_one_clear_line_and_leaves_nothing(
     script = (
         "import resource, sys\n"
         "from isc_core.errors import InputError\n"
-        "from isc_core.result_folder import save\n"
+        "from isc_core.result_files.result_folder import save\n"
         "from tests.core.ball_scene import ball\n"
         "scene = ball()\n"
         f"resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))\n"

@@ -11,15 +11,16 @@ import numpy as np
 import pytest
 
 from isc_core import separation
-from isc_core.cli import main
-from isc_core.decomposition import Separation
+from isc_core.cli.main import main
+from isc_core.datasets.highlight_set import load_shen_zheng
 from isc_core.errors import Cancelled, InputError
-from isc_core.exr import read_channels
-from isc_core.highlight_set import load_shen_zheng
-from isc_core.metrics import psnr
+from isc_core.evaluation.metrics import psnr
+from isc_core.io.exr import read_channels
 from isc_core.progress import Monitor
-from isc_core.separation import METHODS, layers, method_options, separate, variants
+from isc_core.scene.decomposition import Separation
+from isc_core.separation import METHODS, method_options, separate, variants
 from isc_core.separation.option_text import parse_changes
+from isc_core.separation.support import layers
 from tests.core.command_line import ROOT, ball_codes, ball_photo, write_image
 
 
@@ -147,7 +148,7 @@ def test_every_method_has_the_same_face(method: str) -> None:
 
 def test_a_start_does_not_wait_for_the_methods() -> None:
     code = (
-        "import sys; from isc_core.cli import main; main(['separate', '--help']); "
+        "import sys; from isc_core.cli.main import main; main(['separate', '--help']); "
         f"print([m for m in {METHODS[1:]!r} if 'isc_core.separation.' + m in sys.modules], 'numba' in sys.modules)"
     )
     done = subprocess.run(
@@ -201,7 +202,7 @@ def test_options_that_cannot_be_read(made: str, word: str, message: str) -> None
 def test_the_command_chooses_variants_and_options(
     made: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("isc_core.commands.separate.METHODS", separation.METHODS)
+    monkeypatch.setattr("isc_core.cli.commands.separate.METHODS", separation.METHODS)
     photo, removed = str(write_image(tmp_path / "dim.png", ball_codes() // 2)), []
     for words in (
         (),

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from isc_core import separation
-from isc_core.decomposition import Separation
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Separation
 from isc_core.separation import METHODS, variants
 
 # Those that do not judge by colour, and so have an answer for grey photos; the others refuse.

@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
-from isc_core.shape_network import ShapeNetwork, read_shape_network, shape_at
+from isc_core.networks.normal_network import ShapeNetwork, predict_normals, read_shape_network
 from tests.core.lit_balls import ball, under_lamps
 
 SHAPES = [
@@ -49,14 +49,14 @@ def photo(
 def test_normals_and_deviations_are_of_the_object(size: tuple[int, int]) -> None:
     rng = np.random.default_rng(0)
     network, (image, mask) = small_network(rng), photo(rng, *size)
-    seen = shape_at(image, mask, network)
+    seen = predict_normals(image, mask, network)
     assert seen.normal.shape == (*size, 3) and seen.deviation.shape == size
     assert (
         (seen.deviation[mask] > 0).all()
         and not seen.deviation[~mask].any()
         and not seen.normal[~mask].any()
     )
-    bright = shape_at(8 * image, mask, network)
+    bright = predict_normals(8 * image, mask, network)
     np.testing.assert_allclose(bright.normal, seen.normal, atol=1e-4)
     np.testing.assert_allclose(bright.deviation, seen.deviation, rtol=1e-4)
 
@@ -65,8 +65,8 @@ def test_the_photo_mirrored_has_its_shape_mirrored() -> None:
     rng = np.random.default_rng(1)
     network, (image, mask) = small_network(rng), photo(rng)
     seen, mirrored = (
-        shape_at(image, mask, network),
-        shape_at(image[:, ::-1], mask[:, ::-1], network),
+        predict_normals(image, mask, network),
+        predict_normals(image[:, ::-1], mask[:, ::-1], network),
     )
     np.testing.assert_allclose(mirrored.normal[:, ::-1] * (-1, 1, 1), seen.normal, atol=1e-5)
     np.testing.assert_allclose(mirrored.deviation[:, ::-1], seen.deviation, rtol=1e-5)
@@ -75,20 +75,20 @@ def test_the_photo_mirrored_has_its_shape_mirrored() -> None:
 def test_what_is_outside_the_mask_and_the_number_of_threads_change_nothing() -> None:
     rng = np.random.default_rng(2)
     network, (image, mask) = small_network(rng), photo(rng)
-    seen = shape_at(image, mask, network)
+    seen = predict_normals(image, mask, network)
     padded = np.pad(
         np.where(mask[..., None], image, 7), ((13, 4), (3, 21), (0, 0)), constant_values=9
     )
     for threads in (1, 3):
         with threadpool_limits(threads):
-            again = shape_at(padded, np.pad(mask, ((13, 4), (3, 21))), network)
+            again = predict_normals(padded, np.pad(mask, ((13, 4), (3, 21))), network)
         np.testing.assert_array_equal(again.normal[13:-4, 3:-21], seen.normal)
         np.testing.assert_array_equal(again.deviation[13:-4, 3:-21], seen.deviation)
 
 
 @pytest.mark.parametrize("level", [0.0, 1e-30, 1.0])
 def test_photos_without_anything_in_them_have_a_shape_too(level: float) -> None:
-    seen = shape_at(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool))
+    seen = predict_normals(np.full((9, 9, 3), level, np.float32), np.eye(9, dtype=bool))
     assert np.isfinite(seen.normal).all() and np.isfinite(seen.deviation).all()
 
 
@@ -97,7 +97,7 @@ def test_photos_without_anything_in_them_have_a_shape_too(level: float) -> None:
     [[(-0.5, 0.5, 0.7)], [(0.6, 0.1, 0.7)], [(0.1, 0.8, 0.6)], [(-0.7, 0.2, 0.6), (0.7, 0.4, 0.6)]],
 )
 def test_a_painted_ball_is_round(lamps: list[tuple[float, float, float]]) -> None:
-    seen, (normal, mask) = shape_at(*under_lamps(*lamps)), ball()
+    seen, (normal, mask) = predict_normals(*under_lamps(*lamps)), ball()
     length = np.linalg.norm(seen.normal, axis=-1)
     cosine = (seen.normal * normal).sum(-1)[mask] / length[mask]
     assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 12

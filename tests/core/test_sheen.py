@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.arrays_file import ARRAYS
-from isc_core.decomposition import Decomposition
-from isc_core.environment import environment_from_shading
-from isc_core.gloss import FITTED, LOWERED, gloss_of
-from isc_core.result_folder import save
-from isc_core.sheen import most_level, shown_gloss
+from isc_core.lobe_fitting.specular_level import FITTED, LOWERED, gloss_of
+from isc_core.lobe_fitting.specular_upper_bound import shown_gloss, specular_upper_bound
+from isc_core.result_files.arrays_file import ARRAYS
+from isc_core.result_files.result_folder import save
+from isc_core.scene.decomposition import Decomposition
+from isc_core.shading.environment_map import environment_from_shading
 from tests.core.test_arrays_file import glossy
 
 
@@ -21,13 +21,13 @@ def test_plastic_mirrors_a_25th_of_an_even_sky_in_front() -> None:
     facing = replace(d, normal=np.broadcast_to(np.array([0, 0, 1], np.float32), d.normal.shape))
     even = np.broadcast_to(np.array([2.0, 1.0, 0.5]), (16, 32, 3))
     grey = replace(facing, image=np.full_like(d.image, 0.02))
-    assert most_level(grey, 0.3, even) == pytest.approx(0.02 / (0.04 * 2.0), rel=0.1), (
+    assert specular_upper_bound(grey, 0.3, even) == pytest.approx(0.02 / (0.04 * 2.0), rel=0.1), (
         "the brightest channel decides"
     )
-    assert most_level(grey, 0.3, 2 * even) == pytest.approx(
-        0.5 * most_level(grey, 0.3, even), rel=1e-5
+    assert specular_upper_bound(grey, 0.3, 2 * even) == pytest.approx(
+        0.5 * specular_upper_bound(grey, 0.3, even), rel=1e-5
     )
-    assert most_level(grey, 0.3, 0 * even) == np.inf
+    assert specular_upper_bound(grey, 0.3, 0 * even) == np.inf
 
 
 def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> None:
@@ -35,7 +35,7 @@ def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> 
     gloss = gloss_of(d)
     assert gloss.specular is not None and gloss.roughness is not None
     assert shown_gloss(d) == gloss
-    room = most_level(d, gloss.roughness, environment_from_shading(d.illumination, 16))
+    room = specular_upper_bound(d, gloss.roughness, environment_from_shading(d.illumination, 16))
     shown = shown_gloss(stronger(d, 100.0))
     assert gloss.specular < room < 100 * gloss.specular
     assert shown.specular == pytest.approx(room)
@@ -48,8 +48,8 @@ def test_channels_of_zero_tell_nothing_of_the_room() -> None:
     image = d.image.copy()
     rows, columns = np.nonzero(d.mask)
     image[rows[::8], columns[::8], 2] = 0
-    assert most_level(replace(d, image=image), 0.4, sky) == pytest.approx(
-        most_level(d, 0.4, sky), rel=0.1
+    assert specular_upper_bound(replace(d, image=image), 0.4, sky) == pytest.approx(
+        specular_upper_bound(d, 0.4, sky), rel=0.1
     )
 
 

@@ -8,8 +8,8 @@ import pytest
 from scipy import ndimage
 
 from isc_core.errors import InputError
-from isc_core.separation import shen_2009
-from isc_core.separation.shen_2009 import VARIANTS, Shen2009Options
+from isc_core.separation.published import shen_2009
+from isc_core.separation.published.shen_2009 import VARIANTS, Shen2009Options
 from tests.core.separation_scenes import assert_layers_hold, read
 
 

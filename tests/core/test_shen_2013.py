@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 
 from isc_core.errors import InputError
+from isc_core.imaging.channels import fade_in
 from isc_core.inpainting.pull_push import fill
-from isc_core.separation import METHODS, separate, shen_2013
-from isc_core.separation.channels import fade_in
-from isc_core.separation.shen_2013 import VARIANTS, Shen2013Options
+from isc_core.separation import METHODS, separate
+from isc_core.separation.published import shen_2013
+from isc_core.separation.published.shen_2013 import VARIANTS, Shen2013Options
 from tests.core.separation_scenes import assert_layers_hold, read
 
 RED, GREEN = np.array([0.7, 0.25, 0.15]), np.array([0.2, 0.6, 0.15])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from isc_core.separation.smoothing import masked_gaussian, weighted_gaussian
+from isc_core.imaging.smoothing import masked_gaussian, weighted_gaussian
 
 
 def disc(height: int = 40, width: int = 50) -> np.ndarray:

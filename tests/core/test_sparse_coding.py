@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import nnls
 
-from isc_core.decomposition import Separation
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Separation
 from isc_core.separation import sparse_coding
 from isc_core.separation.sparse_coding import VARIANTS, SparseCodingOptions, separate
 from tests.core.separation_scenes import read

@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks import specular_removal, specular_scores
-from benchmarks.specular_scores import Row, measure, read_rows, source_code, write_rows
-from benchmarks.specular_tables import tables
+from benchmarks.separation import scores, specular_removal
+from benchmarks.separation.scores import Row, measure, read_rows, source_code, write_rows
+from benchmarks.separation.tables import tables
 from isc_core import separation
-from isc_core.decomposition import Separation
+from isc_core.datasets.highlight_set import SeparationTruth
 from isc_core.errors import InputError
-from isc_core.highlight_set import SeparationTruth
+from isc_core.scene.decomposition import Separation
 from tests.core.ball_scene import ball
 
 
@@ -180,5 +180,5 @@ def test_a_run_is_taken_up_where_it_was_left(
 
 
 def test_the_source_of_every_method_has_its_mark() -> None:
-    marks = [specular_scores.source_code(method) for method in separation.METHODS]
+    marks = [scores.source_code(method) for method in separation.METHODS]
     assert len(set(marks)) == len(marks) and all(len(mark) == 8 for mark in marks)

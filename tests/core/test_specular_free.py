@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from isc_core.separation.specular_free import (
+from isc_core.separation.support.specular_free import (
     dark_channel,
     fixed_chromaticity,
     less_dark_channel,

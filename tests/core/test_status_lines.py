@@ -1,6 +1,6 @@
 """What a result's status says to people."""
 
-from isc_core.status_lines import status_lines
+from isc_core.result_files.status_lines import status_lines
 
 
 def test_everything_that_is_to_be_said_is_a_line() -> None:

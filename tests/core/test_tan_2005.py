@@ -9,8 +9,8 @@ import pytest
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.separation import tan_2005
-from isc_core.separation.tan_2005 import VARIANTS, Tan2005Options
+from isc_core.separation.published import tan_2005
+from isc_core.separation.published.tan_2005 import VARIANTS, Tan2005Options
 from tests.core.separation_scenes import (
     assert_any_mask_and_noise_keep_the_layers_sound,
     assert_clipped_cores_are_filled_and_inform_nobody,

@@ -7,7 +7,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from benchmarks.thresholding import levels
+from benchmarks.separation.thresholding import levels
 from isc_core.errors import InputError
 from isc_core.thresholding import (
     OPTIMISERS,

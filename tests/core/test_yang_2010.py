@@ -9,8 +9,8 @@ import pytest
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.separation import yang_2010
-from isc_core.separation.yang_2010 import VARIANTS, Yang2010Options
+from isc_core.separation.published import yang_2010
+from isc_core.separation.published.yang_2010 import VARIANTS, Yang2010Options
 from tests.core.separation_scenes import (
     assert_any_mask_and_noise_keep_the_layers_sound,
     assert_clipped_cores_are_filled_and_inform_nobody,

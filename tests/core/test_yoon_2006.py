@@ -10,9 +10,9 @@ from scipy import ndimage
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.separation import yoon_2006
-from isc_core.separation.colour_groups import group_quantile
-from isc_core.separation.yoon_2006 import VARIANTS, Yoon2006Options
+from isc_core.separation.published import yoon_2006
+from isc_core.separation.published.yoon_2006 import VARIANTS, Yoon2006Options
+from isc_core.separation.support.colour_groups import group_quantile
 from tests.core.separation_scenes import (
     assert_any_mask_and_noise_keep_the_layers_sound,
     assert_clipped_cores_are_filled_and_inform_nobody,

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.dichromatic import Dichromatic
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.model import Lobe
-from isc_core.brdf.oren_nayar import OrenNayar
-from isc_core.brdf.phong import Phong
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.dichromatic import Dichromatic
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.brdf.model import Lobe
+from isc_core.shading.brdf.oren_nayar import OrenNayar
+from isc_core.shading.brdf.phong import Phong
 
 UP = np.array([0.0, 0.0, 1.0])
 RECIPROCAL: list[Lobe] = [

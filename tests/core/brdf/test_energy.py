@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.energy import directional_albedo
-from isc_core.brdf.ggx import Ggx, density
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.model import Model
-from isc_core.brdf.oren_nayar import OrenNayar
-from isc_core.brdf.phong import Phong
 from isc_core.errors import InputError
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.energy import directional_albedo
+from isc_core.shading.brdf.ggx import Ggx, density
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.brdf.model import Model
+from isc_core.shading.brdf.oren_nayar import OrenNayar
+from isc_core.shading.brdf.phong import Phong
 
 from .directions_at import GLOSSY_PAINT, UP, polar_units
 

@@ -9,23 +9,23 @@ import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.fitting import LobeFitOptions, fit_lobe
-from isc_core.brdf.fitting.environment_response import respond_to, surroundings
-from isc_core.brdf.fitting.lamps import Lamps, Problem, _measured, _moved
-from isc_core.brdf.fitting.observed import observe
-from isc_core.brdf.fitting.pixels import choose_pixels
-from isc_core.brdf.fitting.recovered import blurred_normals
-from isc_core.brdf.fitting.response import respond
-from isc_core.brdf.fitting.result import CLIPPED, NARROW, NO_LIGHT, SMOOTH, UNLIKE
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.model import Lobe
-from isc_core.brdf.roughness import alpha_from_exponent
-from isc_core.brdf.shading import Lights, directional, environment, radiance
-from isc_core.environment import directions, solid_angles
 from isc_core.errors import Cancelled, InputError
-from isc_core.glance import PLACES, Glance
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting.environment_response import respond_to, surroundings
+from isc_core.lobe_fitting.lamps import Lamps, Problem, _measured, _moved
+from isc_core.lobe_fitting.observed import observe
+from isc_core.lobe_fitting.pixels import choose_pixels
+from isc_core.lobe_fitting.recovered import blurred_normals
+from isc_core.lobe_fitting.response import respond
 from isc_core.progress import Monitor
+from isc_core.scene.light_estimate import PLACES, LightEstimate
+from isc_core.scene.lobe_fit import CLIPPED, NARROW, NO_LIGHT, SMOOTH, UNLIKE, LobeFitOptions
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.model import Lobe
+from isc_core.shading.brdf.roughness import alpha_from_exponent
+from isc_core.shading.environment_map import directions, solid_angles
+from isc_core.shading.radiance import Lights, directional, environment, radiance
 
 VIEW = np.array([0.0, 0, 1])
 KEY = np.array([-0.48, 0.6, 0.64])
@@ -338,25 +338,33 @@ def test_what_the_outline_says_helps_where_the_normals_are_wrong() -> None:
         fit_lobe(specular, flat, mask, options=options, shading=shading, outline=true[1:])
 
 
-def seen_at_first_sight(toward: np.ndarray, none: float = 0.1) -> Glance:
+def seen_at_first_sight(toward: np.ndarray, none: float = 0.1) -> LightEstimate:
     """A lamp, with some doubt."""
     places = np.exp(30 * (PLACES @ toward))
-    return Glance(none, 0.9 - none, 0.1, places / places.sum(), np.zeros(8), np.ones(8))
+    return LightEstimate(none, 0.9 - none, 0.1, places / places.sum(), np.zeros(8), np.ones(8))
 
 
 def test_where_the_lamp_seems_to_stand_is_believed_and_the_picture_stays() -> None:
     specular, normal, mask, shading = whole_chain(0.2)
     options, toward = LobeFitOptions(recovered=True), np.array([0.6, -0.1, np.sqrt(1 - 0.37)])
-    glance = seen_at_first_sight(toward)
+    light_estimate = seen_at_first_sight(toward)
     without, told = (
-        fit_lobe(specular, normal, mask, options=options, shading=shading, glance=seen)
-        for seen in (None, glance)
+        fit_lobe(specular, normal, mask, options=options, shading=shading, light_estimate=seen)
+        for seen in (None, light_estimate)
     )
-    assert angle(told.direction, toward) < 1 and told.lights[0].cone == pytest.approx(glance.cone)
+    assert angle(told.direction, toward) < 1 and told.lights[0].cone == pytest.approx(
+        light_estimate.cone
+    )
     assert told.alpha == without.alpha and told.explained == without.explained
     np.testing.assert_array_equal(told.predicted, without.predicted)
     known = fit_lobe(
-        specular, normal, mask, options=options, shading=shading, glance=glance, light_direction=KEY
+        specular,
+        normal,
+        mask,
+        options=options,
+        shading=shading,
+        light_estimate=light_estimate,
+        light_direction=KEY,
     )
     assert angle(known.direction, KEY) < 1e-4 and known.lights[0].cone == 0
 
@@ -369,7 +377,7 @@ def test_a_light_that_looks_smooth_leaves_the_roughness_open() -> None:
         mask,
         options=LobeFitOptions(recovered=True),
         shading=shading,
-        glance=seen_at_first_sight(KEY, 0.7),
+        light_estimate=seen_at_first_sight(KEY, 0.7),
     )
     assert not fit.determined and fit.alpha is None and "smooth" in fit.reason
 
@@ -530,13 +538,13 @@ def test_the_jacobian_of_the_whole_model_is_that_of_differences(thresholded: boo
 
 def test_a_rendered_highlight_is_found() -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
-    from synth.camera import Camera
-    from synth.lights import DirectionalLight
-    from synth.materials import Material
+    from synth.capture.truth import render_truth
     from synth.rendering import RenderOptions
     from synth.scene import Scene
+    from synth.scene.camera import Camera
+    from synth.scene.lights import DirectionalLight
+    from synth.scene.materials import Material
     from synth.shapes import make_shape
-    from synth.truth import render_truth
 
     material = Material(np.full((2, 2, 3), 0.4), "ggx", 0.18, 0.8)
     scene = Scene(

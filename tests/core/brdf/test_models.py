@@ -7,16 +7,16 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.dichromatic import Dichromatic
-from isc_core.brdf.directions import cosines, half_vector
-from isc_core.brdf.energy import reciprocity_error
-from isc_core.brdf.ggx import Ggx, density, visible
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.model import Lobe, Model
-from isc_core.brdf.oren_nayar import OrenNayar
-from isc_core.brdf.phong import Phong
 from isc_core.errors import InputError
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.dichromatic import Dichromatic
+from isc_core.shading.brdf.directions import cosines, half_vector
+from isc_core.shading.brdf.energy import reciprocity_error
+from isc_core.shading.brdf.ggx import Ggx, density, visible
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.brdf.model import Lobe, Model
+from isc_core.shading.brdf.oren_nayar import OrenNayar
+from isc_core.shading.brdf.phong import Phong
 
 from .directions_at import (
     GLOSSY_PAINT,

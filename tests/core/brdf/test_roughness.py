@@ -5,11 +5,11 @@ that the fitted rule is a minimum.
 import numpy as np
 import pytest
 
-from isc_core.brdf import roughness
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.roughness import Facets, lobe_difference
 from isc_core.errors import InputError
+from isc_core.shading.brdf import roughness
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.roughness import Facets, lobe_difference
 
 from .directions_at import UP, polar_units
 

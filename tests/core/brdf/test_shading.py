@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from isc_core.brdf.energy import directional_albedo
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.shading import Lights, directional, environment, radiance, sh_shading
 from isc_core.errors import InputError
-from isc_core.sirfs.frames import real_sh
+from isc_core.shading.brdf.energy import directional_albedo
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.radiance import Lights, directional, environment, radiance, sh_shading
+from isc_core.shading.spherical_harmonics import real_sh
 
 from .directions_at import GLOSSY_PAINT, UP, polar_units, random_units
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from isc_core.sirfs.contour import occluding_contour
-from isc_core.sirfs.illumination import basis
-from isc_core.sirfs.priors import AbsoluteTable, Light, Priors, SilhouetteProfile
+from isc_core.shading.irradiance_basis import basis
+from isc_core.shading.occluding_contour import occluding_contour
+from isc_core.shading.surface_stencils import normals
+from isc_core.sirfs.priors.priors import AbsoluteTable, Light, Priors, SilhouetteProfile
+from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.problem import DepthObservation, Problem
 from isc_core.sirfs.settings import Weights
 from isc_core.sirfs.silhouette import silhouette_field
-from isc_core.sirfs.stencils import normals
-from isc_core.sirfs.tables import CostTable
 
 NODES = 30
 BRIGHTNESS = (-0.8, -0.9, -1.1)
@@ -45,20 +45,20 @@ def mixture_cost(x: np.ndarray, shares: np.ndarray, scales: np.ndarray) -> np.nd
     return np.logaddexp.reduce(height[:, 0]) - density
 
 
-def symmetric_table(widest: float, scales: tuple[float, ...]) -> CostTable:
+def symmetric_table(widest: float, scales: tuple[float, ...]) -> TabulatedPotential:
     x = np.linspace(-widest, widest, 20001)
-    return CostTable(
+    return TabulatedPotential(
         -widest,
         float(x[1] - x[0]),
         mixture_cost(x, np.full(len(scales), 1 / len(scales)), np.array(scales)),
     )
 
 
-def square_table(widest: float, scales: tuple[float, ...]) -> CostTable:
+def square_table(widest: float, scales: tuple[float, ...]) -> TabulatedPotential:
     """Cost of m = d^2 / 2 from 0 on."""
     m = np.linspace(0, widest, 20001)
     cost = mixture_cost(np.sqrt(2 * m), np.full(len(scales), 1 / len(scales)), np.array(scales))
-    return CostTable(0.0, float(m[1] - m[0]), cost)
+    return TabulatedPotential(0.0, float(m[1] - m[0]), cost)
 
 
 def made_priors(channels: int = 3, seed: int = 0) -> Priors:

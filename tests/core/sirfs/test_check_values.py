@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.reference_priors import reference_priors
-from isc_core import datasets
-from isc_core.sirfs.contour import occluding_contour
+from benchmarks.sirfs.reference_priors import reference_priors
+from isc_core.datasets import mit_berkeley as datasets
+from isc_core.shading.occluding_contour import occluding_contour
 from isc_core.sirfs.illumination import light_cost, unstack
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.problem import PAIR_OFFSETS, Problem

@@ -5,7 +5,7 @@ cuts the object.
 import numpy as np
 import pytest
 
-from isc_core.sirfs.contour import RADIUS, occluding_contour
+from isc_core.shading.occluding_contour import RADIUS, occluding_contour
 
 
 def disc(shape: tuple[int, int], center: tuple[float, float], radius: float) -> np.ndarray:

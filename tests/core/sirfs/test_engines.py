@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.sirfs.lbfgs import LbfgsOptions
+from isc_core.numerics.lbfgs import LbfgsOptions
+from isc_core.numerics.thread_pool import Workers
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.problem import DepthObservation, Problem
 from isc_core.sirfs.solver import SolverOptions, solve
-from isc_core.workers import Workers
 
 from .small_problems import blob, make_problem, random_state, some_trust, weights
 

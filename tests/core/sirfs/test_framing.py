@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from isc_core.sirfs.framing import continued, cut_line, is_cut
+from isc_core.imaging.framing import continued, cut_line, is_cut
 
 
 def disc(size: int, radius: float, center: tuple[float, float]) -> np.ndarray:

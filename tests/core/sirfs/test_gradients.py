@@ -8,9 +8,9 @@ import pytest
 from scipy import ndimage
 
 from isc_core.sirfs.numpy_engine import NumpyEngine
+from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.problem import DepthObservation, Problem, Terms
 from isc_core.sirfs.solver import Engine
-from isc_core.sirfs.tables import CostTable
 
 from .small_problems import blob, make_problem, only, random_state, some_trust, weights
 
@@ -41,11 +41,11 @@ def make_engine(name: str, problem: Problem) -> Engine:
     return NumbaEngine(problem, np.float64)
 
 
-def coarser(table: CostTable) -> CostTable:
+def coarser(table: TabulatedPotential) -> TabulatedPotential:
     """Every hundredth node: cells so wide that a difference's two ends hardly ever lie in two of
     them.
     """
-    return CostTable(table.low, 100 * table.step, table.values[::100])
+    return TabulatedPotential(table.low, 100 * table.step, table.values[::100])
 
 
 def problem_of(term: str, channels: int) -> Problem:

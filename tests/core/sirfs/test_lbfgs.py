@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.sirfs.lbfgs import (
+from isc_core.numerics.lbfgs import (
     Algebra,
     LbfgsOptions,
     Minimisation,
@@ -14,7 +14,7 @@ from isc_core.sirfs.lbfgs import (
     _Memory,
     minimise,
 )
-from isc_core.workers import Workers
+from isc_core.numerics.thread_pool import Workers
 
 EXACT = LbfgsOptions(
     loss_tolerance=0.0, gradient_tolerance=1e-9, step_tolerance=0.0, evaluations=5000

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from isc_core.errors import Cancelled
+from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.progress import Monitor
-from isc_core.sirfs.lbfgs import LbfgsOptions
+from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.problem import DepthObservation
 from isc_core.sirfs.recover import Known, Recovered, RecoverOptions, recover
 from isc_core.sirfs.solver import SolverOptions
-from isc_core.sirfs.stencils import normals
 
 from .small_problems import Scene, blob, made_priors, weights
 

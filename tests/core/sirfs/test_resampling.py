@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isc_core.sirfs.resampling import (
+from isc_core.imaging.resampling import (
     nearest_samples,
     resample_height,
     resample_inside,

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from isc_core.sirfs.frames import light_from_reference, light_to_reference, real_sh
-from isc_core.sirfs.prior_file import shipped_prior_set
-from isc_core.sirfs.priors import Light
-from isc_core.sirfs.seen_light import FRONT, LOOK, seen_light
+from isc_core.shading.spherical_harmonics import light_from_reference, light_to_reference, real_sh
+from isc_core.sirfs.priors.predicted_light import FRONT, LOOK, seen_light
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
+from isc_core.sirfs.priors.priors import Light
 
 SEEN = np.array([0.5, 0.3, -0.2, 0.1, 0.05, -0.1, 0.02, 0.08])
 

@@ -5,13 +5,14 @@ shading alone leaves open.
 import numpy as np
 import pytest
 
-from isc_core.sirfs.frames import normal_from_reference
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.scene.normal_estimate import NormalEstimate
+from isc_core.shading.spherical_harmonics import normal_from_reference
+from isc_core.shading.surface_stencils import normals
+from isc_core.sirfs.normal_prior import height_of_normals, seen_field
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
-from isc_core.sirfs.seen_shape import SeenShape, height_of_normals, seen_field
 from isc_core.sirfs.settings import isc_weights
 from isc_core.sirfs.solver import SolverOptions
-from isc_core.sirfs.stencils import normals
 from tests.core.lit_balls import ball, under_lamps
 
 
@@ -49,7 +50,7 @@ def test_the_field_is_in_the_reference_s_frame_and_goes_on_beyond_what_was_seen(
     normal, mask = ball()
     inner = mask.copy()
     inner[:, :40] = False
-    seen = SeenShape(np.where(inner[..., None], normal, 0), np.where(inner, 0.2, 0))
+    seen = NormalEstimate(np.where(inner[..., None], normal, 0), np.where(inner, 0.2, 0))
     field = seen_field(seen, mask)
     np.testing.assert_allclose(np.dstack([field.right, -field.down])[inner], normal[inner][:, :2])
     np.testing.assert_allclose(field.precision[mask], 25)
@@ -62,7 +63,7 @@ def test_sirfs_takes_the_shape_that_was_seen() -> None:
     normal, _ = ball()
     priors, weights = shipped_prior_set().priors("natural", 3), isc_weights("natural", 3)
 
-    def error(seen: SeenShape | None) -> float:
+    def error(seen: NormalEstimate | None) -> float:
         options = RecoverOptions(solve_size=96, solver=SolverOptions(threads=1))
         found = recover(image, mask, 1e-3, priors, weights, options, seen=seen)
         return float(
@@ -76,6 +77,6 @@ def test_sirfs_takes_the_shape_that_was_seen() -> None:
         )
 
     flat = np.where(mask[..., None], np.array([0, 0, 1.0]), 0)
-    right, wrong = (SeenShape(kind, np.where(mask, 0.1, 0)) for kind in (normal, flat))
+    right, wrong = (NormalEstimate(kind, np.where(mask, 0.1, 0)) for kind in (normal, flat))
     assert error(right) < 0.6 * error(None)
     assert error(wrong) > error(None)

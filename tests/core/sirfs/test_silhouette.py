@@ -5,14 +5,14 @@ ball.
 import numpy as np
 import pytest
 
-from isc_core.sirfs.priors import SilhouetteProfile
+from isc_core.shading.surface_stencils import normals
+from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.silhouette import (
     outline_coordinates,
     outline_normals,
     silhouette_cost,
     silhouette_field,
 )
-from isc_core.sirfs.stencils import normals
 
 
 def disc(size: int = 81, radius: float = 34.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -8,16 +8,16 @@ import pytest
 from scipy import ndimage
 
 from isc_core.errors import Cancelled, InputError
+from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.progress import Monitor
+from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.illumination import unstack
-from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.numpy_engine import NumpyEngine
-from isc_core.sirfs.priors import SilhouetteProfile
+from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.problem import DepthObservation
 from isc_core.sirfs.settings import Start
 from isc_core.sirfs.silhouette import silhouette_field
 from isc_core.sirfs.solver import MOST_THREADS, SirfsResult, SolverOptions, solve, thread_count
-from isc_core.sirfs.stencils import normals
 
 from .small_problems import Scene, blob, make_problem, weights
 
@@ -47,7 +47,7 @@ def hemisphere(size: int = 56, radius: float = 22.0) -> Scene:
     i, j = np.mgrid[:size, :size] - (size - 1) / 2
     mask = np.hypot(i, j) < radius
     height = np.sqrt(np.maximum(radius**2 - i * i - j * j, 0.3 * radius))
-    from isc_core.sirfs.illumination import basis
+    from isc_core.shading.irradiance_basis import basis
 
     shading = np.exp(
         np.einsum("khw,kc->hwc", basis(*np.moveaxis(normals(height), -1, 0)), scene.light)

@@ -5,7 +5,7 @@ sphere.
 import numpy as np
 import pytest
 
-from isc_core.sirfs.stencils import (
+from isc_core.shading.surface_stencils import (
     DERIVATIVES,
     Stencil,
     derivative,
@@ -13,8 +13,8 @@ from isc_core.sirfs.stencils import (
     fold_border,
     normals,
 )
+from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.surface import geometry, pair_slices
-from isc_core.sirfs.tables import CostTable
 
 
 @pytest.mark.parametrize("stencil", DERIVATIVES)
@@ -86,7 +86,7 @@ def test_pair_slices_select_the_offset(offset: tuple[int, int]) -> None:
 
 
 def test_table_interpolates_and_goes_on_straight() -> None:
-    table = CostTable(-1.0, 0.5, np.array([4.0, 1.0, 0.0, 2.0]))
+    table = TabulatedPotential(-1.0, 0.5, np.array([4.0, 1.0, 0.0, 2.0]))
     cost, slope = table.evaluate(np.array([-1.0, -0.75, -0.5, 0.25, 0.5, 3.0, -2.0]))
     np.testing.assert_allclose(cost, [4, 2.5, 1, 1, 2, 12, 10])
     np.testing.assert_allclose(slope, [-6, -6, -2, 4, 4, 4, -6])

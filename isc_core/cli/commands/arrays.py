@@ -1,0 +1,42 @@
+"""`isc arrays`: a result once more as plain NumPy arrays, for programs that read neither OpenEXR
+nor glTF.
+"""
+
+import argparse
+from pathlib import Path
+
+from ...io.atomic import new_file, require_writable_file
+from ...progress import Monitor
+from ...result_files.arrays_file import ARRAYS, write_arrays
+from ...result_files.result_folder import load
+from ..interface.options import Commands, add_command, hints
+
+_EXAMPLES = """  isc arrays cup"""
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands,
+        "arrays",
+        run,
+        "a result as plain NumPy arrays",
+        f"Adds {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, for programs that have NumPy alone. "
+        "isc decompose --arrays writes it at once.",
+        _EXAMPLES,
+    )
+    parser.add_argument(
+        "result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote"
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work; what can be wrong is found before it begins."""
+    monitor.report("reading", 0.0)
+    result, path = load(options.result), options.result / ARRAYS
+    require_writable_file(path)
+    monitor.report("writing arrays", 0.3)
+    with new_file(path) as partial:
+        write_arrays(result, partial)
+        monitor.report("writing arrays", 1.0)
+    return hints(options, f"{path} is written")

@@ -1,0 +1,140 @@
+"""`isc decompose`: one photo in, the folder of its decomposition out."""
+
+import argparse
+from dataclasses import fields
+from pathlib import Path
+
+from ...decompose.pipeline import Evidence, Settings, decompose
+from ...photo.photo import Photo, read_photo
+from ...progress import Monitor
+from ...result_files.known_inputs import read_height, read_light
+from ...result_files.result_folder import require_room, require_writable_result, save
+from ...result_files.status_lines import status_lines
+from ...sirfs.priors.prior_file import load_prior_set
+from ..interface.options import (
+    Commands,
+    add_command,
+    add_engine,
+    add_photo,
+    add_settings,
+    hints,
+    limits_of,
+    number,
+    positive,
+)
+
+_EXAMPLES = """  isc decompose cup.png -o cup
+  isc decompose photo.jpg --mask mask.png --model sirfs -o result
+  isc decompose scan.tif --transfer linear --depth sensor.exr --depth-sigma 3 -o result
+
+height maps (--shape, --depth): of the photo's size, in photo pixels toward the viewer. EXR: a channel Y or Z, or height.Z;
+NumPy .npy; PNG or TIFF of 16 bits, where one code is 1/64 pixel and 0 is a hole; or the folder of an earlier result.
+NaN is a hole. --height-scale changes the unit: -0.2 for a distance from the camera of which one unit is 0.2 pixels."""
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands,
+        "decompose",
+        run,
+        "everything: layers, shape, light, shading, reflectance, mesh",
+        "Takes a photo of one glossy object apart: diffuse and specular light, shape, illumination, shading, reflectance. Writes a folder "
+        "with preview.png (look at this first), maps.exr, mesh.glb and decomposition.json.",
+        _EXAMPLES,
+    )
+    add_photo(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="the folder to write; an earlier result is replaced",
+    )
+    add_settings(parser)
+    _add_evidence(parser)
+    add_engine(parser)
+
+
+def _add_evidence(parser: argparse.ArgumentParser) -> None:
+    usual = Evidence()
+    known = parser.add_argument_group("what is known already")
+    known.add_argument(
+        "--shape",
+        type=Path,
+        metavar="FILE",
+        help="the exact shape, a height map without holes inside the mask",
+    )
+    known.add_argument(
+        "--light",
+        type=Path,
+        metavar="FILE",
+        help="the exact light, a decomposition.json or a JSON file with 9 x 3 coefficients",
+    )
+    known.add_argument(
+        "--depth", type=Path, metavar="FILE", help="a measured height map, with holes and errors"
+    )
+    known.add_argument(
+        "--depth-sigma",
+        type=positive,
+        default=usual.depth_sigma,
+        metavar="S",
+        help="its standard error in photo pixels (default %(default)s)",
+    )
+    known.add_argument(
+        "--depth-weight",
+        type=positive,
+        default=usual.depth_weight,
+        metavar="W",
+        help="how much it counts (default %(default)s)",
+    )
+    known.add_argument(
+        "--height-scale",
+        type=number,
+        metavar="F",
+        help="photo pixels to one unit of --shape and --depth (default 1; 1/64 for 16 bits)",
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work; what can be wrong is found before it begins."""
+    settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
+    settings.check()
+    require_writable_result(options.output, inputs=(options.photo, options.mask))
+    prior_set = None if options.priors is None else load_prior_set(options.priors)
+    photo = read_photo(options.photo, options.mask, options.transfer, limits=limits_of(options))
+    evidence = _evidence(options, photo)
+    require_room(options.output, _pixels(photo, settings), arrays=options.arrays)
+    result = decompose(
+        photo,
+        settings,
+        evidence=evidence,
+        prior_set=prior_set,
+        name=options.photo.name,
+        monitor=monitor.part(0.0, 0.8),
+    )
+    save(result, options.output, arrays=options.arrays, monitor=monitor.part(0.8, 1.0))
+    return hints(
+        options,
+        *status_lines(result.provenance.status),
+        f"look at {options.output / 'preview.png'}",
+    )
+
+
+def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:
+    size, scale, limits = photo.mask.shape, options.height_scale, limits_of(options)
+    return Evidence(
+        height=None if options.shape is None else read_height(options.shape, size, scale, limits),
+        light=None if options.light is None else read_light(options.light),
+        depth=None if options.depth is None else read_height(options.depth, size, scale, limits),
+        depth_sigma=options.depth_sigma,
+        depth_weight=options.depth_weight,
+    )
+
+
+def _pixels(photo: Photo, settings: Settings) -> int:
+    """Of the object in the maps to come."""
+    longest = max(photo.box[2:])
+    keep = settings.full_size or settings.max_size == 0 or longest <= settings.max_size
+    return round(int(photo.mask.sum()) * (1.0 if keep else (settings.max_size / longest) ** 2))

@@ -1,0 +1,113 @@
+"""`isc evaluate`: how far a model is from the truth, object by object."""
+
+import argparse
+import json
+from pathlib import Path
+
+from ...datasets.mit_berkeley import ILLUMINATIONS, INPUTS
+from ...decompose.settings import LIGHT_PRIORS, SHAPE_PRIORS
+from ...evaluation.evaluate import evaluate
+from ...evaluation.runner import RunnerOptions, make_runner
+from ...io.atomic import new_file, require_writable_file
+from ...progress import Monitor
+from ...sirfs.priors.prior_file import load_prior_set, shipped_prior_set
+from ..interface.options import Commands, add_command, add_engine, names
+
+_EXAMPLES = """  isc evaluate DATA --dataset mit-berkeley --json scores.json
+  isc evaluate DATA --dataset mit-berkeley --objects apple,cup1 --illumination natural
+  isc evaluate DATA --dataset mit-berkeley --input original --model joint
+
+The package's own priors were fitted on the training objects of this set. For a fair figure leave the object out:
+  isc fit-priors DATA --leave-out apple -o priors.npz
+  isc evaluate DATA --dataset mit-berkeley --objects apple --priors priors.npz"""
+
+_PRIOR = "as for isc decompose (default %(default)s, so that SIRFS is measured by itself)"
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands,
+        "evaluate",
+        run,
+        "accuracy on a data set with ground truth",
+        "Prints the errors of height, normals, shading, reflectance and light for each object, and their geometric means.",
+        _EXAMPLES,
+    )
+    parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
+    parser.add_argument("--dataset", choices=("mit-berkeley",), required=True, help="its kind")
+    parser.add_argument("--objects", type=names, metavar="a,b", help="their names (default: all)")
+    parser.add_argument(
+        "--input",
+        choices=INPUTS,
+        default="diffuse",
+        help="images without highlights, or as photographed (default %(default)s)",
+    )
+    parser.add_argument(
+        "--illumination",
+        choices=(*ILLUMINATIONS, "both"),
+        help="default: both, or laboratory for --input original",
+    )
+    parser.add_argument(
+        "--model",
+        metavar="NAME",
+        help="as for isc decompose (default: sirfs, or joint for --input original)",
+    )
+    parser.add_argument(
+        "--separator",
+        default=RunnerOptions().separator,
+        metavar="NAME",
+        help="of joint, mdr, mbp (default %(default)s)",
+    )
+    parser.add_argument(
+        "--confidence-weights", action="store_true", help="of joint and mdr: as for isc decompose"
+    )
+    parser.add_argument(
+        "--light-prior", choices=LIGHT_PRIORS, default=RunnerOptions().light_prior, help=_PRIOR
+    )
+    parser.add_argument(
+        "--shape-prior", choices=SHAPE_PRIORS, default=RunnerOptions().shape_prior, help=_PRIOR
+    )
+    parser.add_argument(
+        "--priors",
+        type=Path,
+        metavar="FILE",
+        help="a file of isc fit-priors (default: those of the package)",
+    )
+    add_engine(parser)
+    parser.add_argument(
+        "--json", type=Path, metavar="FILE", help="also write the figures to this file"
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work."""
+    if options.json is not None:
+        require_writable_file(options.json)
+    original = options.input == "original"
+    model = options.model or ("joint" if original else "sirfs")
+    runner_options = RunnerOptions(
+        model, options.separator, options.engine, options.threads, options.confidence_weights,
+        options.light_prior, options.shape_prior,
+    )  # fmt: skip
+    runner_options.check()
+    prior_set = shipped_prior_set() if options.priors is None else load_prior_set(options.priors)
+    report = evaluate(
+        options.root,
+        objects=options.objects,
+        illuminations=_illuminations(options.illumination, original),
+        input=options.input,
+        model=model,
+        runner=make_runner(runner_options, prior_set),
+        monitor=monitor,
+    )
+    if options.json is not None:
+        with new_file(options.json) as partial:
+            partial.write_text(json.dumps(report.to_json(), indent=2) + "\n", encoding="utf-8")
+    return [report.table()]
+
+
+def _illuminations(chosen: str | None, original: bool) -> tuple[str, ...]:
+    if chosen is None:
+        return ("laboratory",) if original else ILLUMINATIONS
+    return ILLUMINATIONS if chosen == "both" else (chosen,)

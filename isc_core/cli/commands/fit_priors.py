@@ -1,0 +1,75 @@
+"""`isc fit-priors`: the statistics of shapes, reflectances and lights, learnt from objects with
+ground truth.
+"""
+
+import argparse
+from pathlib import Path
+
+from ...datasets.mit_berkeley import list_objects, load_natural_lights
+from ...errors import InputError
+from ...io.atomic import require_writable_file
+from ...numerics.jit import ensure_cache_folder
+from ...progress import Monitor
+from ..interface.options import Commands, add_command, hints, names
+
+_EXAMPLES = """  isc fit-priors DATA -o priors.npz
+  isc fit-priors DATA --leave-out cup1,cup2 -o without-cups.npz"""
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands,
+        "fit-priors",
+        run,
+        "learn the statistics of shapes, paints and lights anew",
+        "Fits the priors of SIRFS to the objects of a data set (the MIT-Berkeley set, with natural_lights.mat) and writes them to a file "
+        "for --priors.",
+        _EXAMPLES,
+    )
+    parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")
+    chosen = parser.add_mutually_exclusive_group()
+    chosen.add_argument(
+        "--objects", type=names, metavar="a,b", help="fit to these (default: to all)"
+    )
+    chosen.add_argument("--leave-out", type=names, metavar="a,b", help="fit to all but these")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="FILE", help="the file to write (.npz)"
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work."""
+    ensure_cache_folder()
+    # These declare compiled functions, which needs the folder, and time that the other commands
+    # should not spend.
+    from ...prior_fitting.fit import fit_priors
+    from ...prior_fitting.statistics import collect_statistics
+    from ...prior_fitting.training_objects import read_training_objects
+    from ...sirfs.priors.prior_file import save_prior_set
+
+    require_writable_file(options.output)
+    chosen = _chosen(options.root, options.objects, options.leave_out)
+    lights = load_natural_lights(options.root)
+    objects = read_training_objects(options.root, chosen, monitor.part(0.0, 0.2))
+    statistics = collect_statistics(objects, monitor.part(0.2, 0.4))
+    priors = fit_priors(statistics, lights, monitor=monitor.part(0.4, 1.0))
+    save_prior_set(options.output, priors)
+    return hints(options, f"{options.output}: priors of {', '.join(priors.record.objects)}")
+
+
+def _chosen(
+    root: Path, wanted: tuple[str, ...] | None, left_out: tuple[str, ...] | None
+) -> tuple[str, ...]:
+    known = list_objects(root, "laboratory")
+    for name in (wanted or ()) + (left_out or ()):
+        if name not in known:
+            raise InputError(f"unknown object '{name}': choose from {', '.join(known)}")
+    chosen = (
+        tuple(dict.fromkeys(wanted))
+        if wanted
+        else tuple(name for name in known if name not in (left_out or ()))
+    )
+    if len(chosen) < 2:
+        raise InputError("priors need at least two objects: name more, or leave out fewer")
+    return chosen

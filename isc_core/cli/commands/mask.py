@@ -1,0 +1,55 @@
+"""`isc mask`: the object inside a box, cut out of its background."""
+
+import argparse
+from pathlib import Path
+
+from ...photo.grabcut import Box, cut_out
+from ...progress import Monitor
+from ..interface.options import Commands, add_command, add_limits, add_transfer, hints, limits_of
+
+_EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands,
+        "mask",
+        run,
+        "cut the object out of a box drawn around it",
+        "Finds the object inside a box and writes its mask, white on black. Look at it before you use it: colours alone decide.",
+        _EXAMPLES,
+    )
+    parser.add_argument("photo", metavar="PHOTO", type=Path, help="the photo, as for isc decompose")
+    parser.add_argument(
+        "--box",
+        type=_box,
+        required=True,
+        metavar="x,y,w,h",
+        help="left, top, width and height in pixels, some background around the object included",
+    )
+    add_transfer(parser)
+    add_limits(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, metavar="MASK", help="the PNG file to write"
+    )
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work."""
+    del monitor  # one step of a second or two
+    found = cut_out(
+        options.photo, options.box, options.output, options.transfer, limits_of(options)
+    )
+    return hints(
+        options, f"{options.output}: {int(found.sum())} pixels; look at it before you use it"
+    )
+
+
+def _box(text: str) -> Box:
+    parts = text.split(",")
+    try:
+        x, y, width, height = (int(part) for part in parts)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{text!r} is not four whole numbers x,y,w,h") from error
+    return x, y, width, height

@@ -1,0 +1,272 @@
+"""How options are read: a parser whose complaints are one line, and the types that several commands
+share.
+"""
+
+import argparse
+import math
+import textwrap
+from pathlib import Path
+from typing import Any, NoReturn
+
+from ...decompose.settings import (
+    ILLUMINATIONS,
+    LIGHT_COLOURS,
+    LIGHT_PRIORS,
+    MODELS,
+    SHAPE_PRIORS,
+    Settings,
+)
+from ...errors import InputError
+from ...io.limits import USUAL, Limits
+from ...photo.photo import TRANSFERS
+from ...separation import METHODS
+
+Commands = Any  # what `add_subparsers` returns has no public name
+
+
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Keeps the examples as they are written, and fills the lines above them."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        keep = "\n" in text
+        return super()._fill_text(
+            text if keep else "\n".join(textwrap.wrap(text, width)), width, indent
+        )
+
+
+class Parser(argparse.ArgumentParser):
+    """Raises `InputError` instead of printing its usage; options cannot be shortened, so that new
+    ones never change old scripts.
+    """
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(allow_abbrev=False, formatter_class=_Help, **options)
+
+    def error(self, message: str) -> NoReturn:
+        """Raises `InputError`."""
+        raise InputError(f"{message} (see `{self.prog} --help`)")
+
+
+def add_command(
+    commands: Commands, name: str, run: Any, summary: str, description: str, examples: str
+) -> argparse.ArgumentParser:
+    """A sub-command's parser, with what all of them have."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=summary,
+        description=description,
+        epilog=f"examples:\n{examples}" if examples else None,
+    )
+    parser.set_defaults(run=run)
+    add_speech(parser)
+    return parser
+
+
+def add_speech(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
+    """--quiet and --progress.
+
+    `again`: for an action of a command that has them, so that they may stand before it or behind
+    it.
+    """
+    told = (
+        argparse.SUPPRESS if again else None
+    )  # what stands before the action is not to be undone by a default
+    parser.add_argument(
+        "--quiet",
+        action="store_true",
+        default=told or False,
+        help="show no progress, and print nothing but what was asked for",
+    )
+    parser.add_argument(
+        "--progress",
+        choices=("bar", "json"),
+        default=told or "bar",
+        help="json: for programs, a JSON object a line on stdout, cancelled by `cancel` or the end of stdin (default bar)",
+    )
+
+
+def hints(options: argparse.Namespace, *lines: str) -> list[str]:
+    """Lines to print that only help a person: none with --quiet."""
+    return [] if options.quiet else list(lines)
+
+
+def add_photo(parser: argparse.ArgumentParser) -> None:
+    """PHOTO, --mask, --transfer."""
+    parser.add_argument(
+        "photo",
+        metavar="PHOTO",
+        type=Path,
+        help="8- or 16-bit PNG, JPEG, TIFF, BMP, PPM, EXR, HDR or NumPy .npy",
+    )
+    parser.add_argument(
+        "--mask",
+        type=Path,
+        metavar="MASK",
+        help="image of the photo's size, the object white on black (default: the photo's alpha channel, else what is not black)",
+    )
+    add_transfer(parser)
+    add_limits(parser)
+
+
+def add_transfer(parser: argparse.ArgumentParser) -> None:
+    """--transfer."""
+    parser.add_argument(
+        "--transfer",
+        choices=TRANSFERS,
+        default="auto",
+        help="how the photo is coded (auto: EXR, HDR and floats of .npy are linear, else sRGB)",
+    )
+
+
+def add_limits(parser: argparse.ArgumentParser) -> None:
+    """--max-pixels."""
+    parser.add_argument(
+        "--max-pixels",
+        type=whole,
+        default=USUAL.max_pixels,
+        metavar="N",
+        help="refuse images of more pixels (width x height), before they are unpacked (default %(default)s)",
+    )
+
+
+def limits_of(options: argparse.Namespace) -> Limits:
+    """What the files that a command reads may ask for."""
+    return Limits(max_pixels=options.max_pixels)
+
+
+def add_settings(parser: argparse.ArgumentParser) -> None:
+    """What the command's `Settings` are read from but for --engine and --threads; --priors and
+    --arrays.
+    """
+    usual = Settings()
+    parser.add_argument(
+        "--model",
+        default=usual.model,
+        metavar="NAME",
+        help=f"{', '.join(MODELS)} (default {usual.model})",
+    )
+    parser.add_argument(
+        "--separator",
+        default=usual.separator,
+        metavar="NAME",
+        help=f"what removes highlights: {', '.join(METHODS)} (default {usual.separator})",
+    )
+    parser.add_argument(
+        "--illumination",
+        choices=ILLUMINATIONS,
+        default=usual.illumination,
+        help="which lights to expect (default %(default)s)",
+    )
+    parser.add_argument(
+        "--max-size",
+        type=count,
+        default=usual.max_size,
+        metavar="N",
+        help="long side of the object, in pixels, in the maps (default %(default)s; 0: the photo's)",
+    )
+    parser.add_argument(
+        "--full-size", action="store_true", help="bring the result back to the photo's resolution"
+    )
+    parser.add_argument(
+        "--shading-only", action="store_true", help="shape from shading: the object has one colour"
+    )
+    parser.add_argument(
+        "--confidence-weights",
+        action="store_true",
+        help="of joint and mdr: pixels whose separation is in doubt weigh less in shape and light",
+    )
+    parser.add_argument(
+        "--light-colour",
+        choices=LIGHT_COLOURS,
+        default=usual.light_colour,
+        help="the light is white, or has the colour that the highlights tell, where they do (default %(default)s)",
+    )
+    parser.add_argument(
+        "--light-prior",
+        choices=LIGHT_PRIORS,
+        default=usual.light_prior,
+        help="expect the light that the photo seems to show, or that of all photos alike (default %(default)s)",
+    )
+    parser.add_argument(
+        "--shape-prior",
+        choices=SHAPE_PRIORS,
+        default=usual.shape_prior,
+        help="expect the shape that the photo seems to show, or what its outline alone suggests (default %(default)s)",
+    )
+    parser.add_argument(
+        "--arrays",
+        action="store_true",
+        help="write arrays.npz too: everything as plain NumPy arrays, for other programs",
+    )
+    parser.add_argument(
+        "--priors",
+        type=Path,
+        metavar="FILE",
+        help="a file of isc fit-priors (default: those of the package)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=count,
+        default=usual.seed,
+        metavar="N",
+        help="of random numbers, written into the result (default %(default)s)",
+    )
+
+
+def add_engine(
+    parser: argparse.ArgumentParser, threads: str = "how many threads to use (0: one for each core)"
+) -> None:
+    """--engine and --threads."""
+    parser.add_argument(
+        "--engine",
+        choices=("auto", "numba", "numpy"),
+        default="auto",
+        help="compiled kernels, or plain NumPy (auto: compiled if possible)",
+    )
+    parser.add_argument("--threads", type=count, default=0, metavar="N", help=threads)
+
+
+def count(text: str) -> int:
+    """A whole number from 0 on."""
+    try:
+        value = int(text)
+    except ValueError:
+        value = -1
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+    return value
+
+
+def whole(text: str) -> int:
+    """A whole number from 1 on."""
+    value = count(text)
+    if value == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
+    return value
+
+
+def number(text: str) -> float:
+    """A finite number other than 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not math.isfinite(value) or value == 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number other than 0")
+    return value
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    value = number(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text!r} is not above 0")
+    return value
+
+
+def names(text: str) -> tuple[str, ...]:
+    """Names with commas between them."""
+    found = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not found:
+        raise argparse.ArgumentTypeError("give at least one name")
+    return found

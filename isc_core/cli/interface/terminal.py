@@ -1,0 +1,181 @@
+"""What a person at a terminal sees and presses: the progress bar, results and complaints, and
+Ctrl-C.
+"""
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType, TracebackType
+from typing import TextIO
+
+from ...io.printable_names import readable
+from ...progress import Monitor
+
+_BAR = 24
+_REDRAW_SECONDS = 0.08
+_TIME_LEFT = re.compile(r", [0-9.]+ (s|min|h) left$")
+
+
+def stage_name(stage: str) -> str:
+    """A stage's text without its changing part: what comes after "loss", and how much time is left."""
+    return _TIME_LEFT.sub("", stage.partition(", loss")[0]).partition(", done")[0]
+
+
+def discard_output() -> None:
+    """Points standard output at nothing, so that what is still buffered does not fail once more
+    when Python ends.
+    """
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def printable(text: str, stream: TextIO) -> str:
+    """`text`, which may have several lines, in characters that `stream` can write."""
+    coding = getattr(stream, "encoding", None) or "utf-8"
+    return (
+        "\n".join(map(readable, text.split("\n"))).encode(coding, "backslashreplace").decode(coding)
+    )
+
+
+class TerminalSpeaker:
+    """Speaks to a person: results on standard output, all else on standard error."""
+
+    @contextmanager
+    def progress(self, quiet: bool) -> Iterator[Callable[[str, float], None]]:
+        """Where the work reports to while it lasts."""
+        with ProgressBar(sys.stderr, quiet=quiet) as bar:
+            yield bar
+
+    def __enter__(self) -> "TerminalSpeaker":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        pass
+
+    def done(self, output: str, lines: Sequence[str]) -> None:
+        """The work's result is written to `output`; `lines` say what a person should know."""
+        del output
+        for line in lines:
+            print(printable(line, sys.stdout))
+
+    def failed(self, message: str, code: int) -> None:
+        """One line says why there is no result."""
+        del code
+        print(f"isc: error: {message}", file=sys.stderr)
+
+    def rejected(self, lines: Sequence[str], code: int) -> None:
+        """The result is written, but breaks bounds, a line each."""
+        del code
+        for line in lines:
+            print(f"isc: rejected: {line}", file=sys.stderr)
+
+    def cancelled(self) -> None:
+        """The work was stopped, and left nothing."""
+        print("isc: cancelled", file=sys.stderr)
+
+
+class ProgressBar:
+    """Shows `progress(stage, fraction)` on `stream`: one line that is redrawn on a terminal, else a
+    line for each new stage.
+
+    A stage's text may end in a changing part after a comma ("shape and light, loss 46.1"; "images,
+    done 7"). Use as a context manager: the line is wiped at the end, however the work ends.
+    """
+
+    def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
+        self._stream = stream
+        self._quiet = quiet
+        self._live = stream.isatty()
+        self._stage = ""
+        self._most = 0.0
+        self._drawn = float("-inf")
+
+    def __call__(self, stage: str, fraction: float) -> None:
+        """Shows the stage; a bar never goes back."""
+        if self._quiet:
+            return
+        name = stage_name(stage)
+        new, self._stage = name != self._stage, name
+        self._most = max(self._most, min(fraction, 1.0))
+        if self._live:
+            self._draw(stage, new)
+        elif new:
+            print(f"isc: {name}", file=self._stream, flush=True)
+
+    def _draw(self, stage: str, new: bool) -> None:
+        now = time.monotonic()
+        if not new and now - self._drawn < _REDRAW_SECONDS:
+            return
+        self._drawn = now
+        full = round(_BAR * self._most)
+        line = f"[{'#' * full}{'.' * (_BAR - full)}] {100 * self._most:3.0f} %  {stage}"
+        self._stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
+        self._stream.flush()
+
+    def __enter__(self) -> "ProgressBar":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._drawn > 0:
+            with contextlib.suppress(OSError):
+                self._stream.write("\r\x1b[K")
+                self._stream.flush()
+
+
+class Interrupts:
+    """While in use: the first Ctrl-C asks the work to stop, a second one raises
+    `KeyboardInterrupt`; SIGTERM ends the process with 143.
+
+    All three let the work tidy up. Outside the main thread, and where Ctrl-C is ignored (`nohup`),
+    nothing is changed.
+    """
+
+    def __init__(self) -> None:
+        self._asked = False
+        self._before: dict[int, object] = {}
+
+    def monitor(self, progress: Callable[[str, float], None]) -> Monitor:
+        """The monitor to work with."""
+        return Monitor(progress, lambda: self._asked)
+
+    def _on_interrupt(self, number: int, frame: FrameType | None) -> None:
+        if self._asked:
+            raise KeyboardInterrupt
+        self._asked = True
+
+    def __enter__(self) -> "Interrupts":
+        if threading.current_thread() is threading.main_thread():
+            self._install(signal.SIGINT, self._on_interrupt)
+            self._install(signal.SIGTERM, lambda number, frame: sys.exit(128 + number))
+        return self
+
+    def _install(self, number: int, handler: Callable[[int, FrameType | None], object]) -> None:
+        if signal.getsignal(number) != signal.SIG_IGN:
+            self._before[number] = signal.signal(number, handler)
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        value: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for number, handler in self._before.items():
+            # None: a program around this Python had set it, which cannot be set again from here.
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)  # type: ignore[arg-type]

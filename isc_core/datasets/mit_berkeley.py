@@ -1,0 +1,207 @@
+"""Reading the MIT-Berkeley intrinsic images: photographs of objects with their true shape, light,
+shading and reflectance.
+
+Photographs, shading and reflectance under laboratory light: R. Grosse, M. K. Johnson, E. H.
+Adelson, W. T. Freeman (2009), "Ground truth dataset and baseline evaluations for intrinsic image
+algorithms", doi:10.1109/ICCV.2009.5459428. Heights, lights and the renderings under natural light:
+J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
+doi:10.1109/TPAMI.2014.2377712.
+
+In natural light `image = shading * reflectance` exactly (it is rendered); in the laboratory only to
+a few per cent.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..io.matlab import read_matrix
+from ..photo.photo import read_raster
+
+ILLUMINATIONS = ("natural", "laboratory")
+INPUTS = ("diffuse", "original")
+
+_FOLDERS = {
+    "laboratory": ("laboratory", "MIT-Berkeley-Laboratory"),
+    "natural": ("natural", "MIT-Berkeley-Natural"),
+}
+_WHITE = 65535.0
+
+
+@dataclass(frozen=True)
+class MitBerkeleyObject:
+    """One object under one illumination, cut to the evaluation crop (h, w). Row 0 at the top,
+    linear values, float64.
+
+    `image`: (h, w, 3) the input, in [0, 1]. `valid`: (h, w) bool, all three channels of `image`
+    above 0. `mask`: (h, w) bool, the object. `height`: (h, w) pixels, toward the viewer, NaN where
+    unknown. `shading`, `reflectance`: (h, w, 3), at the scale of the files; laboratory shading may
+    exceed 1. `light`: (9, 3) log-shading coefficients in the reference's convention
+    (`shading.spherical_harmonics.light_from_reference` converts).
+    """
+
+    name: str
+    illumination: str
+    image: np.ndarray
+    valid: np.ndarray
+    mask: np.ndarray
+    height: np.ndarray
+    shading: np.ndarray
+    reflectance: np.ndarray
+    light: np.ndarray
+
+
+def list_objects(root: str | Path, illumination: str) -> tuple[str, ...]:
+    """Names of the objects below `root` under "natural" or "laboratory" light, in alphabetical
+    order.
+
+    Raises `InputError` where the folder is absent or holds no object.
+    """
+    folder = _folder(Path(root), illumination)
+    names = tuple(
+        sorted(
+            entry.name
+            for entry in folder.iterdir()
+            if entry.is_dir() and not entry.name.startswith(".")
+        )
+    )
+    if not names:
+        raise InputError(
+            f"{folder} holds no objects: give the folder that contains the MIT-Berkeley set"
+        )
+    return names
+
+
+def check_request(root: str | Path, name: str, illumination: str, input: str) -> None:
+    """Raises the `InputError` that `load_object` would raise for an unknown name or option, without
+    reading the object.
+    """
+    _check_option("input", input, INPUTS)
+    known = list_objects(root, illumination)
+    if name not in known:
+        raise InputError(f"unknown object '{name}': choose from {', '.join(known)}")
+    if (
+        illumination == "natural"
+        and input == "original"
+        and not (_folder(Path(root), "natural") / name / "original.png").is_file()
+    ):
+        raise InputError(
+            "the natural images of this set have no highlights: use --input diffuse, or --illumination laboratory"
+        )
+
+
+def load_object(
+    root: str | Path, name: str, illumination: str = "natural", input: str = "diffuse"
+) -> MitBerkeleyObject:
+    """One object of the set. `input`: "diffuse" (without highlights) or "original" (as
+    photographed; laboratory light, or the glossy sets of `isc synth glossy-mit`).
+
+    Height, reflectance, mask and crop always come from the laboratory folder. Raises `InputError`
+    for an unknown name or option, and for a missing, damaged or mis-sized file.
+    """
+    check_request(root, name, illumination, input)
+    laboratory = _folder(Path(root), "laboratory") / name
+    own = _folder(Path(root), illumination) / name
+    crop = _crop(laboratory / "crop_idx.mat")
+    image, reflectance = (
+        _cut(_colour(path), crop, 3, path)
+        for path in (own / f"{input}.png", laboratory / "reflectance.png")
+    )
+    mask = _cut(_pixels(laboratory / "mask.png"), crop, 1, laboratory / "mask.png") > 0
+    height = _cut(_matrix(laboratory / "Z.mat", "depth"), crop, 1, laboratory / "Z.mat")
+    shading = _shading(own, illumination, crop)
+    light = _matrix(
+        own / "L.mat", *(("L",) if illumination == "natural" else ("color_lights", "diffuse"))
+    )
+    if light.shape != (9, 3):
+        raise InputError(
+            f"{own / 'L.mat'}: its light has shape {light.shape} where (9, 3) was expected"
+        )
+    valid = (image > 0).all(axis=-1)
+    return MitBerkeleyObject(
+        name, illumination, image, valid, mask, height, shading, reflectance, light
+    )
+
+
+def load_natural_lights(root: str | Path) -> np.ndarray:
+    """Lights of real environments, (9, 3, n) in the reference's convention.
+
+    Raises `InputError` where the file is absent.
+    """
+    path = Path(root) / "natural_lights.mat"
+    lights = _matrix(path, "Ls")
+    if lights.ndim != 3 or lights.shape[:2] != (9, 3):
+        raise InputError(f"{path}: 'Ls' has shape {lights.shape} where (9, 3, n) was expected")
+    return lights
+
+
+def _check_option(what: str, value: str, known: tuple[str, ...]) -> None:
+    if value not in known:
+        raise InputError(f"unknown {what} '{value}': choose from {', '.join(known)}")
+
+
+def _folder(root: Path, illumination: str) -> Path:
+    """The illumination's folder, by either of its two names."""
+    _check_option("illumination", illumination, ILLUMINATIONS)
+    for name in _FOLDERS[illumination]:
+        if (root / name).is_dir():
+            return root / name
+    raise InputError(
+        f"{root} has no folder {' or '.join(_FOLDERS[illumination])}: give the folder that contains the MIT-Berkeley set"
+    )
+
+
+def _pixels(path: Path) -> np.ndarray:
+    """An image's stored values, (h, w) or (h, w, 3) in RGB order."""
+    values = read_raster(path).values
+    return values[..., 0] if values.shape[2] == 1 else values
+
+
+def _colour(path: Path) -> np.ndarray:
+    pixels = _pixels(path)
+    if pixels.ndim != 3 or pixels.dtype != np.uint16:
+        raise InputError(f"{path} is not a 16-bit colour image: fetch the data set again")
+    return pixels / _WHITE
+
+
+def _matrix(path: Path, *keys: str) -> np.ndarray:
+    """A float64 array of a MAT file: the variable `keys[0]`, then its fields; sides of length 1 are
+    dropped.
+    """
+    return np.squeeze(read_matrix(path, *keys)).astype(np.float64)
+
+
+def _shading(folder: Path, illumination: str, crop: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+    if illumination == "natural":
+        path = folder / "shading_color.png"
+        return _cut(_colour(path), crop, 3, path)
+    path = folder / "shading_corrected_color.mat"
+    return _cut(_matrix(path, "shading_correct"), crop, 3, path)
+
+
+def _crop(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    """The rows and columns of the evaluation crop, from 1-based lists to 0-based ones."""
+    with np.errstate(invalid="ignore"):  # what is no number lies outside of any picture
+        rows, columns = (
+            np.atleast_1d(_matrix(path, key)).ravel().astype(np.int64) - 1
+            for key in ("crop_idx1", "crop_idx2")
+        )
+    return rows, columns
+
+
+def _cut(
+    full: np.ndarray, crop: tuple[np.ndarray, np.ndarray], channels: int, path: Path
+) -> np.ndarray:
+    """The crop of a file's whole array, (h, w) for one channel, (h, w, 3) for three."""
+    if full.shape[2:] != ((channels,) if channels > 1 else ()) or full.ndim < 2:
+        raise InputError(
+            f"{path}: shape {full.shape} where {channels} channel(s) were expected: is it the file of the data set?"
+        )
+    for indices, size in zip(crop, full.shape[:2], strict=True):
+        if not 0 < indices.size <= size or indices.min() < 0 or indices.max() >= size:
+            raise InputError(
+                f"{path}: its {full.shape[1]} x {full.shape[0]} pixels do not hold the crop: is it a file of the data set?"
+            )
+    return np.ascontiguousarray(full[np.ix_(*crop)])

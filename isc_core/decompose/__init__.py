@@ -1,0 +1,1 @@
+"""The pipeline: from one photo to its intrinsic scene characteristics."""

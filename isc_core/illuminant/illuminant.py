@@ -1,0 +1,248 @@
+"""The colour of the light, from highlights: what a separation under white light needs to know
+first.
+
+Problem: separations take the light for white. Where it is not, its colour shows in the highlights
+alone; paint may have any.
+
+Equation: of one paint under one light every pixel is I = m B + s L, diffuse colour B and light
+colour L, and so is every change of I. Both lie in the plane of B and L (Lee 1986), whose normal is
+at right angles to L whatever B is:
+
+    n = I x dI,    n . L = 0.
+
+One paint is one plane and says one thing of two; several paints meet in L alone. So L = 1 + d, sum
+d = 0, minimises
+
+    sum w (n . (1 + d))^2 / |n|^2   and   |d|^2 / 2 usual^2,
+
+weighed by the precision of the first, which comes from the disagreement of the normals, summed over
+blocks of the photo because neighbours err alike. Of the two kinds of ignorance, noise and a missing
+second plane, the second term so takes care by itself: what the planes do not say stays white.
+Confidence is the share of the data's precision in its weakest direction.
+
+Only changes count that look like a highlight's flank: all channels rise, and the chromaticity moves
+toward the light's (the highlight's end of the lines that R. T. Tan, K. Nishino and K. Ikeuchi draw
+over inverse intensity). What does not agree has Cauchy's weight, and the square of the share that
+agrees lessens the precision: where half of the flanks are paint's, the other half is less to be
+believed.
+
+Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694; R. T. Tan, K. Nishino, K. Ikeuchi 2004,
+doi:10.1364/JOSAA.21.000321. The blocks: K.-Y. Liang and S. L. Zeger 1986,
+doi:10.1093/biomet/73.1.13.
+
+Limits: one colour of light, tinted by a quarter at most; `light_gamut` looks whether it is
+stronger. Metals tint their highlights themselves. Paint that pales toward a common colour looks
+like a highlight; grey paint says nothing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..imaging.smoothing import masked_gaussian
+from .gamut import PLANE, leads_to, turns, without_white
+
+_FINE = 0.006  # of the object's diagonal: changes are taken over twice this
+_LOOSE, _TOLERANCE = 0.2, 0.02  # of n . L / |n|, in the first round and in the last
+_ROUNDS, _GATES = 15, 3
+_OPEN = (
+    2.0  # how much farther from white than usual the rounds may look, before the answer is weighed
+)
+_BLOCKS = 8
+_FEW = 20  # changes, below which nothing is said
+_FARTHEST = 0.25  # d beyond this is no light's, but paint's
+
+
+@dataclass(frozen=True)
+class IlluminantOptions:
+    """`usual`: the standard deviation of a light's colour from white, of mean 1, before any photo
+    is seen; > 0. `doubt`: the standard deviation of what planes of normals say that is common to
+    all of a photo's, >= 0. `enough`: the confidence from which the colour counts as determined, in
+    [0, 1].
+    """
+
+    usual: float = 0.1
+    doubt: float = 0.02
+    enough: float = 0.5
+
+
+@dataclass(frozen=True)
+class Illuminant:
+    """`colour` (3,) > 0, of mean 1: white where nothing can be said. `confidence` in [0, 1]: how
+    much of it is the photo's word. `determined`: whether that is enough; `reason`: why not, or on
+    what it rests. `too_strong`: the light may have a colour that no lamp has.
+    """
+
+    colour: np.ndarray
+    confidence: float
+    determined: bool
+    reason: str
+    too_strong: bool = False
+
+
+@dataclass(frozen=True)
+class _Changes:
+    """`colour` and `change` (N, 3) in units of the bright pixels' intensity, the change upward;
+
+    `block` (N,).
+    """
+
+    colour: np.ndarray
+    change: np.ndarray
+    block: np.ndarray
+
+
+def estimate_illuminant(
+    image: np.ndarray,
+    mask: np.ndarray,
+    clipped: np.ndarray | None = None,
+    options: IlluminantOptions | None = None,
+) -> Illuminant:
+    """The light's colour in `image` (H, W, 3), linear, >= 0 inside `mask` (H, W) bool; `clipped`
+    (H, W) bool pixels are left out.
+
+    Raises `InputError` for arrays that do not fit, an empty mask, or options out of range.
+    """
+    options = options or IlluminantOptions()
+    if image.ndim != 3 or image.shape[2] != 3 or mask.shape != image.shape[:2] or not mask.any():
+        raise InputError(
+            "the light's colour needs an image (H, W, 3) and a mask of its size that is not empty"
+        )
+    if options.usual <= 0 or options.doubt < 0 or not 0 <= options.enough <= 1:
+        raise InputError("usual must be above 0, doubt at least 0, enough within [0, 1]")
+    changes = _changes(image, mask if clipped is None else mask & ~clipped)
+    if without_white(changes.colour, changes.change):
+        return Illuminant(
+            np.ones(3),
+            0.0,
+            False,
+            "all of the object is of one strong colour, its brightest places too",
+            True,
+        )
+    shift = np.zeros(2)
+    precision = np.zeros((2, 2))
+    for _ in range(_GATES):
+        flanks = _flanks(changes, _colour(shift))
+        if flanks.sum() < _FEW:
+            return Illuminant(
+                np.ones(3),
+                0.0,
+                False,
+                "no coloured paint carries a highlight whose flank can be seen",
+            )
+        shift, precision = _planes(changes, flanks, shift, options)
+    weakest = float(np.linalg.eigvalsh(precision)[0])
+    confidence = weakest / (weakest + 1 / options.usual**2)
+    if np.abs(PLANE @ shift).max() > _FARTHEST:
+        return Illuminant(
+            np.ones(3),
+            0.0,
+            False,
+            "what looks like highlights has too strong a colour for a light: it may be paint",
+            True,
+        )
+    determined = confidence >= options.enough
+    reason = (
+        f"{int(flanks.sum())} changes across highlights agree"
+        if determined
+        else "the highlights lie on one paint, or disagree"
+    )
+    return Illuminant(_colour(shift), confidence, determined, reason)
+
+
+def whitened(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """`image` (..., 3) as it would be under white light of the same mean.
+
+    `colour` (3,) > 0. Raises `InputError`.
+    """
+    return image / _checked(colour).astype(image.dtype)
+
+
+def tinted(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """`image` (..., 3), a photo or any layer of one, back under the light: the inverse of
+    `whitened`. Raises `InputError`.
+    """
+    return image * _checked(colour).astype(image.dtype)
+
+
+def _checked(colour: np.ndarray) -> np.ndarray:
+    colour = np.asarray(colour)
+    if colour.shape != (3,) or not np.isfinite(colour).all() or colour.min() <= 0:
+        raise InputError("a light's colour is three numbers above 0")
+    return colour
+
+
+def _colour(shift: np.ndarray) -> np.ndarray:
+    return np.ones(3) + PLANE @ shift
+
+
+def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
+    """All changes over a short way whose ends and middle are in the mask."""
+    rows, columns = np.nonzero(mask)
+    if len(rows) == 0:
+        return _Changes(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int))
+    box = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+    image, mask = image[box], mask[box]  # what is around the object does not count
+    diagonal = float(np.hypot(mask.shape[0], mask.shape[1]))
+    sigma = max(_FINE * diagonal, 0.6)
+    smooth = masked_gaussian(np.where(mask[..., None], image, 0).astype(float), mask, sigma)
+    bright = max(float(np.quantile(smooth[mask].sum(axis=1), 0.99)), 1e-30)
+    step, side = max(1, round(sigma)), max(diagonal / _BLOCKS, 1.0)
+    places = np.stack(
+        np.meshgrid(*(np.arange(n) // side for n in mask.shape), indexing="ij"), -1
+    ) @ [4 * _BLOCKS, 1]
+    colours, rises, blocks = [], [], []
+    for axis in (0, 1):
+        before, middle, after = (_slices(axis, start, 2 * step) for start in (0, step, 2 * step))
+        known = mask[before] & mask[middle] & mask[after]
+        change = (smooth[after] - smooth[before])[known] / bright
+        colours.append(smooth[middle][known] / bright)
+        rises.append(change * np.where(change.sum(axis=1) < 0, -1, 1)[:, None])
+        blocks.append(places[middle][known].astype(int))
+    return _Changes(np.concatenate(colours), np.concatenate(rises), np.concatenate(blocks))
+
+
+def _slices(axis: int, start: int, length: int) -> tuple[slice, ...]:
+    """Of an axis all but `length`, from `start` on."""
+    part = slice(start, start - length or None)
+    return (part,) if axis == 0 else (slice(None), part)
+
+
+def _flanks(changes: _Changes, light: np.ndarray) -> np.ndarray:
+    """Which changes (N,) may be highlights of that light."""
+    here, turn, rising = turns(changes.colour, changes.change)
+    return rising & leads_to(light, here, turn)
+
+
+def _planes(
+    changes: _Changes, flanks: np.ndarray, shift: np.ndarray, options: IlluminantOptions
+) -> tuple[np.ndarray, np.ndarray]:
+    """The shift (2,) along `PLANE` and the precision (2, 2) of what the planes say of it."""
+    normals = np.cross(changes.colour[flanks], changes.change[flanks])
+    length = np.linalg.norm(normals, axis=1)
+    units = normals / length[:, None]
+    along, offset = units @ PLANE, units.sum(axis=1)
+    blocks = np.unique(changes.block[flanks], return_inverse=True)[1]
+    prior = np.eye(2) / options.usual**2
+    precision, wanted, agreeing = np.zeros((2, 2)), shift, 0.0
+    for tolerance in np.geomspace(_LOOSE, _TOLERANCE, _ROUNDS):
+        off = offset + along @ shift
+        weight = length / (1 + np.square(off / tolerance))
+        agreeing = weight.sum() / length.sum()
+        weight /= weight.sum()
+        curvature = (along * weight[:, None]).T @ along
+        pulls = np.stack([np.bincount(blocks, weight * off * along[:, k]) for k in (0, 1)], axis=1)
+        # The blocks' pulls scatter around zero at the best shift; `doubt` is what all of them have
+        # in common, along each plane's normal.
+        scatter = pulls.T @ pulls + options.doubt**2 * curvature + 1e-12 * np.eye(2)
+        precision = curvature @ np.linalg.solve(scatter, curvature)
+        wanted = (
+            shift
+            - np.linalg.lstsq(curvature, (along * (weight * off)[:, None]).sum(axis=0), rcond=1e-6)[
+                0
+            ]
+        )
+        shift = np.linalg.solve(precision + prior / _OPEN**2, precision @ wanted)
+    precision *= agreeing**2
+    return np.linalg.solve(precision + prior, precision @ wanted), precision

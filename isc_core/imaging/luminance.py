@@ -1,0 +1,22 @@
+"""Luminance of linear Rec.709 light, and the white level of an image layer.
+
+Citation: ITU-R BT.709-6 (2015).
+"""
+
+import numpy as np
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
+
+
+def luminance(color: np.ndarray) -> np.ndarray:
+    """(...) of linear Rec.709 (..., 3), float64."""
+    return np.asarray(color, float) @ LUMINANCE
+
+
+def white_of(layer: np.ndarray, mask: np.ndarray, percentile: float = 99.5) -> float:
+    """The layer's white: this percentile of its brightest channel over the lit pixels of the mask;
+    1 if none is lit.
+    """
+    bright = layer[mask].max(-1)
+    lit = bright[bright > 0]
+    return float(np.percentile(lit, percentile)) if lit.size else 1.0

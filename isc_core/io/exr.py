@@ -1,0 +1,71 @@
+"""Float32 OpenEXR files from and to plain arrays, channel by channel.
+
+Channels keep their full names (`diffuse.R`, `height.Z`); compression is lossless (ZIP), and equal
+arrays give equal bytes.
+"""
+
+import errno
+import shutil
+import struct
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+from ..errors import InputError
+from .exr_header import check_exr
+from .limits import USUAL, Limits
+from .native_io import memory_file, suppress_native_output
+
+
+def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
+    """Writes one scanline file.
+
+    `channels`: name -> (H, W), all of one shape. Raises `OSError` when it cannot be written whole.
+    """
+    # The writer stores garbage from strided arrays without a word: every channel is made contiguous
+    # here.
+    pixels = {name: np.ascontiguousarray(values, np.float32) for name, values in channels.items()}
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    with memory_file() as place:
+        try:
+            with OpenEXR.File(header, pixels) as file:
+                file.write(str(place))
+        except RuntimeError as error:
+            raise OSError(errno.EIO, str(error)) from error
+        shutil.copyfile(place, path)
+
+
+def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
+    """All channels of a file's first part: name -> (H, W) float32.
+
+    Raises `InputError` if it is no readable OpenEXR file.
+    """
+    if not path.is_file():
+        raise InputError(f"{path} does not exist")
+    try:
+        data = path.read_bytes()
+        check_exr(data, path, limits)
+        with (
+            suppress_native_output(),
+            memory_file(data) as place,
+            OpenEXR.File(str(place), separate_channels=True) as file,
+        ):
+            return {
+                name: np.asarray(channel.pixels, np.float32)
+                for name, channel in file.channels().items()
+            }
+    except InputError:
+        raise
+    except (
+        RuntimeError,
+        ValueError,
+        TypeError,
+        KeyError,
+        OSError,
+        OverflowError,
+        MemoryError,
+        struct.error,
+    ) as error:
+        raise InputError(f"{path} is not a readable OpenEXR file (damaged or cut short)") from error

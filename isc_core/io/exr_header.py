@@ -1,0 +1,143 @@
+"""What an OpenEXR file claims, read before the library sees it.
+
+Problem: the library allocates what a header asks for, for every channel, before it looks whether
+the file holds it; and its bindings read whatever a header names. Here windows, channels and chunks
+are held against `Limits` and against the size of the file first. Layout: a mark, the version with
+its flags, one header a part (name, type, size, value; ended by an empty name), then for each part a
+table of 8 bytes a chunk: a block of lines or a tile. Citation: OpenEXR, "OpenEXR File Layout"
+(Academy Software Foundation, 2023), https://openexr.com/en/latest/OpenEXRFileLayout.html. Limits:
+flat images of full resolution; deep ones are refused, and channels that are sampled more coarsely
+than the pixels.
+"""
+
+import math
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+from .limits import Limits
+
+MAGIC = b"\x76\x2f\x31\x01"
+_TILED, _DEEP, _PARTS = 0x200, 0x800, 0x1000
+_BYTES = {0: 4, 1: 2, 2: 4}  # of a value, by its kind: whole number, half, float
+_LINES = (1, 1, 1, 16, 32, 16, 32, 32, 32, 256)  # of a block, by compression
+_MOST_CHANNELS, _MOST_PARTS, _MOST_HEADER, _LONGEST, _LARGEST_TILE = 1024, 64, 1 << 20, 255, 1 << 14
+
+
+@dataclass(frozen=True)
+class ExrPart:
+    """`data`, `display`: windows, (left, top, right, bottom), the last two inside.
+
+    `channels`: names.
+    """
+
+    data: tuple[int, int, int, int]
+    display: tuple[int, int, int, int]
+    channels: tuple[str, ...]
+
+
+def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
+    """Width and height of a window."""
+    left, top, right, bottom = window
+    return right - left + 1, bottom - top + 1
+
+
+def check_exr(
+    data: bytes, path: Path, limits: Limits, stored: int | None = None
+) -> tuple[ExrPart, ...]:
+    """The parts of a file that begins with `data` (all of it, or a MiB) and has `stored` bytes
+    (None: those of `data`).
+
+    Raises `InputError` for one that claims more than `limits` allows, and `ValueError` or
+    `struct.error` for a damaged one.
+    """
+    stored = len(data) if stored is None else stored
+    mark, version = struct.unpack_from("<4sI", data)
+    if mark != MAGIC or version & 0xFF != 2:
+        raise ValueError("not an OpenEXR file of version 2")
+    if version & _DEEP:
+        raise InputError(f"{path}: a deep image, with many values a pixel: save it as a flat EXR")
+    parts, unpacked, at = [], 0, 8
+    while True:
+        header, at = _attributes(data[:_MOST_HEADER], at)
+        if header:
+            part, own, chunks = _part(path, header, bool(version & _TILED), limits)
+            parts.append(part)
+            unpacked += own
+            stored -= 8 * chunks
+        if not header or not version & _PARTS:
+            break
+    if not 0 < len(parts) <= _MOST_PARTS or stored < at:
+        raise ValueError("no parts, or more chunks than the file has room for")
+    limits.check_unpacked(path, unpacked, stored)
+    return tuple(parts)
+
+
+def _attributes(data: bytes, at: int) -> tuple[dict[bytes, bytes], int]:
+    """Values by name, and where the next header begins."""
+    found: dict[bytes, bytes] = {}
+    while (end := data.index(b"\0", at, at + _LONGEST + 1)) > at:
+        kind = data.index(b"\0", end + 1, end + _LONGEST + 2)
+        (size,) = struct.unpack_from("<i", data, kind + 1)
+        start = kind + 5
+        if not 0 <= size <= len(data) - start:
+            raise ValueError("an attribute is longer than the file")
+        found[data[at:end]] = data[start : start + size]
+        at = start + size
+    return found, at + 1
+
+
+def _part(
+    path: Path, header: dict[bytes, bytes], tiled: bool, limits: Limits
+) -> tuple[ExrPart, int, int]:
+    """A part, the bytes that it unpacks to, and how many chunks it has.
+
+    Raises `KeyError` as a `ValueError` where something is missing.
+    """
+    if missing := {b"channels", b"compression", b"dataWindow", b"displayWindow"} - header.keys():
+        raise ValueError(f"lacks {sorted(missing)[0]!r}")
+    if header.get(b"type", b"").startswith(b"deep"):
+        raise InputError(f"{path}: a deep image, with many values a pixel: save it as a flat EXR")
+    windows = [_window(header[name]) for name in (b"dataWindow", b"displayWindow")]
+    for window in windows:
+        limits.check_pixels(path, *size_of(window))
+    names, value = _channels(path, header[b"channels"])
+    width, height = size_of(windows[0])
+    compression = header[b"compression"][0]
+    if compression >= len(_LINES):
+        raise ValueError("an unknown compression")
+    chunks = math.ceil(height / _LINES[compression])
+    if tiled or header.get(b"type", b"") == b"tiledimage":
+        across, down, _ = struct.unpack("<IIB", header.get(b"tiles", b""))
+        if not (0 < across <= _LARGEST_TILE and 0 < down <= _LARGEST_TILE):
+            raise ValueError("tiles of an impossible size")
+        limits.check_unpacked(path, across * down * value, 0)
+        chunks = math.ceil(width / across) * math.ceil(height / down)
+    return ExrPart(windows[0], windows[1], names), width * height * value, chunks
+
+
+def _window(value: bytes) -> tuple[int, int, int, int]:
+    left, top, right, bottom = struct.unpack("<iiii", value)
+    if right < left or bottom < top:
+        raise ValueError("a window without pixels")
+    return left, top, right, bottom
+
+
+def _channels(path: Path, value: bytes) -> tuple[tuple[str, ...], int]:
+    """Names of the channels, and bytes of all of them a pixel."""
+    names, total, at = [], 0, 0
+    while (end := value.index(b"\0", at, at + _LONGEST + 1)) > at:
+        kind, _, across, down = struct.unpack_from("<iB3xii", value, end + 1)
+        if (across, down) != (1, 1):
+            raise InputError(
+                f"{path}: a channel is stored more coarsely than the pixels: save it as a plain RGB EXR"
+            )
+        if kind not in _BYTES:
+            raise ValueError("a channel of an unknown kind")
+        names.append(value[at:end].decode("utf-8"))
+        total += _BYTES[kind]
+        at = end + 17
+    if not 0 < len(names) <= _MOST_CHANNELS or len(set(names)) < len(names):
+        raise ValueError("no channels, too many, or twice the same")
+    return tuple(names), total

@@ -1,0 +1,49 @@
+"""Reading JSON files that may be absent, damaged or somebody else's."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+
+MOST_BYTES = 1 << 28
+
+
+def read_json(path: Path, remedy: str = "write it again") -> Any:
+    """What the file holds; the caller looks at whether that is what it expects.
+
+    Raises `InputError`, its line ended by `remedy`, where it is not readable JSON or larger than
+    256 MB.
+    """
+    try:
+        if (size := path.stat().st_size) > MOST_BYTES:
+            raise InputError(
+                f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB of JSON are read: is it the right file?"
+            )
+        return json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from error
+    except InputError:
+        raise
+    except (ValueError, RecursionError) as error:  # not JSON, not UTF-8, or nested without end
+        raise InputError(f"{path} is damaged or no JSON ({str(error)[:200]}): {remedy}") from error
+
+
+def numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
+    """A part of what a file holds as an array, float64, if it is finite numbers of that shape; else
+    None.
+    """
+    try:
+        found = np.array(value)
+        array = found.astype(np.float64)
+    except (TypeError, ValueError, OverflowError):  # JSON has whole numbers of any length
+        return None
+    # Texts would be read as numbers: "iuf" are numbers, "O" are whole ones that are too long for
+    # these.
+    return (
+        array
+        if found.dtype.kind in "iufO" and array.shape == shape and np.isfinite(array).all()
+        else None
+    )

@@ -1,0 +1,59 @@
+"""How much a file may ask for, known before any of its content is unpacked.
+
+Problem: a hundred bytes can claim a picture of a million pixels a side, and a small archive can
+unpack to more than a machine holds. What a file claims stands in its header: width and height, the
+shape and kind of an array, the unpacked size of an archive's member. Readers hold these against
+`Limits` first, and decode afterwards.
+
+Limits: they bound what a file unpacks to. What a command then needs for its own work is a multiple
+of it; see docs/operations.md.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is read of one file at most.
+
+    `max_pixels`: width x height of a picture. A file may unpack to `max_bytes` bytes of values, or
+    to `max_ratio` times its own size, whichever is more: large files hold what they hold, small
+    ones that unpack to much are bombs.
+    """
+
+    max_pixels: int = 100_000_000
+    max_bytes: int = 1 << 30
+    max_ratio: int = 20
+
+    def check_pixels(self, path: Path | str, width: int, height: int) -> None:
+        """Raises `InputError` for a picture of more pixels."""
+        if width * height > self.max_pixels:
+            most = f"{self.max_pixels / 1e6:g} megapixels"
+            raise InputError(
+                f"{path}: {width} x {height} pixels; at most {most} are read: make it smaller, or raise --max-pixels"
+            )
+
+    def check_stored(self, path: Path | str, stored: int) -> None:
+        """Raises `InputError` for a picture's file of more than `max_bytes` bytes, which is held in
+        memory whole.
+        """
+        if stored > self.max_bytes:
+            raise InputError(
+                f"{path} has {stored / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are read: make it smaller first"
+            )
+
+    def check_unpacked(self, path: Path | str, unpacked: int, stored: int) -> None:
+        """Raises `InputError` for a file of `stored` bytes whose values would take more than it
+        may, `unpacked` bytes.
+        """
+        most = max(self.max_bytes, self.max_ratio * stored)
+        if unpacked > most:
+            raise InputError(
+                f"{path}: unpacks to {unpacked / 1e9:.1f} GB, at most {most / 1e9:.1f} are read: store less in it"
+            )
+
+
+USUAL = Limits()

@@ -1,0 +1,58 @@
+"""Working around what native libraries do: open files by name only, and print to the terminal.
+
+Problem: a library that opens a file by itself may read other bytes than those that were checked,
+since files change, and some accept no names but UTF-8: `memory_file` gives checked bytes an ASCII
+name of their own. Decoders of damaged files print warnings, through Python or straight to the
+process's error stream; the `InputError` that follows is the message that matters:
+`suppress_native_output` mutes the rest.
+
+Limits: memory files live in memory on Linux, in the temporary folder elsewhere. File descriptor 2
+belongs to the whole process: output of other threads is muted as well.
+"""
+
+import contextlib
+import io
+import os
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+_DESCRIPTORS = Path("/proc/self/fd")
+
+
+@contextmanager
+def memory_file(content: bytes = b"") -> Iterator[Path]:
+    """The path of a file that holds `content`; it is gone after the block."""
+    if hasattr(os, "memfd_create") and _DESCRIPTORS.is_dir():
+        with open(os.memfd_create("isc"), "wb") as file:
+            file.write(content)
+            file.flush()
+            yield _DESCRIPTORS / str(file.fileno())
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "content"
+        path.write_bytes(content)
+        yield path
+
+
+@contextlib.contextmanager
+def suppress_native_output() -> Iterator[None]:
+    """No warnings, and nothing printed, while it lasts."""
+    with (
+        warnings.catch_warnings(),
+        contextlib.redirect_stdout(io.StringIO()),
+        contextlib.ExitStack() as stack,
+    ):
+        warnings.simplefilter("ignore")
+        with contextlib.suppress(
+            OSError
+        ):  # without a descriptor 2 (a program with windows only) there is nothing to silence
+            saved = os.dup(2)
+            stack.callback(os.close, saved)
+            stack.callback(os.dup2, saved, 2)
+            null = os.open(os.devnull, os.O_WRONLY)
+            stack.callback(os.close, null)
+            os.dup2(null, 2)
+        yield

@@ -1,0 +1,165 @@
+"""Reading NumPy's files, single arrays and archives of them, from anybody.
+
+Problem: `numpy.load` believes a header: it allocates what the shape asks for before it looks
+whether the file holds it, and unpacks an archive's member whatever its size. Here shape, kind and
+size are held against what is there, and against `Limits`, first. Citation: NumPy Enhancement
+Proposal 1, "A simple file format for NumPy arrays" (2007),
+https://numpy.org/neps/nep-0001-npy-format.html; PKWARE, "APPNOTE.TXT - .ZIP File Format
+Specification", version 6.3.10 (2022). Limits: arrays of numbers, truth values and texts; no objects
+(which are pickles), no records. Members are stored or deflated.
+"""
+
+import io
+import math
+import tokenize
+import warnings
+import zipfile
+import zlib
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .limits import USUAL, Limits
+
+ARRAY, ARCHIVE = b"\x93NUMPY", b"PK"
+KINDS = "fiub"
+_ENCRYPTED = 0x1
+# What the literal in a header can make the parser raise: a nested or broken one, a kind that is
+# none.
+_PARSING = (
+    TypeError,
+    KeyError,
+    IndexError,
+    AttributeError,
+    SyntaxError,
+    OverflowError,
+    RecursionError,
+    MemoryError,
+    tokenize.TokenError,
+)
+_UNPACKING = (
+    ValueError,
+    KeyError,
+    OSError,
+    EOFError,
+    OverflowError,
+    RuntimeError,
+    MemoryError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+def read_array(path: Path, limits: Limits = USUAL) -> np.ndarray:
+    """The array of a `.npy` file, writable.
+
+    Raises `InputError` where the file is absent, damaged, or holds no plain numbers.
+    """
+    return parse_array(_bytes(path), str(path), limits=limits).copy()
+
+
+def read_arrays(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
+    """The arrays of a `.npz` file by name, writable.
+
+    Raises `InputError` as `parse_arrays` does, and where the file is absent.
+    """
+    return parse_arrays(_bytes(path), str(path), limits)
+
+
+def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USUAL) -> np.ndarray:
+    """The array that the bytes of a `.npy` file hold: a view of them. `kinds`: the kinds of value
+    that may be in it, as NumPy's letters.
+
+    Raises `InputError`, its line opened by `name`, where the bytes are damaged, cut short, or hold
+    something else.
+    """
+    try:
+        shape, by_columns, kind, start = array_header(data)
+    except ValueError as error:
+        raise InputError(
+            f"{name} is not a readable array (it is damaged): save it again with numpy.save"
+        ) from error
+    if (
+        kind.kind not in kinds
+        or kind.hasobject
+        or kind.subdtype is not None
+        or not 0 < kind.itemsize <= len(data)
+    ):
+        what = "objects" if kind.hasobject else str(kind)[:40]
+        raise InputError(
+            f"{name} is not a readable array of numbers, it holds {what}: save plain numbers with numpy.save"
+        )
+    count = math.prod(shape)
+    if min(shape, default=0) < 0 or len(shape) > 8 or count * kind.itemsize > len(data) - start:
+        raise InputError(
+            f"{name} is not a readable array (it is damaged or cut short): save it again with numpy.save"
+        )
+    limits.check_unpacked(name, count * kind.itemsize, len(data))
+    if count == 0:
+        return np.zeros([min(n, 1 << 20) for n in shape], kind)
+    return np.frombuffer(data, kind, count, start).reshape(shape, order="F" if by_columns else "C")
+
+
+def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np.ndarray]:
+    """The arrays of the bytes of a `.npz` file by name, writable; texts too.
+
+    Raises `InputError`, its line opened by `name`, where the bytes are damaged, hold something
+    else, or unpack to more than `limits`.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            members = archive.infolist()
+            plain = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+            if any(
+                m.flag_bits & _ENCRYPTED
+                or m.compress_type not in plain
+                or not m.filename.endswith(".npy")
+                for m in members
+            ):
+                raise ValueError("not an archive of arrays")
+            limits.check_unpacked(name, sum(member.file_size for member in members), len(data))
+            unpacked = {
+                member.filename.removesuffix(".npy"): archive.read(member) for member in members
+            }
+    except InputError:
+        raise
+    except _UNPACKING as error:
+        raise InputError(
+            f"{name} is damaged or no archive of NumPy arrays: write it again"
+        ) from error
+    return {
+        key: parse_array(content, f"{name} ({key})"[:400], KINDS + "U", limits).copy()
+        for key, content in unpacked.items()
+    }
+
+
+def array_header(data: bytes) -> tuple[tuple[int, ...], bool, np.dtype, int]:
+    """Of the bytes of a `.npy` file: the shape, whether columns come first, the kind of value, and
+    where the values begin.
+
+    Raises `ValueError` where they do not begin with such a header.
+    """
+    stream = io.BytesIO(data)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of headers that an old version wrote
+            version = np.lib.format.read_magic(stream)
+            if version not in ((1, 0), (2, 0)):
+                raise ValueError("a header of an unknown version")
+            read = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            shape, by_columns, kind = read(stream)
+    except _PARSING as error:
+        raise ValueError("no header of an array") from error
+    return shape, by_columns, kind, stream.tell()
+
+
+def _bytes(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror}") from error

@@ -1,0 +1,196 @@
+"""The lobe under an environment that is known: its strength and its alpha.
+
+Equation: s(n) = strength * y(n; alpha), y of `environment_response`: alpha is searched for on a
+ladder, then between rungs, its strength is found by re-weighted least squares (Charbonnier's loss,
+as in `lamps`).
+
+Citation: A. Ngan, F. Durand, W. Matusik, EGSR 2005, doi:10.2312/EGWR/EGSR05/117-126 (fits of lobes
+under known light).
+
+Limits: where the environment is smooth, all alphas on the ladder explain the picture alike:
+undetermined.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from ..errors import InputError
+from ..scene.lobe_fit import (
+    CONVENTION,
+    FOUND,
+    NARROW,
+    NO_LIGHT,
+    SMOOTH,
+    UNLIKE,
+    Interval,
+    LobeFit,
+    LobeFitOptions,
+)
+from .environment_response import Surroundings, respond_to, surroundings, table_of
+from .lamps import ALPHAS
+from .observed import Observed
+from .pixels import Pixels
+from .uncertainty import covariance, naive_variance
+
+_RUNGS = 11
+_STEPS = 6  # of re-weighting
+_SLOPE = 0.01  # of log alpha, for the derivative
+# an alpha that many times larger or smaller that explains the picture as well leaves it
+# undetermined
+_FLAT = 2.5
+_ALIKE = 0.05  # of the specular light, RMS: predictions that are nearer to each other are the same
+_LEAST_EXPLAINED = 0.25
+_NARROWEST_PIXELS = 6
+
+
+@dataclass(frozen=True)
+class _Try:
+    """An alpha with its strength, mean of the channels, its loss, residual and weights (N,)."""
+
+    log_alpha: float
+    strength: float
+    loss: float
+    residual: np.ndarray
+    weight: np.ndarray
+
+
+def fit_under(
+    radiance: np.ndarray, seen: Observed, pixels: Pixels, options: LobeFitOptions
+) -> LobeFit:
+    """The fit under `radiance` (rows, 2 rows, 3) to the picture and the pixels chosen of it.
+
+    Raises `InputError`.
+    """
+    specular, normal, mask = seen.specular, seen.normal, seen.mask
+    sky = _checked(radiance)
+    convention, empty = CONVENTION[options.model], np.zeros(specular.shape, np.float32)
+    if not radiance.any():
+        return LobeFit(convention, False, NO_LIGHT, None, None, (), None, None, 0.0, empty)
+    least = max(ALPHAS[0], 0.5 * np.pi / len(radiance))
+    rungs = np.linspace(np.log(least), np.log(ALPHAS[1]), _RUNGS)
+    tried = [_try(sky, pixels, options, rung) for rung in rungs]
+    best = int(np.argmin([t.loss for t in tried]))
+    low, high = rungs[max(best - 1, 0)], rungs[min(best + 1, _RUNGS - 1)]
+    found = minimize_scalar(
+        lambda rung: _try(sky, pixels, options, rung).loss,
+        bounds=(low, high),
+        method="bounded",
+        options={"xatol": 1e-3, "maxiter": 14},
+    )
+    chosen = _try(sky, pixels, options, float(found.x))
+    alpha = float(np.exp(chosen.log_alpha))
+    strength, image = _coloured(sky, pixels, chosen, normal, mask, options)
+    total = float(np.square(specular[mask]).sum())
+    explained = float(
+        np.clip(1 - np.square(specular[mask] - image[mask]).sum() / max(total, 1e-300), 0, 1)
+    )
+    sd_alpha, sd_strength, allowed = _deviations(sky, pixels, chosen, options)
+    far = [t for t in tried if abs(t.log_alpha - chosen.log_alpha) > np.log(_FLAT)]
+    flat = any(t.loss - chosen.loss < allowed or _alike(t, chosen, pixels) for t in far)
+    reason = (
+        UNLIKE
+        if explained < _LEAST_EXPLAINED
+        else SMOOTH
+        if flat
+        else NARROW
+        if pixels.bright < _NARROWEST_PIXELS
+        else FOUND
+    )
+    factor = float(np.exp(min(sd_strength, 20)))
+    interval = Interval(
+        max(alpha * np.exp(-sd_alpha), ALPHAS[0]), min(alpha * np.exp(sd_alpha), 1.0)
+    )
+    if reason == NARROW:
+        alpha, interval = float(interval.high), Interval(ALPHAS[0], interval.high)
+    known = reason in (FOUND, NARROW)
+    return LobeFit(
+        convention,
+        reason == FOUND,
+        reason,
+        alpha if known else None,
+        interval if known else None,
+        (),
+        strength,
+        Interval(strength / factor, strength * factor),
+        explained,
+        image,
+    )
+
+
+def _alike(one: _Try, other: _Try, pixels: Pixels) -> bool:
+    """Whether the predictions differ by less than models can be trusted."""
+    apart = pixels.weight @ np.square((one.residual - other.residual) * pixels.sigma)
+    return bool(apart < _ALIKE**2 * (pixels.weight @ np.square(pixels.value)))
+
+
+def _checked(radiance: np.ndarray) -> Surroundings:
+    if (
+        radiance.ndim != 3
+        or radiance.shape[0] < 4
+        or radiance.shape[1:] != (2 * radiance.shape[0], 3)
+    ):
+        raise InputError(
+            f"environment has shape {radiance.shape}: give (rows, 2 rows, 3), at least 4 rows"
+        )
+    if not (np.isfinite(radiance).all() and (radiance >= 0).all()):
+        raise InputError("the environment has to be finite and 0 or more")
+    return surroundings(radiance)
+
+
+def _try(sky: Surroundings, pixels: Pixels, options: LobeFitOptions, log_alpha: float) -> _Try:
+    shape = respond_to(sky, options.model, pixels.normal, float(np.exp(log_alpha))).mean(axis=1)
+    weight = pixels.weight
+    strength = 0.0
+    for _ in range(_STEPS):
+        scaled = weight * shape / pixels.sigma**2
+        strength = max(float(scaled @ pixels.value) / max(float(scaled @ shape), 1e-300), 1e-12)
+        left = (strength * shape - pixels.value) / pixels.sigma
+        left = np.where(pixels.clipped & (left > 0), 0, left)
+        weight = np.where(pixels.clipped & (left == 0), 0, pixels.weight / np.sqrt(1 + left**2))
+    return _Try(
+        log_alpha, strength, float(pixels.weight @ (2 * (np.sqrt(1 + left**2) - 1))), left, weight
+    )
+
+
+def _deviations(
+    sky: Surroundings, pixels: Pixels, best: _Try, options: LobeFitOptions
+) -> tuple[float, float, float]:
+    """Deviations of log alpha and of log strength, and how much the loss may rise within one of the
+    first.
+    """
+    here, there = (
+        respond_to(sky, options.model, pixels.normal, float(np.exp(best.log_alpha + d))).mean(
+            axis=1
+        )
+        for d in (0, -_SLOPE)
+    )
+    jacobian = (
+        np.stack([here, (here - there) / _SLOPE], axis=1) * (best.strength / pixels.sigma)[:, None]
+    )
+    spread = covariance(jacobian, best.residual, best.weight, pixels)
+    systematic = np.radians(options.normal_error)
+    sd_alpha = float(np.sqrt(spread[1, 1] + systematic**2))
+    allowed = max(1.0, sd_alpha**2 / max(naive_variance(jacobian, best.weight, 1), 1e-300))
+    return sd_alpha, float(np.sqrt(spread[0, 0] + (2 * systematic) ** 2)), allowed
+
+
+def _coloured(
+    sky: Surroundings,
+    pixels: Pixels,
+    best: _Try,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    options: LobeFitOptions,
+) -> tuple[np.ndarray, np.ndarray]:
+    """The strength (3,) of each channel and the predicted image (H, W, 3)."""
+    alpha = float(np.exp(best.log_alpha))
+    shape = respond_to(sky, options.model, pixels.normal, alpha)
+    scaled = (best.weight / pixels.sigma**2)[:, None] * shape
+    strength = (scaled * pixels.colour).sum(axis=0) / np.maximum(
+        (scaled * shape).sum(axis=0), 1e-300
+    )
+    image = np.zeros(normal.shape, np.float32)
+    image[mask] = table_of(sky, options.model, alpha, normal[mask]) * strength
+    return strength, image

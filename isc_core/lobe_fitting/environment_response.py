@@ -1,0 +1,148 @@
+"""What a lobe answers to a whole environment.
+
+Equation: integral of L(l) f_r(n, v, l) (n . l) dl with v = (0, 0, 1). The environment is cut in two
+at a radiance. What is brighter counts as small far lights, a pixel each. The rest is smooth: it is
+looked up in directions whose half vectors are spread as the lobe is, for GGX tan^2 t = alpha^2 u /
+(1 - u) with the weight F G (v . h) / ((n . v) (n . h)), for Blinn-Phong cos t = u^(1 / (p + 1))
+with the weight (p + 8) / (p + 1) (v . h) (n . l), u at even steps.
+
+Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206 (sampling of facets).
+
+Limits: no shadows. A lobe much narrower than the environment's pixels shows them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ..scene.lobe_fit import LobeModel
+from ..shading.brdf.ggx import F0, visible
+from ..shading.environment_map import directions, solid_angles
+from .response import respond
+
+_MOST_BRIGHT = 160
+_RINGS, _SPOKES = 7, 9
+_GRID = 81  # table of normals on a disc
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """An environment:
+
+    `bright` (M, 3) unit directions of its brightest pixels with `irradiance` (M, 3), `rest` (rows,
+    2 rows, 3).
+    """
+
+    bright: np.ndarray
+    irradiance: np.ndarray
+    rest: np.ndarray
+
+
+def surroundings(radiance: np.ndarray) -> Surroundings:
+    """Cuts an environment (rows, 2 rows, 3) in two."""
+    rows = len(radiance)
+    mean = radiance.mean(axis=2).ravel()
+    level = np.sort(mean)[-min(_MOST_BRIGHT, mean.size)]
+    gain = np.minimum(1, level / np.maximum(mean, 1e-300)).reshape(rows, 2 * rows, 1)
+    over = (radiance * (1 - gain)).reshape(-1, 3)
+    kept = over.max(axis=1) > 1e-6 * float(over.max(initial=0))
+    irradiance = over * solid_angles(rows).reshape(-1, 1)
+    return Surroundings(directions(rows).reshape(-1, 3)[kept], irradiance[kept], radiance * gain)
+
+
+def respond_to(sky: Surroundings, model: LobeModel, normal: np.ndarray, alpha: float) -> np.ndarray:
+    """(N, 3) for unit normals (N, 3), strength 1."""
+    total = _smooth(sky.rest, model, normal, alpha)
+    for direction, irradiance in zip(sky.bright, sky.irradiance, strict=True):
+        total += respond(model, normal, direction, alpha).value[:, None] * irradiance
+    return total
+
+
+def table_of(sky: Surroundings, model: LobeModel, alpha: float, normal: np.ndarray) -> np.ndarray:
+    """`respond_to` for many normals (N, 3), interpolated in a table over the equal-area disc of
+    normals.
+    """
+    steps = np.linspace(-1, 1, _GRID)
+    x, y = np.meshgrid(steps, steps, indexing="ij")
+    square = np.minimum(x * x + y * y, 1)
+    nodes = np.stack([x * np.sqrt(2 - square), y * np.sqrt(2 - square), 1 - square], -1).reshape(
+        -1, 3
+    )
+    nodes[:, 2] = np.maximum(nodes[:, 2], 1e-3)
+    nodes /= np.linalg.norm(nodes, axis=1, keepdims=True)
+    values = respond_to(sky, model, nodes, alpha).reshape(_GRID, _GRID, 3)
+    flat = normal[:, :2] / np.sqrt(1 + np.clip(normal[:, 2], 0, 1))[:, None]
+    at = ((flat + 1) / 2 * (_GRID - 1)).T
+    return np.stack(
+        [ndimage.map_coordinates(values[..., c], at, order=1, mode="nearest") for c in range(3)],
+        axis=1,
+    )
+
+
+def _smooth(radiance: np.ndarray, model: LobeModel, normal: np.ndarray, alpha: float) -> np.ndarray:
+    first, second = _tangents(normal)
+    exponent = 2 / alpha**2 - 2
+    total = np.zeros((len(normal), 3))
+    for ring in range(_RINGS):
+        u = (ring + 0.5) / _RINGS
+        cos_half = (
+            1 / np.sqrt(1 + alpha**2 * u / (1 - u)) if model == "ggx" else u ** (1 / (exponent + 1))
+        )
+        sin_half = np.sqrt(1 - cos_half**2)
+        for spoke in range(_SPOKES):
+            turn = 2 * np.pi * (spoke + 0.5 * (ring % 2)) / _SPOKES
+            half = cos_half * normal + sin_half * (np.cos(turn) * first + np.sin(turn) * second)
+            deviation = half[:, 2]
+            light = 2 * deviation[:, None] * half - (0, 0, 1)
+            light_cos = (light * normal).sum(axis=1)
+            usable = (deviation > 0) & (light_cos > 0) & (normal[:, 2] > 0)
+            weight = _weight(
+                model, normal[:, 2], np.where(usable, light_cos, 1), cos_half, deviation, alpha
+            )
+            total += np.where(usable, weight, 0)[:, None] * _seen(radiance, light)
+    return total / (_RINGS * _SPOKES)
+
+
+def _weight(
+    model: LobeModel,
+    view_cos: np.ndarray,
+    light_cos: np.ndarray,
+    half_cos: float,
+    deviation: np.ndarray,
+    alpha: float,
+) -> np.ndarray:
+    if model == "blinn_phong":
+        exponent = 2 / alpha**2 - 2
+        return (exponent + 8) / (exponent + 1) * deviation * light_cos
+    fresnel = F0 + (1 - F0) * (1 - np.clip(deviation, 0, 1)) ** 5
+    view_cos = np.maximum(view_cos, 1e-6)
+    return (
+        fresnel
+        * visible(alpha, view_cos)
+        * visible(alpha, light_cos)
+        * deviation
+        / (view_cos * half_cos)
+    )
+
+
+def _seen(radiance: np.ndarray, light: np.ndarray) -> np.ndarray:
+    """The radiance (N, 3) from unit directions (N, 3), bilinear."""
+    rows = len(radiance)
+    row = np.arccos(np.clip(light[:, 1], -1, 1)) * rows / np.pi - 0.5
+    column = (np.arctan2(light[:, 0], -light[:, 2]) % (2 * np.pi)) * rows / np.pi - 0.5
+    row = np.clip(row, 0, rows - 1)
+    top, left = np.minimum(row.astype(int), rows - 2), np.floor(column).astype(int)
+    down, right = (row - top)[:, None], (column - left)[:, None]
+    here, there = left % (2 * rows), (left + 1) % (2 * rows)
+    upper = radiance[top, here] * (1 - right) + radiance[top, there] * right
+    lower = radiance[top + 1, here] * (1 - right) + radiance[top + 1, there] * right
+    return upper * (1 - down) + lower * down
+
+
+def _tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors (N, 3) across the normals, which face the viewer, and each other."""
+    first = np.stack([normal[:, 2], np.zeros(len(normal)), -normal[:, 0]], axis=1)
+    length = np.linalg.norm(first, axis=1, keepdims=True)
+    first = np.where(length > 1e-6, first / np.maximum(length, 1e-6), (1.0, 0, 0))
+    return first, np.cross(normal, first)

@@ -1,0 +1,370 @@
+"""From a specular image and normals to a lobe and its lights.
+
+Problem: how rough a glossy object is, and where its lights stand, from the specular layer of one
+photo.
+
+Method: the specular light as a function of the normal has a peak for each light (`starts`). From
+there, several widths are tried and the best is refined (`lamps`); another light is added where the
+residual has another peak, as long as an information criterion asks for it: n log(loss) + p log n, n
+being the number of independent pieces of the highlight. The alpha that comes out is held against
+others, each with everything else fitted anew (profile likelihood); where the loss hardly rises,
+alpha is undetermined. Intervals: `uncertainty`.
+
+Citation: G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6(2) (1978),
+doi:10.1214/aos/1176344136. The lobes: see `isc_core.shading.brdf`.
+
+Limits: lights are far and small. A light of some width widens the lobe: seen from the object under
+2 w radians, w is added to 2 alpha about as squares are. White gloss, one roughness for the whole
+object, no shadows cast on the highlight.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import nnls
+
+from ..errors import InputError
+from ..progress import Monitor
+from ..scene.light_estimate import LightEstimate
+from ..scene.lobe_fit import (
+    CONVENTION,
+    FOUND,
+    NARROW,
+    NO_LIGHT,
+    SMOOTH,
+    UNLIKE,
+    Interval,
+    LobeFit,
+    LobeFitOptions,
+    LobeLight,
+)
+from ..shading.brdf.directions import unit
+from .environment_fit import fit_under
+from .lamps import ALPHAS, Fitted, Lamps, Problem, contributions, minimise, predicted
+from .observed import Observed, observe
+from .pixels import Pixels, choose_pixels
+from .recovered import fit_recovered
+from .smooth_light import smooth_loss
+from .starts import bright_half_vectors, light_of_half_vector
+from .uncertainty import covariance, naive_variance
+
+_START_ALPHAS = (0.06, 0.2, 0.45)
+_FEW_STEPS = 7
+_PIXELS_UNDER_SKY = 600  # each has to look at the whole environment
+_LADDER = (2.0, 4.0)
+_WIDEST = 0.7  # an alpha as large as that is a light as smooth as shading
+_WIDE = 0.35  # an alpha as large as that may be a smooth light
+_CONE = 1.515  # deviations, each way, that hold 68 % in two dimensions
+# What even exact images leave, the sky being modelled roughly: of log alpha, of log strength, of
+# directions in radians.
+_MODEL_ALPHA, _MODEL_STRENGTH, _MODEL_TURN = 0.003, 0.01, 0.003
+_NARROWEST_PIXELS = 6  # within half of the peak
+_GAIN = 0.15  # of the loss: less, and another light explains nothing
+_LEAST_EXPLAINED = 0.25
+
+
+def fit_lobe(
+    specular: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    confidence: np.ndarray | None = None,
+    *,
+    options: LobeFitOptions | None = None,
+    light_direction: np.ndarray | None = None,
+    environment: np.ndarray | None = None,
+    clipped: np.ndarray | None = None,
+    height: np.ndarray | None = None,
+    shading: np.ndarray | None = None,
+    outline: np.ndarray | None = None,
+    light_estimate: LightEstimate | None = None,
+    monitor: Monitor | None = None,
+) -> LobeFit:
+    """Fits a lobe to `specular` (H, W, 3), linear, >= 0, seen from (0, 0, 1), on the unit normals
+    (H, W, 3), inside `mask` (H, W) bool.
+
+    `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the
+    light is a lower bound. `height` (H, W) in pixels toward the viewer: with it lights may be near,
+    else they are taken to be infinitely far. `shading` (H, W, 3), of a white matt surface: needed
+    where `options.recovered`, for all this then is from one photo. `outline` (H, W, 3), unit
+    normals that the outline alone suggests, and `light_estimate`, how the photo's light looks, help there,
+    else they are not looked at. Either the light is found, or it is given: `light_direction` (3,),
+    a unit vector, or `environment` (rows, 2 rows, 3), see `isc_core.shading.environment_map`. What cannot be
+    known is said in the result. Raises `InputError` for arrays that do not fit together,
+    `Cancelled`.
+    """
+    options, monitor = options or LobeFitOptions(), monitor or Monitor()
+    seen = observe(specular, normal, mask, confidence, clipped, height, outline)
+    if light_direction is not None and environment is not None:
+        raise InputError("give light_direction or environment, not both")
+    fixed = None if light_direction is None else unit(light_direction, "light_direction")
+    if fixed is not None and fixed.shape != (3,):
+        raise InputError(f"light_direction has shape {fixed.shape}: give one unit vector (3,)")
+    monitor.report("fitting the gloss", 0.0)
+    if seen.peak <= options.darkest:
+        return _nothing(seen, options, NO_LIGHT)
+    most = (
+        options.most_pixels if environment is None else min(options.most_pixels, _PIXELS_UNDER_SKY)
+    )
+    pixels = choose_pixels(seen, (options.floor, options.relative), most)
+    if environment is not None:
+        return fit_under(np.asarray(environment, float), seen, pixels, options)
+    if options.recovered:
+        return fit_recovered(
+            seen, pixels, _checked_shading(shading, seen), fixed, light_estimate, options
+        )
+    problem = Problem(
+        pixels,
+        options.model,
+        options.thresholded,
+        directions=fixed is None,
+        nearness=seen.place is not None,
+    )
+    fitted = _search(problem, options, fixed, monitor)
+    monitor.report("how sure the gloss is", 0.7)
+    return _answer(seen, problem, fitted, options)
+
+
+def _checked_shading(shading: np.ndarray | None, seen: Observed) -> np.ndarray:
+    if shading is None:
+        raise InputError(
+            "a recovered specular image is held against the shading: give shading, or recovered=False"
+        )
+    shading = np.asarray(shading, float)
+    if shading.shape != seen.specular.shape or not (
+        np.isfinite(shading[seen.mask]).all() and (shading[seen.mask] >= 0).all()
+    ):
+        raise InputError(
+            f"shading has shape {shading.shape}: give (H, W, 3) as the specular image is, finite and 0 or more inside the mask"
+        )
+    return shading
+
+
+def _search(
+    problem: Problem, options: LobeFitOptions, fixed: np.ndarray | None, monitor: Monitor
+) -> Fitted:
+    """One light after the other, as long as each is worth its parameters."""
+    pixels = problem.pixels
+    best = _first(problem, fixed)
+    for count in range(2, options.most_lights + 1 if fixed is None else 2):
+        monitor.report("looking for another light", 0.2 * count)
+        left = pixels.value - predicted(problem, best.lamps, pixels.normal, pixels.place)
+        more = _best_of(
+            problem,
+            [
+                _with_another(best.lamps, half, 0.3 * pixels.peak)
+                for half in _peaks(pixels, left, 2)
+            ],
+        )
+        if not _worth(best, more, pixels):
+            break
+        best = more
+    return best
+
+
+def _first(problem: Problem, fixed: np.ndarray | None) -> Fitted:
+    pixels = problem.pixels
+    towards = (
+        [light_of_half_vector(half) for half in _peaks(pixels, pixels.value, 3)]
+        if fixed is None
+        else [fixed]
+    )
+    base = (
+        np.array([0.1 * pixels.peak])
+        if problem.thresholded
+        else np.zeros(len(problem.basis(pixels.normal[:1])))
+    )
+    near = np.full(1, 0.1 if problem.nearness else 0.0)
+    return _best_of(
+        problem,
+        [
+            Lamps(d[None], near, np.array([_amplitude(a, pixels.peak)]), base, float(np.log(a)))
+            for d in towards
+            for a in _START_ALPHAS
+        ],
+    )
+
+
+def _best_of(problem: Problem, starts: list[Lamps]) -> Fitted:
+    """A few steps from each, all the way from the best."""
+    tried = [minimise(problem, start, steps=_FEW_STEPS) for start in starts]
+    return minimise(problem, min(tried, key=lambda fit: fit.loss).lamps)
+
+
+def _peaks(pixels: Pixels, value: np.ndarray, count: int) -> list[np.ndarray]:
+    return bright_half_vectors(pixels.normal, value, pixels.weight, count)
+
+
+def _with_another(lamps: Lamps, half: np.ndarray, peak: float) -> Lamps:
+    return replace(
+        lamps,
+        directions=np.vstack([lamps.directions, light_of_half_vector(half)]),
+        nearness=np.append(lamps.nearness, lamps.nearness.mean()),
+        log_amplitudes=np.append(lamps.log_amplitudes, _amplitude(lamps.alpha, peak)),
+    )
+
+
+def _amplitude(alpha: float, peak: float) -> float:
+    """Log of the amplitude whose GGX lobe is as high as `peak` where normal, view and light agree."""
+    return float(np.log(4 * np.pi * alpha**2 * peak / 0.04))
+
+
+def _worth(less: Fitted, more: Fitted, pixels: Pixels) -> bool:
+    """Schwarz' criterion over independent pieces, and a gain that can be seen."""
+    pieces = min(200.0, max(10.0, len(pixels.value) / max(1.0, np.sqrt(pixels.bright))))
+    gain = np.log(max(less.loss, 1e-300) / max(more.loss, 1e-300))
+    return bool(
+        pieces * gain > 3 * np.log(pieces)
+        and more.loss < (1 - _GAIN) * less.loss
+        and less.loss > 1e-3 * len(pixels.value)
+    )
+
+
+def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOptions) -> LobeFit:
+    pixels = problem.pixels
+    spread = covariance(fitted.jacobian, fitted.residual, fitted.weight, pixels)
+    image, gains, explained = _coloured(seen, problem, fitted)
+    at = fitted.lamps.count + len(fitted.lamps.base)
+    sd = float(np.sqrt(spread[at, at] + np.radians(options.normal_error) ** 2 + _MODEL_ALPHA**2))
+    reason = _reason(problem, fitted, explained, sd)
+    if reason == UNLIKE:
+        return replace(_nothing(seen, options, UNLIKE), explained=explained)
+    lights = _lights(problem, fitted, spread, gains, options)
+    alpha: float | None = fitted.lamps.alpha
+    low, high = (
+        float(max(fitted.lamps.alpha * np.exp(-sd), ALPHAS[0])),
+        float(min(fitted.lamps.alpha * np.exp(min(sd, 20)), 1.0)),
+    )
+    interval: Interval | None = Interval(low, high)
+    if reason == NARROW:
+        alpha = max(high, _step(seen, pixels))
+        interval = Interval(ALPHAS[0], alpha)
+    elif reason != FOUND:
+        alpha = interval = None
+    return LobeFit(
+        CONVENTION[options.model],
+        reason == FOUND,
+        reason,
+        alpha,
+        interval,
+        lights,
+        None,
+        None,
+        explained,
+        image,
+    )
+
+
+def _lights(
+    problem: Problem, fitted: Fitted, spread: np.ndarray, gains: np.ndarray, options: LobeFitOptions
+) -> tuple[LobeLight, ...]:
+    """The lights, the brightest first, as they arrive where their highlight is. `spread`: the
+    covariance; `gains` (K, 3): of the channels over the mean amplitude.
+    """
+    systematic, count, lamps = np.radians(options.normal_error), fitted.lamps.count, fitted.lamps
+    shares = contributions(problem.model, lamps, problem.pixels.normal, problem.pixels.place)
+    lights = []
+    for k in range(count):
+        weight = problem.pixels.weight * shares[k] ** 2
+        middle = weight @ problem.pixels.place / max(float(weight.sum()), 1e-300)
+        toward = lamps.directions[k] - lamps.nearness[k] * middle
+        length = float(np.linalg.norm(toward))
+        colour = gains[k] * np.exp(lamps.log_amplitudes[k]) / length**2
+        factor = float(
+            np.exp(min(np.sqrt(spread[k, k] + (2 * systematic) ** 2 + _MODEL_STRENGTH**2), 20))
+        )
+        cone = 0.0
+        if problem.directions:
+            at = count + len(lamps.base) + 1 + 2 * k
+            turn = (spread[at, at] + spread[at + 1, at + 1]) / 2
+            cone = float(
+                min(np.degrees(_CONE * np.sqrt(turn + systematic**2 + _MODEL_TURN**2)), 180)
+            )
+        lights.append(
+            LobeLight(toward / length, cone, colour, Interval(colour / factor, colour * factor))
+        )
+    return tuple(sorted(lights, key=lambda light: -float(light.strength_light.mean())))
+
+
+def _step(seen: Observed, pixels: Pixels) -> float:
+    """How far the normal turns from the highlight's peak to a neighbouring pixel, radians: what the
+    picture can resolve.
+    """
+    row, column = pixels.cell[int(np.argmax(pixels.value))]
+    near = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
+    cosines = (seen.normal[near] @ seen.normal[row, column])[seen.inside[near]]
+    return float(np.clip(np.arccos(np.clip(cosines.min(), -1, 1)), ALPHAS[0], 1))
+
+
+def _reason(problem: Problem, fitted: Fitted, explained: float, sd: float) -> str:
+    if explained < _LEAST_EXPLAINED:
+        return UNLIKE
+    if problem.pixels.bright < _NARROWEST_PIXELS:
+        return NARROW
+    alpha = fitted.lamps.alpha
+    smooth = alpha > _WIDEST or (alpha > _WIDE and smooth_loss(problem.pixels) < fitted.loss)
+    return SMOOTH if smooth or _wider_does(problem, fitted, sd) else FOUND
+
+
+def _wider_does(problem: Problem, fitted: Fitted, sd: float) -> bool:
+    """Whether an alpha twice or four times as large explains the image within one deviation,
+    everything else fitted anew.
+    """
+    allowed = sd**2 / max(
+        naive_variance(fitted.jacobian, fitted.weight, fitted.lamps.count + len(fitted.lamps.base)),
+        1e-300,
+    )
+    for factor in _LADDER:
+        log_alpha = float(np.clip(fitted.lamps.log_alpha + np.log(factor), *np.log(ALPHAS)))
+        start = replace(
+            fitted.lamps,
+            log_alpha=log_alpha,
+            log_amplitudes=fitted.lamps.log_amplitudes + 2 * np.log(factor),
+        )
+        if minimise(replace(problem, alpha=False), start, steps=10).loss - fitted.loss < allowed:
+            return True
+    return False
+
+
+def _coloured(
+    seen: Observed, problem: Problem, fitted: Fitted
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """The predicted image, the gains (K, 3) of the channels of each light, its shape kept, and how
+    much of the image is explained.
+    """
+    pixels, lamps = problem.pixels, fitted.lamps
+    shapes = contributions(problem.model, lamps, pixels.normal, pixels.place)
+    root = np.sqrt(fitted.weight) / pixels.sigma
+    if problem.thresholded:
+        root, colour = np.where(pixels.value > pixels.dark, root, 0), pixels.colour + lamps.base[0]
+    else:
+        sky = lamps.base @ problem.basis(pixels.normal)
+        # The sky's colour is taken to be the lamps' on the average: it is too weak to have one of
+        # its own.
+        colour = pixels.colour - sky[:, None] * _mean_colour(pixels)
+    gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
+    place = np.zeros((int(seen.mask.sum()), 3)) if seen.place is None else seen.place[seen.mask]
+    inside = seen.normal[seen.mask]
+    values = contributions(problem.model, lamps, inside, place).T @ gains
+    if not problem.thresholded:
+        values = np.maximum(
+            values + (lamps.base @ problem.basis(inside))[:, None] * _mean_colour(pixels), 0
+        )
+    image = np.zeros(seen.specular.shape, np.float32)
+    image[seen.mask] = values
+    counted, given = seen.inside[seen.mask], seen.specular[seen.mask]
+    left = given - (np.maximum(values - lamps.base[0], 0) if problem.thresholded else values)
+    explained = 1 - np.square(left[counted]).sum() / max(
+        float(np.square(given[counted]).sum()), 1e-300
+    )
+    return image, gains, float(np.clip(explained, 0, 1))
+
+
+def _mean_colour(pixels: Pixels) -> np.ndarray:
+    """(3,), of mean 1."""
+    colour = pixels.weight @ pixels.colour
+    return colour / max(float(colour.mean()), 1e-300)
+
+
+def _nothing(seen: Observed, options: LobeFitOptions, reason: str) -> LobeFit:
+    empty = np.zeros(seen.specular.shape, np.float32)
+    return LobeFit(CONVENTION[options.model], False, reason, None, None, (), None, None, 0.0, empty)

@@ -1,0 +1,294 @@
+"""One lobe under a few lights, and the nonlinear least squares that fits it.
+
+Equation: the specular light, mean over the channels, at the place p (in radii of the object from
+its middle) is
+
+    s(n, p) = sum_k a_k y(n; l, alpha) / |v|^2 + b,        v = l_k - q_k p,  l = v / |v|,  y of
+    `response`,
+
+over log a_k, log alpha, the base b, the directions l_k, which move in their tangent planes, and the
+nearness q_k >= 0 (0: infinitely far; 1 / q radii from the middle). The base is a mirrored smooth
+sky, sum_j c_j B_j(n), see `sky_basis`; or, where a separator made the image, -c: it sees a
+highlight only above an unknown level, so its image is max(0, s). The loss is Charbonnier's, sum_i
+w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s - s_i) / sigma_i: quadratic for small errors, linear for large
+ones. Steps are Levenberg-Marquardt's with re-weighting; gradients are exact.
+
+Citation: D. W. Marquardt, SIAM J. Appl. Math. 11(2) (1963), doi:10.1137/0111030; P. Charbonnier, L.
+Blanc-Feraud, G. Aubert, M. Barlaud, IEEE TIP 6(2) (1997), doi:10.1109/83.551699.
+
+Limits: a local search; where it starts matters.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..scene.lobe_fit import LobeModel
+from .pixels import Pixels
+from .response import respond, sky_basis
+
+ALPHAS = (0.004, 0.98)
+_NEAREST = 0.6
+# least z of the half vector: farther behind the object no light reaches what the viewer sees
+_LOWEST_TILT = 0.2
+_USUAL_LEVEL, _LEVEL_SPREAD, _LEVEL_WEIGHT = (
+    0.15,
+    0.7,
+    20.0,
+)  # what is known beforehand of a separator's level, as a share of the peak
+_USUAL_SKY, _SKY_WEIGHT = 0.1, 0.1  # of the mirrored sky, as a share of the peak; a weak hint too
+_USUAL_NEARNESS, _NEARNESS_WEIGHT = (
+    0.3,
+    0.1,
+)  # q is below the first; a weak hint, where the image says nothing
+
+
+@dataclass(frozen=True)
+class Lamps:
+    """K lights: unit `directions` (K, 3), `nearness` (K,), log of `amplitudes` (K,) and of `alpha`,
+    `base` (B,): c.
+    """
+
+    directions: np.ndarray
+    nearness: np.ndarray
+    log_amplitudes: np.ndarray
+    base: np.ndarray
+    log_alpha: float
+
+    @property
+    def alpha(self) -> float:
+        """Of the lobe, the same under all lights."""
+        return float(np.exp(self.log_alpha))
+
+    @property
+    def count(self) -> int:
+        """K."""
+        return len(self.directions)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is fitted to, and what may move: the `directions`, their `nearness`, `alpha`.
+
+    `thresholded`: the base is a separator's level.
+    """
+
+    pixels: Pixels
+    model: LobeModel
+    thresholded: bool = False
+    directions: bool = True
+    nearness: bool = False
+    alpha: bool = True
+
+    def basis(self, normal: np.ndarray) -> np.ndarray:
+        """(B, N): what the base is made of, on unit normals (N, 3)."""
+        return -np.ones((1, len(normal))) if self.thresholded else sky_basis(normal)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """`lamps` at the minimum, its `loss`, the `residual` (N,) in sigmas, the `jacobian` (N, P) of
+    it and the weights (N,) in force there. Columns: log amplitudes (K), base (B), log alpha if
+    free, two of each direction if free (`tangents`), nearness (K) if free.
+    """
+
+    lamps: Lamps
+    loss: float
+    residual: np.ndarray
+    jacobian: np.ndarray
+    weight: np.ndarray
+
+
+def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
+    """The minimum near `start`; deterministic."""
+    best = _measured(problem, start)
+    damping = 1e-2
+    for _ in range(steps):
+        curvature, gradient = _normal_equations(problem, best)
+        diagonal = np.diag(curvature)
+        ridge = np.diag(damping * diagonal + 1e-9 * max(float(diagonal.max()), 1e-300) + 1e-300)
+        tried = _measured(
+            problem, _moved(best.lamps, -np.linalg.solve(curvature + ridge, gradient), problem)
+        )
+        if tried.loss < best.loss:
+            small = best.loss - tried.loss < 1e-7 * best.loss
+            best, damping = tried, max(damping / 5, 1e-7)
+            if small:
+                break
+        else:
+            damping *= 6
+            if damping > 1e6:
+                break
+    return best
+
+
+def contributions(
+    model: LobeModel, lamps: Lamps, normal: np.ndarray, place: np.ndarray
+) -> np.ndarray:
+    """(K, N): each light's part of the specular light on normals (N, 3) at the places (N, 3)."""
+    parts = []
+    for direction, near, log_amplitude in zip(
+        lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True
+    ):
+        light, length = arriving(direction, near, place)
+        parts.append(
+            np.exp(log_amplitude) * respond(model, normal, light, lamps.alpha).value / length**2
+        )
+    return np.stack(parts)
+
+
+def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """(N,): the specular light, mean over the channels."""
+    total = contributions(problem.model, lamps, normal, place).sum(
+        axis=0
+    ) + lamps.base @ problem.basis(normal)
+    return np.maximum(total, 0)
+
+
+def arriving(
+    direction: np.ndarray, nearness: float, place: np.ndarray
+) -> tuple[np.ndarray, np.ndarray | float]:
+    """The unit directions toward a light, (3,) if far, else (N, 3), and its distance over that from
+    the middle.
+    """
+    if nearness == 0:
+        return direction, 1.0
+    toward = direction - nearness * place
+    length = np.maximum(np.sqrt((toward * toward).sum(axis=1)), 1e-6)
+    return toward / length[:, None], length
+
+
+def tangents(direction: np.ndarray) -> np.ndarray:
+    """Two unit vectors (2, 3) across a unit direction and each other (Duff et al. 2017, JCGT 6(1),
+    no DOI).
+    """
+    x, y, z = direction
+    # Divided by 1 + |z|, which is never near 0.
+    sign = 1.0 if z >= 0 else -1.0
+    a = -1 / (sign + z)
+    b = x * y * a
+    return np.array([[1 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])
+
+
+def _measured(problem: Problem, lamps: Lamps) -> Fitted:
+    pixels, columns, turns, nearer = problem.pixels, [], [], []
+    by_alpha = np.zeros(len(pixels.value))
+    for direction, near, log_amplitude in zip(
+        lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True
+    ):
+        light, length = arriving(direction, near, pixels.place)
+        answer = respond(problem.model, pixels.normal, light, lamps.alpha)
+        scale = np.exp(log_amplitude) / length**2
+        columns.append(scale * answer.value)
+        by_alpha += scale * answer.by_log_alpha
+        if problem.directions or problem.nearness:
+            along = (answer.by_light * light).sum(axis=1) + 2 * answer.value
+            by_toward = (answer.by_light - along[:, None] * light) * (np.ones(1) * scale / length)[
+                :, None
+            ]
+            turns += list((by_toward @ tangents(direction).T).T) if problem.directions else []
+            nearer += [-(by_toward * pixels.place).sum(axis=1)] if problem.nearness else []
+    basis = problem.basis(pixels.normal)
+    total = np.sum(columns, axis=0) + lamps.base @ basis
+    left = (total - pixels.value) / pixels.sigma
+    jacobian = (
+        np.stack(
+            [*columns, *basis, *([by_alpha] if problem.alpha else []), *turns, *nearer], axis=1
+        )
+        / pixels.sigma[:, None]
+    )
+    silent = pixels.clipped & (left > 0)
+    if problem.thresholded:
+        silent |= (pixels.value <= pixels.dark) & (total < pixels.value)
+    left = np.where(silent, 0, left)
+    root = np.sqrt(1 + left**2)
+    loss = float(pixels.weight @ (2 * (root - 1))) + sum(_hints(problem, lamps)[0])
+    return Fitted(lamps, loss, left, jacobian, np.where(silent, 0, pixels.weight / root))
+
+
+def _hints(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.ndarray]:
+    """What is known beforehand: losses, and as for the columns of the jacobian, halves of gradients
+    and curvatures (P,).
+    """
+    count = lamps.count
+    turning = 2 * count if problem.directions else 0
+    size = (
+        count + len(lamps.base) + int(problem.alpha) + turning + (count if problem.nearness else 0)
+    )
+    gradient, curvature, losses = np.zeros(size), np.zeros(size), []
+    if problem.thresholded:
+        off, slope = (
+            np.log(lamps.base[0] / (_USUAL_LEVEL * problem.pixels.peak)) / _LEVEL_SPREAD,
+            1 / (_LEVEL_SPREAD * lamps.base[0]),
+        )
+        losses.append(_LEVEL_WEIGHT * float(off) ** 2)
+        gradient[count], curvature[count] = _LEVEL_WEIGHT * off * slope, _LEVEL_WEIGHT * slope**2
+    else:
+        usual = _USUAL_SKY * problem.pixels.peak
+        losses.append(_SKY_WEIGHT * float(np.square(lamps.base / usual).sum()))
+        gradient[count : count + len(lamps.base)] = _SKY_WEIGHT * lamps.base / usual**2
+        curvature[count : count + len(lamps.base)] = _SKY_WEIGHT / usual**2
+    if problem.nearness:
+        losses.append(_NEARNESS_WEIGHT * float(np.square(lamps.nearness / _USUAL_NEARNESS).sum()))
+        gradient[-count:] = _NEARNESS_WEIGHT * lamps.nearness / _USUAL_NEARNESS**2
+        curvature[-count:] = _NEARNESS_WEIGHT / _USUAL_NEARNESS**2
+    return losses, gradient, curvature
+
+
+def _normal_equations(problem: Problem, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
+    _, gradient, curvature = _hints(problem, fitted.lamps)
+    return product(fitted.jacobian, fitted.weight, fitted.jacobian) + np.diag(curvature), (
+        product(fitted.jacobian, fitted.weight, fitted.residual[:, None])[:, 0] + gradient
+    )
+
+
+def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """sum_n left_ni weight_n right_nj, (P, Q).
+
+    Not by BLAS, whose threads take longer to wake than a few columns need.
+    """
+    return np.einsum("ni,nj->ij", left * weight[:, None], right)
+
+
+def _moved(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
+    count = lamps.count
+    log_alpha, at = lamps.log_alpha, count + len(lamps.base)
+    if problem.alpha:
+        log_alpha, at = (
+            float(np.clip(log_alpha + np.clip(step[at], -0.7, 0.7), *np.log(ALPHAS))),
+            at + 1,
+        )
+    directions, nearness = lamps.directions, lamps.nearness
+    if problem.directions:
+        directions = np.stack(
+            [
+                _turned(d, np.clip(step[at + 2 * k : at + 2 * k + 2], -0.4, 0.4))
+                for k, d in enumerate(directions)
+            ]
+        )
+    if problem.nearness:
+        # Not quite 0, where the light would count as infinitely far and its derivative would be
+        # lost.
+        nearness = np.clip(nearness + np.clip(step[-count:], -0.15, 0.15), 1e-6, _NEAREST)
+    amplitudes = np.clip(lamps.log_amplitudes + np.clip(step[:count], -1.5, 1.5), -200, 200)
+    base = lamps.base + step[count : count + len(lamps.base)]
+    if problem.thresholded:
+        base = np.clip(base, lamps.base / 3, lamps.base * 3)
+    return replace(
+        lamps,
+        directions=directions,
+        nearness=nearness,
+        log_amplitudes=amplitudes,
+        base=base,
+        log_alpha=log_alpha,
+    )
+
+
+def _turned(direction: np.ndarray, step: np.ndarray) -> np.ndarray:
+    moved = direction + step @ tangents(direction)
+    moved /= np.linalg.norm(moved)
+    lowest = 2 * _LOWEST_TILT**2 - 1
+    if moved[2] < lowest:
+        flat = moved[:2] / max(float(np.linalg.norm(moved[:2])), 1e-12)
+        moved = np.array([*(np.sqrt(1 - lowest**2) * flat), lowest])
+    return moved

@@ -1,0 +1,98 @@
+"""The picture that a lobe is fitted to, checked."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..shading.brdf.directions import unit
+
+
+@dataclass(frozen=True)
+class Observed:
+    """`specular` (H, W, 3), `normal` (H, W, 3), `mask` (H, W) bool, `confidence` (H, W), `clipped`
+    (H, W) bool. `inside` (H, W): what counts. `place` (H, W, 3): where each pixel's surface is, in
+    radii of the object (half of the longer side of the mask's box) from the middle of that box;
+    None where the height is not known. `outline` (H, W, 3): unit normals that the outline alone
+    suggests, or None.
+    """
+
+    specular: np.ndarray
+    normal: np.ndarray
+    mask: np.ndarray
+    confidence: np.ndarray
+    clipped: np.ndarray
+    inside: np.ndarray
+    place: np.ndarray | None
+    outline: np.ndarray | None = None
+
+    @property
+    def peak(self) -> float:
+        """The brightest mean over the channels."""
+        return float(self.specular[self.inside].mean(axis=1).max()) if self.inside.any() else 0.0
+
+
+def observe(
+    specular: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    confidence: np.ndarray | None,
+    clipped: np.ndarray | None,
+    height: np.ndarray | None,
+    outline: np.ndarray | None = None,
+) -> Observed:
+    """Checks what was given, see `fit.fit_lobe`. Raises `InputError`."""
+    specular, normal, mask = (
+        np.asarray(specular, float),
+        np.asarray(normal, float),
+        np.asarray(mask),
+    )
+    shape = mask.shape
+    if (
+        mask.ndim != 2
+        or mask.dtype != bool
+        or specular.shape != (*shape, 3)
+        or normal.shape != (*shape, 3)
+    ):
+        shapes = f"specular {specular.shape}, normal {normal.shape} and mask {shape} {mask.dtype}"
+        raise InputError(f"{shapes} have to be (H, W, 3), (H, W, 3) and (H, W) bool")
+    confidence = np.ones(shape) if confidence is None else np.asarray(confidence, float)
+    clipped = np.zeros(shape, bool) if clipped is None else np.asarray(clipped)
+    if confidence.shape != shape or clipped.shape != shape or clipped.dtype != bool:
+        raise InputError("confidence and clipped have to be (H, W) as the mask is, clipped of bool")
+    if not (np.isfinite(specular[mask]).all() and (specular[mask] >= 0).all()):
+        raise InputError("the specular image has to be finite and 0 or more inside the mask")
+    if not (
+        np.isfinite(confidence[mask]).all()
+        and (confidence[mask] >= 0).all()
+        and (confidence[mask] <= 1).all()
+    ):
+        raise InputError("the confidence has to be within [0, 1] inside the mask")
+    unit(normal[mask], "normal")
+    if outline is not None:
+        outline = np.asarray(outline, float)
+        if outline.shape != normal.shape:
+            raise InputError(
+                f"the outline's normals have shape {outline.shape}: give (H, W, 3) as the normals are"
+            )
+        unit(outline[mask], "outline")
+    inside = mask & (confidence > 0) & (normal[..., 2] > 0)
+    return Observed(
+        specular, normal, mask, confidence, clipped, inside, _places(height, mask), outline
+    )
+
+
+def _places(height: np.ndarray | None, mask: np.ndarray) -> np.ndarray | None:
+    if height is None or not mask.any():
+        return None
+    height = np.asarray(height, float)
+    if height.shape != mask.shape or not np.isfinite(height[mask]).all():
+        raise InputError(
+            f"height has shape {height.shape}: give (H, W) as the mask is, finite inside it, in pixels"
+        )
+    rows, columns = np.nonzero(mask)
+    low, high = np.array([rows.min(), columns.min()]), np.array([rows.max(), columns.max()])
+    middle, radius = (low + high) / 2, max(float((high - low).max()) / 2, 1.0)
+    row, column = np.indices(mask.shape)
+    depth = np.where(mask, height - (height[mask].min() + height[mask].max()) / 2, 0)
+    return np.dstack([column - middle[1], middle[0] - row, depth]) / radius

@@ -1,0 +1,122 @@
+"""What a lobe answers to one far light, with its derivatives by alpha and by the light's direction.
+
+Equation: y(n) = f_r(n, v, l) max(0, n . l) with v = (0, 0, 1) and the lobes of `shading.brdf.ggx` and
+`shading.brdf.blinn_phong` ("normalised", exponent by the usual rule p = 2 / alpha^2 - 2). h = (l + v) / m,
+m = |l + v|, so d(n . h) / dl = (n - (n . h) h) / m.
+
+Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206; J. F. Blinn, SIGGRAPH 1977,
+doi:10.1145/563858.563893.
+
+Limits: one view, orthographic. Behind the light's or the viewer's horizon all is 0, derivatives
+too.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..scene.lobe_fit import LobeModel
+from ..shading.brdf.ggx import F0, density
+
+_LEAST = 1e-6  # cosines below are below the horizon
+
+
+@dataclass(frozen=True)
+class Response:
+    """`value` (N,) in 1/sr;
+
+    `by_log_alpha` (N,); `by_light` (N, 3): only the part across the light's direction means
+    something.
+    """
+
+    value: np.ndarray
+    by_log_alpha: np.ndarray
+    by_light: np.ndarray
+
+
+def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: float) -> Response:
+    """The answer of surfaces with unit normals (N, 3) to light from the unit direction (3,) or (N,
+    3); `alpha` in (0, 1).
+    """
+    view_cos, light_cos = normal[:, 2], (normal * light).sum(axis=1)
+    lit = (view_cos > _LEAST) & (light_cos > _LEAST)
+    view_cos, light_cos = np.where(lit, view_cos, 1), np.where(lit, light_cos, 1)
+    total = light + (0, 0, 1)
+    length = np.maximum(np.sqrt((total * total).sum(axis=-1, keepdims=True)), 1e-9)
+    half = total / length
+    half_cos = np.clip((normal * half).sum(axis=1), 0, 1)
+    deviation = half[..., 2:]
+    lobe = _ggx if model == "ggx" else _blinn_phong
+    value, by_alpha, by_half, by_cos, by_deviation = lobe(
+        view_cos, light_cos, half_cos, deviation[..., 0], alpha
+    )
+    value = np.where(lit, value, 0)
+    across = ((0, 0, 1) - deviation * half) / length
+    turned = (normal - half_cos[:, None] * half) / length
+    by_light = (
+        by_half[:, None] * turned
+        + by_cos[:, None] * normal
+        + np.asarray(by_deviation)[..., None] * across
+    )
+    return Response(value, value * by_alpha, value[:, None] * by_light)
+
+
+def sky_response(normal: np.ndarray) -> np.ndarray:
+    """What the gloss mirrors of a uniform sky of radiance 1, (N,):
+
+    Schlick's F at the view, roughness left out.
+    """
+    return F0 + (1 - F0) * (1 - np.clip(normal[:, 2], 0, 1)) ** 5
+
+
+def sky_basis(normal: np.ndarray) -> np.ndarray:
+    """(4, N): what the gloss mirrors of a smooth sky is about a mix of these: even light, what
+    Fresnel adds toward grazing angles, slow and fast, and light that grows upward in the mirrored
+    view.
+    """
+    grazing = 1 - np.clip(normal[:, 2], 0, 1)
+    return np.stack([np.ones(len(normal)), grazing**2, grazing**5, 2 * normal[:, 2] * normal[:, 1]])
+
+
+# Both lobes: y, and the derivatives of log y by log alpha, n . h, n . l and the deviation v . h.
+_Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def _ggx(
+    view_cos: np.ndarray,
+    light_cos: np.ndarray,
+    half_cos: np.ndarray,
+    deviation: np.ndarray,
+    alpha: float,
+) -> _Parts:
+    square = alpha**2
+    view_root, light_root = (np.sqrt(square + (1 - square) * c * c) for c in (view_cos, light_cos))
+    fresnel = F0 + (1 - F0) * (1 - deviation) ** 5
+    value = (
+        density(alpha, half_cos)
+        * fresnel
+        * light_cos
+        / ((view_cos + view_root) * (light_cos + light_root))
+    )
+    spread = square * half_cos**2 + 1 - half_cos**2
+    by_alpha = 2 - 4 * square * half_cos**2 / spread
+    for c, root in ((view_cos, view_root), (light_cos, light_root)):
+        by_alpha = by_alpha - square * (1 - c * c) / (root * (c + root))
+    by_half = 4 * (1 - square) * half_cos / spread
+    by_cos = 1 / light_cos - (1 + (1 - square) * light_cos / light_root) / (light_cos + light_root)
+    return value, by_alpha, by_half, by_cos, -5 * (1 - F0) * (1 - deviation) ** 4 / fresnel
+
+
+def _blinn_phong(
+    view_cos: np.ndarray,
+    light_cos: np.ndarray,
+    half_cos: np.ndarray,
+    deviation: np.ndarray,
+    alpha: float,
+) -> _Parts:
+    del view_cos
+    exponent = 2 / alpha**2 - 2
+    safe = np.maximum(half_cos, 1e-9)
+    value = (exponent + 8) / (8 * np.pi) * safe**exponent * light_cos
+    by_alpha = -4 / alpha**2 * (1 / (exponent + 8) + np.log(safe))
+    return value, by_alpha, exponent / safe, 1 / light_cos, np.zeros_like(deviation)

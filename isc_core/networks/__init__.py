@@ -1,0 +1,1 @@
+"""The neural networks, their layers and their weights."""

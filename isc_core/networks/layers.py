@@ -1,0 +1,155 @@
+"""What the project's networks are made of: convolutions on photos of objects, the same to the bit
+on any number of threads.
+
+Equation: a photo goes in as log(I / mean I + .03) and its mask, in blocks of 2 x 2 pixels (space to
+depth); each level of an encoder is two 3 x 3 convolutions with max(0, .), zeros around, and half as
+fine as the one before.
+
+Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
+doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
+
+Limits: one matrix product of doubles a layer: made for networks of some hundred thousand weights.
+"""
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+STRIDE = 32  # pixels: sides of what a network sees are multiples
+BLOCK = 2
+_DARK = 0.03  # of the mean light: below, logarithms are of noise
+_BITS = (
+    20  # of the largest factor: 9 x 1024 products of twice as many bits add up to less than 2^53
+)
+_FRAME = 8  # pixels around the object: what lies beyond the picture's frame is background as well
+
+Steps = Iterator[
+    tuple[np.ndarray, np.ndarray]
+]  # weights (9, inputs, outputs) and biases (outputs,) of the convolutions still to come
+
+
+def encoded(image: np.ndarray, mask: np.ndarray, steps: Steps, depth: int) -> list[np.ndarray]:
+    """The layers (H / 2^(k+1), W / 2^(k+1), channels) of an encoder of `depth` levels, the finest
+    first; image and mask as `pad_to_stride`.
+    """
+    layer, kept = space_to_depth(inputs_of(image, mask)), []
+    for level in range(depth):
+        layer = conv_block(layer if level == 0 else average_pool(layer), steps)
+        kept.append(layer)
+    return kept
+
+
+def weights_in(
+    data: Mapping[str, np.ndarray],
+) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+    """Weights and biases, float32, of an archive's arrays `weight00`, `bias00`, ... Raises
+    `KeyError` where one is missing, `ValueError` where their numbers are not finite.
+    """
+    count = sum(name.startswith("weight") for name in data)
+    weights, biases = (
+        tuple(data[f"{kind}{k:02d}"].astype(np.float32) for k in range(count))
+        for kind in ("weight", "bias")
+    )
+    if not all(np.isfinite(values).all() for values in (*weights, *biases)):
+        raise ValueError("some of its numbers are not finite")
+    return weights, biases
+
+
+def is_encoder(weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...]) -> bool:
+    """Whether these are convolutions of an encoder, two for each level, each taking what the one
+    before gives.
+    """
+    shapes = [w.shape for w in weights]
+    chained = all(a[2:] == b[1:2] for a, b in zip(shapes, shapes[1:], strict=False)) and all(
+        len(s) == 3 and s[0] == 9 for s in shapes
+    )
+    biased = [w.shape[2:] for w in weights] == [b.shape for b in biases]
+    return (
+        bool(shapes)
+        and len(shapes) % 2 == 0
+        and shapes[0][1:2] == (4 * BLOCK**2,)
+        and chained
+        and biased
+    )
+
+
+def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """(H, W, 4) float32: log light over the object's mean, 0 outside, and the mask."""
+    light = np.where(mask[..., None], image, 0).astype(np.float32)
+    mean = max(float(light.sum(dtype=float)) / (3 * max(int(mask.sum()), 1)), 1e-9)
+    log_light = np.log(light / np.float32(mean) + np.float32(_DARK)) * mask[..., None]
+    return np.concatenate([log_light, mask[..., None].astype(np.float32)], axis=2)
+
+
+def space_to_depth(layer: np.ndarray) -> np.ndarray:
+    """(H, W, C) as (H / 2, W / 2, 4 C), channels first in each block's order."""
+    rows, columns, channels = layer.shape
+    blocks = layer.reshape(rows // 2, 2, columns // 2, 2, channels)
+    return np.ascontiguousarray(blocks.transpose(0, 2, 4, 1, 3)).reshape(
+        rows // 2, columns // 2, 4 * channels
+    )
+
+
+def depth_to_space(layer: np.ndarray) -> np.ndarray:
+    """The inverse of `space_to_depth`."""
+    rows, columns, channels = layer.shape
+    blocks = layer.reshape(rows, columns, channels // 4, 2, 2)
+    return np.ascontiguousarray(blocks.transpose(0, 3, 1, 4, 2)).reshape(
+        2 * rows, 2 * columns, channels // 4
+    )
+
+
+def average_pool(layer: np.ndarray) -> np.ndarray:
+    """Means of 2 x 2 pixels: (H / 2, W / 2, C) of (H, W, C)."""
+    rows, columns, channels = layer.shape
+    return layer.reshape(rows // 2, 2, columns // 2, 2, channels).mean(axis=(1, 3))
+
+
+def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
+    """The next two convolutions of `steps`, each with max(0, .)."""
+    for _ in range(2):
+        layer = np.maximum(convolved(layer, *next(steps)), 0)
+    return layer
+
+
+def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
+    """3 x 3, zeros around: one matrix product of all neighbourhoods.
+
+    Both factors are rounded to whole multiples of a power of two, so small that doubles hold every
+    sum of their products exactly: the order of summing, which libraries choose by the number of
+    threads, does not change a bit.
+    """
+    rows, columns, channels = layer.shape
+    (seen, of_layer), (kernel, of_kernel) = _in_steps(layer), _in_steps(weight)
+    padded = np.pad(seen, ((1, 1), (1, 1), (0, 0)))
+    near = np.stack(
+        [padded[i : i + rows, j : j + columns] for i in range(3) for j in range(3)], axis=2
+    )
+    sums = near.reshape(-1, 9 * channels) @ kernel.reshape(-1, weight.shape[2])
+    return (sums * (of_layer * of_kernel) + bias).astype(np.float32).reshape(rows, columns, -1)
+
+
+def _in_steps(values: np.ndarray) -> tuple[np.ndarray, float]:
+    """`values` in float64 as whole numbers of steps, at most 2^20 of them; and the step, a power of
+    two.
+    """
+    most = float(np.abs(values).max())
+    step = 2.0 ** (np.ceil(np.log2(most)) - _BITS) if most > 0 else 1.0
+    return np.rint(values.astype(np.float64) / step), step
+
+
+def pad_to_stride(
+    image: np.ndarray, mask: np.ndarray
+) -> tuple[tuple[np.ndarray, np.ndarray], tuple[slice, slice]]:
+    """Image and mask in the middle of a picture whose sides the network can halve, and where they
+    are in it.
+    """
+    sides = [-(-(n + 2 * _FRAME) // STRIDE) * STRIDE for n in mask.shape]
+    place = tuple(
+        slice((side - n) // 2, (side - n) // 2 + n)
+        for side, n in zip(sides, mask.shape, strict=True)
+    )
+    light, inside = np.zeros((*sides, 3), np.float32), np.zeros(sides, bool)
+    mean = max(float(image[mask].mean(dtype=float)), 1e-30)
+    light[place], inside[place] = np.where(mask[..., None], image / mean, 0), mask
+    return (light, inside), place  # type: ignore[return-value]

@@ -1,0 +1,223 @@
+"""Where the lamps of a photo stand, and whether there are none, one, or several, as a network sees
+it.
+
+Problem: highlights and shadows tell people where the light comes from before they know the shape. A
+model that recovers the shape first has the light only as well as its normals, which are 10 to 20
+degrees off, so a mirrored direction twice that.
+
+Equation: an encoder of convolutions (`networks.layers`) makes layers of the photo; their
+roots, averaged in cells of 16 x 16 pixels, and where the cell lies on the object, make h = max(0, A
+f + a) (n,) of each cell. Mean, deviation and most of h over the object make g = max(0, B . + b),
+and
+
+    P(lamps) = softmax(C g + c),    P(place) = softmax(D g + d),    light, log deviations = E g + e,
+
+averaged over the photo and its mirror image: `light_estimate`.
+
+Citation: M.-A. Gardner et al., "Learning to predict indoor illumination from a single image", ACM
+Trans. Graph. 36(6) (2017), doi:10.1145/3130800.3130891 (a light's direction as a class); O.
+Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24574-4_28 (the
+encoder). Weights, training pictures and loss are our own: `python -m
+training.networks.lamp_network`.
+
+Limits: measured in docs/methods/lamps.md. It learned from rendered paint with a gloss.
+"""
+
+import importlib.resources
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..io.npy import read_arrays
+from ..photo.photo import averaged_object
+from ..scene.light_estimate import PLACES, LightEstimate
+from .layers import encoded, is_encoder, pad_to_stride, weights_in
+
+LONG_SIDE = 112  # of the object, in pixels, as the network sees it
+CELL = 16
+_WHERE, _LOOK = 5, 8  # numbers that tell where a cell lies; that tell how a light looks
+_LEAST, _MOST = 1e-6, 1e4
+_INSIDE = (
+    0.2  # of the fullest cell: a cell that the object fills less does not count for the most of h
+)
+_LAYERS = ("local", "whole", "lamps", "places", "light")
+SURE, UNSURE = -3.5, 1.0  # bounds of the logarithm of the deviations
+_MIRROR = np.array([1, 1, -1, -1, 1, 1, -1, 1.0])  # what a look becomes in a mirror
+
+
+@dataclass(frozen=True)
+class LampNetwork:
+    """`weights`: of each convolution (9, inputs, outputs) float32, two for each level; `biases`
+    (outputs,). `middle`, `scale` (m,): what is taken off the cells' layers, and how much of them
+    counts; `layers`: matrix (inputs, outputs) and what is added (outputs,) of each of local, whole,
+    lamps, places, light. Raises `InputError` where they do not fit each other.
+    """
+
+    weights: tuple[np.ndarray, ...]
+    biases: tuple[np.ndarray, ...]
+    middle: np.ndarray
+    scale: np.ndarray
+    layers: Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+    def __post_init__(self) -> None:
+        if not (is_encoder(self.weights, self.biases) and self._layers_fit()):
+            raise InputError("these are not the weights of a lamp network")
+
+    def _layers_fit(self) -> bool:
+        matrices, added = ([self.layers[name][k] for name in _LAYERS] for k in (0, 1))
+        if any(matrix.ndim != 2 for matrix in matrices):
+            return False
+        count, wide, deep = (
+            sum(w.shape[-1] for w in self.weights[1::2]),
+            matrices[0].shape[1],
+            matrices[1].shape[1],
+        )
+        wanted = [
+            (count + _WHERE, wide),
+            (3 * wide, deep),
+            (deep, 3),
+            (deep, len(PLACES)),
+            (deep, 2 * _LOOK),
+        ]
+        fits = [matrix.shape for matrix in matrices] == wanted and [
+            values.shape for values in added
+        ] == [shape[1:] for shape in wanted]
+        return fits and self.middle.shape == self.scale.shape == (count,)
+
+    def __call__(
+        self, image: np.ndarray, mask: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The probabilities of none, one and several lamps (3,) and of `PLACES` (256,), and the
+        light and its deviations (16,); `image` (H, W, 3) and `mask` (H, W) as
+        `networks.layers.pad_to_stride` makes them.
+        """
+        cover = _cells(mask.astype(float)[..., None], CELL)[..., 0]
+        steps = iter(zip(self.weights, self.biases, strict=True))
+        layers = encoded(image, mask, steps, len(self.weights) // 2)
+        found = np.concatenate([_in_cells(layer, cover.shape) for layer in layers], axis=2)
+        inside = cover > 0
+        weight = cover[inside] / cover.sum()
+        seen = (np.sqrt(np.clip(found[inside], 0, _MOST) + _LEAST) - self.middle) * self.scale
+        local = self._layer(
+            "local", np.concatenate([seen, _where(inside, weight)], axis=1), rectified=True
+        )
+        mean = np.einsum("c,cn->n", weight, local)
+        spread = np.sqrt(np.maximum(np.einsum("c,cn->n", weight, local**2) - mean**2, _LEAST))
+        most = np.where((weight > _INSIDE * weight.max())[:, None], local, 0).max(axis=0)
+        whole = self._layer("whole", np.concatenate([mean, spread, most])[None], rectified=True)
+        lamps, places, light = (self._layer(name, whole)[0] for name in _LAYERS[2:])
+        return (
+            _softmax(lamps),
+            _softmax(places),
+            np.concatenate([light[:_LOOK], np.exp(np.clip(light[_LOOK:], SURE, UNSURE))]),
+        )
+
+    def _layer(self, name: str, values: np.ndarray, rectified: bool = False) -> np.ndarray:
+        matrix, added = self.layers[name]
+        found = np.einsum("rn,nk->rk", values, matrix) + added
+        return np.asarray(np.maximum(found, 0) if rectified else found)
+
+
+def predict_light(
+    image: np.ndarray, mask: np.ndarray, network: LampNetwork | None = None
+) -> LightEstimate:
+    """The lamps of a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the shipped
+    network if None.
+    """
+    (light, cover), _ = pad_to_stride(*averaged_object(image, mask, LONG_SIDE)[:2])
+    judge = network or shipped_lamp_network()
+    (counts, places, told), (other, mirrored, reversed_) = (
+        judge(light, cover),
+        judge(light[:, ::-1], cover[:, ::-1]),
+    )
+    none, one, several = (float(share) for share in (counts + other) / 2)
+    seen = (told[:_LOOK] + _MIRROR * reversed_[:_LOOK]) / 2
+    return LightEstimate(
+        none,
+        one,
+        several,
+        (places + _mirror(mirrored)) / 2,
+        seen,
+        (told[_LOOK:] + reversed_[_LOOK:]) / 2,
+    )
+
+
+def _cells(layer: np.ndarray, step: int) -> np.ndarray:
+    """Means of `step` x `step` pixels: (H / step, W / step, C) of (H, W, C)."""
+    rows, columns, channels = layer.shape
+    return np.asarray(
+        layer.reshape(rows // step, step, columns // step, step, channels).mean(axis=(1, 3))
+    )
+
+
+def _in_cells(layer: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+    """A layer of the encoder on the cells' grid: its means, or, where it is coarser, itself."""
+    finer = layer.shape[0] // shape[0]
+    if finer:
+        return _cells(layer.astype(float), finer)
+    times = shape[0] // layer.shape[0]
+    return np.asarray(layer.astype(float).repeat(times, axis=0).repeat(times, axis=1))
+
+
+def _where(inside: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Where each cell of `inside` (rows, columns) bool lies in the object: x, y, x^2, y^2, x y over
+    its extent, (cells, 5).
+    """
+    rows, columns = np.nonzero(inside)
+    off = np.stack([columns, -rows], axis=1) - np.einsum(
+        "c,cd->d", weight, np.stack([columns, -rows], axis=1).astype(float)
+    )
+    x, y = (off / np.sqrt(max(float(np.einsum("c,cd->", weight, off**2)), _LEAST))).T
+    return np.stack([x, y, x * x, y * y, x * y], axis=1)
+
+
+def _softmax(score: np.ndarray) -> np.ndarray:
+    shares = np.exp(score - score.max())
+    return np.asarray(shares / shares.sum())
+
+
+def _mirror(places: np.ndarray) -> np.ndarray:
+    """Probabilities of `PLACES` for the photo whose left is right."""
+    found = places[_mirrored_places()]
+    return np.asarray(found / found.sum())
+
+
+@cache
+def _mirrored_places() -> np.ndarray:
+    return np.argmax((PLACES * (-1, 1, 1)) @ PLACES.T, axis=1)
+
+
+@cache
+def shipped_lamp_network() -> LampNetwork:
+    """The network that comes with the package."""
+    with importlib.resources.as_file(
+        importlib.resources.files(__package__) / "data" / "light_network.npz"
+    ) as path:
+        return read_lamp_network(path)
+
+
+def read_lamp_network(path: Path) -> LampNetwork:
+    """An archive of float16 or float32 arrays: `weight00`, `bias00`, ..., `middle`, `scale`, and
+    `local_weight`, `local_bias`, ...
+
+    Raises `InputError` for a file that is none.
+    """
+    try:
+        data = read_arrays(path)
+        convolutions = {name: values for name, values in data.items() if name[-2:].isdigit()}
+        weights, biases = weights_in(convolutions)
+        rest = {
+            name: values.astype(np.float32).astype(float)
+            for name, values in data.items()
+            if name not in convolutions
+        }
+        if not all(np.isfinite(values).all() for values in rest.values()):
+            raise ValueError("some of its numbers are not finite")
+        layers = {name: (rest[f"{name}_weight"], rest[f"{name}_bias"]) for name in _LAYERS}
+        return LampNetwork(weights, biases, rest["middle"], rest["scale"], layers)
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{path} holds no lamp network: {error}") from error

@@ -1,0 +1,148 @@
+"""Which way the surface of an object faces, as a network sees it in the photo before the light is
+known.
+
+Problem: shading alone does not tell a hollow from a bump, nor how deep either is; outlines,
+highlights and shadows help people, and so does having seen many objects. SIRFS knows the shading
+and the outline only.
+
+Equation: an encoder of convolutions (`networks.layers`) makes layers of the photo, each
+half as fine as the one before; a decoder goes back up to cells of 4 x 4 pixels with the encoder's
+layers beside it; one convolution more gives, for each cell,
+
+    m (3,), the mean of the unit normals that are likely there,    log s, the logarithm of the
+    deviation of n_x and n_y from it,
+
+averaged over the photo and its mirror image: `predict_normals`. What becomes of it: `sirfs.normal_prior`.
+
+Citation: D. Eigen and R. Fergus, "Predicting depth, surface normals and semantic labels with a
+common multi-scale convolutional architecture", ICCV 2015, doi:10.1109/ICCV.2015.304 (normals of a
+network); O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
+doi:10.1007/978-3-319-24574-4_28 (encoder and decoder). Weights, training pictures and loss are our
+own: `python -m training.networks.shape_network`.
+
+Limits: measured in docs/methods/first_shape.md. It learned from rendered paint with a gloss, and
+sees nothing finer than a thirtieth of the object.
+"""
+
+import importlib.resources
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from ..errors import InputError
+from ..imaging.bounding_box import mask_slices
+from ..imaging.upsampling import enlarged
+from ..io.npy import read_arrays
+from ..photo.photo import averaged_object
+from ..scene.normal_estimate import NormalEstimate
+from .layers import conv_block, convolved, encoded, is_encoder, pad_to_stride, weights_in
+
+LONG_SIDE = 112  # of the object, in pixels, as the network sees it
+CELL = 4
+SURE, UNSURE = -4.0, 1.0  # bounds of the logarithm of the deviation
+_CHANNELS = 4  # m, log s
+_COVERED = 0.02  # of a cell that says something
+
+
+@dataclass(frozen=True)
+class ShapeNetwork:
+    """`weights`: of each convolution (9, inputs, outputs) float32; `biases` (outputs,). In the
+    order of the data: two for each of D levels down, two for each of D - 2 levels up from the
+    coarsest, the answer. Raises `InputError` where they do not fit each other.
+    """
+
+    weights: tuple[np.ndarray, ...]
+    biases: tuple[np.ndarray, ...]
+
+    def __post_init__(self) -> None:
+        if len(self.weights) % 4 != 1 or len(self.weights) < 9 or not self._fits():
+            raise InputError("these are not the weights of a shape network")
+
+    @property
+    def _depth(self) -> int:
+        return (len(self.weights) + 3) // 4
+
+    def _fits(self) -> bool:
+        down = 2 * self._depth
+        if not is_encoder(self.weights[:down], self.biases[:down]):
+            return False
+        wide = [w.shape[2] for w in self.weights[1:down:2]]
+        shapes, seen = [], wide[-1]
+        for beside in wide[-2:0:-1]:
+            shapes += [(9, beside + seen, beside), (9, beside, beside)]
+            seen = beside
+        shapes.append((9, seen, _CHANNELS))
+        return [w.shape for w in self.weights[down:]] == shapes and [
+            b.shape for b in self.biases[down:]
+        ] == [s[2:] for s in shapes]
+
+    def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        """m and log s, (H / 4, W / 4, 4) float32;
+
+        `image` (H, W, 3) and `mask` (H, W) as `networks.layers.pad_to_stride` makes them.
+        """
+        steps = iter(zip(self.weights, self.biases, strict=True))
+        kept = encoded(image, mask, steps, self._depth)
+        layer = kept[-1]
+        for beside in kept[-2:0:-1]:
+            layer = conv_block(
+                np.concatenate([beside, layer.repeat(2, axis=0).repeat(2, axis=1)], axis=2), steps
+            )
+        return convolved(layer, *next(steps))
+
+
+def predict_normals(
+    image: np.ndarray, mask: np.ndarray, network: ShapeNetwork | None = None
+) -> NormalEstimate:
+    """The normals of a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the
+    shipped network if None.
+    """
+    box = mask_slices(mask)
+    small, inside, factor = averaged_object(image, mask, LONG_SIDE)
+    (light, cover), place = pad_to_stride(small, inside)
+    judge = network or shipped_shape_network()
+    found = 0.5 * (
+        judge(light, cover)
+        + judge(light[:, ::-1], cover[:, ::-1])[:, ::-1] * np.array([-1, 1, 1, 1], np.float32)
+    )
+    near = enlarged(_carried_on(found, cover), cover.shape, CELL)[place]
+    whole = np.zeros((*mask.shape, _CHANNELS), np.float32)
+    whole[box] = near if factor == 1 else enlarged(near, mask[box].shape, 1 / factor)
+    deviation = np.exp(np.clip(whole[..., 3], SURE, UNSURE))
+    return NormalEstimate(
+        np.where(mask[..., None], whole[..., :3], 0), np.where(mask, deviation, 0)
+    )
+
+
+def _carried_on(found: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """What cells say (h, w, C) where they lie on `mask` (4 h, 4 w), carried on from the nearest of
+    them elsewhere.
+    """
+    rows, columns = found.shape[:2]
+    known = mask.reshape(rows, CELL, columns, CELL).mean(axis=(1, 3)) > _COVERED
+    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    return np.asarray(found[tuple(nearest)])
+
+
+@cache
+def shipped_shape_network() -> ShapeNetwork:
+    """The network that comes with the package."""
+    with importlib.resources.as_file(
+        importlib.resources.files(__package__) / "data" / "normal_network.npz"
+    ) as path:
+        return read_shape_network(path)
+
+
+def read_shape_network(path: Path) -> ShapeNetwork:
+    """An archive of float16 or float32 arrays `weight00`, `bias00`, ...
+
+    Raises `InputError` for a file that is none.
+    """
+    try:
+        weights, biases = weights_in(read_arrays(path))
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{path} holds no shape network: {error}") from error
+    return ShapeNetwork(weights, biases)

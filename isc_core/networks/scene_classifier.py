@@ -1,0 +1,132 @@
+"""What a photo seems to show: opaque paint under one lamp and a smooth light, or what such a model
+does not hold for.
+
+Problem: a mirror, glass, and paint under several lamps also have a shape, a paint and a light that
+add up to the photo: wrong ones. What gives them away is how they look: surroundings bent along the
+outline, highlights of one form beside each other.
+
+Equation: an encoder of convolutions (`networks.layers`) makes layers of the photo. Mean,
+deviation and fourth moment of each of their channels over the object make f (n,), and the
+probability of each kind is
+
+    P = softmax(W' ((sqrt f - m) / s) + b),
+
+averaged over the photo and its mirror image.
+
+Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
+doi:10.1007/978-3-319-24574-4_28 (the encoder); pooled moments: A. Babenko, V. Lempitsky,
+"Aggregating local deep features for image retrieval", ICCV 2015, doi:10.1109/ICCV.2015.150.
+Weights, training scenes and loss are our own: `python -m training.networks.appearance`.
+
+Limits: measured in docs/methods/doubts.md. A mirror of surroundings without detail looks like
+paint, and two lamps may look like two bumps.
+"""
+
+import importlib.resources
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..io.npy import read_arrays
+from ..photo.photo import averaged_object
+from .layers import average_pool, encoded, is_encoder, pad_to_stride, weights_in
+
+ORDINARY, MIRROR, GLASS, LAMPS = KINDS = ("ordinary", "mirror", "glass", "lamps")
+LONG_SIDE = 144  # of the object, in pixels, as the network sees it
+_MOMENTS = 3
+_LEAST, _MOST = 1e-6, 1e4
+_NONE = "these are not the weights of an appearance network"
+
+
+@dataclass(frozen=True)
+class AppearanceNetwork:
+    """`weights`: of each convolution (9, inputs, outputs) float32, two for each level; `biases`
+    (outputs,). `middle`, `scale` (n,), `head` (n, 4), `odds` (4,): the m, s, W and b of the module.
+    Raises `InputError` where they do not fit each other.
+    """
+
+    weights: tuple[np.ndarray, ...]
+    biases: tuple[np.ndarray, ...]
+    middle: np.ndarray
+    scale: np.ndarray
+    head: np.ndarray
+    odds: np.ndarray
+
+    def __post_init__(self) -> None:
+        if not is_encoder(self.weights, self.biases):
+            raise InputError(_NONE)
+        count = _MOMENTS * sum(w.shape[-1] for w in self.weights[1::2])
+        wanted = [(count,), (count,), (count, len(KINDS)), (len(KINDS),)]
+        fits = [part.shape for part in (self.middle, self.scale, self.head, self.odds)] == wanted
+        if not (fits and (self.scale > 0).all()):
+            raise InputError(_NONE)
+
+    def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        """The probabilities (4,) of `KINDS`;
+
+        `image` (H, W, 3) and `mask` (H, W) as `networks.layers.pad_to_stride` makes them.
+        """
+        found = (np.sqrt(self._moments(image, mask)) - self.middle) / self.scale
+        score = np.einsum("n,nk->k", found, self.head) + self.odds
+        shares = np.exp(score - score.max())
+        return np.asarray(shares / shares.sum())
+
+    def _moments(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
+        steps = iter(zip(self.weights, self.biases, strict=True))
+        cover, found = mask.astype(float)[..., None], []
+        for layer in encoded(image, mask, steps, len(self.weights) // 2):
+            cover = average_pool(cover)
+            weight, values = cover[..., 0] / cover.sum(), np.minimum(layer.astype(float), _MOST)
+            first, second, fourth = (
+                np.einsum("ij,ijc->c", weight, values**power) for power in (1, 2, 4)
+            )
+            found += [
+                first,
+                np.sqrt(np.maximum(second - first**2, _LEAST)),
+                (fourth + _LEAST**2) ** 0.25,
+            ]
+        return np.concatenate(found) + _LEAST
+
+
+def classify_scene(
+    image: np.ndarray, mask: np.ndarray, network: AppearanceNetwork | None = None
+) -> dict[str, float]:
+    """The probability of each of `KINDS` for a photo, `image` (H, W, 3) linear >= 0 within `mask`
+    (H, W) bool; by the shipped network if None.
+    """
+    (light, cover), _ = pad_to_stride(*averaged_object(image, mask, LONG_SIDE)[:2])
+    judge = network or shipped_appearance()
+    found = 0.5 * (judge(light, cover) + judge(light[:, ::-1], cover[:, ::-1]))
+    return {kind: float(share) for kind, share in zip(KINDS, found, strict=True)}
+
+
+@cache
+def shipped_appearance() -> AppearanceNetwork:
+    """The network that comes with the package."""
+    with importlib.resources.as_file(
+        importlib.resources.files(__package__) / "data" / "scene_classifier.npz"
+    ) as path:
+        return read_appearance(path)
+
+
+def read_appearance(path: Path) -> AppearanceNetwork:
+    """An archive of float16 or float32 arrays: `weight00`, `bias00`, ... and those of
+    `AppearanceNetwork` by their names.
+
+    Raises `InputError` for a file that is none.
+    """
+    try:
+        data = read_arrays(path)
+        weights, biases = weights_in(data)
+        judge = [
+            data[name].astype(np.float32).astype(float)
+            for name in ("middle", "scale", "head", "odds")
+        ]
+        if not all(np.isfinite(values).all() for values in judge):
+            raise ValueError("some of its numbers are not finite")
+        return AppearanceNetwork(weights, biases, *judge)
+    except (ValueError, KeyError) as error:
+        raise InputError(f"{path} holds no appearance network: {error}") from error

@@ -1,0 +1,1 @@
+"""Deterministic linear algebra, compiled kernels, threads and optimisation."""

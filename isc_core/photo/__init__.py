@@ -1,0 +1,1 @@
+"""Photos and masks: reading, linearising, resizing, and finding the object."""

@@ -1,0 +1,147 @@
+"""Cutting an object out of a photo, from a box that a person draws around it.
+
+Problem: a photo whose background is not black has no mask; everything outside the box is
+background, inside it is unknown. Equation: GrabCut minimises, over the labels a of all pixels, E(a)
+= sum_p D(a_p, z_p) + sum_pq V(a_p, a_q, z_p, z_q), where D is the negative log-likelihood of the
+colour z_p under a Gaussian mixture of the object or of the background and V a contrast-weighted
+cost of the border; minimum cuts and fits of the mixtures take turns. Citation: Rother, Kolmogorov,
+Blake, "GrabCut" (ACM Transactions on Graphics 23, 2004), doi:10.1145/1015706.1015720; OpenCV's
+solver. Limits: colours alone decide, so an object of the background's colour is cut badly: the mask
+should be looked at. Large boxes are solved at one megapixel and the border is interpolated.
+"""
+
+import os
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from ..errors import InputError
+from ..io.atomic import new_file, require_writable_file
+from ..io.limits import USUAL, Limits
+from .photo import MIN_SIDE, check_mask, linear_to_srgb, read_linear, tidy_mask
+
+SOLVED_PIXELS = 1_000_000
+_SEED = 0
+
+Box = tuple[int, int, int, int]
+
+
+def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
+    """The object within a box, by GrabCut: an (H, W) bool mask, false outside the box, holes
+    filled, specks dropped; always the same.
+
+    `image`: (H, W, 3) RGB, uint8 codes or float linear light in [0, 1]. `box`: (x, y, width,
+    height) in pixels from the top left. Raises `InputError` for a box outside of the image, thinner
+    than 8 pixels or without background around it, and where nothing is found.
+    """
+    height, width = image.shape[:2]
+    _check_box(box, width, height)
+    x, y, w, h = box
+    left, top, right, bottom = (
+        max(x - w // 2, 0),
+        max(y - h // 2, 0),
+        min(x + w + w // 2, width),
+        min(y + h + h // 2, height),
+    )
+    part = image[top:bottom, left:right]
+    coded = (
+        part
+        if part.dtype == np.uint8
+        else np.rint(255 * np.clip(linear_to_srgb(part), 0, 1)).astype(np.uint8)
+    )
+    cover = _solve(coded, (x - left, y - top, w, h), iterations)
+    mask = np.zeros((height, width), bool)
+    inside = cover[y - top : y - top + h, x - left : x - left + w] > 0.5
+    mask[y : y + h, x : x + w] = tidy_mask(inside)
+    check_mask(mask, f"--box {x},{y},{w},{h}: what GrabCut finds there")
+    return mask
+
+
+def _check_box(box: Box, width: int, height: int) -> None:
+    x, y, w, h = box
+    name = f"--box {x},{y},{w},{h}"
+    if w < MIN_SIDE or h < MIN_SIDE:
+        raise InputError(
+            f"{name}: the box is x,y,width,height, at least {MIN_SIDE} pixels both ways: draw it around the object"
+        )
+    if x < 0 or y < 0 or x + w > width or y + h > height:
+        raise InputError(
+            f"{name}: reaches out of the image of {width} x {height} pixels: keep it inside"
+        )
+    if (x, y, w, h) == (0, 0, width, height):
+        raise InputError(
+            f"{name}: covers the whole image: leave some background around the box to learn its colours from"
+        )
+
+
+def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
+    """(H, W) float32, how much of each pixel is object, of (H, W, 3) uint8 RGB; solved at no more
+    than a megapixel.
+    """
+    height, width = coded.shape[:2]
+    factor = min(1.0, float(np.sqrt(SOLVED_PIXELS / (height * width))))
+    size = (max(round(width * factor), 1), max(round(height * factor), 1))
+    small = np.ascontiguousarray(cv2.resize(coded, size, interpolation=cv2.INTER_AREA)[..., ::-1])
+    x, y, w, h = (round(n * factor) for n in box)
+    labels = np.full(small.shape[:2], cv2.GC_BGD, np.uint8)
+    labels[y : y + h, x : x + w] = cv2.GC_PR_FGD
+    if labels.all():
+        raise InputError(
+            "--box: leaves too little background to learn its colours from: draw it closer to the object"
+        )
+    cv2.setRNGSeed(_SEED)
+    cv2.grabCut(
+        small, labels, None, np.zeros((1, 65)), np.zeros((1, 65)), iterations, cv2.GC_INIT_WITH_MASK
+    )
+    found = ((labels == cv2.GC_FGD) | (labels == cv2.GC_PR_FGD)).astype(np.float32)
+    return cv2.resize(found, (width, height), interpolation=cv2.INTER_LINEAR)
+
+
+def write_mask(path: str | Path, mask: np.ndarray) -> None:
+    """Writes an (H, W) bool mask as an 8-bit grey PNG, 255 inside; whole or not at all.
+
+    Raises `InputError` where it cannot.
+    """
+    _require_png(path)
+    data = cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes()
+    with new_file(path) as partial:
+        partial.write_bytes(data)
+
+
+def _require_png(path: str | Path) -> None:
+    if Path(path).suffix.lower() != ".png":
+        raise InputError(f"{path}: a mask is written as PNG: give a name that ends in .png")
+
+
+def cut_out(
+    photo_path: str | Path,
+    box: Box,
+    out_path: str | Path,
+    transfer: str = "auto",
+    limits: Limits = USUAL,
+) -> np.ndarray:
+    """Reads a photo, finds the object within the box (x, y, width, height; of the upright photo),
+    writes the mask and returns it.
+
+    `transfer` and `limits` as for `photo.photo.read_photo`; the mask as `grabcut` gives it. Raises
+    `InputError` where the photo cannot be read, the box does not fit, nothing is found or the mask
+    cannot be written or would take the photo's place.
+    """
+    _require_png(out_path)
+    if (
+        os.path.exists(out_path)
+        and os.path.exists(photo_path)
+        and os.path.samefile(photo_path, out_path)
+    ):
+        raise InputError(f"{out_path} is the photo itself: name another file for its mask")
+    require_writable_file(out_path)
+    image = read_linear(photo_path, transfer, limits)
+    white = float(np.percentile(image, 99.9)) or float(image.max())
+    if white == 0:
+        raise InputError(
+            f"{photo_path}: the image is black: there is nothing to cut out; use another photo"
+        )
+    mask = grabcut(image / white, box)
+    write_mask(out_path, mask)
+    return mask

@@ -1,0 +1,56 @@
+"""How surfaces lean behind their silhouettes, measured on objects of known shape: the profile of
+the `silhouette` term.
+
+For every pixel with a known normal, u is its relative depth behind the silhouette and x, y are the
+normal's components in the image plane along and across the outward direction. In each of `BINS`
+bins of u: mean = E[x], spread^2 = (Var[x] + E[y^2]) / 2. Objects count alike.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..shading.surface_stencils import normals
+from ..sirfs.priors.priors import SilhouetteProfile
+from ..sirfs.silhouette import outline_coordinates
+
+BINS = 16
+
+
+@dataclass(frozen=True)
+class OutlineMoments:
+    """One object's shares: of its pixels in each bin, and of the sums of x, x^2 and y^2 there;
+
+    (4, BINS).
+    """
+
+    sums: np.ndarray
+
+    @classmethod
+    def of(cls, height: np.ndarray, mask: np.ndarray) -> "OutlineMoments":
+        """Of a height map (H, W), NaN where unknown, in `mask` (H, W) bool."""
+        u, down, right = outline_coordinates(mask)
+        normal = normals(height)
+        known = mask & np.isfinite(normal).all(axis=-1)
+        along = (normal[..., 0] * down + normal[..., 1] * right)[known]
+        across = (normal[..., 1] * down - normal[..., 0] * right)[known]
+        which = np.minimum((u[known] * BINS).astype(int), BINS - 1)
+        sums = [
+            np.bincount(which, w, BINS) for w in (np.ones(len(which)), along, along**2, across**2)
+        ]
+        return cls(np.stack(sums) / max(len(which), 1))
+
+
+def fit_silhouette(objects: Sequence[OutlineMoments]) -> SilhouetteProfile:
+    """The profile of all `objects`; a bin that no object reaches takes its neighbours' values."""
+    count, along, along2, across2 = np.sum([o.sums for o in objects], axis=0)
+    seen = count > 0
+    n = np.where(seen, count, 1)
+    mean = along / n
+    variance = (along2 / n - mean**2 + across2 / n) / 2
+    bins = np.arange(BINS)
+    filled = (
+        np.interp(bins, bins[seen], v[seen]) for v in (mean, np.sqrt(np.maximum(variance, 1e-4)))
+    )
+    return SilhouetteProfile(*filled)

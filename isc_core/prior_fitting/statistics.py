@@ -1,0 +1,97 @@
+"""What the fit of the priors needs of each training object, condensed once so that any selection of
+objects is fitted fast.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import InputError
+from ..progress import Monitor
+from ..sirfs.priors.color_mixture import ColorCells
+from ..sirfs.priors.scale_mixture import Magnitudes
+from ..sirfs.surface import geometry
+from .pairs import pair_differences
+from .silhouette import OutlineMoments
+
+
+@dataclass(frozen=True)
+class TrainingObject:
+    """An object whose intrinsic characteristics are known.
+
+    `reflectance`: (H, W, 3) linear. `valid`: (H, W) bool, where the reflectance can be trusted.
+    `height`: (H, W) pixels, toward the viewer, NaN where unknown. `mask`: (H, W) bool, the object.
+    `natural_light`, `laboratory_light`: (9, 3), in the reference's convention (`sirfs.priors.priors`).
+    """
+
+    name: str
+    reflectance: np.ndarray
+    valid: np.ndarray
+    height: np.ndarray
+    natural_light: np.ndarray
+    laboratory_light: np.ndarray
+    mask: np.ndarray
+
+
+@dataclass(frozen=True)
+class ObjectStatistics:
+    """One object's share in every prior.
+
+    `curvature`, `grey_smoothness`, `color_smoothness`: differences over neighbouring pixels.
+    `log_reflectance` (n, 3) float32 and `grey_log_reflectance` (n, 1): all valid pixels; grey is
+    the mean of the channels. `outline`: leaning behind the silhouette. The lights are (9, 3).
+    """
+
+    curvature: Magnitudes
+    grey_smoothness: Magnitudes
+    color_smoothness: ColorCells
+    log_reflectance: np.ndarray
+    grey_log_reflectance: np.ndarray
+    outline: OutlineMoments
+    natural_light: np.ndarray
+    laboratory_light: np.ndarray
+
+    def second_moment(self) -> np.ndarray:
+        """Mean of a a^T over the log reflectances a, (3, 3)."""
+        a = self.log_reflectance.astype(float)
+        return a.T @ a / len(a)
+
+
+def object_statistics(training: TrainingObject) -> ObjectStatistics:
+    """Condenses one object.
+
+    Pixels with a channel at or below 0 are left out. Raises `InputError` where nothing is left.
+    """
+    valid = training.valid & (training.reflectance > 0).all(axis=-1)
+    positive = np.where(valid[..., None], training.reflectance, 1.0)
+    log_reflectance, log_grey = np.log(positive), np.log(positive.mean(axis=-1))
+    curvature = geometry(np.asarray(training.height, float)).curvature
+    bends = pair_differences(curvature, np.isfinite(curvature))
+    steps = pair_differences(log_reflectance, valid)
+    if len(bends) == 0 or len(steps) == 0:
+        raise InputError(
+            f"training object '{training.name}' has no neighbouring valid pixels: leave it out"
+        )
+    return ObjectStatistics(
+        curvature=Magnitudes.of(bends),
+        grey_smoothness=Magnitudes.of(pair_differences(log_grey, valid)),
+        color_smoothness=ColorCells.of(steps),
+        log_reflectance=log_reflectance[valid].astype(np.float32),
+        grey_log_reflectance=log_grey[valid].astype(np.float32)[:, None],
+        outline=OutlineMoments.of(np.asarray(training.height, float), training.mask),
+        natural_light=training.natural_light,
+        laboratory_light=training.laboratory_light,
+    )
+
+
+def collect_statistics(
+    objects: Mapping[str, TrainingObject], monitor: Monitor | None = None
+) -> dict[str, ObjectStatistics]:
+    """`object_statistics` of each object, under its name."""
+    monitor = monitor or Monitor()
+    collected = {}
+    for count, (name, training) in enumerate(objects.items()):
+        monitor.report(f"statistics of {name}", count / len(objects))
+        collected[name] = object_statistics(training)
+    return collected

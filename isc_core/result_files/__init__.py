@@ -1,0 +1,1 @@
+"""The files of a result: maps, mesh, contact sheet and records."""

@@ -1,0 +1,124 @@
+"""Everything of a result as plain arrays in one file, for programs that have NumPy and nothing
+else, such as Blender.
+
+Problem: maps are OpenEXR, the mesh is glTF, and the light is nine coefficients of a logarithm: a
+program needs libraries to read them and mathematics to use them. `arrays.npz` (uncompressed, no
+pickles) holds what such a program has to know, float32 unless said otherwise:
+
+    image diffuse specular residual reflectance shading   (H, W, 3) linear Rec.709; 0 outside the
+    mask normal (H, W, 3)   height, confidence (H, W)   mask (H, W) bool       as in maps.exr
+    vertices (V, 3)                  metres, +X right, +Y up, +Z toward the viewer faces (F, 3)
+    int32               counter-clockwise as the viewer sees them vertex_normals (V, 3)   uv (V, 2)
+    v counts from the BOTTOM of the texture vertex_pixel (V, 2) int32        row and column of each
+    vertex base_color (H, W, 3)             linear, k * reflectance, continued beyond the mask; not
+    cut at 1 normal_map (H, W, 3)             tangent space, green up, [0, 1] stands for [-1, 1]
+    reflectance_scale, metres_per_pixel ()    k, and the mesh's size    origin (3,)    column, row,
+    height in pixels of its origin illumination (9, 3)              of log shading, for
+    `reflectance` mesh_illumination (9, 3)         the same for `base_color`: the shading divided by
+    k sky (h, 2 h, 3)                  radiance that lights `base_color` so; layout of `environment`
+    sun_direction (3,)               unit vector toward the one light that best explains the
+    shading, camera frame sun_strength, sun_ambient (3,)   its irradiance across its beam, and the
+    shading it leaves to the rest, for `base_color` sun_explained, sun_cone ()       share of the
+    shading in [0, 1], and the direction's standard error in degrees lobe (H, W, 3)
+    the specular image that the fitted lobe predicts; 0 where none was fitted roughness ()
+    Blender's and glTF's, NaN if unknown specular_level ()                for `base_color`, 1 is
+    plastic (f0 = .04), NaN if unknown; at most what the photo has room for specular_variation (H,
+    W)        factor of that level, where it varies; else absent photo_size (2,) int32
+    width and height of the original photo    crop_scale ()    map pixels to one of its pixels
+
+Equation: base_color * exp(SH(n; mesh_illumination)) = diffuse, and the irradiance of `sky` on a
+white surface, over pi, is exp(SH(n; mesh_illumination)).
+
+Citation: NumPy's file format, NEP 1, https://numpy.org/neps/nep-0001-npy-format.html.
+
+Limits: the sky matches as well as `environment` says; the mesh is the one of the usual options.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..lobe_fitting.light_direction import explain_shading
+from ..lobe_fitting.specular_upper_bound import shown_gloss
+from ..scene.decomposition import COLOR_MAPS, Decomposition
+from ..shading.environment_map import environment_from_shading
+from .mesh import MeshResult, build_mesh
+
+ARRAYS = "arrays.npz"
+_INTEGERS = {"faces", "vertex_pixel", "photo_size"}
+
+
+def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) -> None:
+    """Writes the file. `built`: the mesh of `d`, built here if None. Equal results give equal
+    bytes.
+
+    Raises `InputError` if the mask is too small for a mesh; `OSError` when the file cannot be
+    written.
+    """
+    arrays = arrays_of(
+        d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, shown_gloss(d))
+    )
+    with path.open("wb") as file:  # given a name, NumPy would add a suffix to it
+        np.savez(file, **arrays)
+
+
+def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+    """The file's arrays by name, see the module. `built`: the mesh of `d`."""
+    values = _maps(d) | _mesh(built) | _light(d, built) | _gloss(d, built)
+    size, scale = (
+        d.provenance.input.get("size", d.mask.shape[::-1]),
+        d.provenance.input.get("scale", 1.0),
+    )
+    values |= {"photo_size": np.array(size), "crop_scale": np.array(scale)}
+    return {name: _typed(name, array) for name, array in values.items()}
+
+
+def _typed(name: str, values: np.ndarray) -> np.ndarray:
+    kind = np.int32 if name in _INTEGERS else bool if name == "mask" else np.float32
+    return np.ascontiguousarray(values, kind).reshape(np.shape(values))
+
+
+def _maps(d: Decomposition) -> dict[str, np.ndarray]:
+    return {
+        name: getattr(d, name) for name in (*COLOR_MAPS, "normal", "height", "confidence", "mask")
+    }
+
+
+def _mesh(built: MeshResult) -> dict[str, np.ndarray]:
+    mesh = built.mesh
+    return {
+        "vertices": mesh.vertices,
+        "faces": mesh.faces,
+        "vertex_normals": mesh.vertex_normals,
+        "uv": mesh.visual.uv,
+        "vertex_pixel": built.vertex_pixel,
+        "base_color": built.base_color,
+        "normal_map": (built.detail + 1) / 2,
+        "reflectance_scale": np.array(built.reflectance_scale),
+        "metres_per_pixel": np.array(built.metres_per_pixel),
+        "origin": np.array(built.origin),
+    }
+
+
+def _light(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+    mesh_light, sun = built.illumination(d.illumination), explain_shading(d)
+    return {
+        "illumination": d.illumination,
+        "mesh_illumination": mesh_light,
+        "sky": environment_from_shading(mesh_light),
+        "sun_direction": sun.light.direction,
+        "sun_strength": sun.light.irradiance / built.reflectance_scale,
+        "sun_ambient": sun.light.ambient / built.reflectance_scale,
+        "sun_explained": np.array(sun.explained),
+        "sun_cone": np.array(sun.cone),
+    }
+
+
+def _gloss(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
+    gloss = built.gloss
+    values = {
+        "lobe": np.zeros(d.image.shape) if d.brdf is None else d.brdf.predicted,
+        "roughness": np.array(np.nan if gloss.roughness is None else gloss.roughness),
+        "specular_level": np.array(np.nan if gloss.specular is None else built.specular),
+    }
+    return values if gloss.variation is None else values | {"specular_variation": gloss.variation}

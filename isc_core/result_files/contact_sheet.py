@@ -1,0 +1,453 @@
+"""The contact sheet: one picture that shows a person what came out, before anything else is opened.
+
+Tones: input, diffuse and specular share one exposure, so that they can be compared; reflectance has
+its own, and so has shading, which the light shares unless it would be too bright. An exposure puts
+the 99.5th percentile of the brightest channel inside the mask at 0.95. Everything is blended in
+linear light and coded as sRGB at the end. Maps are cropped to the object and scaled with their mask
+as weight, so that no black creeps in at the edge.
+
+The height is drawn as a relief under a lamp at the upper left, with contour lines at round
+distances; the light as a white ball in it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFilter, ImageFont
+
+from ..errors import InputError
+from ..io.atomic import new_file
+from ..io.printable_names import readable
+from ..photo.photo import linear_to_srgb, srgb_to_linear
+from ..scene.decomposition import Decomposition, Separation
+from ..scene.lobe_fit import NO_LIGHT, LobeFit
+from ..shading.spherical_harmonics import real_sh
+
+_PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
+_PAGE, _CARD, _TEXT, _FAINT = (20, 21, 23), (33, 35, 38), (238, 238, 236), (150, 153, 158)  # sRGB
+_SMALL = 480  # pixels: long side of a sheet's thumbnail
+_MARGIN = 0.06  # room around the object, of the panel's side
+_TOO_BRIGHT, _TOO_DARK, _NO_ERROR = (
+    (1.0, 0.42, 0.04),
+    (0.06, 0.3, 1.0),
+    (0.06, 0.06, 0.06),
+)  # linear
+_FULL_ERROR = 0.1  # of the photo's white: errors from here on have the full colour
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One picture of a sheet:
+
+    `color` (N, N, 3) linear, `coverage` (N, N) in [0, 1], a label and a faint remark.
+    """
+
+    color: np.ndarray
+    coverage: np.ndarray
+    label: str
+    remark: str = ""
+
+
+def contact_sheet(decomposition: Decomposition) -> Image.Image:
+    """The sheet of a decomposition: eight panels, 4 x 2, with a title taken from its provenance.
+
+    The title reads `input["name"]`, `settings["model"]`, `settings["separator"]`,
+    `settings["illumination"]`, `status["loss"]`, `status["converged"]`, as far as they are there,
+    and the fitted gloss.
+    """
+    d = decomposition
+    frame = _Frame.around(d.mask)
+    photo, paint, light = (
+        _exposure(values[d.mask]) for values in (d.image, d.reflectance, d.shading)
+    )
+    ball, coverage = _ball(d.illumination)
+    ball_light = min(
+        light, _exposure(ball[coverage > 0.5])
+    )  # the ball also shows directions that the object does not
+    colors = [
+        (d.image, photo, "Input", ""),
+        (d.diffuse, photo, "Diffuse", ""),
+        (
+            d.specular,
+            photo,
+            "Specular",
+            f"{100 * _share(d.specular, d.image, d.mask):.1f} % of the light",
+        ),
+        (d.reflectance, paint, "Reflectance", ""),
+        (d.shading, light, "Shading", ""),
+    ]
+    panels = [
+        Panel(gain * frame.scaled(values), frame.coverage, label, remark)
+        for values, gain, label, remark in colors
+    ]
+    panels.append(
+        Panel(
+            srgb_to_linear(0.5 + 0.5 * frame.scaled(d.normal)),
+            frame.coverage,
+            "Normals",
+            "x right, y up, z to viewer",
+        )
+    )
+    panels.append(_relief(d, frame))
+    panels.append(Panel(ball_light * ball, coverage, "Light", "on a white ball"))
+    return _sheet(*_title(d), panels, columns=4)
+
+
+def thumbnail(sheet: Path, target: Path) -> None:
+    """Writes a small JPEG of a sheet's picture, for pages that show many.
+
+    Raises `InputError` where it cannot be read or written.
+    """
+    try:
+        with Image.open(sheet) as picture:
+            small = picture.convert("RGB")
+    except OSError as error:
+        raise InputError(f"{sheet}: cannot be read ({error})") from error
+    small.thumbnail((_SMALL, _SMALL), reducing_gap=2.0)
+    with new_file(target) as partial:
+        small.save(partial, "JPEG", quality=85)
+
+
+def separation_sheet(
+    separation: Separation, image: np.ndarray, mask: np.ndarray, title: str = ""
+) -> Image.Image:
+    """The sheet of a separation, 3 x 1: input, diffuse, specular.
+
+    `image`: (H, W, 3) linear. `mask`: (H, W) bool.
+    """
+    frame, gain = _Frame.around(mask), _exposure(image[mask])
+    share = f"{100 * _share(separation.specular, image, mask):.1f} % of the light"
+    maps = [
+        (image, "Input", ""),
+        (separation.diffuse, "Diffuse", ""),
+        (separation.specular, "Specular", share),
+    ]
+    panels = [
+        Panel(gain * frame.scaled(values), frame.coverage, label, remark)
+        for values, label, remark in maps
+    ]
+    return _sheet(title or "Separation", f"{mask.shape[1]} x {mask.shape[0]} px", panels, columns=3)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A separation to be compared with others: the method's name, a faint remark, the layers."""
+
+    label: str
+    remark: str
+    split: Separation
+
+
+def comparison_sheet(
+    title: str,
+    image: np.ndarray,
+    mask: np.ndarray,
+    answers: Sequence[Answer],
+    truth: tuple[np.ndarray, np.ndarray] | None = None,
+) -> Image.Image:
+    """Many separations of one photo, two in a row of six panels: each its diffuse layer, its
+    specular layer and its error.
+
+    `image`, and the true (diffuse, specular) if they are known: (H, W, 3) linear; `mask`: (H, W)
+    bool. Errors of the diffuse layer are orange where too much light was left and blue where too
+    much was taken, in full colour from a tenth of the photo's white on. Without a truth the
+    confidence stands there, white where it is 1. The first three panels are the photo and the
+    truth, or the photo, its smallest channel and its chromaticity, which is all that methods by
+    colour see.
+    """
+    frame, gain = _Frame.around(mask), _exposure(image[mask])
+
+    def panel(values: np.ndarray, label: str, remark: str = "") -> Panel:
+        return Panel(frame.scaled(values), frame.coverage, label, remark)
+
+    if truth is None:
+        low, total = image.min(axis=2, keepdims=True), image.sum(axis=2, keepdims=True)
+        second = (
+            panel(gain * np.repeat(low, 3, axis=2), "Smallest channel"),
+            panel(image / np.maximum(total, 1e-9), "Chromaticity"),
+        )
+    else:
+        share = f"{100 * _share(truth[1], image, mask):.1f} % of the light"
+        second = (
+            panel(gain * truth[0], "True diffuse"),
+            panel(gain * truth[1], "True specular", share),
+        )
+    panels = [panel(gain * image, "Input"), *second]
+    for answer in answers:
+        split = answer.split
+        share = f"{100 * _share(split.specular, image, mask):.1f} % of the light"
+        panels += [
+            panel(gain * split.diffuse, answer.label, answer.remark),
+            panel(gain * split.specular, "Specular", share),
+        ]
+        if truth is None:
+            panels.append(
+                panel(
+                    np.repeat(srgb_to_linear(split.confidence)[..., None], 3, axis=2), "Confidence"
+                )
+            )
+        else:
+            panels.append(
+                panel(
+                    _error_colors(gain * (split.diffuse - truth[0])),
+                    "Error",
+                    "orange: left over, blue: overdone",
+                )
+            )
+    return _sheet(
+        title,
+        f"{mask.shape[1]} x {mask.shape[0]} px   ·   {len(answers)} separations",
+        panels,
+        columns=6,
+    )
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A map of the object on a sheet: `values` (H, W, 3) linear, `mask` (H, W) bool, a label, a
+    faint remark. `own`: in an exposure of its own.
+    """
+
+    values: np.ndarray
+    mask: np.ndarray
+    label: str
+    remark: str = ""
+    own: bool = False
+
+
+def edit_sheet(
+    title: str, subtitle: str, maps: Sequence[Shown], others: Sequence[Panel] = (), columns: int = 4
+) -> Image.Image:
+    """What an edit did:
+
+    `maps`, in the exposure of the first of them, then `others`, (320, 320) pixels each, as they
+    are.
+    """
+    first = _exposure(maps[0].values[maps[0].mask])
+    panels = []
+    for shown in maps:
+        frame, gain = (
+            _Frame.around(shown.mask),
+            _exposure(shown.values[shown.mask]) if shown.own else first,
+        )
+        panels.append(
+            Panel(gain * frame.scaled(shown.values), frame.coverage, shown.label, shown.remark)
+        )
+    panels += others
+    return _sheet(title, subtitle, panels, min(columns, len(panels)))
+
+
+def _error_colors(error: np.ndarray) -> np.ndarray:
+    """Errors (H, W, 3), 1 being the photo's white, as colours (H, W, 3), linear."""
+    mean = error.mean(axis=2, keepdims=True)
+    weight = np.clip(np.abs(mean) / _FULL_ERROR, 0, 1)
+    return (1 - weight) * np.array(_NO_ERROR) + weight * np.where(
+        mean > 0, np.array(_TOO_BRIGHT), np.array(_TOO_DARK)
+    )
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """How a map gets into a panel: the object's box, (first row, end row, first column, end
+    column), is scaled by `zoom` to its middle.
+    """
+
+    mask: np.ndarray
+    box: tuple[int, int, int, int]
+    zoom: float
+
+    @classmethod
+    def around(cls, mask: np.ndarray) -> "_Frame":
+        rows, columns = np.nonzero(mask)
+        box = (int(rows.min()), int(rows.max()) + 1, int(columns.min()), int(columns.max()) + 1)
+        return cls(mask, box, _PANEL * (1 - 2 * _MARGIN) / max(box[1] - box[0], box[3] - box[2]))
+
+    @property
+    def coverage(self) -> np.ndarray:
+        """How much of each pixel of the panel, (N, N), the object covers; a small object's outline
+        is rounded, not shown in steps.
+        """
+        zoom = max(1.0, self.zoom)
+        soft = Image.fromarray(np.rint(255 * self._resized(self.mask)).astype(np.uint8))
+        if zoom > 1:
+            soft = soft.filter(ImageFilter.GaussianBlur(0.9 * zoom))
+        return np.clip((np.asarray(soft) / 255.0 - 0.5) * zoom + 0.5, 0, 1)
+
+    def scaled(self, values: np.ndarray) -> np.ndarray:
+        """A map, (H, W) or (H, W, C), as it appears in the panel, (N, N) or (N, N, C); 0 where the
+        mask is not.
+        """
+        if values.ndim == 3:
+            return np.stack([self.scaled(plane) for plane in np.moveaxis(values, -1, 0)], -1)
+        weight = self._resized(self.mask)
+        return np.where(
+            weight > 1e-3,
+            self._resized(np.where(self.mask, values, 0)) / np.maximum(weight, 1e-3),
+            0,
+        )
+
+    def _resized(self, plane: np.ndarray) -> np.ndarray:
+        first_row, end_row, first_column, end_column = self.box
+        # A border of nothing, so that the object's outline is soft all around.
+        window = np.pad(plane[first_row:end_row, first_column:end_column].astype(np.float32), 1)
+        height, width = (min(_PANEL, max(1, round(self.zoom * n))) for n in window.shape)
+        panel = np.zeros((_PANEL, _PANEL))
+        top, left = (_PANEL - height) // 2, (_PANEL - width) // 2
+        panel[top : top + height, left : left + width] = Image.fromarray(window).resize(
+            (width, height), Image.Resampling.BILINEAR
+        )
+        return panel
+
+
+def _exposure(inside: np.ndarray) -> float:
+    bright = float(np.percentile(inside.max(-1), 99.5))
+    return 0.95 / bright if bright > 0 else 1.0
+
+
+def _share(part: np.ndarray, whole: np.ndarray, mask: np.ndarray) -> float:
+    return float(
+        part[mask].sum(dtype=np.float64) / max(float(whole[mask].sum(dtype=np.float64)), 1e-9)
+    )
+
+
+def _ball(illumination: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A white ball under the light, (N, N, 3), and its coverage, (N, N)."""
+    radius = _PANEL * (0.5 - _MARGIN) * 0.9
+    axis = (np.arange(_PANEL) + 0.5 - _PANEL / 2) / radius
+    x, y = np.meshgrid(axis, -axis)
+    distance = np.hypot(x, y)
+    shrink = np.minimum(
+        1, 1 / np.maximum(distance, 1e-9)
+    )  # beyond the outline: its normal, for the pixels it crosses
+    normal = np.stack([x * shrink, y * shrink, np.sqrt(np.maximum(0, 1 - distance**2))], -1)
+    return np.exp(real_sh(normal) @ illumination), np.clip((1 - distance) * radius + 0.5, 0, 1)
+
+
+def _relief(d: Decomposition, frame: _Frame) -> Panel:
+    """The height under a lamp at the upper left, with contour lines."""
+    heights = d.height[d.mask]
+    low, high = float(heights.min()), float(heights.max())
+    spacing = _round_step((high - low) / 12)
+    normal = frame.scaled(d.normal)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-6)
+    lamp = np.array([-0.52, 0.58, 0.63])
+    key, sky = (
+        np.clip((normal @ lamp + 0.3) / 1.3, 0, 1) ** 1.5,
+        0.6 + 0.4 * normal[..., 1],
+    )  # a large lamp: a soft edge of shadow
+    height = frame.scaled(d.height)
+    tint = np.clip((height - low) / max(high - low, 1e-9), 0, 1)[..., None]
+    clay = (1 - tint) * np.array([0.36, 0.44, 0.52]) + tint * np.array([0.86, 0.78, 0.66])
+    color = clay * (
+        0.95 * key[..., None] * np.array([1.0, 0.97, 0.9])
+        + 0.16 * sky[..., None] * np.array([0.75, 0.88, 1.0])
+    )
+    color *= 1 - 0.55 * _contours(height / spacing, frame.coverage)[..., None]
+    return Panel(
+        color, frame.coverage, "Height", f"range {high - low:.0f} px, lines every {spacing:g}"
+    )
+
+
+def _contours(level: np.ndarray, coverage: np.ndarray) -> np.ndarray:
+    """How much of a contour line, [0, 1], lies on each pixel: at whole numbers of `level`, faded
+    where the lines run together.
+    """
+    slope = np.hypot(*np.gradient(level))
+    distance = np.abs(level - np.rint(level)) / np.maximum(slope, 1e-6)  # pixels to the line
+    fade = np.clip((0.25 - slope) / 0.15, 0, 1) * (coverage > 0.99)
+    return np.clip(1.1 - distance, 0, 1) * fade
+
+
+def _round_step(step: float) -> float:
+    """The nearest of 1, 2, 5 times a power of ten from above; 1 for nothing."""
+    if step <= 0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(step))
+    return float(power * next(m for m in (1, 2, 5, 10) if m * power >= step * (1 - 1e-9)))
+
+
+def _title(d: Decomposition) -> tuple[str, str]:
+    given, settings, status = d.provenance.input, d.provenance.settings, d.provenance.status
+    name = PurePath(str(given.get("name", ""))).name or "Decomposition"
+    words = [f"{d.mask.shape[1]} x {d.mask.shape[0]} px"]
+    words += [
+        str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)
+    ]
+    if isinstance(loss := status.get("loss"), int | float):
+        words.append(f"loss {loss:.2f}")
+    if isinstance(converged := status.get("converged"), bool):
+        words.append("converged" if converged else "stopped early")
+    if d.brdf is not None:
+        words.append(_gloss(d.brdf))
+    if status.get("doubts"):
+        words.append("doubtful, see status.doubts")
+    return name, "   ·   ".join(words)
+
+
+def _gloss(fit: LobeFit) -> str:
+    """The fit in a few words; roughness as Blender and glTF count it."""
+    if fit.blender_roughness is None:
+        return "no highlights" if fit.reason == NO_LIGHT else "gloss undetermined"
+    return f"roughness {'' if fit.determined else 'at most '}{fit.blender_roughness:.2f}"
+
+
+def _sheet(title: str, subtitle: str, panels: Sequence[Panel], columns: int) -> Image.Image:
+    rows = -(-len(panels) // columns)
+    width = 2 * _EDGE + columns * _PANEL + (columns - 1) * _GAP
+    height = _HEAD + rows * (_PANEL + _LABEL) + (rows - 1) * _GAP + _EDGE
+    sheet = Image.new("RGB", (width, height), _PAGE)
+    draw = ImageDraw.Draw(sheet)
+    _write(draw, (_EDGE, 50), title, 30, _TEXT, width - 2 * _EDGE)
+    _write(draw, (_EDGE, 80), subtitle, 16, _FAINT, width - 2 * _EDGE)
+    for index, panel in enumerate(panels):
+        row, column = divmod(index, columns)
+        x, y = _EDGE + column * (_PANEL + _GAP), _HEAD + row * (_PANEL + _LABEL + _GAP)
+        sheet.paste(_picture(panel), (x, y), _rounded())
+        end = _write(draw, (x + 2, y + _PANEL + 27), panel.label, 18, _TEXT, _PANEL)
+        _write(
+            draw,
+            (x + _PANEL - 2, y + _PANEL + 27),
+            panel.remark,
+            14,
+            _FAINT,
+            x + _PANEL - end - 12,
+            right=True,
+        )
+    return sheet
+
+
+def _write(
+    draw: ImageDraw.ImageDraw,
+    place: tuple[float, float],
+    text: str,
+    size: int,
+    color: tuple[int, int, int],
+    room: float,
+    *,
+    right: bool = False,
+) -> float:
+    """Writes a line on the base line `place`, cut to `room` pixels; returns where it ends."""
+    font, text = ImageFont.load_default(size), readable(text)
+    if font.getlength(text) > room:
+        while text and font.getlength(text + "…") > room:
+            text = text[:-1]
+        text += "…"
+    draw.text(place, text, fill=color, font=font, anchor="rs" if right else "ls")
+    return place[0] + font.getlength(text)
+
+
+def _picture(panel: Panel) -> Image.Image:
+    """The panel on its card, blended in linear light."""
+    card = srgb_to_linear(np.array(_CARD) / 255.0)
+    alpha = panel.coverage[..., None]
+    linear = alpha * np.clip(panel.color, 0, 1) + (1 - alpha) * card
+    return Image.fromarray(np.rint(255 * linear_to_srgb(linear)).astype(np.uint8))
+
+
+def _rounded() -> Image.Image:
+    """The card's shape, with smooth round corners."""
+    shape = Image.new("L", (4 * _PANEL, 4 * _PANEL), 0)
+    ImageDraw.Draw(shape).rounded_rectangle((0, 0, 4 * _PANEL - 1, 4 * _PANEL - 1), 48, fill=255)
+    return shape.resize((_PANEL, _PANEL), Image.Resampling.LANCZOS)

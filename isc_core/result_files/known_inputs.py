@@ -1,0 +1,131 @@
+"""Reading what is known of a scene beforehand: height maps and lights, from the files that people
+and programs have them in.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..imaging.resampling import nearest_samples
+from ..io.exr import read_channels
+from ..io.json_files import numbers, read_json
+from ..io.limits import USUAL, Limits
+from ..io.npy import read_array
+from ..photo.photo import read_raster
+from .result_folder import load
+
+CODE = 1 / 64  # photo pixels to one code of an integer file: 16 bits reach 1024 pixels
+_EXR = b"\x76\x2f\x31\x01"
+_NUMPY = b"\x93NUMPY"
+_CHANNELS = ("height.Z", "Z", "Y", "height.Y")
+
+
+def read_height(
+    path: str | Path, shape: tuple[int, ...], scale: float | None = None, limits: Limits = USUAL
+) -> np.ndarray:
+    """A height map (H, W) float64 in photo pixels toward the viewer, NaN where there is none.
+
+    `shape`: the photo's (H, W). `path`: an EXR with a channel Y or Z or height.Z, a NumPy array, an
+    integer PNG or TIFF (0 is a hole), or the folder of an earlier result of the same photo.
+    `scale`: photo pixels to one unit of the file; None for 1, or 1/64 for integers. Raises
+    `InputError` for a file that is missing, damaged, of another size, or all holes.
+    """
+    path = Path(path)
+    height, unit = (_of_result(path, shape), 1.0) if path.is_dir() else _of_file(path, limits)
+    if height.shape != shape:
+        raise InputError(
+            f"{path}: the height map is {_size(height.shape)} pixels, the photo {_size(shape)}: give one of the photo's size"
+        )
+    height = np.where(np.isfinite(height), height, np.nan) * (unit if scale is None else scale)
+    if not np.isfinite(height).any():
+        raise InputError(f"{path}: the height map has no value anywhere, only holes")
+    return height
+
+
+def read_light(path: str | Path) -> np.ndarray:
+    """Coefficients (9, 3) float64 of orthonormal real spherical harmonics of log shading.
+
+    `path`: a decomposition.json, the folder that holds one, or a JSON file with 9 lists of 3
+    numbers, plain or as "coefficients". Raises `InputError`.
+    """
+    path = Path(path)
+    path = path / "decomposition.json" if path.is_dir() else path
+    found: Any = read_json(path, "a light is a decomposition.json or 9 lists of 3 numbers")
+    for key in ("illumination", "coefficients"):
+        found = found[key] if isinstance(found, dict) and key in found else found
+    light = numbers(found, (9, 3))
+    if light is None:
+        raise InputError(
+            f"{path} holds no light: 9 lists of 3 numbers are needed, red, green and blue of each spherical harmonic"
+        )
+    return light
+
+
+def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
+    """The map as stored and its usual unit in photo pixels."""
+    try:
+        with path.open("rb") as file:
+            start = file.read(8)
+    except OSError as error:
+        raise InputError(f"cannot read the height map {path}: {error.strerror}") from error
+    if start.startswith(_EXR):
+        return _of_exr(path, limits), 1.0
+    if start.startswith(_NUMPY):
+        return _of_numpy(path, limits), 1.0
+    raster = read_raster(path, limits)
+    if raster.values.shape[2] != 1 or raster.bit_depth < 16:
+        raise InputError(
+            f"{path}: a height map has one channel of 16 bits or more: save it as a grey 16-bit PNG, a TIFF, an EXR or .npy"
+        )
+    values = raster.values[..., 0].astype(np.float64)
+    return (values, 1.0) if raster.peak is None else (np.where(values > 0, values, np.nan), CODE)
+
+
+def _of_exr(path: Path, limits: Limits) -> np.ndarray:
+    channels = read_channels(path, limits)
+    name = next(
+        (name for name in _CHANNELS if name in channels),
+        next(iter(channels)) if len(channels) == 1 else None,
+    )
+    if name is None:
+        raise InputError(
+            f"{path}: has no channel Y, Z or height.Z but {', '.join(list(channels)[:8])}: save the height as one of these"
+        )
+    height = channels[name].astype(np.float64)
+    inside = channels.get("mask.A")
+    return (
+        height if inside is None or name != "height.Z" else np.where(inside > 0.5, height, np.nan)
+    )
+
+
+def _of_numpy(path: Path, limits: Limits) -> np.ndarray:
+    values = read_array(path, limits)
+    if values.ndim != 2 or values.dtype.kind not in "fiu":
+        raise InputError(
+            f"{path} holds {values.dtype} of shape {values.shape}: a height map is one array (H, W) of numbers"
+        )
+    return values.astype(np.float64)
+
+
+def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
+    """A result's height on the photo's grid, NaN outside its mask; the nearest sample, so that its
+    holes do not grow.
+    """
+    result = load(folder)
+    scale = result.provenance.input.get("scale")
+    if not isinstance(scale, int | float) or not 0 < scale <= 1:
+        raise InputError(
+            f"{folder / 'decomposition.json'} does not say at which scale its maps are: it is damaged"
+        )
+    if tuple(int(np.ceil(n * scale - 1e-6)) for n in shape) != result.mask.shape:
+        raise InputError(
+            f"{folder} is the result of a photo of another size than {_size(shape)}: give one of this photo"
+        )
+    # As the map will be brought to the working grid, so that going there and back changes nothing.
+    return nearest_samples(np.where(result.mask, result.height, np.nan), shape, 1 / scale) / scale
+
+
+def _size(shape: tuple[int, ...]) -> str:
+    return f"{shape[1]} x {shape[0]}"

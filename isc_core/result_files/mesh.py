@@ -1,0 +1,437 @@
+"""A textured mesh of the visible side of the object, as glTF 2.0 binary.
+
+Problem: a height map over a mask, with its normals and reflectance, is to stand as an object in any
+viewer, under the recovered light, and look like the photo.
+
+Geometry: one vertex per pixel centre (or every `stride`-th), one cell of two triangles where all
+pixels of the cell lie inside the mask. World axes are those of glTF: +X right, +Y up, +Z toward the
+viewer, metres; the origin is the middle of the bounding box. Vertex normals are the recovered ones,
+averaged over a vertex' cell; the tangent-space normal map (green up) holds what remains between
+them and the recovered normal of each pixel. At stride 1 nothing remains and the map is flat.
+
+Rim: the true slope of a smooth object is infinite at its silhouette, so that the outermost heights
+of a reconstruction are the least certain and may spike. Coming from inside, a height in the last
+`rim` rings of pixels may differ from its neighbours further inside by no more than 1.5 times what
+these differ from theirs, plus half a pixel; a sphere keeps its shape under this rule. Then the
+outermost ring is averaged along itself over 5 x 5 pixels: the outline climbs the steps of the pixel
+grid, and on a steep rim each step of one pixel sideways would be a tooth of many pixels in depth.
+
+Base colour: k * reflectance, with k such that the 99.5th percentile of the reflectance's brightest
+channel becomes 0.9; the light that belongs to it is the recovered one divided by k, that is log
+shading - log k. Beyond the mask the texture repeats the nearest colour inside, so that filtering
+draws no dark fringe.
+
+Gloss: roughness and specular level are those given (see `lobe_fitting.specular_upper_bound.shown_gloss`), the level times k, as
+the base colour is. A level up to 1, and its variation over the object in a texture's alpha, are
+KHR_materials_specular's factor; what lies above 1 is its colour. Where no level is known the factor
+is 0: what is not known is not shown as gloss, which a file without the extension would be, as shiny
+as plastic.
+
+Reference: Khronos Group (2021), glTF 2.0 specification,
+https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
+
+Limits: one sheet without a back; steps of one cell along the silhouette; reflectances above 1/k are
+cut (at most 0.5 % of the pixels).
+"""
+
+import io
+from dataclasses import dataclass, field
+from math import ceil, log, pi, sqrt
+from typing import Any
+
+import numpy as np
+import trimesh
+from PIL import Image
+from scipy import ndimage
+
+from ..errors import InputError
+from ..lobe_fitting.specular_level import NOT_FITTED, Gloss
+from ..photo.photo import linear_to_srgb
+
+_BRIGHT = 0.9  # linear base colour that the 99.5th percentile of the reflectance is given
+_LEAST_DEPTH = (
+    1e-3  # smallest z of a vertex normal: it faces the viewer, and its tangent is defined
+)
+
+
+@dataclass(frozen=True)
+class MeshOptions:
+    """How the mesh is built.
+
+    `longest_side`: metres, of the mask's bounding box; `metres_per_pixel` takes its place where it
+    is given. `max_faces`: the grid takes every n-th pixel so as to stay below; the usual value
+    spares 512 x 512 pixels. `rim`: rings of border pixels whose height is limited (0: none).
+    `bleed`: pixels by which the texture runs on beyond the mask. `roughness`, `metallic`: glTF
+    factors in [0, 1], usual values; a fitted gloss has a roughness of its own.
+    """
+
+    longest_side: float = 0.1
+    metres_per_pixel: float | None = None
+    max_faces: int = 525_000
+    rim: int = 3
+    bleed: int = 16
+    roughness: float = 0.5
+    metallic: float = 0.0
+
+
+@dataclass(frozen=True)
+class MeshResult:
+    """A mesh with its material and how it relates to the maps.
+
+    `mesh`: metres, +Y up, facing +Z. `reflectance_scale`: k, base colour = k * reflectance.
+    `metres_per_pixel`: of the maps. `origin`: (column, row, height) in pixels of the world's
+    origin. `stride`: pixels from vertex to vertex. `vertex_pixel`: (V, 2) row and column of each
+    vertex. `base_color`: (H, W, 3) linear, k * reflectance continued beyond the mask. `detail`: (H,
+    W, 3) unit vectors of the normal map in tangent space. `options`, `gloss`: as given.
+    """
+
+    mesh: trimesh.Trimesh
+    reflectance_scale: float
+    metres_per_pixel: float
+    origin: tuple[float, float, float]
+    stride: int
+    vertex_pixel: np.ndarray
+    base_color: np.ndarray
+    detail: np.ndarray
+    options: MeshOptions = field(default_factory=MeshOptions)
+    gloss: Gloss = field(default_factory=Gloss)
+
+    @property
+    def specular(self) -> float:
+        """The specular level for the base colour, >= 0; 0 where it is not known, so that nothing is
+        shown that the photo may not have.
+        """
+        return 0.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
+
+    def illumination(self, recovered: np.ndarray) -> np.ndarray:
+        """The light, (9, 3), that gives the photo's diffuse image with the base colour:
+
+        `recovered` divided by k.
+        """
+        light = np.array(recovered, np.float64)
+        light[0] -= log(self.reflectance_scale) * sqrt(4 * pi)
+        return light
+
+    def glb(self) -> bytes:
+        """The content of a `.glb` file. Equal meshes give equal bytes."""
+        scene = trimesh.Scene()
+        scene.add_geometry(self.mesh, node_name="object", geom_name="object")
+        return bytes(
+            scene.export(
+                file_type="glb", include_normals=True, buffer_postprocessor=self._add_specular
+            )
+        )
+
+    def _add_specular(self, buffers: dict[str, bytes], tree: dict[str, Any]) -> None:
+        """Writes KHR_materials_specular into glTF's tree and the texture's picture among its
+        buffers, which trimesh cannot.
+        """
+        variation = self.gloss.variation
+        largest = 1.0 if variation is None else float(variation.max())
+        level = self.specular * largest
+        extension: dict[str, Any] = {"specularFactor": min(level, 1.0)}
+        if level > 1:
+            extension["specularColorFactor"] = [level] * 3
+        if variation is not None:
+            extension["specularTexture"] = {"index": len(tree["textures"])}
+            tree["textures"].append({"source": len(tree["images"])})
+            tree["images"].append({"bufferView": len(buffers), "mimeType": "image/png"})
+            buffers["specular"] = _alpha_png(variation / largest)
+        tree["materials"][0]["extensions"] = {"KHR_materials_specular": extension}
+        tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), "KHR_materials_specular"]
+
+    def describe(self) -> dict[str, Any]:
+        """What a reader needs beside the file, ready for JSON."""
+        return {
+            "reflectance_scale": self.reflectance_scale,
+            "metres_per_pixel": self.metres_per_pixel,
+            "origin": {"column": self.origin[0], "row": self.origin[1], "height": self.origin[2]},
+            "stride": self.stride,
+            "vertices": len(self.mesh.vertices),
+            "faces": len(self.mesh.faces),
+            "roughness": {
+                "value": _roughness(self.options, self.gloss),
+                "source": self.gloss.roughness_source,
+            },
+            "specular": {
+                "value": self.specular,
+                "source": self.gloss.specular_source,
+                "texture": self.gloss.variation is not None,
+                "convention": "factor of the reflectance along the normal, 1 is .04; KHR_materials_specular",
+            },
+            "metallic": {"value": self.options.metallic, "source": NOT_FITTED},
+        }
+
+
+def build_mesh(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    reflectance: np.ndarray,
+    options: MeshOptions | None = None,
+    gloss: Gloss | None = None,
+) -> MeshResult:
+    """Builds the mesh of the pixels inside the mask.
+
+    `height`: (H, W), pixels toward the viewer. `normal`: (H, W, 3), unit, camera frame. `mask`: (H,
+    W) bool. `reflectance`: (H, W, 3), linear, >= 0. All finite inside the mask. `gloss`: of its
+    surface; where it says nothing, the usual roughness and no gloss. Raises `InputError` if the
+    mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
+    """
+    options, gloss = options or MeshOptions(), gloss or Gloss()
+    _require_sound(height, normal, mask, reflectance, options)
+    stride, cells = _grid_cells(mask, options.max_faces)
+    limited = limit_rim(height, mask, options.rim)
+    rows, columns = (np.arange(0, n, stride) for n in mask.shape)
+    smooth = _vertex_normals(normal, mask, stride)
+    used, faces = _triangles(cells, (len(rows), len(columns)))
+    row, column = (axis.reshape(-1)[used] for axis in np.meshgrid(rows, columns, indexing="ij"))
+    pixels = np.stack([column, -row, limited[row, column]], -1).astype(np.float64)
+    middle = (pixels.min(0) + pixels.max(0)) / 2
+    size = options.metres_per_pixel or options.longest_side / max(
+        np.ptp(np.argwhere(mask), axis=0) + 1
+    )
+    detail = _detail_normals(normal, mask, smooth, cells, stride)
+    color, k = base_color(reflectance, mask, options.bleed)
+    visual = trimesh.visual.TextureVisuals(
+        # trimesh counts v from the bottom of the texture and turns it over when it writes.
+        uv=np.stack([(column + 0.5) / mask.shape[1], 1 - (row + 0.5) / mask.shape[0]], -1),
+        material=_material(color, detail, options, gloss),
+    )
+    normals = smooth.reshape(-1, 3)[used].astype(np.float64)
+    mesh = trimesh.Trimesh(
+        (pixels - middle) * size, faces, vertex_normals=normals, visual=visual, process=False
+    )
+    origin = (float(middle[0]), float(-middle[1]), float(middle[2]))
+    return MeshResult(
+        mesh,
+        k,
+        float(size),
+        origin,
+        stride,
+        np.stack([row, column], -1),
+        color,
+        detail,
+        options,
+        gloss,
+    )
+
+
+def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[np.ndarray, float]:
+    """k * reflectance, (H, W, 3) linear, continued `bleed` pixels beyond the mask; and k.
+
+    Further out it is the mean colour, which is what the smallest versions of a texture should fade
+    to.
+    """
+    inside = reflectance[mask].astype(np.float64)
+    bright = float(np.percentile(inside.max(-1), 99.5))
+    k = _BRIGHT / bright if bright > 0 else 1.0
+    distance, (rows, columns) = ndimage.distance_transform_edt(~mask, return_indices=True)
+    filled = np.where((distance <= bleed)[..., None], reflectance[rows, columns], inside.mean(0))
+    return k * filled, k
+
+
+def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
+    """The heights, (H, W) float64, with the last `rings` rings inside the mask held to what the
+    inside foretells (see the module).
+    """
+    depth = ndimage.distance_transform_cdt(np.pad(mask, 1), "chessboard")[
+        1:-1, 1:-1
+    ]  # 1 in the outermost ring
+    limited = np.where(mask, height, 0.0).astype(np.float64)
+    step = np.zeros(mask.shape)
+    for ring in range(rings + 1, 0, -1):
+        here = depth == ring
+        base, weight = _neighbour_mean(limited, depth > ring)
+        known = here & (weight > 0)
+        if ring <= rings:
+            slack = 1.5 * _neighbour_mean(step, depth > ring)[0] + 0.5
+            limited = np.where(known, np.clip(limited, base - slack, base + slack), limited)
+        step = np.where(known, np.abs(limited - base), step)
+    outermost = (depth == 1) & (rings > 0)
+    return np.where(outermost, _neighbour_mean(limited, outermost, 5)[0], limited)
+
+
+def _neighbour_mean(
+    values: np.ndarray, valid: np.ndarray, size: int = 3
+) -> tuple[np.ndarray, np.ndarray]:
+    """Mean of the valid pixels in each pixel's `size` x `size` neighbourhood, and how many were
+    valid.
+    """
+    weight = ndimage.uniform_filter(valid.astype(np.float64), size, mode="constant") * size**2
+    total = ndimage.uniform_filter(np.where(valid, values, 0.0), size, mode="constant") * size**2
+    count = np.rint(weight)
+    return total / np.maximum(count, 1), count
+
+
+def _require_sound(
+    height: np.ndarray,
+    normal: np.ndarray,
+    mask: np.ndarray,
+    reflectance: np.ndarray,
+    options: MeshOptions,
+) -> None:
+    for name, values in (("height", height), ("normal", normal), ("reflectance", reflectance)):
+        if values.shape[:2] != mask.shape:
+            raise InputError(
+                f"the {name} map is {values.shape[:2]}, the mask {mask.shape}: give maps of one size"
+            )
+        if not np.isfinite(values[mask]).all():
+            raise InputError(
+                f"the {name} map holds NaN or infinite values inside the mask: repair it or exclude them from the mask"
+            )
+    if not (
+        options.longest_side > 0
+        and (options.metres_per_pixel is None or options.metres_per_pixel > 0)
+        and options.max_faces >= 2
+    ):
+        raise InputError(
+            "the mesh's longest side, metres per pixel and number of faces must be positive"
+        )
+
+
+def _grid_cells(mask: np.ndarray, max_faces: int) -> tuple[int, np.ndarray]:
+    """The smallest stride that keeps to `max_faces`, and which cells, (rows - 1, columns - 1) bool,
+    lie wholly inside the mask.
+    """
+    cells = _cells_inside(mask, 1)
+    if not cells.any():
+        raise InputError(
+            "the mask holds no block of 2 x 2 pixels to build a mesh of: mark a larger region or use a larger photo"
+        )
+    stride = max(1, ceil(sqrt(2 * int(cells.sum()) / max_faces)))
+    while stride > 1 and not (cells := _cells_inside(mask, stride)).any():
+        stride -= (
+            1  # an object thinner than the cells it would be allowed: rather many faces than none
+        )
+    return stride, cells if stride > 1 else _cells_inside(mask, 1)
+
+
+def _cells_inside(mask: np.ndarray, stride: int) -> np.ndarray:
+    size = stride + 1
+    whole = ndimage.minimum_filter(
+        mask.astype(np.uint8), size, mode="constant", origin=-(size // 2)
+    ).astype(bool)
+    return whole[: mask.shape[0] - stride : stride, : mask.shape[1] - stride : stride]
+
+
+def _triangles(cells: np.ndarray, grid: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """The grid's vertices in use, (V,) flat indices, and the faces, (F, 3), counter-clockwise as
+    seen by the viewer.
+
+    Each cell is split from its top left to its bottom right.
+    """
+    row, column = np.nonzero(cells)
+    top_left = row * grid[1] + column
+    top_right, bottom_left, bottom_right = top_left + 1, top_left + grid[1], top_left + grid[1] + 1
+    lower = np.stack([top_left, bottom_left, bottom_right], -1)
+    upper = np.stack([top_left, bottom_right, top_right], -1)
+    used, faces = np.unique(np.stack([lower, upper], 1).reshape(-1), return_inverse=True)
+    return used, faces.reshape(-1, 3)
+
+
+def _vertex_normals(normal: np.ndarray, mask: np.ndarray, stride: int) -> np.ndarray:
+    """Unit normals, (rows, columns, 3) float32, at the grid's vertices: the mean over one cell's
+    size around each.
+    """
+    sums = np.where(mask[..., None], normal, 0).astype(np.float32)
+    if stride > 1:
+        sums = ndimage.uniform_filter(sums, (stride, stride, 1), mode="constant")
+    return _facing(sums[::stride, ::stride])
+
+
+def _facing(vectors: np.ndarray) -> np.ndarray:
+    """Unit vectors that face the viewer; (0, 0, 1) in place of nothing."""
+    vectors = vectors.copy()
+    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    vectors = np.where(
+        length > 0, vectors / np.where(length > 0, length, 1), np.array([0, 0, 1], vectors.dtype)
+    )
+    vectors[..., 2] = np.maximum(vectors[..., 2], _LEAST_DEPTH)
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def _detail_normals(
+    normal: np.ndarray, mask: np.ndarray, smooth: np.ndarray, cells: np.ndarray, stride: int
+) -> np.ndarray:
+    """The normals of the tangent-space map, (H, W, 3): each pixel's normal as seen from the
+    interpolated vertex normal.
+
+    The tangent is the direction in which the texture's column grows on the surface, the bitangent
+    that in which its row falls.
+    """
+    flat = np.broadcast_to(np.array([0, 0, 1], np.float32), mask.shape + (3,))
+    if stride == 1:
+        return flat
+    shown = np.kron(cells, np.ones((stride, stride), bool))
+    shown = np.pad(
+        shown, [(0, max(0, n - m)) for n, m in zip(mask.shape, shown.shape, strict=True)]
+    )[: mask.shape[0], : mask.shape[1]]
+    base = _facing(_interpolated(smooth, mask.shape, stride))
+    tangent = np.stack([base[..., 2], np.zeros_like(base[..., 0]), -base[..., 0]], -1)
+    tangent /= np.linalg.norm(tangent, axis=-1, keepdims=True)
+    bitangent = np.cross(base, tangent)
+    local = np.stack(
+        [np.einsum("hwc,hwc->hw", normal, axis) for axis in (tangent, bitangent, base)], -1
+    )
+    return np.where((shown & mask)[..., None], local, flat)
+
+
+def _color_picture(linear: np.ndarray) -> Image.Image:
+    return Image.fromarray(np.rint(255 * linear_to_srgb(np.clip(linear, 0, 1))).astype(np.uint8))
+
+
+def _vector_picture(vectors: np.ndarray) -> Image.Image:
+    return Image.fromarray(np.rint(np.clip(vectors * 127.5 + 127.5, 0, 255)).astype(np.uint8))
+
+
+def _interpolated(grid: np.ndarray, shape: tuple[int, ...], stride: int) -> np.ndarray:
+    """The vertices' values, (rows, columns, C), at every pixel of (H, W): linear on the two
+    triangles of each cell.
+    """
+    (row, down), (column, right) = (np.divmod(np.arange(n), stride) for n in shape)
+    next_row, next_column = (
+        np.minimum(row + 1, grid.shape[0] - 1),
+        np.minimum(column + 1, grid.shape[1] - 1),
+    )
+    down, right = (down / stride)[:, None, None], (right / stride)[None, :, None]
+    corner, opposite = grid[np.ix_(row, column)], grid[np.ix_(next_row, next_column)]
+    upper = (
+        corner
+        + right * (grid[np.ix_(row, next_column)] - corner)
+        + down * (opposite - grid[np.ix_(row, next_column)])
+    )
+    lower = (
+        corner
+        + down * (grid[np.ix_(next_row, column)] - corner)
+        + right * (opposite - grid[np.ix_(next_row, column)])
+    )
+    return np.where(right >= down, upper, lower).astype(np.float32)
+
+
+def _roughness(options: MeshOptions, gloss: Gloss) -> float:
+    return options.roughness if gloss.roughness is None else gloss.roughness
+
+
+def _alpha_png(values: np.ndarray) -> bytes:
+    """(H, W) in [0, 1] as the alpha of a white PNG, with room up to a multiple of 4 bytes, as
+    buffers have to begin there.
+    """
+    pixels = np.full((*values.shape, 4), 255, np.uint8)
+    pixels[..., 3] = np.rint(255 * np.clip(values, 0, 1))
+    stream = io.BytesIO()
+    Image.fromarray(pixels).save(stream, format="png")
+    return stream.getvalue() + bytes(-len(stream.getvalue()) % 4)
+
+
+def _material(
+    color: np.ndarray, detail: np.ndarray, options: MeshOptions, gloss: Gloss
+) -> trimesh.visual.material.PBRMaterial:
+    return trimesh.visual.material.PBRMaterial(
+        name="recovered",
+        baseColorTexture=_color_picture(color),
+        normalTexture=_vector_picture(detail),
+        metallicFactor=options.metallic,
+        roughnessFactor=_roughness(options, gloss),
+        doubleSided=True,  # the mesh has no back: seen from behind it should not vanish
+    )

@@ -1,0 +1,336 @@
+"""The files of a result: what other programs read and what a person looks at first.
+
+A decomposition's folder holds `maps.exr` (one multilayer float32 file), `scene.decomposition.json`,
+`result_files.mesh.glb`, `preview.png`, and under `maps/` the main maps once more as single-layer files, for
+programs that cannot read multilayer ones; on demand `arrays.npz`, see `arrays_file`. Where a lobe
+was fitted, `maps.exr` has one layer more, `lobe`: the specular image that the fit predicts. A
+separation's folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder
+appears whole or not at all (see `atomic`).
+"""
+
+import json
+import math
+import shutil
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from PIL import Image
+
+from ..errors import InputError
+from ..io.atomic import new_folder, require_writable
+from ..io.exr import read_channels, write_channels
+from ..io.json_files import numbers, read_json
+from ..io.printable_names import readable
+from ..lobe_fitting.specular_upper_bound import shown_gloss
+from ..photo.photo import linear_to_srgb
+from ..progress import Monitor
+from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
+from ..scene.lobe_fit import LobeFit
+from .arrays_file import ARRAYS, write_arrays
+from .contact_sheet import contact_sheet, separation_sheet
+from .lobe_json import lobe_fit_from_json
+from .mesh import MeshOptions, MeshResult, build_mesh
+
+SCHEMA_VERSION = 1
+LAYERS = {
+    **dict.fromkeys(COLOR_MAPS, "RGB"),
+    "normal": "XYZ",
+    "height": "Z",
+    "mask": "A",
+    "confidence": "Y",
+}
+LOBE = {"lobe": "RGB"}
+SINGLE = {
+    "diffuse": "RGB",
+    "specular": "RGB",
+    "reflectance": "RGB",
+    "shading": "RGB",
+    "normal": "RGB",
+    "height": "Y",
+}
+DECOMPOSITION_FILES = (
+    "decomposition.json",
+    "maps.exr",
+    "mesh.glb",
+    "preview.png",
+    *(f"maps/{name}.exr" for name in SINGLE),
+)
+_OURS = (*DECOMPOSITION_FILES, ARRAYS)  # what may stand there besides is written on demand
+_LONGEST_SIDE = 1 << 31  # of a photo, pixels
+_LEAST_BYTES, _LEAST_BYTES_A_PIXEL = 200_000, 30  # smaller results have not been seen
+_ARRAY_BYTES_A_PIXEL = 129  # its maps are not compressed
+SEPARATION_FILES = ("separation.exr", "diffuse.png", "specular.png", "preview.png")
+
+
+def save(
+    decomposition: Decomposition,
+    folder: Path | str,
+    *,
+    mesh: MeshOptions | None = None,
+    arrays: bool = False,
+    monitor: Monitor | None = None,
+) -> None:
+    """Writes the folder of a decomposition, whole or not at all; an earlier result there is
+    replaced. `arrays`: with `arrays.npz`.
+
+    Raises `InputError` if the folder is not ours or cannot be written, or the mask is too small for
+    a mesh; `Cancelled`. Raises `ValueError` if a map holds NaN or infinite values.
+    """
+    monitor = monitor or Monitor()
+    channels = _channels({name: getattr(decomposition, name) for name in LAYERS}, LAYERS)
+    if decomposition.brdf is not None:
+        channels |= _channels({"lobe": decomposition.brdf.predicted}, LOBE)
+    if broken := sorted(name for name, values in channels.items() if not np.isfinite(values).all()):
+        raise ValueError(f"NaN or infinite values in {', '.join(broken)}")
+    with new_folder(folder, _OURS) as partial:
+        monitor.report("writing maps", 0.0)
+        write_channels(partial / "maps.exr", channels)
+        (partial / "maps").mkdir()
+        for name, letters in SINGLE.items():
+            values = getattr(decomposition, name)
+            write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
+        monitor.report("building the mesh", 0.4)
+        d = decomposition
+        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, shown_gloss(d))
+        (partial / "mesh.glb").write_bytes(built.glb())
+        if arrays:
+            monitor.report("writing arrays", 0.6)
+            write_arrays(d, partial / ARRAYS, built)
+        monitor.report("drawing the preview", 0.7)
+        contact_sheet(decomposition).save(partial / "preview.png")
+        text = json.dumps(
+            _plain(_description(decomposition, built)),
+            indent=2,
+            ensure_ascii=False,
+            allow_nan=False,
+        )
+        (partial / "decomposition.json").write_text(text + "\n", encoding="utf-8")
+        monitor.report("writing maps", 1.0)
+
+
+def load(folder: Path | str) -> Decomposition:
+    """Reads what `save` wrote.
+
+    Raises `InputError` if something is missing, damaged, or does not fit together.
+    """
+    folder = Path(folder)
+    if not (folder / "decomposition.json").is_file():
+        raise InputError(
+            f"{folder} is not a result folder (it has no decomposition.json): give the folder that isc decompose wrote"
+        )
+    description = _read_json(folder / "decomposition.json")
+    channels = read_channels(folder / "maps.exr")
+    maps = _layers(channels, LAYERS, folder / "maps.exr")
+    return Decomposition(
+        **{name: maps[name] for name in (*COLOR_MAPS, "normal", "height", "confidence")},
+        mask=maps["mask"] > 0.5,
+        illumination=_coefficients(description, folder),
+        provenance=_provenance(description, folder),
+        brdf=_brdf(description, channels, folder),
+    )
+
+
+def save_separation(
+    separation: Separation,
+    image: np.ndarray,
+    folder: Path | str,
+    *,
+    mask: np.ndarray | None = None,
+    title: str = "",
+) -> None:
+    """Writes the folder of a separation: `separation.exr` (linear: image, diffuse, specular,
+    residual, confidence) and sRGB pictures.
+
+    `image`: (H, W, 3) linear. `mask`: (H, W) bool; without one, the pixels that are not black.
+    Raises `InputError` if the folder is not ours or cannot be written.
+    """
+    inside = image.max(-1) > 0 if mask is None else mask
+    if not inside.any():
+        raise InputError("the image is black inside the mask: there is nothing to separate")
+    layers = {"diffuse": "RGB", "specular": "RGB", "residual": "RGB", "confidence": "Y"}
+    channels = _channels(
+        {"image": image, **{name: getattr(separation, name) for name in layers}},
+        {"image": "RGB", **layers},
+    )
+    with new_folder(folder, SEPARATION_FILES) as partial:
+        write_channels(partial / "separation.exr", channels)
+        for name in ("diffuse", "specular"):
+            coded = linear_to_srgb(np.clip(getattr(separation, name), 0, 1))
+            Image.fromarray(np.rint(255 * coded).astype(np.uint8)).save(partial / f"{name}.png")
+        separation_sheet(separation, image, inside, title).save(partial / "preview.png")
+
+
+def require_writable_result(
+    folder: Path | str, *, separation: bool = False, inputs: Iterable[Path | None] = ()
+) -> None:
+    """Tells before the work whether its result could be written to `folder` without loss of its
+    `inputs`. Raises `InputError`.
+    """
+    require_writable(folder, SEPARATION_FILES if separation else _OURS, inputs)
+
+
+def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:
+    """Raises `InputError` where the disk surely has no room for the result of an object of `pixels`
+    pixels: known before the work.
+    """
+    place = next(parent for parent in (Path(folder).resolve() / "maps").parents if parent.exists())
+    least = _LEAST_BYTES + (_LEAST_BYTES_A_PIXEL + _ARRAY_BYTES_A_PIXEL * arrays) * pixels
+    if (free := shutil.disk_usage(place).free) < least:
+        raise InputError(
+            f"cannot write {folder}: no space is left on the disk ({free / 1e6:.1f} MB, at least {least / 1e6:.1f} are needed); "
+            "free some or choose another place"
+        )
+
+
+def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
+    p = d.provenance
+    convention = "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, x right, y up, z toward the viewer"
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "illumination": {"coefficients": d.illumination, "convention": convention},
+        "brdf": None if d.brdf is None else d.brdf.to_json(),
+        "mesh": {
+            **built.describe(),
+            "illumination": {
+                "coefficients": built.illumination(d.illumination),
+                "convention": convention,
+            },
+        },
+        "settings": p.settings,
+        "seed": p.seed,
+        "versions": p.versions,
+        "timings": p.timings,
+        "input": p.input,
+        "status": p.status,
+    }
+
+
+def _plain(value: Any) -> Any:
+    """The value in the types of JSON: arrays as lists, paths as text that can be coded, numbers
+    that are not finite as null.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): _plain(part) for key, part in value.items()}
+    if isinstance(value, np.ndarray | np.generic):
+        return _plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [_plain(part) for part in value]
+    if isinstance(value, str | Path):
+        return readable(str(value))
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _planes(values: np.ndarray, names: list[str]) -> dict[str, np.ndarray]:
+    return {
+        name: values[..., index] if values.ndim == 3 else values for index, name in enumerate(names)
+    }
+
+
+def _channels(maps: Mapping[str, np.ndarray], layers: Mapping[str, str]) -> dict[str, np.ndarray]:
+    channels: dict[str, np.ndarray] = {}
+    for name, letters in layers.items():
+        channels |= _planes(maps[name], [f"{name}.{letter}" for letter in letters])
+    return channels
+
+
+def _layers(
+    channels: Mapping[str, np.ndarray], layers: Mapping[str, str], path: Path
+) -> dict[str, np.ndarray]:
+    names = {
+        layer: [f"{layer}.{letter}" for letter in letters] for layer, letters in layers.items()
+    }
+    if missing := [name for group in names.values() for name in group if name not in channels]:
+        raise InputError(
+            f"{path} lacks the channel {missing[0]}: it is not a result of isc decompose, or is damaged"
+        )
+    if broken := [
+        name for group in names.values() for name in group if not np.isfinite(channels[name]).all()
+    ]:
+        raise InputError(
+            f"{path} holds NaN or infinite values in {broken[0]}: it is damaged; decompose the photo again"
+        )
+    stacks = {
+        layer: np.stack([channels[name] for name in group], -1) for layer, group in names.items()
+    }
+    return {
+        layer: stack if stack.shape[-1] > 1 else stack[..., 0] for layer, stack in stacks.items()
+    }
+
+
+def _read_json(path: Path) -> dict[str, Any]:
+    description = read_json(path)
+    version = description.get("schema_version") if isinstance(description, dict) else None
+    if not isinstance(version, int):
+        raise InputError(f"{path} has no schema_version: it is not a result of isc decompose")
+    if version > SCHEMA_VERSION:
+        raise InputError(
+            f"{path} was written by a newer version (schema {version}, known here: {SCHEMA_VERSION}): update ISC"
+        )
+    return dict(description)
+
+
+def _coefficients(description: Mapping[str, Any], folder: Path) -> np.ndarray:
+    given = description.get("illumination")
+    light = numbers(given.get("coefficients"), (9, 3)) if isinstance(given, dict) else None
+    if light is None:
+        raise InputError(
+            f"{folder / 'decomposition.json'} has no illumination of 9 x 3 numbers: it is damaged"
+        )
+    return light
+
+
+def _brdf(
+    description: Mapping[str, Any], channels: Mapping[str, np.ndarray], folder: Path
+) -> LobeFit | None:
+    """The fit; None where none was tried, as in results of earlier versions."""
+    if description.get("brdf") is None:
+        return None
+    predicted = _layers(channels, LOBE, folder / "maps.exr")["lobe"]
+    try:
+        return lobe_fit_from_json(description["brdf"], predicted)
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{folder / 'decomposition.json'} has no usable brdf: it is damaged ({error})"
+        ) from error
+
+
+def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:
+    types = {
+        "settings": dict,
+        "seed": int,
+        "versions": dict,
+        "timings": dict,
+        "input": dict,
+        "status": dict,
+    }
+    for name, kind in types.items():
+        if not isinstance(description.get(name), kind):
+            raise InputError(f"{folder / 'decomposition.json'} has no usable {name}: it is damaged")
+    if wrong := _wrong_input(description["input"]):
+        raise InputError(
+            f"{folder / 'decomposition.json'} has no usable input.{wrong}: it is damaged"
+        )
+    return Provenance(**{name: description[name] for name in types})
+
+
+def _wrong_input(given: Mapping[str, Any]) -> str:
+    """The first entry of what is said of the photo that later work could stumble over; "" if there
+    is none. Any may lack.
+    """
+    scale, size = numbers(given.get("scale", 1.0), ()), given.get("size", [1, 1])
+    if scale is None or not 0 < scale <= 1:
+        return "scale"
+    if (
+        not isinstance(size, list)
+        or len(size) != 2
+        or any(type(side) is not int or not 0 < side < _LONGEST_SIDE for side in size)
+    ):
+        return "size"
+    words = (
+        name
+        for name in ("name", "sha256", "transfer", "mask_from")
+        if not isinstance(given.get(name, ""), str)
+    )
+    return next(words, "" if type(given.get("bit_depth", 8)) is int else "bit_depth")

@@ -1,0 +1,1 @@
+"""What is known or estimated of a scene."""

@@ -1,0 +1,131 @@
+"""The results of the core, as typed frozen objects, and the identities that they keep.
+
+Identities, inside the mask: `image = diffuse + specular + residual`, `diffuse = reflectance *
+shading` (both to 1e-5 of the image's maximum), `shading = exp(SH(normal))` (to 1e-4 relative), unit
+normals. Their files are written and read by `result_folder`.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..shading.spherical_harmonics import real_sh
+from .lobe_fit import LobeFit
+
+
+@dataclass(frozen=True)
+class Separation:
+    """One photo split into its layers: `image = diffuse + specular + residual` inside the mask.
+
+    `diffuse`, `specular`, `residual`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and
+    specular >= 0. `confidence`: (H, W) float32 in [0, 1], how far the split can be trusted at each
+    pixel; 0 outside the mask.
+    """
+
+    diffuse: np.ndarray
+    specular: np.ndarray
+    residual: np.ndarray
+    confidence: np.ndarray
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a result comes from: everything of `scene.decomposition.json` that is not the scene itself
+    (JSON-ready values).
+    """
+
+    settings: dict[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    versions: dict[str, str] = field(default_factory=dict)
+    timings: dict[str, float] = field(default_factory=dict)
+    input: dict[str, Any] = field(default_factory=dict)
+    status: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class IdentityErrors:
+    """The worst violation of each identity inside the mask, and what is tolerated.
+
+    `image`, `shading_product`: largest absolute error over the image's maximum. `sh`: largest
+    relative error of the shading. `normal_length`: largest deviation of a normal's length from 1.
+    """
+
+    image: float
+    shading_product: float
+    sh: float
+    normal_length: float
+
+    def broken(self) -> tuple[str, ...]:
+        """The identities that do not hold, in words; empty for a sound result."""
+        tests = (
+            (self.image, 1e-5, "image = diffuse + specular + residual"),
+            (self.shading_product, 1e-5, "diffuse = reflectance * shading"),
+            (self.sh, 1e-4, "shading = exp(SH(normal))"),
+            (self.normal_length, 1e-4, "normals of length 1"),
+        )
+        return tuple(
+            f"{name} (error {error:.2g})"
+            for error, tolerance, name in tests
+            if not error <= tolerance
+        )
+
+
+@dataclass(frozen=True)
+class Decomposition:
+    """The intrinsic scene characteristics of one photo. Maps cover the whole frame at the scale
+    used.
+
+    `image, diffuse, specular, residual, reflectance, shading`: (H, W, 3) float32, linear Rec.709, 0
+    outside the mask. `normal`: (H, W, 3) float32 unit vectors, x right, y up, z toward the viewer;
+    (0, 0, 1) outside the mask. `height`: (H, W) float32, pixels, toward the viewer; 0 outside.
+    `mask`: (H, W) bool. `confidence`: (H, W) in [0, 1]. `illumination`: (9, 3) float64; log
+    shading_c(n) = sum_k illumination[k, c] Y_k(n), orthonormal real spherical harmonics. `brdf`:
+    the lobe fitted to the specular layer; None where no fit was tried.
+    """
+
+    image: np.ndarray
+    diffuse: np.ndarray
+    specular: np.ndarray
+    residual: np.ndarray
+    reflectance: np.ndarray
+    shading: np.ndarray
+    normal: np.ndarray
+    height: np.ndarray
+    mask: np.ndarray
+    confidence: np.ndarray
+    illumination: np.ndarray
+    provenance: Provenance
+    brdf: LobeFit | None = None
+
+    def identity_errors(self) -> IdentityErrors:
+        """How well the maps fit each other inside the mask.
+
+        Raises `ValueError` for an empty mask.
+        """
+        if not self.mask.any():
+            raise ValueError("the mask is empty: there is nothing to check")
+        inside = {
+            name: getattr(self, name)[self.mask].astype(np.float64)
+            for name in COLOR_MAPS + ("normal",)
+        }
+        scale = max(float(np.abs(inside["image"]).max()), 1e-6)
+        layers = inside["diffuse"] + inside["specular"] + inside["residual"]
+        with np.errstate(
+            over="ignore"
+        ):  # of a light that none of the photos has: then the shading is not that
+            expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
+        return IdentityErrors(
+            image=_worst(inside["image"] - layers) / scale,
+            shading_product=_worst(inside["diffuse"] - inside["reflectance"] * inside["shading"])
+            / scale,
+            sh=_worst(expected / np.maximum(inside["shading"], 1e-9) - 1),
+            normal_length=_worst(np.linalg.norm(inside["normal"], axis=-1) - 1),
+        )
+
+
+COLOR_MAPS = ("image", "diffuse", "specular", "residual", "reflectance", "shading")
+
+
+def _worst(error: np.ndarray) -> float:
+    return float(np.abs(error).max())

@@ -1,0 +1,1 @@
+"""Published separation methods, one a file, named by author and year."""

@@ -1,0 +1,284 @@
+# mypy: disable-error-code="no-untyped-def"
+"""Removes highlights by the dark channel and a maximum a posteriori refinement (Kim et al. 2013).
+
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+photo.
+
+Equation: among the pixels of a patch of diffuse paints some have a channel near zero, so the dark
+channel, the least value of all channels in a patch, is close to s, and I less the dark channel is
+nearly free of it: s_0 = max(dark - b u, 0), u = mean(min I). With a the unit vector of the diffuse
+colour, s minimises over 0 <= s <= min I
+    E = sum_x min_m |I - s 1 - m a|^2 + lambda (s - s_0)^2 + alpha sum_xy psi(s_x - s_y),
+    psi(d) = 2 eps^2 (sqrt(1 + (d / eps)^2) - 1) over neighbours x, y:
+diffuse colours are known ones, s keeps near the dark channel, and its gradients are few. a is
+constant but for edges of hue, which s does not move: a(x) is the mean colour of D over pixels of
+like hue near x, weighed by exp(-s / (t u)), so that what shines least says which colour the paint
+has. Both steps alternate. The first term is k (s - s_a)^2 with k = 3 - (1'a)^2 = 1'P1 and s_a =
+1'PI / k, P = 1 - aa': it vanishes by itself where paint is grey, and there the other terms carry s
+in from around. Scheme: a by a bilateral grid (position, hue) of Gaussian means; s by weights 1 /
+sqrt(1 + (d / eps)^2) from the last step (half-quadratic) and over-relaxed red-black Gauss-Seidel
+sweeps, clamped to the bounds.
+
+Citation: H. Kim, H. Jin, S. Hadap and I. Kweon, "Specular reflection separation using dark channel
+prior", CVPR 2013, 1460-1467, doi:10.1109/CVPR.2013.192. The paper's: the dark channel as the first
+specular image, and a maximum a posteriori estimate of specular and chromaticity together. Ours:
+this energy, its weights and its solution (the "paper" settings are our reading of the idea, not its
+code); and as options b > 0, as few paints are as dark as the dark channel has it; only pixels whose
+smallest channel is above u lose specular; and nothing is removed where all of these together show
+too little colour to be told from white paint.
+
+Limits: the light must be white. A paint that is seen nowhere without highlight, near and in the
+same hue, keeps it in part; two paints of one hue and different saturation are told apart by their
+distance alone. Grey paint is left to its neighbours.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ...errors import InputError
+from ...imaging.channels import smallest
+from ...numerics.jit import compiled
+from ...progress import Monitor
+from ...scene.decomposition import Separation
+from ..support.checks import check_arrays, require_colour
+from ..support.layers import bright_layers
+from ..support.specular_free import dark_channel
+
+
+@dataclass(frozen=True)
+class Kim2013Options:
+    """`patch`: side, in pixels, of the square in which the dark channel is the least value; >= 1.
+    `base`: b, how many times the mean of the smallest channel counts as diffuse in the dark
+    channel; >= 0. Zero is the published idea. `rounds`: how often diffuse colours and specular are
+    found in turn; >= 0. Zero leaves the dark channel. `reach`: how far colours are averaged, as a
+    share of the mask's box (of the root of its area); >= .05. `hue`: which hues are alike, as a
+    distance in the disc of unit chroma; in [.02, 1]. `purity`: the chroma, as a share of the mask's
+    largest value, below which a hue says little; > 0. `trust`: t, the specular light, in units of
+    u, at which a pixel's say in its paint's colour falls to 1 / e; > 0. `prior`: lambda, the weight
+    of the dark channel; > 0. `smoothness`: alpha, that of the gradients; >= 0. `gradient`: eps,
+    above which a step of s is an edge, as a share of the mask's largest value; > 0. `sweeps`:
+    Gauss-Seidel sweeps a round; >= 0. `bright_saturation`: nothing is removed if the colour
+    (largest minus smallest channel) of the pixels whose smallest channel is above u is less than
+    this share of their largest channel, in [0, 1]. Zero always removes. `fade`: s grows from none
+    where the smallest channel is u to all of it at (1 + fade) u; > 0, or None for all of it
+    everywhere.
+    """
+
+    patch: int = 7
+    base: float = 1.0
+    rounds: int = 1
+    reach: float = 0.225
+    hue: float = 0.08
+    purity: float = 0.01
+    trust: float = 0.2
+    prior: float = 0.02
+    smoothness: float = 0.5
+    gradient: float = 0.02
+    sweeps: int = 20
+    bright_saturation: float = 1 / 3
+    fade: float | None = 1.0
+
+
+VARIANTS: dict[str, Kim2013Options] = {
+    "improved": Kim2013Options(),
+    "paper": Kim2013Options(patch=15, base=0, bright_saturation=0, fade=None),
+}
+
+# Even the brightest highlight has a little say in its paint's colour, for the paint of which
+# nothing else is seen.
+_LEAST_SAY = 1e-4
+# Between 1 (plain Gauss-Seidel) and 2; the first term makes the system well conditioned, so that
+# little is best.
+_OVER_RELAXATION = 1.2
+_SMALLEST = 1e-12
+
+
+@dataclass(frozen=True)
+class _Scene:
+    """What stays while s is sought: `image` (H, W, 3), largest value 1; `mask` (H, W) bool of
+    linear pixels; `low` (H, W) its smallest channel, the upper bound; `dark` (H, W) is s_0; `base`
+    is u; `cells` (4, n) the mask's pixels in the grid of size `grid`.
+    """
+
+    image: np.ndarray
+    mask: np.ndarray
+    low: np.ndarray
+    dark: np.ndarray
+    base: float
+    cells: np.ndarray
+    grid: tuple[int, ...]
+
+
+def separate(
+    image: np.ndarray,
+    mask: np.ndarray,
+    options: Kim2013Options | None = None,
+    clipped: np.ndarray | None = None,
+    monitor: Monitor | None = None,
+) -> Separation:
+    """Splits a photo under white light into diffuse and specular.
+
+    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
+    pixels whose true value lies above what was recorded: they say nothing about others. Inside the
+    mask 0 <= diffuse <= image; specular has three equal channels; the residual is zero but where
+    clipped. Confidence as in `layers`. `options` None: the improved variant. `monitor` hears of
+    every round.
+
+    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
+    negative or not finite, or no colour at all; `Cancelled`.
+    """
+    options, monitor = options or Kim2013Options(), monitor or Monitor()
+    check_arrays(image, mask, clipped)
+    _check_options(options)
+    require_colour(image, mask, "kim_2013")
+
+    def find(seen: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
+        scale = float(seen[mask].max())
+        return scale * _specular_of(
+            _scene(seen / scale, linear, base / scale, options), options, monitor
+        )
+
+    return bright_layers(
+        image, mask, clipped, find, least_saturation=options.bright_saturation, fade=options.fade
+    )
+
+
+def _check_options(options: Kim2013Options) -> None:
+    if options.patch < 1 or options.rounds < 0 or options.sweeps < 0:
+        raise InputError("patch must be at least 1, rounds and sweeps at least 0")
+    positive = (options.purity, options.trust, options.prior, options.gradient)
+    if not all(value > 0 for value in positive):
+        raise InputError("purity, trust, prior and gradient must be above 0")
+    # Smaller cells would need more memory than the image.
+    if not options.reach >= 0.05 or not 0.02 <= options.hue <= 1:
+        raise InputError("reach must be at least 0.05, hue within [0.02, 1]")
+    if not (options.base >= 0 and options.smoothness >= 0):
+        raise InputError("base and smoothness must be at least 0")
+    if not 0 <= options.bright_saturation <= 1 or not (options.fade is None or options.fade > 0):
+        raise InputError("bright_saturation must be within [0, 1], fade above 0 or none")
+
+
+def _scene(image: np.ndarray, mask: np.ndarray, base: float, options: Kim2013Options) -> _Scene:
+    low = smallest(image)
+    dark = dark_channel(low, mask, options.patch)
+    first = np.where(mask, np.maximum(dark - options.base * base, 0), 0)
+    cells = _cells(image, mask, options)
+    grid = tuple(int(size) for size in np.ceil(cells.max(axis=1)) + 3)
+    return _Scene(image, mask, low, first, base, cells, grid)
+
+
+def _cells(image: np.ndarray, mask: np.ndarray, options: Kim2013Options) -> np.ndarray:
+    """Where the mask's pixels lie in the bilateral grid, (4, n): row, column and two coordinates of
+    hue, in cells, from 2 on.
+    """
+    rows, columns = np.nonzero(mask)
+    rows, columns = rows - rows.min(), columns - columns.min()
+    cell = options.reach * np.sqrt((rows.max() + 1) * (columns.max() + 1))
+    red, green, blue = image[mask].T
+    u, v = (2 * red - green - blue) / np.sqrt(6), (green - blue) / np.sqrt(2)
+    chroma = np.hypot(u, v) + options.purity
+    return (
+        np.stack(
+            [
+                rows / cell,
+                columns / cell,
+                (u / chroma + 1) / options.hue,
+                (v / chroma + 1) / options.hue,
+            ]
+        )
+        + 2
+    )
+
+
+def _specular_of(scene: _Scene, options: Kim2013Options, monitor: Monitor) -> np.ndarray:
+    """s (H, W) of the scene's pixels, zero elsewhere."""
+    specular = scene.dark
+    for done in range(options.rounds):
+        monitor.report("finding diffuse colours", done / options.rounds)
+        pull, target = _colour_term(scene, _paints(scene, specular, options.trust))
+        total = pull + options.prior
+        target = (pull * target + options.prior * scene.dark) / total
+        specular = np.clip(target, 0, scene.low) if done == 0 else specular
+        monitor.report("smoothing the specular layer", (done + 0.6) / options.rounds)
+        specular = _smoothed(specular, target, np.where(scene.mask, total, 0), scene, options)
+    return specular
+
+
+def _paints(scene: _Scene, specular: np.ndarray, trust: float) -> np.ndarray:
+    """Unit vectors (n, 3) of the diffuse colour of the mask's pixels: means of what is diffuse now,
+    over like hues around.
+    """
+    s = specular[scene.mask]
+    say = np.maximum(np.exp(-s / max(trust * scene.base, _SMALLEST)), _LEAST_SAY)
+    nearest = np.ravel_multi_index(tuple(np.rint(scene.cells).astype(np.intp)), scene.grid)
+    colours = np.empty((len(s), 3))
+    for channel in range(3):
+        diffuse = np.maximum(scene.image[..., channel][scene.mask] - s, 0)
+        sums = np.bincount(nearest, diffuse * say, int(np.prod(scene.grid))).reshape(scene.grid)
+        means = ndimage.gaussian_filter(sums, 1, mode="constant", truncate=3)
+        colours[:, channel] = ndimage.map_coordinates(means, scene.cells, order=1, mode="nearest")
+    return colours / np.maximum(np.linalg.norm(colours, axis=1, keepdims=True), _SMALLEST)
+
+
+def _colour_term(scene: _Scene, paints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """k and s_a of the first term, (H, W), for the unit vectors `paints` (n, 3) of the mask's
+    pixels; s_a is kept within the bounds.
+    """
+    colours = scene.image[scene.mask]
+    whiteness = paints.sum(axis=1)
+    pull, target = np.zeros_like(scene.low), np.zeros_like(scene.low)
+    pull[scene.mask] = np.maximum(3 - whiteness**2, 0)
+    beside = colours.sum(axis=1) - whiteness * np.einsum("ij,ij->i", paints, colours)
+    target[scene.mask] = beside / np.maximum(pull[scene.mask], _SMALLEST)
+    return pull, np.clip(target, 0, scene.low)
+
+
+def _smoothed(
+    specular: np.ndarray,
+    target: np.ndarray,
+    pull: np.ndarray,
+    scene: _Scene,
+    options: Kim2013Options,
+) -> np.ndarray:
+    """The minimum over s (H, W) of sum pull (s - target)^2 + weights * steps^2 within the bounds,
+    from the start `specular`.
+    """
+    across = _weights(np.diff(specular, axis=1), scene.mask[:, 1:] & scene.mask[:, :-1], options)
+    down = _weights(np.diff(specular, axis=0), scene.mask[1:] & scene.mask[:-1], options)
+    result = np.where(scene.mask, specular, 0).astype(float)
+    for _ in range(options.sweeps):
+        for parity in range(2):
+            _relax(result, target, pull, across, down, scene.low, parity)
+    return result
+
+
+def _weights(steps: np.ndarray, both: np.ndarray, options: Kim2013Options) -> np.ndarray:
+    """alpha times psi'(d) / 2 d of the steps d, zero between pixels that are not `both` in the
+    mask.
+    """
+    return np.where(both, options.smoothness / np.hypot(steps / options.gradient, 1), 0)
+
+
+@compiled
+def _relax(s, target, pull, across, down, bound, parity):
+    height, width = s.shape
+    for y in range(height):
+        for x in range((y + parity) % 2, width, 2):
+            total, weight = pull[y, x] * target[y, x], pull[y, x]
+            if x > 0:
+                total += across[y, x - 1] * s[y, x - 1]
+                weight += across[y, x - 1]
+            if x < width - 1:
+                total += across[y, x] * s[y, x + 1]
+                weight += across[y, x]
+            if y > 0:
+                total += down[y - 1, x] * s[y - 1, x]
+                weight += down[y - 1, x]
+            if y < height - 1:
+                total += down[y, x] * s[y + 1, x]
+                weight += down[y, x]
+            if weight > 0:
+                moved = s[y, x] + _OVER_RELAXATION * (total / weight - s[y, x])
+                s[y, x] = min(max(moved, 0.0), bound[y, x])

@@ -1,0 +1,76 @@
+"""What a separation says about clipped pixels, whose true value lies above the recorded one.
+
+Problem: where the sensor is full, image = diffuse + white specular no longer holds, and equations
+that rely on colour differences turn highlights' cores into black holes. Yet a full channel alone is
+no highlight: strong paint in good light fills it too.
+
+Equation: A is the diffuse layer carried in from around the clipped region by pull-push
+interpolation (`inpainting.pull_push`). Channels that are not full are still diffuse plus white: s
+is the least I_c - A_c among them, or with all channels full the most that any shows over A. It is
+believed as far as the pixel itself is nearly white, or as what the method removed there or just
+around is a fair share of the brightness. Elsewhere the pixel stays as it is. A full channel's
+diffuse is A_c, but within [I_c - s, I_c]; what it lost is the residual, <= 0.
+
+Limits: texture under a clipped highlight is lost; the fill is smooth. White paint that is full is
+refilled like a highlight.
+"""
+
+import numpy as np
+
+from ...imaging.channels import largest, mean_channel, smallest
+from ...inpainting.pull_push import fill
+from ...scene.decomposition import Separation
+
+# A channel this near to the pixel's largest, which is full, counts as full too: scaling and
+# compression blur the limit.
+_FULL = 0.95
+# From where to where a pixel's smallest channel, and white light in or around it, speak for a
+# highlight: shares of its largest channel.
+_WHITE = (0.6, 0.8)
+_LIT = (0.03, 0.1)
+
+
+def explain_clipped(split: Separation, clipped: np.ndarray, mask: np.ndarray) -> Separation:
+    """The same split with clipped pixels explained anew; `clipped` and `mask` (H, W) bool.
+
+    There 0 <= diffuse <= image, specular is white, the residual is <= 0, and 0 in channels that are
+    not full; confidence is 0. A mask without any unclipped pixel keeps its split.
+    """
+    known = mask & ~clipped
+    if not clipped.any() or not known.any():
+        return split
+    image = (split.diffuse + split.specular + split.residual)[clipped]
+    removed = mean_channel(split.specular)
+    around = fill(np.concatenate([split.diffuse, removed[..., None]], axis=2), known)[clipped]
+    high = largest(image)
+    full = image >= _FULL * high[:, None]
+    light = np.maximum(around[:, 3], removed[clipped])
+    believed = np.maximum(_ramp(smallest(image), high, _WHITE), _ramp(light, high, _LIT))
+    white = believed * _white_over(image, around[:, :3], full)
+    rest = image - white[:, None]
+    diffuse, specular, residual = split.diffuse.copy(), split.specular.copy(), split.residual.copy()
+    diffuse[clipped] = np.where(full, np.clip(around[:, :3], np.maximum(rest, 0), image), rest)
+    specular[clipped] = white[:, None]
+    residual[clipped] = np.where(full, np.minimum(rest - diffuse[clipped], 0), 0)
+    return Separation(
+        diffuse, specular, residual, np.where(clipped, np.float32(0), split.confidence)
+    )
+
+
+def _white_over(image: np.ndarray, around: np.ndarray, full: np.ndarray) -> np.ndarray:
+    """s (n,) of clipped colours `image` (n, 3) over the diffuse ones `around` (n, 3), where `full`
+    (n, 3) bool says which channels are.
+    """
+    over = np.maximum(image - around, 0)
+    return np.where(full.all(axis=1), largest(over), smallest(np.where(full, np.inf, over))).astype(
+        np.float32
+    )
+
+
+def _ramp(value: np.ndarray, high: np.ndarray, ends: tuple[float, float]) -> np.ndarray:
+    """From 0 where `value` is the first share of `high` to 1 from the second on; all (n,), 0 where
+    both are.
+    """
+    return np.clip(
+        (value - ends[0] * high) / np.maximum((ends[1] - ends[0]) * high, np.float32(1e-30)), 0, 1
+    )

@@ -1,0 +1,238 @@
+"""How probable a highlight is by the statistics of filter outputs: a prior for the separator `isc`.
+
+Problem: highlights are compact and bounded by steep flanks, shading is smooth, paint has steps and
+little else. So the outputs of small filters are distributed differently on diffuse and on specular
+light (thesis, section 3.6.5.1, figure 3.12), and the outputs around a pixel say something of which
+of the two made them, whatever the colours are.
+
+Equation: L = log of the smoothed intensity over the object's; at widths w, shares of the object's
+diagonal, the outputs r_f are the slope w dL, the curvature w^2 ddL (along both axes, one histogram)
+and the difference of Gaussians G_w L - G_2w L. Each has a histogram over asinh(r / spread), which
+is fine in the middle and coarse in the heavy tails, once with and once without a highlight. With G
+the mean over the neighbourhood,
+
+    p = 1 / (1 + exp(-Lambda / T)),    Lambda = G sum_f log(h_f(r_f | highlight) / h_f(r_f | none)).
+
+Neighbouring outputs are far from independent, so Lambda promises too much: the temperature T,
+chosen on scenes left out, takes that back. Both kinds count the same: .5 says nothing, which is
+what the `prior` of `isc` means by it. `python -m benchmarks.separation.filter_statistics fit` fits histograms
+and T to rendered scenes.
+
+Citation: H. Akbar 2016; heavy-tailed outputs of derivative filters: B. A. Olshausen and D. J. Field
+1996, doi:10.1038/381607a0, J. Huang and D. Mumford 1999, doi:10.1109/CVPR.1999.786990; the
+temperature: C. Guo et al. 2017, arXiv:1706.04599.
+
+Limits: round shapes under a near lamp look like broad highlights and the other way round; how much
+it is worth is measured in docs/methods/filter_statistics.md.
+"""
+
+import importlib.resources
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy import ndimage
+
+from ...errors import InputError
+from ...imaging.bounding_box import mask_slices
+from ...imaging.smoothing import masked_gaussian
+from ...io.npy import parse_arrays
+
+WIDTHS = (0.006, 0.015, 0.04)  # of the object's diagonal
+KINDS = ("slope", "curvature", "difference")
+FILTERS = tuple((kind, width) for width in WIDTHS for kind in KINDS)
+BINS = 25  # odd: the middle one is around 0
+_REACH = (
+    4.0  # asinh(r / spread) at the outermost edges, about 27 spreads; what lies beyond counts there
+)
+_POOLED = 0.05  # of the diagonal: the neighbourhood whose evidence is averaged
+_DARK = 0.05  # of the mean intensity: below, logarithms are of noise
+_LONGEST = 192  # pixels of the object at which filters run; larger ones are averaged over blocks
+_SURE = 0.02  # no answer is nearer to 0 or 1
+_ARRAYS = ("spread", "without", "highlight", "temperature")
+
+
+@dataclass(frozen=True)
+class FilterTable:
+    """`spread` (F,) > 0: the unit of each filter's outputs. `without`, `highlight` (F, BINS) > 0:
+    the histograms, each of sum 1. `temperature` > 0. F = len(FILTERS).
+    """
+
+    spread: np.ndarray
+    without: np.ndarray
+    highlight: np.ndarray
+    temperature: float
+
+    def evidence(self, outputs: np.ndarray) -> np.ndarray:
+        """The log-likelihood ratios (N,) of outputs (N, F, 2), summed over filters; an axis that is
+        not finite says nothing.
+        """
+        ratio = np.log(self.highlight / self.without)
+        total = np.zeros(outputs.shape[0])
+        for number, unit in enumerate(self.spread):
+            values = outputs[:, number]
+            known = np.isfinite(values)
+            found = np.where(known, ratio[number][bins(np.where(known, values, 0), unit)], 0)
+            total += found.sum(axis=1) / np.maximum(known.sum(axis=1), 1)
+        return total
+
+
+def bins(values: np.ndarray, spread: float) -> np.ndarray:
+    """The bin of each value, in [0, BINS), of a filter's outputs."""
+    place = (np.arcsinh(values / spread) / _REACH + 1) * (BINS / 2)
+    return np.clip(place, 0, BINS - 1).astype(np.int64)
+
+
+def bin_edges() -> np.ndarray:
+    """The histograms' edges (BINS + 1,), in units of asinh(output / spread)."""
+    return np.linspace(-_REACH, _REACH, BINS + 1)
+
+
+@cache
+def shipped_table() -> FilterTable:
+    """The table that comes with the package."""
+    resource = importlib.resources.files(__package__) / "data" / "filter_statistics.npz"
+    return _read(resource.read_bytes(), "the shipped table")
+
+
+def read_table(path: str | Path) -> FilterTable:
+    """A table that `benchmarks.separation.filter_statistics fit` wrote.
+
+    Raises `InputError` for a file that is none.
+    """
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {error.strerror}") from error
+    return _read(data, str(path))
+
+
+def _read(data: bytes, name: str) -> FilterTable:
+    try:
+        arrays = parse_arrays(data, name)
+        with np.errstate(invalid="ignore"):  # what is no number is refused below
+            spread, without, highlight, temperature = (
+                np.asarray(arrays[key], float) for key in _ARRAYS
+            )
+    except (ValueError, KeyError) as error:
+        raise InputError(
+            f"{name} is no table of filter statistics: fit one with benchmarks.separation.filter_statistics"
+        ) from error
+    shape = (len(FILTERS), BINS)
+    fit = (
+        spread.shape == shape[:1]
+        and without.shape == shape
+        and highlight.shape == shape
+        and temperature.shape == ()
+    )
+    if not fit or not all(
+        (np.isfinite(values) & (values > 0)).all()
+        for values in (spread, without, highlight, temperature)
+    ):
+        raise InputError(
+            f"{name} holds other filters than this version has: fit it anew with benchmarks.separation.filter_statistics"
+        )
+    return FilterTable(spread, without, highlight, float(temperature))
+
+
+def highlight_prior(
+    image: np.ndarray, mask: np.ndarray, table: FilterTable | None = None
+) -> np.ndarray:
+    """The probability (H, W) float32 in [.02, .98] that a highlight is seen at each pixel of `mask`
+    (H, W) bool; .5 outside.
+
+    `image` (H, W, 3) linear, >= 0 inside the mask, at any exposure. Raises `InputError` for an
+    empty mask.
+    """
+    if not mask.any():
+        raise InputError("the mask is empty: mark at least the object's pixels")
+    table, box = table or shipped_table(), mask_slices(mask)
+    intensity = np.where(mask[box], image[box].mean(axis=2, dtype=float), 0)
+    light, inside, factor = reduced(intensity, mask[box])
+    pooled = pooled_evidence(light, inside, table) / table.temperature
+    if factor > 1:
+        filled = np.where(inside, pooled, masked_gaussian(pooled, inside, 1.0))
+        places = np.meshgrid(
+            *((np.arange(n) + 0.5) / factor - 0.5 for n in intensity.shape), indexing="ij"
+        )
+        pooled = ndimage.map_coordinates(filled, places, order=1, mode="nearest")
+    probability = np.full(mask.shape, 0.5, np.float32)
+    probability[box] = np.where(
+        mask[box], np.clip(1 / (1 + np.exp(-np.clip(pooled, -50, 50))), _SURE, 1 - _SURE), 0.5
+    )
+    return probability
+
+
+def reduced(intensity: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Intensity and mask (h, w), averaged over blocks of the mask's pixels, and the blocks' side:
+    at most 192 are left a side.
+    """
+    factor = -(-max(mask.shape) // _LONGEST)
+    if factor == 1:
+        return intensity, mask, 1
+    padded = [(0, -n % factor) for n in mask.shape]
+    rows, columns = (
+        (n + extra) // factor for n, (_, extra) in zip(mask.shape, padded, strict=True)
+    )
+
+    def share(values: np.ndarray) -> np.ndarray:
+        return (
+            np.pad(values, padded)
+            .reshape(rows, factor, columns, factor)
+            .mean(axis=(1, 3), dtype=float)
+        )
+
+    covered = share(mask)
+    inside = covered > 0.5 if (covered > 0.5).any() else covered > 0
+    return (
+        np.where(inside, share(np.where(mask, intensity, 0)) / np.maximum(covered, 1e-9), 0),
+        inside,
+        factor,
+    )
+
+
+def pooled_evidence(intensity: np.ndarray, mask: np.ndarray, table: FilterTable) -> np.ndarray:
+    """Lambda (H, W) of `intensity` (H, W) >= 0 inside `mask`; 0 outside."""
+    found = np.zeros(mask.shape)
+    found[mask] = table.evidence(filter_outputs(intensity, mask))
+    return np.where(mask, masked_gaussian(found, mask, _POOLED * _diagonal(mask)), 0)
+
+
+def filter_outputs(intensity: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The filters' outputs (N, F, 2) at the mask's N pixels, in the order of `FILTERS`; of each the
+    two axes, or the one value and NaN.
+
+    NaN where a neighbour is outside the mask: the background says nothing of the object.
+    `intensity` (H, W) >= 0.
+    """
+    mean = max(float(intensity[mask].mean(dtype=float)), 1e-30)
+    logarithm = np.where(mask, np.log(np.maximum(intensity, 0) / mean + _DARK), 0)
+    outputs: list[np.ndarray] = []
+    for width in WIDTHS:
+        sigma = max(width * _diagonal(mask), 0.5)
+        smooth = masked_gaussian(logarithm, mask, sigma)
+        slopes, curvatures = [], []
+        for axis in (0, 1):
+            before, after = _neighbour(smooth, mask, 1, axis), _neighbour(smooth, mask, -1, axis)
+            slopes.append((sigma * (after - before) / 2)[mask])
+            curvatures.append((sigma**2 * (after - 2 * smooth + before))[mask])
+        difference = (smooth - masked_gaussian(logarithm, mask, 2 * sigma))[mask]
+        outputs += [
+            np.stack(slopes, 1),
+            np.stack(curvatures, 1),
+            np.stack([difference, np.full_like(difference, np.nan)], 1),
+        ]
+    return np.stack(outputs, axis=1)
+
+
+def _neighbour(values: np.ndarray, mask: np.ndarray, step: int, axis: int) -> np.ndarray:
+    """The values `step` pixels before, along the axis; NaN where that is not in the mask."""
+    known = np.pad(np.where(mask, values, np.nan), 1, constant_values=np.nan)
+    return np.roll(known, step, axis)[1:-1, 1:-1]
+
+
+def _diagonal(mask: np.ndarray) -> float:
+    """Of the object's box, in pixels."""
+    rows, columns = (np.flatnonzero(mask.any(axis=axis)) for axis in (1, 0))
+    return float(np.hypot(rows[-1] - rows[0] + 1, columns[-1] - columns[0] + 1))

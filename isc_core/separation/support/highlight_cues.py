@@ -1,0 +1,140 @@
+"""What tells a highlight from pale paint: borders, texture, and which way the colour goes.
+
+White light raises all channels alike, so it leaves the chroma C = max I - min I as it is. White
+paint, printed or mixed in, looks like it to a single pixel, but C falls where such paint begins.
+Four cues follow, each a number or a map of a photo's candidate specular layer s:
+
+- a border of paint is where log C steps; what s does beside it proves nothing;
+- a highlight is smooth: s has little in it that is finer than a few pixels, paint has texture;
+- paint mixes: where white paint begins, s rises by (1 + q) times what C falls by, q = min / (max -
+  min) of the paint; light does not;
+- objects whose bright pixels are grey, taken together, offer no colour to judge by.
+
+The cues and their combination are ours. That a highlight leaves C alone is the two-band image of
+K.-J. Yoon, Y. Choi and I. S. Kweon (ICIP 2006, doi:10.1109/ICIP.2006.312650); for the chroma and
+the diffuse ratio see H.-L. Shen and Z.-H. Zheng (2013), doi:10.1364/AO.52.004483.
+
+Limits: pale paint without borders and without texture, on a coloured object, passes for a broad
+highlight.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ...imaging.smoothing import masked_gaussian, weighted_gaussian
+
+_TINY = 1e-12
+
+
+def ramp(value: np.ndarray | float, ends: tuple[float, float]) -> np.ndarray:
+    """0 up to the first end, 1 from the second on, a cubic between; the ends may fall, then it
+    does.
+    """
+    low, high = ends
+    t = np.clip((np.asarray(value) - low) / (high - low), 0, 1)
+    return t * t * (3 - 2 * t)
+
+
+def noise_level(image: np.ndarray, mask: np.ndarray) -> float:
+    """The standard deviation of the noise in `image` (H, W, 3), from differences that smooth
+    shading does not have (Immerkaer 1996, doi:10.1006/cviu.1996.0060), robustly: by their median
+    over `mask` (H, W) bool, the mean of the channels.
+    """
+    kernel = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]]) / 6
+    return float(
+        np.mean(
+            [
+                1.4826 * np.median(np.abs(ndimage.convolve(image[..., c], kernel)[mask]))
+                for c in range(3)
+            ]
+        )
+    )
+
+
+@dataclass(frozen=True)
+class Steps:
+    """How much a photo changes from each pixel's left (`across`) and upper (`down`) neighbour, (H,
+    W) >= 0, in units of what counts as a border; 0 where one of the two is not in the mask.
+    """
+
+    across: np.ndarray
+    down: np.ndarray
+
+    def around(self) -> np.ndarray:
+        """The larger of both sides, summed over the two directions (H, W)."""
+        across, down = self.across.copy(), self.down.copy()
+        across[:, :-1] = np.maximum(across[:, :-1], self.across[:, 1:])
+        down[:-1] = np.maximum(down[:-1], self.down[1:])
+        return across + down
+
+
+def steps_of(
+    change: list[tuple[np.ndarray, float]], mask: np.ndarray, floor: np.ndarray | float
+) -> Steps:
+    """Steps of several maps (H, W) or (H, W, C), each with the step that counts as a border;
+
+    `floor` (H, W): what noise does to them.
+    """
+
+    def along(axis: int) -> np.ndarray:
+        steps = np.zeros(mask.shape, np.float32)
+        inside = steps[:, 1:] if axis == 1 else steps[1:]
+        for values, unit in change:
+            difference = np.abs(np.diff(values, axis=axis))
+            inside += (difference if values.ndim == 2 else difference.sum(axis=2)) / unit
+        limit = np.broadcast_to(floor, mask.shape)
+        inside -= limit[:, 1:] if axis == 1 else limit[1:]
+        both = mask[:, 1:] & mask[:, :-1] if axis == 1 else mask[1:] & mask[:-1]
+        inside[~both] = 0
+        return np.maximum(steps, 0)
+
+    return Steps(along(1), along(0))
+
+
+def far_from_borders(steps: Steps, mask: np.ndarray, blur: float, unit: float) -> np.ndarray:
+    """Trust (H, W) in [0, 1]: near 0 on borders and beside them, within `blur` pixels; 0 outside
+    the mask.
+    """
+    border = masked_gaussian(np.minimum(steps.around(), 1), mask, blur)
+    return np.where(mask, np.exp(-np.square(border / unit)), 0).astype(np.float32)
+
+
+def roughness(
+    specular: np.ndarray, trust: np.ndarray, mask: np.ndarray, scale: float, fine: float
+) -> tuple[float, np.ndarray]:
+    """Which part of what stands out from its surroundings of `scale` pixels is finer than `fine`
+    pixels: over all, and (H, W) locally.
+
+    0 for a smooth highlight, near 1 for texture and noise; both from pixels far from borders, the
+    first from raised ones only.
+    """
+    raised = np.where(mask, specular - weighted_gaussian(specular, trust, scale, 1e-6), 0)
+    detail = np.square(raised - ndimage.gaussian_filter(raised, fine))
+    weight = np.where(mask, np.square(trust), 0)
+    up = weight * (raised > 0)
+    over_all = np.sqrt(
+        (up * detail).sum(dtype=float) / max((up * np.square(raised)).sum(dtype=float), _TINY)
+    )
+    below = ndimage.gaussian_filter(weight * np.square(raised), scale) + _TINY
+    return float(over_all), np.sqrt(ndimage.gaussian_filter(weight * detail, scale) / below)
+
+
+def paint_mixing(
+    specular: np.ndarray, chroma: np.ndarray, ratio: np.ndarray, mask: np.ndarray, scale: float
+) -> np.ndarray:
+    """How far a rise of `specular` is white paint mixed in, within `scale` pixels (H, W): 1 for
+    paint, about 0 for light.
+
+    It is the share of grad s that runs against grad C, times 1 + q; `chroma` C, `ratio` q, all (H,
+    W).
+    """
+    if min(mask.shape) < 2:
+        return np.zeros_like(specular)
+    down, across = np.gradient(specular)
+    chroma_down, chroma_across = np.gradient(chroma)
+    inner = ndimage.binary_erosion(mask, iterations=2)
+    against = np.where(inner, -(down * chroma_down + across * chroma_across) * (1 + ratio), 0)
+    steep = np.where(inner, np.square(down) + np.square(across), 0)
+    return ndimage.gaussian_filter(against, scale) / (ndimage.gaussian_filter(steep, scale) + _TINY)

@@ -1,0 +1,97 @@
+"""From what a method found at each pixel to the layers of a `Separation`, and how far they are
+trusted.
+
+Inside the mask 0 <= diffuse <= image, whatever the method says; clipped pixels are explained by
+`clipped`. Confidence, for methods that have none of their own, is exp(-e / u): e is the error of
+the specular light to be expected, what was removed plus a share of what could still hide in the
+smallest channel; u is the mean of the smallest channel over the mask.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from ...imaging.channels import fade_in, mean_channel, saturation, smallest
+from ...scene.decomposition import Separation
+from .clipped import explain_clipped
+
+# A highlight can hide in a pixel's smallest channel; the share of it that stays in doubt where a
+# method could decide.
+DOUBT = 0.3
+
+
+def white_layers(
+    image: np.ndarray, mask: np.ndarray, specular: np.ndarray, clipped: np.ndarray | None = None
+) -> Separation:
+    """The layers where `specular` (H, W), the same in all three channels, is taken off `image` (H,
+    W, 3), but never below zero.
+
+    What is not finite counts as 0. `mask`, `clipped`: (H, W) bool. The residual is 0 but where
+    clipped.
+    """
+    low = smallest(image)
+    white = np.where(mask & np.isfinite(specular), np.clip(specular, 0, low), 0).astype(np.float32)
+    diffuse = np.where(mask[..., None], np.maximum(image - white[..., None], 0), 0).astype(
+        np.float32
+    )
+    return _finished(image, mask, diffuse, np.repeat(white[..., None], 3, axis=2), clipped)
+
+
+def bright_layers(
+    image: np.ndarray,
+    mask: np.ndarray,
+    clipped: np.ndarray | None,
+    find: Callable[[np.ndarray, np.ndarray, float], np.ndarray],
+    *,
+    least_saturation: float,
+    fade: float | None,
+) -> Separation:
+    """The layers of a method that can judge coloured objects only, and finds highlights where the
+    smallest channel lies above its mean.
+
+    `find(image, linear, base)` gives the specular light (H, W) of the image, zero outside the mask,
+    from the `linear` (H, W) bool pixels, those of the mask that are not clipped; `base` is the mean
+    of the smallest channel. It is not asked if the pixels above that mean have less `saturation`
+    together than `least_saturation`, in [0, 1]. `fade`: see `channels.fade_in`; None for all of it
+    everywhere.
+    """
+    seen = np.where(mask[..., None], image, 0)
+    low = smallest(seen)
+    base = float(low[mask].mean(dtype=float))
+    specular = np.zeros_like(low)
+    linear = mask if clipped is None else mask & ~clipped
+    if linear.any() and saturation(seen[mask & (low > base)]) >= least_saturation:
+        specular = find(seen, linear, base)
+        if fade is not None:
+            specular = specular * fade_in(low, base, fade)
+    return white_layers(seen, mask, specular, clipped)
+
+
+def diffuse_layers(
+    image: np.ndarray, mask: np.ndarray, diffuse: np.ndarray, clipped: np.ndarray | None = None
+) -> Separation:
+    """The layers where `diffuse` (H, W, 3), kept within [0, image], is all that stays: the specular
+    layer may then be tinted.
+
+    What is not finite counts as the image. `mask`, `clipped`: (H, W) bool. The residual is 0 but
+    where clipped.
+    """
+    known = np.where(np.isfinite(diffuse), diffuse, image)
+    kept = np.where(mask[..., None], np.clip(known, 0, image), 0).astype(np.float32)
+    specular = np.where(mask[..., None], np.maximum(image - kept, 0), 0).astype(np.float32)
+    return _finished(image, mask, kept, specular, clipped)
+
+
+def _finished(
+    image: np.ndarray,
+    mask: np.ndarray,
+    diffuse: np.ndarray,
+    specular: np.ndarray,
+    clipped: np.ndarray | None,
+) -> Separation:
+    low = np.where(mask, smallest(image), 0)
+    base = max(float(low[mask].mean(dtype=float)), 1e-30) if mask.any() else 1.0
+    error = mean_channel(specular) + DOUBT * low
+    confidence = np.where(mask, np.exp(-error / base), 0).astype(np.float32)
+    split = Separation(diffuse, specular, np.zeros_like(diffuse), confidence)
+    return split if clipped is None else explain_clipped(split, clipped & mask, mask)

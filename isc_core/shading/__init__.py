@@ -1,0 +1,1 @@
+"""Shading: spherical harmonics, environment maps, surface derivatives and lights."""

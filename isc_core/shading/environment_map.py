@@ -1,0 +1,136 @@
+"""Environments: the light that arrives from every direction, as a latitude-longitude picture, and
+what it does to matt surfaces.
+
+A picture (rows, 2 rows, 3) holds linear radiance. Row 0 is straight up (+y). Its first column looks
+away from the viewer (-z), a quarter along is right (+x), the middle is toward the viewer (+z),
+three quarters along is left: pixel centres at the polar angle t = (row + .5) pi / rows from +y and
+the turn a = (column + .5) pi / rows look toward (sin t sin a, cos t, -sin t cos a). Mitsuba reads
+this layout as it is; Blender's is the same, rolled by a quarter.
+
+Problem: the recovered illumination is log shading, S(n) = exp(SH(n)), for the normals that face the
+viewer; a renderer wants the radiance L(w) that comes from each direction. A Lambertian surface of
+albedo 1 has, without shadows, the shading
+
+    S(n) = 1/pi * integral of L(w) max(n . w, 0) dw = sum_j K(n, w_j) L_j,        L >= 0
+
+Many environments give the same shading. From a uniform one the iteration of Richardson and Lucy
+finds a smooth one, never negative:
+
+    L <- L * K'(S / (K L)) / K'(1)
+
+Citation: W. H. Richardson 1972, doi:10.1364/JOSA.62.000055; L. B. Lucy 1974, doi:10.1086/111605;
+irradiance as a convolution with the clamped cosine: R. Ramamoorthi, P. Hanrahan 2001,
+doi:10.1145/383259.383317.
+
+Limits: a shading that turns faster than a clamped cosine allows (a strong contrast in the
+logarithm) is matched in the sense of least relative error only; light from behind that no visible
+normal can see is a guess; the object's own shadows come on top.
+"""
+
+import numpy as np
+
+from .spherical_harmonics import real_sh
+
+# normals at a time: their kernel is a matrix with a column for every pixel of the environment
+_CHUNK = 4096
+
+
+def directions(rows: int) -> np.ndarray:
+    """Where each pixel's centre looks:
+
+    (rows, 2 rows, 3) unit vectors, x right, y up, z toward the viewer.
+    """
+    polar, turn = np.meshgrid(
+        (np.arange(rows) + 0.5) * np.pi / rows,
+        (np.arange(2 * rows) + 0.5) * np.pi / rows,
+        indexing="ij",
+    )
+    return np.stack(
+        [np.sin(polar) * np.sin(turn), np.cos(polar), -np.sin(polar) * np.cos(turn)], -1
+    )
+
+
+def solid_angles(rows: int) -> np.ndarray:
+    """(rows, 2 rows) steradians of each pixel; they sum to 4 pi."""
+    edges = np.cos(np.arange(rows + 1) * np.pi / rows)
+    return np.broadcast_to(
+        ((edges[:-1] - edges[1:]) * np.pi / rows)[:, None], (rows, 2 * rows)
+    ).copy()
+
+
+def shading_under(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """The shading, (N, 3), that an environment (rows, 2 rows, 3) gives to unshadowed matt surfaces
+    with the unit normals (N, 3).
+    """
+    flat = radiance.reshape(-1, 3)
+    parts = [
+        _kernel(normals[k : k + _CHUNK], len(radiance)) @ flat
+        for k in range(0, len(normals), _CHUNK)
+    ]
+    return np.concatenate(parts) if parts else np.zeros((0, 3))
+
+
+def environment_from_shading(
+    illumination: np.ndarray, rows: int = 32, iterations: int = 100
+) -> np.ndarray:
+    """The environment, (rows, 2 rows, 3) float32 >= 0, linear radiance, under which matt surfaces
+    look as they do in a recovered light.
+
+    `illumination`: (9, 3) coefficients of log shading in the camera's frame, as in
+    `scene.decomposition.json`.
+    """
+    normals = _facing_normals(24)
+    kernel = _kernel(normals, rows)
+    wanted = np.exp(real_sh(normals) @ illumination)
+    seen = kernel.sum(0)[:, None]
+    sky = np.broadcast_to(wanted.mean(0), (kernel.shape[1], 3)).copy()
+    for _ in range(iterations):
+        correction = kernel.T @ (wanted / np.maximum(kernel @ sky, 1e-12))
+        sky *= np.where(seen > 1e-9, correction / np.maximum(seen, 1e-9), 1)
+    return np.ascontiguousarray(sky.reshape(rows, 2 * rows, 3), np.float32)
+
+
+def resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
+    """An environment (r, 2 r, 3) with another number of rows: (rows, 2 rows, 3) of the same type of
+    values.
+
+    Each pixel gets the mean radiance of the solid angle that it covers, so that no light is lost or
+    won.
+    """
+    old = len(radiance)
+    down = _shares(
+        np.cos(np.arange(old + 1) * np.pi / old), np.cos(np.arange(rows + 1) * np.pi / rows)
+    )
+    across = _shares(np.arange(2 * old + 1) * -np.pi / old, np.arange(2 * rows + 1) * -np.pi / rows)
+    return np.einsum("ri,ijc,sj->rsc", down, radiance, across, optimize=True).astype(
+        np.result_type(radiance, np.float32)
+    )
+
+
+def _shares(old: np.ndarray, new: np.ndarray) -> np.ndarray:
+    """Between falling edges (n + 1,) and (m + 1,): which share of each new interval lies in each
+    old one, (m, n).
+    """
+    overlap = np.minimum(old[:-1], new[:-1, None]) - np.maximum(old[1:], new[1:, None])
+    return np.maximum(overlap, 0) / (new[:-1] - new[1:])[:, None]
+
+
+def _kernel(normals: np.ndarray, rows: int) -> np.ndarray:
+    """K (N, pixels): the share of each pixel's radiance in the shading of each normal."""
+    return (
+        np.clip(normals @ directions(rows).reshape(-1, 3).T, 0, None)
+        * solid_angles(rows).reshape(-1)
+        / np.pi
+    )
+
+
+def _facing_normals(steps: int) -> np.ndarray:
+    """Normals that face the viewer, (N, 3), spread evenly over what an orthographic camera sees of
+    a sphere.
+    """
+    x, y = np.meshgrid(
+        (np.arange(steps) + 0.5) * 2 / steps - 1, (np.arange(steps) + 0.5) * 2 / steps - 1
+    )
+    inside = x * x + y * y < 1
+    x, y = x[inside], y[inside]
+    return np.stack([x, y, np.sqrt(1 - x * x - y * y)], -1)

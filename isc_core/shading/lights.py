@@ -1,0 +1,136 @@
+"""The lights that an edit can ask for: one distant light with an ambient rest, recovered light
+turned, an environment.
+
+Equations, for the unit normal n of a matt surface of reflectance 1: under a distant light with
+irradiance E from l and an ambient A, S(n) = E / pi max(0, n . l) + A; under spherical harmonics
+S(n) = exp(sum_k L_k Y_k(n)). A light turned by the rotation R gives S'(n) = S(R^T n); its
+coefficients are L' = Y(d)^+ Y(R^T d) L for any directions d that fix a quadratic on the sphere,
+because the nine functions turn among themselves: exact but for rounding.
+
+Citation: R. Ramamoorthi, P. Hanrahan, "An efficient representation for irradiance environment
+maps", SIGGRAPH 2001, doi:10.1145/383259.383317 (the space of nine functions).
+
+Limits: no cast shadows. What the recovered light has behind the object was seen by no normal:
+turned to the front, it is a guess.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import InputError
+from .brdf.directions import unit
+from .brdf.model import check_range
+from .spherical_harmonics import real_sh
+
+VIEW = np.array([0.0, 0.0, 1.0])  # toward the viewer
+_EXACT = 1e-12
+
+
+@dataclass(frozen=True)
+class DirectionalLight:
+    """One distant light. `direction` (3,): unit vector toward it. `irradiance` (3,): across its
+    beam, >= 0; pi gives a white matt surface that faces it the shading 1. `ambient` (3,): shading
+    that everything has, >= 0. Raises `InputError` for anything else.
+    """
+
+    direction: np.ndarray
+    irradiance: np.ndarray = field(default_factory=lambda: np.full(3, np.pi))
+    ambient: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def __post_init__(self) -> None:
+        unit(self.direction, "direction")
+        check_range("irradiance", self.irradiance, 0, np.inf)
+        check_range("ambient", self.ambient, 0, np.inf)
+        if (
+            not np.shape(self.direction)
+            == np.shape(self.irradiance)
+            == np.shape(self.ambient)
+            == (3,)
+        ):
+            raise InputError("direction, irradiance and ambient of a light have three numbers each")
+
+    def shading(self, normal: np.ndarray) -> np.ndarray:
+        """(..., 3) of a white matt surface with the unit normals (..., 3), shadows of its own side
+        included.
+        """
+        return (
+            np.maximum(np.asarray(normal, float) @ self.direction, 0)[..., None]
+            * (self.irradiance / np.pi)
+            + self.ambient
+        )
+
+
+def toward(x: float, y: float, z: float) -> np.ndarray:
+    """The unit vector (3,) along x right, y up, z toward the viewer.
+
+    Raises `InputError` for no direction at all.
+    """
+    vector = np.array([x, y, z], float)
+    length = float(np.linalg.norm(vector))
+    if not np.isfinite(length) or length < 1e-9:
+        raise InputError(
+            f"{x:g} {y:g} {z:g} is no direction: give x (right), y (up), z (toward the viewer), not all 0"
+        )
+    return vector / length
+
+
+def turn(yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> np.ndarray:
+    """The rotation (3, 3) by `roll` about z (toward the viewer), then `pitch` about x (right), then
+    `yaw` about y (up), in degrees.
+
+    A positive yaw moves what is in front to the right, a positive pitch what is above to the front,
+    a positive roll turns the picture's right side up. Raises `InputError` for angles that are not
+    finite.
+    """
+    if not np.isfinite([yaw, pitch, roll]).all():
+        raise InputError("the angles of a rotation have to be finite, in degrees")
+    about_y, about_x, about_z = (
+        _plane_turn(angle, *axes)
+        for angle, axes in ((yaw, (2, 0)), (pitch, (1, 2)), (roll, (0, 1)))
+    )
+    return about_y @ about_x @ about_z
+
+
+def turned_light(coefficients: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Coefficients (9, 3) of the light turned by `rotation` (3, 3): what came from d comes from
+    rotation @ d.
+
+    The identity gives exactly the same. Raises `InputError` for a matrix that is not a rotation.
+    """
+    if (
+        np.shape(rotation) != (3, 3)
+        or np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-9
+        or np.linalg.det(rotation) < 0
+    ):
+        raise InputError(
+            "this is not a rotation: give an orthonormal matrix (3, 3) of determinant 1"
+        )
+    if np.array_equal(rotation, np.eye(3)):
+        return np.array(coefficients, float)
+    directions = sphere_directions(64)
+    return np.linalg.pinv(real_sh(directions)) @ real_sh(directions @ rotation) @ coefficients
+
+
+def sphere_directions(count: int) -> np.ndarray:
+    """`count` unit vectors (count, 3), evenly spread over the whole sphere along a spiral, from
+    front to back.
+    """
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
+    across = np.sqrt(1 - z * z)
+    return np.stack([across * np.cos(angle), across * np.sin(angle), z], -1)
+
+
+def _plane_turn(degrees: float, first: int, second: int) -> np.ndarray:
+    """Turns the axis `first` toward the axis `second`."""
+    matrix = np.eye(3)
+    cosine, sine = _clean(np.cos(np.deg2rad(degrees))), _clean(np.sin(np.deg2rad(degrees)))
+    matrix[first, first] = matrix[second, second] = cosine
+    matrix[second, first], matrix[first, second] = sine, -sine
+    return matrix
+
+
+def _clean(value: float) -> float:
+    """Full and quarter turns come out exact."""
+    return float(np.rint(value)) + 0.0 if abs(value - np.rint(value)) < _EXACT else float(value)

@@ -1,0 +1,111 @@
+"""A specular lobe, and its radiance toward the viewer under a light or an environment map.
+
+Equation: radiance(n) = sum over lights of f_r(n, v, l) max(0, n . l) E, with the viewer along z. It
+depends on the normal alone, so under an environment map of many samples it is evaluated on a table
+of normals in the stereographic plane (x, y) / (1 + z) and interpolated there.
+
+Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; B. Walter et al. 2007,
+doi:10.2312/EGWR/EGSR07/195-206 (see `brdf`).
+
+Limits: no cast shadows, no interreflection.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from .brdf.blinn_phong import BlinnPhong
+from .brdf.ggx import Ggx
+from .brdf.model import Model, check_range
+from .brdf.roughness import exponent_from_alpha, fitted_exponent
+from .environment_map import directions, solid_angles
+from .lights import VIEW, DirectionalLight
+from .radiance import Lights, directional, radiance
+
+USUAL_EXPONENT = 60.0
+
+
+_FITTED_ALPHA = 0.5  # the largest alpha of `fitted_exponent`
+
+
+_TABLE = 65  # samples of the stereographic plane along an axis
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """A lobe of strength 1: Blinn-Phong's `exponent` in [1, 1e5], or the `alpha` in [.01, 1] of GGX
+    facets, which then counts, and their `f0`, 1 for mirrors.
+
+    Raises `InputError` outside these ranges.
+    """
+
+    exponent: float = USUAL_EXPONENT
+    alpha: float | None = None
+    f0: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_range("exponent", self.exponent, 1, 1e5)
+        if self.alpha is not None:
+            check_range("alpha", self.alpha, 0.01, 1)
+            check_range("f0", self.f0, 0, 1)
+
+    @property
+    def model(self) -> Model:
+        """The reflectance model, without a strength of its own."""
+        return BlinnPhong(1.0, self.exponent) if self.alpha is None else Ggx(self.alpha, self.f0)
+
+    @property
+    def nearest_exponent(self) -> float:
+        """The Blinn-Phong exponent, at least 1, whose lobe is about this one's."""
+        if self.alpha is None:
+            return self.exponent
+        rule = fitted_exponent if self.alpha <= _FITTED_ALPHA else exponent_from_alpha
+        return max(float(rule(self.alpha)), 1.0)
+
+
+def lobe_under(lobe: Lobe, normal: np.ndarray, light: DirectionalLight) -> np.ndarray:
+    """What the lobe sends to the viewer under one light, without its ambient:
+
+    (..., 3) for unit normals (..., 3).
+    """
+    return radiance(lobe.model, _unit(normal), VIEW, directional(light.direction, light.irradiance))
+
+
+def lobe_in(lobe: Lobe, normal: np.ndarray, sky: np.ndarray) -> np.ndarray:
+    """What the lobe sends to the viewer in an environment (rows, 2 rows, 3), see `environment`:
+
+    (N, 3) for unit normals (N, 3).
+    """
+    rows = len(sky)
+    lit = (sky > 0).any(-1).reshape(-1)
+    if not lit.any():
+        return np.zeros((len(normal), 3))
+    lights = Lights(
+        directions(rows).reshape(-1, 3)[lit],
+        (solid_angles(rows)[..., None] * sky).reshape(-1, 3)[lit],
+    )
+    axis = np.linspace(-1.0, 1.0, _TABLE)
+    u, v = np.meshgrid(axis, axis, indexing="ij")
+    square = np.minimum(
+        u * u + v * v, 1
+    )  # the corners lie behind the horizon: their normals are not asked for
+    shrink = np.sqrt(square / np.maximum(u * u + v * v, 1e-12))
+    table_normals = (
+        np.stack([2 * u * shrink, 2 * v * shrink, 1 - square], -1) / (1 + square)[..., None]
+    )
+    table_normals[_TABLE // 2, _TABLE // 2] = VIEW
+    table = radiance(lobe.model, _unit(table_normals), VIEW, lights)
+    places = (normal[:, :2] / (1 + np.maximum(normal[:, 2:], 0)) + 1) * (_TABLE - 1) / 2
+    return np.stack(
+        [
+            ndimage.map_coordinates(table[..., c], places.T, order=1, mode="nearest")
+            for c in range(3)
+        ],
+        -1,
+    )
+
+
+def _unit(normal: np.ndarray) -> np.ndarray:
+    normal = np.asarray(normal, float)
+    return normal / np.linalg.norm(normal, axis=-1, keepdims=True)

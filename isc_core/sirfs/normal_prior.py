@@ -1,0 +1,121 @@
+"""What somebody who looked at the photo believes of its normals, as a prior of SIRFS' shape.
+
+Where the normal's part in the image plane is t = (N1, N2), and m is what was seen of it, give or
+take s a component,
+  cost = w/n_v * sum over valid pixels of |t - m|^2 / (2 s^2):
+the outline's term (`silhouette`), with another expectation. The solver begins at the height Z whose
+slopes are nearest to m's,
+  min over Z of sum over neighbours of (Z' - Z - slope)^2, slope = m / sqrt(1 - |m|^2),
+on a coarse grid: B. K. P. Horn and M. J. Brooks, "The variational approach to shape from shading",
+Computer Vision, Graphics, and Image Processing 33(2) (1986), doi:10.1016/0734-189X(86)90114-3.
+
+Limits: s is of one pixel, while neighbours err alike; w makes up for that in the mean.
+"""
+
+import numpy as np
+from scipy import ndimage
+
+from ..imaging.upsampling import enlarged
+from ..scene.normal_estimate import NormalEstimate
+from .priors.priors import SilhouetteProfile
+from .silhouette import SilhouetteField, silhouette_field
+
+_STEP = 4  # pixels of the coarse grid
+_STEEPEST = 0.97  # of an in-plane part, where slopes are added up
+_COVERED = 0.1  # of a cell that belongs to the object
+_PRECISION = 1e-6  # of the slopes' sums: the start is not needed better
+
+
+def expected_field(
+    mask: np.ndarray, profile: SilhouetteProfile | None, seen: NormalEstimate | None
+) -> SilhouetteField | None:
+    """What is expected of the normals inside `mask` (H, W) bool: what was `seen`, else what the
+    outline suggests by `profile`.
+    """
+    if seen is not None:
+        return seen_field(seen, mask)
+    return None if profile is None else silhouette_field(mask, profile)
+
+
+def seen_field(seen: NormalEstimate, mask: np.ndarray) -> SilhouetteField:
+    """What `seen` says of the normals inside `mask` (H, W) bool; where that reaches further, the
+    nearest that was seen goes on.
+    """
+    nearest = tuple(
+        ndimage.distance_transform_edt(
+            seen.deviation <= 0, return_distances=False, return_indices=True
+        )
+    )
+    normal, deviation = seen.normal[nearest].astype(float), seen.deviation[nearest].astype(float)
+    maps = (-normal[..., 1], normal[..., 0], 1 / deviation**2, height_of_normals(normal, mask))
+    return SilhouetteField(*(np.where(mask, values, 0) for values in maps))
+
+
+def height_of_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
+    """The height (H, W) in pixels, 0 at its lowest and outside `mask` (H, W) bool, whose slopes are
+    nearest to those of the mean normals (H, W, 3); nothing finer than 4 pixels.
+    """
+    cover, sums = (
+        _cells(mask.astype(float)),
+        [_cells(np.where(mask, normal[..., k], 0)) for k in (0, 1)],
+    )
+    across, up = (total / np.where(cover > 0, cover, 1) for total in sums)
+    flat = np.minimum(1, _STEEPEST / np.maximum(np.hypot(across, up), _STEEPEST))
+    across, up = across * flat, up * flat
+    steep = np.sqrt(1 - across**2 - up**2)
+    known = cover > _COVERED
+    if not known.any():
+        return np.zeros(mask.shape)
+    height = _added_up(-_STEP * across / steep, _STEP * up / steep, known)
+    nearest = tuple(
+        ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    )
+    fine = enlarged(height[nearest], tuple(_STEP * n for n in height.shape), _STEP)[
+        : mask.shape[0], : mask.shape[1]
+    ]
+    return np.where(mask, fine, 0)
+
+
+def _cells(values: np.ndarray) -> np.ndarray:
+    """Means of cells of (H, W), which goes on as 0."""
+    rows, columns = (-(-n // _STEP) for n in values.shape)
+    padded = np.pad(
+        values, [(0, _STEP * n - m) for n, m in zip((rows, columns), values.shape, strict=True)]
+    )
+    return np.asarray(padded.reshape(rows, _STEP, columns, _STEP).mean(axis=(1, 3)))
+
+
+def _added_up(right: np.ndarray, down: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """The height (h, w), least 0, 0 where not `known`, that rises nearest to `right` and `down`
+    from a cell to the next, in least squares: by conjugate gradients (M. R. Hestenes and E. Stiefel
+    1952, doi:10.6028/jres.049.044), whose sums no thread reorders.
+    """
+    beside, below = known[:, :-1] & known[:, 1:], known[:-1] & known[1:]
+
+    def transposed(along: np.ndarray, across: np.ndarray) -> np.ndarray:
+        out = np.zeros(known.shape)
+        out[:, 1:] += along
+        out[:, :-1] -= along
+        out[1:] += across
+        out[:-1] -= across
+        return out
+
+    def rises(z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return np.where(beside, np.diff(z, axis=1), 0), np.where(below, np.diff(z, axis=0), 0)
+
+    wanted = (
+        np.where(beside, (right[:, :-1] + right[:, 1:]) / 2, 0),
+        np.where(below, (down[:-1] + down[1:]) / 2, 0),
+    )
+    height, left = np.zeros(known.shape), transposed(*wanted)
+    way, square = left, float(np.square(left).sum())
+    enough = _PRECISION**2 * square
+    for _ in range(known.size):
+        if square <= enough:
+            break
+        turned = transposed(*rises(way))
+        step = square / float((way * turned).sum())
+        height, left = height + step * way, left - step * turned
+        before, square = square, float(np.square(left).sum())
+        way = left + square / before * way
+    return np.where(known, height - height[known].min(), 0)

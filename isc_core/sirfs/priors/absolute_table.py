@@ -1,0 +1,95 @@
+"""The cost of an absolute (whitened, log) reflectance as a table that stays small in a file.
+
+The full table of n nodes an axis is an upsampling by two of a coarse one: insert zeros, then filter
+with (1, 4, 6, 4, 1) / 8 along each axis, zero padded (P. J. Burt, E. H. Adelson 1983,
+doi:10.1109/TCOM.1983.1095851). Only the coarse one is stored. The model: J. T. Barron, J. Malik
+(2015), doi:10.1109/TPAMI.2014.2377712.
+"""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse
+
+from .priors import AbsoluteTable
+
+LOW, HIGH = -7.0, 4.0
+
+
+@dataclass(frozen=True)
+class CoarseTable:
+    """A table of n = `nodes` a side as the upsampling of `base + coarse`, less its minimum;
+    `coarse` is (ceil(n/2),) * d, least 0.
+
+    So a short float type keeps its digits where the cost is low, that is, where reflectances are.
+    """
+
+    coarse: np.ndarray
+    base: float
+    nodes: int
+
+    @staticmethod
+    def of(values: np.ndarray, nodes: int, dtype: type = np.float16) -> "CoarseTable":
+        """The coarse `values` (ceil(nodes/2),) * d kept as `dtype`."""
+        base = float(values.min())
+        return CoarseTable((values - base).astype(dtype), base, nodes)
+
+    def table(self) -> AbsoluteTable:
+        """The full table, float64, minimum 0, over [-7, 4] on each axis."""
+        values = synthesise(synthesis_matrix(self.nodes), self.coarse.astype(float) + self.base)
+        return AbsoluteTable(LOW, HIGH, values - values.min())
+
+
+def synthesis_matrix(nodes: int, dtype: type = np.float64) -> scipy.sparse.csr_matrix:
+    """The upsampling of one axis from ceil(nodes/2) to `nodes` values."""
+    coarse = -(-nodes // 2)
+    taps = {-2: 0.125, -1: 0.5, 0: 0.75, 1: 0.5, 2: 0.125}
+    rows = [
+        (2 * k + o, k, tap)
+        for k in range(coarse)
+        for o, tap in taps.items()
+        if 0 <= 2 * k + o < nodes
+    ]
+    row, column, value = zip(*rows, strict=True)
+    return scipy.sparse.csr_matrix((np.array(value, dtype), (row, column)), shape=(nodes, coarse))
+
+
+def synthesise(matrix: scipy.sparse.spmatrix, values: np.ndarray) -> np.ndarray:
+    """Applies `matrix` (n, m) along every axis of `values` (m, ..., m)."""
+    for _ in range(values.ndim):
+        # Each turn treats the first axis and puts it last, so that after all turns the axes are in
+        # order again.
+        turned = matrix @ values.reshape(values.shape[0], -1)
+        values = np.ascontiguousarray(np.moveaxis(turned.reshape(-1, *values.shape[1:]), 0, -1))
+    return values
+
+
+def splat(points: np.ndarray, nodes: int, weights: np.ndarray) -> np.ndarray:
+    """Histogram (nodes,) * d of `points` (n, d) over [-7, 4]^d with multilinear weights; points
+    outside are moved to the border.
+
+    `weights` (n,) is what each point adds in all.
+    """
+    dimensions = points.shape[1]
+    position = np.clip((points - LOW) * ((nodes - 1) / (HIGH - LOW)), 0, nodes - 1)
+    cell = np.minimum(position.astype(np.int64), nodes - 2)
+    fraction = position - cell
+    total = np.zeros(nodes**dimensions)
+    for corner in itertools.product((0, 1), repeat=dimensions):
+        offset = np.array(corner)
+        share = np.where(offset == 1, fraction, 1 - fraction).prod(axis=1)
+        index = np.ravel_multi_index(tuple((cell + offset).T), (nodes,) * dimensions)
+        total += np.bincount(index, share * weights, len(total))
+    return total.reshape((nodes,) * dimensions)
+
+
+def log_likelihood(table: np.ndarray, histogram: np.ndarray) -> float:
+    """Mean log probability of `histogram` (sums to 1) under the distribution exp(-table) / sum
+    exp(-table) over the nodes.
+
+    On objects that the table was not fitted to, this is what its smoothness is chosen by.
+    """
+    lowest = table.min()
+    log_partition = np.log(np.exp(lowest - table).sum()) - lowest
+    return -float((histogram * table).sum() + log_partition)

@@ -1,0 +1,60 @@
+"""The light's prior, once a photo has been looked at.
+
+Problem: which of all lights a photo was taken in, SIRFS finds together with the shape, and often a
+wrong pair of both. What the photo shows at first sight, its shadows and highlights, is not in its
+model; it can be in its prior.
+
+Equation: a light looks like the eight numbers q, the parts of its log shading along eight
+orthonormal functions of the normals before the object, which with a constant span the harmonics of
+degree 2. With q = A l for the light's coefficients l (the channels' mean), and q seen with
+deviations d,
+
+    K = S A' (A S A' + diag d^2)^-1,    mean' = mean + K (q - A mean),    S' = S - K A S.
+
+Citation: R. E. Kalman 1960, doi:10.1115/1.3662552 (the update of a Gaussian).
+
+Limits: neither how bright the light is nor its colour is looked at; both stay the prior's.
+"""
+
+import numpy as np
+
+from ...numerics.linear import solved
+from ...shading.spherical_harmonics import light_from_reference, real_sh
+from .priors import Light
+
+_RINGS, _TURNS, _GRAZING = 12, 32, 0.1
+
+
+def _front() -> np.ndarray:
+    """Normals (384, 3) evenly over those before the object, left and right alike."""
+    z, turn = np.meshgrid(
+        _GRAZING + (1 - _GRAZING) * (np.arange(_RINGS) + 0.5) / _RINGS,
+        2 * np.pi * (np.arange(_TURNS) + 0.5) / _TURNS,
+    )
+    across = np.sqrt(1 - z**2)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=-1).reshape(-1, 3)
+
+
+def _look() -> np.ndarray:
+    """A (8, 9) for one channel, of the coefficients of `frames.real_sh`."""
+    values = real_sh(FRONT)
+    triangle = np.linalg.qr((values - values.mean(axis=0))[:, 1:] / np.sqrt(len(values)))[1]
+    return np.hstack([np.zeros((8, 1)), triangle * np.sign(np.diag(triangle))[:, None]])
+
+
+FRONT = _front()
+LOOK = _look()
+
+
+def seen_light(prior: Light, seen: np.ndarray, deviations: np.ndarray) -> Light:
+    """`prior` for C channels, told that the light looks like `seen` (8,), give or take `deviations`
+    (8,), > 0.
+    """
+    channels = len(prior.mean) // 9
+    look = np.hstack([LOOK @ light_from_reference(np.eye(9)) / channels] * channels)
+    across = np.einsum("ij,kj->ik", prior.covariance, look)
+    spread = np.einsum("ij,jk->ik", look, across) + np.diag(np.square(deviations))
+    gain = solved(spread, across.T).T
+    mean = prior.mean + np.einsum("ij,j->i", gain, seen - np.einsum("ij,j->i", look, prior.mean))
+    covariance = prior.covariance - np.einsum("ij,kj->ik", gain, across)
+    return Light(mean, (covariance + covariance.T) / 2, prior.unwhiten, mean)
