@@ -11,18 +11,18 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.atomic import new_folder, require_writable
 from isc_core.errors import InputError
-from isc_core.exr import write_channels
+from isc_core.io.atomic import new_folder, require_writable
+from isc_core.io.exr import write_channels
 
-from .camera import SMALLEST, Camera
-from .gourd import gourd, painted_skin
-from .lights import EnvironmentLight, Light, panel_toward_origin
-from .materials import Material
+from .capture.sensor import write_photo
+from .capture.truth import GroundTruth, exposed, render_truth
 from .rendering import RenderOptions
-from .scene import Scene
-from .sensor import write_photo
-from .truth import GroundTruth, exposed, render_truth
+from .scene.camera import SMALLEST, Camera
+from .scene.lights import EnvironmentLight, Light, panel_toward_origin
+from .scene.materials import Material
+from .scene.scene import Scene
+from .shapes.gourd import gourd, painted_skin
 
 SIZE, SAMPLES = 320, 64
 _IN_VIEW = 2.3  # object units, the side of the picture

@@ -5,10 +5,10 @@ layer.
 import argparse
 from pathlib import Path
 
-from isc_core.commands.options import Commands, add_command, count, hints, names, positive
+from isc_core.cli.interface.options import Commands, add_command, count, hints, names, positive
 from isc_core.progress import Monitor
 
-from ..glossy_mit.run import make_glossy
+from ..glossy_mit.generate import make_glossy
 from ..glossy_mit.settings import GlossySettings
 
 _EXAMPLES = """  isc synth glossy-mit DATA -o glossy

@@ -6,21 +6,21 @@ import sys
 from pathlib import Path
 from typing import get_args
 
-from isc_core.commands.options import Commands, add_command, count, hints, names, positive
+from isc_core.cli.interface.options import Commands, add_command, count, hints, names, positive
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..albedos import ALBEDOS
-from ..dataset.run import Run, make_dataset
+from ..capture.recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, Picture, Sources
+from ..capture.sensor import DEPTHS, Sensor
+from ..dataset.generate import Run, make_dataset
 from ..dataset.splits import SPLITS, Choices
 from ..light_rigs import FROM_FILES, RIGS
 from ..light_rigs.files import PANORAMAS
-from ..materials import MODELS
-from ..recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, Picture, Sources
 from ..rendering import Renderer
-from ..sensor import DEPTHS, Sensor
+from ..scene.materials import MODELS
+from ..scene.variant import slower_without
 from ..shapes import SHAPES
-from ..variant import slower_without
 from . import glossy_mit
 
 _EXAMPLES = """  isc synth --count 200 --size 128 -o scenes              about six of ten scenes to train on, the others held out

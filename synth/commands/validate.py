@@ -6,11 +6,11 @@ import argparse
 import shlex
 from pathlib import Path
 
-from isc_core.atomic import require_writable_file
-from isc_core.commands.options import Commands, add_command, count, hints, names
+from isc_core.cli.interface.options import Commands, add_command, count, hints, names
+from isc_core.decompose.pipeline import ILLUMINATIONS
+from isc_core.decompose.settings import SEPARATING_MODELS
 from isc_core.errors import InputError, Rejected
-from isc_core.models.settings import SEPARATING_MODELS
-from isc_core.pipeline import ILLUMINATIONS
+from isc_core.io.atomic import require_writable_file
 from isc_core.progress import Monitor
 from isc_core.separation import BEST, METHODS
 
@@ -112,17 +112,18 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
     Raises `Rejected` where a bound is broken, with the report written.
     """
-    from ..validation.bounds import SHIPPED, bounds_from, read_bounds, write_bounds
-    from ..validation.folder import require_writable_report, write_report
-    from ..validation.models_stage import models_stage
-    from ..validation.run import RunOptions
-    from ..validation.stages import StageOptions, find_stages
+    from ..validation.measurement.bounds import SHIPPED, bounds_from, read_bounds, write_bounds
+    from ..validation.measurement.measure import ValidationOptions
+    from ..validation.reporting.folder import require_writable_report, write_report
+    from ..validation.stages.models import models_stage
+    from ..validation.stages.registry import find_stages
+    from ..validation.stages.types import StageOptions
     from ..validation.validate import validate
 
     models = tuple(dict.fromkeys(options.models or ()))
     settings = StageOptions(options.separator, options.illumination, models=models)
     stages = find_stages(options.stages) + ((models_stage(models),) if models else ())
-    wanted = RunOptions(
+    wanted = ValidationOptions(
         options.split, options.scenes, stages, settings, options.seed, options.threads
     )
     bounds_file = SHIPPED if options.bounds is None else Path(options.bounds)

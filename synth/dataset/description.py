@@ -12,15 +12,15 @@ import numpy as np
 
 from isc_core import __version__
 
-from ..camera import Camera
-from ..finishes import gloss_class
-from ..lights import EnvironmentLight, Light
-from ..materials import Material
-from ..recipe import Picture, Recipe
-from ..scene import Scene
-from ..sensor import Sensor
-from ..truth import GroundTruth
-from ..variant import has_llvm, load_mitsuba
+from ..capture.finishes import gloss_class
+from ..capture.recipe import Picture, Recipe
+from ..capture.sensor import Sensor
+from ..capture.truth import GroundTruth
+from ..scene.camera import Camera
+from ..scene.lights import EnvironmentLight, Light
+from ..scene.materials import Material
+from ..scene.scene import Scene
+from ..scene.variant import has_llvm, load_mitsuba
 
 SCHEMA_VERSION = 1
 KIND = "isc synth scene"

@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from isc_core.atomic import new_folder
-from isc_core.decomposition import COLOR_MAPS, Decomposition, Provenance
-from isc_core.exr import write_channels
-from isc_core.report import contact_sheet
-from isc_core.result_folder import LAYERS
+from isc_core.io.atomic import new_folder
+from isc_core.io.exr import write_channels
+from isc_core.result_files.contact_sheet import contact_sheet
+from isc_core.result_files.result_folder import LAYERS
+from isc_core.scene.decomposition import COLOR_MAPS, Decomposition, Provenance
 
-from ..recipe import Recipe
-from ..scene import Scene
-from ..sensor import write_photo
-from ..truth import GroundTruth
+from ..capture.recipe import Recipe
+from ..capture.sensor import write_photo
+from ..capture.truth import GroundTruth
+from ..scene.scene import Scene
 from .description import describe
 
 DATA_FILES = (

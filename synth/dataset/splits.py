@@ -19,13 +19,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from isc_core.datasets import load_natural_lights
+from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import InputError
 
 from ..albedos import ALBEDOS
+from ..capture.recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, Part, Picture, Recipe, Sources
 from ..light_rigs import FROM_FILES, RIGS
-from ..materials import MATT, MODELS
-from ..recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, Part, Picture, Recipe, Sources
+from ..scene.materials import MATT, MODELS
 from ..shapes import SHAPES
 
 # A scene's split is the entry at its seed modulo ten.

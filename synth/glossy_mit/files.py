@@ -25,9 +25,9 @@ import cv2
 import numpy as np
 import scipy.io
 
-from isc_core.atomic import new_folder
-from isc_core.exr import write_channels
-from isc_core.sirfs.frames import light_to_reference
+from isc_core.io.atomic import new_folder
+from isc_core.io.exr import write_channels
+from isc_core.shading.spherical_harmonics import light_to_reference
 
 from ..dataset.scene_folder import checksum
 from .layers import Layers

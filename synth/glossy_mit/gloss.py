@@ -18,10 +18,10 @@ Limits: pieces are six to a lobe's width, which leaves about 1e-3 of the brighte
 
 import numpy as np
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.environment import directions, resampled, solid_angles
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.environment_map import directions, resampled, solid_angles
 
-from ..lights import PanelLight
+from ..scene.lights import PanelLight
 
 _VIEW = np.array([0.0, 0.0, 1.0])
 _CELLS = 10  # normals in one cube of side 1 / _CELLS make a group

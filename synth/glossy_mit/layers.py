@@ -2,7 +2,7 @@
 beside it.
 
 Equation: shading = exp(SH(normal)) [+ P], gloss = G(environment) [+ G(panel)], where
-`isc_core.environment` fits the environment to exp(SH), P is the panel's irradiance over pi, and G
+`isc_core.shading.environment_map` fits the environment to exp(SH), P is the panel's irradiance over pi, and G
 the normalised Blinn-Phong lobe of strength 1 (see `gloss`). In the physical variant
 `synth.rendering` renders both layers under environment and panel, with the object's own shadows.
 
@@ -15,16 +15,16 @@ from zlib import crc32
 
 import numpy as np
 
-from isc_core.environment import environment_from_shading, shading_under
 from isc_core.progress import Monitor
-from isc_core.sirfs.frames import real_sh
+from isc_core.shading.environment_map import environment_from_shading, shading_under
+from isc_core.shading.spherical_harmonics import real_sh
 
-from ..lights import EnvironmentLight, PanelLight, panel_toward_origin
-from ..materials import Material
+from ..capture.truth import fit_light
 from ..rendering import RenderOptions, light_surface
-from ..surface import Surface
-from ..tracing import Tracer
-from ..truth import fit_light
+from ..scene.lights import EnvironmentLight, PanelLight, panel_toward_origin
+from ..scene.materials import Material
+from ..scene.surface import Surface
+from ..scene.tracing import Tracer
 from .gloss import environment_gloss, panel_layers
 from .settings import GlossySettings
 from .source import Source

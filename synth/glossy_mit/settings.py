@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from isc_core.datasets import ILLUMINATIONS
+from isc_core.datasets.mit_berkeley import ILLUMINATIONS
 from isc_core.errors import InputError
 
 SCHEMA_VERSION = 1

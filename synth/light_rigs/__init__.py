@@ -1,9 +1,9 @@
 """Lights of a scene by the name of their kind, drawn at random: from a single lamp to a
 photographed environment.
 
-Directions and lengths are those of `synth.lights`: the object is about 2 wide, around the origin,
+Directions and lengths are those of `synth.scene.lights`: the object is about 2 wide, around the origin,
 the viewer toward +z. Every draw reaches the side that the viewer sees. How bright it is on the
-whole is left to the caller (`synth.truth.exposed`): the strongest lamp, or an environment on the
+whole is left to the caller (`synth.capture.truth.exposed`): the strongest lamp, or an environment on the
 average, gives a white matt surface a radiance of about 1.
 
 Limits: colours of invented lights stay within some per cent of white; those of files are as they
@@ -16,7 +16,7 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..lights import Light
+from ..scene.lights import Light
 from .areas import area_lights
 from .files import hdr_lights, natural_lights
 from .harmonics import harmonic_lights

@@ -9,7 +9,7 @@ Limits: panels are uniform; their frames and window bars are not there.
 
 import numpy as np
 
-from ..lights import Light, panel_toward_origin
+from ..scene.lights import Light, panel_toward_origin
 from .placing import ambient, places, white
 
 _NEAR, _FAR = 3.0, 6.0

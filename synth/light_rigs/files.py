@@ -2,7 +2,7 @@
 environments.
 
 The file's lights are quadratics of LOG shading for the normals that face a viewer;
-`isc_core.environment` finds an environment, never negative, that gives a shading as near as can be.
+`isc_core.shading.environment_map` finds an environment, never negative, that gives a shading as near as can be.
 Panoramas are latitude-longitude pictures, straight up in row 0, and what is in their middle stands
 at the viewer; they are turned about the vertical so that the viewer's side is lit.
 
@@ -18,13 +18,18 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.datasets import load_natural_lights
-from isc_core.environment import directions, environment_from_shading, resampled, solid_angles
+from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import InputError
-from isc_core.photo import read_linear
-from isc_core.sirfs.frames import light_from_reference
+from isc_core.photo.photo import read_linear
+from isc_core.shading.environment_map import (
+    directions,
+    environment_from_shading,
+    resampled,
+    solid_angles,
+)
+from isc_core.shading.spherical_harmonics import light_from_reference
 
-from ..lights import EnvironmentLight, Light
+from ..scene.lights import EnvironmentLight, Light
 
 PANORAMAS = (".exr", ".hdr")
 _FINE, _COARSE = 128, 64

@@ -14,9 +14,9 @@ Limits: nothing in it is sharp: no sun, no window; highlights are broad.
 import numpy as np
 from numpy.polynomial.legendre import legval
 
-from isc_core.environment import directions, solid_angles
+from isc_core.shading.environment_map import directions, solid_angles
 
-from ..lights import EnvironmentLight, Light
+from ..scene.lights import EnvironmentLight, Light
 from .placing import white
 
 _ROWS = 32

@@ -1,6 +1,6 @@
 """Small lights: one or two lamps far away or near by, usually with a little light from all around.
 
-Equation: see `synth.lights`; an irradiance of pi gives a white matt surface that faces the lamp the
+Equation: see `synth.scene.lights`; an irradiance of pi gives a white matt surface that faces the lamp the
 radiance 1.
 
 Limits: lamps have no size, so that shadows are hard and highlights as wide as the gloss alone.
@@ -8,7 +8,7 @@ Limits: lamps have no size, so that shadows are hard and highlights as wide as t
 
 import numpy as np
 
-from ..lights import DirectionalLight, Light, PointLight
+from ..scene.lights import DirectionalLight, Light, PointLight
 from .placing import perhaps_ambient, places, white
 
 _NEAR, _FAR = 2.5, 6.0

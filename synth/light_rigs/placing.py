@@ -9,9 +9,9 @@ Limits: only the side of the viewer, tilt below 90 degrees, reaches what the vie
 
 import numpy as np
 
-from isc_core.environment import directions
+from isc_core.shading.environment_map import directions
 
-from ..lights import EnvironmentLight
+from ..scene.lights import EnvironmentLight
 
 _TINT = 0.03
 _AMBIENT_ROWS = 16

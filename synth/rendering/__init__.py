@@ -1,7 +1,7 @@
 """Light on a surface, the two lobes of its material apart: from one set of samples, by Mitsuba's
 kernels or by NumPy.
 
-`mitsuba_lobes` runs in Mitsuba's LLVM variants; `array_lobes` runs everywhere, on `isc_core.brdf`,
+`mitsuba_lobes` runs in Mitsuba's LLVM variants; `array_lobes` runs everywhere, on `isc_core.shading.brdf`,
 and needs Mitsuba for its rays only. Both estimate the same integral, so each is the other's test.
 """
 
@@ -13,11 +13,11 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
-from ..lights import Light
-from ..materials import Material
-from ..surface import Surface
-from ..tracing import Tracer
-from ..variant import has_llvm
+from ..scene.lights import Light
+from ..scene.materials import Material
+from ..scene.surface import Surface
+from ..scene.tracing import Tracer
+from ..scene.variant import has_llvm
 
 Renderer = Literal["auto", "mitsuba", "arrays"]
 

@@ -17,10 +17,10 @@ import numpy as np
 
 from isc_core.progress import Monitor
 
-from ..lights import EnvironmentLight, Light, PanelLight
-from ..materials import Material
-from ..surface import Surface
-from ..tracing import Tracer
+from ..scene.lights import EnvironmentLight, Light, PanelLight
+from ..scene.materials import Material
+from ..scene.surface import Surface
+from ..scene.tracing import Tracer
 from . import Lit, RenderOptions
 from .bounced_light import World, bounced_paths
 from .direct_light import Paths, Sums, add_exactly, draw_paths, trace_paths, unshadowed

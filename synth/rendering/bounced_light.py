@@ -16,9 +16,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lights import Light
-from ..materials import Material
-from ..tracing import Tracer
+from ..scene.lights import Light
+from ..scene.materials import Material
+from ..scene.tracing import Tracer
 from .direct_light import Paths, Sums, add_exactly, draw_paths, trace_paths
 from .light_sampling import Sampler
 from .reflection import Points, Reflection, cosine_density, cosine_directions

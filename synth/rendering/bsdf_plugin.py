@@ -19,8 +19,8 @@ from typing import Any
 
 from isc_core.errors import InputError
 
-from ..materials import MODELS
-from ..variant import load_mitsuba
+from ..scene.materials import MODELS
+from ..scene.variant import load_mitsuba
 from .bsdfs import BlinnPhongGloss, GgxGloss, Lanes, PaintLobes, load_drjit
 
 NAME = "isc_paint"

@@ -4,14 +4,14 @@ which they reflect most.
 Directions are in the local frame of a point, z along its normal: `view` toward the camera, `light`
 toward the light, both unit vectors of Dr.Jit, or of numbers in a scalar variant. Parameters are
 numbers or arrays with an entry for each lane; all may carry gradients. They share no code with
-`isc_core.brdf`, so that each is the other's test.
+`isc_core.shading.brdf`, so that each is the other's test.
 
 Equation: values are f_r cos_light. A gloss is sampled by half vectors: with the density p(h) per
 solid angle of h, the light's is p(h) / (4 view . h), in proportion to cos^p of the normal for
 Blinn-Phong, and to the facets that the view sees for GGX.
 
 Citation: E. Heitz, "Sampling the GGX distribution of visible normals", Journal of Computer Graphics
-Techniques 7(4), 2018 (no DOI), as Mitsuba does it; the models' own stand in `isc_core.brdf`.
+Techniques 7(4), 2018 (no DOI), as Mitsuba does it; the models' own stand in `isc_core.shading.brdf`.
 
 Limits: reflection only. Half of the directions are drawn for the body and half for the gloss,
 whatever their strengths.
@@ -24,9 +24,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..materials import Material, Paint
-from ..tracing import lanes
-from ..variant import load_mitsuba
+from ..scene.materials import Material, Paint
+from ..scene.tracing import lanes
+from ..scene.variant import load_mitsuba
 
 # Arrays of Dr.Jit, whose types depend on the variant.
 Lanes = Any

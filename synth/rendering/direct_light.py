@@ -27,8 +27,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lights import DirectionalLight, EnvironmentLight, Light, PanelLight, PointLight
-from ..tracing import Tracer
+from ..scene.lights import DirectionalLight, EnvironmentLight, Light, PanelLight, PointLight
+from ..scene.tracing import Tracer
 from .irradiance import unoccluded_panel, unoccluded_shading
 from .light_sampling import Sampler
 from .reflection import Points, Reflection

@@ -2,8 +2,8 @@
 needs no random numbers.
 
 Problem: S(n) = 1/pi * integral of L(w) max(n . w, 0) dw for many normals, L being constant on a
-panel, or on each pixel of a picture laid out as `isc_core.environment` says.
-`isc_core.environment.shading_under` puts each pixel's light at its centre, which is off by 2e-4 at
+panel, or on each pixel of a picture laid out as `isc_core.shading.environment_map` says.
+`isc_core.shading.environment_map.shading_under` puts each pixel's light at its centre, which is off by 2e-4 at
 64 rows, and its matrix has an entry for every normal and pixel.
 
 Equation: with the pixel's moment v = integral of w dw (closed form), a pixel wholly above the
@@ -30,9 +30,9 @@ are triangles.
 
 import numpy as np
 
-from isc_core.environment import solid_angles
+from isc_core.shading.environment_map import solid_angles
 
-from ..lights import PanelLight
+from ..scene.lights import PanelLight
 
 _CELLS = 10  # normals in one cube of side 1 / _CELLS make a group
 _THINNEST = (

@@ -18,9 +18,9 @@ from typing import Protocol
 
 import numpy as np
 
-from isc_core.environment import solid_angles
+from isc_core.shading.environment_map import solid_angles
 
-from ..lights import EnvironmentLight, Light, PanelLight
+from ..scene.lights import EnvironmentLight, Light, PanelLight
 
 
 @dataclass(frozen=True)

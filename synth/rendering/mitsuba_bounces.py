@@ -17,10 +17,10 @@ import numpy as np
 
 from isc_core.progress import Monitor
 
-from ..materials import Material, Paint
-from ..surface import Surface
-from ..tracing import Tracer
-from ..variant import load_mitsuba
+from ..scene.materials import Material, Paint
+from ..scene.surface import Surface
+from ..scene.tracing import Tracer
+from ..scene.variant import load_mitsuba
 from . import Lit, RenderOptions
 from .bsdfs import load_drjit, lobes_of, rows_of
 from .mitsuba_direct import beam_light, generator, one_sample, points_at

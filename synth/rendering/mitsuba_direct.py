@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..tracing import LIFT, Tracer, lanes
-from ..variant import load_mitsuba
+from ..scene.tracing import LIFT, Tracer, lanes
+from ..scene.variant import load_mitsuba
 from .bsdfs import Lanes, Lobes, load_drjit
 from .mitsuba_lights import Beam, WideLight
 

@@ -17,11 +17,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from isc_core.environment import solid_angles
+from isc_core.shading.environment_map import solid_angles
 
-from ..lights import DirectionalLight, EnvironmentLight, Light, PanelLight, PointLight
-from ..tracing import lanes
-from ..variant import load_mitsuba
+from ..scene.lights import DirectionalLight, EnvironmentLight, Light, PanelLight, PointLight
+from ..scene.tracing import lanes
+from ..scene.variant import load_mitsuba
 from .bsdfs import Lanes, load_drjit
 from .irradiance import unoccluded_panel, unoccluded_shading
 

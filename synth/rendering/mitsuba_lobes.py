@@ -36,11 +36,11 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
-from ..lights import Light
-from ..materials import Material, Paint
-from ..surface import Surface
-from ..tracing import Tracer
-from ..variant import has_llvm, load_mitsuba
+from ..scene.lights import Light
+from ..scene.materials import Material, Paint
+from ..scene.surface import Surface
+from ..scene.tracing import Tracer
+from ..scene.variant import has_llvm, load_mitsuba
 from . import Lit, RenderOptions
 from .bsdfs import Lanes, load_drjit, lobes_of, rows_of
 from .mitsuba_bounces import World, bounced_light

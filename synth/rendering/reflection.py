@@ -1,6 +1,6 @@
 """What a material reflects at many points at once, and the directions in which it does so most.
 
-Equation: body and gloss as `synth.materials` says. Directions are drawn from the gloss, matt
+Equation: body and gloss as `synth.scene.materials` says. Directions are drawn from the gloss, matt
 materials' by the cosine (density cos / pi): Blinn-Phong's half vectors have the density (p + 1) /
 (2 pi) cos^p, those of GGX facets that of the facets that the viewer sees, D G1(view) (view . h) /
 cos_view; a half vector stands for a light direction of 1 / (4 view . h) times its density.
@@ -17,12 +17,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.ggx import Ggx, density, visible
-from isc_core.brdf.oren_nayar import OrenNayar
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.ggx import Ggx, density, visible
+from isc_core.shading.brdf.oren_nayar import OrenNayar
 
-from ..materials import Material
-from ..tracing import LIFT
+from ..scene.materials import Material
+from ..scene.tracing import LIFT
 from .rough_plastic import RoughPlastic
 
 

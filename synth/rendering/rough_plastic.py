@@ -1,7 +1,7 @@
 """Mitsuba's rough plastic, in plain arrays: a matt body under a rough dielectric interface.
 
 Equation: f_r = albedo g(cos_view) g(cos_light) / pi + F D G / (4 cos_view cos_light). D, G: GGX
-facets and Smith's separable shadowing as in `isc_core.brdf.ggx`; F: the exact Fresnel term of
+facets and Smith's separable shadowing as in `isc_core.shading.brdf.ggx`; F: the exact Fresnel term of
 unpolarised light at a dielectric, for the angle between view and half vector,
 
     F = (r_s^2 + r_p^2) / 2,   r_s = (c - n t) / (c + n t),   r_p = (n c - t) / (n c + t),   t =
@@ -21,10 +21,10 @@ One alpha for the whole object.
 
 import numpy as np
 
-from isc_core.brdf.directions import cosines
-from isc_core.brdf.ggx import Ggx
+from isc_core.shading.brdf.directions import cosines
+from isc_core.shading.brdf.ggx import Ggx
 
-from ..variant import load_mitsuba
+from ..scene.variant import load_mitsuba
 
 _KNOTS = 64  # of Mitsuba's own table, evenly spaced in the cosine
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 import numpy as np
 
 from isc_core.errors import InputError
-from synth.meshes import Mesh
+from synth.scene.meshes import Mesh
 
 from .blobby import blobby
 from .displaced import displaced

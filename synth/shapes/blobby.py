@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from synth.meshes import Mesh
+from synth.scene.meshes import Mesh
 
 from .posing import posed
 from .sphere_grid import sphere_grid

@@ -11,7 +11,7 @@ Limits: star-shaped: nothing overhangs as seen from the middle. Normals are thos
 
 import numpy as np
 
-from synth.meshes import Mesh, vertex_normals
+from synth.scene.meshes import Mesh, vertex_normals
 
 from .fields import ridged, smooth_field
 from .posing import posed

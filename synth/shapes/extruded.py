@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from synth.meshes import Mesh, grid_faces
+from synth.scene.meshes import Mesh, grid_faces
 
 from .posing import posed
 

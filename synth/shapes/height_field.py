@@ -2,7 +2,7 @@
 
 Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s, y = (H
 / 2 - r - 1/2) / s and z = (height - offset) / s, with s pixels a unit: the mapping of
-`synth.camera.Camera(W, H, s)`, bit by bit. A vertex stands at each centre, with the normal (-dh/dx,
+`synth.scene.camera.Camera(W, H, s)`, bit by bit. A vertex stands at each centre, with the normal (-dh/dx,
 -dh/dy, 1) of central differences (one-sided at the rim), and one at each corner of a pixel, at the
 mean of what the pixels around it foretell; so the mesh covers exactly the pixels that have a
 height.
@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.exr import read_channels
-from isc_core.mat_files import read_matrix
-from isc_core.numpy_files import ARCHIVE, read_array
-from synth.camera import LARGEST, SMALLEST, Camera
-from synth.meshes import Mesh
+from isc_core.io.exr import read_channels
+from isc_core.io.matlab import read_matrix
+from isc_core.io.npy import ARCHIVE, read_array
+from synth.scene.camera import LARGEST, SMALLEST, Camera
+from synth.scene.meshes import Mesh
 
 FEWEST = 64  # pixels with a height
 # of the range of heights to the larger side of the object: beyond it the unit is not the pixel

@@ -16,7 +16,7 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from synth.meshes import Mesh, joined, swept
+from synth.scene.meshes import Mesh, joined, swept
 
 from .posing import posed
 

@@ -29,11 +29,11 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from isc_core.errors import InputError
-from isc_core.limits import USUAL
-from isc_core.photo import srgb_to_linear
-from isc_core.quiet import quiet
-from synth.materials import texture_at
-from synth.meshes import Mesh
+from isc_core.io.limits import USUAL
+from isc_core.io.native_io import suppress_native_output
+from isc_core.photo.photo import srgb_to_linear
+from synth.scene.materials import texture_at
+from synth.scene.meshes import Mesh
 
 from .texture_coordinates import from_the_front
 
@@ -176,7 +176,7 @@ def _read_parts(path: Path) -> list[_Part]:
     try:
         if kind in ("glb", "gltf"):
             _check_claims(path, data)
-        with quiet():
+        with suppress_native_output():
             loaded = trimesh.load(
                 io.BytesIO(data), file_type=kind, resolver=beside, force="scene", process=False
             )
@@ -225,7 +225,7 @@ def _check_claims(path: Path, data: bytes) -> None:
 
 def _is_image(data: bytes) -> bool:
     try:
-        with quiet(), Image.open(io.BytesIO(data), formats=_PICTURES) as image:
+        with suppress_native_output(), Image.open(io.BytesIO(data), formats=_PICTURES) as image:
             USUAL.check_pixels("a texture", *image.size)
             image.load()
     except _ERRORS:

@@ -5,7 +5,7 @@ not quite from the front.
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from synth.meshes import Mesh
+from synth.scene.meshes import Mesh
 
 
 def posed(

@@ -13,7 +13,7 @@ Limits: sheets do not overhang; the back repeats the front, `_THICKNESS` behind 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from synth.meshes import Mesh, grid_faces, vertex_normals
+from synth.scene.meshes import Mesh, grid_faces, vertex_normals
 
 from .fields import smooth_field
 from .posing import posed

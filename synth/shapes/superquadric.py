@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synth.meshes import Mesh
+from synth.scene.meshes import Mesh
 
 from .posing import posed
 from .sphere_grid import sphere_grid

@@ -6,22 +6,22 @@ from pathlib import Path
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
-from .bounds import Bound, judge
-from .figures import all_figures
-from .gains import all_gains
-from .outcome import Outcome, all_budgets
-from .render_checks import check_dataset
-from .run import RunOptions, choose_scenes, run_scenes
+from .checks.render_checks import check_dataset
+from .measurement.bounds import Bound, judge
+from .measurement.figures import all_figures
+from .measurement.gains import all_gains
+from .measurement.measure import ValidationOptions, choose_scenes, run_scenes
+from .reporting.outcome import ValidationOutcome, all_budgets
 
 
 def validate(
     root: Path,
-    options: RunOptions,
+    options: ValidationOptions,
     bounds: Sequence[Bound],
     renders: int,
     command: str,
     monitor: Monitor,
-) -> Outcome:
+) -> ValidationOutcome:
     """Validates the stages on the dataset below `root`.
 
     `bounds` to judge by; `renders`: how many scenes to render again; `command`: what the report
@@ -37,7 +37,7 @@ def validate(
     figures = all_figures(options.stages, measured, options.seed)
     budgets = all_budgets(measured, options.seed)
     gains = all_gains(measured, options.seed)
-    return Outcome(
+    return ValidationOutcome(
         str(root),
         command,
         options,

@@ -19,26 +19,26 @@ from benchmarks.fuzzing import data_files
 from benchmarks.fuzzing.data_files import deflated, matlab
 from benchmarks.fuzzing.mesh_files import glb
 from benchmarks.fuzzing.pictures import array, ball, coded, codes, exr
-from isc_core.appearance import read_appearance
-from isc_core.cli import main
-from isc_core.datasets import load_natural_lights
+from isc_core.cli.main import main
+from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import InputError
-from isc_core.evidence_files import read_light
-from isc_core.exr import read_channels
-from isc_core.json_files import read_json
-from isc_core.lamp_network import read_lamp_network
-from isc_core.limits import Limits
-from isc_core.mat_files import read_matrix
-from isc_core.numpy_files import read_array, read_arrays
-from isc_core.photo import read_linear, read_photo
-from isc_core.result_folder import load
-from isc_core.separation.filter_statistics import read_table, shipped_table
-from isc_core.separation.layer_network import read_network
+from isc_core.io.exr import read_channels
+from isc_core.io.json_files import read_json
+from isc_core.io.limits import Limits
+from isc_core.io.matlab import read_matrix
+from isc_core.io.npy import read_array, read_arrays
+from isc_core.networks.layer_network import read_network
+from isc_core.networks.light_network import read_lamp_network
+from isc_core.networks.scene_classifier import read_appearance
+from isc_core.photo.photo import read_linear, read_photo
+from isc_core.result_files.known_inputs import read_light
+from isc_core.result_files.result_folder import load
+from isc_core.separation.support.filter_statistics import read_table, shipped_table
 from synth.dataset.reading import read_facts
 from synth.shapes.mesh_file import read_mesh_file
-from synth.validation import html
-from synth.validation.bounds import read_bounds
-from synth.validation.folder import FILES, _ours
+from synth.validation.measurement.bounds import read_bounds
+from synth.validation.reporting import html
+from synth.validation.reporting.folder import FILES, _ours
 
 
 @pytest.fixture

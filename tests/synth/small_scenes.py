@@ -5,14 +5,20 @@ from typing import Any
 
 import numpy as np
 
-from synth.camera import Camera
-from synth.lights import DirectionalLight, EnvironmentLight, Light, PointLight, panel_toward_origin
-from synth.materials import Material
-from synth.meshes import Mesh, swept
 from synth.scene import Scene
-from synth.surface import Surface, find_surface
-from synth.tracing import Tracer
-from synth.variant import load_mitsuba
+from synth.scene.camera import Camera
+from synth.scene.lights import (
+    DirectionalLight,
+    EnvironmentLight,
+    Light,
+    PointLight,
+    panel_toward_origin,
+)
+from synth.scene.materials import Material
+from synth.scene.meshes import Mesh, swept
+from synth.scene.surface import Surface, find_surface
+from synth.scene.tracing import Tracer
+from synth.scene.variant import load_mitsuba
 
 GREY = np.full((2, 2, 3), 0.5)
 

@@ -7,14 +7,18 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from isc_core.brdf import blinn_phong, ggx, lambert, oren_nayar
-from isc_core.brdf.energy import directional_albedo
-from isc_core.brdf.model import Model
-from isc_core.brdf.shading import Lights, radiance
-from isc_core.environment import directions, shading_under, solid_angles
 from isc_core.errors import Cancelled
 from isc_core.progress import Monitor
-from synth.lights import (
+from isc_core.shading.brdf import blinn_phong, ggx, lambert, oren_nayar
+from isc_core.shading.brdf.energy import directional_albedo
+from isc_core.shading.brdf.model import Model
+from isc_core.shading.environment_map import directions, shading_under, solid_angles
+from isc_core.shading.radiance import Lights, radiance
+from synth.rendering import Lit, RenderOptions, array_lobes, light_surface
+from synth.rendering.light_sampling import EnvironmentSampler, PanelSampler, sampler_of
+from synth.rendering.reflection import Points, Reflection
+from synth.rendering.rough_plastic import RoughPlastic, fresnel
+from synth.scene.lights import (
     DirectionalLight,
     EnvironmentLight,
     Light,
@@ -22,13 +26,9 @@ from synth.lights import (
     PointLight,
     panel_toward_origin,
 )
-from synth.materials import Material
-from synth.rendering import Lit, RenderOptions, array_lobes, light_surface
-from synth.rendering.light_sampling import EnvironmentSampler, PanelSampler, sampler_of
-from synth.rendering.reflection import Points, Reflection
-from synth.rendering.rough_plastic import RoughPlastic, fresnel
-from synth.validation.pixel_test import PixelTestOptions, pixel_test
-from synth.variant import load_mitsuba
+from synth.scene.materials import Material
+from synth.scene.variant import load_mitsuba
+from synth.validation.checks.pixel_test import PixelTestOptions, pixel_test
 from tests.synth.small_scenes import GREY, Seen, ball, lights, materials, seen, skittle, sky, toward
 
 MODELS: dict[str, tuple[Model, Model | None]] = {

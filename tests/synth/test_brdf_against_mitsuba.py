@@ -7,15 +7,15 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.energy import directional_albedo
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.model import Model
-from isc_core.brdf.oren_nayar import OrenNayar
 from isc_core.errors import InputError
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.energy import directional_albedo
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.brdf.model import Model
+from isc_core.shading.brdf.oren_nayar import OrenNayar
 from synth.rendering.bsdf_plugin import register
-from synth.variant import has_llvm, load_mitsuba
+from synth.scene.variant import has_llvm, load_mitsuba
 from tests.synth.small_scenes import mitsuba_camera
 
 SIZE, HALF = 24, 1.1

@@ -12,22 +12,22 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
+from isc_core.datasets.highlight_set import load_rendered
 from isc_core.errors import Cancelled, InputError
-from isc_core.exr import read_channels
-from isc_core.highlight_set import load_rendered
-from isc_core.photo import read_photo
+from isc_core.io.exr import read_channels
+from isc_core.photo.photo import read_photo
 from isc_core.progress import Monitor
-from isc_core.result_folder import LAYERS
-from isc_core.sirfs.frames import real_sh
-from synth.dataset import run as run_module
+from isc_core.result_files.result_folder import LAYERS
+from isc_core.shading.spherical_harmonics import real_sh
+from synth.capture.recipe import Picture, Recipe, photograph
+from synth.capture.sensor import Sensor
+from synth.dataset import generate as run_module
 from synth.dataset.description import CONVENTIONS
+from synth.dataset.generate import Run, make_dataset, plan
 from synth.dataset.reading import list_scenes, read_facts, read_truth
-from synth.dataset.run import Run, make_dataset, plan
 from synth.dataset.scene_folder import FILES
 from synth.dataset.splits import SPLITS, Choices
-from synth.materials import MODELS
-from synth.recipe import Picture, Recipe, photograph
-from synth.sensor import Sensor
+from synth.scene.materials import MODELS
 
 # One scene of each split; shapes and lights that are quick to make.
 CHOICES = Choices(

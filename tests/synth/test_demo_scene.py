@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from isc_core.exr import read_channels
+from isc_core.io.exr import read_channels
+from synth.capture.truth import GroundTruth
 from synth.demo_scene import demo_object, main, soft_sky
-from synth.truth import GroundTruth
 
 
 @pytest.fixture(scope="module")

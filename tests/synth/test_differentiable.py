@@ -1,5 +1,5 @@
 """Derivatives of a rendered pixel that Dr.Jit carries through the plugin, against the hand-written
-gradients of `isc_core.brdf`.
+gradients of `isc_core.shading.brdf`.
 """
 
 import numpy as np
@@ -7,11 +7,11 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.lambert import Lambert
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.lambert import Lambert
 from synth.rendering.bsdf_plugin import register
-from synth.variant import has_llvm, load_mitsuba
+from synth.scene.variant import has_llvm, load_mitsuba
 from tests.synth.small_scenes import mitsuba_camera
 
 SIZE = 16

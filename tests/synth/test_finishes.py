@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from isc_core.brdf.roughness import fitted_exponent
 from isc_core.errors import InputError
-from synth.finishes import (
+from isc_core.shading.brdf.roughness import fitted_exponent
+from synth.capture.finishes import (
     EXPONENTS,
     FACET_STRENGTHS,
     FINISHES,
@@ -14,7 +14,7 @@ from synth.finishes import (
     gloss_class,
     make_material,
 )
-from synth.materials import MODELS, Material
+from synth.scene.materials import MODELS, Material
 
 WHITE = np.full((2, 3, 3), 0.5)
 GLOSSY = ("blinn_phong", "ggx", "roughplastic")

@@ -12,24 +12,24 @@ import numpy as np
 import pytest
 import scipy.io
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.commands.options import Parser
-from isc_core.datasets import list_objects, load_object
-from isc_core.environment import directions, resampled, shading_under, solid_angles
+from isc_core.cli.interface.options import Parser
+from isc_core.datasets.highlight_set import load_laboratory
+from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.errors import Cancelled, InputError
-from isc_core.exr import read_channels
-from isc_core.highlight_set import load_laboratory
-from isc_core.metrics import truth_normal
+from isc_core.evaluation.metrics import truth_normal
+from isc_core.io.exr import read_channels
 from isc_core.progress import Monitor
-from isc_core.sirfs.frames import light_from_reference, real_sh
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.environment_map import directions, resampled, shading_under, solid_angles
+from isc_core.shading.spherical_harmonics import light_from_reference, real_sh
 from synth.commands import glossy_mit
 from synth.glossy_mit.files import LABORATORY_FILES, NATURAL_FILES
+from synth.glossy_mit.generate import make_glossy
 from synth.glossy_mit.gloss import environment_gloss, panel_layers
 from synth.glossy_mit.layers import make_layers, surface_of
-from synth.glossy_mit.run import make_glossy
 from synth.glossy_mit.settings import LIGHTS, GlossySettings, root_name, root_names
 from synth.glossy_mit.source import Source, load_source
-from synth.lights import lights_as_environment, panel_toward_origin
+from synth.scene.lights import lights_as_environment, panel_toward_origin
 
 VIEW = np.array([0.0, 0.0, 1.0])
 OBJECT = "teabag2"
@@ -104,7 +104,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("exponent", [10.0, 100.0, 1000.0])
 def test_the_gloss_of_an_environment_is_the_integral_of_the_lobe(exponent: float) -> None:
-    """Against `isc_core.brdf`, which sums over a finer environment without leaving anything out."""
+    """Against `isc_core.shading.brdf`, which sums over a finer environment without leaving anything out."""
     sky = np.random.default_rng(1).gamma(1.0, size=(8, 16, 3))
     normal, rows = facing(6), 160
     toward, solid = directions(rows).reshape(-1, 3), solid_angles(rows).reshape(-1, 1)
@@ -118,7 +118,7 @@ def test_the_gloss_of_an_environment_is_the_integral_of_the_lobe(exponent: float
 
 
 def test_a_uniform_environment_seen_head_on_gives_the_lobes_energy() -> None:
-    """Closed form, see `isc_core.brdf.blinn_phong`: (p + 8) (p + 2^(-p/2)) / ((p + 2) (p + 4))."""
+    """Closed form, see `isc_core.shading.brdf.blinn_phong`: (p + 8) (p + 2^(-p/2)) / ((p + 2) (p + 4))."""
     for exponent in (9.0, 100.0):
         wanted = (
             (exponent + 8) * (exponent + 2 ** (-exponent / 2)) / ((exponent + 2) * (exponent + 4))
@@ -142,11 +142,11 @@ def test_the_gloss_is_what_mitsuba_renders(bump: Source) -> None:
     that nothing is before.
     """
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
-    from synth.lights import EnvironmentLight
-    from synth.materials import Material
-    from synth.meshes import Mesh
     from synth.rendering import RenderOptions, light_surface
-    from synth.tracing import Tracer
+    from synth.scene.lights import EnvironmentLight
+    from synth.scene.materials import Material
+    from synth.scene.meshes import Mesh
+    from synth.scene.tracing import Tracer
 
     far = np.array([[0, 0, -1e5], [1e-3, 0, -1e5], [0, 1e-3, -1e5]])
     nothing = Tracer(Mesh(far, np.tile(VIEW, (3, 1)), np.zeros((3, 2)), np.array([[0, 1, 2]])))

@@ -7,10 +7,12 @@ import pytest
 import scipy.io
 
 from isc_core.errors import InputError
-from isc_core.exr import write_channels
-from synth.lights import DirectionalLight
-from synth.materials import Material
+from isc_core.io.exr import write_channels
 from synth.scene import Scene
+from synth.scene.lights import DirectionalLight
+from synth.scene.materials import Material
+from synth.scene.surface import Surface, find_surface
+from synth.scene.tracing import Tracer
 from synth.shapes.height_field import (
     HeightField,
     check_height,
@@ -18,8 +20,6 @@ from synth.shapes.height_field import (
     place_height,
     read_height,
 )
-from synth.surface import Surface, find_surface
-from synth.tracing import Tracer
 
 
 def bumpy_map(rows: int = 37, columns: int = 52) -> np.ndarray:

@@ -9,14 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
-from isc_core.datasets import load_natural_lights
-from isc_core.environment import directions, shading_under, solid_angles
+from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import InputError
-from isc_core.exr import write_channels
-from isc_core.sirfs.frames import light_from_reference, real_sh
+from isc_core.io.exr import write_channels
+from isc_core.shading.environment_map import directions, shading_under, solid_angles
+from isc_core.shading.spherical_harmonics import light_from_reference, real_sh
 from synth.light_rigs import RIGS, make_lights
 from synth.light_rigs.files import read_panorama
-from synth.lights import (
+from synth.scene.lights import (
     DirectionalLight,
     EnvironmentLight,
     Light,

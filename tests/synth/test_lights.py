@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from isc_core.environment import directions, shading_under, solid_angles
 from isc_core.errors import InputError
-from synth.lights import (
+from isc_core.shading.environment_map import directions, shading_under, solid_angles
+from synth.scene.lights import (
     DirectionalLight,
     EnvironmentLight,
     Light,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from isc_core.errors import InputError
-from synth.materials import MATT, MODELS, Material, texture_at
+from synth.scene.materials import MATT, MODELS, Material, texture_at
 
 GREY = np.full((2, 2, 3), 0.5)
 

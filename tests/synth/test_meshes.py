@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from synth.gourd import gourd, painted_skin
-from synth.meshes import Mesh, swept, write_ply
+from synth.scene.meshes import Mesh, swept, write_ply
+from synth.shapes.gourd import gourd, painted_skin
 
 
 def unit_sphere(rows: int = 61, columns: int = 121) -> Mesh:

@@ -9,19 +9,22 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.energy import directional_albedo
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.model import Model
-from isc_core.brdf.oren_nayar import OrenNayar
-from isc_core.brdf.shading import directional, radiance
-from isc_core.environment import directions, shading_under, solid_angles
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
-from isc_core.sirfs.frames import real_sh
-from synth.camera import Camera
-from synth.lights import (
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.energy import directional_albedo
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.brdf.model import Model
+from isc_core.shading.brdf.oren_nayar import OrenNayar
+from isc_core.shading.environment_map import directions, shading_under, solid_angles
+from isc_core.shading.radiance import directional, radiance
+from isc_core.shading.spherical_harmonics import real_sh
+from synth.rendering import Lit, RenderOptions, light_surface
+from synth.rendering.irradiance import unoccluded_panel, unoccluded_shading
+from synth.scene import Scene
+from synth.scene.camera import Camera
+from synth.scene.lights import (
     DirectionalLight,
     EnvironmentLight,
     Light,
@@ -29,15 +32,12 @@ from synth.lights import (
     PointLight,
     panel_toward_origin,
 )
-from synth.materials import Material
-from synth.meshes import Mesh, swept
-from synth.rendering import Lit, RenderOptions, light_surface
-from synth.rendering.irradiance import unoccluded_panel, unoccluded_shading
-from synth.scene import Scene
-from synth.surface import Surface, find_surface
-from synth.tracing import Tracer
-from synth.validation.pixel_test import PixelTestOptions, pixel_test
-from synth.variant import has_llvm
+from synth.scene.materials import Material
+from synth.scene.meshes import Mesh, swept
+from synth.scene.surface import Surface, find_surface
+from synth.scene.tracing import Tracer
+from synth.scene.variant import has_llvm
+from synth.validation.checks.pixel_test import PixelTestOptions, pixel_test
 
 WHITE = np.ones((1, 1, 3))
 MATERIALS: dict[str, tuple[Material, Model, Model]] = {
@@ -272,7 +272,7 @@ def test_light_between_parts_of_the_object_is_that_of_mitsubas_path_tracer(model
     kernels_or_skip()
     from synth.rendering.bsdf_plugin import register
     from synth.rendering.bsdfs import rough_plastic
-    from synth.variant import load_mitsuba
+    from synth.scene.variant import load_mitsuba
 
     mi = load_mitsuba()
     material = Material(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from isc_core.errors import InputError
-from isc_core.exr import read_channels
-from synth.validation.pixel_test import (
+from isc_core.io.exr import read_channels
+from synth.validation.checks.pixel_test import (
     PixelTestOptions,
     PixelTestResult,
     keep_evidence,

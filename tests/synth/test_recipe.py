@@ -10,13 +10,13 @@ import pytest
 
 from isc_core.errors import InputError
 from synth.albedos import ALBEDOS
+from synth.capture.recipe import Part, Picture, Recipe, Sources, build, camera_around, photograph
+from synth.capture.sensor import Sensor
 from synth.dataset.splits import SPLITS, Choices, Pools, make_pools
 from synth.light_rigs import RIGS
-from synth.lights import EnvironmentLight, PanelLight
-from synth.materials import MATT, MODELS
-from synth.recipe import Part, Picture, Recipe, Sources, build, camera_around, photograph
 from synth.scene import Scene
-from synth.sensor import Sensor
+from synth.scene.lights import EnvironmentLight, PanelLight
+from synth.scene.materials import MATT, MODELS
 from synth.shapes import SHAPES
 
 SMALL = Picture(size=32, samples=4, renderer="arrays")

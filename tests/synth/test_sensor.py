@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from isc_core.errors import InputError
-from isc_core.photo import linear_to_srgb, read_photo, srgb_to_linear
-from synth.sensor import READ, Sensor, noise_deviation, observe, write_photo
-from synth.truth import GroundTruth
+from isc_core.photo.photo import linear_to_srgb, read_photo, srgb_to_linear
+from synth.capture.sensor import READ, Sensor, noise_deviation, observe, write_photo
+from synth.capture.truth import GroundTruth
 
 
 def truth_of(diffuse: np.ndarray, specular: np.ndarray, mask: np.ndarray) -> GroundTruth:

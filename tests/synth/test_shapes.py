@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from isc_core.errors import InputError
-from synth.meshes import Mesh, vertex_normals
+from synth.scene.meshes import Mesh, vertex_normals
 from synth.shapes import SHAPES, make_shape
 from synth.shapes.blobby import Blobs
 from synth.shapes.displaced import STYLES, displacement

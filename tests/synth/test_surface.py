@@ -6,12 +6,12 @@ import pytest
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
 from isc_core.errors import InputError
-from synth.camera import FAR, Camera
-from synth.materials import Material
-from synth.meshes import Mesh
 from synth.scene import Scene
-from synth.surface import find_surface
-from synth.tracing import Tracer
+from synth.scene.camera import FAR, Camera
+from synth.scene.materials import Material
+from synth.scene.meshes import Mesh
+from synth.scene.surface import find_surface
+from synth.scene.tracing import Tracer
 from tests.synth.small_scenes import GREY, ball, seen
 
 SIZE = 40

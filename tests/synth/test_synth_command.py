@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core import commands
-from isc_core.cli import main
-from isc_core.exr import write_channels
+from isc_core.cli import commands
+from isc_core.cli.main import main
+from isc_core.io.exr import write_channels
 
 ROOT = Path(__file__).resolve().parents[2]
 QUICK = (
@@ -57,7 +57,7 @@ def isolated(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 def test_help_needs_no_mitsuba_and_running_says_what_to_install(tmp_path: Path) -> None:
-    start = "from isc_core.cli import main; sys.exit(main(sys.argv[1:]))"
+    start = "from isc_core.cli.main import main; sys.exit(main(sys.argv[1:]))"
     shown = isolated(start, "synth", "--help")
     assert shown.returncode == 0, shown.stderr
     assert {"--count", "--natural-lights", "--renderer"} <= set(
@@ -73,7 +73,7 @@ def test_help_needs_no_mitsuba_and_running_says_what_to_install(tmp_path: Path) 
 
 
 def test_the_parser_loads_no_renderer() -> None:
-    code = "import sys; from isc_core.commands import build_parser; build_parser(); sys.exit(bool({'mitsuba', 'drjit'} & set(sys.modules)))"
+    code = "import sys; from isc_core.cli.commands import build_parser; build_parser(); sys.exit(bool({'mitsuba', 'drjit'} & set(sys.modules)))"
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -257,7 +257,7 @@ def test_a_painted_mesh_keeps_its_paint(tmp_path: Path) -> None:
 
 def test_interrupting_ends_with_130(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
-    code = "import sys; from isc_core.cli import main; sys.exit(main(sys.argv[1:]))"
+    code = "import sys; from isc_core.cli.main import main; sys.exit(main(sys.argv[1:]))"
     arguments = [
         "synth",
         "--count",

@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from synth.tracing import LIFT, Tracer
-from synth.variant import has_llvm, load_mitsuba
+from synth.scene.tracing import LIFT, Tracer
+from synth.scene.variant import has_llvm, load_mitsuba
 from tests.synth.small_scenes import ball, skittle
 
 

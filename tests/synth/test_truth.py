@@ -5,14 +5,14 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
-from isc_core.sirfs.frames import real_sh
-from synth.camera import Camera
-from synth.gourd import gourd, painted_skin
-from synth.lights import DirectionalLight, EnvironmentLight, panel_toward_origin
-from synth.materials import Material
+from isc_core.shading.spherical_harmonics import real_sh
+from synth.capture.truth import GroundTruth, exposed, fit_light, render_truth
 from synth.rendering import RenderOptions
 from synth.scene import Scene
-from synth.truth import GroundTruth, exposed, fit_light, render_truth
+from synth.scene.camera import Camera
+from synth.scene.lights import DirectionalLight, EnvironmentLight, panel_toward_origin
+from synth.scene.materials import Material
+from synth.shapes.gourd import gourd, painted_skin
 
 RADIOMETRIC = ("image", "diffuse", "specular", "residual", "shading")
 

@@ -13,9 +13,14 @@ import pytest
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
 from synth.rendering import Lit, Renderer, RenderOptions, light_surface
-from synth.surface import Surface
-from synth.validation.pixel_test import PixelTestOptions, PixelTestResult, keep_evidence, pixel_test
-from synth.variant import has_llvm, load_mitsuba
+from synth.scene.surface import Surface
+from synth.scene.variant import has_llvm, load_mitsuba
+from synth.validation.checks.pixel_test import (
+    PixelTestOptions,
+    PixelTestResult,
+    keep_evidence,
+    pixel_test,
+)
 from tests.synth.small_scenes import Seen, lights, materials, seen, skittle
 
 SAMPLES = 256

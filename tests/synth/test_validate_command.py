@@ -11,24 +11,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.cli import main
+from isc_core.cli.main import main
 from isc_core.errors import Cancelled
-from isc_core.exr import read_channels
-from isc_core.metrics import Scores
+from isc_core.evaluation.metrics import Scores
+from isc_core.io.exr import read_channels
 from isc_core.progress import Monitor
 from synth.dataset import reading
 from synth.dataset.reading import SceneFacts
-from synth.validation import html as html_module
-from synth.validation import render_checks
-from synth.validation.bounds import Bound, Verdict, read_bounds, write_bounds
-from synth.validation.cases import Case
-from synth.validation.figures import CHAIN, all_figures
-from synth.validation.folder import FILES, write_report
-from synth.validation.outcome import Outcome, all_budgets, to_json
-from synth.validation.render_checks import RenderCheck, check_shading, needs_files, read_recipe
-from synth.validation.run import RunOptions, SceneResult, StageResult
-from synth.validation.stages import Picture, find_stages
-from synth.validation.substitution import COMBINATIONS, ChainScores
+from synth.validation.checks import render_checks
+from synth.validation.checks.render_checks import (
+    RenderCheck,
+    check_shading,
+    needs_files,
+    read_recipe,
+)
+from synth.validation.measurement.bounds import Bound, Verdict, read_bounds, write_bounds
+from synth.validation.measurement.figures import CHAIN, all_figures
+from synth.validation.measurement.measure import SceneResult, StageResult, ValidationOptions
+from synth.validation.measurement.substitution import COMBINATIONS, ChainScores
+from synth.validation.reporting import html as html_module
+from synth.validation.reporting.cases import ValidationCase
+from synth.validation.reporting.folder import FILES, write_report
+from synth.validation.reporting.outcome import ValidationOutcome, all_budgets, to_json
+from synth.validation.stages.registry import find_stages
+from synth.validation.stages.types import StagePicture
 
 pytest.importorskip("mitsuba", reason="rendered scenes need Mitsuba")
 
@@ -306,10 +312,10 @@ def test_text_from_outside_cannot_become_markup() -> None:
         )
 
     scenes = tuple(scene(name) for name in (evil, "b", evil, "b"))
-    options = RunOptions(stages=find_stages(("sirfs",)))
+    options = ValidationOptions(stages=find_stages(("sirfs",)))
     figures, budgets = all_figures(options.stages, scenes, 0), all_budgets(scenes, 0)
     verdicts = (Verdict(Bound("sirfs", evil, evil, evil, 1.0), figures[0].interval, True),)
-    outcome = Outcome(
+    outcome = ValidationOutcome(
         evil,
         evil,
         options,
@@ -321,7 +327,9 @@ def test_text_from_outside_cannot_become_markup() -> None:
         (evil,),
     )
     text = html_module.page(
-        outcome, [Case(CHAIN, "worst", evil, evil, (Picture(evil, np.zeros((4, 4, 3))),))], [evil]
+        outcome,
+        [ValidationCase(CHAIN, "worst", evil, evil, (StagePicture(evil, np.zeros((4, 4, 3))),))],
+        [evil],
     )
     page = Page(text)
     assert (
@@ -342,7 +350,7 @@ def test_text_from_outside_cannot_become_markup() -> None:
 
 
 def test_a_cancelled_report_leaves_nothing(tmp_path: Path) -> None:
-    outcome = Outcome("d", "c", RunOptions(), (), (), (), (), ())
+    outcome = ValidationOutcome("d", "c", ValidationOptions(), (), (), (), (), ())
     with pytest.raises(Cancelled):
         write_report(outcome, tmp_path / "out", Monitor(cancelled=lambda: True))
     assert list(tmp_path.iterdir()) == []

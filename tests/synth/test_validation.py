@@ -7,24 +7,33 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.decomposition import Separation
 from isc_core.errors import Cancelled, InputError
-from isc_core.metrics import Scores
+from isc_core.evaluation.metrics import Scores
+from isc_core.imaging.framing import continued_height
 from isc_core.progress import Monitor
-from isc_core.sirfs.frames import real_sh
-from isc_core.sirfs.framing import continued_height
+from isc_core.scene.decomposition import Separation
+from isc_core.shading.spherical_harmonics import real_sh
+from synth.capture.truth import GroundTruth
 from synth.dataset.reading import SceneFacts
-from synth.truth import GroundTruth
-from synth.validation.bootstrap import Interval, mean_interval
-from synth.validation.bounds import FEWEST, Bound, bounds_from, judge, read_bounds, write_bounds
-from synth.validation.figures import CHAIN, Figure, all_figures, scene_value
-from synth.validation.render_checks import check_identities
-from synth.validation.run import SceneResult, StageResult, measure_scene, side_by_side
-from synth.validation.separation_stage import SEPARATION, SeparationScores, score_separation
-from synth.validation.sirfs_stage import SIRFS, run_sirfs, score_sirfs, show_sirfs, with_normals
-from synth.validation.slices import EVERYTHING, Slice, all_slices
-from synth.validation.stages import Metric, StageOptions, all_stages, find_stages, given
-from synth.validation.substitution import (
+from synth.validation.checks.render_checks import check_identities
+from synth.validation.measurement.bootstrap import Interval, mean_interval
+from synth.validation.measurement.bounds import (
+    FEWEST,
+    Bound,
+    bounds_from,
+    judge,
+    read_bounds,
+    write_bounds,
+)
+from synth.validation.measurement.figures import CHAIN, Figure, all_figures, scene_value
+from synth.validation.measurement.measure import (
+    SceneResult,
+    StageResult,
+    measure_scene,
+    side_by_side,
+)
+from synth.validation.measurement.slices import EVERYTHING, Slice, all_slices
+from synth.validation.measurement.substitution import (
     COMBINATIONS,
     METRICS,
     TRUTHS,
@@ -32,6 +41,10 @@ from synth.validation.substitution import (
     budget,
     chain_value,
 )
+from synth.validation.stages.registry import all_stages, find_stages
+from synth.validation.stages.separation import SEPARATION, SeparationScores, score_separation
+from synth.validation.stages.sirfs import SIRFS, run_sirfs, score_sirfs, show_sirfs, with_normals
+from synth.validation.stages.types import Metric, StageOptions, stage_inputs
 
 SIZE = 40
 
@@ -170,7 +183,7 @@ def test_of_a_matt_scene_only_what_was_taken_counts() -> None:
 
 def test_the_exact_answer_has_no_error() -> None:
     truth = sphere()
-    inputs = given(truth, TRUTHS)
+    inputs = stage_inputs(truth, TRUTHS)
     exact = with_normals(
         inputs, truth.height.astype(float), truth.normal.astype(float), truth.illumination
     )
@@ -185,7 +198,8 @@ def test_the_exact_answer_has_no_error() -> None:
 def test_with_all_truths_nothing_is_solved_and_only_the_pixel_grid_errs() -> None:
     truth = sphere()
     scores = score_sirfs(
-        truth, run_sirfs(given(truth, TRUTHS), StageOptions(), Monitor(cancelled=lambda: True))
+        truth,
+        run_sirfs(stage_inputs(truth, TRUTHS), StageOptions(), Monitor(cancelled=lambda: True)),
     )
     assert scores.height == 0 and scores.light < 1e-20
     assert scores.normal < 0.05 and chain_value(scores, "images") < 2e-3
@@ -194,9 +208,9 @@ def test_with_all_truths_nothing_is_solved_and_only_the_pixel_grid_errs() -> Non
 @pytest.mark.parametrize("grey", [False, True])
 def test_what_is_given_is_kept(grey: bool) -> None:
     truth = sphere(grey=grey)
-    shape_known = run_sirfs(given(truth, ("diffuse", "shape")), StageOptions(), Monitor())
+    shape_known = run_sirfs(stage_inputs(truth, ("diffuse", "shape")), StageOptions(), Monitor())
     assert np.array_equal(shape_known.height[truth.mask], truth.height[truth.mask].astype(float))
-    light_known = run_sirfs(given(truth, ("diffuse", "light")), StageOptions(), Monitor())
+    light_known = run_sirfs(stage_inputs(truth, ("diffuse", "light")), StageOptions(), Monitor())
     assert np.allclose(light_known.light, truth.illumination, atol=1e-6)
     for answer in (shape_known, light_known):
         remade = (answer.reflectance * answer.shading)[truth.mask]
@@ -216,9 +230,9 @@ def test_sirfs_refuses_what_is_black() -> None:
     truth = sphere()
     black = replace(truth, diffuse=0 * truth.diffuse)
     with pytest.raises(InputError, match="black"):
-        run_sirfs(given(black, ("diffuse",)), StageOptions(), Monitor())
+        run_sirfs(stage_inputs(black, ("diffuse",)), StageOptions(), Monitor())
     with pytest.raises(InputError, match="black"):
-        score_sirfs(black, run_sirfs(given(truth, TRUTHS), StageOptions(), Monitor()))
+        score_sirfs(black, run_sirfs(stage_inputs(truth, TRUTHS), StageOptions(), Monitor()))
 
 
 def test_the_budget_is_the_mean_over_orders_and_adds_up() -> None:

@@ -8,21 +8,21 @@ import pytest
 pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
 from isc_core.progress import Monitor
-from synth.camera import Camera
-from synth.lights import DirectionalLight, EnvironmentLight, Light
-from synth.materials import Material
+from synth.capture.truth import GroundTruth, render_truth
 from synth.rendering import RenderOptions
 from synth.scene import Scene
-from synth.truth import GroundTruth, render_truth
-from synth.validation.lobe_stage import (
-    GLOSS,
-    GlossScores,
-    gloss_maps,
-    run_gloss,
-    score_gloss,
-    show_gloss,
+from synth.scene.camera import Camera
+from synth.scene.lights import DirectionalLight, EnvironmentLight, Light
+from synth.scene.materials import Material
+from synth.validation.stages.lobe import (
+    LOBE,
+    LobeScores,
+    lobe_maps,
+    run_lobe,
+    score_lobe,
+    show_lobe,
 )
-from synth.validation.stages import StageOptions, given
+from synth.validation.stages.types import StageOptions, stage_inputs
 from tests.synth.small_scenes import ball
 
 SUN = DirectionalLight(np.array([-0.3, 0.4, np.sqrt(0.75)]), np.full(3, 2.0))
@@ -38,8 +38,8 @@ def rendered(material: Material, light: Light) -> GroundTruth:
     )
 
 
-def scores(truth: GroundTruth) -> GlossScores:
-    return score_gloss(truth, run_gloss(given(truth, GLOSS.needs), StageOptions(), Monitor()))
+def scores(truth: GroundTruth) -> LobeScores:
+    return score_lobe(truth, run_lobe(stage_inputs(truth, LOBE.needs), StageOptions(), Monitor()))
 
 
 @pytest.mark.parametrize(
@@ -56,18 +56,18 @@ def test_the_roughness_of_a_ball_in_the_sun_is_found(material: Material) -> None
 
 
 def test_nothing_is_told_of_a_matt_ball_and_under_a_smooth_sky() -> None:
-    assert scores(rendered(Material(RED, "lambert"), SUN)) == GlossScores(invented=0.0)
-    assert scores(rendered(Material(RED, "ggx", 0.2, 1.0), SKY)) == GlossScores(determined=0.0)
+    assert scores(rendered(Material(RED, "lambert"), SUN)) == LobeScores(invented=0.0)
+    assert scores(rendered(Material(RED, "ggx", 0.2, 1.0), SKY)) == LobeScores(determined=0.0)
 
 
 def test_what_it_shows_and_keeps() -> None:
     truth = rendered(Material(RED, "ggx", 0.2, 1.0), SUN)
-    answer = run_gloss(given(truth, GLOSS.needs), StageOptions(), Monitor())
-    assert [picture.caption for picture in show_gloss(truth, answer)] == [
+    answer = run_lobe(stage_inputs(truth, LOBE.needs), StageOptions(), Monitor())
+    assert [picture.caption for picture in show_lobe(truth, answer)] == [
         "photo",
         "specular, true",
         "specular, of the fit",
     ]
-    np.testing.assert_allclose(gloss_maps(answer)["specular.R"], truth.specular[..., 0], atol=1e-6)
+    np.testing.assert_allclose(lobe_maps(answer)["specular.R"], truth.specular[..., 0], atol=1e-6)
     with pytest.raises(ValueError, match="known shape"):
-        run_gloss(replace(given(truth, GLOSS.needs), height=None), StageOptions(), Monitor())
+        run_lobe(replace(stage_inputs(truth, LOBE.needs), height=None), StageOptions(), Monitor())

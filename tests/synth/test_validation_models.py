@@ -15,28 +15,36 @@ import pytest
 
 pytest.importorskip("mitsuba", reason="rendered scenes need Mitsuba")
 
-from isc_core.cli import main
-from isc_core.decomposition import Separation
-from isc_core.evaluate import Estimate
-from isc_core.metrics import Scores
-from isc_core.models import Answer, Settings, Task, layers, shape, solve
-from isc_core.models.settings import SEPARATING_MODELS
-from isc_core.photo import Photo, PhotoSource
+from isc_core.cli.main import main
+from isc_core.decompose import layers, shape
+from isc_core.decompose.models import Answer, Settings, Task, solve
+from isc_core.decompose.settings import SEPARATING_MODELS
+from isc_core.evaluation.evaluate import Estimate
+from isc_core.evaluation.metrics import Scores
+from isc_core.numerics.lbfgs import LbfgsOptions
+from isc_core.photo.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
+from isc_core.scene.decomposition import Separation
 from isc_core.separation import separate
-from isc_core.sirfs.lbfgs import LbfgsOptions
 from isc_core.sirfs.recover import RecoverOptions
 from isc_core.sirfs.solver import SolverOptions
-from synth.truth import GroundTruth
-from synth.validation import separation_stage
-from synth.validation.bootstrap import Interval
-from synth.validation.cases import write_evidence
-from synth.validation.figures import CHAIN, all_figures
-from synth.validation.gains import all_gains
-from synth.validation.html import page
-from synth.validation.markdown import summary
-from synth.validation.model_tables import model_findings, model_tables
-from synth.validation.models_stage import (
+from synth.capture.truth import GroundTruth
+from synth.validation.measurement.bootstrap import Interval
+from synth.validation.measurement.figures import CHAIN, all_figures
+from synth.validation.measurement.gains import all_gains
+from synth.validation.measurement.measure import (
+    SceneResult,
+    StageResult,
+    ValidationOptions,
+    measure_scene,
+)
+from synth.validation.reporting.cases import write_evidence
+from synth.validation.reporting.html import page
+from synth.validation.reporting.markdown import summary
+from synth.validation.reporting.model_tables import model_findings, model_tables
+from synth.validation.reporting.outcome import ValidationOutcome
+from synth.validation.stages import separation as separation_stage
+from synth.validation.stages.models import (
     PLAIN,
     TRUE_DIFFUSE,
     Variants,
@@ -44,10 +52,9 @@ from synth.validation.models_stage import (
     run_models,
     score_models,
 )
-from synth.validation.outcome import Outcome
-from synth.validation.run import RunOptions, SceneResult, StageResult, measure_scene
-from synth.validation.separation_stage import SEPARATION
-from synth.validation.stages import BLACK, StageOptions, find_stages, given
+from synth.validation.stages.registry import find_stages
+from synth.validation.stages.separation import SEPARATION
+from synth.validation.stages.types import BLACK, StageOptions, stage_inputs
 from tests.synth.test_validation import facts, sphere
 
 EVERY = StageOptions(models=("mbp", "joint", "mdr"))
@@ -121,10 +128,10 @@ def scene(name: str, true: float, mdr: float, **changes: object) -> SceneResult:
     return SceneResult(facts(name, **changes), (StageResult("models", scores, 1.0),))
 
 
-def outcome_of(scenes: tuple[SceneResult, ...]) -> Outcome:
+def outcome_of(scenes: tuple[SceneResult, ...]) -> ValidationOutcome:
     stages = (models_stage(("mdr",)),)
-    options = RunOptions(stages=stages, settings=StageOptions(models=("mdr",)))
-    return Outcome(
+    options = ValidationOptions(stages=stages, settings=StageOptions(models=("mdr",)))
+    return ValidationOutcome(
         "d",
         "c",
         options,
@@ -160,14 +167,14 @@ def test_shared_steps_change_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
         / np.where(truth.mask, truth.diffuse.mean(axis=2), 1)
     )
     joint = importlib.import_module(
-        "isc_core.models.joint"
+        "isc_core.decompose.joint"
     )  # the package has a function of that name
     seen = np.repeat(
         (left + 1.0 * (left > 0.5))[..., None], 3, axis=2
     )  # so that joint goes beyond MDR
     monkeypatch.setattr(joint, "log_ratio", lambda *given: (seen, None))
     monkeypatch.setattr(joint, "lowers_energy", kept)
-    answers = dict(run_models(given(truth, ("diffuse",)), EVERY, Monitor()).items())
+    answers = dict(run_models(stage_inputs(truth, ("diffuse",)), EVERY, Monitor()).items())
     for name in (PLAIN, *SEPARATING_MODELS):
         model = "sirfs" if name == PLAIN else name
         found, direct = answers[name], alone(truth, model)
@@ -211,7 +218,9 @@ def test_a_perfect_separation_makes_mdr_the_true_diffuse_layer_s_equal() -> None
         truth.diffuse, truth.specular, truth.residual, truth.mask.astype(np.float32)
     )
     options = StageOptions(models=("mdr",))
-    answers = run_models(replace(given(truth, ("diffuse",)), split=perfect), options, Monitor())
+    answers = run_models(
+        replace(stage_inputs(truth, ("diffuse",)), split=perfect), options, Monitor()
+    )
     assert answers.mdr is not None and answers.joint is None and answers.mbp is None
     assert np.array_equal(answers.mdr.height, answers.true_diffuse.height)
     scores = score_models(truth, answers)
@@ -387,7 +396,7 @@ def test_an_unknown_model_is_refused(
 @pytest.mark.parametrize("stage", ["models", CHAIN])
 def test_evidence_of_a_broken_bound_is_kept(dataset: Path, tmp_path: Path, stage: str) -> None:
     settings = StageOptions(models=("mdr",))
-    options = RunOptions(
+    options = ValidationOptions(
         stages=(*find_stages(None), models_stage(settings.models)), settings=settings
     )
     folder = sorted(dataset.glob("*/*/scene.json"))[0].parent

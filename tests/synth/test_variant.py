@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from isc_core.errors import InputError
-from synth import variant
-from synth.variant import llvm_is_usable, load_mitsuba, slower_without
+from synth.scene import variant
+from synth.scene.variant import llvm_is_usable, load_mitsuba, slower_without
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -43,10 +43,10 @@ def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     code = (
         "import numpy as np\n"
-        "from synth import variant\n"
+        "from synth.scene import variant\n"
         f"variant.newest_llvm = lambda: {found}\n"
-        "from synth.gourd import gourd\n"
-        "from synth.tracing import Tracer\n"
+        "from synth.shapes.gourd import gourd\n"
+        "from synth.scene.tracing import Tracer\n"
         "hits = Tracer(gourd(40, 41)).hits(np.array([[0., 0, 9]]), np.array([[0., 0, -1]]))\n"
         "assert hits.valid.all() and variant.load_mitsuba().variant() == 'scalar_rgb'\n"
         "print(variant.slower_without())\n"

@@ -7,8 +7,8 @@ import pytest
 
 pytest.importorskip("mitsuba")
 
-from isc_core.environment import solid_angles
-from synth.meshes import Mesh, write_ply
+from isc_core.shading.environment_map import solid_angles
+from synth.scene.meshes import Mesh, write_ply
 from synth.shapes import make_shape
 from training.data import rendered_scenes
 from training.data.environments import PLACES, ROWS, make_surroundings

@@ -31,17 +31,17 @@ from typing import Any
 
 import numpy as np
 
-from isc_core.atomic import new_file
 from isc_core.errors import InputError
+from isc_core.io.atomic import new_file
 from synth.albedos import ALBEDOS, make_albedo
-from synth.camera import FAR
+from synth.capture.recipe import camera_around
 from synth.light_rigs.files import PANORAMAS, read_panorama
 from synth.light_rigs.placing import toward
-from synth.meshes import Mesh, write_ply
-from synth.recipe import camera_around
+from synth.scene.camera import FAR
+from synth.scene.meshes import Mesh, write_ply
+from synth.scene.variant import load_mitsuba
 from synth.shapes import SHAPES, make_shape
 from synth.shapes.mesh_file import read_mesh_file
-from synth.variant import load_mitsuba
 from training.data.environments import PLACES, make_surroundings
 
 SIZE, SAMPLES = 192, 64
@@ -235,7 +235,7 @@ def _surface(kind: str, rng: np.random.Generator) -> dict[str, Any]:
 
 
 def _around(surroundings: np.ndarray, rng: np.random.Generator) -> dict[str, Any]:
-    """Mitsuba reads `isc_core.environment`'s layout as it is.
+    """Mitsuba reads `isc_core.shading.environment_map`'s layout as it is.
 
     Turned about the vertical, and tipped by up to 20 degrees.
     """

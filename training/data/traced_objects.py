@@ -23,17 +23,17 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from isc_core.atomic import new_file
-from isc_core.datasets import list_objects, load_object
-from isc_core.models.settings import LABORATORY
+from isc_core.datasets.mit_berkeley import list_objects, load_object
+from isc_core.decompose.settings import LABORATORY
+from isc_core.io.atomic import new_file
 from synth.albedos import ALBEDOS, make_albedo
+from synth.capture.recipe import camera_around, centred
 from synth.light_rigs.placing import toward
-from synth.materials import texture_at
-from synth.meshes import Mesh
-from synth.recipe import camera_around, centred
+from synth.scene.materials import texture_at
+from synth.scene.meshes import Mesh
+from synth.scene.tracing import LIFT, Tracer
 from synth.shapes import SHAPES, make_shape
 from synth.shapes.height_field import mesh_of_height
-from synth.tracing import LIFT, Tracer
 
 SIZE, LAMPS, PAINTS = 160, 32, 2
 _FILL = 0.9

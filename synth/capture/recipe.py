@@ -1,0 +1,258 @@
+"""What a scene is made of, as a few words and numbers, and how they become that scene.
+
+An object, a material and a light are members of families: the object "lathe03" is the fourth of the
+lathe's, the same one in every scene, under whatever material and light. So that this holds, each
+member draws from random numbers of its own, seeded by what it is called; what belongs to one scene
+alone (framing, exposure, samples, noise) draws from streams of the scene's seed.
+
+Equation: member (aspect, family, number): SeedSequence((crc32 aspect, crc32 family, number));
+scene: SeedSequence(seed, spawn_key=(k,)). The camera: pixels_per_unit = fill * size / extent, the
+extent being the wider side of the object's outline.
+
+Citation: M. E. O'Neill, "PCG: a family of simple fast space-efficient statistically good algorithms
+for random number generation", Harvey Mudd College HMC-CS-2014-0905 (2014) (NumPy's generator).
+
+Limits: members are the same only as long as the code that draws them is: `scene.json` therefore
+names the version.
+"""
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import cast
+from zlib import crc32
+
+import numpy as np
+
+from isc_core.datasets.mit_berkeley import load_natural_lights
+from isc_core.errors import InputError
+from isc_core.progress import Monitor
+from isc_core.shading.environment_map import environment_from_shading
+from isc_core.shading.spherical_harmonics import light_from_reference
+
+from ..albedos import image_albedo, make_albedo
+from ..light_rigs import make_lights
+from ..light_rigs.files import read_panorama
+from ..rendering import Renderer, RenderOptions
+from ..scene.camera import Camera
+from ..scene.lights import EnvironmentLight, Light
+from ..scene.materials import Material, Model
+from ..scene.meshes import Mesh
+from ..scene.scene import Scene
+from ..shapes import make_shape
+from ..shapes.height_field import mesh_of_height, read_height
+from ..shapes.mesh_file import read_mesh_file
+from .finishes import make_material
+from .sensor import Sensor, observe
+from .truth import GroundTruth, exposed, render_truth
+
+# Families that are read from a user's file instead of drawn; "mesh" is also the paint that a mesh
+# brings along.
+MESH_FILE, HEIGHT_FILE, IMAGE_FILE = "mesh", "height", "image"
+_DISTANCE = 5.0  # of a pinhole, object units: as one photographs things on a table
+_FILL = (0.85, 0.90)  # of the picture's side, by the object
+_LEVEL = (0.50, 0.75)  # of the brightest matt light
+_MOST_CLIPPED = 0.1  # of the image's values: what a photographer still accepts as highlights
+_FRAMING, _EXPOSURE, _SAMPLES, _NOISE = range(4)  # streams of a scene's seed
+
+
+@dataclass(frozen=True)
+class Part:
+    """A member of a family of objects, materials or lights: the `family`'s name and its `number`,
+    from 0 on.
+    """
+
+    family: str
+    number: int
+
+    @property
+    def name(self) -> str:
+        """As in folder names: `lathe03`."""
+        return f"{self.family}{self.number:02d}"
+
+    def generator(self, aspect: str) -> np.random.Generator:
+        """The random numbers that make one aspect ("shape", "albedo", "gloss", "light") of this
+        member, from their beginning.
+        """
+        words = (crc32(text.encode()) for text in (aspect, self.family))
+        return np.random.default_rng(np.random.SeedSequence([*words, self.number]))
+
+
+@dataclass(frozen=True)
+class Sources:
+    """Files that a user brings along, None where none: `mesh` and `height` of objects,
+    `albedo_image`, `natural_lights` (the folder of natural_lights.mat), `hdr` (the environments,
+    one light each, in alphabetical order).
+    """
+
+    mesh: Path | None = None
+    height: Path | None = None
+    albedo_image: Path | None = None
+    natural_lights: Path | None = None
+    hdr: tuple[Path, ...] = ()
+
+    def check(self) -> bool:
+        """Reads the files once, before any work, and says whether the mesh has colours.
+
+        Raises `InputError`.
+        """
+        if self.height is not None:
+            read_height(self.height)
+        if self.albedo_image is not None:
+            image_albedo(self.albedo_image)
+        for path in self.hdr:
+            read_panorama(path)
+        return self.mesh is not None and read_mesh_file(self.mesh).albedo is not None
+
+
+@dataclass(frozen=True)
+class Picture:
+    """How scenes are taken. `size`: of the square picture's side, pixels. `samples`, `bounces`,
+    `renderer`: see `RenderOptions`. `perspective`: a pinhole instead of an orthographic camera.
+    `exposure`: what 99.5 % of the diffuse layer's values stay below, > 0; None draws it for each
+    scene from .5 to .75, and takes less where more than a tenth of the image would be above 1.
+    `sensor`: what becomes of the light. Raises `InputError` for impossible values.
+    """
+
+    size: int = 256
+    samples: int = 64
+    bounces: int = 0
+    perspective: bool = False
+    exposure: float | None = None
+    sensor: Sensor = field(default_factory=lambda: Sensor(clip=False))
+    renderer: Renderer = "auto"
+
+    def __post_init__(self) -> None:
+        Camera(self.size, self.size, 1.0)
+        RenderOptions(self.samples, 0, self.bounces, self.renderer)
+        if self.exposure is not None and not 0 < self.exposure < np.inf:
+            raise InputError("the exposure has to be finite and above 0")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One scene. `seed` >= 0. `shape`, `material`, `light`: the members. `model`: the material's
+    reflectance, of `MODELS`; `albedo`: the family of its paint, of `ALBEDOS`, "image" or "mesh".
+    `picture`, `sources`: shared by all scenes of a run.
+    """
+
+    seed: int
+    shape: Part
+    material: Part
+    model: str
+    albedo: str
+    light: Part
+    picture: Picture = field(default_factory=Picture)
+    sources: Sources = field(default_factory=Sources)
+
+    @property
+    def name(self) -> str:
+        """Of the scene's folder."""
+        return f"{self.shape.name}_{self.material.name}_{self.light.name}_{self.seed:05d}"
+
+    def stream(self, number: int) -> np.random.SeedSequence:
+        """The scene's own random numbers of one purpose."""
+        return np.random.SeedSequence(self.seed, spawn_key=(number,))
+
+    def render_options(self) -> RenderOptions:
+        """What `render_truth` takes."""
+        seed = int(self.stream(_SAMPLES).generate_state(1)[0] & 0x7FFFFFFF)
+        return RenderOptions(
+            self.picture.samples, seed, self.picture.bounces, self.picture.renderer
+        )
+
+
+def build(recipe: Recipe) -> Scene:
+    """The scene, its lights as bright as they come.
+
+    Raises `InputError` for unknown names and files that cannot be used.
+    """
+    mesh = _mesh(recipe)
+    fill = float(np.random.default_rng(recipe.stream(_FRAMING)).uniform(*_FILL))
+    return Scene(
+        mesh,
+        _material(recipe),
+        _lights(recipe),
+        camera_around(mesh, recipe.picture.size, fill, recipe.picture.perspective),
+    )
+
+
+def photograph(recipe: Recipe, monitor: Monitor | None = None) -> tuple[Scene, GroundTruth]:
+    """The scene with its lights set, and its truth as the sensor sees it.
+
+    Raises `InputError`, `Cancelled`.
+    """
+    scene = build(recipe)
+    truth = render_truth(scene, recipe.render_options(), monitor)
+    drawn = float(np.random.default_rng(recipe.stream(_EXPOSURE)).uniform(*_LEVEL))
+    wanted = recipe.picture.exposure
+    scene, truth = exposed(scene, truth, drawn if wanted is None else wanted)
+    if wanted is None and (truth.image[truth.mask] > 1).mean() > _MOST_CLIPPED:
+        scene, truth = exposed(scene, truth, 1.0, 1 - _MOST_CLIPPED, "image")
+    return scene, observe(
+        truth, recipe.picture.sensor, np.random.default_rng(recipe.stream(_NOISE))
+    )
+
+
+def camera_around(mesh: Mesh, size: int, fill: float, perspective: bool = False) -> Camera:
+    """The camera in whose picture of `size` x `size` pixels the mesh, centred in x and y, reaches
+    `fill` of the wider side.
+    """
+    distance = _DISTANCE if perspective else np.inf
+    nearer = 1 - mesh.vertices[:, 2:] / distance
+    reach = float(np.abs(mesh.vertices[:, :2] / np.maximum(nearer, 0.1)).max())
+    return Camera(size, size, fill * size / (2 * reach), distance)
+
+
+def _mesh(recipe: Recipe) -> Mesh:
+    shape, sources = recipe.shape, recipe.sources
+    if shape.family == MESH_FILE:
+        return centred(read_mesh_file(_given(sources.mesh, "--mesh")).mesh)
+    if shape.family == HEIGHT_FILE:
+        return centred(mesh_of_height(read_height(_given(sources.height, "--height"))))
+    return centred(make_shape(shape.family, shape.generator("shape")))
+
+
+def centred(mesh: Mesh) -> Mesh:
+    """With the middle of its outline on the camera's axis."""
+    low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
+    return replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
+
+
+def _material(recipe: Recipe) -> Material:
+    albedo: np.ndarray | None
+    if recipe.albedo == IMAGE_FILE:
+        albedo = image_albedo(_given(recipe.sources.albedo_image, "--albedo-image"))
+    elif recipe.albedo == MESH_FILE:
+        albedo = read_mesh_file(_given(recipe.sources.mesh, "--mesh")).albedo
+        if albedo is None:
+            raise InputError(
+                f"{recipe.sources.mesh} has no colours of its own: name other --albedos"
+            )
+    else:
+        albedo = make_albedo(recipe.albedo, recipe.material.generator("albedo"))
+    return make_material(cast(Model, recipe.model), albedo, recipe.material.generator("gloss"))
+
+
+def _lights(recipe: Recipe) -> tuple[Light, ...]:
+    light, sources = recipe.light, recipe.sources
+    if (
+        light.family == "natural"
+    ):  # by its number in the file, so that no two members are the same light
+        found = load_natural_lights(_given(sources.natural_lights, "--natural-lights"))
+        return (
+            EnvironmentLight(
+                environment_from_shading(light_from_reference(found[..., light.number]))
+            ),
+        )
+    source = (
+        sources.hdr[light.number]
+        if light.family == "hdr" and light.number < len(sources.hdr)
+        else None
+    )
+    return make_lights(light.family, light.generator("light"), source)
+
+
+def _given(path: Path | None, option: str) -> Path:
+    if path is None:
+        raise InputError(f"this scene needs a file: give {option}")
+    return path

@@ -1,0 +1,1 @@
+"""Whether the data set itself is correct: statistical tests of its renders."""

@@ -1,0 +1,200 @@
+"""Whether a dataset's truth can be trusted: its identities, and its shading against an independent
+render.
+
+Identities, on every scene: image = diffuse + specular + residual and diffuse = reflectance *
+shading, to 1e-5 of the image's maximum. Renders, on a few scenes: the scene is built again from its
+description, painted white and rendered with another seed; the stored shading has to agree within
+the noise of both (`pixel_test`, over blocks of pixels, whose means are near normal).
+
+Limits: an independent seed finds errors of sampling and storage, not those of a shared formula,
+which the generator's own tests look for. Scenes that need a user's files cannot be built again.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from isc_core.errors import InputError
+from isc_core.progress import Monitor
+
+from ...capture.recipe import Part, Picture, Recipe, build
+from ...capture.truth import ENVIRONMENT_ROWS, GroundTruth, render_truth
+from ...dataset.reading import read_description, read_truth
+from ...scene.lights import lights_as_environment
+from .pixel_test import PixelTestOptions, PixelTestResult, pixel_test, pooled
+
+_TOLERANCE = 1e-5
+_LEVEL = 0.01  # the chance that right renders are rejected, over all scenes of a run
+_BLOCK = 4  # pixels a side
+_OTHER_SEED = 0x5EED
+
+
+@dataclass(frozen=True)
+class RenderCheck:
+    """One check of one scene: the worst `error` and the `limit` that it has to keep.
+
+    `maps`: channels of what shows why, if it failed.
+    """
+
+    scene: str
+    what: str
+    error: float
+    limit: float
+    maps: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the limit is kept."""
+        return self.error <= self.limit
+
+    @property
+    def text(self) -> str:
+        """The check in words."""
+        return (
+            f"{self.scene}: {self.what}: {self.error:.3g} "
+            + ("keeps" if self.passed else "is beyond")
+            + f" the limit {self.limit:.3g}"
+        )
+
+
+def check_dataset(
+    folders: Sequence[Path], renders: int, seed: int, monitor: Monitor
+) -> tuple[tuple[RenderCheck, ...], tuple[str, ...]]:
+    """The identities of every scene, new renders of `renders` of them drawn by `seed`, and notes on
+    what could not be checked.
+
+    Raises `InputError` for a scene that cannot be read, `Cancelled`.
+    """
+    checks: list[RenderCheck] = []
+    for done, folder in enumerate(folders):
+        monitor.part(0, 0.2).report("checking the dataset", done / len(folders))
+        checks += check_identities(folder.name, read_truth(folder))
+    if not renders:
+        return tuple(checks), ("no scene was rendered again",)
+    if find_spec("mitsuba") is None:
+        return tuple(checks), (
+            "no scene was rendered again: that needs Mitsuba, `pip install 'isc3d[synth]'`",
+        )
+    chosen = [folder for folder in folders if not needs_files(folder)]
+    order = np.random.default_rng(seed).permutation(len(chosen))[:renders]
+    for done, index in enumerate(order):
+        monitor.report("rendering again", 0.2 + 0.8 * done / len(order))
+        checks.append(check_shading(chosen[index], _LEVEL / len(order)))
+    return tuple(checks), () if chosen else (
+        "no scene was rendered again: all of them need files of yours",
+    )
+
+
+def check_identities(name: str, truth: GroundTruth) -> tuple[RenderCheck, ...]:
+    """How well the layers of a scene add and multiply up, relative to the image's maximum."""
+    scale = max(float(np.abs(truth.image).max()), 1e-12)
+    image, diffuse, specular, residual, reflectance, shading = (
+        getattr(truth, layer).astype(float)
+        for layer in ("image", "diffuse", "specular", "residual", "reflectance", "shading")
+    )
+    errors = {
+        "image = diffuse + specular + residual": image - diffuse - specular - residual,
+        "diffuse = reflectance * shading": (diffuse - reflectance * shading)[truth.mask],
+    }
+    return tuple(
+        RenderCheck(name, what, float(np.abs(error).max()) / scale, _TOLERANCE)
+        for what, error in errors.items()
+    )
+
+
+def check_shading(folder: Path, level: float) -> RenderCheck:
+    """The stored shading of a scene against that of a new render, painted white, with another seed.
+
+    `level`: the chance that a right scene is rejected. Raises `InputError` where the scene cannot
+    be built again.
+    """
+    stored = read_truth(folder)
+    recipe = read_recipe(folder)
+    scene = build(recipe)
+    gain = stored.environment.sum(dtype=float) / max(
+        float(lights_as_environment(scene.lights, ENVIRONMENT_ROWS).sum(dtype=float)), 1e-30
+    )
+    white = replace(scene, material=replace(scene.material, albedo=np.ones((1, 1, 3))))
+    options = recipe.render_options()
+    again = render_truth(white, replace(options, seed=options.seed ^ _OTHER_SEED)).brightened(
+        float(gain)
+    )
+    if not np.array_equal(again.mask, stored.mask):
+        return RenderCheck(
+            folder.name,
+            "the object's outline when it is built again: pixels that differ",
+            float((again.mask ^ stored.mask).sum()),
+            0,
+        )
+    difference = again.shading.astype(float) - stored.shading
+    variance = again.shading_variance.astype(float) + stored.shading_variance
+    result = _tested(difference, variance, float(stored.shading.max()), level)
+    worst = max(
+        result.worst / result.threshold,
+        abs(result.bias) / result.global_threshold,
+        result.spread / result.global_threshold,
+    )
+    maps = (
+        {}
+        if result.accepted
+        else {"difference": difference, "variance": variance, "again": again.shading}
+    )
+    channels = {
+        f"{name}.{letter}": image[..., k]
+        for name, image in maps.items()
+        for k, letter in enumerate("RGB")
+    }
+    what = "shading against an independent white render, largest z over what noise explains"
+    return RenderCheck(folder.name, what, float(worst), 1.0, channels)
+
+
+def read_recipe(folder: Path) -> Recipe:
+    """How a scene was made, from its `scene.json`, the sensor aside.
+
+    Raises `InputError` where that does not say.
+    """
+    content = read_description(folder)
+    try:
+        parts = {
+            what: Part(content[what]["family"], content[what]["number"])
+            for what in ("object", "light")
+        }
+        model, name = content["material"]["model"], content["material"]["id"]
+        number, picture = int(name.removeprefix(model)), content["picture"]
+        settings = Picture(
+            size=picture["size"],
+            samples=picture["samples"],
+            bounces=picture["bounces"],
+            perspective=picture["perspective"],
+            renderer=picture["renderer"],
+        )
+        return Recipe(
+            content["seed"],
+            parts["object"],
+            Part(model, number),
+            model,
+            content["albedo"]["family"],
+            parts["light"],
+            settings,
+        )
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"{folder / 'scene.json'} does not say how the scene was made: {error}"
+        ) from error
+
+
+def needs_files(folder: Path) -> bool:
+    """Whether a scene was made with files that a user brought along."""
+    content = read_description(folder)
+    families = [content.get(what, {}).get("family") for what in ("object", "albedo", "light")]
+    return any(family in ("mesh", "height", "image", "natural", "hdr") for family in families)
+
+
+def _tested(
+    difference: np.ndarray, variance: np.ndarray, brightest: float, level: float
+) -> PixelTestResult:
+    blocks = pooled(difference, _BLOCK), pooled(variance, _BLOCK, variance=True)
+    return pixel_test(*blocks, PixelTestOptions(level=level, tolerance=_TOLERANCE * brightest))

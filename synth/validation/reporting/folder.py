@@ -1,0 +1,83 @@
+"""The folder of a validation: `report.json`, `report.html`, `summary.md`, and
+`evidence/SCENE/*.exr` where something was rejected.
+
+It appears whole or not at all; an earlier report there is replaced, together with the evidence that
+it names.
+"""
+
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+from isc_core.errors import InputError
+from isc_core.io.atomic import new_folder, require_writable
+from isc_core.io.exr import write_channels
+from isc_core.io.json_files import read_json
+from isc_core.progress import Monitor
+
+from ..measurement.measure import SceneResult
+from .cases import make_cases, worst_scenes, write_evidence
+from .html import page
+from .markdown import summary
+from .outcome import ValidationOutcome, to_json
+
+FILES = ("report.json", "report.html", "summary.md")
+_EVIDENCE = re.compile(r"evidence/[^/\\.][^/\\]*/[a-z_]+\.exr")
+
+
+def require_writable_report(folder: Path) -> None:
+    """Tries now whether a report could be written there. Raises `InputError`."""
+    require_writable(folder, _ours(folder))
+
+
+def write_report(outcome: ValidationOutcome, folder: Path, monitor: Monitor) -> None:
+    """Writes the folder; runs the scenes to be shown once more.
+
+    Raises `InputError`, `Cancelled`.
+    """
+    cases = make_cases(outcome.measured, outcome.options, monitor.part(0, 0.7))
+    with new_folder(folder, _ours(folder)) as partial:
+        evidence = _write_evidence(outcome, partial, monitor.part(0.7, 0.95))
+        monitor.report("writing the report", 0.95)
+        text = json.dumps(to_json(outcome, evidence), indent=1, ensure_ascii=False, allow_nan=False)
+        (partial / "report.json").write_text(text + "\n", encoding="utf-8")
+        (partial / "report.html").write_text(page(outcome, cases, evidence), encoding="utf-8")
+        (partial / "summary.md").write_text(summary(outcome), encoding="utf-8")
+
+
+def _write_evidence(outcome: ValidationOutcome, folder: Path, monitor: Monitor) -> tuple[str, ...]:
+    """The scenes that broke a bound or a check; the names of the files, relative to `folder`."""
+    wanted: dict[tuple[str, str], SceneResult] = {}
+    for verdict in outcome.verdicts:
+        if verdict.broken:
+            worst = worst_scenes(verdict, outcome.figures, outcome.measured)
+            wanted |= {(scene.facts.name, verdict.bound.stage): scene for scene in worst}
+    names: list[str] = []
+    for done, ((name, stage), scene) in enumerate(wanted.items()):
+        monitor.report("keeping evidence", done / len(wanted))
+        files = write_evidence(
+            folder / "evidence" / name, scene, stage, outcome.options, monitor.part(1, 1)
+        )
+        names += [f"evidence/{name}/{file}" for file in files]
+    for check in outcome.checks:
+        if not check.passed and check.maps:
+            place = folder / "evidence" / check.scene
+            place.mkdir(parents=True, exist_ok=True)
+            write_channels(place / "render_check.exr", check.maps)
+            names.append(f"evidence/{check.scene}/render_check.exr")
+    return tuple(dict.fromkeys(names))
+
+
+def _ours(folder: Path) -> Sequence[str]:
+    """The files of a report, and the evidence that the one standing in `folder` names."""
+    try:
+        content = read_json(folder / "report.json")
+    except InputError:
+        return FILES
+    named = content.get("evidence") if isinstance(content, dict) else None
+    return (
+        (*FILES, *(name for name in named if isinstance(name, str) and _EVIDENCE.fullmatch(name)))
+        if isinstance(named, list)
+        else FILES
+    )

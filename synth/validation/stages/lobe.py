@@ -1,0 +1,143 @@
+"""The stage "gloss": roughness from the specular layer, with the true shape and the true layers
+given.
+
+The truth of a varying gloss is its median, weighted by the specular light that it gives;
+Blinn-Phong exponents are compared as alpha.
+
+Limits: where light is only smooth nothing can be told: such scenes count by how many of them are
+answered all the same.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from isc_core.imaging.framing import continued_height
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.progress import Monitor
+from isc_core.scene.lobe_fit import LobeFit, LobeFitOptions
+from isc_core.shading.brdf.roughness import alpha_from_exponent
+from isc_core.shading.spherical_harmonics import normal_from_reference
+from isc_core.shading.surface_stencils import normals
+
+from ...capture.truth import GroundTruth
+from .pictures import exposure, lit
+from .types import Metric, Stage, StageInputs, StageOptions, StagePicture
+
+_NO_GLOSS = 0.01  # of the image's light: less specular light than this is none
+
+
+@dataclass(frozen=True)
+class FittedLobe:
+    """`fit`: the answer. `specular`: (H, W, 3), what it was fitted to."""
+
+    fit: LobeFit
+    specular: np.ndarray
+
+
+@dataclass(frozen=True)
+class LobeScores:
+    """`alpha_factor`: by which alpha is off, 1 or more; `explained`: share of the squared specular
+    image; both where gloss was found, the first where the material says how rough it is.
+    `determined`, `invented`: 1 or 0, whether alpha was told where there is gloss, and where there
+    is none. None: not defined.
+    """
+
+    alpha_factor: float | None = None
+    explained: float | None = None
+    determined: float | None = None
+    invented: float | None = None
+
+
+def run_lobe(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> FittedLobe:
+    """Fits a lobe to what is not diffuse. Raises `Cancelled`."""
+    if inputs.diffuse is None or inputs.height is None:
+        raise ValueError("the gloss is fitted to a known shape and a known diffuse image")
+    specular = np.where(inputs.mask[..., None], np.maximum(inputs.image - inputs.diffuse, 0), 0)
+    normal = normal_from_reference(
+        normals(continued_height(inputs.height, inputs.mask).astype(float))
+    )
+    fit = fit_lobe(
+        specular,
+        normal,
+        inputs.mask,
+        options=LobeFitOptions(),
+        clipped=inputs.clipped,
+        height=inputs.height,
+        monitor=monitor,
+    )
+    return FittedLobe(fit, specular)
+
+
+def score_lobe(truth: GroundTruth, answer: FittedLobe) -> LobeScores:
+    """The answer's roughness against the material's."""
+    fit, light = answer.fit, truth.specular[truth.mask].sum(axis=1, dtype=float)
+    told = fit.determined and fit.alpha is not None
+    if light.sum() < _NO_GLOSS * truth.image[truth.mask].sum(dtype=float):
+        return LobeScores(invented=float(told))
+    if not told or fit.alpha is None:
+        return LobeScores(determined=0.0)
+    true = _alpha(truth, light)
+    return LobeScores(
+        float(np.exp(abs(np.log(fit.alpha / true)))) if true > 0 else None, fit.explained, 1.0
+    )
+
+
+def show_lobe(truth: GroundTruth, answer: FittedLobe) -> tuple[StagePicture, ...]:
+    """The specular layer and the fit's, under one exposure."""
+    gain = exposure(truth.image, truth.mask)
+    pairs = (
+        ("photo", truth.image),
+        ("specular, true", truth.specular),
+        ("specular, of the fit", answer.fit.predicted),
+    )
+    return tuple(StagePicture(caption, lit(gain * values, truth.mask)) for caption, values in pairs)
+
+
+def lobe_maps(answer: FittedLobe) -> dict[str, np.ndarray]:
+    """Channels of the specular layer and of the fit's."""
+    layers = {"specular": answer.specular, "lobe": answer.fit.predicted}
+    return {
+        f"{name}.{letter}": values[..., k]
+        for name, values in layers.items()
+        for k, letter in enumerate("RGB")
+    }
+
+
+def _alpha(truth: GroundTruth, light: np.ndarray) -> float:
+    """The material's alpha: the median over the specular light."""
+    gloss = truth.gloss[truth.mask].astype(float)
+    order = np.argsort(gloss)
+    middle = float(gloss[order][np.searchsorted(np.cumsum(light[order]), light.sum() / 2)])
+    return (
+        middle if middle <= 1 else float(alpha_from_exponent(middle))
+    )  # exponents are above 1, alphas are not
+
+
+LOBE = Stage(
+    name="gloss",
+    title="Roughness of the gloss, shape and layers given",
+    needs=("diffuse", "shape"),
+    metrics=(
+        Metric("alpha_factor", "alpha, off by a factor of"),
+        Metric(
+            "explained",
+            "of the specular image explained",
+            geometric=False,
+            larger_is_better=True,
+            margin=0.1,
+        ),
+        Metric(
+            "determined",
+            "told where there is gloss",
+            geometric=False,
+            larger_is_better=True,
+            margin=0.1,
+        ),
+        Metric("invented", "told where there is none", geometric=False, margin=0.05),
+    ),
+    run=run_lobe,
+    score=score_lobe,
+    show=show_lobe,
+    maps=lobe_maps,
+)

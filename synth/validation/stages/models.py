@@ -1,0 +1,218 @@
+"""The stage "models": what each model makes of a glossy photo, beside plain SIRFS on the same photo
+and SIRFS on the true diffuse layer.
+
+Each model is run as `isc decompose` runs it (`isc_core.decompose.models.solve`), and scored as the stage
+"sirfs" is. Errors count relative to plain SIRFS on the same scene, so that a mean over scenes is a
+paired comparison; the true diffuse layer shows what perfect separation would gain.
+
+MBP has the shape and light of plain SIRFS by definition: they are found once.
+
+Limits: SIRFS is solved with the object 256 pixels long, as for a photo, not at the picture's own
+size as in the stage "sirfs" and the chain: figures of the two do not compare. Black channels, in
+the shadows of lamps in the dark, are raised to half a code, for all alike.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from isc_core.decompose.layers import separated, shaded
+from isc_core.decompose.models import Answer, Settings, Task, solve
+from isc_core.decompose.settings import SEPARATING_MODELS
+from isc_core.evaluation.evaluate import Estimate
+from isc_core.evaluation.metrics import Scores
+from isc_core.networks.light_network import predict_light
+from isc_core.networks.normal_network import predict_normals
+from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.progress import Monitor
+from isc_core.shading.spherical_harmonics import light_from_reference
+from isc_core.sirfs.recover import Known
+
+from ...capture.truth import GroundTruth
+from .pictures import directions, exposure, lit
+from .sirfs import SIRFS, score_sirfs, sirfs_maps, with_normals
+from .types import BLACK, AnyStage, Metric, Stage, StageInputs, StageOptions, StagePicture
+
+NAME = "models"
+TITLE = "Models beside plain SIRFS"
+PLAIN, TRUE_DIFFUSE = "plain", "true_diffuse"
+TITLES = {PLAIN: "plain SIRFS", TRUE_DIFFUSE: "SIRFS on the true diffuse layer"} | {
+    name: name for name in SEPARATING_MODELS
+}
+ERRORS = SIRFS.metrics
+_STARTS = {"mbp": PLAIN}  # whose shape and light a model has
+_SMALLEST = 1e-30
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class Variants(Generic[Item]):
+    """One thing for each way to explain a photo:
+
+    `plain` SIRFS, SIRFS on the `true_diffuse` layer, and the models; None: not asked for.
+    """
+
+    plain: Item
+    true_diffuse: Item
+    mdr: Item | None = None
+    mbp: Item | None = None
+    joint: Item | None = None
+
+    def items(self) -> tuple[tuple[str, Item], ...]:
+        """Names and things, of what was asked for."""
+        found = ((field.name, getattr(self, field.name)) for field in fields(self))
+        return tuple((name, item) for name, item in found if item is not None)
+
+
+def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> Variants[Estimate]:
+    """Explains the photo in every way;
+
+    `inputs.split` is used where it is known. Raises `InputError`, `Cancelled`.
+    """
+    if inputs.diffuse is None:
+        raise ValueError(
+            "the models are compared with SIRFS on the true diffuse layer, which has to be given"
+        )
+    photo = _photo(inputs)
+    split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
+    light_estimate, seen = (
+        predict_light(photo.image, photo.mask),
+        predict_normals(photo.image, photo.mask),
+    )  # of the photo, also for its diffuse layer alone
+
+    def solved(model: str, image: Photo, start: Answer | None = None) -> Answer:
+        known = Known() if start is None else Known(start.height, start.light)
+        settings = Settings(model, options.separator, options.illumination, threads=options.threads)
+        return solve(
+            Task(
+                image,
+                image,
+                settings,
+                known,
+                monitor=monitor,
+                split=split,
+                light_estimate=light_estimate,
+                seen=seen,
+            )
+        )
+
+    answers = {PLAIN: solved("sirfs", photo)}
+    for name in (name for name in SEPARATING_MODELS if name in options.models):
+        answers[name] = solved(name, photo, answers.get(_STARTS.get(name, "")))
+    answers[TRUE_DIFFUSE] = solved(
+        "sirfs", replace(photo, image=inputs.diffuse, clipped=np.zeros_like(inputs.clipped))
+    )
+    return Variants(**{name: _estimate(inputs, answer) for name, answer in answers.items()})
+
+
+def score_models(truth: GroundTruth, answers: Variants[Estimate]) -> Variants[Scores]:
+    """Plain SIRFS' errors, and those of all others relative to them.
+
+    Raises `InputError` where the true diffuse image is black.
+    """
+    errors = {name: score_sirfs(truth, answer) for name, answer in answers.items()}
+    plain = errors[PLAIN]
+    return Variants(
+        **{name: own if name == PLAIN else _relative(own, plain) for name, own in errors.items()}
+    )
+
+
+def show_models(truth: GroundTruth, answers: Variants[Estimate]) -> tuple[StagePicture, ...]:
+    """The photo, then diffuse layers, reflectance and normals: the truth's, and everyone's at the
+    truth's brightness.
+    """
+    mask, items = truth.mask, answers.items()
+    gain = exposure(truth.image, mask)
+    shown = [
+        StagePicture("photo", lit(gain * truth.image, mask)),
+        StagePicture("diffuse, true", lit(gain * truth.diffuse, mask)),
+    ]
+    diffuse = [
+        (name, own.reflectance * own.shading)
+        for name, own in items
+        if name not in (PLAIN, TRUE_DIFFUSE)
+    ]
+    shown += [
+        StagePicture(f"diffuse, {name}", lit(gain * values, mask)) for name, values in diffuse
+    ]
+    gain = exposure(truth.reflectance, mask)
+    shown.append(StagePicture("reflectance, true", lit(gain * truth.reflectance, mask)))
+    for name, own in items:
+        scale = (truth.reflectance[mask] * own.reflectance[mask]).sum() / max(
+            np.square(own.reflectance[mask]).sum(), _SMALLEST
+        )
+        shown.append(
+            StagePicture(f"reflectance, {TITLES[name]}", lit(gain * scale * own.reflectance, mask))
+        )
+    shown.append(StagePicture("normals, true", directions(truth.normal, mask)))
+    return (
+        *shown,
+        *(
+            StagePicture(f"normals, {TITLES[name]}", directions(own.normal, mask))
+            for name, own in items
+        ),
+    )
+
+
+def models_maps(answers: Variants[Estimate]) -> Mapping[str, np.ndarray]:
+    """Channels of everyone's maps: "joint.reflectance.R"."""
+    return {
+        f"{name}.{channel}": values
+        for name, own in answers.items()
+        for channel, values in sirfs_maps(own).items()
+    }
+
+
+def models_stage(models: tuple[str, ...]) -> AnyStage:
+    """The stage for the models of `StageOptions.models`; the first one ranks the scenes."""
+    named = [(name, metric) for name in (*models, TRUE_DIFFUSE, PLAIN) for metric in ERRORS]
+    return Stage(
+        name=NAME,
+        title=TITLE,
+        needs=("diffuse",),
+        metrics=tuple(_metric(name, error) for name, error in named),
+        run=run_models,
+        score=score_models,
+        show=show_models,
+        maps=models_maps,
+    )
+
+
+def metric_name(variant: str, error: str) -> str:
+    """The metric of one error of one variant: "joint.average"."""
+    return f"{variant}.{error}"
+
+
+def _metric(variant: str, error: Metric) -> Metric:
+    """An error of plain SIRFS as it is; of the others, relative to that."""
+    unit = error.unit if variant == PLAIN else ""
+    return Metric(metric_name(variant, error.name), f"{TITLES[variant]}: {error.title}", unit)
+
+
+def _photo(inputs: StageInputs) -> Photo:
+    """The scene's image as a photo with 16-bit codes.
+
+    Noise can take light below zero, which no photo holds.
+    """
+    height, width = inputs.mask.shape
+    source = PhotoSource("", (width, height), 16, "linear", "file")
+    return Photo(np.maximum(inputs.image, 0), inputs.mask, 2 * BLACK, inputs.clipped, source)
+
+
+def _estimate(inputs: StageInputs, answer: Answer) -> Estimate:
+    normal, _ = shaded(answer.height, answer.light, inputs.mask)
+    return with_normals(
+        replace(inputs, diffuse=answer.split.diffuse),
+        answer.height,
+        normal,
+        light_from_reference(answer.light),
+    )
+
+
+def _relative(errors: Scores, plain: Scores) -> Scores:
+    """Each error over plain SIRFS'; 1 where both are zero."""
+    pairs = ((getattr(errors, field.name), getattr(plain, field.name)) for field in fields(Scores))
+    return Scores(*(max(own, _SMALLEST) / max(other, _SMALLEST) for own, other in pairs))
