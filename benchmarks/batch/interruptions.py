@@ -1,7 +1,7 @@
 """Does a batch that is killed lose or spoil anything? Kills at random moments, a check after each,
 the same command again until it is done.
 
-  python -m benchmarks.batch_kills -o FOLDER [--kills 100] [--images 10]
+  python -m benchmarks.batch.interruptions -o FOLDER [--kills 100] [--images 10]
 
 Four kinds, in turn: worker processes, several while a run goes on; the run, whose workers are left
 to themselves; the run and its workers at once; the scheduler of a cluster that stands by itself.
@@ -32,13 +32,13 @@ from pathlib import Path
 
 import psutil  # type: ignore[import-untyped]
 
-from isc_core.models.settings import Settings
-from isc_core.photo import read_photo
-from isc_core.pipeline import decompose
-from isc_core.result_folder import save
+from isc_core.decompose.pipeline import decompose
+from isc_core.decompose.settings import Settings
+from isc_core.photo.photo import read_photo
+from isc_core.result_files.result_folder import save
 
-from .batch_images import made_photos
-from .kept_rows import append_row, read_rows
+from ..records import append_row, read_rows
+from .photos import made_photos
 
 KINDS = ("worker", "run", "run and workers", "run", "scheduler")
 _WORKERS_A_RUN = 4
@@ -92,7 +92,7 @@ def main() -> None:
     if options.reference:
         make_reference(place, options.images)
         return
-    again = [sys.executable, "-m", "benchmarks.batch_kills", *sys.argv[1:], "--reference"]
+    again = [sys.executable, "-m", "benchmarks.batch.interruptions", *sys.argv[1:], "--reference"]
     subprocess.run(again, check=True, env={**os.environ, **_ONE_THREAD})
     log = place.root / "kills.jsonl"
     rows = read_rows(log)

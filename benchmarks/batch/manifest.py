@@ -1,6 +1,6 @@
 """How soon does a batch of a million lines start, and how much memory does its list take?
 
-  python -m benchmarks.batch_manifest -o FOLDER [--lines 1000000]
+  python -m benchmarks.batch.manifest -o FOLDER [--lines 1000000]
 
 Writes a manifest of so many lines, of each kind, and starts `isc batch` on it in a process of its
 own, with one worker process whose task does nothing. Measured: seconds from the process's start to
@@ -51,7 +51,7 @@ def main() -> None:
             again = [
                 sys.executable,
                 "-m",
-                "benchmarks.batch_manifest",
+                "benchmarks.batch.manifest",
                 "-o",
                 str(options.output / "out"),
                 "--one",

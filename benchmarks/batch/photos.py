@@ -11,8 +11,8 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from isc_core.photo import linear_to_srgb
-from isc_core.sirfs.frames import real_sh
+from isc_core.photo.photo import linear_to_srgb
+from isc_core.shading.spherical_harmonics import real_sh
 
 _MODES = 5
 _COLOURS = 6

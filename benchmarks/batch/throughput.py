@@ -1,6 +1,6 @@
 """What does `isc batch` cost beside a plain loop, and does its memory stay flat?
 
-  python -m benchmarks.batch_throughput -o FOLDER [--images 200] [--size 256] [--model joint]
+  python -m benchmarks.batch.throughput -o FOLDER [--images 200] [--size 256] [--model joint]
 
 The same photos, made here: a plain loop over them (read, decompose, write) with one thread, the
 loop with two, and `isc batch` with two workers of one thread each; each in processes of its own.
@@ -26,14 +26,14 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 
-from isc_core.models.settings import Settings
-from isc_core.photo import read_photo
-from isc_core.pipeline import decompose
-from isc_core.report import thumbnail
-from isc_core.result_folder import save
+from isc_core.decompose.pipeline import decompose
+from isc_core.decompose.settings import Settings
+from isc_core.photo.photo import read_photo
+from isc_core.result_files.contact_sheet import thumbnail
+from isc_core.result_files.result_folder import save
 
-from .batch_images import made_photos
-from .kept_rows import append_row, read_rows
+from ..records import append_row, read_rows
+from .photos import made_photos
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _WARM = 50  # images of which a peak is taken, at each end
@@ -58,7 +58,7 @@ def main() -> None:
         command = [
             sys.executable,
             "-m",
-            "benchmarks.batch_throughput",
+            "benchmarks.batch.throughput",
             *sys.argv[1:],
             "--loop",
             str(threads),

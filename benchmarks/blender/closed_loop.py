@@ -1,9 +1,9 @@
 """The closed loop: does what stands in Blender look like the photo, and does it stay right under
 another light?
 
-  python -m benchmarks.closed_loop -o FOLDER --photos ../shared/data/photos          five photos and
-  three rendered objects python -m benchmarks.closed_loop -o FOLDER
-  the rendered objects alone python -m benchmarks.closed_loop -o FOLDER --names gourd --size 64
+  python -m benchmarks.blender.closed_loop -o FOLDER --photos ../shared/data/photos          five photos and
+  three rendered objects python -m benchmarks.blender.closed_loop -o FOLDER
+  the rendered objects alone python -m benchmarks.blender.closed_loop -o FOLDER --names gourd --size 64
   --samples 16    a quick look
 
 Each object is decomposed, built in Blender by the add-on's own `scene.build`, and rendered with
@@ -31,14 +31,14 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from blender_addon.arrays import Result, read_result
-from isc_core.environment import shading_under
+from blender_addon.files.result_arrays import Result, read_result
 from isc_core.errors import InputError
-from isc_core.metrics import psnr
-from isc_core.report import Shown, edit_sheet
+from isc_core.evaluation.metrics import psnr
+from isc_core.result_files.contact_sheet import Shown, edit_sheet
+from isc_core.shading.environment_map import shading_under
 
 from .closed_loop_cases import PHOTOS, RENDERED, Case, Making, Relit, cases
-from .closed_loop_renders import Look, picture
+from .renders import Look, picture
 
 USUAL_FILTER = 1.5  # Blender's, pixels
 _RING = 2  # pixels of the outline that "inner" leaves out
@@ -352,7 +352,7 @@ _TITLES = {
 def main(arguments: list[str] | None = None) -> int:
     """The command. Returns 0, or 2 after one line about what was wrong."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.closed_loop",
+        prog="python -m benchmarks.blender.closed_loop",
         description="Render imported results and hold them to the photo.",
     )
     parser.add_argument(

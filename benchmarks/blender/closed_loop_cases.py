@@ -18,20 +18,20 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.arrays_file import ARRAYS, write_arrays
-from isc_core.cli import main as isc
-from isc_core.decomposition import Decomposition, Provenance
+from isc_core.cli.main import main as isc
 from isc_core.errors import InputError
-from isc_core.result_folder import save
+from isc_core.result_files.arrays_file import ARRAYS, write_arrays
+from isc_core.result_files.result_folder import save
+from isc_core.scene.decomposition import Decomposition, Provenance
+from synth.capture.recipe import Part, Picture, Recipe, photograph
+from synth.capture.sensor import write_photo
+from synth.capture.truth import GroundTruth, exposed, render_truth
 from synth.demo_scene import demo_scene
 from synth.light_rigs import make_lights
 from synth.light_rigs.placing import toward
-from synth.lights import DirectionalLight, EnvironmentLight, Light, lights_as_environment
-from synth.recipe import Part, Picture, Recipe, photograph
 from synth.rendering import RenderOptions
 from synth.scene import Scene
-from synth.sensor import write_photo
-from synth.truth import GroundTruth, exposed, render_truth
+from synth.scene.lights import DirectionalLight, EnvironmentLight, Light, lights_as_environment
 
 PHOTOS = ("Banana", "Basketball", "Cup", "Helmet", "Shrek")
 RENDERED = ("gourd", "vase", "blob")
@@ -39,7 +39,7 @@ NEW_LIGHTS = ("sun", "sky")
 _MEMBERS = {
     "vase": ("lathe", "print", "area"),
     "blob": ("blobby", "patches", "sh"),
-}  # shape, paint and light, see `synth.recipe`
+}  # shape, paint and light, see `synth.capture.recipe`
 _LEVEL, _FILL = (
     0.9,
     0.91,

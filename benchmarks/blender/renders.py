@@ -17,11 +17,11 @@ from typing import Any, Literal
 import bpy
 import numpy as np
 
-from blender_addon.arrays import Result
+from blender_addon.files.result_arrays import Result
 from blender_addon.scene import BuildOptions, Built, build
 from blender_addon.scene.images import COLOR, ensure_image
 from blender_addon.scene.sun import ensure_sun
-from isc_core.exr import read_channels
+from isc_core.io.exr import read_channels
 
 from .closed_loop_cases import Relit
 

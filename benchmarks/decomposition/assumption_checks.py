@@ -1,11 +1,11 @@
-"""How often a photo is doubted that should be, and how often one that should not.
+"""How often a photo is with_warnings that should be, and how often one that should not.
 
-  python -m benchmarks.doubts SCENES... [--photos DIR...] [--data ROOT...] [--only NAME...]
+  python -m benchmarks.decomposition.assumption_checks SCENES... [--photos DIR...] [--data ROOT...] [--only NAME...]
       [--appearance FILE] [--lamps FILE]
 
 SCENES: of `python -m training.data.rendered_scenes`. `--photos`: folders of photos with masks; `--data`:
 sets like MIT-Berkeley's, their laboratory photos as they are and without gloss. `--only`: those of
-these families of shapes and objects of sets. A Markdown table; what is doubted of the photos is
+these families of shapes and objects of sets. A Markdown table; what is with_warnings of the photos is
 named below it. Of "rig" scenes, one lamp and then several are lit.
 """
 
@@ -17,12 +17,22 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.appearance import AppearanceNetwork, kinds_of, read_appearance, shipped_appearance
-from isc_core.datasets import list_objects, load_object
+from isc_core.datasets.mit_berkeley import list_objects, load_object
+from isc_core.decompose.assumption_checks import CLEAR, SEVERAL, doubts_of
 from isc_core.errors import InputError
-from isc_core.lamp_network import LampNetwork, glance_at, read_lamp_network, shipped_lamp_network
-from isc_core.models.doubts import CLEAR, SEVERAL, doubts_of
-from isc_core.photo import read_photo
+from isc_core.networks.light_network import (
+    LampNetwork,
+    predict_light,
+    read_lamp_network,
+    shipped_lamp_network,
+)
+from isc_core.networks.scene_classifier import (
+    AppearanceNetwork,
+    classify_scene,
+    read_appearance,
+    shipped_appearance,
+)
+from isc_core.photo.photo import read_photo
 from training.data.rendered_scenes import scenes_in
 
 
@@ -30,7 +40,7 @@ from training.data.rendered_scenes import scenes_in
 class Case:
     """`image` (H, W, 3), `mask` (H, W);
 
-    `group`: of the table; `name`: to be told where it is a photo that is doubted, else "".
+    `group`: of the table; `name`: to be told where it is a photo that is with_warnings, else "".
     """
 
     image: np.ndarray
@@ -102,7 +112,7 @@ def _cases(given: argparse.Namespace) -> Iterator[Case]:
 
 
 def report(cases: list[Case], appearance: AppearanceNetwork, lamps: LampNetwork) -> None:
-    """Prints the table, and what is doubted of the photos.
+    """Prints the table, and what is with_warnings of the photos.
 
     Raises `InputError` where there are none.
     """
@@ -110,12 +120,13 @@ def report(cases: list[Case], appearance: AppearanceNetwork, lamps: LampNetwork)
         raise InputError("there is nothing to judge: name folders of scenes, --photos or --data")
     found = [
         doubts_of(
-            kinds_of(case.image, case.mask, appearance), glance_at(case.image, case.mask, lamps)
+            classify_scene(case.image, case.mask, appearance),
+            predict_light(case.image, case.mask, lamps),
         )
         for case in cases
     ]
     lines = [
-        "| photos | number | doubted | mirror or glass | several lights |",
+        "| photos | number | with_warnings | mirror or glass | several lights |",
         "|---|---:|---:|---:|---:|",
     ]
     for group in sorted({case.group for case in cases}):

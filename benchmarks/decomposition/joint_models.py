@@ -1,7 +1,7 @@
 """What each model makes of glossy photos, against SIRFS on the photo as it is and on the true
 diffuse image.
 
-  python -m benchmarks.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT
+  python -m benchmarks.decomposition.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT
   [--objects a,b] [--sets level-25_natural]
                                     [--networks FOLDER] [--models plain,joint] [--roundings K]
                                     [--shape-prior seen]
@@ -26,16 +26,16 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.berkeley import rounded
-from benchmarks.kept_rows import append_row, read_rows
-from isc_core.datasets import MitBerkeleyObject, list_objects, load_object
-from isc_core.evaluate import Estimate, paired_bootstrap
-from isc_core.evaluation_runner import RunnerOptions, make_runner
-from isc_core.metrics import score
-from isc_core.models.settings import OUTLINE, SHAPE_PRIORS
+from benchmarks.records import append_row, read_rows
+from benchmarks.sirfs.mit_berkeley import rounded
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_object
+from isc_core.decompose.settings import OUTLINE, SHAPE_PRIORS
+from isc_core.evaluation.evaluate import Estimate, paired_bootstrap
+from isc_core.evaluation.metrics import score
+from isc_core.evaluation.runner import RunnerOptions, make_runner
+from isc_core.networks.layer_network import LayerNetwork, read_network
 from isc_core.progress import Monitor
-from isc_core.separation.layer_network import LayerNetwork, read_network
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
 MODELS = ("plain", "mdr", "mbp", "joint", "true diffuse")
 METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light", "average")

@@ -1,7 +1,7 @@
 """How exactly the specular layer has to be known before shape, light and reflectance gain by taking
 it off.
 
-  python -m benchmarks.layer_precision --glossy DIR -o OUT [--sets level-25_natural,...] [--objects
+  python -m benchmarks.decomposition.layer_precision --glossy DIR -o OUT [--sets level-25_natural,...] [--objects
   a,b]
 
 DIR: as `isc synth glossy-mit` writes it, whose true layers are known. SIRFS is given the photo less
@@ -14,7 +14,7 @@ what somebody would take off who knew
                          recovers from the photo
 
 Writes OUT/rows.jsonl, a row a run, which is not run again, and OUT/tables.md, laid out as those of
-`benchmarks.joint_models`.
+`benchmarks.decomposition.joint_models`.
 """
 
 import argparse
@@ -25,12 +25,12 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import map_coordinates
 
-from benchmarks.joint_models import photo_of, row_of, run, tables
-from benchmarks.kept_rows import append_row, read_rows
-from isc_core.datasets import MitBerkeleyObject, list_objects
-from isc_core.environment import environment_from_shading
-from isc_core.evaluate import Estimate
-from isc_core.separation.smoothing import masked_gaussian
+from benchmarks.decomposition.joint_models import photo_of, row_of, run, tables
+from benchmarks.records import append_row, read_rows
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects
+from isc_core.evaluation.evaluate import Estimate
+from isc_core.imaging.smoothing import masked_gaussian
+from isc_core.shading.environment_map import environment_from_shading
 from synth.glossy_mit.gloss import environment_gloss
 from synth.glossy_mit.settings import GlossySettings
 

@@ -1,7 +1,7 @@
 """How well lobes are found in rendered scenes: with the true normals and specular image, and
 through the whole chain from the photo.
 
-  python -m benchmarks.lobe_fitting -o FOLDER [--scenes 60] [--size 128]
+  python -m benchmarks.decomposition.lobe_fitting -o FOLDER [--scenes 60] [--size 128]
 
 Scene k is an object of its own (shapes and paints in turn, lights drawn), GGX gloss with alpha
 log-uniform over [.05, .45], ior 1.5; every tenth object is matt. FOLDER keeps what was rendered and
@@ -21,16 +21,21 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.brdf.fitting import Interval, LobeFit, LobeFitOptions, fit_lobe
-from isc_core.lamp_network import glance_at
-from isc_core.photo import Photo, PhotoSource
-from isc_core.pipeline import decompose
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.decompose.pipeline import decompose
+from isc_core.lobe_fitting import fit_lobe
+from isc_core.networks.light_network import predict_light
+from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOptions
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.silhouette import outline_normals
 from synth.albedos import make_albedo
+from synth.capture.recipe import camera_around
+from synth.capture.truth import exposed, render_truth
 from synth.light_rigs import make_lights
 from synth.light_rigs.placing import places, white
-from synth.lights import (
+from synth.rendering import RenderOptions
+from synth.scene import Scene
+from synth.scene.lights import (
     DirectionalLight,
     EnvironmentLight,
     Light,
@@ -38,12 +43,8 @@ from synth.lights import (
     PointLight,
     panel_toward_origin,
 )
-from synth.materials import Material
-from synth.recipe import camera_around
-from synth.rendering import RenderOptions
-from synth.scene import Scene
+from synth.scene.materials import Material
 from synth.shapes import SHAPES, make_shape
-from synth.truth import exposed, render_truth
 
 ALPHAS = (0.05, 0.45)
 LIGHTS = ("directional", "directional", "small", "point", "area", "directional", "sh", "small")
@@ -246,7 +247,7 @@ def chain_fit(case: Case) -> Found:
     start = time.perf_counter()
     options = LobeFitOptions(recovered=True)
     outline = outline_normals(mask, shipped_prior_set().silhouette)
-    glance = glance_at(np.maximum(m["image"], 0), mask)
+    light_estimate = predict_light(np.maximum(m["image"], 0), mask)
     fit = fit_lobe(
         m["chain_specular"],
         m["chain_normal"],
@@ -254,7 +255,7 @@ def chain_fit(case: Case) -> Found:
         options=options,
         shading=m["chain_shading"],
         outline=outline,
-        glance=glance,
+        light_estimate=light_estimate,
     )
     seconds = time.perf_counter() - start
     return compare(

@@ -14,7 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from ..kept_rows import append_row, read_rows
+from ..records import append_row, read_rows
 from .commands import COMMANDS, Command, prepared
 from .disk import FAULTS, Faults, reference
 from .listing import many_images

@@ -11,7 +11,7 @@ from pathlib import Path
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import seed as seeded
 
-from ..kept_rows import append_row, read_rows
+from ..records import append_row, read_rows
 from .law import Law, Notes
 
 CHUNK = 200

@@ -1,7 +1,7 @@
 """How good is `--method isc` on photos without a say in its constants? These are chosen on all
 photos but one object's, which is measured.
 
-  python -m benchmarks.separator_constants --data ../shared/data -o constants.csv [--candidates 60]
+  python -m benchmarks.separation.constants --data ../shared/data -o constants.csv [--candidates 60]
 
 Candidates are the shipped constants and random changes of them (seeded): each number of a few
 chosen at random is scaled, ramps are moved and stretched. Each candidate is measured once on every
@@ -29,8 +29,8 @@ from typing import Any
 
 import numpy as np
 
-from isc_core.box import mask_slices
-from isc_core.highlight_set import SeparationTruth
+from isc_core.datasets.highlight_set import SeparationTruth
+from isc_core.imaging.bounding_box import mask_slices
 from isc_core.separation.isc import VARIANTS, IscOptions, separate
 
 from .specular_removal import cases

@@ -1,9 +1,9 @@
 """Filter statistics as a prior of the separation (thesis, section 3.6.5.1): fitted, drawn as in
 figure 3.12, and measured by an ablation.
 
-  python -m benchmarks.filter_statistics fit SCENES -o FILE [--of seen|layers]    histograms and
-  temperature from SCENES/train python -m benchmarks.filter_statistics figure SCENES -o DIR
-  diffuse against specular layers, one picture a filter python -m benchmarks.filter_statistics
+  python -m benchmarks.separation.filter_statistics fit SCENES -o FILE [--of seen|layers]    histograms and
+  temperature from SCENES/train python -m benchmarks.separation.filter_statistics figure SCENES -o DIR
+  diffuse against specular layers, one picture a filter python -m benchmarks.separation.filter_statistics
   ablation SCENES --data DATA -o FILE      `isc` with and without, a Markdown table
 
 SCENES is a folder of `isc synth`. `layers` takes the statistics of true diffuse and true specular
@@ -20,11 +20,11 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from isc_core.atomic import new_file
+from isc_core.datasets.highlight_set import SeparationTruth, load_rendered
 from isc_core.errors import InputError
-from isc_core.highlight_set import SeparationTruth, load_rendered
+from isc_core.io.atomic import new_file
 from isc_core.separation import separate
-from isc_core.separation.filter_statistics import (
+from isc_core.separation.support.filter_statistics import (
     BINS,
     FILTERS,
     FilterTable,
@@ -36,7 +36,7 @@ from isc_core.separation.filter_statistics import (
     read_table,
 )
 
-from .plot import COLOURS, Plot
+from ..plots import COLOURS, Plot
 from .specular_removal import cases
 
 _SEEN, _NONE = 0.25, 0.05  # of the light is specular

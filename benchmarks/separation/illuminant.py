@@ -1,6 +1,6 @@
 """How well the light's colour is found, and what it is worth to the separation.
 
-  python -m benchmarks.illuminant SCENES --data ../shared/data -o FILE [--splits train]
+  python -m benchmarks.separation.illuminant SCENES --data ../shared/data -o FILE [--splits train]
   [--colours-only]
 
 Each rendered scene is lit anew: its true diffuse and specular layers are multiplied by 1 + tint (1,
@@ -18,11 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.atomic import new_file
-from isc_core.datasets import list_objects
+from isc_core.datasets.highlight_set import SeparationTruth, load_laboratory, load_rendered
+from isc_core.datasets.mit_berkeley import list_objects
 from isc_core.errors import InputError
-from isc_core.highlight_set import SeparationTruth, load_laboratory, load_rendered
-from isc_core.illuminant import estimate_illuminant, tinted, whitened
+from isc_core.illuminant.illuminant import estimate_illuminant, tinted, whitened
+from isc_core.io.atomic import new_file
 from isc_core.separation import separate
 
 WHITE = np.ones(3)

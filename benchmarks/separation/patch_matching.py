@@ -1,6 +1,6 @@
 """How good and how fast is Coherency Sensitive Hashing, against comparing all pairs of patches?
 
-  python -m benchmarks.patch_matching [PHOTO ...] [--megapixels .5] [--sample 2000] [--tables 8]
+  python -m benchmarks.separation.patch_matching [PHOTO ...] [--megapixels .5] [--sample 2000] [--tables 8]
 
 For each photo (enlarged or reduced to the size asked for; without one, a made-up texture): patches
 of a turned, enlarged and noisy copy are matched to those of the photo ("later view"), and patches
@@ -24,7 +24,7 @@ from isc_core.inpainting.coherency_sensitive_hashing import (
     Patches,
     patches_within,
 )
-from isc_core.photo import read_photo
+from isc_core.photo.photo import read_photo
 
 # Source patches that the exhaustive search compares at once: the products fit a processor's cache
 # then.

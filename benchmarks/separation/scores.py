@@ -13,17 +13,17 @@ from typing import Any
 import numpy as np
 
 from isc_core import separation
-from isc_core.decomposition import Separation
+from isc_core.datasets.highlight_set import SeparationTruth
 from isc_core.errors import InputError
-from isc_core.highlight_set import SeparationTruth
-from isc_core.image_metrics import (
+from isc_core.evaluation.image_metrics import (
     highlight_region,
     rank_correlation,
     sparsification,
     ssim,
     ssim_volume,
 )
-from isc_core.metrics import lmse, mse, psnr
+from isc_core.evaluation.metrics import lmse, mse, psnr
+from isc_core.scene.decomposition import Separation
 
 # Methods that read another method's file too.
 _BUILT_ON = {"isc": ("sparse_coding",)}

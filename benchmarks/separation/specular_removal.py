@@ -1,10 +1,10 @@
 """Every separation method in every variant on every photo whose layers are known.
 
-  python -m benchmarks.specular_removal --data ../shared/data -o DIR                      tables and
-  sheets python -m benchmarks.specular_removal --data ../shared/data -o DIR --photos
-  every photo through `isc separate`, and sheets python -m benchmarks.specular_removal --data
+  python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR                      tables and
+  sheets python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR --photos
+  every photo through `isc separate`, and sheets python -m benchmarks.separation.specular_removal --data
   ../shared/data -o DIR --speed              warm seconds and memory of one megapixel python -m
-  benchmarks.specular_removal --data ../shared/data -o DIR --rendered SCENES    also the rendered
+  benchmarks.separation.specular_removal --data ../shared/data -o DIR --rendered SCENES    also the rendered
   scenes in that folder
 
 Photos: Shen & Zheng's (values as stored, whole frame), the laboratory objects of MIT-Berkeley
@@ -22,25 +22,25 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.cli import main as isc
-from isc_core.datasets import list_objects
-from isc_core.decomposition import Separation
-from isc_core.errors import InputError
-from isc_core.exr import read_channels
-from isc_core.highlight_set import (
+from isc_core.cli.main import main as isc
+from isc_core.datasets.highlight_set import (
     SeparationTruth,
     list_shen_zheng,
     load_laboratory,
     load_rendered,
     load_shen_zheng,
 )
-from isc_core.photo import read_linear, read_photo, srgb_to_linear
-from isc_core.report import Answer, comparison_sheet
+from isc_core.datasets.mit_berkeley import list_objects
+from isc_core.errors import InputError
+from isc_core.io.exr import read_channels
+from isc_core.photo.photo import read_linear, read_photo, srgb_to_linear
+from isc_core.result_files.contact_sheet import Answer, comparison_sheet
+from isc_core.scene.decomposition import Separation
 from isc_core.separation import IMPROVED, METHODS, variants
 
-from .specular_scores import Row, measure, read_rows, source_code, write_rows
-from .specular_speed import speed_table
-from .specular_tables import tables
+from .scores import Row, measure, read_rows, source_code, write_rows
+from .speed import speed_table
+from .tables import tables
 
 _PHOTO_SUFFIXES = {".bmp", ".ppm", ".png", ".jpg", ".tif"}
 

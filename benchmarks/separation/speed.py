@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from scipy import ndimage
 
-from isc_core.highlight_set import load_shen_zheng
+from isc_core.datasets.highlight_set import load_shen_zheng
 from isc_core.separation import separate
 
 _PIXELS = 1_000_000

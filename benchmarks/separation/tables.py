@@ -5,10 +5,10 @@ from itertools import product
 
 import numpy as np
 
-from isc_core.metrics import geometric_mean
+from isc_core.evaluation.metrics import geometric_mean
 from isc_core.separation import IMPROVED, METHODS
 
-from .specular_scores import Row
+from .scores import Row
 
 Cell = Callable[[Row], str]
 _CLAIMED = ("apple", "teabag2", "paper1", "animals", "cups")

@@ -1,7 +1,7 @@
 """The optimisers of thresholds against the exact optimum, on nine images and three numbers of
 thresholds, with equal budgets.
 
-  python -m benchmarks.thresholding -o DIR [--runs 50] [--evaluations 20000]
+  python -m benchmarks.separation.thresholding -o DIR [--runs 50] [--evaluations 20000]
 
 Writes thresholding.csv (a row for each optimiser, image and number of thresholds), thresholding.md
 (tables), and PNG figures: the mutation rate, the logistic map's bifurcation, density and
@@ -32,7 +32,7 @@ from isc_core.thresholding.logistic_map import (
     uniformised,
 )
 
-from .plot import COLOURS, Plot
+from ..plots import COLOURS, Plot
 
 IMAGES = ("camera", "coins", "moon", "page", "brick", "grass", "gravel", "clock", "astronaut")
 COUNTS = (3, 4, 5)

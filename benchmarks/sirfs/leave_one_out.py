@@ -1,9 +1,9 @@
 """How good are the priors on objects they have not seen? Each training object is solved with priors
 and lights fitted to the other nine.
 
-  python -m benchmarks.leave_one_out --json loo.json        baseline B (the published recipe and
-  weights) and ours, both lights python -m benchmarks.leave_one_out --in-sample            the same
-  with priors fitted to all ten python -m benchmarks.leave_one_out --grey                 the photos
+  python -m benchmarks.sirfs.leave_one_out --json loo.json        baseline B (the published recipe and
+  weights) and ours, both lights python -m benchmarks.sirfs.leave_one_out --in-sample            the same
+  with priors fitted to all ten python -m benchmarks.sirfs.leave_one_out --grey                 the photos
   without their colours; for grey ones in natural light no weights are
                                                             published: those for laboratory light
                                                             stand in
@@ -20,18 +20,18 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.datasets import load_natural_lights
-from isc_core.evaluate import paired_bootstrap
-from isc_core.metrics import geometric_mean
-from isc_core.sirfs.fitting.fit import RECIPE, FitOptions, fit_priors
-from isc_core.sirfs.fitting.prior_set import PriorSet
-from isc_core.sirfs.fitting.statistics import ObjectStatistics, collect_statistics
-from isc_core.sirfs.fitting.training import read_training_objects
-from isc_core.sirfs.lbfgs import LbfgsOptions
+from isc_core.datasets.mit_berkeley import load_natural_lights
+from isc_core.evaluation.evaluate import paired_bootstrap
+from isc_core.evaluation.metrics import geometric_mean
+from isc_core.numerics.lbfgs import LbfgsOptions
+from isc_core.prior_fitting.fit import RECIPE, FitOptions, fit_priors
+from isc_core.prior_fitting.statistics import ObjectStatistics, collect_statistics
+from isc_core.prior_fitting.training_objects import read_training_objects
+from isc_core.sirfs.priors.prior_set import PriorSet
 from isc_core.sirfs.settings import isc_weights, published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .berkeley import LIGHTS, greyed, parser, problem, scores, training_object, write_json
+from .mit_berkeley import LIGHTS, greyed, parser, problem, scores, training_object, write_json
 
 METHODS = ("B", "B, lights scaled", "ours")
 METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")

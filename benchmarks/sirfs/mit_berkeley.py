@@ -9,15 +9,19 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.datasets import MitBerkeleyObject, load_object
-from isc_core.evaluation_runner import pose
-from isc_core.metrics import Scores, score
-from isc_core.sirfs.frames import light_from_reference, normal_from_reference, real_sh
-from isc_core.sirfs.priors import Priors
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_object
+from isc_core.evaluation.metrics import Scores, score
+from isc_core.evaluation.runner import pose
+from isc_core.shading.spherical_harmonics import (
+    light_from_reference,
+    normal_from_reference,
+    real_sh,
+)
+from isc_core.shading.surface_stencils import normals
+from isc_core.sirfs.priors.priors import Priors
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
 from isc_core.sirfs.solver import SirfsResult
-from isc_core.sirfs.stencils import normals
 
 LIGHTS = ("natural", "laboratory")
 _LAST_DIGIT = 1e-7

@@ -1,8 +1,8 @@
 """Production (float32, compiled) against double precision and against the plain NumPy engine, with
 the shipped priors and weights.
 
-python -m benchmarks.precision               production against float64: losses and scores of the
-ten objects, both lights python -m benchmarks.precision --numpy       ten fixed states and whole
+python -m benchmarks.sirfs.precision               production against float64: losses and scores of the
+ten objects, both lights python -m benchmarks.sirfs.precision --numpy       ten fixed states and whole
 solves in both engines, with the ratio of their times
 """
 
@@ -12,17 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.datasets import list_objects
-from isc_core.metrics import geometric_mean
+from isc_core.datasets.mit_berkeley import list_objects
+from isc_core.evaluation.metrics import geometric_mean
+from isc_core.numerics.thread_pool import Workers
 from isc_core.sirfs.numba_engine import NumbaEngine
 from isc_core.sirfs.numpy_engine import NumpyEngine
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import isc_weights
 from isc_core.sirfs.solver import SirfsResult, SolverOptions, solve
-from isc_core.workers import Workers
 
-from .berkeley import LIGHTS, parser, problem, scores, training_object
+from .mit_berkeley import LIGHTS, parser, problem, scores, training_object
 
 
 def timed(function: Callable[[], SirfsResult]) -> tuple[SirfsResult, float]:

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.sirfs.priors import AbsoluteTable, Light, Priors
-from isc_core.sirfs.tables import CostTable
+from isc_core.sirfs.priors.priors import AbsoluteTable, Light, Priors
+from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 
 
 def reference_priors(path: Path, illumination: str, channels: int = 3) -> Priors:
@@ -18,13 +18,13 @@ def reference_priors(path: Path, illumination: str, channels: int = 3) -> Priors
         d = {k: f[k] for k in f.files}
     kind = f"light_{'color' if channels == 3 else 'gray'}_{illumination}_"
     light = Light(d[kind + "mu"], d[kind + "Sigma"], d[kind + "inverse"], d[kind + "mean"])
-    curvature = CostTable(
+    curvature = TabulatedPotential(
         float(d["z_curv_lut_low"]), float(d["z_curv_lut_step"]), d["z_curv_lut_cost"]
     )
     if channels == 1:
         low, high = (float(v) for v in d["gray_a_abs_range"])
         values = d["gray_a_smooth_lut_cost"]
-        smooth = CostTable(-3.925369950195567, 3.925566228506992e-04, values)
+        smooth = TabulatedPotential(-3.925369950195567, 3.925566228506992e-04, values)
         return Priors(
             1,
             curvature,
@@ -34,7 +34,7 @@ def reference_priors(path: Path, illumination: str, channels: int = 3) -> Priors
             AbsoluteTable(low, high, d["gray_a_abs_cost"]),
             light,
         )
-    smooth = CostTable(
+    smooth = TabulatedPotential(
         float(d["a_smooth_lut_low"]),
         float(d["a_smooth_lut_step"]),
         float(d["a_smooth_LL_zero"]) - d["a_smooth_lut_loglik"],

@@ -1,7 +1,7 @@
 """Does the answer depend on the photo's scale or on empty space around the object? And what does a
 larger photo cost?
 
-  python -m benchmarks.scale [--photos DIR] [--cost]
+  python -m benchmarks.sirfs.scale [--photos DIR] [--cost]
 
 For each photo (enlarged, where its object is shorter than 512 pixels): normals at --max-size 192,
 256 and 384 against those at 512, compared on the smaller grid, and the ratio of relative heights;
@@ -19,12 +19,12 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.photo import Photo, mask_box, read_photo
-from isc_core.pipeline import Settings, decompose
-from isc_core.sirfs.lbfgs import LbfgsOptions
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.imaging.resampling import resample_inside
+from isc_core.numerics.lbfgs import LbfgsOptions
+from isc_core.photo.photo import Photo, mask_box, read_photo
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
-from isc_core.sirfs.resampling import resample_inside
 from isc_core.sirfs.settings import isc_weights
 from isc_core.sirfs.solver import SolverOptions
 
@@ -156,7 +156,8 @@ def main() -> None:
     if given.cost:
         for megapixels in (0.1, 0.25, 1.0, 4.0):
             subprocess.run(
-                [sys.executable, "-m", "benchmarks.scale", "--one", str(megapixels)], check=True
+                [sys.executable, "-m", "benchmarks.sirfs.scale", "--one", str(megapixels)],
+                check=True,
             )
         return
     for path in sorted(given.photos.glob("*.png")):

@@ -1,17 +1,17 @@
 """Our solver with the reference's priors against the reference program: losses, scores, time.
 
-python -m benchmarks.solver_reference [--float64] [--engine numpy]
+python -m benchmarks.sirfs.solver_reference [--float64] [--engine numpy]
 """
 
 import time
 
-from isc_core.datasets import list_objects
-from isc_core.metrics import geometric_mean
-from isc_core.sirfs.lbfgs import LbfgsOptions
+from isc_core.datasets.mit_berkeley import list_objects
+from isc_core.evaluation.metrics import geometric_mean
+from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.sirfs.settings import published_weights
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .berkeley import (
+from .mit_berkeley import (
     LIGHTS,
     parser,
     problem,

@@ -1,9 +1,9 @@
 """Where should SIRFS begin? Its objective has many minima, and the start decides into which it
 goes: several, on objects not seen.
 
-  python -m benchmarks.starts                                     the MIT-Berkeley objects as they
-  are python -m benchmarks.starts --others 0,2,4,6                    each under four of the other
-  objects' lights python -m benchmarks.starts --scenes FOLDER                     rendered scenes of
+  python -m benchmarks.sirfs.starts                                     the MIT-Berkeley objects as they
+  are python -m benchmarks.sirfs.starts --others 0,2,4,6                    each under four of the other
+  objects' lights python -m benchmarks.sirfs.starts --scenes FOLDER                     rendered scenes of
   `isc synth`
 
 A start is "dome:light", how much of the outline's dome and of the expected light
@@ -24,24 +24,29 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.datasets import MitBerkeleyObject, list_objects, load_natural_lights
-from isc_core.metrics import Scores, truth_normal
-from isc_core.models.shape import usual_gain
-from isc_core.sirfs.fitting.fit import FitOptions, fit_priors
-from isc_core.sirfs.fitting.prior_set import PriorSet
-from isc_core.sirfs.fitting.statistics import collect_statistics
-from isc_core.sirfs.fitting.training import read_training_objects
-from isc_core.sirfs.frames import light_from_reference, normal_from_reference, real_sh
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_natural_lights
+from isc_core.decompose.shape import exposure_normalisation
+from isc_core.evaluation.metrics import Scores, truth_normal
+from isc_core.prior_fitting.fit import FitOptions, fit_priors
+from isc_core.prior_fitting.statistics import collect_statistics
+from isc_core.prior_fitting.training_objects import read_training_objects
+from isc_core.shading.spherical_harmonics import (
+    light_from_reference,
+    normal_from_reference,
+    real_sh,
+)
+from isc_core.shading.surface_stencils import normals
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
+from isc_core.sirfs.priors.prior_set import PriorSet
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.settings import Start, Weights, isc_weights
 from isc_core.sirfs.solver import SolverOptions, solve
-from isc_core.sirfs.stencils import normals
 from synth.dataset.reading import list_scenes, read_truth
-from synth.validation.sirfs_stage import score_sirfs, with_normals
-from synth.validation.stages import BLACK, Inputs
+from synth.validation.stages.sirfs import score_sirfs, with_normals
+from synth.validation.stages.types import BLACK, StageInputs
 
-from .berkeley import (
+from .leave_one_out import METRICS, without
+from .mit_berkeley import (
     LIGHTS,
     parser,
     problem,
@@ -51,7 +56,6 @@ from .berkeley import (
     training_object,
     write_json,
 )
-from .leave_one_out import METRICS, without
 
 Starts = tuple[Start, ...]
 _APART = 1.5
@@ -119,7 +123,7 @@ def _lit(truth: MitBerkeleyObject, light: np.ndarray) -> MitBerkeleyObject:
 def _of_scene(task: Task, weights: Weights) -> Found:
     truth = read_truth(task.case)
     diffuse = rounded_image(np.maximum(truth.diffuse, 0).astype(float), task.rounding)
-    gain = usual_gain(diffuse, truth.mask)
+    gain = exposure_normalisation(diffuse, truth.mask)
     options = RecoverOptions(solver=SolverOptions(threads=1))
     result = recover(
         diffuse * gain,
@@ -130,7 +134,7 @@ def _of_scene(task: Task, weights: Weights) -> Found:
         options,
     )
     normal = normal_from_reference(normals(result.height))
-    seen = Inputs(truth.image, truth.mask, np.zeros_like(truth.mask), diffuse)
+    seen = StageInputs(truth.image, truth.mask, np.zeros_like(truth.mask), diffuse)
     errors = score_sirfs(
         truth, with_normals(seen, result.height, normal, light_from_reference(result.light))
     )

@@ -1,17 +1,17 @@
 """The smoothness of the tables of absolute reflectance, cross-validated: log likelihood of each
 object under the others' table.
 
-python -m benchmarks.table_smoothness [--grey]
+python -m benchmarks.sirfs.table_smoothness [--grey]
 """
 
 from dataclasses import replace
 
-from isc_core.sirfs.fitting.cross_validation import held_out_log_likelihood
-from isc_core.sirfs.fitting.fit import FitOptions
-from isc_core.sirfs.fitting.statistics import collect_statistics
-from isc_core.sirfs.fitting.training import read_training_objects
+from isc_core.prior_fitting.cross_validation import held_out_log_likelihood
+from isc_core.prior_fitting.fit import FitOptions
+from isc_core.prior_fitting.statistics import collect_statistics
+from isc_core.prior_fitting.training_objects import read_training_objects
 
-from .berkeley import parser
+from .mit_berkeley import parser
 
 
 def main() -> None:

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from benchmarks.layer_precision import TAKEN, mirrored
-from isc_core.environment import environment_from_shading
-from isc_core.evaluate import Estimate
+from benchmarks.decomposition.layer_precision import TAKEN, mirrored
+from isc_core.evaluation.evaluate import Estimate
+from isc_core.shading.environment_map import environment_from_shading
 from synth.glossy_mit.gloss import environment_gloss
 from synth.glossy_mit.settings import GlossySettings
 from tests.core.lit_balls import ball

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from benchmarks.berkeley import greyed
-from isc_core.datasets import MitBerkeleyObject
+from benchmarks.sirfs.mit_berkeley import greyed
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 
 
 def test_a_grey_photo_is_still_paint_times_shading_and_has_equal_channels() -> None:

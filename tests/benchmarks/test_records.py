@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from benchmarks.kept_rows import append_row, read_rows
+from benchmarks.records import append_row, read_rows
 
 
 def test_rows_come_back_and_a_line_cut_short_is_taken_out(tmp_path: Path) -> None:

@@ -6,7 +6,7 @@ pictures are rectangles; radiance 1 is about that of a white wall. Outdoors a sk
 the horizon, below it lie houses or trees and a ground. A studio is a dark backdrop with softboxes.
 Clutter is made of dead leaves: discs and rectangles of all sizes, their number falling as size^-2,
 each before the last, which gives the statistics of natural pictures. The layout is that of
-`isc_core.environment`.
+`isc_core.shading.environment_map`.
 
 Citation: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41 (2001),
 doi:10.1023/A:1011109015675.
@@ -17,7 +17,7 @@ Limits: flat: what stands in a room is painted on its walls. Nothing moves as on
 import numpy as np
 from scipy.ndimage import gaussian_filter, gaussian_filter1d
 
-from isc_core.environment import directions
+from isc_core.shading.environment_map import directions
 from synth.albedos.fields import fractal_noise, smooth_noise
 
 PLACES = ("room", "outdoors", "studio", "clutter")

@@ -22,7 +22,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from isc_core.environment import directions
+from isc_core.shading.environment_map import directions
 from synth.light_rigs.harmonics import smooth_pattern, turned_to_front
 
 from .random_draws import log_uniform

@@ -1,4 +1,4 @@
-"""Fits the network of `isc_core.appearance`.
+"""Fits the network of `isc_core.networks.scene_classifier`.
 
   python -m training.networks.appearance SCENES... --synth DIR [--data ROOT --glossy DIR...]
   [--leave NAME...] -o APPEARANCE.npz
@@ -6,7 +6,7 @@
 SCENES: of `training.data.rendered_scenes`; `--synth`: a run of `isc synth`, whose training scenes are
 ordinary; `--data`, `--glossy`: the MIT-Berkeley set and what `isc synth glossy-mit` made of it,
 ordinary too; `--leave`: families of shapes, objects of the set and surroundings that the network
-must not see, because it will be measured on them (`benchmarks.doubts`). `--start`: a layer network,
+must not see, because it will be measured on them (`benchmarks.decomposition.assumption_checks`). `--start`: a layer network,
 whose encoder it begins with (the shipped one if none): what that has seen, `--leave` does not take
 back. Needs PyTorch (`pip install 'isc3d[training]'`), which nothing else of ISC does.
 
@@ -33,12 +33,12 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from isc_core.appearance import GLASS, KINDS, LAMPS, LONG_SIDE, MIRROR, ORDINARY
-from isc_core.box import mask_slices
-from isc_core.datasets import list_objects, load_object
-from isc_core.exr import read_channels
-from isc_core.photo import averaged
-from isc_core.separation.layer_network import read_network, shipped_network
+from isc_core.datasets.mit_berkeley import list_objects, load_object
+from isc_core.imaging.bounding_box import mask_slices
+from isc_core.io.exr import read_channels
+from isc_core.networks.layer_network import read_network, shipped_network
+from isc_core.networks.scene_classifier import GLASS, KINDS, LAMPS, LONG_SIDE, MIRROR, ORDINARY
+from isc_core.photo.photo import averaged
 from training.data.random_draws import log_uniform
 from training.data.rendered_scenes import scenes_in
 from training.networks.layer_network import arrays_of, encoder_of, inputs
@@ -254,7 +254,7 @@ def sensed(image: torch.Tensor, mask: torch.Tensor, rng: np.random.Generator) ->
 
 
 class Network(nn.Module):  # type: ignore[misc]
-    """The network of `isc_core.appearance`, to be fitted; it begins with the encoder of a layer
+    """The network of `isc_core.networks.scene_classifier`, to be fitted; it begins with the encoder of a layer
     network.
     """
 
@@ -294,7 +294,7 @@ class Network(nn.Module):  # type: ignore[misc]
         return self.head(self.dropped(self.scaled(torch.sqrt(torch.cat(found, 1) + 1e-6))))
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As `isc_core.appearance.read_appearance` reads them."""
+        """As `isc_core.networks.scene_classifier.read_appearance` reads them."""
         norm, head = self.scaled, self.head
         return arrays_of(self.convolutions) | {
             "middle": norm.running_mean.numpy(),

@@ -1,4 +1,4 @@
-"""Fits the network of `isc_core.lamp_network`.
+"""Fits the network of `isc_core.networks.light_network`.
 
   python -m training.networks.lamp_network OBJECTS [--leave NAME...] [--steps N] -o LAMPS.npz
 
@@ -25,11 +25,11 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from isc_core.glance import PLACES
-from isc_core.lamp_network import CELL, LONG_SIDE, SURE, UNSURE
-from isc_core.separation.layer_network import shipped_network
-from isc_core.sirfs.frames import real_sh
-from isc_core.sirfs.seen_light import FRONT, LOOK
+from isc_core.networks.layer_network import shipped_network
+from isc_core.networks.light_network import CELL, LONG_SIDE, SURE, UNSURE
+from isc_core.scene.light_estimate import PLACES
+from isc_core.shading.spherical_harmonics import real_sh
+from isc_core.sirfs.priors.predicted_light import FRONT, LOOK
 from training.data.random_draws import log_uniform
 from training.data.relighting import NONE, ONE, SEVERAL, Relit, draw_photo
 from training.data.traced_objects import SIZE, objects_in
@@ -138,7 +138,7 @@ def _blurred(toward: torch.Tensor, shares: np.ndarray) -> torch.Tensor:
 
 
 class Network(nn.Module):  # type: ignore[misc]
-    """The network of `isc_core.lamp_network`, to be fitted; it begins with the encoder of the layer
+    """The network of `isc_core.networks.light_network`, to be fitted; it begins with the encoder of the layer
     network that ships.
     """
 
@@ -194,7 +194,7 @@ class Network(nn.Module):  # type: ignore[misc]
         return self.lamps(whole), self.places(whole), self.light(whole), normals
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As `isc_core.lamp_network.read_lamp_network` reads them."""
+        """As `isc_core.networks.light_network.read_lamp_network` reads them."""
         norm, found = self.scaled, {}
         scale = norm.weight / torch.sqrt(norm.running_var + norm.eps)
         found["middle"], found["scale"] = (norm.running_mean - norm.bias / scale), scale
@@ -274,7 +274,9 @@ def main() -> None:
         Relit.of(unlit) for unlit in objects_in(given.objects) if unlit.shape not in given.leave
     ]
     if not objects:
-        parser.error("there is nothing to learn from: make objects with training.data.traced_objects")
+        parser.error(
+            "there is nothing to learn from: make objects with training.data.traced_objects"
+        )
     given.output.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(given.output, **fit(objects, given).arrays())  # type: ignore[arg-type]
 

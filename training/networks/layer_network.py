@@ -1,4 +1,4 @@
-"""Fits the network of `isc_core.separation.layer_network`.
+"""Fits the network of `isc_core.networks.layer_network`.
 
   python -m training.networks.layer_network --scenes DIR [--data ROOT --glossy DIR... [--leave
   a,b]] -o NETWORK.npz [--steps N]
@@ -55,7 +55,7 @@ class Block(nn.Module):  # type: ignore[misc]
 
 
 class Network(nn.Module):  # type: ignore[misc]
-    """The network of `isc_core.separation.layer_network`, to be fitted."""
+    """The network of `isc_core.networks.layer_network`, to be fitted."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -93,7 +93,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
 
 def encoder_of(weights: Sequence[np.ndarray], biases: Sequence[np.ndarray]) -> nn.ModuleList:
-    """The convolutions of an encoder of `isc_core.separation.convolutions`, to begin another
+    """The convolutions of an encoder of `isc_core.networks.layers`, to begin another
     network with.
     """
     convolutions = nn.ModuleList()
@@ -108,7 +108,7 @@ def encoder_of(weights: Sequence[np.ndarray], biases: Sequence[np.ndarray]) -> n
 
 
 def arrays_of(convolutions: Iterable[nn.Conv2d]) -> dict[str, np.ndarray]:
-    """Weights and biases as `isc_core.separation.convolutions.weights_in` reads them."""
+    """Weights and biases as `isc_core.networks.layers.weights_in` reads them."""
     found: dict[str, np.ndarray] = {}
     for k, one in enumerate(convolutions):
         weight = one.weight.detach().numpy().transpose(2, 3, 1, 0)

@@ -1,4 +1,4 @@
-"""Fits the network of `isc_core.shape_network`.
+"""Fits the network of `isc_core.networks.normal_network`.
 
   python -m training.networks.shape_network OBJECTS... [--measured DIR] [--leave NAME...] [--start
   STATE.pt] [--steps N] -o SHAPE.npz
@@ -25,8 +25,8 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from isc_core.lamp_network import shipped_lamp_network
-from isc_core.shape_network import CELL, LONG_SIDE, SURE, UNSURE
+from isc_core.networks.light_network import shipped_lamp_network
+from isc_core.networks.normal_network import CELL, LONG_SIDE, SURE, UNSURE
 from training.data.random_draws import log_uniform
 from training.data.relighting import NONE, ONE, SEVERAL, Lit, Relit, draw_photo
 from training.data.traced_objects import SIZE, objects_in
@@ -146,7 +146,7 @@ def _divided(room: int, rng: np.random.Generator) -> tuple[int, int]:
 
 
 class Network(nn.Module):  # type: ignore[misc]
-    """The network of `isc_core.shape_network`, to be fitted; it begins with the encoder of the lamp
+    """The network of `isc_core.networks.normal_network`, to be fitted; it begins with the encoder of the lamp
     network that ships.
     """
 
@@ -192,7 +192,7 @@ class Network(nn.Module):  # type: ignore[misc]
             return self.out(layer).float()
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As `isc_core.shape_network.read_shape_network` reads them."""
+        """As `isc_core.networks.normal_network.read_shape_network` reads them."""
         return arrays_of(
             [
                 *self.down,
@@ -259,7 +259,9 @@ def main() -> None:
 
     objects = [relit for folder in given.objects for relit in seen(folder)]
     if not objects:
-        parser.error("there is nothing to learn from: make objects with training.data.traced_objects")
+        parser.error(
+            "there is nothing to learn from: make objects with training.data.traced_objects"
+        )
     given.output.parent.mkdir(parents=True, exist_ok=True)
     network = fit(objects, [] if given.measured is None else seen(given.measured), given)
     np.savez_compressed(given.output, **network.arrays())  # type: ignore[arg-type]
