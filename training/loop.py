@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import nn
 
-from training.networks.appearance import follow
+from training.networks.scene_classifier import follow
 
 RATE, HEAD_RATE = 4e-4, 1e-3  # of an encoder that knows something, and of what is new
 _DECAY, _WARM_UP, _SHOWN, _KEPT = 1e-2, 100, 100, 1000

@@ -32,7 +32,7 @@ from ..imaging.bounding_box import mask_slices
 from ..imaging.smoothing import masked_gaussian
 from ..imaging.upsampling import enlarged
 from ..io.npy import read_arrays
-from ..photo.photo import averaged_object
+from ..imaging.area_resize import averaged_object
 from .layers import BLOCK, conv_block, convolved, depth_to_space, encoded, pad_to_stride, weights_in
 
 _MARGIN = 2.0  # of the output: without evidence it says "hardly anything"

@@ -18,7 +18,7 @@ Citation: M.-A. Gardner et al., "Learning to predict indoor illumination from a 
 Trans. Graph. 36(6) (2017), doi:10.1145/3130800.3130891 (a light's direction as a class); O.
 Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24574-4_28 (the
 encoder). Weights, training pictures and loss are our own: `python -m
-training.networks.lamp_network`.
+training.networks.light_network`.
 
 Limits: measured in docs/methods/lamps.md. It learned from rendered paint with a gloss.
 """
@@ -33,7 +33,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.npy import read_arrays
-from ..photo.photo import averaged_object
+from ..imaging.area_resize import averaged_object
 from ..scene.light_estimate import PLACES, LightEstimate
 from .layers import encoded, is_encoder, pad_to_stride, weights_in
 

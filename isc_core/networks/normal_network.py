@@ -18,7 +18,7 @@ Citation: D. Eigen and R. Fergus, "Predicting depth, surface normals and semanti
 common multi-scale convolutional architecture", ICCV 2015, doi:10.1109/ICCV.2015.304 (normals of a
 network); O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28 (encoder and decoder). Weights, training pictures and loss are our
-own: `python -m training.networks.shape_network`.
+own: `python -m training.networks.normal_network`.
 
 Limits: measured in docs/methods/first_shape.md. It learned from rendered paint with a gloss, and
 sees nothing finer than a thirtieth of the object.
@@ -36,7 +36,7 @@ from ..errors import InputError
 from ..imaging.bounding_box import mask_slices
 from ..imaging.upsampling import enlarged
 from ..io.npy import read_arrays
-from ..photo.photo import averaged_object
+from ..imaging.area_resize import averaged_object
 from ..scene.normal_estimate import NormalEstimate
 from .layers import conv_block, convolved, encoded, is_encoder, pad_to_stride, weights_in
 

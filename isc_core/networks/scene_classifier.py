@@ -16,7 +16,7 @@ averaged over the photo and its mirror image.
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28 (the encoder); pooled moments: A. Babenko, V. Lempitsky,
 "Aggregating local deep features for image retrieval", ICCV 2015, doi:10.1109/ICCV.2015.150.
-Weights, training scenes and loss are our own: `python -m training.networks.appearance`.
+Weights, training scenes and loss are our own: `python -m training.networks.scene_classifier`.
 
 Limits: measured in docs/methods/doubts.md. A mirror of surroundings without detail looks like
 paint, and two lamps may look like two bumps.
@@ -31,7 +31,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.npy import read_arrays
-from ..photo.photo import averaged_object
+from ..imaging.area_resize import averaged_object
 from .layers import average_pool, encoded, is_encoder, pad_to_stride, weights_in
 
 ORDINARY, MIRROR, GLASS, LAMPS = KINDS = ("ordinary", "mirror", "glass", "lamps")

@@ -20,7 +20,7 @@ from torch.nn import functional
 
 from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.io.exr import read_channels
-from isc_core.photo.photo import averaged
+from isc_core.imaging.area_resize import averaged
 
 from .random_draws import log_uniform
 

@@ -1,6 +1,6 @@
 """Fits the network of `isc_core.networks.normal_network`.
 
-  python -m training.networks.shape_network OBJECTS... [--measured DIR] [--leave NAME...] [--start
+  python -m training.networks.normal_network OBJECTS... [--measured DIR] [--leave NAME...] [--start
   STATE.pt] [--steps N] -o SHAPE.npz
 
 OBJECTS, `--measured`: of `training.data.traced_objects`; every picture lights one of them anew
@@ -31,7 +31,7 @@ from training.data.random_draws import log_uniform
 from training.data.relighting import NONE, ONE, SEVERAL, Lit, Relit, draw_photo
 from training.data.traced_objects import SIZE, objects_in
 from training.loop import optimised
-from training.networks.appearance import sensed
+from training.networks.scene_classifier import sensed
 from training.networks.layer_network import Block, arrays_of, encoder_of, inputs
 
 _SIDE = 128  # of the pictures that it learns from

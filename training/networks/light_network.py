@@ -1,6 +1,6 @@
 """Fits the network of `isc_core.networks.light_network`.
 
-  python -m training.networks.lamp_network OBJECTS [--leave NAME...] [--steps N] -o LAMPS.npz
+  python -m training.networks.light_network OBJECTS [--leave NAME...] [--steps N] -o LAMPS.npz
 
 OBJECTS: of `training.data.traced_objects`; every picture lights one of them anew
 (`training.data.relighting`): by smooth light alone, by one lamp, or by two to four. `--leave`:
@@ -34,7 +34,7 @@ from training.data.random_draws import log_uniform
 from training.data.relighting import NONE, ONE, SEVERAL, Relit, draw_photo
 from training.data.traced_objects import SIZE, objects_in
 from training.loop import optimised
-from training.networks.appearance import sensed
+from training.networks.scene_classifier import sensed
 from training.networks.layer_network import arrays_of, encoder_of, inputs
 
 _SIDE = 128  # of the pictures that it learns from

@@ -1,6 +1,6 @@
 """Fits the network of `isc_core.networks.scene_classifier`.
 
-  python -m training.networks.appearance SCENES... --synth DIR [--data ROOT --glossy DIR...]
+  python -m training.networks.scene_classifier SCENES... --synth DIR [--data ROOT --glossy DIR...]
   [--leave NAME...] -o APPEARANCE.npz
 
 SCENES: of `training.data.rendered_scenes`; `--synth`: a run of `isc synth`, whose training scenes are
@@ -38,7 +38,7 @@ from isc_core.imaging.bounding_box import mask_slices
 from isc_core.io.exr import read_channels
 from isc_core.networks.layer_network import read_network, shipped_network
 from isc_core.networks.scene_classifier import GLASS, KINDS, LAMPS, LONG_SIDE, MIRROR, ORDINARY
-from isc_core.photo.photo import averaged
+from isc_core.imaging.area_resize import averaged
 from training.data.random_draws import log_uniform
 from training.data.rendered_scenes import scenes_in
 from training.networks.layer_network import arrays_of, encoder_of, inputs
