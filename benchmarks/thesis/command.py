@@ -8,12 +8,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from isc_core.commands.options import Commands, add_command, add_speech, count, hints
+from isc_core.cli.interface.options import Commands, add_command, add_speech, count, hints
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 if TYPE_CHECKING:
-    from .item import Item
+    pass
 
 _DEFAULT = Path("docs") / "thesis"
 _LIBRARIES = ("matplotlib", "skimage")
@@ -99,11 +99,11 @@ def run_list(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Raises `InputError` where a library is missing.
     """
     _require_libraries()
-    from .registry import items
-    from .run import states
+    from .making import item_states
+    from .registry import all_items
 
     del monitor
-    return list(states(items(), options.output))
+    return list(item_states(all_items(), options.output))
 
 
 def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
@@ -112,9 +112,9 @@ def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Raises `InputError` for an unknown number and what cannot be made; `Cancelled`.
     """
     _require_libraries()
-    from .registry import find
+    from .registry import find_item
 
-    item = find(options.kind, options.number)
+    item = find_item(options.kind, options.number)
     if item.make is None:
         raise InputError(f"{item.kind} {item.number} cannot be made again: {item.reason}")
     return _made(options, [item], monitor)
@@ -126,9 +126,9 @@ def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     Raises `InputError` for data and folders that cannot be used; `Cancelled`.
     """
     _require_libraries()
-    from .registry import items
+    from .registry import all_items
 
-    return _made(options, [item for item in items() if item.make is not None], monitor)
+    return _made(options, [item for item in all_items() if item.make is not None], monitor)
 
 
 def _require_libraries() -> None:
@@ -143,8 +143,8 @@ def _require_libraries() -> None:
 
 
 def _made(options: argparse.Namespace, wanted: "Sequence[Item]", monitor: Monitor) -> list[str]:
-    from .context import Context
-    from .run import make_items
+    from .making import make_items
+    from .measuring.context import Context
 
     context = Context(options.output, options.data, options.quick, options.seed, monitor)
     if options.again:

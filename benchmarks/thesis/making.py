@@ -11,20 +11,20 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from isc_core.atomic import require_writable_file
 from isc_core.errors import InputError
+from isc_core.io.atomic import require_writable_file
 from isc_core.progress import Monitor
 
-from .context import Context
-from .item import Item
-from .registry import items as all_items
-from .written import is_complete, read_record, write_index, write_item
+from .measuring.context import Context
+from .registry import all_items as all_items
+from .report.item import ThesisItem
+from .report.written import is_complete, read_record, write_index, write_item
 
 _USUAL = 10.0  # seconds of an item that nobody has timed
 
 
 @dataclass(frozen=True)
-class Outcome:
+class MakeSummary:
     """How many items were `made` and how many `kept`; which `failed`, with the reason in one line."""
 
     made: int
@@ -32,7 +32,9 @@ class Outcome:
     failed: tuple[tuple[str, str], ...]
 
 
-def make_items(wanted: Sequence[Item], context: Context, *, again: bool = False) -> Outcome:
+def make_items(
+    wanted: Sequence[ThesisItem], context: Context, *, again: bool = False
+) -> MakeSummary:
     """Makes the items that are not complete, or all of them `again`, and the index.
 
     Raises `InputError` where data or folder cannot be used, or where a single item was wanted and
@@ -57,12 +59,12 @@ def make_items(wanted: Sequence[Item], context: Context, *, again: bool = False)
             # After each item, so that the index of a long run, or an interrupted one, is never
             # behind.
             write_index(context.output, all_items())
-    return Outcome(len(missing) - len(failed), len(wanted) - len(missing), tuple(failed))
+    return MakeSummary(len(missing) - len(failed), len(wanted) - len(missing), tuple(failed))
 
 
-def states(items: Sequence[Item], folder: Path) -> Iterator[str]:
+def item_states(all_items: Sequence[ThesisItem], folder: Path) -> Iterator[str]:
     """A line for each item: what it is, whether it is made, and which claims it has a verdict on."""
-    for item in items:
+    for item in all_items:
         record = read_record(folder, item.name)
         state = (
             "not regenerable" if item.make is None else "made" if record is not None else "not made"
@@ -76,13 +78,15 @@ def states(items: Sequence[Item], folder: Path) -> Iterator[str]:
         yield f"{item.kind:6s} {item.number:5s} {state:15s} {item.title}{reason}{said}"
 
 
-def _make(item: Item, context: Context) -> None:
+def _make(item: ThesisItem, context: Context) -> None:
     assert item.make is not None
     begin = time.monotonic()
     write_item(item, item.make(context), context, time.monotonic() - begin)
 
 
-def _watched(missing: Sequence[Item], context: Context) -> Iterator[tuple[Item, Monitor]]:
+def _watched(
+    missing: Sequence[ThesisItem], context: Context
+) -> Iterator[tuple[ThesisItem, Monitor]]:
     """The items, each with the monitor of its part of the whole."""
     known = {
         item.name: record.seconds

@@ -5,30 +5,30 @@ from functools import cache
 
 from isc_core.errors import InputError
 
-from .item import Item
+from .report.item import ThesisItem
 
 _MODULES = (
-    "introduction_items",
-    "background_items",
-    "framework_items",
-    "filter_items",
-    "application_items",
-    "catalogue_items",
-    "thresholding_items",
-    "thresholding_figures",
-    "segmentation_items",
-    "removal_items",
-    "sparse_coding_items",
-    "characteristics_items",
-    "sheets_items",
+    "introduction",
+    "background",
+    "framework",
+    "filters",
+    "applications",
+    "catalogue",
+    "thresholds",
+    "threshold_figures",
+    "segmentation",
+    "removal",
+    "sparse_coding",
+    "characteristics",
+    "sheets",
 )
 
 
 @cache
-def items() -> tuple[Item, ...]:
+def all_items() -> tuple[ThesisItem, ...]:
     """Every item. matplotlib and scikit-image have to be installed."""
-    modules = [importlib.import_module(f".{name}", __package__) for name in _MODULES]
-    found: list[Item] = sorted(
+    modules = [importlib.import_module(f".items.{name}", __package__) for name in _MODULES]
+    found: list[ThesisItem] = sorted(
         (item for module in modules for item in module.ITEMS), key=lambda item: item.order
     )
     names = [item.name for item in found]
@@ -37,9 +37,9 @@ def items() -> tuple[Item, ...]:
     return tuple(found)
 
 
-def find(kind: str, number: str) -> Item:
+def find_item(kind: str, number: str) -> ThesisItem:
     """One item. Raises `InputError` that names the nearest numbers where there is none."""
-    known = {item.number: item for item in items() if item.kind == kind}
+    known = {item.number: item for item in all_items() if item.kind == kind}
     if number not in known:
         near = sorted(known, key=lambda other: _distance(number, other))[:3]
         raise InputError(

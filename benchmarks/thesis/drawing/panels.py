@@ -12,10 +12,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from isc_core.box import mask_slices
-from isc_core.decomposition import Decomposition
+from isc_core.imaging.bounding_box import mask_slices
+from isc_core.scene.decomposition import Decomposition
 
-from .pictures import ball
+from .image_maps import light_ball
 from .style import LETTERS, WIDTH, exposure, figure, normal_colours, show, show_map
 
 _LINE = 0.16  # inches of a line of letters
@@ -41,7 +41,7 @@ class Panel:
     bar: bool = True
 
 
-def panels(shown: Sequence[Panel], columns: int, *, width: float = WIDTH) -> Figure:
+def panel_figure(shown: Sequence[Panel], columns: int, *, width: float = WIDTH) -> Figure:
     """The panels, row by row, each cut to its mask's box."""
     rows = -(-len(shown) // columns)
     cut = [_cut(panel) for panel in shown]
@@ -100,10 +100,10 @@ def normals_panel(title: str, normal: np.ndarray, mask: np.ndarray) -> Panel:
 
 def light_panel(title: str, illumination: np.ndarray) -> Panel:
     """A white ball under the light of coefficients (9, 3)."""
-    return Panel(title, *ball(illumination))
+    return Panel(title, *light_ball(illumination))
 
 
-def characteristics(d: Decomposition) -> list[Panel]:
+def characteristic_panels(d: Decomposition) -> list[Panel]:
     """Everything that a decomposition holds: photo and layers in one exposure, the rest each in its
     own.
     """

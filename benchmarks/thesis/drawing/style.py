@@ -17,7 +17,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from isc_core.photo import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb
 
 OKABE_ITO = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#F0E442")
 WIDTH = 7.0  # inches
@@ -58,13 +58,13 @@ def figure(
     return made, axes
 
 
-def finish(made: Figure) -> None:
+def unify_titles(made: Figure) -> None:
     """Gives all titles the size of the other letters, whichever way they were set."""
     for axes in made.axes:
         axes.title.set_fontsize(LETTERS)
 
 
-def tabulated(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Figure:
+def table_figure(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Figure:
     """A picture of a table, for where Markdown is not shown: columns as wide as their longest cell,
     every second row shaded.
     """
@@ -168,7 +168,7 @@ def exposure(image_linear: np.ndarray, mask: np.ndarray | None = None) -> float:
     return _BRIGHT / peak if peak > 0 else 1.0
 
 
-def sheet(
+def image_sheet(
     columns: Sequence[str],
     rows: Sequence[tuple[str, Sequence[np.ndarray | None]]],
     *,

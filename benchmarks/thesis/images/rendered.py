@@ -1,14 +1,13 @@
-"""The project's own images, rendered on first use, so that everything runs without anybody's data.
+"""Test images rendered by the project itself, on first use; no data set is needed.
 
-"scene": glossy things under softboxes, as a photographer would take them. "glossy": the arithmetic
-of `isc synth glossy-mit`, on objects of MIT-Berkeley where a copy is given, else on our own shapes
-and paints: shading is exp(SH(normal)) exactly. "synth": scenes as `isc synth` draws them. All have
-the truth of every layer, laid out as that of MIT-Berkeley.
+Problem: family `scene` has glossy objects under softboxes, as a photographer takes them. `glossy`
+has the composition of `isc synth glossy-mit`, on MIT-Berkeley objects where a copy is given, else
+on own shapes and albedos; its shading is exp(SH(normal)) exactly. `synth` has scenes of `isc
+synth`. All have the ground truth of every layer, stored like that of MIT-Berkeley.
 
-Citation: H. Akbar (2016), thesis, whose MIT-Berkeley-UTeM set is not public: "glossy" stands in for
-it.
+Citation: H. Akbar (2016), thesis, whose MIT-Berkeley-UTeM set is not public: `glossy` replaces it.
 
-Limits: what is kept in the folder is found by its name: it belongs to one version of the program.
+Limits: a cached image is identified by its file name, which contains the program's version.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,13 +18,15 @@ from pathlib import Path
 import numpy as np
 
 from isc_core import __version__
-from isc_core.atomic import new_file
-from isc_core.datasets import MitBerkeleyObject
-from isc_core.environment import shading_under
-from isc_core.metrics import truth_normal
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject
+from isc_core.evaluation.metrics import truth_normal
+from isc_core.io.atomic import new_file
 from isc_core.progress import Monitor
-from isc_core.sirfs.frames import light_to_reference
+from isc_core.shading.environment_map import shading_under
+from isc_core.shading.spherical_harmonics import light_to_reference
 from synth.albedos import make_albedo
+from synth.capture.recipe import Part, Picture, Sources, camera_around, photograph
+from synth.capture.truth import GroundTruth, exposed, fit_light, render_truth
 from synth.dataset.splits import Choices, make_pools
 from synth.demo_scene import demo_scene
 from synth.glossy_mit.files import exposed as exposed_layers
@@ -33,58 +34,53 @@ from synth.glossy_mit.layers import make_layers
 from synth.glossy_mit.settings import GlossySettings
 from synth.glossy_mit.source import Source, load_source
 from synth.light_rigs import make_lights
-from synth.lights import EnvironmentLight
-from synth.materials import Material
-from synth.recipe import Part, Picture, Sources, camera_around, photograph
 from synth.rendering import RenderOptions
 from synth.scene import Scene
+from synth.scene.lights import EnvironmentLight
+from synth.scene.materials import Material
+from synth.scene.variant import load_mitsuba
 from synth.shapes import make_shape
-from synth.truth import GroundTruth, exposed, fit_light, render_truth
-from synth.variant import load_mitsuba
 
-from .subjects import QUICK_SIZE, Subject
+from .subject import QUICK_SIZE, Subject
 
 _SAMPLES, _QUICK_SAMPLES = 128, 32
-_LEVEL = 25.0  # per cent of the light that is specular
+_LEVEL = 25.0  # specular share of the light, per cent
 _SYNTH_SEEDS = (2, 21)
 _ARRAYS = ("image", "valid", "mask", "height", "shading", "reflectance", "light")
 
 
 @dataclass(frozen=True)
-class _Thing:
-    """An object of ours: a member of a family of shapes, painted from a family of albedos.
-
-    `exponent`, `strength`: of its gloss.
-    """
+class _RenderedObject:
+    """Own object: a member of a shape family with an albedo family and a specular lobe."""
 
     name: str
     shape: str
     member: int
-    paint: str
+    albedo: str
     exponent: float = 100.0
     strength: float = 0.1
 
     def part(self, seed: int) -> Part:
-        """The shape's member; another seed takes another one."""
+        """Return the shape's member; another seed selects another one."""
         return Part(self.shape, self.member + seed)
 
 
 _SCENES = (
-    _Thing("fruit", "lathe", 8, "patches", 80.0),
-    _Thing("pebble", "displaced", 7, "uniform", 60.0),
-    _Thing("soap", "superquadric", 11, "noise", 80.0),
-    _Thing("tin", "lathe", 7, "print", 120.0),
+    _RenderedObject("fruit", "lathe", 8, "patches", 80.0),
+    _RenderedObject("pebble", "displaced", 7, "uniform", 60.0),
+    _RenderedObject("soap", "superquadric", 11, "noise", 80.0),
+    _RenderedObject("tin", "lathe", 7, "print", 120.0),
 )
 _GLOSSY = (
-    _Thing("bowl", "lathe", 6, "patches"),
-    _Thing("stone", "displaced", 3, "uniform"),
-    _Thing("seal", "blobby", 11, "patches"),
+    _RenderedObject("bowl", "lathe", 6, "patches"),
+    _RenderedObject("stone", "displaced", 3, "uniform"),
+    _RenderedObject("seal", "blobby", 11, "patches"),
 )
 
-Layers = tuple[MitBerkeleyObject, np.ndarray]  # the truth, and the diffuse layer (H, W, 3)
+Layers = tuple[MitBerkeleyObject, np.ndarray]  # ground truth, diffuse layer (H, W, 3)
 
 
-def rendered(
+def rendered_subjects(
     family: str,
     folder: Path,
     root: Path | None,
@@ -93,12 +89,36 @@ def rendered(
     seed: int,
     monitor: Monitor,
 ) -> Iterator[Subject]:
-    """The subjects of a family, "scene", "glossy" or "synth", one by one, from `folder` where they
-    are kept.
+    """Yield the subjects of a family, from the cache where possible.
 
-    `root`, `objects`: the folder of MIT-Berkeley and which of its objects "glossy" takes; None for
-    our own. `size`: of the square pictures, pixels. Raises `InputError` where Mitsuba is not
-    installed; `Cancelled`.
+    Parameters
+    ----------
+    family : str
+        "scene", "glossy" or "synth".
+    folder : Path
+        Cache of rendered images.
+    root : Path or None
+        MIT-Berkeley folder used by "glossy"; None uses own objects.
+    objects : sequence of str
+        MIT-Berkeley objects used by "glossy".
+    size : int
+        Side of the square images, pixels.
+    seed : int
+        Seed of shapes, albedos, lights and samples.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Yields
+    ------
+    Subject
+        One subject with its layers and ground truth.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is required and not installed.
+    Cancelled
+        If the user cancels.
     """
     origin = "-data" if root is not None and family == "glossy" else ""
     for name, make in _plans(family, root, objects, size, seed):
@@ -113,14 +133,14 @@ def rendered(
 def _plans(
     family: str, root: Path | None, objects: Sequence[str], size: int, seed: int
 ) -> list[tuple[str, Callable[[Monitor], Layers]]]:
-    """Names, and what makes them."""
+    """List the names of a family and the function that renders each."""
     if family == "scene":
         gourd = ("gourd", partial(_of_scene, demo_scene, size, seed))
         return [
             gourd,
             *(
-                (thing.name, partial(_of_scene, partial(_scene, thing, seed), size, seed))
-                for thing in _SCENES
+                (object_.name, partial(_of_scene, partial(_scene, object_, seed), size, seed))
+                for object_ in _SCENES
             ),
         ]
     if family == "synth":
@@ -132,17 +152,17 @@ def _plans(
             (name, partial(_of_glossy, partial(load_source, root, name), seed)) for name in objects
         ]
     return [
-        (thing.name, partial(_of_glossy, partial(_own_source, thing, size, seed), seed))
-        for thing in _GLOSSY
+        (object_.name, partial(_of_glossy, partial(_own_source, object_, size, seed), seed))
+        for object_ in _GLOSSY
     ]
 
 
-def _scene(thing: _Thing, seed: int, size: int) -> Scene:
-    """A glossy object under softboxes."""
-    shape = thing.part(seed)
-    albedo = make_albedo(thing.paint, shape.generator("albedo"))
-    mesh = make_shape(thing.shape, shape.generator("shape"))
-    material = Material(albedo, "blinn_phong", thing.exponent, thing.strength)
+def _scene(object_: _RenderedObject, seed: int, size: int) -> Scene:
+    """Build a glossy object under softboxes."""
+    shape = object_.part(seed)
+    albedo = make_albedo(object_.albedo, shape.generator("albedo"))
+    mesh = make_shape(object_.shape, shape.generator("shape"))
+    material = Material(albedo, "blinn_phong", object_.exponent, object_.strength)
     return Scene(
         mesh,
         material,
@@ -159,7 +179,7 @@ def _of_scene(make: Callable[[int], Scene], size: int, seed: int, monitor: Monit
 
 
 def _of_synth(number: int, size: int, monitor: Monitor) -> Layers:
-    """A scene of `isc synth`, glossy ones only."""
+    """Render a glossy scene of `isc synth`."""
     choices = Choices(materials=("blinn_phong", "ggx", "roughplastic"), splits=("train",))
     picture = Picture(size, _QUICK_SAMPLES if size <= QUICK_SIZE else _SAMPLES)
     recipe = make_pools(choices, Sources()).recipe(number, picture, Sources())
@@ -167,17 +187,17 @@ def _of_synth(number: int, size: int, monitor: Monitor) -> Layers:
 
 
 def _layers(truth: GroundTruth, name: str) -> Layers:
-    """A rendered truth as that of an object of the set; light above 1 is lost, as on a sensor."""
+    """Convert a rendered truth; image values above 1 are clipped, as by a sensor."""
     image = np.minimum(truth.image, 1).astype(float)
     height = np.where(truth.mask, truth.height, np.nan).astype(float)
-    seen = truth.mask & (truth.diffuse > 0).all(-1)
+    valid = truth.mask & (truth.diffuse > 0).all(-1)
     layers = (truth.shading.astype(float), truth.reflectance.astype(float))
     return (
         MitBerkeleyObject(
             name,
             "laboratory",
             image,
-            seen,
+            valid,
             truth.mask,
             height,
             *layers,
@@ -187,13 +207,11 @@ def _layers(truth: GroundTruth, name: str) -> Layers:
     )
 
 
-def _own_source(thing: _Thing, size: int, seed: int) -> Source:
-    """An object of ours as the glossy set's arithmetic takes one of MIT-Berkeley: shape, paint and
-    a light of its own.
-    """
-    shape = thing.part(seed)
-    mesh = make_shape(thing.shape, shape.generator("shape"))
-    material = Material(make_albedo(thing.paint, shape.generator("albedo")), "lambert")
+def _own_source(object_: _RenderedObject, size: int, seed: int) -> Source:
+    """Build an own object as input of the glossy set: shape, albedo and environment map."""
+    shape = object_.part(seed)
+    mesh = make_shape(object_.shape, shape.generator("shape"))
+    material = Material(make_albedo(object_.albedo, shape.generator("albedo")), "lambert")
     lights = make_lights("sh", shape.generator("light"))
     scene = Scene(mesh, material, lights, camera_around(mesh, size, 0.92))
     truth = render_truth(scene, RenderOptions(samples=2, seed=seed))
@@ -205,7 +223,7 @@ def _own_source(thing: _Thing, size: int, seed: int) -> Source:
     rows, columns = (np.arange(side) for side in mask.shape)
     known = np.where(mask, height, np.nan)
     return Source(
-        thing.name,
+        object_.name,
         mask.shape,
         rows,
         columns,
@@ -218,9 +236,9 @@ def _own_source(thing: _Thing, size: int, seed: int) -> Source:
     )
 
 
-def _of_glossy(find: Callable[[], Source], seed: int, monitor: Monitor) -> Layers:
-    """An object under its light and a panel, a quarter of the light being specular."""
-    source = find()
+def _of_glossy(load: Callable[[], Source], seed: int, monitor: Monitor) -> Layers:
+    """Light an object by its light and an area light; a quarter of the light is specular."""
+    source = load()
     settings = GlossySettings(levels=(_LEVEL,), seed=seed)
     made = make_layers(source, settings, monitor)
     picture = exposed_layers(
@@ -237,12 +255,12 @@ def _of_glossy(find: Callable[[], Source], seed: int, monitor: Monitor) -> Layer
         for values in (picture.diffuse + picture.specular(_LEVEL), picture.diffuse)
     )
     layers = (crop(picture.shading), crop(source.reflectance))
-    seen = source.mask & (image > 0).all(-1)
+    valid = source.mask & (image > 0).all(-1)
     truth = MitBerkeleyObject(
         source.name,
         "laboratory",
         image,
-        seen,
+        valid,
         source.mask,
         source.height,
         *layers,

@@ -22,23 +22,24 @@ from functools import partial
 
 import numpy as np
 
-from isc_core.decomposition import Decomposition, Provenance, Separation
 from isc_core.editing.clusters import Clusters, find_clusters
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
-from isc_core.editing.edited import Edited, luminance
-from isc_core.editing.light_direction import explain_shading, explain_specular, lobe_light
-from isc_core.editing.lights import DirectionalLight, toward
+from isc_core.editing.edited import Edited
 from isc_core.editing.recolour import Paint, recolour
 from isc_core.editing.spheres import render_sphere, sphere_normals
+from isc_core.imaging.luminance import luminance
+from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, lobe_light
+from isc_core.scene.decomposition import Decomposition, Provenance, Separation
 from isc_core.separation import separate
-from synth.truth import fit_light
+from isc_core.shading.lights import DirectionalLight, toward
+from synth.capture.truth import fit_light
 
-from .context import Context, JsonRow
-from .decompositions import decomposed, photo_of
-from .item import Item, Made, Table
-from .panels import Panel, panels
-from .style import exposure
-from .subjects import Subject
+from ..drawing.panels import Panel, panel_figure
+from ..drawing.style import exposure
+from ..images.subject import Subject
+from ..measuring.context import Context, JsonRow
+from ..measuring.decompositions import decompose_subject, subject_as_photo
+from ..report.item import ItemContent, ItemTable, ThesisItem
 
 PAINT = np.array([0.62, 0.18, 0.10])
 EXPONENT, _GLOSS, _AMBIENT = 60.0, 0.06, 0.08
@@ -52,7 +53,7 @@ DIRECTIONS = (
 )
 
 
-def lit_ball(direction: np.ndarray, size: int) -> Decomposition:
+def render_ball(direction: np.ndarray, size: int) -> Decomposition:
     """A glossy ball under a light from the unit vector `direction` (3,): the truth of every layer,
     in a picture of `size` pixels a side.
 
@@ -82,7 +83,7 @@ def lit_ball(direction: np.ndarray, size: int) -> Decomposition:
     return Decomposition(*layers, facing, height, mask, sure, illumination, Provenance())
 
 
-def separated(d: Decomposition) -> Decomposition:
+def with_separated_layers(d: Decomposition) -> Decomposition:
     """The same scene with the layers that `isc` finds in its image."""
     split: Separation = separate("isc", d.image, d.mask)
     return replace(d, diffuse=split.diffuse, specular=split.specular, residual=split.residual)
@@ -93,7 +94,7 @@ def degrees_between(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)))
 
 
-def found_lights(
+def estimate_directions(
     ball: Decomposition, picture_only: Decomposition | None = None
 ) -> dict[str, np.ndarray]:
     """Directions (3,) of the light by each way of finding it;
@@ -103,7 +104,7 @@ def found_lights(
     ways = {
         "shading, true shape": explain_shading(ball),
         "highlight, true layers": explain_specular(ball),
-        "highlight, layers by isc": explain_specular(separated(ball)),
+        "highlight, layers by isc": explain_specular(with_separated_layers(ball)),
     }
     if picture_only is not None:
         ways |= {
@@ -122,13 +123,13 @@ _WAYS = (
 )
 
 
-def _spheres(context: Context) -> Made:
+def _spheres(context: Context) -> ItemContent:
     size = 64 if context.quick else 128
     shown, rows, errors = [], [], []
     for number, direction in enumerate(
         [toward(*one) for one in (DIRECTIONS[:3] if context.quick else DIRECTIONS)]
     ):
-        ball = lit_ball(direction, size)
+        ball = render_ball(direction, size)
         kept = context.rows(f"light on ball {number}", partial(_found_rows, context, ball, number))
         found = {
             str(row["way"]): np.array([float(row[axis] or 0) for axis in "xyz"]) for row in kept
@@ -140,7 +141,7 @@ def _spheres(context: Context) -> Made:
     means = [[off[name] for off in errors if name in off] for name in _WAYS]
     rows.append(("mean", *(float(np.mean(values)) for values in means)))
     header = ("light (x, y, z)", *_WAYS)
-    table = Table(
+    table = ItemTable(
         header,
         tuple(rows),
         "Degrees between the true direction and the one found; x right, y up, z toward the viewer.",
@@ -152,18 +153,18 @@ def _spheres(context: Context) -> Made:
     )
     if context.quick:
         text += " In a quick run the model sees the first ball only."
-    return Made((table,), (panels(shown, 4 if context.quick else 5),), text)
+    return ItemContent((table,), (panel_figure(shown, 4 if context.quick else 5),), text)
 
 
 def _found_rows(context: Context, ball: Decomposition, number: int) -> list[JsonRow]:
     picture_only = None
     if number == 0 or not context.quick:
-        picture_only = decomposed(
+        picture_only = decompose_subject(
             context,
             Subject(f"ball{number}", "sphere", ball.image, ball.mask),
             illumination="laboratory",
         )
-    found = found_lights(ball, picture_only)
+    found = estimate_directions(ball, picture_only)
     return [
         {"way": name, **dict(zip("xyz", map(float, direction), strict=True))}
         for name, direction in found.items()
@@ -174,7 +175,7 @@ def _ball_panels(
     ball: Decomposition, found: dict[str, np.ndarray], off: dict[str, float], size: int, quick: bool
 ) -> list[Panel]:
     gain = exposure(ball.image, ball.mask)
-    parted = separated(ball)
+    parted = with_separated_layers(ball)
     shown = [
         Panel("image", ball.image, ball.mask, gain=gain),
         Panel("specular, by isc", parted.specular, ball.mask, gain=gain),
@@ -202,12 +203,12 @@ def _photographed(
     """The masked photo with the most of what an edit needs; SIRFS needs an outline."""
     photos = context.photos()
     chosen = max([one for one in photos if not one.mask.all()] or photos, key=best)
-    return chosen, decomposed(context, chosen)
+    return chosen, decompose_subject(context, chosen)
 
 
 def _glossy(subject: Subject) -> float:
     """The share of its light that `isc` takes for specular."""
-    split = separate("isc", subject.image, subject.mask, photo_of(subject).clipped)
+    split = separate("isc", subject.image, subject.mask, subject_as_photo(subject).clipped)
     return float(
         split.specular[subject.mask].sum(dtype=float) / subject.image[subject.mask].sum(dtype=float)
     )
@@ -233,7 +234,7 @@ EDITS: tuple[tuple[str, DichromaticEdit], ...] = (
 )
 
 
-def _dichromatic(context: Context) -> Made:
+def _dichromatic(context: Context) -> ItemContent:
     subject, d = _photographed(context, _glossy)
     gain = exposure(d.image, d.mask)
     shown = [Panel("photo", d.image, d.mask, gain=gain)]
@@ -250,7 +251,7 @@ def _dichromatic(context: Context) -> Made:
     )
     caption = f"{subject.name}: RMS of the change, of the layer's or the image's own RMS. A layer that an edit leaves alone changes by nothing."
     text = f"{subject.name}: each layer edited by itself, then added up again; one exposure for all. A layer's removal shows the other one."
-    return Made((Table(header, tuple(rows), caption),), (panels(shown, 4),), text)
+    return ItemContent((ItemTable(header, tuple(rows), caption),), (panel_figure(shown, 4),), text)
 
 
 def _change(name: str, d: Decomposition, after: Edited) -> tuple[str, float, float, float]:
@@ -270,7 +271,7 @@ def _moved(before: np.ndarray, after: np.ndarray) -> float:
     return float(np.sqrt(np.square(after.astype(float) - before).sum() / max(size, 1e-30)))
 
 
-def painted_region(d: Decomposition) -> np.ndarray:
+def soft_disc_mask(d: Decomposition) -> np.ndarray:
     """A mask (H, W) in [0, 1] as a person might paint it: a soft disc on the object's middle, a
     quarter of its size.
     """
@@ -281,7 +282,7 @@ def painted_region(d: Decomposition) -> np.ndarray:
     return np.where(d.mask, np.clip((radius - distance) / 2 + 0.5, 0, 1), 0)
 
 
-def _recolouring(context: Context) -> Made:
+def _recolouring(context: Context) -> ItemContent:
     subject, d = _photographed(context, _colourful)
     gain = exposure(d.image, d.mask)
     clusters = find_clusters(d, 4, context.seed)
@@ -290,7 +291,7 @@ def _recolouring(context: Context) -> Made:
     asked: list[tuple[str, Paint, np.ndarray | None]] = [
         ("hue turned by 120°, everywhere", Paint(hue=120), None),
         ("less saturation, everywhere", Paint(saturation=0.3), None),
-        ("blue in a painted mask", Paint(target=target), painted_region(d)),
+        ("blue in a painted mask", Paint(target=target), soft_disc_mask(d)),
     ]
     asked += [
         (f"blue in cluster {number}", Paint(target=target), clusters.weight(number))
@@ -300,7 +301,7 @@ def _recolouring(context: Context) -> Made:
         Panel("photo", d.image, d.mask, gain=gain),
         Panel("clusters of paint", _cluster_picture(clusters), d.mask),
     ]
-    shown.append(Panel("painted mask", painted_region(d), d.mask, (0, 1)))
+    shown.append(Panel("painted mask", soft_disc_mask(d), d.mask, (0, 1)))
     rows: list[tuple[str | float, ...]] = []
     for name, paint, region in asked:
         after = recolour(d, paint, region)
@@ -319,7 +320,7 @@ def _recolouring(context: Context) -> Made:
         f"{subject.name}: another paint under the same light and gloss. Clusters are numbered by size; their picture shows each in its "
         "mean colour. Luminance stays, unless a colour cannot be that bright and becomes paler."
     )
-    return Made((Table(header, tuple(rows), caption),), (panels(shown, 3),), text)
+    return ItemContent((ItemTable(header, tuple(rows), caption),), (panel_figure(shown, 3),), text)
 
 
 def _cluster_picture(clusters: Clusters) -> np.ndarray:
@@ -340,8 +341,8 @@ def _recoloured(d: Decomposition, after: Edited, region: np.ndarray | None) -> t
     )
 
 
-_figure: Callable[..., Item] = partial(Item, "figure")
-ITEMS: tuple[Item, ...] = (
+_figure: Callable[..., ThesisItem] = partial(ThesisItem, "figure")
+ITEMS: tuple[ThesisItem, ...] = (
     _figure("4.49", "Highlights on a sphere, and the light directions found from them", _spheres),
     _figure("4.50", "Dichromatic editing", _dichromatic),
     _figure("4.51", "Reflectance editing", _recolouring),

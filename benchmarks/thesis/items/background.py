@@ -20,29 +20,35 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.dichromatic import Dichromatic
-from isc_core.brdf.energy import directional_albedo
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.model import Model
-from isc_core.brdf.oren_nayar import OrenNayar
-from isc_core.brdf.phong import Phong
-from isc_core.brdf.shading import directional, radiance
-from isc_core.editing.light_direction import VIEW
-from isc_core.editing.lights import DirectionalLight, toward
 from isc_core.editing.spheres import sphere_normals
-from isc_core.metrics import scaled_mse, truth_normal
-from isc_core.sirfs.frames import real_sh
-from synth.truth import fit_light
+from isc_core.evaluation.metrics import scaled_mse, truth_normal
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.dichromatic import Dichromatic
+from isc_core.shading.brdf.energy import directional_albedo
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.brdf.model import Model
+from isc_core.shading.brdf.oren_nayar import OrenNayar
+from isc_core.shading.brdf.phong import Phong
+from isc_core.shading.lights import VIEW, DirectionalLight, toward
+from isc_core.shading.radiance import directional, radiance
+from isc_core.shading.spherical_harmonics import real_sh
+from synth.capture.truth import fit_light
 
-from .context import Context
-from .decompositions import decomposed
-from .item import Item, Made, Table
-from .panels import Panel, normals_panel, panels
-from .specular_free_images import DARK, KINDS, PHOTO, highlight_left, titled, with_layers
-from .style import LETTERS, OKABE_ITO, exposure, figure, sheet
-from .subjects import Subject
+from ..drawing.panels import Panel, normals_panel, panel_figure
+from ..drawing.style import LETTERS, OKABE_ITO, exposure, figure, image_sheet
+from ..images.subject import Subject
+from ..measuring.context import Context
+from ..measuring.decompositions import decompose_subject
+from ..measuring.specular_free_images import (
+    DARK,
+    KINDS,
+    PHOTO,
+    residual_highlight,
+    subject_title,
+    subjects_with_highlights,
+)
+from ..report.item import ItemContent, ItemTable, ThesisItem
 
 INCIDENT = (0, 30, 60)  # degrees
 _NORMAL = np.array([0.0, 0.0, 1.0])
@@ -72,7 +78,7 @@ def lobe(model: Model, incident: float, views: np.ndarray) -> np.ndarray:
     return np.cos(angle) * (value if value.ndim == 1 else value[:, 0])
 
 
-def _lobes(context: Context) -> Made:
+def _lobes(context: Context) -> ItemContent:
     del context
     made, axes = figure(2, 3, height=4.0)
     rows = []
@@ -104,7 +110,7 @@ def _lobes(context: Context) -> Made:
         "number at its rim, 1/sr); dashed: where the light comes from. A Lambertian patch sends most along its normal wherever light comes "
         "from, Oren-Nayar more of it back. GGX grows toward grazing light, as real gloss does; Phong and Blinn-Phong do not."
     )
-    return Made((Table(header, tuple(rows)),), (made,), text)
+    return ItemContent((ItemTable(header, tuple(rows)),), (made,), text)
 
 
 def _polar(place: Axes, views: np.ndarray, curves: list[np.ndarray], title: str) -> None:
@@ -164,7 +170,7 @@ def phong_sphere(size: int, exponent: float) -> tuple[dict[str, np.ndarray], np.
     return {name: np.where(mask[..., None], layer, 1) for name, layer in layers.items()}, mask
 
 
-def _phong(context: Context) -> Made:
+def _phong(context: Context) -> ItemContent:
     rows, cells = [], []
     for exponent in (5.0, 20.0, 100.0):
         layers, mask = phong_sphere(96 if context.quick else 240, exponent)
@@ -173,9 +179,9 @@ def _phong(context: Context) -> Made:
         cells.append((exponent, float(level.max()), 100 * float((level > level.max() / 2).mean())))
     header = ("exponent", "brightest specular light", "share of the ball above half of it (%)")
     text = "Ambient, diffuse and specular light of one lamp on a ball, and their sum; the higher the exponent, the smaller the highlight."
-    return Made(
-        (Table(header, tuple(cells)),),
-        (sheet(("ambient", "diffuse", "specular", "sum"), rows, expose=False),),
+    return ItemContent(
+        (ItemTable(header, tuple(cells)),),
+        (image_sheet(("ambient", "diffuse", "specular", "sum"), rows, expose=False),),
         text,
     )
 
@@ -221,9 +227,9 @@ def _one_light(normal: np.ndarray, shading: np.ndarray) -> np.ndarray:
     return best
 
 
-def _shading(context: Context) -> Made:
+def _shading(context: Context) -> ItemContent:
     shown, cells = [], []
-    for kind in ("synthetic", "matt"):
+    for kind in ("synthetic", "diffuse"):
         subject = next((one for one in context.subjects(kind) if one.truth is not None), None)
         if subject is None:
             continue
@@ -237,7 +243,7 @@ def _shading(context: Context) -> Made:
         ]
         for name, model in models.items():
             left = float(np.sqrt(np.square((model - true)[inside]).mean())) / size
-            cells.append((titled(subject), name, 100 * left))
+            cells.append((subject_title(subject), name, 100 * left))
             if name != "constant":
                 error = np.abs(model - true).mean(axis=2) / size
                 shown += [
@@ -250,18 +256,18 @@ def _shading(context: Context) -> Made:
         "others, and light between them, no function of the normal can have. Normals are differences of the true height, "
         "wrong where it has steps."
     )
-    return Made((Table(header, tuple(cells)),), (panels(shown, 6),), text)
+    return ItemContent((ItemTable(header, tuple(cells)),), (panel_figure(shown, 6),), text)
 
 
 _LAYERS = ("image", "diffuse", "specular", "reflectance", "shading")
 
 
-def _intrinsic(context: Context) -> Made:
+def _intrinsic(context: Context) -> ItemContent:
     subject = next(one for one in context.subjects("synthetic") if one.truth is not None)
     assert subject.truth is not None
     assert subject.diffuse is not None
     assert subject.specular is not None
-    d = decomposed(context, subject)
+    d = decompose_subject(context, subject)
     true = dict(
         zip(
             _LAYERS,
@@ -291,7 +297,7 @@ def _intrinsic(context: Context) -> Made:
             )
     both = d.mask & subject.mask & np.isfinite(subject.truth.shading).all(-1)
     cells = tuple((name, 100 * _error(true[name][both], found[name][both])) for name in _LAYERS[1:])
-    table = Table(
+    table = ItemTable(
         ("intrinsic image", "RMS error after the best scale (% of its RMS)"),
         cells,
         f"{subject.name}: found by `--model mdr`.",
@@ -300,7 +306,7 @@ def _intrinsic(context: Context) -> Made:
         "image = reflectance × shading + specular; above the true layers, below what was found. Reflectance and shading are in exposures "
         "of their own, since one photo leaves their scale open."
     )
-    return Made((table,), (panels(shown, 5),), text)
+    return ItemContent((table,), (panel_figure(shown, 5),), text)
 
 
 def _error(true: np.ndarray, found: np.ndarray) -> float:
@@ -308,13 +314,16 @@ def _error(true: np.ndarray, found: np.ndarray) -> float:
     return float(np.sqrt(scaled_mse(true.astype(float), found.astype(float)) / max(size, 1e-12)))
 
 
-def _specular_free(context: Context) -> Made:
-    subjects = with_layers((*context.subjects("specular"), *context.subjects("synthetic")))
+def _specular_free(context: Context) -> ItemContent:
+    subjects = subjects_with_highlights(
+        (*context.subjects("specular"), *context.subjects("synthetic"))
+    )
     kinds = (PHOTO, *KINDS, DARK)
     cells: list[tuple[str | int | float, ...]] = [
-        (titled(one), *(100 * highlight_left(kind, one) for kind in kinds)) for one in subjects
+        (subject_title(one), *(100 * residual_highlight(kind, one) for kind in kinds))
+        for one in subjects
     ]
-    table = Table(("subject", *(kind.name for kind in kinds)), tuple(cells), _LEFT)
+    table = ItemTable(("subject", *(kind.name for kind in kinds)), tuple(cells), _LEFT)
     chosen = subjects[0]
     assert chosen.diffuse is not None
     shown = []
@@ -333,12 +342,12 @@ def _specular_free(context: Context) -> Made:
         "rows look alike, highlights do not reach the image. The dark channel is the opposite: mostly highlight, and what is left of pale "
         "paint. SF1 and SF2 take highlights for white: what is left in them is noise, clipping, and the tint of the light."
     )
-    return Made((table,), (panels(shown, len(kinds)),), text)
+    return ItemContent((table,), (panel_figure(shown, len(kinds)),), text)
 
 
 _LEFT = "Share of the highlights' light that is left in each image (%), without what lies evenly on the whole object."
-_figure = partial(Item, "figure")
-ITEMS: tuple[Item, ...] = (
+_figure = partial(ThesisItem, "figure")
+ITEMS: tuple[ThesisItem, ...] = (
     _figure("2.1", "Lobes of the reflectance models", _lobes),
     _figure("2.2", "Phong's components on a sphere", _phong),
     _figure("2.3", "Shading and its model", _shading),

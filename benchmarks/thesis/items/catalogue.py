@@ -25,22 +25,26 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.brdf.blinn_phong import BlinnPhong
-from isc_core.brdf.dichromatic import Dichromatic
-from isc_core.brdf.energy import directional_albedo, reciprocity_error
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.lambert import Lambert
-from isc_core.brdf.model import Model
-from isc_core.brdf.oren_nayar import OrenNayar
-from isc_core.brdf.phong import Phong
-from isc_core.decomposition import Decomposition
-from isc_core.exr import read_channels
-from isc_core.result_folder import LAYERS, save
+from isc_core.io.exr import read_channels
+from isc_core.result_files.result_folder import LAYERS, save
+from isc_core.scene.decomposition import Decomposition
+from isc_core.shading.brdf.blinn_phong import BlinnPhong
+from isc_core.shading.brdf.dichromatic import Dichromatic
+from isc_core.shading.brdf.energy import directional_albedo, reciprocity_error
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.brdf.lambert import Lambert
+from isc_core.shading.brdf.model import Model
+from isc_core.shading.brdf.oren_nayar import OrenNayar
+from isc_core.shading.brdf.phong import Phong
 
-from .context import Context
-from .decompositions import decomposed
-from .item import Item, Made, Table
-from .specular_free_images import KINDS, highlight_left, titled, with_layers
+from ..measuring.context import Context
+from ..measuring.decompositions import decompose_subject
+from ..measuring.specular_free_images import (
+    KINDS,
+    residual_highlight,
+    subjects_with_highlights,
+)
+from ..report.item import ItemContent, ItemTable, ThesisItem
 
 _PAIRS = 4000
 _RECIPROCAL, _KEPT = (
@@ -71,7 +75,7 @@ MODELS: tuple[tuple[str, Model], ...] = (
 
 
 @dataclass(frozen=True)
-class Constraints:
+class ConstraintCheck:
     """What was measured of a model. `least`: the smallest f_r (1/sr). `asymmetry`: the largest
     |f_r(v, l) - f_r(l, v)| over the largest f_r. `most`: the largest share of the light that
     leaves, and `at`, for light from how many degrees.
@@ -88,7 +92,7 @@ class Constraints:
         return self.least >= 0, self.asymmetry <= _RECIPROCAL, self.most <= 1 + _KEPT
 
 
-def measure(model: Model, seed: int = 0) -> Constraints:
+def check_constraints(model: Model, seed: int = 0) -> ConstraintCheck:
     """The constraints of a model, over random pairs of directions and light from 0 to 85 degrees."""
     directions = np.random.default_rng(seed).normal(size=(2, _PAIRS, 3))
     directions[..., 2] = np.abs(directions[..., 2])
@@ -100,15 +104,15 @@ def measure(model: Model, seed: int = 0) -> Constraints:
         for angle in angles
     ]
     worst = int(np.argmax(shares))
-    return Constraints(
+    return ConstraintCheck(
         least, reciprocity_error(model, _PAIRS, seed), shares[worst], float(angles[worst])
     )
 
 
-def _constraints(context: Context) -> Made:
+def _constraints(context: Context) -> ItemContent:
     rows = []
     for name, model in MODELS:
-        found = measure(model, context.seed)
+        found = check_constraints(model, context.seed)
         words = ["yes" if obeyed else "no" for obeyed in found.obeyed]
         rows.append(
             (name, found.least, words[0], found.asymmetry, words[1], found.most, found.at, words[2])
@@ -130,9 +134,9 @@ def _constraints(context: Context) -> Made:
         "7.5 % too much, which the conserving one mends; Oren-Nayar's short form up to 1.5 % at grazing light. A body under a gloss can "
         "give back more than it gets, since the gloss takes nothing from the body: the dichromatic model is one of images, not of energy."
     )
-    return Made(
+    return ItemContent(
         (
-            Table(
+            ItemTable(
                 header,
                 tuple(rows),
                 f"Measured on {_PAIRS} pairs of directions and 12 angles of the light.",
@@ -142,11 +146,13 @@ def _constraints(context: Context) -> Made:
     )
 
 
-def _specular_free(context: Context) -> Made:
-    subjects = with_layers((*context.subjects("specular"), *context.subjects("synthetic")))
+def _specular_free(context: Context) -> ItemContent:
+    subjects = subjects_with_highlights(
+        (*context.subjects("specular"), *context.subjects("synthetic"))
+    )
     rows = []
     for kind in KINDS:
-        left = [highlight_left(kind, subject) for subject in subjects]
+        left = [residual_highlight(kind, subject) for subject in subjects]
         rows.append(
             (
                 kind.name,
@@ -172,11 +178,11 @@ def _specular_free(context: Context) -> Made:
         f"{', '.join(map(titled, subjects))}, without what lies evenly on the whole object. Two methods have "
         "invariants that are no images: `mallick_2006` the hue and chroma in a plane across white, `isc` the chroma max I − min I."
     )
-    return Made((Table(header, tuple(rows)),), text=text)
+    return ItemContent((ItemTable(header, tuple(rows)),), text=text)
 
 
 @dataclass(frozen=True)
-class Characteristic:
+class CharacteristicEntry:
     """What a decomposition holds. `symbol`, `unit`, `frame`: as one writes them; `field`: of
     `Decomposition`; `shape`: of the array, H and W being the picture's; `stored`: under which keys
     of `decomposition.json`, for what has no channels.
@@ -193,14 +199,14 @@ class Characteristic:
 
 _LINEAR = "linear Rec.709, the photo's unit"
 CHARACTERISTICS = (
-    Characteristic("photo", "I", _LINEAR, "image", "image", "H, W, 3"),
-    Characteristic("diffuse light", "D", _LINEAR, "image", "diffuse", "H, W, 3"),
-    Characteristic("specular light", "s", _LINEAR, "image", "specular", "H, W, 3"),
-    Characteristic("residual", "I − D − s", _LINEAR, "image", "residual", "H, W, 3"),
-    Characteristic(
+    CharacteristicEntry("photo", "I", _LINEAR, "image", "image", "H, W, 3"),
+    CharacteristicEntry("diffuse light", "D", _LINEAR, "image", "diffuse", "H, W, 3"),
+    CharacteristicEntry("specular light", "s", _LINEAR, "image", "specular", "H, W, 3"),
+    CharacteristicEntry("residual", "I − D − s", _LINEAR, "image", "residual", "H, W, 3"),
+    CharacteristicEntry(
         "reflectance", "R = D / S", "none, up to one scale", "image", "reflectance", "H, W, 3"
     ),
-    Characteristic(
+    CharacteristicEntry(
         "shading",
         "S = exp Σ L_k Y_k(n)",
         "the photo's unit, up to one scale",
@@ -208,7 +214,7 @@ CHARACTERISTICS = (
         "shading",
         "H, W, 3",
     ),
-    Characteristic(
+    CharacteristicEntry(
         "normal",
         "n",
         "none, length 1",
@@ -216,7 +222,7 @@ CHARACTERISTICS = (
         "normal",
         "H, W, 3",
     ),
-    Characteristic(
+    CharacteristicEntry(
         "height",
         "z",
         "pixels, from the object's lowest point",
@@ -224,9 +230,9 @@ CHARACTERISTICS = (
         "height",
         "H, W",
     ),
-    Characteristic("mask", "Ω", "object or not", "image", "mask", "H, W"),
-    Characteristic("confidence", "c", "none, 0 to 1", "image", "confidence", "H, W"),
-    Characteristic(
+    CharacteristicEntry("mask", "Ω", "object or not", "image", "mask", "H, W"),
+    CharacteristicEntry("confidence", "c", "none, 0 to 1", "image", "confidence", "H, W"),
+    CharacteristicEntry(
         "light",
         "L",
         "none: of log shading",
@@ -235,7 +241,7 @@ CHARACTERISTICS = (
         "9, 3",
         "illumination",
     ),
-    Characteristic(
+    CharacteristicEntry(
         "gloss",
         "α, f0, lights",
         "none; strength in the photo's unit",
@@ -244,7 +250,7 @@ CHARACTERISTICS = (
         "one lobe",
         "brdf",
     ),
-    Characteristic(
+    CharacteristicEntry(
         "origin",
         "",
         "",
@@ -256,7 +262,7 @@ CHARACTERISTICS = (
 )
 
 
-def channels_of(characteristic: Characteristic) -> tuple[str, ...]:
+def channels_of(characteristic: CharacteristicEntry) -> tuple[str, ...]:
     """Its channels in `maps.exr`; none for what is stored elsewhere."""
     return tuple(
         f"{characteristic.field}.{letter}" for letter in LAYERS.get(characteristic.field, "")
@@ -290,8 +296,8 @@ def check_characteristics(d: Decomposition, folder: Path) -> tuple[str, ...]:
     )
 
 
-def _characteristics(context: Context) -> Made:
-    d = decomposed(context, context.subjects("specular")[0])
+def _characteristics(context: Context) -> ItemContent:
+    d = decompose_subject(context, context.subjects("specular")[0])
     with tempfile.TemporaryDirectory() as folder:
         wrong = check_characteristics(d, Path(folder) / "result")
     rows = []
@@ -327,9 +333,9 @@ def _characteristics(context: Context) -> Made:
             else f"NOT as listed: {'; '.join(wrong)}."
         )
     )
-    return Made(
+    return ItemContent(
         (
-            Table(
+            ItemTable(
                 header,
                 tuple(rows),
                 "Channels are those of `maps.exr`, JSON is `decomposition.json`.",
@@ -339,8 +345,8 @@ def _characteristics(context: Context) -> Made:
     )
 
 
-_table: Callable[..., Item] = partial(Item, "table")
-ITEMS: tuple[Item, ...] = (
+_table: Callable[..., ThesisItem] = partial(ThesisItem, "table")
+ITEMS: tuple[ThesisItem, ...] = (
     _table("2.1", "Functional constraints of reflectance models", _constraints),
     _table("2.2", "Specular-free images", _specular_free),
     _table("2.3", "The characteristics and how they are stored", _characteristics),

@@ -6,7 +6,7 @@ on the photo as it is.
 shape and light are known. `joint`, ours, and SIRFS on the true diffuse image, which is what a
 perfect separation would give, stand beside them.
 
-Equation: errors as in `isc_core.metrics.Scores`; the ratio of geometric means over the subjects,
+Equation: errors as in `isc_core.evaluation.metrics.Scores`; the ratio of geometric means over the subjects,
 with the interval of resampled subjects.
 
 Citation: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712; B. Efron (1979),
@@ -19,13 +19,23 @@ subjects the intervals are wide.
 
 from collections.abc import Callable, Sequence
 
-from isc_core.metrics import geometric_mean
+from isc_core.evaluation.metrics import geometric_mean
 
-from . import claims
-from .comparing import gain, in_words, ratio
-from .context import Context
-from .estimates import AFTER, BEFORE, BOUND, METRICS, SIRFS, Framework, Row, known, measured
-from .item import Cell, Item, Made, Table, Verdict
+from ..measuring.context import Context
+from ..measuring.framework_runs import (
+    AFTER,
+    BEFORE,
+    BOUND,
+    METRICS,
+    SIRFS,
+    Framework,
+    FrameworkErrors,
+    score_frameworks,
+    subjects_with_truth,
+)
+from ..report import claims
+from ..report.comparing import format_ratio, judge_reduction, paired_ratio
+from ..report.item import Cell, ClaimVerdict, ItemContent, ItemTable, ThesisItem
 
 KINDS = {"specular": "photos with significant specularity", "synthetic": "synthetic images"}
 _NAMES = {
@@ -48,27 +58,31 @@ _JUDGED = "MDR-SIRFS"
 _MODELS_AFTER, _MODELS_BEFORE = (SIRFS, *AFTER), (SIRFS, *BEFORE, BOUND)
 
 
-def _errors(frameworks: Sequence[Framework], text: str, judged: bool) -> Callable[[Context], Made]:
-    def make(context: Context) -> Made:
-        rows = measured(context, known(context, tuple(KINDS)), frameworks)
+def _errors(
+    frameworks: Sequence[Framework], text: str, judged: bool
+) -> Callable[[Context], ItemContent]:
+    def make(context: Context) -> ItemContent:
+        rows = score_frameworks(context, subjects_with_truth(context, tuple(KINDS)), frameworks)
         tables = [
-            relative_errors(_of_kind(rows, kind), words, context.seed)
+            relative_error_table(_of_kind(rows, kind), words, context.seed)
             for kind, words in KINDS.items()
         ]
         tables = [
-            relative_errors(rows, "all of them", context.seed),
+            relative_error_table(rows, "all of them", context.seed),
             *(table for table in tables if table.rows),
         ]
         verdicts = _verdicts(rows, context.seed) if judged else ()
-        return Made((*tables, absolute(rows)), text=text, verdicts=verdicts)
+        return ItemContent((*tables, error_table(rows)), text=text, verdicts=verdicts)
 
     return make
 
 
-def _times(frameworks: Sequence[Framework], text: str, judged: bool) -> Callable[[Context], Made]:
-    def make(context: Context) -> Made:
-        rows = measured(context, known(context, tuple(KINDS)), frameworks)
-        return Made(
+def _times(
+    frameworks: Sequence[Framework], text: str, judged: bool
+) -> Callable[[Context], ItemContent]:
+    def make(context: Context) -> ItemContent:
+        rows = score_frameworks(context, subjects_with_truth(context, tuple(KINDS)), frameworks)
+        return ItemContent(
             (_speed(rows, context.seed),),
             text=text,
             verdicts=(_time_verdict(rows, context.seed),) if judged else (),
@@ -77,45 +91,45 @@ def _times(frameworks: Sequence[Framework], text: str, judged: bool) -> Callable
     return make
 
 
-def relative_errors(rows: Sequence[Row], words: str, seed: int) -> Table:
+def relative_error_table(rows: Sequence[FrameworkErrors], words: str, seed: int) -> ItemTable:
     """Each framework's errors over those of SIRFS, with their intervals; a line a framework."""
     lines: list[tuple[str, ...]] = []
     for label in dict.fromkeys(row.framework for row in rows):
         cells = [
-            in_words(ratio(_of(rows, label, name), _of(rows, SIRFS.label, name), seed))
+            format_ratio(paired_ratio(_of(rows, label, name), _of(rows, SIRFS.label, name), seed))
             for name in METRICS
         ]
         lines.append((label, *(["1"] * len(METRICS) if label == SIRFS.label else cells)))
     count = len({row.subject for row in rows})
     header = ("framework", *(_NAMES[name].partition(",")[0] for name in METRICS))
-    return Table(
+    return ItemTable(
         header,
         tuple(lines),
         f"Errors relative to SIRFS, geometric means (95 %): {words}, {count} subjects",
     )
 
 
-def absolute(rows: Sequence[Row]) -> Table:
+def error_table(rows: Sequence[FrameworkErrors]) -> ItemTable:
     """Each run's errors as they are."""
     lines: list[tuple[Cell, ...]] = [
         (row.subject, row.framework, *(row.errors[name] for name in METRICS)) for row in rows
     ]
-    return Table(
+    return ItemTable(
         ("subject", "framework", *(_NAMES[name] for name in METRICS)),
         tuple(lines),
         "Errors by subject",
     )
 
 
-def _speed(rows: Sequence[Row], seed: int) -> Table:
+def _speed(rows: Sequence[FrameworkErrors], seed: int) -> ItemTable:
     lines = []
     for label in dict.fromkeys(row.framework for row in rows):
         seconds, evaluations = _seconds(rows, label), _evaluations(rows, label)
         plain = label == SIRFS.label
         lines.append((
             label, geometric_mean(seconds.values()), geometric_mean(evaluations.values()),
-            "1" if plain else in_words(ratio(seconds, _seconds(rows, SIRFS.label), seed)),
-            "1" if plain else in_words(ratio(evaluations, _evaluations(rows, SIRFS.label), seed)),
+            "1" if plain else format_ratio(paired_ratio(seconds, _seconds(rows, SIRFS.label), seed)),
+            "1" if plain else format_ratio(paired_ratio(evaluations, _evaluations(rows, SIRFS.label), seed)),
         ))  # fmt: skip
     header = (
         "framework",
@@ -124,35 +138,37 @@ def _speed(rows: Sequence[Row], seed: int) -> Table:
         "seconds over SIRFS (95 %)",
         "evaluations over SIRFS (95 %)",
     )
-    return Table(
+    return ItemTable(
         header,
         tuple(lines),
         "Geometric means over the subjects, warm, two threads; evaluations of the energy by the solver",
     )
 
 
-def _verdicts(rows: Sequence[Row], seed: int) -> tuple[Verdict, ...]:
+def _verdicts(rows: Sequence[FrameworkErrors], seed: int) -> tuple[ClaimVerdict, ...]:
     return tuple(
-        gain(
+        judge_reduction(
             claim,
             share,
-            ratio(_of(rows, _JUDGED, name), _of(rows, SIRFS.label, name), seed),
+            paired_ratio(_of(rows, _JUDGED, name), _of(rows, SIRFS.label, name), seed),
             f"error of {_NAMES[name].partition(',')[0]}",
         )
         for claim, name, share in _CLAIMED
     )
 
 
-def _time_verdict(rows: Sequence[Row], seed: int) -> Verdict:
-    judged = gain(
+def _time_verdict(rows: Sequence[FrameworkErrors], seed: int) -> ClaimVerdict:
+    judged = judge_reduction(
         claims.MDR_TIME,
         0.192,
-        ratio(_seconds(rows, _JUDGED), _seconds(rows, SIRFS.label), seed),
+        paired_ratio(_seconds(rows, _JUDGED), _seconds(rows, SIRFS.label), seed),
         "time",
     )
-    found = in_words(ratio(_evaluations(rows, _JUDGED), _evaluations(rows, SIRFS.label), seed))
+    found = format_ratio(
+        paired_ratio(_evaluations(rows, _JUDGED), _evaluations(rows, SIRFS.label), seed)
+    )
     why = f"{judged.why}; " if judged.why else ""
-    return Verdict(
+    return ClaimVerdict(
         judged.claim,
         judged.here,
         judged.holds,
@@ -160,19 +176,19 @@ def _time_verdict(rows: Sequence[Row], seed: int) -> Verdict:
     )
 
 
-def _of(rows: Sequence[Row], label: str, name: str) -> dict[str, float]:
+def _of(rows: Sequence[FrameworkErrors], label: str, name: str) -> dict[str, float]:
     return {row.subject: row.errors[name] for row in rows if row.framework == label}
 
 
-def _seconds(rows: Sequence[Row], label: str) -> dict[str, float]:
+def _seconds(rows: Sequence[FrameworkErrors], label: str) -> dict[str, float]:
     return {row.subject: row.seconds for row in rows if row.framework == label}
 
 
-def _evaluations(rows: Sequence[Row], label: str) -> dict[str, float]:
+def _evaluations(rows: Sequence[FrameworkErrors], label: str) -> dict[str, float]:
     return {row.subject: float(row.evaluations) for row in rows if row.framework == label}
 
 
-def _of_kind(rows: Sequence[Row], kind: str) -> list[Row]:
+def _of_kind(rows: Sequence[FrameworkErrors], kind: str) -> list[FrameworkErrors]:
     return [row for row in rows if row.subject.startswith(f"{kind} ")]
 
 
@@ -187,26 +203,26 @@ _BEFORE_TEXT = (
 )
 _TIME_TEXT = "Seconds hold the separation as well as SIRFS; they are worth no more than the quiet of the machine they were taken on."
 
-ITEMS: tuple[Item, ...] = (
-    Item(
+ITEMS: tuple[ThesisItem, ...] = (
+    ThesisItem(
         "table",
         "4.19",
         "SIRFS, SIRFS-MZK06, SIRFS-YCK06, SIRFS-MBP: errors",
         _errors(_MODELS_AFTER, _AFTER_TEXT, False),
     ),
-    Item(
+    ThesisItem(
         "table",
         "4.20",
         "SIRFS, SIRFS-MZK06, SIRFS-YCK06, SIRFS-MBP: time",
         _times(_MODELS_AFTER, _TIME_TEXT, False),
     ),
-    Item(
+    ThesisItem(
         "table",
         "4.21",
         "SIRFS, MZK06-SIRFS, YCK06-SIRFS, MDR-SIRFS: errors",
         _errors(_MODELS_BEFORE, _BEFORE_TEXT, True),
     ),
-    Item(
+    ThesisItem(
         "table",
         "4.22",
         "SIRFS, MZK06-SIRFS, YCK06-SIRFS, MDR-SIRFS: time",

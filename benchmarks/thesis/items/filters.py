@@ -24,28 +24,40 @@ from functools import partial
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.filter_statistics import Sample, area, fitted, sample_of
-from isc_core.highlight_set import SeparationTruth
-from isc_core.separation.filter_statistics import BINS, FILTERS, KINDS, WIDTHS, bin_edges, bins
+from benchmarks.separation.filter_statistics import Sample, area, fitted, sample_of
+from isc_core.datasets.highlight_set import SeparationTruth
+from isc_core.separation.support.filter_statistics import (
+    BINS,
+    FILTERS,
+    KINDS,
+    WIDTHS,
+    bin_edges,
+    bins,
+)
 
-from .context import Context
-from .item import Item, Made, Table
-from .specular_free_images import titled, with_layers
-from .style import LETTERS, OKABE_ITO, figure, legend
-from .subjects import Subject
+from ..drawing.style import LETTERS, OKABE_ITO, figure, legend
+from ..images.subject import Subject
+from ..measuring.context import Context
+from ..measuring.specular_free_images import subject_title, subjects_with_highlights
+from ..report.item import ItemContent, ItemTable, ThesisItem
 
 _EXCHANGES = 4096
 _LEAST = 30  # pixels of either kind, below which a subject has no histogram of its own
 
 
-def samples_of(subjects: list[Subject]) -> list[Sample]:
+def layer_samples(subjects: list[Subject]) -> list[Sample]:
     """The filters' outputs on the layers of each subject that has enough of both."""
     found = []
     for one in subjects:
         assert one.diffuse is not None
         assert one.specular is not None
         truth = SeparationTruth(
-            titled(one), one.image, one.mask, one.diffuse, one.specular, np.zeros_like(one.mask)
+            subject_title(one),
+            one.image,
+            one.mask,
+            one.diffuse,
+            one.specular,
+            np.zeros_like(one.mask),
         )
         sample = sample_of(truth, "layers")
         if min(len(sample.of_highlight), len(sample.of_without)) >= _LEAST:
@@ -53,7 +65,7 @@ def samples_of(subjects: list[Subject]) -> list[Sample]:
     return found
 
 
-def histograms(sample: Sample, spread: np.ndarray) -> np.ndarray:
+def layer_histograms(sample: Sample, spread: np.ndarray) -> np.ndarray:
     """(2, F, BINS): of the specular and of the diffuse layer, each of sum 1."""
     pair = np.zeros((2, len(FILTERS), BINS))
     for kind, outputs in enumerate((sample.of_highlight, sample.of_without)):
@@ -64,12 +76,12 @@ def histograms(sample: Sample, spread: np.ndarray) -> np.ndarray:
     return pair
 
 
-def distances(pairs: np.ndarray) -> np.ndarray:
+def total_variation(pairs: np.ndarray) -> np.ndarray:
     """Total variation (F,) of the means of histograms (S, 2, F, BINS) over the subjects."""
     return np.abs(pairs[:, 0].mean(axis=0) - pairs[:, 1].mean(axis=0)).sum(axis=1) / 2
 
 
-def chance(pairs: np.ndarray, seed: int) -> np.ndarray:
+def exchange_test(pairs: np.ndarray, seed: int) -> np.ndarray:
     """p (F,): the share of exchanges of layers within subjects that give no smaller distance;
 
     `pairs` (S, 2, F, BINS).
@@ -82,12 +94,12 @@ def chance(pairs: np.ndarray, seed: int) -> np.ndarray:
         flips[0] = 0  # what was seen is one of them
     difference = pairs[:, 0] - pairs[:, 1]
     sign = 1 - 2.0 * flips
-    seen = distances(pairs)
+    seen = total_variation(pairs)
     exchanged = np.abs(np.einsum("es,sfb->efb", sign, difference)).sum(axis=2) / (2 * count)
     return np.asarray((exchanged >= seen - 1e-12).mean(axis=0))
 
 
-def holm(p: np.ndarray) -> np.ndarray:
+def holm_correction(p: np.ndarray) -> np.ndarray:
     """p (F,) corrected for their number."""
     order = np.argsort(p, kind="stable")
     raised = np.maximum.accumulate(p[order] * (len(p) - np.arange(len(p))))
@@ -107,19 +119,19 @@ def left_out_area(samples: list[Sample]) -> float:
     return float(np.mean(areas))
 
 
-def _filters(context: Context) -> Made:
-    samples = samples_of(
-        with_layers([*context.subjects("specular"), *context.subjects("synthetic")])
+def _filters(context: Context) -> ItemContent:
+    samples = layer_samples(
+        subjects_with_highlights([*context.subjects("specular"), *context.subjects("synthetic")])
     )
     if len(samples) < 2:
-        return Made(
+        return ItemContent(
             text="Fewer than two subjects here have enough of both layers: nothing can be compared."
         )
     spread = fitted(samples).spread
-    pairs = np.stack([histograms(sample, spread) for sample in samples])
+    pairs = np.stack([layer_histograms(sample, spread) for sample in samples])
 
-    p = chance(pairs, context.seed)
-    columns = zip(FILTERS, distances(pairs), p, holm(p), strict=True)
+    p = exchange_test(pairs, context.seed)
+    columns = zip(FILTERS, total_variation(pairs), p, holm_correction(p), strict=True)
     cells = tuple(
         (kind, 100 * width, float(distance), float(one), float(raised))
         for (kind, width), distance, one, raised in columns
@@ -134,7 +146,7 @@ def _filters(context: Context) -> Made:
         f"{left_out_area(samples):.2f} (.5 is chance, 1 always right). In a photo only the sum of the layers is seen: what that leaves of "
         "it is in docs/methods/filter_statistics.md. Widths are shares of the object's diagonal."
     )
-    return Made((Table(header, cells),), (_picture(pairs, cells),), text)
+    return ItemContent((ItemTable(header, cells),), (_picture(pairs, cells),), text)
 
 
 def _picture(
@@ -156,8 +168,8 @@ def _picture(
     return made
 
 
-ITEMS: tuple[Item, ...] = (
-    partial(Item, "figure")(
+ITEMS: tuple[ThesisItem, ...] = (
+    partial(ThesisItem, "figure")(
         "3.12", "Histograms of filter outputs on diffuse and specular layers", _filters
     ),
 )

@@ -17,28 +17,35 @@ from functools import partial
 import numpy as np
 from matplotlib.axes import Axes
 
-from isc_core.decomposition import Decomposition
-from isc_core.editing.light_direction import explain_shading
-from isc_core.editing.lights import turn, turned_light
+from isc_core.decompose.mbp import split_reflectance
 from isc_core.editing.relight import NewLight, relight
-from isc_core.models.mbp import split_reflectance
+from isc_core.imaging.channels import smallest
+from isc_core.lobe_fitting.light_direction import explain_shading
+from isc_core.scene.decomposition import Decomposition
 from isc_core.separation import separate
-from isc_core.separation.channels import smallest
 from isc_core.separation.chaotic_segmentation import (
     VARIANTS,
     ChaoticSegmentationOptions,
     find_specular,
 )
 from isc_core.separation.sparse_coding import stages
-from isc_core.separation.specular_free import fixed_chromaticity, two_band
+from isc_core.separation.support.specular_free import fixed_chromaticity, two_band
+from isc_core.shading.lights import turn, turned_light
 from isc_core.thresholding import OtsuObjective, exact, maximise, quantise
 
-from .context import Context
-from .decompositions import decomposed, photo_of
-from .item import Item, Made, Table
-from .panels import COLOURS, Panel, characteristics, light_panel, normals_panel, panels
-from .style import LETTERS, OKABE_ITO, exposure, figure, legend, show_map
-from .subjects import Subject
+from ..drawing.panels import (
+    COLOURS,
+    Panel,
+    characteristic_panels,
+    light_panel,
+    normals_panel,
+    panel_figure,
+)
+from ..drawing.style import LETTERS, OKABE_ITO, exposure, figure, legend, show_map
+from ..images.subject import Subject
+from ..measuring.context import Context
+from ..measuring.decompositions import decompose_subject, subject_as_photo
+from ..report.item import ItemContent, ItemTable, ThesisItem
 
 _LEVELS = 255
 _LEAST_EXPLAINED = 0.1  # share of the specular layer, below which a lobe's picture needs a warning
@@ -57,12 +64,12 @@ def _subject(context: Context) -> Subject:
     return max([one for one in subjects if not one.mask.all()] or subjects, key=share)
 
 
-def _framework(context: Context) -> Made:
+def _framework(context: Context) -> ItemContent:
     """3.2: from the photo to the picture under another light."""
     subject = _subject(context)
-    d = decomposed(context, subject)
+    d = decompose_subject(context, subject)
     gain = exposure(d.image, d.mask)
-    shown = characteristics(d)
+    shown = characteristic_panels(d)
     if d.brdf is not None:
         shown.append(Panel("the fitted lobe's highlights", d.brdf.predicted, d.mask, gain=gain))
     sun = explain_shading(d).light.direction
@@ -73,15 +80,15 @@ def _framework(context: Context) -> Made:
     rebuilt = d.reflectance * d.shading + d.specular + d.residual
     shown.append(Panel("rebuilt: reflectance × shading + specular", rebuilt, d.mask, gain=gain))
     seconds = tuple((name, float(value)) for name, value in d.provenance.timings.items())
-    table = Table(("stage", "seconds"), seconds, f"{subject.name}: what the stages took.")
+    table = ItemTable(("stage", "seconds"), seconds, f"{subject.name}: what the stages took.")
     text = (
         f"{subject.name}: specular removal, shape, light, shading and reflectance, the lobe, and what the result is good for."
         f"{_lobe_words(d)} {COLOURS}"
     )
-    return Made((table,), (panels(shown, 4),), text)
+    return ItemContent((table,), (panel_figure(shown, 4),), text)
 
 
-def _segmentation(context: Context) -> Made:
+def _segmentation(context: Context) -> ItemContent:
     """3.3: the stages of Chaotic Segmentation."""
     subject = _subject(context)
     image, mask = _inside(subject)
@@ -116,10 +123,10 @@ def _segmentation(context: Context) -> Made:
         f"{subject.name}. As published: pixels above the highest of three thresholds are replaced as a whole, from patches of the rest. "
         "Ours: one threshold, a rim around it, and only white light is taken off, by the ratio of the channels that the patches hand over."
     )
-    return Made((Table(header, tuple(rows)),), (panels(shown, 3),), text)
+    return ItemContent((ItemTable(header, tuple(rows)),), (panel_figure(shown, 3),), text)
 
 
-def _search(context: Context) -> Made:
+def _search(context: Context) -> ItemContent:
     """3.4: how Chaotic Segmentation finds its thresholds."""
     subject = _subject(context)
     image, mask = _inside(subject)
@@ -172,7 +179,7 @@ def _search(context: Context) -> Made:
     show_map(axes[0, 2], box, "classes of the thresholds found")
     header = ("search", "thresholds", "objective / optimum", "evaluations until then")
     text = f"{subject.name}: one search with each optimiser, of the smallest channel's histogram. Repeated runs are in tables 4.1 to 4.4."
-    return Made((Table(header, tuple(rows)),), (made,), text)
+    return ItemContent((ItemTable(header, tuple(rows)),), (made,), text)
 
 
 def _histogram(place: Axes, levels: np.ndarray, thresholds: np.ndarray) -> None:
@@ -210,7 +217,7 @@ def _thresholds(
     return levels, found.thresholds
 
 
-def _sparse(context: Context) -> Made:
+def _sparse(context: Context) -> ItemContent:
     """3.9: the stages of Sparse Coding."""
     subject = _subject(context)
     image, mask = _inside(subject)
@@ -248,16 +255,19 @@ def _sparse(context: Context) -> Made:
         f"{subject.name}. Paint has an atom for each hue; what a pixel has too much of white for its atom is the highlight's code, if its "
         "group of pixels looks like a highlight. Groups have arbitrary colours; where there is none it is darkest."
     )
-    return Made((Table(("measure", "value"), rows),), (panels(shown, 5),), text)
+    return ItemContent((ItemTable(("measure", "value"), rows),), (panel_figure(shown, 5),), text)
 
 
-def _mbp(context: Context) -> Made:
+def _mbp(context: Context) -> ItemContent:
     """3.10: SIRFS first, then separation of its reflectance."""
     subject = _subject(context)
-    plain, d = decomposed(context, subject, "sirfs"), decomposed(context, subject, "mbp")
+    plain, d = (
+        decompose_subject(context, subject, "sirfs"),
+        decompose_subject(context, subject, "mbp"),
+    )
     gain, paint = exposure(d.image, d.mask), exposure(plain.reflectance, d.mask)
     again = split_reflectance(
-        plain.image, plain.shading, plain.mask, photo_of(subject).clipped, "isc"
+        plain.image, plain.shading, plain.mask, subject_as_photo(subject).clipped, "isc"
     )
     shown = [
         Panel("photo", plain.image, plain.mask, gain=gain),
@@ -280,15 +290,15 @@ def _mbp(context: Context) -> Made:
         f"{subject.name}: SIRFS explains the photo as it is; highlights are then pale paint on evenly lit paint, and taken off there."
         f"{_lobe_words(d)}"
     )
-    return Made((Table(("measure", "value"), rows),), (panels(shown, 5),), text)
+    return ItemContent((ItemTable(("measure", "value"), rows),), (panel_figure(shown, 5),), text)
 
 
-def _mdr(context: Context) -> Made:
+def _mdr(context: Context) -> ItemContent:
     """3.11: separation first, then SIRFS of the diffuse image."""
     subject = _subject(context)
-    d = decomposed(context, subject)
+    d = decompose_subject(context, subject)
     gain = exposure(d.image, d.mask)
-    alone = separate("isc", d.image, d.mask, photo_of(subject).clipped)
+    alone = separate("isc", d.image, d.mask, subject_as_photo(subject).clipped)
     shown = [
         Panel("photo", d.image, d.mask, gain=gain),
         Panel("1. separated: diffuse", d.diffuse, d.mask, gain=gain),
@@ -308,7 +318,7 @@ def _mdr(context: Context) -> Made:
         *_lobe_rows(d),
     )
     text = f"{subject.name}: highlights are taken off the photo; shape, light and paint are those of the diffuse image.{_lobe_words(d)}"
-    return Made((Table(("measure", "value"), rows),), (panels(shown, 5),), text)
+    return ItemContent((ItemTable(("measure", "value"), rows),), (panel_figure(shown, 5),), text)
 
 
 def _lobe_panel(d: Decomposition, title: str, gain: float) -> list[Panel]:
@@ -356,9 +366,9 @@ def _left(subject: Subject, diffuse: np.ndarray) -> tuple[float | str]:
     )
 
 
-_figure = partial(Item, "figure")
-ITEMS: tuple[Item, ...] = (
-    Item(
+_figure = partial(ThesisItem, "figure")
+ITEMS: tuple[ThesisItem, ...] = (
+    ThesisItem(
         "figure",
         "3.1",
         "Diagram of the research",

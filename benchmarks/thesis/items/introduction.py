@@ -21,14 +21,14 @@ from functools import partial
 import numpy as np
 
 from isc_core import baselines
-from isc_core.editing.lights import toward
-from isc_core.metrics import angular_error, height_error, truth_normal
+from isc_core.evaluation.metrics import angular_error, height_error, truth_normal
+from isc_core.shading.lights import toward
 
-from .context import Context, JsonRow
-from .decompositions import decomposed
-from .item import Item, Made, Table
-from .panels import COLOURS, Panel, characteristics, panels
-from .subjects import Subject
+from ..drawing.panels import COLOURS, Panel, characteristic_panels, panel_figure
+from ..images.subject import Subject
+from ..measuring.context import Context, JsonRow
+from ..measuring.decompositions import decompose_subject
+from ..report.item import ItemContent, ItemTable, ThesisItem
 
 LIGHT = toward(-0.4, 0.5, 1.0)
 _ALBEDO, _DARKEST = 0.8, 1e-3
@@ -40,7 +40,7 @@ _NAMES = {
 
 
 @dataclass(frozen=True)
-class Shaded:
+class ShadedObject:
     """An object whose shape is known.
 
     `image`: (H, W, 3) linear; `mask`: (H, W) bool; `height`: (H, W) pixels, NaN where unknown.
@@ -52,7 +52,7 @@ class Shaded:
     height: np.ndarray
 
 
-def sphere(size: int) -> Shaded:
+def sphere(size: int) -> ShadedObject:
     """A ball that fills 90 % of a picture of `size` pixels a side, under `LIGHT`."""
     radius = 0.45 * size
     axis = (np.arange(size) + 0.5 - size / 2) / radius
@@ -63,7 +63,7 @@ def sphere(size: int) -> Shaded:
     return _lit("sphere", np.stack([x, y, z], -1), mask, radius * z)
 
 
-def vase(size: int) -> Shaded:
+def vase(size: int) -> ShadedObject:
     """The vase of the survey, as high as a picture of `size` pixels a side, under `LIGHT`."""
     x, y = np.meshgrid((np.arange(size) + 0.5) / size - 0.5, 1 - (np.arange(size) + 0.5) / size)
     f = 0.15 - 0.1 * y * (6 * y + 1) ** 2 * (y - 1) ** 2 * (3 * y - 2)
@@ -81,26 +81,26 @@ def vase(size: int) -> Shaded:
     )
 
 
-def _lit(name: str, normal: np.ndarray, mask: np.ndarray, height: np.ndarray) -> Shaded:
+def _lit(name: str, normal: np.ndarray, mask: np.ndarray, height: np.ndarray) -> ShadedObject:
     shade = np.where(mask, np.maximum(normal @ LIGHT, 0), 0)
-    return Shaded(
+    return ShadedObject(
         name, _ALBEDO * np.repeat(shade[..., None], 3, axis=2), mask, np.where(mask, height, np.nan)
     )
 
 
-def shaded_objects(context: Context) -> tuple[Shaded, ...]:
+def shaded_objects(context: Context) -> tuple[ShadedObject, ...]:
     """The sphere, the vase, and the first object of the matt ones whose height is known."""
     size = 64 if context.quick else 160
-    found: list[Shaded] = [sphere(size), vase(size)]
-    for subject in context.subjects("matt"):
+    found: list[ShadedObject] = [sphere(size), vase(size)]
+    for subject in context.subjects("diffuse"):
         if subject.truth is not None:
             height = np.where(subject.mask, subject.truth.height, np.nan)
-            return (*found, Shaded(subject.name, subject.image, subject.mask, height))
+            return (*found, ShadedObject(subject.name, subject.image, subject.mask, height))
     return tuple(found)
 
 
 @dataclass(frozen=True)
-class Recovered:
+class RecoveredShape:
     """A method's answer. `height`: (H, W) pixels. `angle`: (H, W) degrees between true and found
     normals, NaN where unknown. `height_share`: mean error of the height after the best offset, of
     the true height's range.
@@ -116,7 +116,7 @@ class Recovered:
         return float(np.nanmean(self.angle))
 
 
-def recover(shaded: Shaded, method: str) -> Recovered:
+def recover_shape(shaded: ShadedObject, method: str) -> RecoveredShape:
     """What a method of `baselines.METHODS` makes of the image.
 
     Raises `InputError` for an unknown one.
@@ -137,7 +137,7 @@ def recover(shaded: Shaded, method: str) -> Recovered:
     share = height_error(shaded.height, height) / max(
         float(np.ptp(shaded.height[np.isfinite(shaded.height)])), 1e-9
     )
-    return Recovered(height, angle, share)
+    return RecoveredShape(height, angle, share)
 
 
 def _errors(context: Context) -> list[JsonRow]:
@@ -145,7 +145,7 @@ def _errors(context: Context) -> list[JsonRow]:
         rows: list[JsonRow] = []
         for shaded in shaded_objects(context):
             for method in _NAMES:
-                found = recover(shaded, method)
+                found = recover_shape(shaded, method)
                 rows.append(
                     {
                         "object": shaded.name,
@@ -159,10 +159,10 @@ def _errors(context: Context) -> list[JsonRow]:
     return context.rows("shape from shading", compute)
 
 
-def _shape_from_shading(method: str, context: Context) -> Made:
+def _shape_from_shading(method: str, context: Context) -> ItemContent:
     shown = []
     for shaded in shaded_objects(context):
-        found = recover(shaded, method)
+        found = recover_shape(shaded, method)
         true = shaded.height - np.nanmin(shaded.height)
         ends = 0.0, float(np.nanmax(true))
         shown += [
@@ -187,7 +187,7 @@ def _shape_from_shading(method: str, context: Context) -> Made:
         for r in rows
     ]
     header = ("object", "method", "height error / range", "normal error (degrees)")
-    table = Table(
+    table = ItemTable(
         header,
         tuple(cells),
         "Mean errors inside the mask; heights after the best offset. The light is estimated, too.",
@@ -201,14 +201,14 @@ def _shape_from_shading(method: str, context: Context) -> Made:
         f"{here} Heights are in one scale of colours for each object; errors above 60 degrees are drawn as 60. The last object's "
         "brightness is paint as well as shape."
     )
-    return Made((table,), (panels(shown, 4),), text)
+    return ItemContent((table,), (panel_figure(shown, 4),), text)
 
 
-def _characteristics(kind: str, context: Context) -> Made:
+def _characteristics(kind: str, context: Context) -> ItemContent:
     subject: Subject = context.subjects(kind)[0]
-    d = decomposed(context, subject)
+    d = decompose_subject(context, subject)
     errors = d.identity_errors()
-    table = Table(
+    table = ItemTable(
         ("identity", "largest error"),
         (
             ("image = diffuse + specular + residual", errors.image),
@@ -227,15 +227,15 @@ def _characteristics(kind: str, context: Context) -> Made:
         f"{subject.name}, the first subject of its kind, in a real run of `isc decompose --model mdr`: {100 * share:.1f} % of its "
         f"light was found to be specular; {state}. {COLOURS}"
     )
-    return Made((table,), (panels(characteristics(d), 4),), text)
+    return ItemContent((table,), (panel_figure(characteristic_panels(d), 4),), text)
 
 
-def _item(number: str, title: str, make: Callable[[Context], Made]) -> Item:
-    return Item("figure", number, title, make)
+def _item(number: str, title: str, make: Callable[[Context], ItemContent]) -> ThesisItem:
+    return ThesisItem("figure", number, title, make)
 
 
-ITEMS: tuple[Item, ...] = (
-    Item(
+ITEMS: tuple[ThesisItem, ...] = (
+    ThesisItem(
         "figure",
         "1.1",
         "Illustration of the introduction",

@@ -14,42 +14,52 @@ Limits: which images the thesis' own tables are made on is not known.
 
 from isc_core.separation import variants
 
-from .context import Context
-from .item import Item, Made
-from .layer_tables import DIFFUSE, KINDS, Runs, by_subject, run_all, speed, summary
-from .separations import NOTHING, Way
+from ..measuring.context import Context
+from ..measuring.separation_scores import NOTHING, SeparatorSetting
+from ..report.item import ItemContent, ThesisItem
+from ..report.layer_tables import (
+    DIFFUSE,
+    KINDS,
+    RunScores,
+    accuracy_table,
+    score_settings,
+    speed_table,
+    subject_table,
+)
 
 METHODS = {"MZK06": "mallick_2006", "YCK06": "yoon_2006", "YWA10": "yang_2010", "SC09": "shen_2009"}
-WORDS = {"paper": "as published", "sihr": "as in the toolbox", "improved": "improved"}
+VARIANT_LABELS = {"paper": "as published", "sihr": "as in the toolbox", "improved": "improved"}
 
 
-def ways() -> tuple[Way, ...]:
+def settings() -> tuple[SeparatorSetting, ...]:
     """Every method in every setting that it has."""
     return tuple(
-        Way(f"{label}, {words}", method, variant)
+        SeparatorSetting(f"{label}, {words}", method, variant)
         for label, method in METHODS.items()
-        for variant, words in WORDS.items()
+        for variant, words in VARIANT_LABELS.items()
         if variant in variants(method)
     )
 
 
-def _accuracy(context: Context) -> Made:
-    found = {kind: run_all(context, kind, ways()) for kind in KINDS}
-    overall = [summary(runs, kind, DIFFUSE, context.seed) for kind, runs in found.items()]
-    return Made(
-        (*overall, *(by_subject(runs, kind, DIFFUSE) for kind, runs in found.items())),
+def _accuracy(context: Context) -> ItemContent:
+    found = {kind: score_settings(context, kind, settings()) for kind in KINDS}
+    overall = [accuracy_table(runs, kind, DIFFUSE, context.seed) for kind, runs in found.items()]
+    return ItemContent(
+        (*overall, *(subject_table(runs, kind, DIFFUSE) for kind, runs in found.items())),
         text=_ACCURACY,
     )
 
 
-def _speed(context: Context) -> Made:
-    whole: Runs = {}
+def _speed(context: Context) -> ItemContent:
+    whole: RunScores = {}
     for kind in KINDS:
-        for label, found in run_all(context, kind, ways()).items():
+        for label, found in score_settings(context, kind, settings()).items():
             whole.setdefault(label, {}).update(
                 {f"{kind} {name}": runs for name, runs in found.items()}
             )
-    return Made((speed(whole, _quickest, context.seed, "SC09, as published"),), text=_SPEED)
+    return ItemContent(
+        (speed_table(whole, _quickest, context.seed, "SC09, as published"),), text=_SPEED
+    )
 
 
 def _quickest(label: str) -> str | None:
@@ -62,7 +72,7 @@ _ACCURACY = (
 )
 _SPEED = "All kinds of images together; one warm run each, seconds as the machine was."
 
-ITEMS: tuple[Item, ...] = (
-    Item("table", "4.11", "MZK06, YCK06, YWA10 and SC09: accuracy", _accuracy),
-    Item("table", "4.12", "MZK06, YCK06, YWA10 and SC09: speed", _speed),
+ITEMS: tuple[ThesisItem, ...] = (
+    ThesisItem("table", "4.11", "MZK06, YCK06, YWA10 and SC09: accuracy", _accuracy),
+    ThesisItem("table", "4.12", "MZK06, YCK06, YWA10 and SC09: speed", _speed),
 )

@@ -16,12 +16,21 @@ depend on what else the machine does.
 import functools
 from collections.abc import Callable
 
-from .claims import CHAOS_HELPS
-from .comparing import in_words, ratio
-from .context import Context
-from .item import Item, Made, Table, Verdict
-from .layer_tables import DIFFUSE, KINDS, Runs, by_subject, means, run_all, speed, summary
-from .separations import NOTHING, SEGMENTATION, Way
+from ..measuring.context import Context
+from ..measuring.separation_scores import NOTHING, SEGMENTATION, SeparatorSetting
+from ..report.claims import CHAOS_HELPS
+from ..report.comparing import paired_ratio
+from ..report.item import ClaimVerdict, ItemContent, ItemTable, ThesisItem
+from ..report.layer_tables import (
+    DIFFUSE,
+    KINDS,
+    RunScores,
+    accuracy_table,
+    mean_scores,
+    score_settings,
+    speed_table,
+    subject_table,
+)
 
 OPTIMISERS = {
     "PSO": "particle_swarm",
@@ -32,27 +41,27 @@ OPTIMISERS = {
 RUNS, QUICK_RUNS = 5, 2
 _SETTINGS = {"paper": "as published", "improved": "improved"}
 WAYS = tuple(
-    Way(f"{label}, {words}", SEGMENTATION, variant, (("optimiser", optimiser),))
+    SeparatorSetting(f"{label}, {words}", SEGMENTATION, variant, (("optimiser", optimiser),))
     for variant, words in _SETTINGS.items()
     for label, optimiser in OPTIMISERS.items()
 )
 _CHAOS, _RIVALS = "CS, as published", ("PSO, as published", "ClonalG, as published")
 
 
-def _accuracy(kind: str, context: Context) -> Made:
+def _accuracy(kind: str, context: Context) -> ItemContent:
     runs = _runs(kind, context)
     tables = (
-        summary(runs, kind, DIFFUSE, context.seed, _chaos_of, "CS"),
-        by_subject(runs, kind, DIFFUSE, _chaos_of, "CS"),
+        accuracy_table(runs, kind, DIFFUSE, context.seed, _chaos_of, "CS"),
+        subject_table(runs, kind, DIFFUSE, _chaos_of, "CS"),
     )
-    return Made(
-        (tables[0], hits(runs), tables[1]),
+    return ItemContent(
+        (tables[0], hit_table(runs), tables[1]),
         text=_ACCURACY,
         verdicts=(verdict(runs, "mse", "MSE", _SAME, context.seed),),
     )
 
 
-def hits(runs: Runs) -> Table:
+def hit_table(runs: RunScores) -> ItemTable:
     """How often each search marked the very pixels that the exact one marks."""
     lines = []
     for label, of_subjects in runs.items():
@@ -61,42 +70,45 @@ def hits(runs: Runs) -> Table:
         ]
         if ends:
             lines.append((label, len(ends), f"{100 * sum(ends) / len(ends):.0f} %"))
-    return Table(
+    return ItemTable(
         ("method", "runs", "as the exact search"),
         tuple(lines),
         "Runs that marked the pixels which the exact search marks",
     )
 
 
-def _speed(kind: str, context: Context) -> Made:
+def _speed(kind: str, context: Context) -> ItemContent:
     runs = _runs(kind, context)
-    return Made(
-        (speed(runs, _chaos_of, context.seed, "CS"),),
+    return ItemContent(
+        (speed_table(runs, _chaos_of, context.seed, "CS"),),
         text=_SPEED,
         verdicts=(verdict(runs, "search", "search time", _DEAR, context.seed),),
     )
 
 
-def _runs(kind: str, context: Context) -> Runs:
-    return run_all(context, kind, WAYS, QUICK_RUNS if context.quick else RUNS)
+def _runs(kind: str, context: Context) -> RunScores:
+    return score_settings(context, kind, WAYS, QUICK_RUNS if context.quick else RUNS)
 
 
-def verdict(runs: Runs, name: str, what: str, why: str, seed: int) -> Verdict:
+def verdict(runs: RunScores, name: str, what: str, why: str, seed: int) -> ClaimVerdict:
     """Whether CS has less of a score, `what`, than both rivals;
 
     `why`: what explains that it has not.
     """
-    found = [ratio(means(runs[_CHAOS], name), means(runs[label], name), seed) for label in _RIVALS]
+    found = [
+        paired_ratio(mean_scores(runs[_CHAOS], name), mean_scores(runs[label], name), seed)
+        for label in _RIVALS
+    ]
     here = f"{what} of CS over that of " + "; of ".join(
         f"{label.split(',')[0]} {in_words(each)}"
         for label, each in zip(_RIVALS, found, strict=True)
     )
     if any(each is None for each in found):
-        return Verdict(
+        return ClaimVerdict(
             CHAOS_HELPS, here, "cannot be told", "fewer than two subjects with a value above 0"
         )
     surely = [each is not None and each.high < 1 for each in found]
-    return Verdict(
+    return ClaimVerdict(
         CHAOS_HELPS,
         here,
         "yes" if all(surely) else "partly" if any(surely) else "no",
@@ -121,13 +133,13 @@ _SPEED = (
     "Search: finding the thresholds, 20,000 evaluations at most, and marking the pixels above them, in processor time. Whole: the search, "
     "matching and filling. Seconds are worth no more than the quiet of the machine they were taken on."
 )
-_PARTS: tuple[tuple[str, Callable[[str, Context], Made]], ...] = (
+_PARTS: tuple[tuple[str, Callable[[str, Context], ItemContent]], ...] = (
     ("accuracy", _accuracy),
     ("speed", _speed),
 )
 
-ITEMS: tuple[Item, ...] = tuple(
-    Item(
+ITEMS: tuple[ThesisItem, ...] = tuple(
+    ThesisItem(
         "table",
         f"4.{5 + 2 * row + column}",
         f"Segmentation by PSO, ClonalG and CS with inpainting, {words}: {what}",

@@ -15,52 +15,78 @@ from dataclasses import replace
 
 import numpy as np
 
-from isc_core.datasets import MitBerkeleyObject
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.errors import InputError
-from isc_core.evaluate import Estimate
-from isc_core.image_metrics import highlight_region
-from isc_core.metrics import mse, truth_normal
-from isc_core.sirfs.frames import light_from_reference
+from isc_core.evaluation.evaluate import Estimate
+from isc_core.evaluation.image_metrics import highlight_region
+from isc_core.evaluation.metrics import mse, truth_normal
+from isc_core.shading.spherical_harmonics import light_from_reference
 
-from .characteristics_items import absolute
-from .context import Context
-from .decompositions import decomposed
-from .estimates import AFTER, BEFORE, BOUND, SIRFS, Framework, estimated, known, measured
-from .item import Cell, Item, Made, Table
-from .layer_tables import KINDS
-from .panels import COLOURS, characteristics, panels
-from .pictures import ball, beside, directions, fitted, lit, marked, relief, signed
-from .removal_items import METHODS
-from .segmentation_items import WAYS as SEGMENTATIONS
-from .separations import SEGMENTATION, Way, highlights, layers, split
-from .sparse_coding_items import METHOD as SPARSE_CODING
-from .sparse_coding_items import OURS as SPECULAR_FREE
-from .style import exposure, sheet
-from .subjects import Subject
+from ..drawing.image_maps import (
+    crop_image,
+    fit_scale,
+    height_colours,
+    light_ball,
+    mark_pixels,
+    normal_image,
+    pad_to_aspect,
+    signed_error,
+)
+from ..drawing.panels import COLOURS, characteristic_panels, panel_figure
+from ..drawing.style import exposure, image_sheet
+from ..images.subject import Subject
+from ..measuring.context import Context
+from ..measuring.decompositions import decompose_subject
+from ..measuring.framework_runs import (
+    AFTER,
+    BEFORE,
+    BOUND,
+    SIRFS,
+    Framework,
+    run_framework,
+    score_frameworks,
+    subjects_with_truth,
+)
+from ..measuring.separation_scores import (
+    SEGMENTATION,
+    SeparatorSetting,
+    segment_highlights,
+    separate_subject,
+    true_layers,
+)
+from ..report.item import Cell, ItemContent, ItemTable, ThesisItem
+from ..report.layer_tables import KINDS
+from .characteristics import error_table
+from .removal import METHODS
+from .segmentation import WAYS as SEGMENTATIONS
+from .sparse_coding import METHOD as SPARSE_CODING
+from .sparse_coding import OURS as SPECULAR_FREE
 
 Rows = list[tuple[str, Sequence[np.ndarray | None]]]
 _OPTIMISERS = SEGMENTATIONS[:3]
-_PAINTED = (*_OPTIMISERS, Way("CS, improved", SEGMENTATION))
+_PAINTED = (*_OPTIMISERS, SeparatorSetting("CS, improved", SEGMENTATION))
 _PUBLISHED = tuple(
-    Way(f"{label}, as published", method, "paper") for label, method in METHODS.items()
+    SeparatorSetting(f"{label}, as published", method, "paper") for label, method in METHODS.items()
 )
-_IMPROVED = tuple(Way(f"{label}, improved", method) for label, method in METHODS.items())
+_IMPROVED = tuple(
+    SeparatorSetting(f"{label}, improved", method) for label, method in METHODS.items()
+)
 _OWN = {"iterative": "tan_2005", "CS": SEGMENTATION, "SC": SPARSE_CODING}
 _THESIS = (
-    *(Way(f"{label}, improved", method) for label, method in _OWN.items()),
-    Way("ISC", "isc"),
+    *(SeparatorSetting(f"{label}, improved", method) for label, method in _OWN.items()),
+    SeparatorSetting("ISC", "isc"),
 )
 _THESIS_PUBLISHED = tuple(
-    Way(f"{label}, as published", method, "paper") for label, method in _OWN.items()
+    SeparatorSetting(f"{label}, as published", method, "paper") for label, method in _OWN.items()
 )
-_FREE_OTHERS = (Way("SC, as published", SPARSE_CODING, "paper"), *SPECULAR_FREE[2:])
+_FREE_OTHERS = (SeparatorSetting("SC, as published", SPARSE_CODING, "paper"), *SPECULAR_FREE[2:])
 _LATER = (SIRFS, *(one for one in BEFORE if one.label in ("SC-SIRFS", "MDR-SIRFS")), BOUND)
 _FIRST = (SIRFS, *(one for one in BEFORE if one.label != "SC-SIRFS"))
 _MODELS = {"mdr": "MDR", "mbp": "MBP", "joint": "joint", "sirfs": "SIRFS alone"}
 _PREFERRED = ("Cup", "Helmet", "Basketball", "Goldfish", "Hydrant", "Bag", "Guitar", "Clock")
 
 
-def turn(index: int, subjects: Sequence[Subject], rounds: int) -> tuple[Subject, int]:
+def subject_for_figure(index: int, subjects: Sequence[Subject], rounds: int) -> tuple[Subject, int]:
     """The subject of the `index`-th figure of a family, and in which of its rounds.
 
     Raises `InputError` where there are too few.
@@ -72,31 +98,41 @@ def turn(index: int, subjects: Sequence[Subject], rounds: int) -> tuple[Subject,
     return subjects[index % len(subjects)], index // len(subjects)
 
 
-def separation_rows(subject: Subject, ways: Sequence[Way], seed: int) -> tuple[Rows, Table]:
+def separation_rows(
+    subject: Subject, ways: Sequence[SeparatorSetting], seed: int
+) -> tuple[Rows, ItemTable]:
     """The truth and the photo, then each way's layers and its error; and the errors as numbers."""
-    diffuse, specular = layers(subject)
+    diffuse, specular = true_layers(subject)
     mask, gain = subject.mask, exposure(subject.image, subject.mask)
     rows: Rows = [
         (
             "truth",
-            [lit(diffuse, mask, gain), lit(specular, mask, gain), lit(subject.image, mask, gain)],
+            [
+                crop_image(diffuse, mask, gain),
+                crop_image(specular, mask, gain),
+                crop_image(subject.image, mask, gain),
+            ],
         )
     ]
     nothing, lines = mse(diffuse, subject.image, mask), []
     for way in ways:
         try:
-            found = split(subject, way, seed)
+            found = separate_subject(subject, way, seed)
         except InputError:
             rows.append((f"{_wrapped(way.label)}\nrefuses", [None, None, None]))
             lines.append((way.label, "refuses", "-", "-"))
             continue
         error = mse(diffuse, found.diffuse, mask)
         words = f"MSE × {_short(error / nothing)}" if nothing > 0 else f"RMS {error**0.5:.2g}"
-        wrong = signed(found.diffuse - diffuse, mask, gain)
+        wrong = signed_error(found.diffuse - diffuse, mask, gain)
         rows.append(
             (
                 f"{_wrapped(way.label)}\n{words}",
-                [lit(found.diffuse, mask, gain), lit(found.specular, mask, gain), wrong],
+                [
+                    crop_image(found.diffuse, mask, gain),
+                    crop_image(found.specular, mask, gain),
+                    wrong,
+                ],
             )
         )
         lines.append(
@@ -108,7 +144,7 @@ def separation_rows(subject: Subject, ways: Sequence[Way], seed: int) -> tuple[R
             )
         )
     header = ("method", "MSE of the diffuse layer", "over doing nothing", "light taken off, %")
-    return rows, Table(
+    return rows, ItemTable(
         header,
         tuple(lines),
         f"{subject.name}: {_share(specular, subject)} % of the light is specular",
@@ -122,11 +158,12 @@ def characteristics_rows(
     truth = subject.truth
     assert truth is not None
     errors = {
-        row.framework: row.errors["average"] for row in measured(context, [subject], frameworks)
+        row.framework: row.errors["average"]
+        for row in score_frameworks(context, [subject], frameworks)
     }
     shown: list[tuple[str, Estimate | None]] = [("truth", _known(truth))]
     for framework in frameworks:
-        answer = estimated(context, subject, framework).answer
+        answer = run_framework(context, subject, framework).answer
         words = "refuses" if answer is None else f"error {errors[framework.label]:.3f}"
         shown.append(
             (
@@ -151,17 +188,20 @@ def _maps(
     """One row of a sheet: an answer's maps, those of free scale in the truth's scale and exposure."""
     seen, mask = truth.valid & np.isfinite(truth.height), truth.mask
     colours = [
-        lit(fitted(getattr(answer, name), true, seen), seen, exposure(true, seen), mask)
+        crop_image(fit_scale(getattr(answer, name), true, seen), seen, exposure(true, seen), mask)
         for name, true in (("shading", truth.shading), ("reflectance", truth.reflectance))
     ]
-    (true_lamp, covered), (lamp, _) = ball(light_from_reference(truth.light)), ball(answer.light)
-    light = lit(fitted(lamp, true_lamp, covered), covered, exposure(true_lamp, covered))
+    (true_lamp, covered), (lamp, _) = (
+        light_ball(light_from_reference(truth.light)),
+        light_ball(answer.light),
+    )
+    light = crop_image(fit_scale(lamp, true_lamp, covered), covered, exposure(true_lamp, covered))
     height = np.where(np.isfinite(truth.height), answer.height, np.nan)
     return [
-        relief(height, mask, limits),
-        directions(answer.normal, mask),
+        height_colours(height, mask, limits),
+        normal_image(answer.normal, mask),
         *colours,
-        beside(light, mask),
+        pad_to_aspect(light, mask),
     ]
 
 
@@ -181,16 +221,18 @@ def _levelled(answer: Estimate, truth: MitBerkeleyObject) -> Estimate:
     )
 
 
-def _masks(kind: str, context: Context) -> Made:
+def _masks(kind: str, context: Context) -> ItemContent:
     rows: Rows = []
     lines: list[tuple[Cell, ...]] = []
     names = [way.label.partition(",")[0] for way in _OPTIMISERS]
     for subject in context.subjects(kind):
         gain = exposure(subject.image, subject.mask)
-        true = highlight_region(layers(subject)[1], subject.mask)
-        found = [highlights(subject, way, context.seed) for way in _OPTIMISERS]
-        pictures = [marked(subject.image, subject.mask, pixels, gain) for pixels in (*found, true)]
-        rows.append((subject.name, [lit(subject.image, subject.mask, gain), *pictures]))
+        true = highlight_region(true_layers(subject)[1], subject.mask)
+        found = [segment_highlights(subject, way, context.seed) for way in _OPTIMISERS]
+        pictures = [
+            mark_pixels(subject.image, subject.mask, pixels, gain) for pixels in (*found, true)
+        ]
+        rows.append((subject.name, [crop_image(subject.image, subject.mask, gain), *pictures]))
         for name, pixels in zip(names, found, strict=True):
             both = int((pixels & true).sum())
             lines.append(
@@ -202,7 +244,7 @@ def _masks(kind: str, context: Context) -> Made:
                     _percent(both, int(true.sum())),
                 )
             )
-    table = Table(
+    table = ItemTable(
         ("image", "search", "pixels marked", "of them highlights, %", "of the highlights, %"),
         tuple(lines),
     )
@@ -210,37 +252,51 @@ def _masks(kind: str, context: Context) -> Made:
         "Orange: the pixels above the highest of three thresholds of the smallest channel, as each search finds them; in the last column, "
         "those where the true specular layer has at least a tenth of its strongest light."
     )
-    return Made((table,), (sheet(("photo", *names, "true highlights"), rows, expose=False),), text)
+    return ItemContent(
+        (table,), (image_sheet(("photo", *names, "true highlights"), rows, expose=False),), text
+    )
 
 
-def _layers(kind: str, rounds: Sequence[Sequence[Way]], index: int, context: Context) -> Made:
-    subject, which = turn(index, context.subjects(kind), len(rounds))
+def _layers(
+    kind: str, rounds: Sequence[Sequence[SeparatorSetting]], index: int, context: Context
+) -> ItemContent:
+    subject, which = subject_for_figure(index, context.subjects(kind), len(rounds))
     rows, table = separation_rows(subject, rounds[which], context.seed)
     text = (
         f"{subject.name}. Under each name: the diffuse layer's mean square error over that of doing nothing, or, where there is no "
         "highlight, its RMS error. Errors: orange is light left over, blue is paint taken for light, in full colour from a tenth of the "
         "photo's white on."
     )
-    return Made(
-        (table,), (sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),), text
+    return ItemContent(
+        (table,),
+        (image_sheet(("diffuse", "specular", "photo, then errors"), rows, expose=False),),
+        text,
     )
 
 
-def _characteristics(rounds: Sequence[Sequence[Framework]], index: int, context: Context) -> Made:
-    subject, which = turn(index, known(context, ("specular", "synthetic")), len(rounds))
+def _characteristics(
+    rounds: Sequence[Sequence[Framework]], index: int, context: Context
+) -> ItemContent:
+    subject, which = subject_for_figure(
+        index, subjects_with_truth(context, ("specular", "synthetic")), len(rounds)
+    )
     rows = characteristics_rows(context, subject, rounds[which])
     text = (
         f"{subject.name} ({subject.kind}). Under each name the geometric mean of the six errors. Heights of all in one range, shading, "
         f"reflectance and light in the scale nearest to the truth; the light on a white ball. {COLOURS}"
     )
-    drawn = sheet(("height", "normals", "shading", "reflectance", "light"), rows, expose=False)
-    return Made((absolute(measured(context, [subject], rounds[which])),), (drawn,), text)
+    drawn = image_sheet(
+        ("height", "normals", "shading", "reflectance", "light"), rows, expose=False
+    )
+    return ItemContent(
+        (error_table(score_frameworks(context, [subject], rounds[which])),), (drawn,), text
+    )
 
 
-def _photo(index: int, context: Context) -> Made:
+def _photo(index: int, context: Context) -> ItemContent:
     order = {name: place for place, name in enumerate(_PREFERRED)}
     subjects = sorted(context.photos(), key=lambda subject: order.get(subject.name, len(order)))
-    subject, which = turn(index, subjects, len(_MODELS))
+    subject, which = subject_for_figure(index, subjects, len(_MODELS))
     model = list(_MODELS)[which]
     source = (
         "its truth is not known"
@@ -248,13 +304,17 @@ def _photo(index: int, context: Context) -> Made:
         else "no photos were given, a rendered object stands in for one"
     )
     text = f"{subject.name}, by {_MODELS[model]}; {source}. Photo, diffuse and specular share an exposure, the rest has its own. {COLOURS}"
-    found = decomposed(context, subject, model)
+    found = decompose_subject(context, subject, model)
     heights = found.height[found.mask]
     lines = (
         ("light taken off, %", _share(found.specular, subject)),
         ("range of heights, pixels", f"{np.ptp(heights):.0f}"),
     )
-    return Made((Table(("what", "here"), lines),), (panels(characteristics(found), 4),), text)
+    return ItemContent(
+        (ItemTable(("what", "here"), lines),),
+        (panel_figure(characteristic_panels(found), 4),),
+        text,
+    )
 
 
 def _share(specular: np.ndarray, subject: Subject) -> str:
@@ -286,12 +346,14 @@ def _wrapped(label: str) -> str:
 _KINDS = {
     "specular": "significant specularity",
     "synthetic": "a synthetic image",
-    "matt": "an image without specularity",
+    "diffuse": "an image without specularity",
 }
-_Plan = tuple[str, Callable[[Context], Made]]
+_Plan = tuple[str, Callable[[Context], ItemContent]]
 
 
-def _family(words: str, kind: str, rounds: Sequence[Sequence[Way]], count: int) -> list[_Plan]:
+def _family(
+    words: str, kind: str, rounds: Sequence[Sequence[SeparatorSetting]], count: int
+) -> list[_Plan]:
     return [
         (f"{words}: {_KINDS[kind]} ({index + 1})", functools.partial(_layers, kind, rounds, index))
         for index in range(count)
@@ -305,11 +367,11 @@ def _plans() -> list[_Plan]:
     ]
     for kind in _KINDS:
         plans += _family("Highlights painted over after PSO, ClonalG and CS", kind, (_PAINTED,), 1)
-    for kind, count in (("specular", 4), ("synthetic", 3), ("matt", 2)):
+    for kind, count in (("specular", 4), ("synthetic", 3), ("diffuse", 2)):
         plans += _family(
             "Layers by MZK06, YCK06, YWA10 and SC09", kind, (_PUBLISHED, _IMPROVED), count
         )
-    for kind, count in (("specular", 2), ("synthetic", 1), ("matt", 1)):
+    for kind, count in (("specular", 2), ("synthetic", 1), ("diffuse", 1)):
         plans += _family(
             "Layers by Sparse Coding with SF1, SF2 and both",
             kind,
@@ -344,6 +406,7 @@ def _plans() -> list[_Plan]:
     ]
 
 
-ITEMS: tuple[Item, ...] = tuple(
-    Item("figure", f"4.{10 + place}", title, make) for place, (title, make) in enumerate(_plans())
+ITEMS: tuple[ThesisItem, ...] = tuple(
+    ThesisItem("figure", f"4.{10 + place}", title, make)
+    for place, (title, make) in enumerate(_plans())
 )

@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from isc_core.photo import srgb_to_linear
+from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.thresholding import exact
 from isc_core.thresholding.clonal_selection import mutation_rate
 from isc_core.thresholding.logistic_map import (
@@ -23,11 +23,11 @@ from isc_core.thresholding.logistic_map import (
     uniformised,
 )
 
-from ..thresholding import COUNTS, IMAGES, levels
-from .context import Context
-from .item import Cell, Item, Made, Table
-from .style import OKABE_ITO, figure, legend, show
-from .thresholding_runs import objective, runs
+from ...separation.thresholding import COUNTS, IMAGES, levels
+from ..drawing.style import OKABE_ITO, figure, legend, show
+from ..measuring.context import Context
+from ..measuring.threshold_runs import image_objective, threshold_runs
+from ..report.item import Cell, ItemContent, ItemTable, ThesisItem
 
 _DECAYS = (2.0, 3.0, 4.0, 5.0)
 _NUMBERS = 100_000
@@ -35,7 +35,7 @@ _LEVELS = 256
 _LINES = ("-", "--", "-.", ":")
 
 
-def mutation(context: Context) -> Made:
+def mutation(context: Context) -> ItemContent:
     """Figure 3.5."""
     del context
     affinity = np.linspace(0, 1, 201)
@@ -53,19 +53,19 @@ def mutation(context: Context) -> Made:
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (float(f), *row) for f, row in zip(at, zip(*rates, strict=True), strict=True)
     )
-    table = Table(
+    table = ItemTable(
         ("affinity", *(f"rho = {decay:g}" for decay in _DECAYS)),
         rows,
         "The mutation rate exp(-rho f).",
     )
-    return Made(
+    return ItemContent(
         (table,),
         (made,),
         "The better an antibody, the smaller the steps of its clones. The searches here use rho = 5.",
     )
 
 
-def branching(context: Context) -> Made:
+def branching(context: Context) -> ItemContent:
     """Figure 3.6."""
     rates = np.linspace(2.8, 4, 400 if context.quick else 1400)
     ends = bifurcation(rates)
@@ -83,19 +83,19 @@ def branching(context: Context) -> Made:
     rows = tuple(
         (rate, what, _distinct(bifurcation(np.array([rate]))[:, 0])) for rate, what in known
     )
-    table = Table(
+    table = ItemTable(
         ("r", "what is known", "distinct values of 200"),
         rows,
         "The logistic map x <- r x (1 - x) at some rates.",
     )
-    return Made(
+    return ItemContent(
         (table,),
         (made,),
         "Only at r = 4 does the orbit fill the whole interval: that is where chaotic numbers are taken from.",
     )
 
 
-def distribution(context: Context) -> Made:
+def distribution(context: Context) -> ItemContent:
     """Figure 3.7."""
     values = orbit(_start(context), _NUMBERS)
     edges = np.linspace(0, 1, 51)
@@ -120,17 +120,17 @@ def distribution(context: Context) -> Made:
         ("within .06 of an end", ends, float(2 * law[3])),
         ("largest error of a bin's share", float(np.abs(counted - np.diff(law)).max()), 0.0),
     )
-    table = Table(
+    table = ItemTable(
         ("of the orbit", "measured", "by the law"), rows, "The orbit at r = 4 against its law."
     )
-    return Made(
+    return ItemContent(
         (table,),
         (made,),
         "An orbit stays near the ends of the interval: used as it is, it is far from uniform.",
     )
 
 
-def generators(context: Context) -> Made:
+def generators(context: Context) -> ItemContent:
     """Figure 3.8."""
     values = uniformised(orbit(_start(context), _NUMBERS))
     sources = (
@@ -177,14 +177,14 @@ def generators(context: Context) -> Made:
         "All three are close to uniform. Below, each number against the next: in one orbit, each is a function of the one before, which "
         "correlation does not see and pairs do. With many orbits, and every eighth value of them, nothing of it is left."
     )
-    return Made(
-        (Table(header, tuple(rows), f"{_NUMBERS:,} numbers of each source."),), (made,), text
+    return ItemContent(
+        (ItemTable(header, tuple(rows), f"{_NUMBERS:,} numbers of each source."),), (made,), text
     )
 
 
-def thresholded(context: Context, name: str) -> Made:
+def thresholded(context: Context, name: str) -> ItemContent:
     """One of figures 4.1 to 4.9."""
-    image, of = levels(name), objective(name)
+    image, of = levels(name), image_objective(name)
     made, axes = figure(2, 1 + len(COUNTS), height=4.1)
     show(axes[0, 0], srgb_to_linear(image / 255), name)
     shares = 100 * of.counts / of.counts.sum()
@@ -193,7 +193,7 @@ def thresholded(context: Context, name: str) -> Made:
     rows = []
     for column, count in enumerate(COUNTS, 1):
         found = exact(of, count).thresholds
-        searched = runs(context, "CS", name, count).thresholds[0]
+        searched = threshold_runs(context, "CS", name, count).thresholds[0]
         show(axes[0, column], srgb_to_linear(_classes(image, found) / 255), f"{count} thresholds")
         for number, level in enumerate(found):
             axes[1, column].axvline(
@@ -230,7 +230,7 @@ def thresholded(context: Context, name: str) -> Made:
     high = [f"{level} ({share:.1f} %)" for level, share in enumerate(shares) if share > top]
     cut = f" Bars that the histogram cuts off: level {', '.join(high)}." if high else ""
     text = f"Each class is shown at its mean level.{cut}"
-    return Made((Table(header, tuple(rows), f"Thresholds of {name}."),), (made,), text)
+    return ItemContent((ItemTable(header, tuple(rows), f"Thresholds of {name}."),), (made,), text)
 
 
 def _classes(image: np.ndarray, thresholds: np.ndarray) -> np.ndarray:
@@ -252,18 +252,18 @@ def _start(context: Context) -> float:
     return 0.1 + 0.8 * ((0.0293 + context.seed * 0.6180339887) % 1)
 
 
-ITEMS: tuple[Item, ...] = (
-    Item("figure", "3.5", "The mutation rate by affinity", mutation),
-    Item("figure", "3.6", "Bifurcation of the logistic map", branching),
-    Item("figure", "3.7", "Distribution of the logistic map's values", distribution),
-    Item(
+ITEMS: tuple[ThesisItem, ...] = (
+    ThesisItem("figure", "3.5", "The mutation rate by affinity", mutation),
+    ThesisItem("figure", "3.6", "Bifurcation of the logistic map", branching),
+    ThesisItem("figure", "3.7", "Distribution of the logistic map's values", distribution),
+    ThesisItem(
         "figure",
         "3.8",
         "Histogram of chaotic numbers against a pseudo-random generator",
         generators,
     ),
     *(
-        Item(
+        ThesisItem(
             "figure",
             f"4.{number}",
             f"Histogram, thresholds and thresholded images of {name}",

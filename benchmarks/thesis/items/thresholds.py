@@ -21,25 +21,24 @@ import numpy as np
 
 from isc_core.thresholding import OtsuObjective, exact
 
-from ..thresholding import COUNTS, HIT
-from .claims import CHAOS_FINDS_OPTIMUM, CHAOS_HELPS
-from .context import Context
-from .item import Cell, Item, Made, Table, Verdict
-from .style import OKABE_ITO, figure, legend
-from .thresholding_runs import (
+from ...separation.thresholding import COUNTS, HIT
+from ..drawing.style import OKABE_ITO, figure, legend
+from ..measuring.context import Context
+from ..measuring.threshold_runs import (
     COMPARED,
     EVALUATIONS,
     SEARCHES,
-    Runs,
-    all_runs,
-    holm,
-    images,
-    iterations,
-    milliseconds,
-    objective,
-    rank_sum,
-    share_interval,
+    ThresholdRuns,
+    holm_correction,
+    image_names,
+    image_objective,
+    rank_sum_test,
+    run_searches,
+    search_times,
+    wilson_interval,
 )
+from ..report.claims import CHAOS_FINDS_OPTIMUM, CHAOS_HELPS
+from ..report.item import Cell, ClaimVerdict, ItemContent, ItemTable, ThesisItem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +49,7 @@ _SIGNIFICANT = 0.05
 _MARKS = ("o", "s", "D", "^")
 
 
-def exhaustive(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
+def exhaustive_search(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
     """The best three thresholds by looking at each of the 2.7 million sets, and the value there."""
     best, where = -np.inf, (0, 0, 0)
     for first in range(_LEVELS - 2):
@@ -64,15 +63,15 @@ def exhaustive(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
     return where, best
 
 
-def ground_truth(context: Context) -> Made:
+def ground_truth(context: Context) -> ItemContent:
     """Table 4.1."""
     rows, checks = [], []
-    names = images(context)
+    names = image_names(context)
     for number, name in enumerate(names):
         context.monitor.report(f"exact thresholds of {name}", number / len(names))
-        of = objective(name)
+        of = image_objective(name)
         begin = time.process_time()
-        one_by_one = exhaustive(of)
+        one_by_one = exhaustive_search(of)
         seconds = time.process_time() - begin
         for count in COUNTS:
             found = exact(of, count)
@@ -94,8 +93,10 @@ def ground_truth(context: Context) -> Made:
     header = ("image", "K", "thresholds", "objective", "% of the variance", "ms")
     caption = f"Three thresholds by trying all {comb(_LEVELS, 3):,} sets: the same optimum?"
     tables = (
-        Table(header, tuple(rows), "Exact optimum of Otsu's criterion by dynamic programming."),
-        Table(("image", "thresholds", "objective", "same optimum", "ms"), tuple(checks), caption),
+        ItemTable(header, tuple(rows), "Exact optimum of Otsu's criterion by dynamic programming."),
+        ItemTable(
+            ("image", "thresholds", "objective", "same optimum", "ms"), tuple(checks), caption
+        ),
     )
     made, axes = figure(1, 1, height=2.8)
     for count, colour, mark in zip(COUNTS, OKABE_ITO, _MARKS, strict=False):
@@ -115,24 +116,24 @@ def ground_truth(context: Context) -> Made:
         "All sets of thresholds for K = 4 and 5 would be 175 million and 8.8 thousand million; the criterion is a sum over classes, so "
         "that dynamic programming finds the same optimum in about a millisecond."
     )
-    return Made(tables, (made,), text)
+    return ItemContent(tables, (made,), text)
 
 
-def objectives(context: Context) -> Made:
+def objectives(context: Context) -> ItemContent:
     """Table 4.2."""
-    found = all_runs(context, tuple(SEARCHES))
-    names = images(context)
+    found = run_searches(context, tuple(SEARCHES))
+    names = image_names(context)
     shares = tuple(_shares(found, search, names) for search in SEARCHES)
-    p_swarm = holm(
+    p_swarm = holm_correction(
         [
-            rank_sum(found["CS", i, k].values, found["PSO", i, k].values)[1]
+            rank_sum_test(found["CS", i, k].values, found["PSO", i, k].values)[1]
             for i in names
             for k in COUNTS
         ]
     )
-    p_clonal = holm(
+    p_clonal = holm_correction(
         [
-            rank_sum(found["CS", i, k].values, found["ClonalG", i, k].values)[1]
+            rank_sum_test(found["CS", i, k].values, found["ClonalG", i, k].values)[1]
             for i in names
             for k in COUNTS
         ]
@@ -154,18 +155,18 @@ def objectives(context: Context) -> Made:
     )
     runs = len(next(iter(found.values())).values)
     tables = (
-        Table(
+        ItemTable(
             ("search", *(f"K = {k}" for k in COUNTS), "all", "95 % interval"),
             shares,
             f"Runs of {runs} an image that found the optimum.",
         ),
-        Table(
+        ItemTable(
             header,
             tuple(rows),
             f"Objective over {runs} runs; p: rank-sum test, corrected for {len(rows)} cases (Holm).",
         ),
     )
-    return Made(
+    return ItemContent(
         tables, (_hit_figure(found, names),), _OBJECTIVES_TEXT, _objective_verdicts(found, names)
     )
 
@@ -176,13 +177,17 @@ _OBJECTIVES_TEXT = (
 )
 
 
-def thresholds(context: Context) -> Made:
+def thresholds(context: Context) -> ItemContent:
     """Table 4.3."""
-    found = all_runs(context, COMPARED)
-    names, rows = images(context), []
+    found = run_searches(context, COMPARED)
+    names, rows = image_names(context), []
     for name in names:
         for count in COUNTS:
-            cells: list[Cell] = [name, count, _listed(exact(objective(name), count).thresholds)]
+            cells: list[Cell] = [
+                name,
+                count,
+                _listed(exact(image_objective(name), count).thresholds),
+            ]
             for search in COMPARED:
                 usual, many = Counter(
                     map(tuple, found[search, name, count].thresholds.tolist())
@@ -222,18 +227,21 @@ def thresholds(context: Context) -> Made:
         fontsize=7,
     )
     text = "In the picture each stroke is a threshold of one run: where a search is sure, its strokes lie on each other."
-    return Made(
-        (Table(header, tuple(rows), "The thresholds that most runs found."),), (made,), text
+    return ItemContent(
+        (ItemTable(header, tuple(rows), "The thresholds that most runs found."),), (made,), text
     )
 
 
-def times(context: Context) -> Made:
+def times(context: Context) -> ItemContent:
     """Table 4.4."""
-    found = all_runs(replace(context, monitor=context.monitor.part(0.0, 0.5)), COMPARED)
-    names = images(context)
+    found = run_searches(replace(context, monitor=context.monitor.part(0.0, 0.5)), COMPARED)
+    names = image_names(context)
     cases = [(name, count) for name in names for count in COUNTS]
-    p_values = holm(
-        [rank_sum(found["CS", *case].needed, found["ClonalG", *case].needed)[1] for case in cases]
+    p_values = holm_correction(
+        [
+            rank_sum_test(found["CS", *case].needed, found["ClonalG", *case].needed)[1]
+            for case in cases
+        ]
     )
     rows: list[tuple[Cell, ...]] = []
     for case, p in zip(cases, p_values, strict=True):
@@ -243,7 +251,7 @@ def times(context: Context) -> Made:
                 f"timing {search} on {case[0]}", 0.5 + 0.5 * len(rows) / len(cases)
             )
             cells += [
-                float(np.median(milliseconds(context, search, *case))),
+                float(np.median(search_times(context, search, *case))),
                 _median_iterations(search, found[search, *case]),
             ]
         rows.append((*cells, float(p)))
@@ -275,8 +283,8 @@ def times(context: Context) -> Made:
         )
     axes[0, 0].set_ylabel("runs at the optimum, %")
     legend(axes[0, -1], "lower right")
-    return Made(
-        (Table(header, tuple(rows), caption),),
+    return ItemContent(
+        (ItemTable(header, tuple(rows), caption),),
         (made,),
         _TIMES_TEXT,
         (_speed_verdict(found, cases, p_values),),
@@ -290,17 +298,17 @@ _TIMES_TEXT = (
 
 
 def _objective_verdicts(
-    found: dict[tuple[str, str, int], Runs], names: tuple[str, ...]
-) -> tuple[Verdict, ...]:
+    found: dict[tuple[str, str, int], ThresholdRuns], names: tuple[str, ...]
+) -> tuple[ClaimVerdict, ...]:
     hits = {
         search: sum(found[search, i, k].hits for i in names for k in COUNTS) for search in SEARCHES
     }
     total = sum(len(found["CS", i, k].values) for i in names for k in COUNTS)
-    low, _ = share_interval(hits["CS"], total)
+    low, _ = wilson_interval(hits["CS"], total)
     share = {search: f"{100 * many / total:.1f} %" for search, many in hits.items()}
     best = "yes" if hits["CS"] == total else "partly" if hits["CS"] > 0.95 * total else "no"
-    over_swarm = share_interval(hits["CS"], total)[0] > share_interval(hits["PSO"], total)[1]
-    over_clonal = share_interval(hits["CS"], total)[0] > share_interval(hits["ClonalG"], total)[1]
+    over_swarm = wilson_interval(hits["CS"], total)[0] > wilson_interval(hits["PSO"], total)[1]
+    over_clonal = wilson_interval(hits["CS"], total)[0] > wilson_interval(hits["ClonalG"], total)[1]
     holds = (
         "yes"
         if over_swarm and over_clonal
@@ -311,12 +319,12 @@ def _objective_verdicts(
         else "no"
     )
     return (
-        Verdict(
+        ClaimVerdict(
             CHAOS_FINDS_OPTIMUM,
             f"{hits['CS']} of {total} runs ({share['CS']}, at least {100 * low:.1f} % at 95 %).",
             best,
         ),
-        Verdict(
+        ClaimVerdict(
             CHAOS_HELPS,
             f"Optimum found in {share['CS']} of runs by CS, {share['ClonalG']} by ClonalG, {share['PSO']} by PSO; {share['CS, one orbit']} "
             "by CS on one orbit.",
@@ -329,17 +337,19 @@ def _objective_verdicts(
 
 
 def _speed_verdict(
-    found: dict[tuple[str, str, int], Runs], cases: list[tuple[str, int]], p_values: np.ndarray
-) -> Verdict:
+    found: dict[tuple[str, str, int], ThresholdRuns],
+    cases: list[tuple[str, int]],
+    p_values: np.ndarray,
+) -> ClaimVerdict:
     chaotic, plain, swarm = (
         np.concatenate([found[search, *case].needed for case in cases])
         for search in ("CS", "ClonalG", "PSO")
     )
-    more, p = rank_sum(chaotic, plain)
+    more, p = rank_sum_test(chaotic, plain)
     faster = p < _SIGNIFICANT and more < 0.5
     different = int((p_values < _SIGNIFICANT).sum())
     medians = [np.median(needed[np.isfinite(needed)]) for needed in (chaotic, plain, swarm)]
-    return Verdict(
+    return ClaimVerdict(
         CHAOS_HELPS,
         f"CS needs {medians[0]:.0f} evaluations, ClonalG {medians[1]:.0f}, PSO {medians[2]:.0f} where it arrives (medians). CS needs more "
         f"than ClonalG in {100 * more:.0f} % of pairs of runs (p = {p:.2g}); {different} of {len(cases)} cases differ.",
@@ -351,12 +361,12 @@ def _speed_verdict(
 
 
 def _shares(
-    found: dict[tuple[str, str, int], Runs], search: str, names: tuple[str, ...]
+    found: dict[tuple[str, str, int], ThresholdRuns], search: str, names: tuple[str, ...]
 ) -> tuple[Cell, ...]:
     """A row: the share of runs that found the optimum by K, of all, and its interval."""
     hits = [sum(found[search, name, count].hits for name in names) for count in COUNTS]
     total = len(names) * len(found[search, names[0], COUNTS[0]].values)
-    low, high = share_interval(sum(hits), total * len(COUNTS))
+    low, high = wilson_interval(sum(hits), total * len(COUNTS))
     cells = [f"{100 * many / total:.1f} %" for many in hits]
     return (
         search,
@@ -366,7 +376,9 @@ def _shares(
     )
 
 
-def _hit_figure(found: dict[tuple[str, str, int], Runs], names: tuple[str, ...]) -> "Figure":
+def _hit_figure(
+    found: dict[tuple[str, str, int], ThresholdRuns], names: tuple[str, ...]
+) -> "Figure":
     """The share of runs that found the optimum, by image and K."""
     made, axes = figure(1, len(COUNTS), height=0.9 + 0.25 * len(names), sharey=True)
     for place, count in zip(axes[0], COUNTS, strict=True):
@@ -407,7 +419,7 @@ def _hit_figure(found: dict[tuple[str, str, int], Runs], names: tuple[str, ...])
     return made
 
 
-def _median_iterations(search: str, runs: Runs) -> str:
+def _median_iterations(search: str, runs: ThresholdRuns) -> str:
     hit = runs.needed[np.isfinite(runs.needed)]
     return f"{np.median(iterations(search, hit)):.0f}" if len(hit) else "never"
 
@@ -426,14 +438,14 @@ def _listed(found: "np.ndarray | tuple[int, ...]") -> str:
     return " ".join(str(int(level)) for level in found)
 
 
-ITEMS: tuple[Item, ...] = (
-    Item("table", "4.1", "Exact Otsu thresholds of nine images", ground_truth),
-    Item(
+ITEMS: tuple[ThesisItem, ...] = (
+    ThesisItem("table", "4.1", "Exact Otsu thresholds of nine images", ground_truth),
+    ThesisItem(
         "table",
         "4.2",
         "Objective of PSO, ClonalG and CS: mean and deviation over repeated runs",
         objectives,
     ),
-    Item("table", "4.3", "Thresholds that PSO, ClonalG and CS find", thresholds),
-    Item("table", "4.4", "Time and iterations of PSO, ClonalG and CS", times),
+    ThesisItem("table", "4.3", "Thresholds that PSO, ClonalG and CS find", thresholds),
+    ThesisItem("table", "4.4", "Time and iterations of PSO, ClonalG and CS", times),
 )

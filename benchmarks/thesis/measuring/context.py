@@ -18,11 +18,12 @@ from functools import cached_property
 from pathlib import Path
 
 from isc_core import __version__
-from isc_core.atomic import new_file
 from isc_core.errors import InputError
+from isc_core.io.atomic import new_file
 from isc_core.progress import Monitor
 
-from .subjects import Library, Subject
+from ..images.library import SubjectLibrary
+from ..images.subject import Subject
 
 JsonRow = dict[str, str | int | float | bool | None]
 WORK = ".work"
@@ -44,7 +45,7 @@ class Context:
 
     def subjects(self, kind: str) -> tuple[Subject, ...]:
         """The images of a kind: "specular" (significant specularity), "synthetic" (rendered
-        scenes), "matt" (without highlights).
+        scenes), "diffuse" (without highlights).
 
         Raises `InputError` where data are damaged or nothing can be rendered here.
         """
@@ -89,8 +90,8 @@ class Context:
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
     @cached_property
-    def _library(self) -> Library:
-        return Library(self.output / WORK / "rendered", self.data, self.quick, self.seed)
+    def _library(self) -> SubjectLibrary:
+        return SubjectLibrary(self.output / WORK / "rendered", self.data, self.quick, self.seed)
 
     def _path(self, key: str) -> Path:
         digest = hashlib.sha256(f"{self.fingerprint} {key}".encode()).hexdigest()[:12]

@@ -7,16 +7,16 @@ are taken for clipped.
 
 import numpy as np
 
-from isc_core.decomposition import Decomposition
+from isc_core.decompose.pipeline import Settings, decompose
 from isc_core.photo import FLOAT_STEP, Photo, PhotoSource
-from isc_core.pipeline import Settings, decompose
-from isc_core.result_folder import load, save
+from isc_core.result_files.result_folder import load, save
+from isc_core.scene.decomposition import Decomposition
 
+from ..images.subject import Subject
 from .context import WORK, Context
-from .subjects import Subject
 
 
-def photo_of(subject: Subject) -> Photo:
+def subject_as_photo(subject: Subject) -> Photo:
     """The subject as a photo that a model takes."""
     bright = subject.image[subject.mask]
     height, width = subject.mask.shape
@@ -31,7 +31,7 @@ def photo_of(subject: Subject) -> Photo:
     )
 
 
-def decomposed(
+def decompose_subject(
     context: Context, subject: Subject, model: str = "mdr", illumination: str | None = None
 ) -> Decomposition:
     """What a model of `pipeline.MODELS` makes of the subject, pixel by pixel. `illumination`: which
@@ -49,7 +49,9 @@ def decomposed(
     if record.is_file() and record.stat().st_mtime >= context.fresh_since:
         return load(folder)
     settings = Settings(model=model, illumination=lit, max_size=0, seed=context.seed, threads=2)
-    found = decompose(photo_of(subject), settings, name=subject.name, monitor=context.monitor)
+    found = decompose(
+        subject_as_photo(subject), settings, name=subject.name, monitor=context.monitor
+    )
     folder.parent.mkdir(parents=True, exist_ok=True)
     save(found, folder)
     return load(folder)

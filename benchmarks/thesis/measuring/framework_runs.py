@@ -19,18 +19,18 @@ from functools import cache
 
 import numpy as np
 
-from isc_core.atomic import new_file
-from isc_core.datasets import MitBerkeleyObject
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.errors import InputError
-from isc_core.evaluate import Estimate
-from isc_core.evaluation_runner import RunnerOptions, make_runner
-from isc_core.metrics import score
+from isc_core.evaluation.evaluate import Estimate
+from isc_core.evaluation.metrics import score
+from isc_core.evaluation.runner import RunnerOptions, make_runner
+from isc_core.io.atomic import new_file
 from isc_core.progress import Monitor
 from isc_core.separation import BEST
-from isc_core.sirfs.prior_file import shipped_prior_set
+from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
+from ..images.subject import Subject, downsample_subject
 from .context import WORK, Context
-from .subjects import Subject, shrunk
 
 METRICS = ("height", "normal", "light", "shading", "reflectance", "rs_mse", "average")
 _MAPS = ("height", "normal", "shading", "reflectance", "light")
@@ -68,7 +68,7 @@ BEFORE = (
 
 
 @dataclass(frozen=True)
-class Run:
+class FrameworkRun:
     """One framework on one subject: its answer, and how long it took.
 
     `answer` is None where the photo was refused.
@@ -79,7 +79,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Row:
+class FrameworkErrors:
     """A run's errors by the names of `METRICS`, its seconds, and the evaluations of the energy."""
 
     subject: str
@@ -89,30 +89,30 @@ class Row:
     evaluations: int
 
 
-def known(context: Context, kinds: Sequence[str]) -> list[Subject]:
+def subjects_with_truth(context: Context, kinds: Sequence[str]) -> list[Subject]:
     """The subjects of some kinds whose shape and light are known; smaller still, if it must be
     quick.
     """
     found = [
         subject for kind in kinds for subject in context.subjects(kind) if subject.truth is not None
     ]
-    return [shrunk(subject, _QUICK) for subject in found] if context.quick else found
+    return [downsample_subject(subject, _QUICK) for subject in found] if context.quick else found
 
 
-def measured(
+def score_frameworks(
     context: Context, subjects: Sequence[Subject], frameworks: Sequence[Framework]
-) -> list[Row]:
+) -> list[FrameworkErrors]:
     """A row for each framework on each subject, without those that a framework refuses."""
     rows = []
     for subject in subjects:
         assert subject.truth is not None
         for framework in frameworks:
-            run = estimated(context, subject, framework)
+            run = run_framework(context, subject, framework)
             if run.answer is not None:
                 scores = score(subject.truth, **{name: getattr(run.answer, name) for name in _MAPS})
                 errors = asdict(scores) | {"average": scores.average}
                 rows.append(
-                    Row(
+                    FrameworkErrors(
                         f"{subject.kind} {subject.name}",
                         framework.label,
                         errors,
@@ -123,7 +123,7 @@ def measured(
     return rows
 
 
-def estimated(context: Context, subject: Subject, framework: Framework) -> Run:
+def run_framework(context: Context, subject: Subject, framework: Framework) -> FrameworkRun:
     """What a framework answers, kept below the output.
 
     Raises `InputError` for a subject without a truth; `Cancelled`.
@@ -142,7 +142,7 @@ def estimated(context: Context, subject: Subject, framework: Framework) -> Run:
     return run
 
 
-def _timed(context: Context, subject: Subject, framework: Framework) -> Run:
+def _timed(context: Context, subject: Subject, framework: Framework) -> FrameworkRun:
     _warm(framework.model, framework.separator)
     runner = make_runner(
         RunnerOptions(framework.model, framework.separator, threads=2), shipped_prior_set()
@@ -151,8 +151,8 @@ def _timed(context: Context, subject: Subject, framework: Framework) -> Run:
     try:
         answer = runner(_seen(subject, framework), context.monitor)
     except InputError:
-        return Run(None, 0.0)
-    return Run(answer, time.perf_counter() - begun)
+        return FrameworkRun(None, 0.0)
+    return FrameworkRun(answer, time.perf_counter() - begun)
 
 
 @cache
@@ -184,7 +184,7 @@ def _seen(subject: Subject, framework: Framework) -> MitBerkeleyObject:
     return replace(subject.truth, image=image, valid=subject.truth.valid & (image > 0).all(axis=-1))
 
 
-def _arrays(run: Run) -> dict[str, np.ndarray]:
+def _arrays(run: FrameworkRun) -> dict[str, np.ndarray]:
     if run.answer is None:
         return {"seconds": np.array(run.seconds)}
     maps = {name: np.asarray(getattr(run.answer, name), np.float32) for name in _MAPS}
@@ -194,11 +194,11 @@ def _arrays(run: Run) -> dict[str, np.ndarray]:
     }
 
 
-def _restored(kept: dict[str, np.ndarray]) -> Run:
+def _restored(kept: dict[str, np.ndarray]) -> FrameworkRun:
     if "height" not in kept:
-        return Run(None, float(kept["seconds"]))
+        return FrameworkRun(None, float(kept["seconds"]))
     height, normal, shading, reflectance, light = (kept[name].astype(float) for name in _MAPS)
     answer = Estimate(
         height, normal, shading, reflectance, light, evaluations=int(kept["evaluations"])
     )
-    return Run(answer, float(kept["seconds"]))
+    return FrameworkRun(answer, float(kept["seconds"]))

@@ -1,7 +1,7 @@
 """What separations make of subjects whose layers are known: run, timed and scored once, for all
 tables and figures that need them.
 
-Errors are those of `isc_core.metrics` and `isc_core.image_metrics`, inside the mask, of linear
+Errors are those of `isc_core.evaluation.metrics` and `isc_core.evaluation.image_metrics`, inside the mask, of linear
 values; the peak of PSNR and SSIM is 1. A method that draws random numbers is run with several
 seeds, the others once.
 
@@ -21,21 +21,21 @@ from typing import Any
 
 import numpy as np
 
-from isc_core.decomposition import Separation
 from isc_core.errors import InputError
-from isc_core.image_metrics import ssim
-from isc_core.metrics import lmse, mse
+from isc_core.evaluation.image_metrics import ssim
+from isc_core.evaluation.metrics import lmse, mse
+from isc_core.scene.decomposition import Separation
 from isc_core.separation import method_options, separate
 from isc_core.separation.chaotic_segmentation import ChaoticSegmentationOptions, find_specular
 
+from ..images.subject import Subject
 from .context import Context
-from .subjects import Subject
 
 SEGMENTATION = "chaotic_segmentation"
 
 
 @dataclass(frozen=True)
-class Way:
+class SeparatorSetting:
     """A separation under the name that the thesis has for it:
 
     `label`; `method`, `variant` and the options that differ from it.
@@ -58,11 +58,11 @@ class Way:
         return dict(self.changes) | ({"seed": seed} if self.method == SEGMENTATION else {})
 
 
-NOTHING = Way("doing nothing", "none")
+NOTHING = SeparatorSetting("doing nothing", "none")
 
 
 @dataclass(frozen=True)
-class Scores:
+class SeparationScores:
     """One run of a way on one subject; None: not defined, or not measured.
 
     `mse`, `lmse`, `ssim` of the diffuse layer; `specular_*` of the specular one. `removed`: RMS of
@@ -88,23 +88,25 @@ class Scores:
     refused: str = ""
 
 
-def measured(context: Context, subject: Subject, way: Way, runs: int = 1) -> list[Scores]:
+def score_separations(
+    context: Context, subject: Subject, way: SeparatorSetting, runs: int = 1
+) -> list[SeparationScores]:
     """The scores of `runs` runs, seeds counting on from the context's. Kept, see `Context.rows`."""
     key = f"separation-{subject.kind}-{subject.name}-{way.key}-{runs}"
     rows: list[dict[str, Any]] = context.rows(
         key, lambda: [asdict(_run(context, subject, way, run)) for run in range(runs)]
     )
-    return [Scores(**row) for row in rows]
+    return [SeparationScores(**row) for row in rows]
 
 
-def split(subject: Subject, way: Way, seed: int) -> Separation:
+def separate_subject(subject: Subject, way: SeparatorSetting, seed: int) -> Separation:
     """The layers that a way finds. Raises `InputError` where the method refuses the photo."""
     return separate(
         way.method, subject.image, subject.mask, variant=way.variant, changes=way.options(seed)
     )
 
 
-def layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
+def true_layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     """The true diffuse and specular layer; of a subject without highlights the photo and nothing.
 
     Raises `InputError` for a subject whose layers nobody knows.
@@ -116,14 +118,14 @@ def layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
             else subject.specular
         )
         return subject.diffuse, specular
-    if subject.kind == "matt":
+    if subject.kind == "diffuse":
         return subject.image, np.zeros_like(subject.image)
     raise InputError(
         f"{subject.name} has no true diffuse layer: choose a subject whose layers are known"
     )
 
 
-def highlights(subject: Subject, way: Way, seed: int) -> np.ndarray:
+def segment_highlights(subject: Subject, way: SeparatorSetting, seed: int) -> np.ndarray:
     """The pixels (H, W) bool that a segmentation takes for specular."""
     peak = max(float(subject.image[subject.mask].max()), 1e-30)
     options = method_options(way.method, way.variant, way.options(seed))
@@ -132,10 +134,12 @@ def highlights(subject: Subject, way: Way, seed: int) -> np.ndarray:
     return find_specular((subject.image / peak).astype(np.float32), subject.mask, options)
 
 
-def scored(subject: Subject, found: Separation) -> dict[str, Any]:
+def layer_errors(subject: Subject, found: Separation) -> dict[str, Any]:
     """The errors of an answer, by the names of `Scores`."""
     mask, inside = subject.mask, subject.mask[..., None]
-    diffuse, specular = (np.where(inside, layer, 0).astype(np.float64) for layer in layers(subject))
+    diffuse, specular = (
+        np.where(inside, layer, 0).astype(np.float64) for layer in true_layers(subject)
+    )
     answer, light = (
         np.where(inside, layer, 0).astype(np.float64) for layer in (found.diffuse, found.specular)
     )
@@ -154,22 +158,22 @@ def scored(subject: Subject, found: Separation) -> dict[str, Any]:
     }
 
 
-def _run(context: Context, subject: Subject, way: Way, run: int) -> Scores:
+def _run(context: Context, subject: Subject, way: SeparatorSetting, run: int) -> SeparationScores:
     context.monitor.report(f"{way.label} on {subject.name}, run {run + 1}", 0.0)
-    known = Scores(subject.name, way.label, run, float(subject.mask.sum()) / 1e6)
+    known = SeparationScores(subject.name, way.label, run, float(subject.mask.sum()) / 1e6)
     try:
         if run == 0:  # what is compiled or imported at the first call shall not count
-            split(subject, way, context.seed)
+            separate_subject(subject, way, context.seed)
         start = time.perf_counter()
-        found = split(subject, way, context.seed + run)
+        found = separate_subject(subject, way, context.seed + run)
         seconds = time.perf_counter() - start
     except InputError as error:
         return replace(known, refused=str(error))
     searched = _searched(subject, way, context.seed + run) if way.method == SEGMENTATION else {}
-    return replace(known, **scored(subject, found), **searched, seconds=round(seconds, 5))
+    return replace(known, **layer_errors(subject, found), **searched, seconds=round(seconds, 5))
 
 
-def _searched(subject: Subject, way: Way, seed: int) -> dict[str, Any]:
+def _searched(subject: Subject, way: SeparatorSetting, seed: int) -> dict[str, Any]:
     """How long the search for thresholds takes, and whether it ends where the exact one does.
 
     The least processor time of three runs: a search runs on one thread, so that what else the
@@ -178,7 +182,9 @@ def _searched(subject: Subject, way: Way, seed: int) -> dict[str, Any]:
     times = []
     for _ in range(3):
         start = time.process_time()
-        marked = highlights(subject, way, seed)
+        marked = segment_highlights(subject, way, seed)
         times.append(time.process_time() - start)
-    best = highlights(subject, replace(way, changes=(*way.changes, ("optimiser", "exact"))), seed)
+    best = segment_highlights(
+        subject, replace(way, changes=(*way.changes, ("optimiser", "exact"))), seed
+    )
     return {"search": round(min(times), 6), "exact": bool((marked == best).all())}

@@ -17,16 +17,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from isc_core.separation import specular_free
-from isc_core.separation.channels import smallest
+from isc_core.imaging.channels import smallest
+from isc_core.separation.support import specular_free
 
-from .subjects import Subject
+from ..images.subject import Subject
 
 Images = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class SpecularFree:
+class SpecularFreeImage:
     """A kind of them. `formula`: in words of mathematics; `citation`: with DOI; `function`: where
     it is; `methods`: which separations compare with it; `make(image, mask)`: (H, W, 3).
     """
@@ -44,9 +44,9 @@ def _dark(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.repeat(dark[..., None], 3, axis=2)
 
 
-_HOME = "isc_core.separation.specular_free"
+_HOME = "isc_core.separation.support.specular_free"
 KINDS = (
-    SpecularFree(
+    SpecularFreeImage(
         "fixed chromaticity (SF1)",
         "I − w, w = (max I − c ΣI) / (1 − 3c), c = .6",
         "Tan & Ikeuchi 2005, doi:10.1109/TPAMI.2005.36",
@@ -54,7 +54,7 @@ KINDS = (
         "tan_2005, sparse_coding",
         lambda image, mask: specular_free.fixed_chromaticity(image),
     ),
-    SpecularFree(
+    SpecularFreeImage(
         "two-band (SF2)",
         "I − min I",
         "Yoon, Choi & Kweon 2006, doi:10.1109/ICIP.2006.312650",
@@ -62,7 +62,7 @@ KINDS = (
         "yoon_2006, sparse_coding, chaotic_segmentation",
         lambda image, mask: specular_free.two_band(image),
     ),
-    SpecularFree(
+    SpecularFreeImage(
         "lifted two-band",
         "I − min I + u, u = mean of min I",
         "Shen & Zheng 2013, doi:10.1364/AO.52.004483",
@@ -70,7 +70,7 @@ KINDS = (
         "shen_2013",
         specular_free.lifted_two_band,
     ),
-    SpecularFree(
+    SpecularFreeImage(
         "modified",
         "I − max(min I − T, 0), T = mean + ½ deviation of min I",
         "Shen & Cai 2009, doi:10.1364/AO.48.002711",
@@ -78,7 +78,7 @@ KINDS = (
         "shen_2009",
         specular_free.modified,
     ),
-    SpecularFree(
+    SpecularFreeImage(
         "less the dark channel",
         "I − min of all channels in 7 × 7 pixels",
         "Kim, Jin, Hadap & Kweon 2013, doi:10.1109/CVPR.2013.192",
@@ -87,8 +87,8 @@ KINDS = (
         specular_free.less_dark_channel,
     ),
 )
-PHOTO = SpecularFree("photo", "I", "", "", "none", lambda image, mask: image)
-DARK = SpecularFree(
+PHOTO = SpecularFreeImage("photo", "I", "", "", "none", lambda image, mask: image)
+DARK = SpecularFreeImage(
     "dark channel",
     "min of all channels in 7 × 7 pixels",
     KINDS[-1].citation,
@@ -98,7 +98,7 @@ DARK = SpecularFree(
 )
 
 
-def highlight_left(kind: SpecularFree, subject: Subject) -> float:
+def residual_highlight(kind: SpecularFreeImage, subject: Subject) -> float:
     """The share of the highlights' light that is left in the image.
 
     `subject` has a diffuse layer, and highlights.
@@ -113,7 +113,7 @@ def highlight_left(kind: SpecularFree, subject: Subject) -> float:
     return float(np.abs(change - np.median(change, axis=0)).sum() / light)
 
 
-def with_layers(subjects: Sequence[Subject]) -> list[Subject]:
+def subjects_with_highlights(subjects: Sequence[Subject]) -> list[Subject]:
     """Those whose diffuse layer is known and differs from the image."""
     return [
         one
@@ -122,6 +122,6 @@ def with_layers(subjects: Sequence[Subject]) -> list[Subject]:
     ]
 
 
-def titled(subject: Subject) -> str:
+def subject_title(subject: Subject) -> str:
     """Its name and kind: kinds share objects."""
     return f"{subject.name} ({subject.kind})"

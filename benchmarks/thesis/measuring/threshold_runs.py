@@ -27,7 +27,7 @@ from scipy.stats import mannwhitneyu
 from isc_core.thresholding import OtsuObjective, exact, particle_swarm
 from isc_core.thresholding.clonal_selection import ClonalOptions
 
-from ..thresholding import COUNTS, IMAGES, OPTIMISERS, levels, to_optimum
+from ...separation.thresholding import COUNTS, IMAGES, OPTIMISERS, levels, to_optimum
 from .context import Context, JsonRow
 
 SEARCHES = {
@@ -44,7 +44,7 @@ _SURE = 1.959964  # standard deviations, of 95 %
 
 
 @dataclass(frozen=True)
-class Runs:
+class ThresholdRuns:
     """The n runs of one optimiser on one image. `values` (n,): the objective found. `needed` (n,):
     evaluations until the optimum, infinite where it was missed. `thresholds` (n, K).
     """
@@ -59,28 +59,30 @@ class Runs:
         return int(np.isfinite(self.needed).sum())
 
 
-def images(context: Context) -> tuple[str, ...]:
+def image_names(context: Context) -> tuple[str, ...]:
     """The names of the images that are looked at."""
     return IMAGES[:_QUICK_IMAGES] if context.quick else IMAGES
 
 
 @cache
-def objective(image: str) -> OtsuObjective:
+def image_objective(image: str) -> OtsuObjective:
     """Otsu's objective of one of the images."""
     return OtsuObjective.of(levels(image))
 
 
-def runs(context: Context, search: str, image: str, count: int) -> Runs:
+def threshold_runs(context: Context, search: str, image: str, count: int) -> ThresholdRuns:
     """The runs of one of `SEARCHES`, computed once. Raises `Cancelled`."""
     rows = context.rows(
         f"thresholds {search} {image} {count}", lambda: _searched(context, search, image, count)
     )
     thresholds = [[int(level) for level in str(row["thresholds"]).split()] for row in rows]
     needed = np.array([np.inf if row["needed"] is None else row["needed"] for row in rows], float)
-    return Runs(np.array([row["value"] for row in rows], float), needed, np.array(thresholds))
+    return ThresholdRuns(
+        np.array([row["value"] for row in rows], float), needed, np.array(thresholds)
+    )
 
 
-def milliseconds(context: Context, search: str, image: str, count: int) -> np.ndarray:
+def search_times(context: Context, search: str, image: str, count: int) -> np.ndarray:
     """(n,) milliseconds of whole runs, on the processor's clock, which other programs do not slow
     down. Raises `Cancelled`.
     """
@@ -89,7 +91,9 @@ def milliseconds(context: Context, search: str, image: str, count: int) -> np.nd
         rows: list[JsonRow] = []
         for run in range(_QUICK_RUNS if context.quick else _TIMED_RUNS):
             begin = time.process_time()
-            OPTIMISERS[SEARCHES[search]](objective(image), count, EVALUATIONS, context.seed + run)
+            OPTIMISERS[SEARCHES[search]](
+                image_objective(image), count, EVALUATIONS, context.seed + run
+            )
             rows.append({"milliseconds": 1e3 * (time.process_time() - begin)})
         return rows
 
@@ -102,7 +106,9 @@ def milliseconds(context: Context, search: str, image: str, count: int) -> np.nd
     )
 
 
-def all_runs(context: Context, searches: Sequence[str]) -> dict[tuple[str, str, int], Runs]:
+def run_searches(
+    context: Context, searches: Sequence[str]
+) -> dict[tuple[str, str, int], ThresholdRuns]:
     """The runs of several searches on all images, by search, image and number of thresholds.
 
     Raises `Cancelled`.
@@ -110,17 +116,17 @@ def all_runs(context: Context, searches: Sequence[str]) -> dict[tuple[str, str, 
     cases = [
         (search, image, count)
         for search in searches
-        for image in images(context)
+        for image in image_names(context)
         for count in COUNTS
     ]
     found = {}
     for number, case in enumerate(cases):
         context.monitor.report(f"{case[0]} on {case[1]}, {case[2]} thresholds", number / len(cases))
-        found[case] = runs(context, *case)
+        found[case] = threshold_runs(context, *case)
     return found
 
 
-def iterations(search: str, evaluations: np.ndarray) -> np.ndarray:
+def count_iterations(search: str, evaluations: np.ndarray) -> np.ndarray:
     """Generations of a search, or steps of the swarm, in which so many evaluations (n,) lie."""
     if search == "PSO":
         first = each = particle_swarm.SwarmOptions().particles
@@ -133,7 +139,7 @@ def iterations(search: str, evaluations: np.ndarray) -> np.ndarray:
     return np.ceil(np.maximum(evaluations - first, 0) / each)
 
 
-def share_interval(hits: int, total: int) -> tuple[float, float]:
+def wilson_interval(hits: int, total: int) -> tuple[float, float]:
     """The 95 % interval of a share, by Wilson."""
     share, square = hits / total, _SURE**2
     middle = (share + square / (2 * total)) / (1 + square / total)
@@ -145,7 +151,7 @@ def share_interval(hits: int, total: int) -> tuple[float, float]:
     return max(0.0, middle - half), min(1.0, middle + half)
 
 
-def rank_sum(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
+def rank_sum_test(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
     """In which share of pairs the first sample (n,) is larger than the second (m,), ties counting
     half; and p that they are alike.
     """
@@ -159,7 +165,7 @@ def rank_sum(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
     return float(test.statistic) / (len(first) * len(second)), float(test.pvalue)
 
 
-def holm(p_values: Sequence[float]) -> np.ndarray:
+def holm_correction(p_values: Sequence[float]) -> np.ndarray:
     """The p values (n,) corrected for their number."""
     order = np.argsort(p_values)
     scaled = np.asarray(p_values, float)[order] * np.arange(len(order), 0, -1)
@@ -170,11 +176,11 @@ def holm(p_values: Sequence[float]) -> np.ndarray:
 
 def _searched(context: Context, search: str, image: str, count: int) -> list[JsonRow]:
     """A row for each run."""
-    best = exact(objective(image), count).value
+    best = exact(image_objective(image), count).value
     rows: list[JsonRow] = []
     for run in range(_QUICK_RUNS if context.quick else _RUNS):
         found = OPTIMISERS[SEARCHES[search]](
-            objective(image), count, EVALUATIONS, context.seed + run
+            image_objective(image), count, EVALUATIONS, context.seed + run
         )
         needed = to_optimum(found, best)
         rows.append(

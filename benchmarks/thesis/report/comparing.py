@@ -14,12 +14,12 @@ from collections.abc import Mapping, Sequence
 
 from scipy.stats import mannwhitneyu
 
-from isc_core.evaluate import Ratio, paired_bootstrap
+from isc_core.evaluation.evaluate import Ratio, paired_bootstrap
 
-from .item import Verdict
+from .item import ClaimVerdict
 
 
-def ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: int) -> Ratio | None:
+def paired_ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: int) -> Ratio | None:
     """Ours over theirs, over the subjects that both have with errors above 0;
 
     None for fewer than two.
@@ -32,7 +32,7 @@ def ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: int) -> 
     )
 
 
-def in_words(found: Ratio | None) -> str:
+def format_ratio(found: Ratio | None) -> str:
     """A cell: the ratio and its interval."""
     return (
         "-"
@@ -46,7 +46,7 @@ def _brief(value: float) -> str:
     return f"{value:.3f}" if value < 100 else f"{value:,.0f}"
 
 
-def rank_sum(ours: Sequence[float], theirs: Sequence[float]) -> float | None:
+def rank_sum_p(ours: Sequence[float], theirs: Sequence[float]) -> float | None:
     """The probability of a difference like this between repeated runs by chance;
 
     None for fewer than three runs.
@@ -56,24 +56,24 @@ def rank_sum(ours: Sequence[float], theirs: Sequence[float]) -> float | None:
     return 1.0 if len({*ours, *theirs}) == 1 else float(mannwhitneyu(ours, theirs).pvalue)
 
 
-def gain(claim: str, claimed: float, found: Ratio | None, what: str) -> Verdict:
+def judge_reduction(claim: str, claimed: float, found: Ratio | None, what: str) -> ClaimVerdict:
     """Whether an error is lower by `claimed`, a share of 1: yes, if by that much or more and
     surely; partly, if lower and surely; no, if the interval holds no difference but not the claim.
     Where it holds both, nobody can tell.
     """
     if found is None:
-        return Verdict(claim, "-", "cannot be told", "fewer than two subjects with an error")
+        return ClaimVerdict(claim, "-", "cannot be told", "fewer than two subjects with an error")
     change = f"{100 * abs(1 - found.ratio):.1f} % {'lower' if found.ratio <= 1 else 'higher'}"
     here = f"{what} {change}: ratio {in_words(found)}"
     if found.high >= 1 and found.low <= 1 - claimed:
-        return Verdict(
+        return ClaimVerdict(
             claim,
             here,
             "cannot be told",
             "too few subjects: the interval holds the claim, and no difference as well",
         )
     if found.high >= 1:
-        return Verdict(
+        return ClaimVerdict(
             claim,
             here,
             "no",
@@ -82,5 +82,5 @@ def gain(claim: str, claimed: float, found: Ratio | None, what: str) -> Verdict:
             else "not lower at all",
         )
     if 1 - found.ratio >= claimed:
-        return Verdict(claim, here, "yes")
-    return Verdict(claim, here, "partly", "lower, by less than is claimed")
+        return ClaimVerdict(claim, here, "yes")
+    return ClaimVerdict(claim, here, "partly", "lower, by less than is claimed")

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from .context import Context
+    from ..measuring.context import Context
 
 HOLDS = ("yes", "partly", "no", "cannot be told")
 Cell = str | int | float
 
 
 @dataclass(frozen=True)
-class Table:
+class ItemTable:
     """One table. `header`: column names. `rows`: as many cells each; numbers are shown with four
     digits in Markdown and in full in the CSV file. `caption`: one line.
     """
@@ -36,7 +36,7 @@ class Table:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ClaimVerdict:
     """A claim of the thesis beside what was measured.
 
     `claim`: what the thesis says, with its figure (see `claims`). `here`: what was measured.
@@ -54,19 +54,19 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Made:
+class ItemContent:
     """What an item is made of: tables, figures (written and closed by `written`), `text` in
     Markdown (what one sees), and verdicts.
     """
 
-    tables: tuple[Table, ...] = ()
+    tables: tuple[ItemTable, ...] = ()
     figures: tuple[Figure, ...] = ()
     text: str = ""
-    verdicts: tuple[Verdict, ...] = ()
+    verdicts: tuple[ClaimVerdict, ...] = ()
 
 
 @dataclass(frozen=True)
-class Item:
+class ThesisItem:
     """A table or figure of the thesis. `kind`: "table" or "figure". `number`: as "4.5". `title`: in
     our words. `make`: computes it; None where it cannot be regenerated, which `reason` explains.
     """
@@ -74,7 +74,7 @@ class Item:
     kind: str
     number: str
     title: str
-    make: Callable[[Context], Made] | None
+    make: Callable[[Context], ItemContent] | None
     reason: str = ""
 
     @property

@@ -1,233 +1,374 @@
-"""Tables of separations: accuracy of the diffuse or of the specular layer, and speed, over all
-subjects and one by one.
+"""Tables of separations: accuracy of the diffuse or the specular layer, by subject, and speed.
 
-The error of one subject counts relative to doing nothing (diffuse = photo, specular = none), and
-subjects are summed up by geometric means, so that no dark or bright one decides; images without
-highlights have no such ratio, and what was taken off them is told instead.
+Equation: the error of a subject counts relative to doing nothing (diffuse = photo, specular = 0);
+subjects are summarised by geometric means, so that no single dark or bright image decides. Images
+without highlights have no such ratio: the share of light removed is reported instead.
 
-Limits: where doing nothing is right, PSNR is infinite, and a mean over subjects is of their errors,
-not of decibels.
+Limits: where doing nothing is right, PSNR is infinite; PSNR of a mean is that of the mean error.
 """
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from isc_core.metrics import geometric_mean
+from isc_core.evaluation.metrics import geometric_mean
 
-from .comparing import in_words, rank_sum, ratio
-from .context import Context
-from .item import Cell, Table
-from .separations import NOTHING, Scores, Way, measured
+from ..measuring.context import Context
+from ..measuring.separation_scores import (
+    NOTHING,
+    SeparationScores,
+    SeparatorSetting,
+    score_separations,
+)
+from .comparing import format_ratio, paired_ratio, rank_sum_p
+from .item import Cell, ItemTable
 
 KINDS = {
     "specular": "significant specularity",
     "synthetic": "synthetic images",
-    "matt": "images without specularity",
+    "diffuse": "images without specularity",
 }
-Layer = tuple[
-    str, str, str
-]  # the fields of `Scores`: mean square error, local error, structural similarity
+# Fields of `SeparationScores`: mean square error, local error, structural similarity.
+LayerFields = tuple[str, str, str]
 DIFFUSE, SPECULAR = ("mse", "lmse", "ssim"), ("specular_mse", "specular_lmse", "specular_ssim")
-Runs = dict[str, dict[str, list[Scores]]]  # of each way's label: of each subject's name: the runs
-Against = Callable[[str], str | None]  # the label of the way that a way is compared with
+RunScores = dict[str, dict[str, list[SeparationScores]]]  # setting label -> subject name -> runs
+Reference = Callable[[str], str | None]  # label of a setting -> label of the one to compare with
 
 
-def run_all(context: Context, kind: str, ways: Sequence[Way], runs: int = 1) -> Runs:
-    """Doing nothing, and all ways, on all subjects of a kind."""
+def score_settings(
+    context: Context, kind: str, settings: Sequence[SeparatorSetting], runs: int = 1
+) -> RunScores:
+    """Score doing nothing and several settings on all subjects of a kind.
+
+    Parameters
+    ----------
+    context : Context
+        The run; scores are kept in its output folder.
+    kind : str
+        One of `KINDS`.
+    settings : sequence of SeparatorSetting
+        Methods with their options.
+    runs : int
+        Runs per setting and subject.
+
+    Returns
+    -------
+    RunScores
+        Scores by setting and subject, doing nothing first.
+    """
     subjects = context.subjects(kind)
-    found: Runs = {
-        NOTHING.label: {subject.name: measured(context, subject, NOTHING) for subject in subjects}
-    }
-    for way in ways:
-        found[way.label] = {
-            subject.name: measured(context, subject, way, runs) for subject in subjects
+    scores: RunScores = {
+        NOTHING.label: {
+            subject.name: score_separations(context, subject, NOTHING) for subject in subjects
         }
-    return found
-
-
-def means(of_subjects: Mapping[str, Sequence[Scores]], name: str) -> dict[str, float]:
-    """The mean of a subject's runs, for each subject that has one."""
-    found = {
-        subject: present([getattr(run, name) for run in runs])
-        for subject, runs in of_subjects.items()
     }
-    return {subject: sum(values) / len(values) for subject, values in found.items() if values}
+    for setting in settings:
+        scores[setting.label] = {
+            subject.name: score_separations(context, subject, setting, runs)
+            for subject in subjects
+        }
+    return scores
 
 
-def relative(runs: Runs, label: str, kind: str, layer: Layer, seed: int) -> str:
-    """How much a layer errs: over doing nothing, with its interval, or, where nothing is to be
-    done, the share of light taken off.
+def mean_scores(subjects: Mapping[str, Sequence[SeparationScores]], field: str) -> dict[str, float]:
+    """Average a score over the runs of each subject.
+
+    Parameters
+    ----------
+    subjects : mapping of str to sequence of SeparationScores
+        Runs by subject.
+    field : str
+        A field of `SeparationScores`.
+
+    Returns
+    -------
+    dict of str to float
+        Means by subject; subjects without a value are omitted.
     """
-    if kind == "matt":
-        taken = average(means(runs[label], "removed").values())
-        return number(None if taken is None else 100 * taken, ".2f")
-    return (
-        "1"
-        if label == NOTHING.label
-        else in_words(
-            ratio(means(runs[label], layer[0]), means(runs[NOTHING.label], layer[0]), seed)
-        )
-    )
+    values = {
+        subject: drop_missing([getattr(run, field) for run in runs])
+        for subject, runs in subjects.items()
+    }
+    return {subject: sum(each) / len(each) for subject, each in values.items() if each}
 
 
-def summary(
-    runs: Runs, kind: str, layer: Layer, seed: int, against: Against | None = None, words: str = ""
-) -> Table:
-    """A line a way, over all subjects;
+def relative_error(runs: RunScores, label: str, kind: str, layer: LayerFields, seed: int) -> str:
+    """Format a layer's error relative to doing nothing.
 
-    `against` which others it is also compared with, in `words`.
+    Parameters
+    ----------
+    runs : RunScores
+        Scores of all settings.
+    label : str
+        The setting.
+    kind : str
+        One of `KINDS`.
+    layer : LayerFields
+        `DIFFUSE` or `SPECULAR`.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    str
+        Ratio and interval; for images without highlights, the light removed in per cent.
     """
-    first = "taken off, % of the RMS" if kind == "matt" else "MSE over doing nothing (95 %)"
-    which = "diffuse" if layer is DIFFUSE else "specular"
-    lines = []
-    for label, found in runs.items():
-        error, local, alike = (means(found, name) for name in layer)
-        level = average(error.values())
-        more = () if against is None else (_beside(runs, label, layer[0], against, seed),)
-        lines.append(
+    if kind == "diffuse":
+        removed = mean_or_none(mean_scores(runs[label], "removed").values())
+        return format_cell(None if removed is None else 100 * removed, ".2f")
+    if label == NOTHING.label:
+        return "1"
+    errors = (mean_scores(runs[one], layer[0]) for one in (label, NOTHING.label))
+    return format_ratio(paired_ratio(*errors, seed))
+
+
+def accuracy_table(
+    runs: RunScores,
+    kind: str,
+    layer: LayerFields,
+    seed: int,
+    reference: Reference | None = None,
+    reference_label: str = "",
+) -> ItemTable:
+    """Summarise the accuracy of a layer over all subjects, one row per setting.
+
+    Parameters
+    ----------
+    runs : RunScores
+        Scores of all settings.
+    kind : str
+        One of `KINDS`.
+    layer : LayerFields
+        `DIFFUSE` or `SPECULAR`.
+    seed : int
+        Seed of the bootstrap.
+    reference : callable, optional
+        Selects the setting that a setting is also compared with.
+    reference_label : str
+        Name of the reference in the header.
+
+    Returns
+    -------
+    ItemTable
+        Relative error, LMSE, PSNR and SSIM.
+    """
+    first = "removed, % of the RMS" if kind == "diffuse" else "MSE / doing nothing (95 %)"
+    rows = []
+    for label, subjects in runs.items():
+        error, local, similarity = (mean_scores(subjects, field) for field in layer)
+        level = mean_or_none(error.values())
+        more = () if reference is None else (_compared(runs, label, layer[0], reference, seed),)
+        rows.append(
             (
                 label,
-                relative(runs, label, kind, layer, seed),
-                number(thousand(average(local.values()))),
-                number(None if level is None else decibels(level), ".2f"),
-                number(average(alike.values()), ".4f"),
+                relative_error(runs, label, kind, layer, seed),
+                format_cell(times_thousand(mean_or_none(local.values()))),
+                format_cell(None if level is None else decibels(level), ".2f"),
+                format_cell(mean_or_none(similarity.values()), ".4f"),
                 *more,
             )
         )
-    header = (
-        "method",
-        first,
-        "LMSE x 1000",
-        "PSNR, dB",
-        "SSIM",
-        *(() if against is None else (f"MSE over that of {words} (95 %)",)),
-    )
-    return Table(
-        header,
-        tuple(lines),
-        f"The {which} layer against the truth, {len(runs[NOTHING.label])} subjects, {KINDS[kind]}",
+    more_header = () if reference is None else (f"MSE / {reference_label} (95 %)",)
+    count = len(runs[NOTHING.label])
+    return ItemTable(
+        ("method", first, "LMSE x 1000", "PSNR, dB", "SSIM", *more_header),
+        tuple(rows),
+        f"The {_layer_name(layer)} layer, {count} subjects, {KINDS[kind]}",
     )
 
 
-def _beside(runs: Runs, label: str, name: str, against: Against, seed: int) -> str:
-    other = against(label)
-    return (
-        "-"
-        if other is None or other == label
-        else in_words(ratio(means(runs[label], name), means(runs[other], name), seed))
+def _layer_name(layer: LayerFields) -> str:
+    return "diffuse" if layer is DIFFUSE else "specular"
+
+
+def _compared(runs: RunScores, label: str, field: str, reference: Reference, seed: int) -> str:
+    other = reference(label)
+    if other is None or other == label:
+        return "-"
+    return format_ratio(
+        paired_ratio(mean_scores(runs[label], field), mean_scores(runs[other], field), seed)
     )
 
 
-def by_subject(
-    runs: Runs, kind: str, layer: Layer, against: Against | None = None, words: str = ""
-) -> Table:
-    """A line a way and subject; where runs are repeated, their means and deviations, and rank-sum
-    tests against another way.
+def subject_table(
+    runs: RunScores,
+    kind: str,
+    layer: LayerFields,
+    reference: Reference | None = None,
+    reference_label: str = "",
+) -> ItemTable:
+    """List the accuracy of a layer, one row per subject and setting.
+
+    Parameters
+    ----------
+    runs : RunScores
+        Scores of all settings. Repeated runs add their deviation and a rank-sum test.
+    kind : str
+        One of `KINDS`.
+    layer : LayerFields
+        `DIFFUSE` or `SPECULAR`.
+    reference : callable, optional
+        Selects the setting of the rank-sum test.
+    reference_label : str
+        Name of the reference in the header.
+
+    Returns
+    -------
+    ItemTable
+        Errors as they are; "refused" where a method gives no result.
     """
-    repeated = any(len(found) > 1 for of in runs.values() for found in of.values())
-    more = ("runs", "deviation of the MSE", f"p against {words}") if repeated else ()
-    lines = []
+    repeated = any(len(each) > 1 for subjects in runs.values() for each in subjects.values())
+    more = ("runs", "deviation of the MSE", f"p against {reference_label}") if repeated else ()
+    rows = []
     for subject in runs[NOTHING.label]:
-        for label, found in runs.items():
-            other = None if against is None else against(label)
-            beside = (
-                None
-                if other is None or other == label
-                else present([getattr(run, layer[0]) for run in runs[other][subject]])
-            )
-            lines.append(
-                (
-                    subject,
-                    label,
-                    *_errors(found[subject], layer),
-                    *(_repeated(found[subject], layer[0], beside) if repeated else ()),
-                )
-            )
-    caption = f"The {'diffuse' if layer is DIFFUSE else 'specular'} layer by subject, {KINDS[kind]}"
-    return Table(
+        for label, subjects in runs.items():
+            cells: tuple[Cell, ...] = (subject, label, *_errors(subjects[subject], layer))
+            if repeated:
+                other = None if reference is None else reference(label)
+                compared = None
+                if other is not None and other != label:
+                    compared = drop_missing(
+                        [getattr(run, layer[0]) for run in runs[other][subject]]
+                    )
+                cells = (*cells, *_deviation(subjects[subject], layer[0], compared))
+            rows.append(cells)
+    return ItemTable(
         ("subject", "method", "MSE", "LMSE x 1000", "PSNR, dB", "SSIM", *more),
-        tuple(lines),
-        caption,
+        tuple(rows),
+        f"The {_layer_name(layer)} layer by subject, {KINDS[kind]}",
     )
 
 
-def speed(runs: Runs, against: Against, seed: int, words: str) -> Table:
-    """A line a way: geometric means over the subjects, warm; the search for thresholds apart, where
-    there is one.
+def speed_table(
+    runs: RunScores, reference: Reference, seed: int, reference_label: str, *, search: bool = True
+) -> ItemTable:
+    """Summarise run times, one row per setting.
+
+    Parameters
+    ----------
+    runs : RunScores
+        Scores of all settings.
+    reference : callable
+        Selects the setting that a setting is compared with.
+    seed : int
+        Seed of the bootstrap.
+    reference_label : str
+        Name of the reference in the header.
+    search : bool
+        Whether to list the time of the threshold search separately, where there is one.
+
+    Returns
+    -------
+    ItemTable
+        Milliseconds, megapixels per second and ratios to the reference.
     """
-    searched = any(
-        run.search is not None for of in runs.values() for found in of.values() for run in found
+    searched = search and any(
+        run.search is not None
+        for subjects in runs.values()
+        for each in subjects.values()
+        for run in each
     )
-    names = {"search": "search", "seconds": "whole"} if searched else {"seconds": "whole"}
-    lines = []
-    for label, found in runs.items():
-        rates = [run.megapixels / run.seconds for of in found.values() for run in of if run.seconds]
-        times = [number(thousand(middle(means(found, name).values()))) for name in names]
-        lines.append(
-            (
-                label,
-                *times,
-                number(middle(rates)),
-                *(_beside(runs, label, name, against, seed) for name in names),
-            )
-        )
-    compared = (f"{what} over that of {words} (95 %)" for what in names.values())
+    names = {"search": "search", "seconds": "total"} if searched else {"seconds": "total"}
+    rows = []
+    for label, subjects in runs.items():
+        rates = [
+            run.megapixels / run.seconds for each in subjects.values() for run in each if run.seconds
+        ]
+        times = [
+            format_cell(times_thousand(geometric_or_none(mean_scores(subjects, name).values())))
+            for name in names
+        ]
+        ratios = (_compared(runs, label, name, reference, seed) for name in names)
+        rows.append((label, *times, format_cell(geometric_or_none(rates)), *ratios))
     header = (
         "method",
         *(f"{what}, ms" for what in names.values()),
-        "megapixels a second",
-        *compared,
+        "megapixels per second",
+        *(f"{what} / {reference_label} (95 %)" for what in names.values()),
     )
-    return Table(
+    return ItemTable(
         header,
-        tuple(lines),
-        "Geometric means over the subjects of the runs' mean times, warm, on this machine",
+        tuple(rows),
+        "Geometric means over the subjects of the mean run times, after a warm-up run",
     )
 
 
 def decibels(error: float) -> float:
-    """PSNR of a mean square error, dB, peak 1; infinite for none."""
+    """Convert a mean square error to PSNR.
+
+    Parameters
+    ----------
+    error : float
+        Mean square error, peak value 1.
+
+    Returns
+    -------
+    float
+        Decibels; infinite for an error of 0.
+    """
     return math.inf if error == 0 else -10 * math.log10(error)
 
 
-def number(value: float | None, form: str = ".4g") -> str:
-    """A cell of a table; a dash where there is no value."""
+def format_cell(value: float | None, form: str = ".4g") -> str:
+    """Format a number for a table.
+
+    Parameters
+    ----------
+    value : float or None
+        The number.
+    form : str
+        Format specification.
+
+    Returns
+    -------
+    str
+        The number; a dash for None.
+    """
     return "-" if value is None else "∞" if math.isinf(value) else format(value, form)
 
 
-def present(values: Sequence[float | None]) -> list[float]:
-    """Those values that there are."""
+def drop_missing(values: Sequence[float | None]) -> list[float]:
+    """Return the values that are not None."""
     return [value for value in values if value is not None]
 
 
-def average(values: Iterable[float]) -> float | None:
-    """The arithmetic mean; None of nothing."""
-    found = list(values)
-    return sum(found) / len(found) if found else None
+def mean_or_none(values: Iterable[float]) -> float | None:
+    """Return the arithmetic mean, or None without values."""
+    each = list(values)
+    return sum(each) / len(each) if each else None
 
 
-def middle(values: Iterable[float]) -> float | None:
-    """The geometric mean; None of nothing."""
-    found = list(values)
-    return geometric_mean(found) if found else None
+def geometric_or_none(values: Iterable[float]) -> float | None:
+    """Return the geometric mean, or None without values."""
+    each = list(values)
+    return geometric_mean(each) if each else None
 
 
-def thousand(value: float | None) -> float | None:
-    """A thousand times a value, where there is one."""
+def times_thousand(value: float | None) -> float | None:
+    """Return a thousand times a value; None stays None."""
     return None if value is None else 1000 * value
 
 
-def _errors(runs: Sequence[Scores], layer: Layer) -> tuple[Cell, ...]:
-    error, local, alike = (average(present([getattr(run, name) for run in runs])) for name in layer)
+def _errors(runs: Sequence[SeparationScores], layer: LayerFields) -> tuple[Cell, ...]:
+    error, local, similarity = (
+        mean_or_none(drop_missing([getattr(run, field) for run in runs])) for field in layer
+    )
     if error is None:
         return ("refused", "-", "-", "-")
-    return (error, number(thousand(local)), number(decibels(error), ".2f"), number(alike, ".4f"))
+    return (
+        error,
+        format_cell(times_thousand(local)),
+        format_cell(decibels(error), ".2f"),
+        format_cell(similarity, ".4f"),
+    )
 
 
-def _repeated(runs: Sequence[Scores], name: str, beside: list[float] | None) -> tuple[Cell, ...]:
-    errors = present([getattr(run, name) for run in runs])
+def _deviation(
+    runs: Sequence[SeparationScores], field: str, compared: list[float] | None
+) -> tuple[Cell, ...]:
+    errors = drop_missing([getattr(run, field) for run in runs])
     if len(errors) < 2:
         return (len(runs), "-", "-")
     level = sum(errors) / len(errors)
     deviation = math.sqrt(sum((error - level) ** 2 for error in errors) / (len(errors) - 1))
-    return (len(runs), deviation, number(rank_sum(errors, beside) if beside else None, ".2g"))
+    p = rank_sum_p(errors, compared) if compared else None
+    return (len(runs), deviation, format_cell(p, ".2g"))

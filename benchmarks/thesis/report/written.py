@@ -17,14 +17,14 @@ from pathlib import Path
 from typing import Any
 
 from isc_core import __version__
-from isc_core.atomic import new_file
 from isc_core.errors import InputError
-from isc_core.json_files import read_json
+from isc_core.io.atomic import new_file
+from isc_core.io.json_files import read_json
 
+from ..drawing.style import table_figure, unify_titles
+from ..measuring.context import Context
 from .claims import ABSTRACT
-from .context import Context
-from .item import HOLDS, Item, Made, Table, Verdict
-from .style import finish, tabulated
+from .item import HOLDS, ClaimVerdict, ItemContent, ItemTable, ThesisItem
 
 RECORDS = "records"
 _SCHEMA = 1
@@ -78,7 +78,7 @@ _SHORT_NAMES = (
 
 
 @dataclass(frozen=True)
-class Record:
+class ItemRecord:
     """What is known of a written item. `fingerprint`: of the run (see `Context.fingerprint`).
     `files`: names beside the index, the Markdown file first. `seconds`: that it took. `machine`: in
     words. `verdicts`: its claims.
@@ -89,13 +89,13 @@ class Record:
     command: str
     seed: int
     version: str
-    machine: str
+    describe_machine: str
     seconds: float
     files: tuple[str, ...]
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[ClaimVerdict, ...]
 
 
-def write_item(item: Item, made: Made, context: Context, seconds: float) -> Record:
+def write_item(item: ThesisItem, made: ItemContent, context: Context, seconds: float) -> ItemRecord:
     """Writes the files of an item and its record; files that an earlier run left beside them are
     removed.
 
@@ -103,7 +103,7 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     """
     folder, name = context.output, item.name
     drawings = made.figures or tuple(
-        tabulated(table.header, _cells(table), table.caption) for table in made.tables[:1]
+        table_figure(table.header, _cells(table), table.caption) for table in made.tables[:1]
     )
     pictures = [_numbered(name, number, "png") for number in range(len(drawings))]
     lists = [_numbered(name, number, "csv") for number in range(len(made.tables))]
@@ -111,7 +111,7 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     _forget(folder, name)
     for file, figure in zip(pictures, drawings, strict=True):
         with new_file(folder / file) as partial:
-            finish(figure)
+            unify_titles(figure)
             figure.savefig(
                 partial, format="png", metadata={"Software": None}, pil_kwargs={"optimize": True}
             )
@@ -121,19 +121,19 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
             partial.open("w", newline="", encoding="utf-8") as stream,
         ):
             csv.writer(stream, lineterminator="\n").writerows([table.header, *table.rows])
-    record = Record(
+    record = ItemRecord(
         name,
         context.fingerprint,
-        command_of(item, context),
+        item_command(item, context),
         context.seed,
         __version__,
-        machine(),
+        describe_machine(),
         round(seconds, 1),
         (f"{name}.md", *lists, *pictures),
         made.verdicts,
     )
     with new_file(folder / f"{name}.md") as partial:
-        partial.write_text(page(item, made, record, pictures, lists), encoding="utf-8")
+        partial.write_text(item_page(item, made, record, pictures, lists), encoding="utf-8")
     for file in set(before.files if before is not None else ()) - set(record.files):
         (folder / file).unlink(missing_ok=True)
     with new_file(_record_path(folder, name)) as partial:
@@ -144,7 +144,7 @@ def write_item(item: Item, made: Made, context: Context, seconds: float) -> Reco
     return record
 
 
-def read_record(folder: Path, name: str) -> Record | None:
+def read_record(folder: Path, name: str) -> ItemRecord | None:
     """The record of an item, None where there is none that can be used."""
     path = _record_path(folder, name)
     if not path.is_file():
@@ -153,8 +153,8 @@ def read_record(folder: Path, name: str) -> Record | None:
         content: dict[str, Any] = read_json(path)
         if content.pop("schema_version") != _SCHEMA:
             return None
-        verdicts = tuple(Verdict(**verdict) for verdict in content.pop("verdicts"))
-        return Record(**{**content, "files": tuple(content["files"])}, verdicts=verdicts)
+        verdicts = tuple(ClaimVerdict(**verdict) for verdict in content.pop("verdicts"))
+        return ItemRecord(**{**content, "files": tuple(content["files"])}, verdicts=verdicts)
     except (InputError, KeyError, TypeError, ValueError, AttributeError):
         return None
 
@@ -169,8 +169,12 @@ def is_complete(folder: Path, name: str, fingerprint: str) -> bool:
     )
 
 
-def page(
-    item: Item, made: Made, record: Record, pictures: Sequence[str], lists: Sequence[str]
+def item_page(
+    item: ThesisItem,
+    made: ItemContent,
+    record: ItemRecord,
+    pictures: Sequence[str],
+    lists: Sequence[str],
 ) -> str:
     """The item's Markdown."""
     title = f"{item.kind.capitalize()} {item.number}: {item.title}"
@@ -181,7 +185,9 @@ def page(
     parts += [
         part
         for table in made.tables
-        for part in ((table.caption, markdown(table)) if table.caption else (markdown(table),))
+        for part in (
+            (table.caption, markdown_table(table)) if table.caption else (markdown_table(table),)
+        )
     ]
     if made.text:
         parts.append(made.text.strip())
@@ -196,7 +202,7 @@ def page(
     return "\n\n".join(parts) + "\n"
 
 
-def markdown(table: Table) -> str:
+def markdown_table(table: ItemTable) -> str:
     """A table in Markdown, numbers with four digits."""
     lines = ["| " + " | ".join(table.header) + " |", "|" + "---|" * len(table.header)]
     return "\n".join(
@@ -210,13 +216,13 @@ def markdown(table: Table) -> str:
     )
 
 
-def verdict_lines(verdict: Verdict) -> str:
+def verdict_lines(verdict: ClaimVerdict) -> str:
     """A claim, what was measured, and whether it holds."""
     why = f" {_sentence(verdict.why)}" if verdict.why else ""
     return f"**The thesis:** {_sentence(verdict.claim)} **Here:** {_sentence(verdict.here)} **Holds: {verdict.holds}.**{why}"
 
 
-def write_index(folder: Path, items: Sequence[Item]) -> None:
+def write_index(folder: Path, items: Sequence[ThesisItem]) -> None:
     """Writes README.md: what there is, the verdict of every claim of the abstract, and every item."""
     records = {
         item.name: record
@@ -224,10 +230,10 @@ def write_index(folder: Path, items: Sequence[Item]) -> None:
         if (record := read_record(folder, item.name)) is not None
     }
     with new_file(folder / "README.md") as partial:
-        partial.write_text(index(items, records), encoding="utf-8")
+        partial.write_text(index_page(items, records), encoding="utf-8")
 
 
-def index(items: Sequence[Item], records: dict[str, Record]) -> str:
+def index_page(items: Sequence[ThesisItem], records: dict[str, ItemRecord]) -> str:
     """The index's Markdown."""
     made = sum(item.name in records for item in items)
     lines = [
@@ -266,7 +272,7 @@ def index(items: Sequence[Item], records: dict[str, Record]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def command_of(item: Item, context: Context) -> str:
+def item_command(item: ThesisItem, context: Context) -> str:
     """What makes the item again; folders stand there by name only."""
     words = [
         "isc thesis",
@@ -278,7 +284,7 @@ def command_of(item: Item, context: Context) -> str:
     return " ".join([*words, *([f"--seed {context.seed}"] if context.seed else [])])
 
 
-def machine() -> str:
+def describe_machine() -> str:
     """The processor, its cores and Python, in words."""
     return f"{_processor()}, {os.cpu_count()} cores, Python {platform.python_version()}"
 
@@ -300,14 +306,14 @@ def _processor() -> str:
         return platform.machine()
 
 
-def _index_row(item: Item, record: Record | None) -> str:
+def _index_row(item: ThesisItem, record: ItemRecord | None) -> str:
     title = f"[{item.number}]({item.name}.md)" if record is not None else item.number
     state = f"not regenerable: {item.reason}" if item.make is None else "not made yet"
     said = state if record is None else _counted(record.verdicts)
     return f"| {title} | {item.title} | {said} |"
 
 
-def _settings(records: dict[str, Record]) -> str:
+def _settings(records: dict[str, ItemRecord]) -> str:
     """What kind of runs made them, in words."""
     commands = [record.command for record in records.values()]
     quick, own = (
@@ -331,7 +337,7 @@ def _settings(records: dict[str, Record]) -> str:
     )
 
 
-def _counted(verdicts: Sequence[Verdict]) -> str:
+def _counted(verdicts: Sequence[ClaimVerdict]) -> str:
     """How many claims hold, in words: "no, cannot be told (3)"."""
     many = Counter(verdict.holds for verdict in verdicts)
     return ", ".join(
@@ -348,7 +354,7 @@ def _spoken(name: str) -> str:
     return name.replace("-", " ")
 
 
-def _cells(table: Table) -> list[list[str]]:
+def _cells(table: ItemTable) -> list[list[str]]:
     """The rows as they are shown, numbers with four digits."""
     return [
         [f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in row]

@@ -16,35 +16,35 @@ pytest.importorskip("mitsuba")
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from benchmarks.thesis import (
-    application_items,
-    background_items,
-    catalogue_items,
-    filter_items,
-    framework_items,
-    introduction_items,
+from benchmarks.thesis.images.subject import Subject
+from benchmarks.thesis.items import (
+    applications,
+    background,
+    catalogue,
+    filters,
+    framework,
+    introduction,
 )
-from benchmarks.thesis.context import Context
-from benchmarks.thesis.item import Item, Made
-from benchmarks.thesis.specular_free_images import KINDS, PHOTO, highlight_left
-from benchmarks.thesis.subjects import Subject
-from isc_core.brdf.phong import Phong
-from isc_core.datasets import MitBerkeleyObject
-from isc_core.decomposition import Decomposition
-from isc_core.editing.lights import toward
-from isc_core.metrics import truth_normal
-from isc_core.separation.filter_statistics import BINS, FILTERS
-from isc_core.sirfs.frames import light_to_reference
+from benchmarks.thesis.measuring.context import Context
+from benchmarks.thesis.measuring.specular_free_images import KINDS, PHOTO, residual_highlight
+from benchmarks.thesis.report.item import ItemContent, ThesisItem
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject
+from isc_core.evaluation.metrics import truth_normal
+from isc_core.scene.decomposition import Decomposition
+from isc_core.separation.support.filter_statistics import BINS, FILTERS
+from isc_core.shading.brdf.phong import Phong
+from isc_core.shading.lights import toward
+from isc_core.shading.spherical_harmonics import light_to_reference
 from tests.core.ball_scene import ball
 from tests.core.separation_scenes import glossy_disc
 
 MODULES = (
-    introduction_items,
-    background_items,
-    framework_items,
-    filter_items,
-    application_items,
-    catalogue_items,
+    introduction,
+    background,
+    framework,
+    filters,
+    applications,
+    catalogue,
 )
 ITEMS = {item.name: item for module in MODULES for item in module.ITEMS}
 
@@ -72,11 +72,11 @@ class Known(Context):
     """A run on the ball alone."""
 
     def subjects(self, kind: str) -> tuple[Subject, ...]:
-        """The ball, whatever the kind; without its highlight as a matt one."""
+        """The ball, whatever the kind; without its highlight as a diffuse one."""
         one = known_ball()
         assert one.diffuse is not None
-        matt = replace(one, image=one.diffuse, specular=np.zeros_like(one.diffuse))
-        return (matt,) if kind == "matt" else (one, known_ball("other"))
+        bare = replace(one, image=one.diffuse, specular=np.zeros_like(one.diffuse))
+        return (bare,) if kind == "diffuse" else (one, known_ball("other"))
 
     def photos(self) -> tuple[Subject, ...]:
         """The ball, of which nothing is known."""
@@ -95,24 +95,24 @@ def context(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Context:
         return answer
 
     for module in (
-        introduction_items,
-        background_items,
-        framework_items,
-        application_items,
-        catalogue_items,
+        introduction,
+        background,
+        framework,
+        applications,
+        catalogue,
     ):
         monkeypatch.setattr(module, "decomposed", decomposed)
-    monkeypatch.setattr(application_items, "DIRECTIONS", application_items.DIRECTIONS[:1])
+    monkeypatch.setattr(applications, "DIRECTIONS", applications.DIRECTIONS[:1])
     return Known(tmp_path, quick=True)
 
 
-def made(name: str, context: Context) -> Made:
-    item: Item = ITEMS[name]
+def made(name: str, context: Context) -> ItemContent:
+    item: ThesisItem = ITEMS[name]
     assert item.make is not None
     return item.make(context)
 
 
-def column(answer: Made, header: str) -> dict[str, float]:
+def column(answer: ItemContent, header: str) -> dict[str, float]:
     """A column of the first table by that of names."""
     place = answer.tables[0].header.index(header)
     return {str(row[0]): float(row[place]) for row in answer.tables[0].rows}
@@ -159,7 +159,7 @@ def test_what_cannot_be_made_again_says_why() -> None:
 
 
 def test_reflectance_models_obey_what_the_table_says_of_them() -> None:
-    found = {name: catalogue_items.measure(model).obeyed for name, model in catalogue_items.MODELS}
+    found = {name: catalogue.check_constraints(model).obeyed for name, model in catalogue.MODELS}
     assert all(positive for positive, _, _ in found.values())
     reciprocal = {name for name, (_, obeyed, _) in found.items() if obeyed}
     assert set(found) - reciprocal == {name for name in found if "plain" in name}
@@ -174,9 +174,9 @@ def test_reflectance_models_obey_what_the_table_says_of_them() -> None:
 def test_characteristics_are_those_of_a_saved_result(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert catalogue_items.check_characteristics(ball(), tmp_path / "all") == ()
-    monkeypatch.setattr(catalogue_items, "CHARACTERISTICS", catalogue_items.CHARACTERISTICS[1:])
-    missing = catalogue_items.check_characteristics(ball(), tmp_path / "fewer")
+    assert catalogue.check_characteristics(ball(), tmp_path / "all") == ()
+    monkeypatch.setattr(catalogue, "CHARACTERISTICS", catalogue.CHARACTERISTICS[1:])
+    missing = catalogue.check_characteristics(ball(), tmp_path / "fewer")
     assert any("image" in said for said in missing), "a field that nobody lists is noticed"
 
 
@@ -184,26 +184,24 @@ def test_tables_of_documentation_are_made(context: Context) -> None:
     assert "NOT" not in made("table-2.3", context).text
     left = column(made("table-2.2", context), "highlight left (%), mean")
     assert set(left) == {kind.name for kind in KINDS}
-    assert len(made("table-2.1", context).tables[0].rows) == len(catalogue_items.MODELS)
+    assert len(made("table-2.1", context).tables[0].rows) == len(catalogue.MODELS)
 
 
 def test_white_highlights_are_not_left_in_the_exact_images() -> None:
     image, diffuse, mask = glossy_disc()
     subject = Subject("disc", "specular", image, mask, diffuse, image - diffuse)
-    assert highlight_left(PHOTO, subject) == pytest.approx(1, abs=0.05)
+    assert residual_highlight(PHOTO, subject) == pytest.approx(1, abs=0.05)
     for kind in KINDS[:3]:
-        assert highlight_left(kind, subject) < 1e-9
+        assert residual_highlight(kind, subject) < 1e-9
 
 
 def test_a_lobe_is_largest_where_light_is_mirrored_to() -> None:
     views = np.linspace(-89, 89, 179)
     for incident in (0, 30, 60):
-        curve = background_items.lobe(Phong(exponent=50.0), incident, views) / np.cos(
-            np.deg2rad(views)
-        )
+        curve = background.lobe(Phong(exponent=50.0), incident, views) / np.cos(np.deg2rad(views))
         assert views[np.argmax(curve)] == incident
-    sharp, _ = background_items.phong_sphere(48, 100.0)
-    soft, mask = background_items.phong_sphere(48, 5.0)
+    sharp, _ = background.phong_sphere(48, 100.0)
+    soft, mask = background.phong_sphere(48, 5.0)
     assert np.allclose(
         soft["sum"][mask], (soft["ambient"] + soft["diffuse"] + soft["specular"])[mask]
     )
@@ -211,7 +209,7 @@ def test_a_lobe_is_largest_where_light_is_mirrored_to() -> None:
 
 
 def test_smooth_light_is_modelled_better_by_harmonics_than_by_one_lamp() -> None:
-    true, models, _ = background_items.shading_models(known_ball())
+    true, models, _ = background.shading_models(known_ball())
     inside = true.any(axis=2)
     smooth, lamp, constant = (
         float(np.square((model - true)[inside]).mean()) for model in models.values()
@@ -221,17 +219,17 @@ def test_smooth_light_is_modelled_better_by_harmonics_than_by_one_lamp() -> None
 
 
 def test_closed_forms_look_as_their_shape_and_light_say() -> None:
-    for shaded in (introduction_items.sphere(64), introduction_items.vase(64)):
+    for shaded in (introduction.sphere(64), introduction.vase(64)):
         inside = np.isfinite(shaded.height)
         assert np.array_equal(inside, shaded.mask)
         normal = truth_normal(shaded.height)
         known = np.isfinite(normal[..., 2]) & (normal[..., 2] > 0.5)
-        expected = introduction_items._ALBEDO * np.maximum(normal @ introduction_items.LIGHT, 0)
+        expected = introduction._ALBEDO * np.maximum(normal @ introduction.LIGHT, 0)
         assert np.abs(expected - shaded.image[..., 0])[known].mean() < 0.02
-    ball_, method = introduction_items.sphere(64), "sfs-ikeuchi-horn"
+    ball_, method = introduction.sphere(64), "sfs-ikeuchi-horn"
     assert (
-        introduction_items.recover(ball_, method).mean_angle
-        < 0.4 * introduction_items.recover(ball_, "naive").mean_angle
+        introduction.recover_shape(ball_, method).mean_angle
+        < 0.4 * introduction.recover_shape(ball_, "naive").mean_angle
     )
 
 
@@ -241,26 +239,26 @@ def test_chance_is_told_from_difference() -> None:
     apart = alike.copy()
     apart[:, 0, :, : BINS // 2] *= 9
     apart /= apart.sum(axis=-1, keepdims=True)
-    assert (filter_items.chance(apart, 0) == pytest.approx(2 / 2**8)) and (
-        filter_items.chance(alike, 0) > 0.02
+    assert (filters.exchange_test(apart, 0) == pytest.approx(2 / 2**8)) and (
+        filters.exchange_test(alike, 0) > 0.02
     ).mean() > 0.7
     assert (
-        (filter_items.distances(apart) > filter_items.distances(alike))
-        & (filter_items.distances(apart) < 1)
+        (filters.total_variation(apart) > filters.total_variation(alike))
+        & (filters.total_variation(apart) < 1)
     ).all()
     many = np.concatenate([apart, apart])
-    assert (filter_items.chance(many, 0) <= 4 / 4096).all(), (
+    assert (filters.exchange_test(many, 0) <= 4 / 4096).all(), (
         "beyond twelve subjects exchanges are drawn at random"
     )
-    assert np.allclose(filter_items.holm(np.array([0.01, 0.5, 0.02])), [0.03, 0.5, 0.04])
+    assert np.allclose(filters.holm_correction(np.array([0.01, 0.5, 0.02])), [0.03, 0.5, 0.04])
 
 
 def test_the_light_of_a_ball_is_found_to_a_degree() -> None:
     for direction in (toward(-0.6, 0.6, 1.0), toward(0.9, -0.4, 0.8)):
-        found = application_items.found_lights(application_items.lit_ball(direction, 40))
+        found = applications.estimate_directions(applications.render_ball(direction, 40))
         assert len(found) == 3
         for name, light in found.items():
-            assert application_items.degrees_between(light, direction) < 1, name
+            assert applications.degrees_between(light, direction) < 1, name
 
 
 def test_edits_do_what_was_asked_for_and_nothing_else(context: Context) -> None:

@@ -15,34 +15,36 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks.thesis.claims import ABSTRACT, MDR_HEIGHT
-from benchmarks.thesis.context import WORK, Context
-from benchmarks.thesis.item import Item, Made, Table, Verdict
-from benchmarks.thesis.registry import find, items
-from benchmarks.thesis.run import make_items, states
-from benchmarks.thesis.style import figure
-from benchmarks.thesis.written import index, is_complete, read_record, write_item
-from isc_core.cli import main as isc
+from benchmarks.thesis.drawing.style import figure
+from benchmarks.thesis.making import item_states, make_items
+from benchmarks.thesis.measuring.context import WORK, Context
+from benchmarks.thesis.registry import all_items, find_item
+from benchmarks.thesis.report.claims import ABSTRACT, MDR_HEIGHT
+from benchmarks.thesis.report.item import ClaimVerdict, ItemContent, ItemTable, ThesisItem
+from benchmarks.thesis.report.written import index_page, is_complete, read_record, write_item
+from isc_core.cli.main import main as isc
 from isc_core.errors import Cancelled, InputError
 from isc_core.progress import Monitor
 from tests.core.command_line import ROOT, isc_command, run_isc
 
-TABLE = Table(("image", "K", "error | x"), (("apple", 3, 1 / 3), ("pear", 4, 1e-7)), "Two rows.")
-VERDICT = Verdict(MDR_HEIGHT, "3.1 % on two images.", "partly", "Few images.")
+TABLE = ItemTable(
+    ("image", "K", "error | x"), (("apple", 3, 1 / 3), ("pear", 4, 1e-7)), "Two rows."
+)
+VERDICT = ClaimVerdict(MDR_HEIGHT, "3.1 % on two images.", "partly", "Few images.")
 
 
-def drawn(pictures: int = 1) -> Made:
+def drawn(pictures: int = 1) -> ItemContent:
     figures = []
     for _ in range(pictures):
         made, axes = figure(1, 1, width=2.0, height=1.5)
         axes[0, 0].plot([0, 1], [0, 1])
         axes[0, 0].set_title("a title set by hand", fontsize=40)
         figures.append(made)
-    return Made((TABLE,), tuple(figures), "What one sees.", (VERDICT,))
+    return ItemContent((TABLE,), tuple(figures), "What one sees.", (VERDICT,))
 
 
-def item(number: str = "9.1", make: object = lambda context: drawn()) -> Item:
-    return Item("table", number, "A table", make)
+def item(number: str = "9.1", make: object = lambda context: drawn()) -> ThesisItem:
+    return ThesisItem("table", number, "A table", make)
 
 
 def test_an_item_leaves_a_page_numbers_a_picture_and_a_record(tmp_path: Path) -> None:
@@ -85,7 +87,7 @@ def test_an_item_leaves_a_page_numbers_a_picture_and_a_record(tmp_path: Path) ->
 
 def test_a_table_without_a_figure_gets_a_picture_of_itself(tmp_path: Path) -> None:
     context = Context(tmp_path)
-    record = write_item(item(), Made((TABLE, TABLE)), context, 1.0)
+    record = write_item(item(), ItemContent((TABLE, TABLE)), context, 1.0)
     assert record.files == ("table-9.1.md", "table-9.1.csv", "table-9.1-2.csv", "table-9.1.png")
     picture = cv2.imread(str(tmp_path / "table-9.1.png"))
     assert picture.shape[1] >= 440 and 0.5 < (picture > 200).mean() < 1, "a page with letters on it"
@@ -106,9 +108,9 @@ def test_files_of_an_earlier_run_do_not_stay_beside_the_new_ones(tmp_path: Path)
 
 def test_cells_fit_their_header_and_verdicts_have_known_words() -> None:
     with pytest.raises(ValueError, match="cells"):
-        Table(("a", "b"), ((1,),))
+        ItemTable(("a", "b"), ((1,),))
     with pytest.raises(ValueError, match="cannot be told"):
-        Verdict("claim", "here", "maybe")
+        ClaimVerdict("claim", "here", "maybe")
 
 
 def test_rows_are_computed_once_and_only_for_the_same_run(tmp_path: Path) -> None:
@@ -147,7 +149,7 @@ def test_rows_are_not_begun_once_somebody_cancelled(tmp_path: Path) -> None:
 
 
 def test_a_failing_item_does_not_stop_the_others_and_is_named(tmp_path: Path) -> None:
-    def fails(context: Context) -> Made:
+    def fails(context: Context) -> ItemContent:
         raise InputError("no data for this one")
 
     wanted = [item("9.1"), item("9.2", fails), item("9.3")]
@@ -169,8 +171,8 @@ def test_a_cancelled_run_leaves_whole_items_and_goes_on_there(tmp_path: Path) ->
     made: list[str] = []
     stop = {"after": 2}
 
-    def makes(number: str) -> Item:
-        def make(context: Context) -> Made:
+    def makes(number: str) -> ThesisItem:
+        def make(context: Context) -> ItemContent:
             made.append(number)
             context.monitor.report("half of it", 0.5)
             return drawn()
@@ -196,7 +198,7 @@ def test_a_cancelled_run_leaves_whole_items_and_goes_on_there(tmp_path: Path) ->
 def test_progress_names_the_item_and_only_grows(tmp_path: Path) -> None:
     heard: list[tuple[str, float]] = []
 
-    def make(context: Context) -> Made:
+    def make(context: Context) -> ItemContent:
         for step in range(4):
             context.monitor.report("step", step / 4)
         return drawn()
@@ -214,8 +216,8 @@ def test_progress_names_the_item_and_only_grows(tmp_path: Path) -> None:
 
 def test_the_index_has_every_claim_and_every_item(tmp_path: Path) -> None:
     record = write_item(item(), drawn(), Context(tmp_path), 1.0)
-    illustration = Item("figure", "9.9", "An illustration", None, "nothing is computed in it")
-    text = index([item(), item("9.2"), illustration], {"table-9.1": record})
+    illustration = ThesisItem("figure", "9.9", "An illustration", None, "nothing is computed in it")
+    text = index_page([item(), item("9.2"), illustration], {"table-9.1": record})
     assert all(claim in text for claim in ABSTRACT)
     assert f"| {MDR_HEIGHT} | 3.1 % on two images. | partly | [table 9.1](table-9.1.md) |" in text
     assert (
@@ -237,7 +239,7 @@ def test_a_damaged_record_counts_as_none(tmp_path: Path) -> None:
     ):
         path.write_text(content, encoding="utf-8")
         assert read_record(tmp_path, "table-9.1") is None
-    assert "not made" in next(iter(states([item()], tmp_path)))
+    assert "not made" in next(iter(item_states([item()], tmp_path)))
 
 
 def test_all_numbers_of_the_thesis_are_listed() -> None:
@@ -247,10 +249,10 @@ def test_all_numbers_of_the_thesis_are_listed() -> None:
         for chapter, last in ((1, 5), (2, 5), (3, 12), (4, 51))
         for n in range(1, last + 1)
     }
-    assert {one.number for one in items() if one.kind == "table"} == tables
-    assert {one.number for one in items() if one.kind == "figure"} == figures
-    assert {one.name for one in items() if one.make is None} == {"figure-1.1", "figure-3.1"}
-    assert all(one.reason for one in items() if one.make is None)
+    assert {one.number for one in all_items() if one.kind == "table"} == tables
+    assert {one.number for one in all_items() if one.kind == "figure"} == figures
+    assert {one.name for one in all_items() if one.make is None} == {"figure-1.1", "figure-3.1"}
+    assert all(one.reason for one in all_items() if one.make is None)
 
 
 @pytest.mark.parametrize(
@@ -260,7 +262,7 @@ def test_an_unknown_number_names_the_nearest(number: str, nearest: str) -> None:
     with pytest.raises(
         InputError, match=f"there is no table '{number}': the nearest are {re.escape(nearest)}"
     ):
-        find("table", number)
+        find_item("table", number)
 
 
 Refusal = Callable[..., str]
@@ -283,7 +285,7 @@ def test_mistakes_are_one_line_and_write_nothing(tmp_path: Path, refused: Refusa
     output = tmp_path / "out"
     (tmp_path / "empty").mkdir()
     assert "the nearest are" in refused("table", "4.99", "-o", output)
-    assert "holds nothing known here" in refused(
+    assert "holds no known data set" in refused(
         "figure", "3.5", "--data", tmp_path / "empty", "-o", output
     )
     assert "is not a folder" in refused(

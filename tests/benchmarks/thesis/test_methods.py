@@ -11,29 +11,28 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks.thesis import (
-    characteristics_items,
-    estimates,
-    layer_tables,
-    removal_items,
-    segmentation_items,
-    separations,
-    sheets_items,
-    sparse_coding_items,
+from benchmarks.thesis.drawing.image_maps import (
+    crop_image,
+    fit_scale,
+    light_ball,
+    pad_to_aspect,
+    signed_error,
 )
-from benchmarks.thesis.comparing import gain, rank_sum, ratio
-from benchmarks.thesis.context import Context
-from benchmarks.thesis.estimates import AFTER, BOUND, SIRFS
-from benchmarks.thesis.layer_tables import DIFFUSE, SPECULAR
-from benchmarks.thesis.pictures import ball, beside, fitted, lit, signed
-from benchmarks.thesis.separations import NOTHING, Way
-from benchmarks.thesis.subjects import Subject
-from isc_core.datasets import MitBerkeleyObject
-from isc_core.decomposition import Separation
+from benchmarks.thesis.images.subject import Subject
+from benchmarks.thesis.items import characteristics, removal, segmentation, sheets, sparse_coding
+from benchmarks.thesis.measuring import framework_runs, separation_scores
+from benchmarks.thesis.measuring.context import Context
+from benchmarks.thesis.measuring.framework_runs import AFTER, BOUND, SIRFS
+from benchmarks.thesis.measuring.separation_scores import NOTHING, SeparatorSetting
+from benchmarks.thesis.report import layer_tables
+from benchmarks.thesis.report.comparing import judge_reduction, paired_ratio, rank_sum_p
+from benchmarks.thesis.report.layer_tables import DIFFUSE, SPECULAR
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.errors import InputError
-from isc_core.evaluate import Ratio
-from isc_core.metrics import score, truth_normal
-from isc_core.sirfs.frames import light_from_reference, light_to_reference, real_sh
+from isc_core.evaluation.evaluate import Ratio
+from isc_core.evaluation.metrics import score, truth_normal
+from isc_core.scene.decomposition import Separation
+from isc_core.shading.spherical_harmonics import light_from_reference, light_to_reference, real_sh
 
 SIZE = 36
 PAINTS = ((0.8, 0.25, 0.1), (0.15, 0.45, 0.7))
@@ -75,7 +74,7 @@ class Balls(Context):
     def subjects(self, kind: str) -> tuple[Subject, ...]:
         """Red and blue."""
         return tuple(
-            painted_ball(f"ball {number}", kind, paint, 0 if kind == "matt" else 0.4)
+            painted_ball(f"ball {number}", kind, paint, 0 if kind == "diffuse" else 0.4)
             for number, paint in enumerate(PAINTS)
         )
 
@@ -93,29 +92,29 @@ def context(tmp_path_factory: pytest.TempPathFactory) -> Context:
 
 
 def perfect(subject: Subject) -> Separation:
-    diffuse, specular = separations.layers(subject)
+    diffuse, specular = separation_scores.true_layers(subject)
     return Separation(
         diffuse, specular, np.zeros_like(diffuse), np.ones(subject.mask.shape, np.float32)
     )
 
 
-@pytest.mark.parametrize("kind", ["specular", "matt"])
+@pytest.mark.parametrize("kind", ["specular", "diffuse"])
 def test_the_truth_scores_perfectly(context: Context, kind: str) -> None:
     subject = context.subjects(kind)[0]
-    found = separations.scored(subject, perfect(subject))
+    found = separation_scores.layer_errors(subject, perfect(subject))
     assert found["mse"] == found["specular_mse"] == 0
     assert found["ssim"] == pytest.approx(1)
     assert found["lmse"] == pytest.approx(0, abs=1e-9)
     assert (
         found["specular_lmse"] is None
-        if kind == "matt"
+        if kind == "diffuse"
         else found["specular_lmse"] == pytest.approx(0, abs=1e-9)
     )
     assert layer_tables.decibels(0) == np.inf
 
 
 def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Context) -> None:
-    for items in (segmentation_items, removal_items, sparse_coding_items):
+    for items in (segmentation, removal, sparse_coding):
         for item in items.ITEMS:
             assert item.make is not None
             made = item.make(context)
@@ -126,50 +125,48 @@ def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Conte
                 NOTHING.label in [cell for row in table.rows for cell in row[:2]]
                 for table in of_layers
             ), item.number
-    runs = layer_tables.run_all(context, "specular", ())
-    assert layer_tables.relative(runs, NOTHING.label, "specular", DIFFUSE, 0) == "1"
+    runs = layer_tables.score_settings(context, "specular", ())
+    assert layer_tables.relative_error(runs, NOTHING.label, "specular", DIFFUSE, 0) == "1"
     for layer in (DIFFUSE, SPECULAR):
-        error = layer_tables.means(runs[NOTHING.label], layer[0])
+        error = layer_tables.mean_scores(runs[NOTHING.label], layer[0])
         true = {
-            s.name: float(np.mean(separations.layers(s)[1][s.mask].astype(float) ** 2))
+            s.name: float(np.mean(separation_scores.true_layers(s)[1][s.mask].astype(float) ** 2))
             for s in context.subjects("specular")
         }
         assert error == pytest.approx(
             true, rel=1e-4
         )  # leaving the highlight costs exactly the highlight, in both layers
-    matt = layer_tables.run_all(context, "matt", ())
-    assert layer_tables.relative(matt, NOTHING.label, "matt", DIFFUSE, 0) == "0.00"
+    bare = layer_tables.score_settings(context, "diffuse", ())
+    assert layer_tables.relative_error(bare, NOTHING.label, "diffuse", DIFFUSE, 0) == "0.00"
 
 
 def test_every_search_marks_the_pixels_of_the_exact_one(context: Context) -> None:
     subject = context.subjects("specular")[0]
-    exact = next(
-        way for way in segmentation_items.WAYS if way.label == "exact search, as published"
-    )
-    marked = separations.highlights(subject, exact, 0)
+    exact = next(way for way in segmentation.WAYS if way.label == "exact search, as published")
+    marked = separation_scores.segment_highlights(subject, exact, 0)
     assert 0 < marked.sum() < subject.mask.sum() / 2
-    for way in segmentation_items.WAYS[:3]:
-        assert (separations.highlights(subject, way, 3) == marked).all(), way.label
+    for way in segmentation.WAYS[:3]:
+        assert (separation_scores.segment_highlights(subject, way, 3) == marked).all(), way.label
 
 
 def test_runs_are_repeated_with_other_seeds_and_taken_up_again(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     subject = context.subjects("specular")[0]
-    way = next(way for way in segmentation_items.WAYS if way.label == "CS, as published")
-    first = separations.measured(context, subject, way, 3)
+    way = next(way for way in segmentation.WAYS if way.label == "CS, as published")
+    first = separation_scores.score_separations(context, subject, way, 3)
     assert [run.run for run in first] == [0, 1, 2]
     assert all(
         run.search is not None and run.seconds is not None and run.search > 0 and run.seconds > 0
         for run in first
     )
     assert all(run.exact for run in first)
-    assert segmentation_items.hits(
+    assert segmentation.hit_table(
         {way.label: {subject.name: [first[0], replace(first[1], exact=False)]}}
     ).rows == ((way.label, 2, "50 %"),)
     assert way.options(1) == {"optimiser": "chaotic_clonal", "seed": 1}
-    monkeypatch.setattr(separations, "split", lambda *_: pytest.fail("computed again"))
-    assert separations.measured(context, subject, way, 3) == first
+    monkeypatch.setattr(separation_scores, "split", lambda *_: pytest.fail("computed again"))
+    assert separation_scores.score_separations(context, subject, way, 3) == first
 
 
 def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -> None:
@@ -177,12 +174,12 @@ def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -
     grey = replace(
         subject, name="grey", image=np.repeat(subject.image.mean(2, keepdims=True), 3, 2)
     )
-    way = Way("CS, improved", separations.SEGMENTATION)
-    found = separations.measured(context, grey, way)
+    way = SeparatorSetting("CS, improved", separation_scores.SEGMENTATION)
+    found = separation_scores.score_separations(context, grey, way)
     assert found[0].refused and found[0].mse is None
-    table = layer_tables.by_subject(
+    table = layer_tables.subject_table(
         {
-            NOTHING.label: {"grey": separations.measured(context, grey, NOTHING)},
+            NOTHING.label: {"grey": separation_scores.score_separations(context, grey, NOTHING)},
             way.label: {"grey": found},
         },
         "specular",
@@ -205,39 +202,43 @@ def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -
 def test_a_claim_of_ten_per_cent_holds_only_where_the_interval_says_so(
     found: Ratio | None, holds: str
 ) -> None:
-    assert gain("ten per cent less", 0.1, found, "error").holds == holds
+    assert judge_reduction("ten per cent less", 0.1, found, "error").holds == holds
 
 
 def test_comparisons_pair_subjects_and_know_when_they_cannot_tell() -> None:
-    found = ratio({"a": 1.0, "b": 2.0, "c": 5.0}, {"a": 2.0, "b": 4.0, "d": 1.0}, 0)
+    found = paired_ratio({"a": 1.0, "b": 2.0, "c": 5.0}, {"a": 2.0, "b": 4.0, "d": 1.0}, 0)
     assert found is not None
     assert found == pytest.approx((0.5, 0.5, 0.5))  # the two subjects that both have, not c and d
-    assert ratio({"a": 1.0, "b": 0.0}, {"a": 1.0, "b": 1.0}, 0) is None
-    assert rank_sum([1, 2], [1, 2]) is None
-    assert rank_sum([2, 2, 2], [2, 2, 2]) == 1
+    assert paired_ratio({"a": 1.0, "b": 0.0}, {"a": 1.0, "b": 1.0}, 0) is None
+    assert rank_sum_p([1, 2], [1, 2]) is None
+    assert rank_sum_p([2, 2, 2], [2, 2, 2]) == 1
     low, high = [1.0, 1.1, 1.2, 1.3, 1.4], [2.0, 2.1, 2.2, 2.3, 2.4]
-    chance = rank_sum(low, high)
+    chance = rank_sum_p(low, high)
     assert chance is not None and chance < 0.01
 
 
 @pytest.fixture(scope="module")
-def rows(context: Context) -> list[estimates.Row]:
-    subjects = [estimates.known(context, (kind,))[0] for kind in ("specular", "matt")]
-    return estimates.measured(context, subjects, (SIRFS, AFTER[-1], BOUND))
+def rows(context: Context) -> list[framework_runs.FrameworkErrors]:
+    subjects = [
+        framework_runs.subjects_with_truth(context, (kind,))[0] for kind in ("specular", "diffuse")
+    ]
+    return framework_runs.score_frameworks(context, subjects, (SIRFS, AFTER[-1], BOUND))
 
 
-def test_sirfs_is_what_all_are_relative_to(rows: list[estimates.Row]) -> None:
-    table = characteristics_items.relative_errors(rows, "balls", 0)
-    assert table.rows[0] == ("SIRFS", *["1"] * len(estimates.METRICS))
+def test_sirfs_is_what_all_are_relative_to(rows: list[framework_runs.FrameworkErrors]) -> None:
+    table = characteristics.relative_error_table(rows, "balls", 0)
+    assert table.rows[0] == ("SIRFS", *["1"] * len(framework_runs.METRICS))
     of = {(row.subject.split()[0], row.framework): row for row in rows}
-    plain, bound = of["matt", "SIRFS"], of["matt", BOUND.label]
+    plain, bound = of["diffuse", "SIRFS"], of["diffuse", BOUND.label]
     assert bound.errors == pytest.approx(
         plain.errors, rel=1e-4
     )  # without a highlight the photo is the diffuse image
     assert all(row.seconds > 0 and row.evaluations > 0 for row in rows)
 
 
-def test_a_separation_afterwards_changes_reflectance_alone(rows: list[estimates.Row]) -> None:
+def test_a_separation_afterwards_changes_reflectance_alone(
+    rows: list[framework_runs.FrameworkErrors],
+) -> None:
     glossy = {row.framework: row.errors for row in rows if row.subject.startswith("specular")}
     for name in ("height", "normal", "light", "shading"):
         assert glossy["SIRFS-MBP"][name] == pytest.approx(glossy["SIRFS"][name], rel=1e-3)
@@ -245,12 +246,12 @@ def test_a_separation_afterwards_changes_reflectance_alone(rows: list[estimates.
 
 
 def test_an_estimate_is_kept_with_its_maps(
-    context: Context, rows: list[estimates.Row], monkeypatch: pytest.MonkeyPatch
+    context: Context, rows: list[framework_runs.FrameworkErrors], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     del rows
-    monkeypatch.setattr(estimates, "make_runner", lambda *_: pytest.fail("computed again"))
-    subject = estimates.known(context, ("specular",))[0]
-    answer = estimates.estimated(context, subject, SIRFS).answer
+    monkeypatch.setattr(framework_runs, "make_runner", lambda *_: pytest.fail("computed again"))
+    subject = framework_runs.subjects_with_truth(context, ("specular",))[0]
+    answer = framework_runs.run_framework(context, subject, SIRFS).answer
     assert answer is not None and answer.height.shape == subject.mask.shape
 
 
@@ -276,12 +277,10 @@ def test_the_true_maps_score_perfectly_and_fill_the_first_row_of_a_sheet(context
 
 
 def test_figures_are_numbered_without_a_gap_and_none_is_drawn_twice() -> None:
-    assert [item.number for item in sheets_items.ITEMS] == [
-        f"4.{number}" for number in range(10, 49)
-    ]
-    assert len({item.title for item in sheets_items.ITEMS}) == 39
+    assert [item.number for item in sheets.ITEMS] == [f"4.{number}" for number in range(10, 49)]
+    assert len({item.title for item in sheets.ITEMS}) == 39
     subjects = [painted_ball(name, "specular", PAINTS[0], 0.4) for name in "ab"]
-    shown = [sheets_items.turn(index, subjects, 2) for index in range(4)]
+    shown = [sheets.subject_for_figure(index, subjects, 2) for index in range(4)]
     assert [(subject.name, which) for subject, which in shown] == [
         ("a", 0),
         ("b", 0),
@@ -290,11 +289,11 @@ def test_figures_are_numbered_without_a_gap_and_none_is_drawn_twice() -> None:
     ]
     for few in ([], subjects):
         with pytest.raises(InputError, match="too few"):
-            sheets_items.turn(4, few, 2)
+            sheets.subject_for_figure(4, few, 2)
 
 
 def test_sheets_have_a_row_for_the_truth_and_for_each_method(context: Context) -> None:
-    made = {item.number: item.make for item in sheets_items.ITEMS}
+    made = {item.number: item.make for item in sheets.ITEMS}
     pictures = []
     for number in (
         "4.16",
@@ -318,7 +317,9 @@ def test_sheets_have_a_row_for_the_truth_and_for_each_method(context: Context) -
 
 def test_errors_are_orange_where_light_was_left_and_blue_where_too_much_was_taken() -> None:
     mask = np.ones((3, 5), bool)
-    pictures = {sign: signed(np.full((3, 5, 3), 0.2 * sign), mask, 1.0) for sign in (-1, 0, 1)}
+    pictures = {
+        sign: signed_error(np.full((3, 5, 3), 0.2 * sign), mask, 1.0) for sign in (-1, 0, 1)
+    }
     assert (pictures[1][..., 0] > pictures[1][..., 2]).all()
     assert (pictures[-1][..., 0] < pictures[-1][..., 2]).all()
     assert np.ptp(pictures[0]) == 0
@@ -328,21 +329,21 @@ def test_pictures_are_cut_to_the_object_and_compared_at_one_scale() -> None:
     mask = np.zeros((20, 30), bool)
     mask[5:10, 4:24] = True
     truth = np.random.default_rng(0).random((20, 30, 3))
-    assert lit(truth, mask).shape == (5, 20, 3)
-    assert fitted(0.3 * truth, truth, mask) == pytest.approx(truth)
-    picture, covered = ball(np.zeros((9, 3)))
+    assert crop_image(truth, mask).shape == (5, 20, 3)
+    assert fit_scale(0.3 * truth, truth, mask) == pytest.approx(truth)
+    picture, covered = light_ball(np.zeros((9, 3)))
     assert picture[covered] == pytest.approx(1)
-    wide = beside(picture, mask)
+    wide = pad_to_aspect(picture, mask)
     assert wide.shape[1] == 4 * wide.shape[0]
 
 
 def test_every_number_of_the_tables_is_there_once() -> None:
     def numbers() -> Iterator[str]:
         for module in (
-            segmentation_items,
-            removal_items,
-            sparse_coding_items,
-            characteristics_items,
+            segmentation,
+            removal,
+            sparse_coding,
+            characteristics,
         ):
             yield from (item.number for item in module.ITEMS)
 

@@ -11,13 +11,13 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks.thesis.context import Context
-from benchmarks.thesis.subjects import KINDS, QUICK_SIZE, Library, Subject, shrunk
-from isc_core.datasets import MitBerkeleyObject
+from benchmarks.thesis.images.library import KINDS, QUICK_SIZE, Subject, SubjectLibrary
+from benchmarks.thesis.measuring.context import Context
+from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.errors import Cancelled, InputError
-from isc_core.metrics import Scores, score, truth_normal
+from isc_core.evaluation.metrics import Scores, score, truth_normal
 from isc_core.progress import Monitor
-from isc_core.sirfs.frames import light_from_reference
+from isc_core.shading.spherical_harmonics import light_from_reference
 
 
 def own_score(truth: MitBerkeleyObject) -> Scores:
@@ -83,7 +83,9 @@ def test_without_data_everything_is_rendered(rendered: Context, kind: str) -> No
         check(subject)
         diffuse, specular = layers(subject)
         share = specular[subject.mask].sum() / subject.image[subject.mask].sum()
-        assert share == 0 if kind == "matt" else 0.03 < share < 0.5, f"{subject.name}: {share:.3f}"
+        assert share == 0 if kind == "diffuse" else 0.03 < share < 0.5, (
+            f"{subject.name}: {share:.3f}"
+        )
         assert subject.truth is not None
         explained = np.minimum(subject.truth.shading * subject.truth.reflectance, 1)
         assert np.allclose(diffuse[subject.mask], explained[subject.mask], atol=2e-3)
@@ -124,17 +126,17 @@ def test_public_data_in_each_layout(shared: Path, tmp_path: Path) -> None:
         context.check()
         names = [subject.name for subject in context.subjects("specular")]
         assert names[:2] == ["apple", "teabag2"]
-        assert [subject.name for subject in context.subjects("matt")] == ["apple", "teabag2"]
+        assert [subject.name for subject in context.subjects("diffuse")] == ["apple", "teabag2"]
     photos = [
         [subject.name for subject in context.photos()] for context in list(found.values())[:2]
     ]
     assert photos[0] == photos[1] == ["Bag", "Banana"]
-    for subject in (*found[data].subjects("specular"), *found[data].subjects("matt")):
+    for subject in (*found[data].subjects("specular"), *found[data].subjects("diffuse")):
         check(subject)
 
 
 def test_photos_with_ground_truth_are_linear_and_whole(shared: Path, tmp_path: Path) -> None:
-    library = Library(tmp_path, shared / "data", False, 0)
+    library = SubjectLibrary(tmp_path, shared / "data", False, 0)
     subjects = {subject.name: subject for subject in library.subjects("specular", Monitor())}
     assert {"apple", "teabag2", "animals", "cups"} == set(subjects)
     animals = subjects["animals"]
@@ -161,7 +163,7 @@ def test_the_fingerprint_follows_the_data(shared: Path, tmp_path: Path) -> None:
 
 def test_a_folder_without_known_data_is_refused(tmp_path: Path) -> None:
     os.makedirs(tmp_path / "holidays")
-    with pytest.raises(InputError, match="holds nothing known here"):
+    with pytest.raises(InputError, match="holds no known data set"):
         Context(tmp_path / "out", tmp_path).check()
 
 
@@ -192,7 +194,7 @@ def plane(size: int) -> Subject:
 
 def test_a_smaller_copy_keeps_light_and_slope() -> None:
     subject = plane(240)
-    small = shrunk(subject, QUICK_SIZE)
+    small = downsample_subject(subject, QUICK_SIZE)
     assert small.mask.shape == (80, 80) and small.truth is not None and subject.truth is not None
     assert small.image[small.mask].mean() == pytest.approx(
         subject.image[subject.mask].mean(), rel=1e-4
@@ -208,4 +210,4 @@ def test_a_smaller_copy_keeps_light_and_slope() -> None:
     assert np.allclose(sum(layers(small)), small.image, atol=1e-6)
     # No light of the background gets into the object.
     assert small.image[small.mask].min() >= subject.image[subject.mask].min()
-    assert shrunk(subject, 240) is subject
+    assert downsample_subject(subject, 240) is subject

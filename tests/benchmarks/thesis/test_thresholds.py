@@ -10,21 +10,21 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks.thesis.claims import CHAOS_FINDS_OPTIMUM, CHAOS_HELPS
-from benchmarks.thesis.context import Context
-from benchmarks.thesis.item import Made
-from benchmarks.thesis.registry import find
-from benchmarks.thesis.thresholding_items import exhaustive
-from benchmarks.thesis.thresholding_runs import (
-    all_runs,
-    holm,
-    iterations,
-    objective,
-    rank_sum,
-    runs,
-    share_interval,
+from benchmarks.separation.thresholding import COUNTS, IMAGES
+from benchmarks.thesis.items.thresholds import exhaustive_search
+from benchmarks.thesis.measuring.context import Context
+from benchmarks.thesis.measuring.threshold_runs import (
+    count_iterations,
+    holm_correction,
+    image_objective,
+    rank_sum_test,
+    run_searches,
+    threshold_runs,
+    wilson_interval,
 )
-from benchmarks.thresholding import COUNTS, IMAGES
+from benchmarks.thesis.registry import find_item
+from benchmarks.thesis.report.claims import CHAOS_FINDS_OPTIMUM, CHAOS_HELPS
+from benchmarks.thesis.report.item import ItemContent
 from isc_core.thresholding import OtsuObjective, exact
 
 
@@ -33,8 +33,8 @@ def context(tmp_path_factory: pytest.TempPathFactory) -> Context:
     return Context(tmp_path_factory.mktemp("thesis"), quick=True)
 
 
-def made(context: Context, kind: str, number: str) -> Made:
-    item = find(kind, number)
+def made(context: Context, kind: str, number: str) -> ItemContent:
+    item = find_item(kind, number)
     assert item.make is not None
     return item.make(context)
 
@@ -44,11 +44,11 @@ def test_all_candidates_agree_with_dynamic_programming() -> None:
     rng = np.random.default_rng(3)
     few = OtsuObjective(np.concatenate([rng.integers(1, 50, 12), np.zeros(244)]))
     loop = max(float(few(np.array([sets]))[0]) for sets in combinations(range(12), 3))
-    assert exhaustive(few)[1] == pytest.approx(loop, rel=1e-12)
+    assert exhaustive_search(few)[1] == pytest.approx(loop, rel=1e-12)
     for name in ("camera", "clock"):
-        where, value = exhaustive(objective(name))
-        assert value == pytest.approx(exact(objective(name), 3).value, rel=1e-12)
-        assert objective(name)(np.array([where]))[0] == pytest.approx(value, rel=1e-12)
+        where, value = exhaustive_search(image_objective(name))
+        assert value == pytest.approx(exact(image_objective(name), 3).value, rel=1e-12)
+        assert image_objective(name)(np.array([where]))[0] == pytest.approx(value, rel=1e-12)
 
 
 def test_the_exact_table_has_every_image_and_its_known_optimum(context: Context) -> None:
@@ -65,17 +65,17 @@ def test_the_exact_table_has_every_image_and_its_known_optimum(context: Context)
 
 
 def test_runs_are_kept_differ_by_seed_and_never_beat_the_optimum(context: Context) -> None:
-    found = all_runs(context, ("PSO", "CS"))
+    found = run_searches(context, ("PSO", "CS"))
     for (_, image, count), each in found.items():
-        best = exact(objective(image), count).value
+        best = exact(image_objective(image), count).value
         assert (each.values <= best * (1 + 1e-12)).all() and each.thresholds.shape == (
             len(each.values),
             count,
         )
-        assert each.values == pytest.approx(objective(image)(each.thresholds), rel=1e-12)
+        assert each.values == pytest.approx(image_objective(image)(each.thresholds), rel=1e-12)
         assert np.array_equal(np.isfinite(each.needed), each.values >= best * (1 - 1e-12))
     before = {path: path.stat().st_mtime_ns for path in context.output.rglob("*.jsonl")}
-    runs(Context(context.output, quick=True), "PSO", "camera", 5)
+    threshold_runs(Context(context.output, quick=True), "PSO", "camera", 5)
     assert before and before == {
         path: path.stat().st_mtime_ns for path in context.output.rglob("*.jsonl")
     }, "they were computed anew"
@@ -87,7 +87,7 @@ def test_tables_of_runs_fit_the_runs(context: Context) -> None:
         made(context, "table", number) for number in ("4.2", "4.3", "4.4")
     )
     assert [verdict.claim for verdict in objectives.verdicts] == [CHAOS_FINDS_OPTIMUM, CHAOS_HELPS]
-    chaotic = all_runs(context, ("CS",))
+    chaotic = run_searches(context, ("CS",))
     hits = sum(each.hits for each in chaotic.values())
     assert (
         f"{hits} of {sum(len(each.values) for each in chaotic.values())} runs"
@@ -114,18 +114,19 @@ def test_uniform_numbers_and_one_orbit_are_told_apart(context: Context) -> None:
 
 
 def test_statistics_are_what_they_are_called() -> None:
-    assert np.allclose(share_interval(50, 50), (0.92866, 1), atol=1e-4)
-    assert np.allclose(share_interval(5, 10), (0.23659, 0.76341), atol=1e-4)
-    assert holm([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
-    assert rank_sum(np.array([1.0, 1.0]), np.array([1.0, 1.0])) == (0.5, 1.0)
-    share, p = rank_sum(np.array([np.inf] * 20), np.arange(20.0))
+    assert np.allclose(wilson_interval(50, 50), (0.92866, 1), atol=1e-4)
+    assert np.allclose(wilson_interval(5, 10), (0.23659, 0.76341), atol=1e-4)
+    assert holm_correction([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
+    assert rank_sum_test(np.array([1.0, 1.0]), np.array([1.0, 1.0])) == (0.5, 1.0)
+    share, p = rank_sum_test(np.array([np.inf] * 20), np.arange(20.0))
     assert share == 1.0 and p < 1e-6
-    assert iterations("PSO", np.array([40, 41, 80, 120])).tolist() == [0, 1, 1, 2]
-    assert iterations("CS", np.array([50, 51, 305, 306])).tolist() == [0, 1, 1, 2]
+    assert count_iterations("PSO", np.array([40, 41, 80, 120])).tolist() == [0, 1, 1, 2]
+    assert count_iterations("CS", np.array([50, 51, 305, 306])).tolist() == [0, 1, 1, 2]
 
 
 def test_another_seed_is_another_run(context: Context, tmp_path: Path) -> None:
     one, other = (
-        runs(Context(tmp_path, quick=True, seed=seed), "PSO", "camera", 5) for seed in (0, 100)
+        threshold_runs(Context(tmp_path, quick=True, seed=seed), "PSO", "camera", 5)
+        for seed in (0, 100)
     )
     assert not np.array_equal(one.thresholds, other.thresholds)

@@ -1,0 +1,1 @@
+"""Figures: style, labelled panels, and maps as images."""

@@ -1,0 +1,1 @@
+"""Measurements shared by items: every run is computed once per output folder and kept there."""

@@ -1,0 +1,1 @@
+"""Content of items (tables, verdicts) and the files written from it."""
