@@ -27,15 +27,29 @@ SOLVE_SIZE = 256
 
 @dataclass(frozen=True)
 class RecoverOptions:
-    """`solve_size`: long side of the object's box, in pixels, at which SIRFS is solved; 0 for the
-    size given.
+    """How the problem is cut out of the image, and how it is solved.
 
-    `margin`: pixels of empty space around the box there. `shading_only`: shape-from-shading mode,
-    one reflectance colour.
+    Attributes
+    ----------
+    solve_size : int
+        Long side of the object's box, in pixels, at which SIRFS is solved; 0 for the size given.
+    margin : int
+        Pixels of empty space around the box at that size.
+    whole_frame : bool
+        Solve the frame as given instead of a window around the object. The height then is returned
+        as solved, not shifted to a mean of 0.
+    drop_near_edge : bool
+        Ignore occluding-contour points near the frame, see `occluding_contour`.
+    shading_only : bool
+        Shape-from-shading mode, one reflectance colour.
+    solver : SolverOptions
+        How the problem is minimised.
     """
 
     solve_size: int = SOLVE_SIZE
     margin: int = MARGIN
+    whole_frame: bool = False
+    drop_near_edge: bool = False
     shading_only: bool = False
     solver: SolverOptions = field(default_factory=SolverOptions)
 
@@ -116,6 +130,7 @@ def recover(
     *,
     trust: np.ndarray | None = None,
     seen: NormalEstimate | None = None,
+    outline: np.ndarray | None = None,
     known: Known | None = None,
     monitor: Monitor | None = None,
 ) -> Recovered:
@@ -123,7 +138,9 @@ def recover(
 
     `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`:
     zero channels are raised to it, in the logarithm only. `trust`: (H, W) in [0, 1], see `Problem`.
-    `seen`: what was seen of the shape, instead of what the outline suggests. Raises `Cancelled`.
+    `seen`: what was seen of the shape, instead of what the outline suggests. `outline` (H, W) bool:
+    the object's silhouette where it differs from `mask`, the pixels whose values count. Raises
+    `Cancelled`.
     """
     options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
     known, base = _levelled(known, mask)
@@ -132,7 +149,7 @@ def recover(
     scene = _Scene(
         window.cut(image, 0),
         inside,
-        _outline(mask, window),
+        _outline(mask if outline is None else outline, window),
         photo,
         floor,
         priors,
@@ -159,7 +176,7 @@ def recover(
         if known.height is None
         else window.cut_on(known.height)
     )
-    if known.height is None and known.depth is None:
+    if known.height is None and known.depth is None and not options.whole_frame:
         cut = cut - cut[scene.inside].mean()
     return Recovered(
         window.put(cut, mask.shape),
@@ -185,6 +202,9 @@ def _levelled(known: Known, mask: np.ndarray) -> tuple[Known, float]:
 
 
 def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[_Window, float]:
+    if options.whole_frame:
+        factor = options.solve_size / max(mask.shape) if options.solve_size else 1.0
+        return _Window(0, 0, *mask.shape), factor
     rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
     height, width = int(rows[-1] - rows[0] + 1), int(columns[-1] - columns[0] + 1)
     factor = options.solve_size / max(height, width) if options.solve_size else 1.0
@@ -262,7 +282,7 @@ class _Scene:
             log_image,
             valid,
             outline,
-            _seen(occluding_contour(outline), photo),
+            _seen(occluding_contour(outline, drop_near_edge=self.options.drop_near_edge), photo),
             self.priors,
             self.weights,
             depth,
