@@ -7,7 +7,7 @@ from pathlib import Path
 from ..decompose.settings import Settings
 from ..errors import InputError
 from ..io.limits import USUAL, Limits
-from ..photo.photo import TRANSFERS
+from ..photo import TRANSFERS
 
 DONE, SKIPPED, FAILED = "done", "skipped", "failed"
 

@@ -16,7 +16,7 @@ from pathlib import Path, PurePath
 from .. import __version__
 from ..decompose.pipeline import decompose
 from ..errors import Cancelled, InputError
-from ..photo.photo import read_photo
+from ..photo import read_photo
 from ..progress import Monitor
 from ..result_files.contact_sheet import thumbnail
 from ..result_files.result_folder import require_room, save

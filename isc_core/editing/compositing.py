@@ -23,7 +23,8 @@ from scipy import ndimage
 from ..errors import InputError
 from ..imaging.guided_filter import affine_fit, window_means
 from ..imaging.luminance import white_of
-from ..photo.photo import Photo, mask_box
+from ..photo import Photo
+from ..imaging.bounding_box import mask_box
 from ..scene.decomposition import Decomposition
 from .edited import Edited
 

@@ -20,7 +20,8 @@ import numpy as np
 from ..imaging.luminance import white_of
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
-from ..photo.photo import Photo, Raster, recoded, write_png
+from ..photo import Photo, Raster, encode_like
+from ..io.decoders import write_png
 from ..result_files.contact_sheet import Panel, Shown, edit_sheet
 from ..scene.decomposition import Decomposition
 from .clusters import Clusters
@@ -164,7 +165,7 @@ def _picture(
             image,
             photo.mask,
             photo.image,
-            recoded(original.raster, photo.original.transfer, image, changed),
+            encode_like(original.raster, photo.original.transfer, image, changed),
         )
     given = d.provenance.input
     bits, transfer = given.get("bit_depth", 8), str(given.get("transfer", "srgb"))
@@ -173,4 +174,4 @@ def _picture(
     empty = Raster(
         np.zeros(d.image.shape, kind), d.mask.astype(np.float32), peak, 32 if peak is None else bits
     )
-    return edit.image, d.mask, d.image, recoded(empty, transfer, edit.image, d.mask)
+    return edit.image, d.mask, d.image, encode_like(empty, transfer, edit.image, d.mask)

@@ -17,9 +17,12 @@ import cv2
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_file, require_writable_file
+from ..io.decoders import MIN_SIDE
 from ..io.limits import USUAL, Limits
-from .photo import MIN_SIDE, check_mask, linear_to_srgb, read_linear, tidy_mask
+from .masks import check_mask, tidy_mask
+from .reading import read_linear
 
 SOLVED_PIXELS = 1_000_000
 _SEED = 0

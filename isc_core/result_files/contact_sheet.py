@@ -20,7 +20,7 @@ from PIL import Image, ImageDraw, ImageFilter, ImageFont
 from ..errors import InputError
 from ..io.atomic import new_file
 from ..io.printable_names import readable
-from ..photo.photo import linear_to_srgb, srgb_to_linear
+from ..imaging.srgb import linear_to_srgb, srgb_to_linear
 from ..scene.decomposition import Decomposition, Separation
 from ..scene.lobe_fit import NO_LIGHT, LobeFit
 from ..shading.spherical_harmonics import real_sh

@@ -13,7 +13,7 @@ from ..io.exr import read_channels
 from ..io.json_files import numbers, read_json
 from ..io.limits import USUAL, Limits
 from ..io.npy import read_array
-from ..photo.photo import read_raster
+from ..photo import read_raster
 from .result_folder import load
 
 CODE = 1 / 64  # photo pixels to one code of an integer file: 16 bits reach 1024 pixels

@@ -46,7 +46,7 @@ from scipy import ndimage
 
 from ..errors import InputError
 from ..lobe_fitting.specular_level import NOT_FITTED, Gloss
-from ..photo.photo import linear_to_srgb
+from ..imaging.srgb import linear_to_srgb
 
 _BRIGHT = 0.9  # linear base colour that the 99.5th percentile of the reflectance is given
 _LEAST_DEPTH = (

@@ -24,7 +24,7 @@ from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.printable_names import readable
 from ..lobe_fitting.specular_upper_bound import shown_gloss
-from ..photo.photo import linear_to_srgb
+from ..imaging.srgb import linear_to_srgb
 from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.lobe_fit import LobeFit

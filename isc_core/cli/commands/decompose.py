@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from ...decompose.pipeline import Evidence, Settings, decompose
-from ...photo.photo import Photo, read_photo
+from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.known_inputs import read_height, read_light
 from ...result_files.result_folder import require_room, require_writable_result, save

@@ -28,14 +28,8 @@ from ...lobe_fitting.light_direction import (
     share_explained,
 )
 from ...networks.light_network import predict_light
-from ...photo.photo import (
-    TRANSFERS,
-    linear_to_srgb,
-    read_linear,
-    read_photo,
-    read_raster,
-    srgb_to_linear,
-)
+from ...photo import TRANSFERS, read_linear, read_photo, read_raster
+from ...imaging.srgb import linear_to_srgb, srgb_to_linear
 from ...progress import Monitor
 from ...result_files.contact_sheet import Panel
 from ...result_files.known_inputs import read_light

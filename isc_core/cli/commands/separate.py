@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...io.limits import Limits
-from ...photo.photo import Photo, read_linear, read_photo
+from ...photo import Photo, read_linear, read_photo
 from ...progress import Monitor
 from ...result_files.result_folder import require_writable_result, save_separation
 from ...scene.decomposition import Separation

@@ -18,7 +18,7 @@ from ...decompose.settings import (
 )
 from ...errors import InputError
 from ...io.limits import USUAL, Limits
-from ...photo.photo import TRANSFERS
+from ...photo import TRANSFERS
 from ...separation import METHODS
 
 Commands = Any  # what `add_subparsers` returns has no public name

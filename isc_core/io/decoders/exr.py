@@ -1,0 +1,82 @@
+"""OpenEXR files as photos: the RGB or Y channels of one layer, in the display window."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenEXR
+
+from ...errors import InputError
+from ..exr_header import check_exr, size_of
+from ..limits import Limits
+from ..native_io import memory_file
+from .raster import Raster, check_size, raster_of_codes
+
+
+def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
+    """The RGB or Y channels, and A, which EXR colours are premultiplied by; the frame is the
+    display window, black without data.
+    """
+    for claimed in check_exr(data, path, limits):
+        for window in (claimed.data, claimed.display):
+            check_size(path, limits, *size_of(window))
+    with memory_file(data) as place:
+        parts = OpenEXR.File(str(place), separate_channels=True).parts
+    if not parts:
+        raise ValueError("the pixels cannot be read")
+    layer = "{0}.{1}" if len(parts) > 1 else "{1}"
+    found = {
+        layer.format(part.name(), name): (channel.pixels, part.header)
+        for part in parts
+        for name, channel in part.channels.items()
+    }
+    names = _exr_channels(list(found), path)
+    if len({found[name][0].shape for name in names}) > 1:
+        raise InputError(f"{path}: its channels differ in size: save it as a plain RGB EXR")
+    planes = [_in_display_window(*found[name]) for name in names]
+    if len(planes) == 2:
+        planes = [planes[0]] * 3 + planes[1:]
+    depth = 8 * found[names[0]][0].dtype.itemsize
+    return replace(
+        raster_of_codes(np.stack(planes, axis=2), 0, premultiplied=True), bit_depth=depth
+    )
+
+
+def _exr_channels(names: list[str], path: Path) -> list[str]:
+    """R, G, B or Y, then A where there is one, of the layer without a name or of the only layer
+    that has them.
+    """
+    layers: dict[str, dict[str, str]] = {}
+    for name in names:
+        layer, _, channel = name.rpartition(".")
+        layers.setdefault(layer, {})[channel.upper()] = name
+    if len(names) == 1:
+        return names
+    for wanted in ("RGB", "Y"):
+        fitting = [
+            layer
+            for layer, channels in layers.items()
+            if set(wanted) <= channels.keys() and "RY" not in channels
+        ]
+        chosen = "" if "" in fitting else fitting[0] if len(fitting) == 1 else None
+        if chosen is not None:
+            return [layers[chosen][c] for c in wanted + "A" if c in layers[chosen]]
+        if fitting:
+            raise InputError(
+                f"{path}: which layer is the photo: {', '.join(fitting)}? Save that one as an EXR of its own"
+            )
+    raise InputError(
+        f"{path}: has no R, G, B and no Y channels but {', '.join(names[:8])}: save it as a plain RGB EXR"
+    )
+
+
+def _in_display_window(pixels: np.ndarray, header: dict[str, Any]) -> np.ndarray:
+    (low, _), (frame_low, frame_high) = header["dataWindow"], header["displayWindow"]
+    (x, y), (width, height) = low - frame_low, frame_high - frame_low + 1
+    left, right = max(x, 0), max(min(x + pixels.shape[1], width), 0)
+    top, bottom = max(y, 0), max(min(y + pixels.shape[0], height), 0)
+    frame = np.zeros((height, width), np.float32)
+    if right > left and bottom > top:
+        frame[top:bottom, left:right] = pixels[top - y : bottom - y, left - x : right - x]
+    return frame

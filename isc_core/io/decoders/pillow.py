@@ -1,0 +1,53 @@
+"""Images of 8 bits a channel, decoded by Pillow, and the EXIF orientation."""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from ...errors import InputError
+from ..limits import Limits
+from .raster import Raster, check_size, raster_of_codes
+
+_ORIENTATION_TAG = 0x0112
+
+
+def exif_orientation(image: Image.Image) -> int:
+    try:
+        return int(image.getexif().get(_ORIENTATION_TAG, 1))
+    except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
+        return (
+            1  # metadata that cannot be read says nothing about rotation; the pixels are still good
+        )
+
+
+def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool = False) -> Raster:
+    """`oriented`: the decoder turns the image itself.
+
+    Stricter than OpenCV: a file cut short raises OSError.
+    """
+    check_size(path, limits, *image.size)
+    if image.mode in ("CMYK", "LAB", "HSV"):
+        raise InputError(
+            f"{path}: its colours are {image.mode}, made for printing or editing: convert it to RGB, for example as a PNG"
+        )
+    orientation = 1 if oriented else exif_orientation(image)
+    image.load()
+    has_alpha = image.mode in ("LA", "La", "PA", "RGBA", "RGBa") or "transparency" in image.info
+    mode = "RGBA" if has_alpha else "L" if image.mode in ("1", "L") else "RGB"
+    if image.mode == "RGBa" or image.mode in (
+        "1",
+        "L",
+        "LA",
+        "PA",
+        "P",
+        "RGB",
+        "RGBA",
+        "RGBX",
+        "YCbCr",
+    ):
+        return raster_of_codes(np.asarray(image.convert(mode)), 255, orientation)
+    raise InputError(
+        f"{path}: pixels of kind {image.mode} are not read: convert it to an 8- or 16-bit PNG or an EXR"
+    )

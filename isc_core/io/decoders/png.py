@@ -1,0 +1,74 @@
+"""PNG files, of 8 and 16 bits; and writing them."""
+
+import errno
+import io
+import struct
+import zlib
+from pathlib import Path
+
+import cv2
+import numpy as np
+from PIL import PngImagePlugin
+
+from ..limits import Limits
+from .opencv import decode_opencv
+from .pillow import decode_pillow, exif_orientation
+from .raster import Raster, as_rgb, check_size, raster_of_codes
+
+
+def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
+    """16 bits go through OpenCV, for Pillow would cut RGB to 8; each chunk's checksum is verified
+    first, which decoders skip.
+    """
+    width, height, bits = struct.unpack(">IIB", data[16:25])
+    check_size(path, limits, width, height)
+    plain = _plain_png(data)
+    image = PngImagePlugin.PngImageFile(io.BytesIO(plain))
+    if bits == 16:
+        return raster_of_codes(decode_opencv(plain), 65535, exif_orientation(image))
+    return decode_pillow(image, path, limits)
+
+
+def _plain_png(data: bytes) -> bytes:
+    """The PNG with nothing but pixels, transparency and EXIF.
+
+    Raises ValueError for a wrong checksum or a missing end.
+    """
+    kept, at = [data[:8]], 8
+    while True:
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        chunk = data[at : at + 12 + length]
+        kind = chunk[4:8]
+        if (
+            len(chunk) < 12 + length
+            or zlib.crc32(chunk[4:-4]) != struct.unpack(">I", chunk[-4:])[0]
+        ):
+            raise ValueError("a PNG chunk is damaged")
+        if kind in (b"IHDR", b"PLTE", b"tRNS", b"eXIf", b"IDAT", b"IEND"):
+            kept.append(chunk)
+        if kind == b"IEND":
+            return b"".join(kept)
+        at += 12 + length
+
+
+def write_png(path: Path, raster: Raster) -> None:
+    """Writes integer codes and their alpha as a PNG of 8 or 16 bits, as they are.
+
+    Raises `OSError` when it cannot be written.
+    """
+    assert raster.peak is not None, "floats have no codes"
+    kind = raster.values.dtype
+    planes = (
+        as_rgb(raster.values)[..., ::-1]
+        if raster.alpha is not None or raster.values.shape[2] == 3
+        else raster.values
+    )
+    if raster.alpha is not None:
+        planes = np.concatenate(
+            [planes, np.rint(raster.alpha * float(np.iinfo(kind).max)).astype(kind)[..., None]],
+            axis=2,
+        )
+    done, data = cv2.imencode(".png", np.ascontiguousarray(planes))
+    if not done:
+        raise OSError(errno.EIO, "the PNG could not be coded")
+    path.write_bytes(data.tobytes())

@@ -1,0 +1,26 @@
+"""Portable pixmaps and graymaps (PPM, PGM), of 8 and 16 bits."""
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+from PIL import PpmImagePlugin
+
+from ..limits import Limits
+from .pillow import decode_pillow
+from .raster import Raster, check_size, raster_of_codes
+
+
+def read_pnm(data: bytes, path: Path, limits: Limits) -> Raster:
+    gap = rb"(?:\s|#[^\n]*\n)+"
+    header = re.match(rb"P([56])" + gap + rb"(\d+)" + gap + rb"(\d+)" + gap + rb"(\d+)\s", data)
+    if header is None or int(header[4]) < 256:
+        return decode_pillow(PpmImagePlugin.PpmImageFile(io.BytesIO(data)), path, limits)
+    width, height, peak = int(header[2]), int(header[3]), int(header[4])
+    check_size(path, limits, width, height)
+    channels = 3 if header[1] == b"6" else 1
+    codes = np.frombuffer(data, ">u2", width * height * channels, header.end()).astype(np.uint16)
+    if peak > 65535 or codes.max() > peak:
+        raise ValueError("codes above the stated maximum")
+    return raster_of_codes(codes.reshape(height, width, channels), peak)

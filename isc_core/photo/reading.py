@@ -1,0 +1,121 @@
+"""Reading a photo and its mask as linear light.
+
+Problem: files store codes (8 or 16 bits, mostly sRGB) or floats; everything behind this folder
+works on linear Rec.709 light with a mask.
+
+Limits: see `transfer` for colour spaces and `io.decoders` for file formats.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..imaging.srgb import srgb_to_linear
+from ..io.decoders import Raster, read_raster
+from ..io.decoders.raster import as_rgb
+from ..io.limits import USUAL, Limits
+from .masks import check_mask, find_mask, largest_channel
+from .photo import Photo, PhotoSource
+from .transfer import resolve_transfer, to_linear
+
+FLOAT_STEP = 2.0**-14
+_WILD = 1e9  # times the median light of the object: no source is that bright, a broken pixel is
+
+
+def read_photo(
+    path: str | Path,
+    mask_path: str | Path | None = None,
+    transfer: str = "auto",
+    *,
+    whole_frame: bool = False,
+    limits: Limits = USUAL,
+) -> Photo:
+    """Reads a photo at full size.
+
+    Files: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM, NumPy's .npy (its integers are codes),
+    told apart by their content. `transfer`: "srgb", "linear", or "auto" = floats linear, all others
+    sRGB. The mask is `mask_path` (inside = above half of its largest value, or its alpha channel
+    where that is not opaque); else the photo's alpha channel (>= 0.5) where that is not opaque;
+    else, on a black border (at most 2/255 in sRGB coding), the pixels that are not black: holes
+    filled, parts smaller than 1 % of the largest dropped. Where there is none of these,
+    `whole_frame` takes all pixels. Raises `InputError`, one line with the remedy, for anything that
+    cannot be used; what is beyond `limits` is told from the file's header.
+    """
+    raster = read_raster(path, limits)
+    used = resolve_transfer(transfer, raster)
+    _refuse_constant(raster.values, f"{path}: every pixel")
+    linear = to_linear(raster, used)
+    mask, mask_from = find_mask(path, raster, linear, mask_path, whole_frame, limits)
+    check_mask(mask, f"{path if mask_path is None else mask_path}: the mask")
+    _refuse_constant(raster.values[mask], f"{path}: every pixel inside the mask")
+    height, width = mask.shape
+    return Photo(
+        image=as_rgb(linear if raster.peak is not None else _valid_light(linear, mask, path)),
+        mask=mask,
+        code_value=_code_value(raster, used, linear, mask),
+        clipped=np.zeros_like(mask)
+        if raster.peak is None
+        else largest_channel(raster.values) == raster.peak,
+        original=PhotoSource(raster.sha256, (width, height), raster.bit_depth, used, mask_from),
+        exposed=raster.peak is not None,
+    )
+
+
+def read_linear(
+    path: str | Path, transfer: str = "auto", limits: Limits = USUAL, *, finite: bool = False
+) -> np.ndarray:
+    """The whole image without a mask: (H, W, 3) float32, linear Rec.709; what is not finite or
+    negative in a float file becomes 0.
+
+    Raises `InputError` as `read_photo` does, and with `finite` for values that are not.
+    """
+    raster = read_raster(path, limits)
+    if finite and not np.isfinite(raster.values).all():
+        raise InputError(
+            f"{path} holds NaN or infinite values: light that bright has to be clipped, or saved as 32-bit floats"
+        )
+    linear = as_rgb(to_linear(raster, resolve_transfer(transfer, raster)))
+    return np.where(np.isfinite(linear) & (linear > 0), linear, np.float32(0))
+
+
+def _refuse_constant(values: np.ndarray, what: str) -> None:
+    first = values.reshape(-1, values.shape[-1])[0]
+    if (values == first).all():
+        raise InputError(
+            f"{what} is {'the same' if first.any() else 'black'}: there is nothing to recover; use another photo"
+        )
+
+
+def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.ndarray:
+    """The image with zeros for unusable values outside the mask; raises `InputError` for those
+    inside.
+    """
+    brightest, wild = largest_channel(linear), f"brighter than {_WILD:g} times most of the object"
+    for bad, what in (
+        (~np.isfinite(linear).all(axis=2), "NaN or infinite"),
+        ((linear < 0).any(axis=2), "negative"),
+        (brightest > _WILD * _median_positive(brightest[mask]), wild),
+    ):
+        count = int((bad & mask).sum())
+        if count:
+            raise InputError(
+                f"{path}: {count} pixels inside the mask are {what}: mend them, or leave them out of the mask"
+            )
+        if bad.any():
+            linear = np.where(bad[..., None], np.float32(0), linear)
+    return linear
+
+
+def _median_positive(light: np.ndarray) -> float:
+    """The median of the values (N,) above 0, infinite where none is."""
+    light = light[light > 0]
+    return float(np.median(light)) if light.size else np.inf
+
+
+def _code_value(raster: Raster, transfer: str, linear: np.ndarray, mask: np.ndarray) -> float:
+    if raster.peak is None:
+        light = largest_channel(linear)[mask]
+        return FLOAT_STEP * float(np.percentile(light, 99.9) or light.max())
+    step = 1.0 / raster.peak
+    return float(srgb_to_linear(step)) if transfer == "srgb" else step
