@@ -6,12 +6,11 @@
     OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    once it ends
     OUT/.isc-batch/          lock, the run's name, the journal, records of attempts, fetched files
 
-The lock is the kernel's (`flock`): it ends with its process, however that ends, so that no stale
-file keeps anybody out.
+The lock (`filelock`) is the kernel's: it ends with its process, however that ends, so that no stale
+file locks anybody out. `owner` beside it names the process that holds it.
 """
 
 import contextlib
-import fcntl
 import os
 import shutil
 import socket
@@ -31,7 +30,8 @@ class RunFolder:
         self.output = output
         own = output / ".isc-batch"
         self.own, self.attempts, self.fetched = own, own / "attempts", own / "fetched"
-        self.lock, self.run, self.journal = own / "lock", own / "run", own / "journal.jsonl"
+        self.lock, self.owner = own / "lock", own / "owner"
+        self.run, self.journal = own / "run", own / "journal.jsonl"
         self.failures = output / "failures.jsonl"
         self.thumbnails, self.pages = output / "thumbnails", output / "summary-pages"
 
@@ -46,18 +46,19 @@ class RunFolder:
 
         Raises `InputError` where another process holds it, or it is not ours to write to.
         """
+        # Of the extra `batch`, as Dask: the other commands start without it.
+        from filelock import FileLock, Timeout
+
         self._make()
-        with self.lock.open("a+") as lock:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except OSError as error:
-                lock.seek(0)
-                raise InputError(
-                    f"{self.output} is being written by another run ({lock.read().strip()}): wait for its end"
-                ) from error
-            lock.truncate(0)
-            lock.write(f"process {os.getpid()} on {socket.gethostname()}\n")
-            lock.flush()
+        try:
+            lock = FileLock(self.lock).acquire(blocking=False)
+        except Timeout as error:
+            owner = self.owner.read_text().strip() if self.owner.exists() else "unknown"
+            raise InputError(
+                f"{self.output} is being written by another run ({owner}): wait until it ends"
+            ) from error
+        with lock:
+            self.owner.write_text(f"process {os.getpid()} on {socket.gethostname()}\n")
             self._tidy()
             self.run.write_text(run)
             try:
@@ -65,7 +66,7 @@ class RunFolder:
             finally:
                 self.run.unlink(missing_ok=True)
                 self._tidy()
-                lock.truncate(0)
+                self.owner.unlink(missing_ok=True)
 
     def runs(self, run: str) -> bool:
         """Whether this run holds the folder now, as seen from this machine."""

@@ -3,7 +3,6 @@ stands in the output.
 """
 
 import csv
-import fcntl
 import html
 import itertools
 import json
@@ -12,6 +11,7 @@ from pathlib import Path
 
 import fsspec
 import pytest
+from filelock import FileLock
 
 from isc_core.batch import run as run_module
 from isc_core.batch.engine import Crew
@@ -23,7 +23,7 @@ from isc_core.decompose.pipeline import decompose
 from isc_core.decompose.settings import Settings
 from isc_core.errors import Cancelled, InputError
 from isc_core.io.limits import Limits
-from isc_core.photo.photo import read_photo
+from isc_core.photo import read_photo
 from isc_core.progress import Monitor
 from isc_core.result_files.result_folder import DECOMPOSITION_FILES, load, save
 from tests.batch.conftest import HERE, QUICK, batch, rows
@@ -115,10 +115,8 @@ def test_what_a_killed_run_left_is_tidied(made: Path, photos: Path) -> None:
 
 
 def test_two_runs_into_one_folder(made: Path, photos: Path) -> None:
-    with (made / ".isc-batch" / "lock").open("a") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        with pytest.raises(InputError, match="another run"):
-            run_batch(batch(photos, output=made))
+    with FileLock(made / ".isc-batch" / "lock"), pytest.raises(InputError, match="another run"):
+        run_batch(batch(photos, output=made))
     assert run_batch(batch(photos, output=made))[SKIPPED] == 3
 
 
