@@ -1,17 +1,39 @@
-"""How long work reports its progress and learns that it should stop.
+"""Progress and cancellation of long work.
 
-The core receives one `progress(stage, fraction)` and one `cancelled()`; terminals, panels and batch
-runners adapt them.
+The core receives one `Monitor`: it sends `ProgressEvent` objects and asks whether to stop.
+Terminals, Blender's panels and batch runners adapt it.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .errors import Cancelled
 
 
-def _ignore(stage: str, fraction: float) -> None:
-    del stage, fraction
+@dataclass(frozen=True)
+class ProgressEvent:
+    """How far a job is.
+
+    Attributes
+    ----------
+    stage : str
+        Name of the current stage; constant while the stage lasts.
+    fraction : float
+        Completed share of the whole job, in [0, 1].
+    detail : str
+        What changes within the stage, such as the loss or the time left; may be empty.
+    """
+
+    stage: str
+    fraction: float
+    detail: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.stage}, {self.detail}" if self.detail else self.stage
+
+
+def _ignore(event: ProgressEvent) -> None:
+    del event
 
 
 def _never() -> bool:
@@ -22,21 +44,38 @@ def _never() -> bool:
 class Monitor:
     """The pair of callbacks that goes through the core.
 
-    `progress(stage, fraction)`: a stage's text for people, and how much of the whole job is done,
-    in [0, 1]. `cancelled()`: true once the user wants to stop.
+    Attributes
+    ----------
+    progress : callable
+        Receives a `ProgressEvent`.
+    cancelled : callable
+        Returns True once the user asks to stop.
     """
 
-    progress: Callable[[str, float], None] = _ignore
+    progress: Callable[[ProgressEvent], None] = _ignore
     cancelled: Callable[[], bool] = _never
 
-    def report(self, stage: str, fraction: float) -> None:
-        """Passes progress on. Raises `Cancelled` when the user asked to stop."""
+    def report(self, stage: str, fraction: float, detail: str = "") -> None:
+        """Send a `ProgressEvent`.
+
+        Parameters
+        ----------
+        stage, fraction, detail
+            See `ProgressEvent`.
+
+        Raises
+        ------
+        Cancelled
+            If the user asked to stop.
+        """
         if self.cancelled():
             raise Cancelled(stage)
-        self.progress(stage, fraction)
+        self.progress(ProgressEvent(stage, fraction, detail))
 
     def part(self, start: float, end: float) -> "Monitor":
-        """A monitor whose [0, 1] is the range [start, end] of this one."""
-        return Monitor(
-            lambda stage, f: self.progress(stage, start + (end - start) * f), self.cancelled
-        )
+        """Return a monitor whose fractions 0 to 1 are the range `start` to `end` of this one."""
+
+        def scaled(event: ProgressEvent) -> None:
+            self.progress(replace(event, fraction=start + (end - start) * event.fraction))
+
+        return Monitor(scaled, self.cancelled)

@@ -156,7 +156,7 @@ class _Pace:
         counts, total = self._journal.counts, self._journal.total
         reached = sum(counts.values())
         self._monitor.report(
-            f"images, done {counts['done']}, {self._told(total - reached)}", reached / total
+            "images", reached / total, f"done {counts['done']}, {self._told(total - reached)}"
         )
 
     def _told(self, left: int) -> str:

@@ -145,7 +145,7 @@ def _steps(stage: str, monitor: Monitor) -> Callable[[float], None]:
     count = itertools.count(1)
 
     def on_step(loss: float) -> None:
-        monitor.report(f"{stage}, loss {loss:.4f}", 1 - 0.98 ** next(count))
+        monitor.report(stage, 1 - 0.98 ** next(count), f"loss {loss:.4f}")
 
     return on_step
 

@@ -19,9 +19,9 @@ from typing import Any
 
 from isc_core.errors import InputError
 from isc_core.io.atomic import new_file, require_writable_file
-from isc_core.progress import Monitor
+from isc_core.progress import Monitor, ProgressEvent
 
-from ..capture.recipe import Picture, Recipe, Sources, photograph
+from ..capture.recipe import PictureSettings, Recipe, Sources, photograph
 from ..rendering.bsdfs import load_drjit
 from ..scene.variant import has_llvm, load_mitsuba
 from .card import card
@@ -40,7 +40,7 @@ _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
 @dataclass(frozen=True)
-class Run:
+class DatasetSettings:
     """A data set: the scenes of the seeds `seed` ... `seed` + `count` - 1, drawn from `choices`,
     taken as `picture` says, with the files of `sources`. Raises `InputError` for an impossible
     count or seed.
@@ -49,7 +49,7 @@ class Run:
     count: int
     seed: int = 0
     choices: Choices = field(default_factory=Choices)
-    picture: Picture = field(default_factory=Picture)
+    picture: PictureSettings = field(default_factory=PictureSettings)
     sources: Sources = field(default_factory=Sources)
 
     def __post_init__(self) -> None:
@@ -60,7 +60,7 @@ class Run:
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedScene:
     """One scene to be made, and its split."""
 
     split: str
@@ -68,14 +68,14 @@ class Planned:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class DatasetOutcome:
     """How many scenes were `made`, and how many were there already and `kept`."""
 
     made: int
     kept: int
 
 
-def plan(run: Run) -> tuple[Planned, ...]:
+def plan(run: DatasetSettings) -> tuple[PlannedScene, ...]:
     """All scenes of a run, in the order of their seeds.
 
     Raises `InputError` for splits and sources that cannot be had.
@@ -83,12 +83,12 @@ def plan(run: Run) -> tuple[Planned, ...]:
     pools = make_pools(run.choices, run.sources)
     seeds = range(run.seed, run.seed + run.count)
     return tuple(
-        Planned(pools.split_of(seed), pools.recipe(seed, run.picture, run.sources))
+        PlannedScene(pools.split_of(seed), pools.recipe(seed, run.picture, run.sources))
         for seed in seeds
     )
 
 
-def make_dataset(run: Run, out: Path, monitor: Monitor | None = None) -> Outcome:
+def make_dataset(run: DatasetSettings, out: Path, monitor: Monitor | None = None) -> DatasetOutcome:
     """Makes the scenes of `run` that `out` lacks.
 
     Raises `InputError` where `out` holds anything else, and `Cancelled`.
@@ -107,19 +107,20 @@ def make_dataset(run: Run, out: Path, monitor: Monitor | None = None) -> Outcome
         _write_root(out, run, settings, planned, complete=False)
     _make(missing, len(planned), out, monitor.part(_LOOKING, 1.0))
     _write_root(out, run, settings, planned, complete=True)
-    return Outcome(len(missing), len(planned) - len(missing))
+    return DatasetOutcome(len(missing), len(planned) - len(missing))
 
 
-def _make(missing: list[Planned], total: int, out: Path, monitor: Monitor) -> None:
+def _make(missing: list[PlannedScene], total: int, out: Path, monitor: Monitor) -> None:
     begin = time.monotonic()
     for index, scene in enumerate(missing):
-        text = f"scene {total - len(missing) + index + 1} of {total}{_time_left(time.monotonic() - begin, index, len(missing))}"
+        text = f"scene {total - len(missing) + index + 1} of {total}"
+        left = _time_left(time.monotonic() - begin, index, len(missing))
         within = monitor.part(index / len(missing), (index + 1) / len(missing))
-        within.report(text, 0.0)
+        within.report(text, 0.0, left)
         scene_itself, truth = photograph(
-            scene.recipe, Monitor(_constant(text, within), within.cancelled)
+            scene.recipe, Monitor(_constant(text, left, within), within.cancelled)
         )
-        within.report(text, 0.9)
+        within.report(text, 0.9, left)
         write_scene(
             out / scene.split / scene.recipe.name, scene.split, scene.recipe, scene_itself, truth
         )
@@ -138,9 +139,9 @@ def _tidy(index: int) -> None:
         drjit.flush_malloc_cache()
 
 
-def _constant(text: str, monitor: Monitor) -> Callable[[str, float], None]:
+def _constant(text: str, left: str, monitor: Monitor) -> Callable[[ProgressEvent], None]:
     """Progress inside a scene, under the scene's own text; files take the last tenth."""
-    return lambda stage, fraction: monitor.progress(text, 0.9 * fraction)
+    return lambda event: monitor.progress(ProgressEvent(text, 0.9 * event.fraction, left))
 
 
 def _time_left(seconds: float, done: int, total: int) -> str:
@@ -148,10 +149,10 @@ def _time_left(seconds: float, done: int, total: int) -> str:
     if not done:
         return ""
     left = seconds / done * (total - done)
-    return f", {left:.0f} s left" if left < 90 else f", {left / 60:.0f} min left"
+    return f"{left:.0f} s left" if left < 90 else f"{left / 60:.0f} min left"
 
 
-def is_finished(folder: Path, scene: Planned) -> bool:
+def is_finished(folder: Path, scene: PlannedScene) -> bool:
     """Whether the folder holds this very scene, undamaged."""
     try:
         content = read_description(folder)
@@ -163,7 +164,7 @@ def is_finished(folder: Path, scene: Planned) -> bool:
     )
 
 
-def describe_run(run: Run) -> dict[str, Any]:
+def describe_run(run: DatasetSettings) -> dict[str, Any]:
     """What decides the scenes of a run, whatever their number: two runs are the same where this is
     equal.
     """
@@ -238,7 +239,12 @@ def _described(path: Path | None) -> dict[str, str] | None:
 
 
 def _write_root(
-    out: Path, run: Run, settings: dict[str, Any], planned: tuple[Planned, ...], *, complete: bool
+    out: Path,
+    run: DatasetSettings,
+    settings: dict[str, Any],
+    planned: tuple[PlannedScene, ...],
+    *,
+    complete: bool,
 ) -> None:
     """`manifest.json` and `README.md`; what says so already is left alone."""
     counted = Counter(scene.split for scene in planned)
@@ -263,7 +269,7 @@ def _write_root(
                 partial.write_bytes(content)
 
 
-def _listed(scene: Planned) -> dict[str, Any]:
+def _listed(scene: PlannedScene) -> dict[str, Any]:
     recipe = scene.recipe
     return {
         "name": recipe.name,

@@ -7,7 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from isc_core.photo.photo import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb
 from tests.core.ball_scene import ball
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -148,7 +148,7 @@ def test_grey_photos() -> None:
 def test_stops_when_asked() -> None:
     image, _, mask = glossy_scene()
     seen: list[float] = []
-    separate(image, mask, monitor=Monitor(lambda stage, fraction: seen.append(fraction)))
+    separate(image, mask, monitor=Monitor(lambda event: seen.append(event.fraction)))
     assert seen == sorted(seen) and len(seen) > 2
     with pytest.raises(Cancelled):
         separate(image, mask, monitor=Monitor(cancelled=lambda: len(seen) > 0))

@@ -22,9 +22,10 @@ from isc_core.cli.main import main
 from isc_core.datasets.mit_berkeley import load_object
 from isc_core.errors import Cancelled, InputError
 from isc_core.evaluation.runner import RunnerOptions, make_runner
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.io.exr import read_channels, write_channels
-from isc_core.photo.photo import linear_to_srgb, read_photo
-from isc_core.progress import Monitor
+from isc_core.photo import read_photo
+from isc_core.progress import Monitor, ProgressEvent
 from isc_core.result_files.known_inputs import CODE, read_height, read_light
 from isc_core.result_files.result_folder import load
 from isc_core.separation import BEST, separate
@@ -563,7 +564,7 @@ def interruptible() -> Iterator[None]:
 @pytest.mark.usefixtures("interruptible")
 def test_the_first_interrupt_asks_and_the_second_insists() -> None:
     with Interrupts() as interrupts:
-        monitor = interrupts.monitor(lambda stage, fraction: None)
+        monitor = interrupts.monitor(lambda event: None)
         monitor.report("work", 0.0)
         signal.raise_signal(signal.SIGINT)
         with pytest.raises(Cancelled):
@@ -578,7 +579,7 @@ def test_an_ignored_interrupt_stays_ignored() -> None:
     try:
         with Interrupts() as interrupts:
             signal.raise_signal(signal.SIGINT)
-            interrupts.monitor(lambda stage, fraction: None).report("work", 0.0)
+            interrupts.monitor(lambda event: None).report("work", 0.0)
     finally:
         signal.signal(signal.SIGINT, before)
 
@@ -653,8 +654,10 @@ def through_terminal(script: str) -> str:
 def test_a_terminal_shows_one_line_that_is_wiped_at_the_end() -> None:
     text = through_terminal(
         "import sys; from isc_core.cli.interface.terminal import ProgressBar\n"
+        "from isc_core.progress import ProgressEvent as E\n"
         "with ProgressBar(sys.stderr) as bar:\n"
-        "    bar('separating', 0.25); bar('shape and light, loss 46.100', 0.5); bar('maps ' + 99 * '.', 0.4)\n"
+        "    bar(E('separating', 0.25)); bar(E('shape and light', 0.5, 'loss 46.100'))\n"
+        "    bar(E('maps ' + 99 * '.', 0.4))\n"
     )
     assert "\n" not in text
     frames = text.split("\r\x1b[K")[1:]
@@ -668,8 +671,9 @@ def test_a_terminal_is_not_redrawn_for_every_step() -> None:
     start = time.monotonic()
     text = through_terminal(
         "import sys; from isc_core.cli.interface.terminal import ProgressBar\n"
+        "from isc_core.progress import ProgressEvent as E\n"
         "with ProgressBar(sys.stderr) as bar:\n"
-        "    for k in range(20000): bar(f'shape and light, loss {k}', k / 20000)\n"
+        "    for k in range(20000): bar(E('shape and light', k / 20000, f'loss {k}'))\n"
     )
     assert 2 <= text.count("\r") <= 3 + (time.monotonic() - start) / 0.08
 
@@ -677,8 +681,8 @@ def test_a_terminal_is_not_redrawn_for_every_step() -> None:
 def test_a_file_gets_a_line_for_each_stage(tmp_path: Path) -> None:
     with (tmp_path / "log").open("w") as log, ProgressBar(log) as bar:
         for loss in (3.0, 2.0, 1.0):
-            bar(f"shape and light, loss {loss}", 0.1)
-        bar("maps", 0.9)
+            bar(ProgressEvent("shape and light", 0.1, f"loss {loss}"))
+        bar(ProgressEvent("maps", 0.9))
     assert (tmp_path / "log").read_text() == "isc: shape and light\nisc: maps\n"
 
 
@@ -717,7 +721,7 @@ def test_the_first_compilation_is_announced(monkeypatch: pytest.MonkeyPatch) -> 
     from isc_core.sirfs import kernel_cache
 
     stages: list[str] = []
-    monitor = Monitor(lambda stage, fraction: stages.append(stage))
+    monitor = Monitor(lambda event: stages.append(event.stage))
     for compiled in (True, False):
         monkeypatch.setattr(kernel_cache, "kernels_compiled", lambda known=compiled: known)
         kernel_cache.announce_compilation("auto", monitor)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.photo.photo import read_photo
+from isc_core.photo import read_photo
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import separate
 from isc_core.separation.support.layers import white_layers

@@ -14,7 +14,7 @@ from isc_core.decompose.assumption_checks import (
 )
 from isc_core.decompose.models import Answer
 from isc_core.networks.scene_classifier import GLASS, KINDS, LAMPS, MIRROR, ORDINARY
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Separation
 from isc_core.scene.light_estimate import PLACES, LightEstimate
 

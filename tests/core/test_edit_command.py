@@ -10,7 +10,7 @@ import pytest
 
 from isc_core.cli.main import main
 from isc_core.io.exr import read_channels, write_channels
-from isc_core.photo.photo import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.result_files.result_folder import save
 from tests.core.ball_scene import LIGHT, ball
 

@@ -16,14 +16,8 @@ from isc_core.editing.edited import Edited
 from isc_core.editing.recolour import Paint, recolour
 from isc_core.errors import InputError
 from isc_core.io.exr import read_channels, write_channels
-from isc_core.photo.photo import (
-    Photo,
-    PhotoSource,
-    linear_to_srgb,
-    read_linear,
-    read_photo,
-    read_raster,
-)
+from isc_core.photo import Photo, PhotoSource, read_linear, read_photo, read_raster
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.scene.decomposition import Decomposition, Provenance
 from tests.core.ball_scene import ball
 

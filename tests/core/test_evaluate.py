@@ -244,7 +244,7 @@ def test_progress_rises_and_cancelling_stops(root: Path) -> None:
         objects=["ball"],
         model="oracle",
         runner=oracle,
-        monitor=Monitor(lambda stage, f: seen.append((stage, f))),
+        monitor=Monitor(lambda event: seen.append((event.stage, event.fraction))),
     )
     fractions = [f for _, f in seen]
     assert fractions == [0, 0.25, 0.5, 0.75, 1] and "ball" in seen[0][0]

@@ -453,7 +453,7 @@ class TestFit:
             balls,
             environments,
             FAST,
-            Monitor(progress=lambda stage, fraction: seen.append(fraction)),
+            Monitor(progress=lambda event: seen.append(event.fraction)),
         )
         assert seen == sorted(seen)
         assert seen[-1] == 1

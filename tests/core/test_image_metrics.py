@@ -16,7 +16,7 @@ from isc_core.evaluation.image_metrics import (
     ssim,
     ssim_volume,
 )
-from isc_core.photo.photo import read_linear
+from isc_core.photo import read_linear
 from isc_core.separation.published import shen_2013
 
 

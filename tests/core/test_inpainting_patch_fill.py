@@ -83,7 +83,7 @@ def test_reports_and_stops() -> None:
     image = checks(60, 60)
     hole = disc(60, 60, 30, 30, 8)
     seen: list[float] = []
-    fill_patches(image, ~hole, hole, monitor=Monitor(lambda stage, fraction: seen.append(fraction)))
+    fill_patches(image, ~hole, hole, monitor=Monitor(lambda event: seen.append(event.fraction)))
     assert seen == sorted(seen) and len(seen) > 3 and 0 <= seen[0] <= seen[-1] <= 1
     with pytest.raises(Cancelled):
         fill_patches(image, ~hole, hole, monitor=Monitor(cancelled=lambda: True))

@@ -13,7 +13,7 @@ from isc_core.datasets.highlight_set import SeparationTruth, load_laboratory, lo
 from isc_core.errors import InputError
 from isc_core.evaluation.image_metrics import rank_correlation, sparsification, ssim_volume
 from isc_core.evaluation.metrics import psnr
-from isc_core.photo.photo import read_linear
+from isc_core.photo import read_linear
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import BEST, METHODS, isc, separate
@@ -199,7 +199,7 @@ def test_large_photos_are_judged_alike(size: tuple[int, int]) -> None:
         "isc",
         large.image,
         large.mask,
-        monitor=Monitor(lambda stage, fraction: told.append(fraction)),
+        monitor=Monitor(lambda event: told.append(event.fraction)),
     )
     assert error_ratio(split, large.image, large.diffuse, large.mask) < 0.02
     assert_layers_hold(split, large.image, large.mask)

@@ -11,12 +11,12 @@ from isc_core.decompose.joint import JointOptions, ResidualHighlights, doubt, jo
 from isc_core.decompose.mdr import mdr
 from isc_core.decompose.models import Settings, Task
 from isc_core.decompose.task import Answer
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.known_inputs import SceneConstraints
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
 from isc_core.shading.spherical_harmonics import light_to_reference
-from isc_core.sirfs.recover import Known
 from tests.core.ball_scene import ball
 
 LAMP = np.array([-0.42, 0.5, 0.757])
@@ -58,7 +58,7 @@ def task_of(d: Decomposition) -> Task:
     them.
     """
     photo = photo_of(d)
-    truth = Known(d.height.astype(float), light_to_reference(d.illumination))
+    truth = SceneConstraints(d.height.astype(float), light_to_reference(d.illumination))
     return Task(photo, photo, Settings(illumination="laboratory"), truth)
 
 

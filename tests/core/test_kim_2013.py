@@ -178,7 +178,7 @@ def test_progress_and_cancel() -> None:
         image,
         mask,
         Kim2013Options(rounds=3),
-        monitor=Monitor(lambda _, fraction: heard.append(fraction)),
+        monitor=Monitor(lambda event: heard.append(event.fraction)),
     )
     assert len(heard) == 6 and heard == sorted(heard) and heard[-1] <= 1
     with pytest.raises(Cancelled):

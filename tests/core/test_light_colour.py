@@ -12,7 +12,7 @@ from isc_core.decompose.models import Answer, Settings, Task
 from isc_core.decompose.pipeline import decompose
 from isc_core.errors import InputError
 from isc_core.illuminant.illuminant import estimate_illuminant
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Separation
 from isc_core.scene.lobe_fit import Interval, LobeFit, LobeLight
 from isc_core.separation import separate

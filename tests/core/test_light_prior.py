@@ -7,7 +7,7 @@ import pytest
 
 from isc_core.decompose.pipeline import Settings, decompose
 from isc_core.errors import InputError
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
 from tests.core.lit_balls import ball, under_lamps
 

@@ -172,7 +172,7 @@ def test_clipped_cores_are_filled_from_around() -> None:
 def test_progress_and_cancel() -> None:
     image, _, mask = plate()
     heard: list[float] = []
-    mallick_2006.separate(image, mask, monitor=Monitor(lambda _, fraction: heard.append(fraction)))
+    mallick_2006.separate(image, mask, monitor=Monitor(lambda event: heard.append(event.fraction)))
     assert heard == sorted(heard) and heard[0] >= 0 and heard[-1] <= 1
     with pytest.raises(Cancelled):
         mallick_2006.separate(image, mask, monitor=Monitor(cancelled=lambda: True))

@@ -11,7 +11,7 @@ from isc_core.decompose.lobe import HIDDEN, MATT, NOT_LOOKED_FOR
 from isc_core.decompose.mbp import split_reflectance
 from isc_core.decompose.pipeline import Evidence, Settings, decompose
 from isc_core.errors import InputError
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Decomposition
 from isc_core.separation import separate
@@ -157,7 +157,7 @@ def test_a_mask_without_an_inside_is_refused_before_the_work() -> None:
         decompose(
             replace(photo_of(d, d.image), mask=speckled),
             Settings(),
-            monitor=Monitor(lambda stage, share: stages.append(stage)),
+            monitor=Monitor(lambda event: stages.append(event.stage)),
         )
     assert stages == []
 

@@ -16,7 +16,7 @@ from scipy import ndimage
 
 from isc_core.errors import InputError
 from isc_core.lobe_fitting.specular_level import BOUND, FITTED, NOT_FITTED, Gloss
-from isc_core.photo.photo import srgb_to_linear
+from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.result_files.mesh import (
     MeshOptions,
     MeshResult,

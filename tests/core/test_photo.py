@@ -19,17 +19,9 @@ from PIL import Image
 
 from isc_core.errors import InputError
 from isc_core.io.limits import Limits
-from isc_core.photo.photo import (
-    Photo,
-    PhotoSource,
-    linear_to_srgb,
-    mask_box,
-    read_linear,
-    read_photo,
-    read_raster,
-    srgb_to_linear,
-    tidy_mask,
-)
+from isc_core.photo import Photo, PhotoSource, read_linear, read_photo, read_raster, tidy_mask
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
+from isc_core.imaging.bounding_box import mask_box
 
 H, W = 40, 52
 

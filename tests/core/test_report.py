@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from isc_core.lobe_fitting import fit_lobe
-from isc_core.photo.photo import srgb_to_linear
+from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.result_files.contact_sheet import (
     Answer,
     _title,

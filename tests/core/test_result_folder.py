@@ -13,7 +13,7 @@ from PIL import Image
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.lobe_fitting import fit_lobe
-from isc_core.photo.photo import srgb_to_linear
+from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.progress import Monitor
 from isc_core.result_files.result_folder import (
     DECOMPOSITION_FILES,
@@ -267,7 +267,7 @@ def test_maps_with_nan_are_never_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize("stage", ["writing maps", "building the mesh", "drawing the preview"])
 def test_a_cancelled_save_leaves_nothing(tmp_path: Path, stage: str) -> None:
     seen: list[str] = []
-    monitor = Monitor(lambda name, fraction: seen.append(name), lambda: stage in seen)
+    monitor = Monitor(lambda event: seen.append(event.stage), lambda: stage in seen)
     with pytest.raises(Cancelled):
         save(ball((24, 30), 9.0, (12, 15)), tmp_path / "out", monitor=monitor)
     assert seen[-1] == stage

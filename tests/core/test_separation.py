@@ -102,7 +102,7 @@ def test_progress_is_told_and_a_stop_is_heard(made: str) -> None:
     image, mask = framed()
     told = []
     separate(
-        made, image, mask, monitor=Monitor(lambda stage, fraction: told.append((stage, fraction)))
+        made, image, mask, monitor=Monitor(lambda event: told.append((event.stage, event.fraction)))
     )
     assert told == [("making", 0.5)]
     with pytest.raises(Cancelled):

@@ -93,7 +93,7 @@ def test_an_ordinary_photo(method: str, variant: str) -> None:
         image,
         mask,
         variant=variant,
-        monitor=Monitor(lambda stage, fraction: told.append(fraction)),
+        monitor=Monitor(lambda event: told.append(event.fraction)),
     )
     assert_sound(split, image, mask)
     assert method == "none" or split.specular.any()

@@ -18,6 +18,7 @@ from ...editing.recolour import Paint, recolour
 from ...editing.relight import HIGHLIGHTS, NewLight, Relighting, relight
 from ...editing.spheres import render_sphere, sphere_normals
 from ...errors import InputError
+from ...imaging.srgb import linear_to_srgb, srgb_to_linear
 from ...io.limits import Limits
 from ...io.npy import read_array
 from ...io.printable_names import readable
@@ -29,7 +30,6 @@ from ...lobe_fitting.light_direction import (
 )
 from ...networks.light_network import predict_light
 from ...photo import TRANSFERS, read_linear, read_photo, read_raster
-from ...imaging.srgb import linear_to_srgb, srgb_to_linear
 from ...progress import Monitor
 from ...result_files.contact_sheet import Panel
 from ...result_files.known_inputs import read_light

@@ -27,7 +27,8 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import TextIO
 
-from .terminal import discard_output, stage_name
+from ...progress import ProgressEvent
+from .terminal import discard_output
 
 _REPEAT_SECONDS = 0.05
 _PATIENCE_SECONDS = (1.0, 10.0)  # after asking, after interrupting
@@ -49,7 +50,7 @@ class JsonSpeaker:
         self._before: object = None
 
     @contextmanager
-    def progress(self, quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
         """Where the work reports to; it is told even to those who want no hints."""
         del quiet
         yield self._step
@@ -70,12 +71,17 @@ class JsonSpeaker:
         """The work was stopped, and left nothing."""
         self._say("cancelled")
 
-    def _step(self, stage: str, fraction: float) -> None:
-        name, now = stage_name(stage), time.monotonic()
-        self._most = max(self._most, min(fraction, 1.0))
-        if name != self._stage or now - self._told > _REPEAT_SECONDS:
-            self._stage, self._told = name, now
-            self._say("progress", stage=name, fraction=round(self._most, 4))
+    def _step(self, event: ProgressEvent) -> None:
+        now = time.monotonic()
+        self._most = max(self._most, min(event.fraction, 1.0))
+        if event.stage != self._stage or now - self._told > _REPEAT_SECONDS:
+            self._stage, self._told = event.stage, now
+            self._say(
+                "progress",
+                stage=event.stage,
+                fraction=round(self._most, 4),
+                detail=event.detail,
+            )
 
     def _say(self, event: str, **content: object) -> None:
         try:
@@ -98,7 +104,7 @@ class JsonSpeaker:
             threading.Thread(
                 target=self._watch, args=(descriptor,), name="isc-cancel", daemon=True
             ).start()
-        self._step("starting", 0.0)
+        self._step(ProgressEvent("starting", 0.0))
         return self
 
     def __exit__(

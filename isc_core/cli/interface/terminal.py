@@ -4,7 +4,6 @@ Ctrl-C.
 
 import contextlib
 import os
-import re
 import shutil
 import signal
 import sys
@@ -16,16 +15,10 @@ from types import FrameType, TracebackType
 from typing import TextIO
 
 from ...io.printable_names import readable
-from ...progress import Monitor
+from ...progress import Monitor, ProgressEvent
 
 _BAR = 24
 _REDRAW_SECONDS = 0.08
-_TIME_LEFT = re.compile(r", [0-9.]+ (s|min|h) left$")
-
-
-def stage_name(stage: str) -> str:
-    """A stage's text without its changing part: what comes after "loss", and how much time is left."""
-    return _TIME_LEFT.sub("", stage.partition(", loss")[0]).partition(", done")[0]
 
 
 def discard_output() -> None:
@@ -48,7 +41,7 @@ class TerminalSpeaker:
     """Speaks to a person: results on standard output, all else on standard error."""
 
     @contextmanager
-    def progress(self, quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
         """Where the work reports to while it lasts."""
         with ProgressBar(sys.stderr, quiet=quiet) as bar:
             yield bar
@@ -87,11 +80,16 @@ class TerminalSpeaker:
 
 
 class ProgressBar:
-    """Shows `progress(stage, fraction)` on `stream`: one line that is redrawn on a terminal, else a
-    line for each new stage.
+    """Show progress on `stream`: one line, redrawn, on a terminal; else a line for each new stage.
 
-    A stage's text may end in a changing part after a comma ("shape and light, loss 46.1"; "images,
-    done 7"). Use as a context manager: the line is wiped at the end, however the work ends.
+    Use as a context manager: the line is wiped at the end, however the work ends.
+
+    Parameters
+    ----------
+    stream : text file
+        Usually standard error.
+    quiet : bool
+        Show nothing.
     """
 
     def __init__(self, stream: TextIO, *, quiet: bool = False) -> None:
@@ -102,25 +100,24 @@ class ProgressBar:
         self._most = 0.0
         self._drawn = float("-inf")
 
-    def __call__(self, stage: str, fraction: float) -> None:
-        """Shows the stage; a bar never goes back."""
+    def __call__(self, event: ProgressEvent) -> None:
+        """Show an event; the bar never moves backwards."""
         if self._quiet:
             return
-        name = stage_name(stage)
-        new, self._stage = name != self._stage, name
-        self._most = max(self._most, min(fraction, 1.0))
+        new, self._stage = event.stage != self._stage, event.stage
+        self._most = max(self._most, min(event.fraction, 1.0))
         if self._live:
-            self._draw(stage, new)
+            self._draw(str(event), new)
         elif new:
-            print(f"isc: {name}", file=self._stream, flush=True)
+            print(f"isc: {event.stage}", file=self._stream, flush=True)
 
-    def _draw(self, stage: str, new: bool) -> None:
+    def _draw(self, text: str, new: bool) -> None:
         now = time.monotonic()
         if not new and now - self._drawn < _REDRAW_SECONDS:
             return
         self._drawn = now
         full = round(_BAR * self._most)
-        line = f"[{'#' * full}{'.' * (_BAR - full)}] {100 * self._most:3.0f} %  {stage}"
+        line = f"[{'#' * full}{'.' * (_BAR - full)}] {100 * self._most:3.0f} %  {text}"
         self._stream.write(f"\r\x1b[K{line[: shutil.get_terminal_size().columns - 1]}")
         self._stream.flush()
 
@@ -151,7 +148,7 @@ class Interrupts:
         self._asked = False
         self._before: dict[int, object] = {}
 
-    def monitor(self, progress: Callable[[str, float], None]) -> Monitor:
+    def monitor(self, progress: Callable[[ProgressEvent], None]) -> Monitor:
         """The monitor to work with."""
         return Monitor(progress, lambda: self._asked)
 

@@ -1,8 +1,8 @@
-"""Runs the stages over the scenes of a dataset: each stage by itself, then the chain under every
-combination of truths.
+"""Running the stages over the scenes of a data set: each stage in isolation, then the chain under
+every combination of ground truths.
 
-Scenes run side by side, a thread each: compiled kernels release the interpreter. What comes out
-does not depend on how many.
+Scenes run in parallel, one thread each; compiled kernels release the interpreter lock. Results do
+not depend on the number of threads.
 """
 
 import time
@@ -35,9 +35,22 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class ValidationOptions:
-    """`split`: the one to run, None for all. `scenes`: how many, drawn by `seed` without order; 0
-    for all. `stages`: which. `settings`: of the stages. `threads`: how many scenes at once, 0 for
-    one on each core.
+    """What a validation runs.
+
+    Attributes
+    ----------
+    split : str or None
+        The split to run, None for all.
+    scenes : int
+        How many scenes, drawn by `seed`; 0 for all.
+    stages : tuple of Stage
+        The stages; empty for all.
+    settings : StageOptions
+        Options of the stages.
+    seed : int
+        Seed of all random draws.
+    threads : int
+        How many scenes run at once, 0 for one per core.
     """
 
     split: str | None = None
@@ -50,7 +63,7 @@ class ValidationOptions:
 
 @dataclass(frozen=True)
 class StageResult:
-    """One stage's scores (a dataclass of its own) on one scene, and the seconds that it took."""
+    """One stage's scores (a dataclass of the stage) on one scene, and the run time in seconds."""
 
     stage: str
     scores: Any
@@ -59,8 +72,18 @@ class StageResult:
 
 @dataclass(frozen=True)
 class SceneResult:
-    """What was measured on one scene. `chain`: None unless both of its stages were asked for.
-    `refused`: why the scene could not be run, empty where it could.
+    """The measurements of one scene.
+
+    Attributes
+    ----------
+    facts : SceneFacts
+        The scene's properties.
+    stages : tuple of StageResult
+        One per stage.
+    chain : ChainScores or None
+        None unless both of its stages were run.
+    refused : str
+        Why the scene could not be run, empty if it could.
     """
 
     facts: SceneFacts
@@ -69,22 +92,34 @@ class SceneResult:
     refused: str = ""
 
     def scores(self, stage: str) -> Any | None:
-        """A stage's scores, None where it was not run."""
+        """Return a stage's scores, None if it was not run."""
         return next((result.scores for result in self.stages if result.stage == stage), None)
 
 
 def choose_scenes(root: Path, options: ValidationOptions) -> tuple[Path, ...]:
-    """The folders of the scenes to run, in their order in the dataset.
+    """Return the folders of the scenes to run, in the order of the data set.
 
-    Raises `InputError` where there are none.
+    Parameters
+    ----------
+    root : Path
+        Folder of the data set.
+    options : ValidationOptions
+        Split and number of scenes.
+
+    Returns
+    -------
+    tuple of Path
+        The folders.
+
+    Raises
+    ------
+    InputError
+        If there are none.
     """
     folders = list_scenes(root, options.split)
     if not folders:
-        raise InputError(
-            f"{root} holds no scenes"
-            + (f" of the split {options.split!r}" if options.split else "")
-            + ": make some by isc synth"
-        )
+        split = f" of the split {options.split!r}" if options.split else ""
+        raise InputError(f"{root} has no scenes{split}: render some with isc synth")
     if not options.scenes or options.scenes >= len(folders):
         return folders
     chosen = np.random.default_rng(options.seed).choice(
@@ -96,7 +131,29 @@ def choose_scenes(root: Path, options: ValidationOptions) -> tuple[Path, ...]:
 def run_scenes(
     folders: Sequence[Path], options: ValidationOptions, monitor: Monitor
 ) -> tuple[SceneResult, ...]:
-    """Measures scenes. Raises `InputError` for a folder that cannot be read, `Cancelled`."""
+    """Measure scenes.
+
+    Parameters
+    ----------
+    folders : sequence of Path
+        The scenes.
+    options : ValidationOptions
+        What to run.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    tuple of SceneResult
+        In the order of `folders`.
+
+    Raises
+    ------
+    InputError
+        If a folder cannot be read.
+    Cancelled
+        If the user cancels.
+    """
     announce_compilation("auto", monitor)
     stages = options.stages or all_stages()
 
@@ -113,7 +170,31 @@ def measure_scene(
     settings: StageOptions,
     monitor: Monitor,
 ) -> SceneResult:
-    """Every stage by itself on one scene, and the chain if both of its stages are among them."""
+    """Run every stage in isolation on one scene, and the chain if both of its stages are present.
+
+    Parameters
+    ----------
+    facts : SceneFacts
+        The scene's properties.
+    truth : GroundTruth
+        Its ground truth.
+    stages : sequence of Stage
+        The stages.
+    settings : StageOptions
+        Options of the stages.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    SceneResult
+        The scores, or why the scene could not be run.
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
+    """
     answers: dict[str, Any] = {}
     results = []
     try:
@@ -141,9 +222,32 @@ def side_by_side(
     what: str,
     monitor: Monitor,
 ) -> tuple[Result, ...]:
-    """`task` of every item, in the items' order, some at once.
+    """Process items in parallel threads.
 
-    Raises what a task raised, and `Cancelled`.
+    Parameters
+    ----------
+    task : callable
+        ``task(item, monitor)``.
+    items : sequence
+        The items.
+    threads : int
+        How many at once, 0 for one per core.
+    what : str
+        Name of the work in progress reports.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    tuple
+        The results in the order of `items`.
+
+    Raises
+    ------
+    Exception
+        What a task raised.
+    Cancelled
+        If the user cancels.
     """
     quiet = Monitor(cancelled=monitor.cancelled)
     results: dict[int, Result] = {}
@@ -156,8 +260,9 @@ def side_by_side(
         try:
             while waiting:
                 monitor.report(
-                    f"{what}{_time_left(time.monotonic() - start, len(results), len(items))}",
+                    what,
                     len(results) / len(items),
+                    _time_left(time.monotonic() - start, len(results), len(items)),
                 )
                 done, waiting = wait(waiting, _POLL_SECONDS, FIRST_COMPLETED)
                 results.update({futures[future]: future.result() for future in done})
@@ -167,10 +272,10 @@ def side_by_side(
 
 
 def _time_left(seconds: float, done: int, total: int) -> str:
-    """How far the work is and, after the first item, how long the rest may take."""
+    """How many scenes are done and, after the first, the estimated remaining time."""
     if not done:
-        return f" {total} scenes"
+        return f"{total} scenes"
     left = seconds / done * (total - done)
-    return f" {done} of {total}" + (
+    return f"{done} of {total}" + (
         f", {left:.0f} s left" if left < 90 else f", {left / 60:.0f} min left"
     )

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
+from isc_core.scene.known_inputs import DepthObservation
 from isc_core.shading.irradiance_basis import basis
 from isc_core.shading.occluding_contour import occluding_contour
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.priors.priors import AbsoluteTable, Light, Priors, SilhouetteProfile
 from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
-from isc_core.sirfs.problem import DepthObservation, Problem
+from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
 from isc_core.sirfs.silhouette import silhouette_field
 
@@ -186,10 +187,10 @@ def make_problem(
     )
 
 
-def some_trust(shape: tuple[int, ...]) -> np.ndarray:
-    """How far pixels of a photo may be trusted: between 0 and 1, not at all in places."""
-    trust = np.random.default_rng(12).uniform(-0.3, 1, shape)
-    return np.maximum(trust, 0)
+def some_pixel_weight(shape: tuple[int, ...]) -> np.ndarray:
+    """How far pixels of a photo may be weighted: between 0 and 1, not at all in places."""
+    weight = np.random.default_rng(12).uniform(-0.3, 1, shape)
+    return np.maximum(weight, 0)
 
 
 def random_state(

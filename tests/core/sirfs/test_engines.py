@@ -7,11 +7,12 @@ import pytest
 
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.numerics.thread_pool import Workers
+from isc_core.scene.known_inputs import DepthObservation
 from isc_core.sirfs.numpy_engine import NumpyEngine
-from isc_core.sirfs.problem import DepthObservation, Problem
+from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.solver import SolverOptions, solve
 
-from .small_problems import blob, make_problem, random_state, some_trust, weights
+from .small_problems import blob, make_problem, random_state, some_pixel_weight, weights
 
 numba_engine = pytest.importorskip(
     "isc_core.sirfs.numba_engine", reason="needs numba", exc_type=ImportError
@@ -19,8 +20,8 @@ numba_engine = pytest.importorskip(
 
 KINDS = {
     "colour": (3, False),
-    "trusted": (3, False),
-    "grey trusted": (1, False),
+    "weighted": (3, False),
+    "grey weighted": (1, False),
     "grey": (1, False),
     "shading only": (3, True),
     "grey shading only": (1, True),
@@ -41,7 +42,7 @@ def problem_of(kind: str) -> Problem:
         holes=True,
         outline=True,
     )
-    return replace(problem, trust=some_trust(scene.mask.shape) if "trusted" in kind else None)
+    return replace(problem, pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in kind else None)
 
 
 def states(problem: Problem, dtype: type[np.floating]) -> list[tuple[np.ndarray, np.ndarray]]:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
+from isc_core.scene.known_inputs import DepthObservation
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
-from isc_core.sirfs.problem import DepthObservation, Problem, Terms
+from isc_core.sirfs.problem import Problem, Terms
 from isc_core.sirfs.solver import Engine
 
-from .small_problems import blob, make_problem, only, random_state, some_trust, weights
+from .small_problems import blob, make_problem, only, random_state, some_pixel_weight, weights
 
 TERMS = (
     "smoothness",
@@ -51,7 +52,7 @@ def coarser(table: TabulatedPotential) -> TabulatedPotential:
 def problem_of(term: str, channels: int) -> Problem:
     scene = blob((38, 45), channels)
     seen = None
-    everything = term in ("all", "all, some trusted less")
+    everything = term in ("all", "all, some weighted less")
     if term == "observation" or everything:
         rng = np.random.default_rng(8)
         heights = np.where(
@@ -73,7 +74,7 @@ def problem_of(term: str, channels: int) -> Problem:
         priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness)
     )
     return replace(
-        problem, priors=priors, trust=some_trust(scene.mask.shape) if "trusted" in term else None
+        problem, priors=priors, pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in term else None
     )
 
 
@@ -98,7 +99,7 @@ def difference(
 
 @pytest.mark.parametrize("channels", [3, 1])
 @pytest.mark.parametrize("engine", ["numpy", pytest.param("numba", marks=numba_only)])
-@pytest.mark.parametrize("term", [*TERMS, "all", "all, some trusted less"])
+@pytest.mark.parametrize("term", [*TERMS, "all", "all, some weighted less"])
 def test_gradient_is_the_slope(term: str, engine: str, channels: int) -> None:
     problem = problem_of(term, channels)
     shape: tuple[int, int] = problem.valid.shape  # type: ignore[assignment]
@@ -138,11 +139,11 @@ def test_what_trust_means(engine: str, shading_only: bool) -> None:
     """
     problem = make_problem(blob((30, 34)), shading_only=shading_only)
     height, light = random_state((30, 34), 3, 4)
-    doubtful = some_trust((30, 34)) == 0
+    doubtful = some_pixel_weight((30, 34)) == 0
 
-    def terms(trust: np.ndarray | None, valid: np.ndarray = problem.valid) -> Terms:
+    def terms(pixel_weight: np.ndarray | None, valid: np.ndarray = problem.valid) -> Terms:
         return (
-            make_engine(engine, replace(problem, trust=trust, valid=valid))
+            make_engine(engine, replace(problem, pixel_weight=pixel_weight, valid=valid))
             .evaluate(height, light)
             .terms
         )

@@ -10,9 +10,9 @@ import pytest
 from isc_core.errors import Cancelled
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.progress import Monitor
+from isc_core.scene.known_inputs import DepthObservation, SceneConstraints
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.problem import DepthObservation
-from isc_core.sirfs.recover import Known, Recovered, RecoverOptions, recover
+from isc_core.sirfs.recover import Recovered, RecoverOptions, recover
 from isc_core.sirfs.solver import SolverOptions
 
 from .small_problems import Scene, blob, made_priors, weights
@@ -23,7 +23,9 @@ SOLVER = SolverOptions(threads=1, lbfgs=SOME)
 OPTIONS = RecoverOptions(solve_size=0, solver=SOLVER)
 
 
-def run(scene: Scene, options: RecoverOptions = OPTIONS, known: Known | None = None) -> Recovered:
+def run(
+    scene: Scene, options: RecoverOptions = OPTIONS, known: SceneConstraints | None = None
+) -> Recovered:
     return recover(
         scene.image,
         scene.mask,
@@ -158,11 +160,11 @@ def test_solving_at_another_size_keeps_the_shape() -> None:
 def test_what_is_known_comes_back_as_it_was_given(solve_size: int) -> None:
     scene = blob()
     options = replace(OPTIONS, solve_size=solve_size)
-    shaped = run(scene, options, Known(height=scene.height + 11))
+    shaped = run(scene, options, SceneConstraints(height=scene.height + 11))
     np.testing.assert_array_equal(shaped.height[scene.mask], (scene.height + 11)[scene.mask])
-    lit = run(scene, options, Known(light=scene.light))
+    lit = run(scene, options, SceneConstraints(light=scene.light))
     np.testing.assert_array_equal(lit.light, scene.light)
-    both = run(scene, options, Known(height=scene.height, light=scene.light))
+    both = run(scene, options, SceneConstraints(height=scene.height, light=scene.light))
     np.testing.assert_array_equal(both.height[scene.mask], scene.height[scene.mask])
 
 
@@ -179,7 +181,9 @@ def test_depth_with_holes_pulls_the_height(solve_size: int, offset: float) -> No
         OPTIONS, solve_size=solve_size, solver=replace(SOLVER, lbfgs=LbfgsOptions(iterations=200))
     )
     plain = run(scene, options)
-    pulled = run(scene, options, Known(depth=DepthObservation(seen, sigma=1.0, weight=300.0)))
+    pulled = run(
+        scene, options, SceneConstraints(depth=DepthObservation(seen, sigma=1.0, weight=300.0))
+    )
     assert np.isfinite(pulled.height).all()
     away = [(r.height - target)[scene.mask] for r in (plain, pulled)]
     errors = [np.abs(a - np.median(a)).mean() for a in away]
@@ -208,7 +212,7 @@ def test_a_line_one_pixel_wide(solve_size: int) -> None:
 
 def test_shape_from_shading_mode() -> None:
     scene = blob(one_color=True)
-    result = run(scene, replace(OPTIONS, shading_only=True), Known(light=scene.light))
+    result = run(scene, replace(OPTIONS, shading_only=True), SceneConstraints(light=scene.light))
     assert result.terms.shading_only > 0 and result.terms.smoothness == 0
     where = inner(scene.mask)
     assert (

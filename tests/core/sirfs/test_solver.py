@@ -10,11 +10,11 @@ from scipy import ndimage
 from isc_core.errors import Cancelled, InputError
 from isc_core.numerics.lbfgs import LbfgsOptions
 from isc_core.progress import Monitor
+from isc_core.scene.known_inputs import DepthObservation
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.illumination import unstack
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors.priors import SilhouetteProfile
-from isc_core.sirfs.problem import DepthObservation
 from isc_core.sirfs.settings import Start
 from isc_core.sirfs.silhouette import silhouette_field
 from isc_core.sirfs.solver import MOST_THREADS, SirfsResult, SolverOptions, solve, thread_count
@@ -195,7 +195,7 @@ def test_progress_rises_from_0_to_1(size: tuple[int, int]) -> None:
     solve(
         make_problem(blob(size)),
         options,
-        monitor=Monitor(lambda stage, fraction: seen.append((stage, fraction))),
+        monitor=Monitor(lambda event: seen.append((event.stage, event.fraction))),
     )
     fractions = [f for _, f in seen]
     assert len(fractions) >= 7
@@ -300,7 +300,7 @@ def test_trying_starts_can_be_cancelled_and_does_not_pretend_to_advance() -> Non
     solve(
         problem,
         SolverOptions(threads=1),
-        monitor=Monitor(lambda stage, share: seen.append((stage, share))),
+        monitor=Monitor(lambda event: seen.append((event.stage, event.fraction))),
     )
     shares, losses = (
         [share for _, share in seen],
