@@ -18,8 +18,16 @@ from .bounding_box import mask_slices
 
 @dataclass(frozen=True)
 class AreaFilter:
-    """Integrates an (H, W) array over square pixels of side 1/factor, exactly; the last row and
-    column may reach past the image.
+    """Integrate an (H, W) array over square pixels of side 1 / factor, exactly.
+
+    The last row and column may reach past the image.
+
+    Attributes
+    ----------
+    rows, columns : sparse array
+        Overlap of new and old rows and columns.
+    full : (h, w) ndarray
+        Area of each new pixel that lies on the image.
     """
 
     rows: Any
@@ -28,6 +36,7 @@ class AreaFilter:
 
     @staticmethod
     def of(shape: tuple[int, ...], factor: float) -> "AreaFilter":
+        """Return the filter for images of `shape` (H, W), scaled by `factor` in (0, 1]."""
         rows, columns = _overlaps(shape[0], factor), _overlaps(shape[1], factor)
         return AreaFilter(rows, columns, np.outer(rows.sum(axis=1), columns.sum(axis=1)))
 
@@ -54,7 +63,7 @@ def _overlaps(count: int, factor: float) -> Any:
 def averaged_object(
     image: np.ndarray, mask: np.ndarray, long_side: int
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """`averaged` of the object's box, at most `long_side` pixels long."""
+    """Apply `averaged` to the box of an object so that its long side is at most `long_side` pixels."""
     box = mask_slices(mask)
     return averaged(image[box], mask[box], min(1.0, long_side / max(mask[box].shape)))
 
@@ -62,9 +71,24 @@ def averaged_object(
 def averaged(
     image: np.ndarray, mask: np.ndarray, factor: float
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """`image` (H, W, 3) and `mask` (H, W) bool, `factor` times as large, 0 < factor <= 1: means of
-    the mask's light over the new pixels, and the pixels of which the mask covers half, or any,
-    where that leaves none. Returns (h, w, 3) float32, (h, w) bool, and the factor.
+    """Downscale an image by averaging the light of the mask over each new pixel.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear light.
+    mask : (H, W) bool ndarray
+    factor : float
+        New size over old size; from 1 on nothing is resized.
+
+    Returns
+    -------
+    image : (h, w, 3) float32 ndarray
+        0 outside the new mask.
+    mask : (h, w) bool ndarray
+        Pixels of which the mask covers half, or any if that leaves none.
+    factor : float
+        The factor used.
     """
     if factor >= 1:
         return np.where(mask[..., None], image, 0).astype(np.float32), mask, 1.0
@@ -78,8 +102,19 @@ def averaged(
 def resize_apart(
     image: np.ndarray, mask: np.ndarray, new_mask: np.ndarray, area: AreaFilter
 ) -> np.ndarray:
-    """Means of `image` over the new pixels: of the object's pixels alone inside `new_mask`, of the
-    others alone outside.
+    """Downscale an image; pixels of the new mask average the object alone, all others the background.
+
+    Parameters
+    ----------
+    image : (H, W, C) ndarray
+    mask : (H, W) bool ndarray
+    new_mask : (h, w) bool ndarray
+    area : AreaFilter
+        From the old grid to the new one.
+
+    Returns
+    -------
+    (h, w, C) float32 ndarray
     """
     result = np.empty((*new_mask.shape, image.shape[2]), np.float32)
     weight = np.where(new_mask, area(mask), area(~mask))

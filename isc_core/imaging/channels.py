@@ -1,40 +1,65 @@
-"""The smallest, largest and mean channel of every pixel, three times faster than NumPy's reductions
-along so short an axis, and what methods ask of them: how coloured many pixels are together, and how
-far above their mean the smallest channel lies.
+"""Per-pixel statistics of colour channels.
+
+The smallest, largest and mean channel are computed three times faster than by NumPy's reductions
+along so short an axis.
 """
 
 import numpy as np
 
 
 def smallest(image: np.ndarray) -> np.ndarray:
-    """(...) of an image (..., 3)."""
+    """Return the smallest channel (...) of an image (..., 3)."""
     return np.minimum(np.minimum(image[..., 0], image[..., 1]), image[..., 2])
 
 
 def largest(image: np.ndarray) -> np.ndarray:
-    """(...) of an image (..., 3)."""
+    """Return the largest channel (...) of an image (..., 3)."""
     return np.maximum(np.maximum(image[..., 0], image[..., 1]), image[..., 2])
 
 
 def mean_channel(image: np.ndarray) -> np.ndarray:
-    """(...) of an image (..., 3)."""
+    """Return the mean channel (...) of an image (..., 3)."""
     return (image[..., 0] + image[..., 1] + image[..., 2]) / 3
 
 
 def saturation(colours: np.ndarray) -> float:
-    """The colour (largest minus smallest channel) of pixels (n, 3) together, over their largest
-    channels; zero for no pixel.
+    """Return the saturation of a set of pixels: summed chroma over summed largest channel.
 
-    In [0, 1]; strong pixels count most, and a highlight lowers it.
+    Strong pixels count most, and a highlight lowers it.
+
+    Parameters
+    ----------
+    colours : (n, 3) ndarray
+
+    Returns
+    -------
+    float
+        In [0, 1]; 0 for no pixel.
     """
     high = largest(colours).sum(dtype=float)
     return float(1 - smallest(colours).sum(dtype=float) / high) if high > 0 else 0.0
 
 
 def fade_in(low: np.ndarray, base: float, fade: float) -> np.ndarray:
-    """The share (...) of a specular layer that counts: none where the smallest channel `low` (...)
-    is at most `base`, all from (1 + fade) base on. A highlight, being white, lies high in the
-    smallest channel; `fade` >= 0, zero for a step.
+    """Return the share of a specular layer that counts, by the smallest channel.
+
+    Parameters
+    ----------
+    low : ndarray
+        The smallest channel.
+    base : float
+        Level up to which nothing counts.
+    fade : float
+        All counts from (1 + fade) base on; 0 makes a step.
+
+    Attributes
+    ----------
+    highlight, being white, is bright in the smallest channel.
+
+    Returns
+    -------
+    ndarray
+        In [0, 1], of the shape of `low`.
     """
     room = max(fade * base, 1e-30)
     return np.clip(low - base, 0, room) / room

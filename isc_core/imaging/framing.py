@@ -1,9 +1,11 @@
-"""An object at the photo's frame: cut by it, or trimmed to it?
+"""Objects at the frame of the photo: cut by it, or cropped to it.
 
-Where the frame cuts the object its outline is no occluding contour; where a photo was merely
-trimmed to the object it is. A run of the mask along the frame is a cut if the mask is hardly wider
-a few pixels further in (`CUT_RATIO`); a rounded outline that touches the frame widens quickly.
-Limits: a box-shaped object trimmed exactly along its sides counts as cut.
+Where the frame cuts the object, the object's outline is no occluding contour; where a photo was
+merely cropped to the object, it is. A run of mask pixels along the frame is a cut if the mask is
+hardly wider a few pixels further in (`CUT_RATIO`); a rounded outline that touches the frame widens
+quickly.
+
+Limits: a box-shaped object cropped exactly along its sides counts as cut.
 """
 
 import numpy as np
@@ -14,9 +16,15 @@ CUT_RATIO = 0.75
 
 
 def cut_line(mask: np.ndarray) -> np.ndarray:
-    """Of the first row of `mask` (H, W) bool, the pixels where the frame cuts the object;
+    """Return the pixels of the first row where the frame cuts the object.
 
-    (W,) bool.
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (W,) bool ndarray
     """
     line, inner = mask[0], mask[min(DEPTH, mask.shape[0] - 1)]
     runs, count = ndimage.label(line)
@@ -32,7 +40,7 @@ def cut_line(mask: np.ndarray) -> np.ndarray:
 
 
 def is_cut(mask: np.ndarray) -> bool:
-    """Whether the frame cuts the object of `mask` (H, W) bool."""
+    """Return whether the frame cuts the object of `mask` (H, W) bool."""
     return any(bool(cut_line(m).any()) for m in _sides(mask))
 
 
@@ -42,8 +50,17 @@ def _sides(mask: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def continued(mask: np.ndarray, top: int, bottom: int, left: int, right: int) -> np.ndarray:
-    """`mask` with so many rows and columns added; the object goes on into them where the frame cuts
-    it, else they are empty.
+    """Extend a mask beyond the frame; the object continues where the frame cuts it.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    top, bottom, left, right : int
+        Rows and columns to add.
+
+    Returns
+    -------
+    (H + top + bottom, W + left + right) bool ndarray
     """
     upper, lower, first, last = (cut_line(m) for m in _sides(mask))
     out = np.pad(mask, [(top, bottom), (left, right)])
@@ -57,8 +74,18 @@ def continued(mask: np.ndarray, top: int, bottom: int, left: int, right: int) ->
 
 
 def continued_height(height: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The height (H, W) inside the mask, going on outside as it arrives at the rim (by point
-    reflection): normals look one pixel out.
+    """Extend a height map beyond the mask by point reflection at the rim.
+
+    Normals are computed from pixels one step outside.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     rim = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
     rows, columns = (

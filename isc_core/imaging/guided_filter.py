@@ -1,9 +1,11 @@
-"""Local affine fits: how a quantity follows the colours of a picture around each pixel (the guided
-filter, in colour).
+"""Local affine models of a quantity in the colours of a picture (the guided filter, in colour).
 
 Equation, over a window k inside the mask, for the picture I and the quantity e: e ~ A_k^T I + b_k,
-A_k = (cov_k(I) + epsilon)^-1 (cov_k(I, e) + epsilon P_k),   b_k = mean_k e - A_k^T mean_k I. Where
-the window's colours tell nothing A falls back to P, which is 0 in the published filter.
+
+    A_k = (cov_k(I) + epsilon)^-1 (cov_k(I, e) + epsilon P_k),   b_k = mean_k e - A_k^T mean_k I.
+
+Where the colours of the window are uninformative, A falls back to P, which is 0 in the published
+filter.
 
 Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013,
 doi:10.1109/TPAMI.2012.213.
@@ -22,11 +24,23 @@ def affine_fit(
     epsilon: float,
     fallback: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A (H, W, 3, C) and b (H, W, C), averaged over the windows that hold a pixel; nothing useful
-    outside `mask` (H, W).
+    """Fit local affine models, averaged over the windows that hold a pixel.
 
-    `guide` (H, W, 3), `values` (H, W, C), `epsilon` > 0 in the guide's square, `fallback`: P (H, W,
-    3, C), None for 0.
+    Parameters
+    ----------
+    guide : (H, W, 3) ndarray
+    values : (H, W, C) ndarray
+    mask : (H, W) bool ndarray
+        Results outside it are undefined.
+    epsilon : float
+        Regularisation, greater than 0, in units of the guide squared.
+    fallback : (H, W, 3, C) ndarray, optional
+        The slope P; 0 by default.
+
+    Returns
+    -------
+    slope : (H, W, 3, C) ndarray
+    offset : (H, W, C) ndarray
     """
     mean_guide, mean_values = window_means(guide, mask), window_means(values, mask)
     own = (
@@ -45,7 +59,18 @@ def affine_fit(
 
 
 def window_means(values: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Means (H, W, ...) over windows, of the mask's pixels alone; 0 where a window has none."""
+    """Return means over windows, of the pixels of the mask alone.
+
+    Parameters
+    ----------
+    values : (H, W, ...) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W, ...) ndarray
+        0 where a window holds no pixel of the mask.
+    """
     size = (2 * _RADIUS + 1,) * 2 + (1,) * (values.ndim - 2)
     inside = mask.reshape(mask.shape + (1,) * (values.ndim - 2)).astype(float)
     weight = ndimage.uniform_filter(inside, size, mode="constant")

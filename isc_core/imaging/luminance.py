@@ -9,13 +9,24 @@ LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
 
 
 def luminance(color: np.ndarray) -> np.ndarray:
-    """(...) of linear Rec.709 (..., 3), float64."""
+    """Return the luminance (...) of linear Rec.709 colours (..., 3), float64."""
     return np.asarray(color, float) @ LUMINANCE
 
 
 def white_of(layer: np.ndarray, mask: np.ndarray, percentile: float = 99.5) -> float:
-    """The layer's white: this percentile of its brightest channel over the lit pixels of the mask;
-    1 if none is lit.
+    """Return the white level of a layer: a percentile of the largest channel over the lit pixels.
+
+    Parameters
+    ----------
+    layer : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    percentile : float
+        In [0, 100].
+
+    Returns
+    -------
+    float
+        1 if no pixel is lit.
     """
     bright = layer[mask].max(-1)
     lit = bright[bright > 0]

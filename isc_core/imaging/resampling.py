@@ -1,8 +1,8 @@
-"""Bringing an object to the scale at which the priors were fitted, and its height back.
+"""Resampling an object to the scale at which the priors were fitted, and its height map back.
 
-A pixel's centre at index i lies at (i + 0.5) / factor - 0.5 of the resampled grid's source. Images
-are averaged over the area of each new pixel (or interpolated linearly when enlarged) with weights
-inside the object only, so that no background bleeds in.
+The centre of pixel i lies at (i + 0.5) / factor - 0.5 of the source grid. Images are averaged over
+the area of each new pixel (interpolated linearly when enlarged), with weights inside the object
+only, so that no background bleeds in.
 """
 
 import numpy as np
@@ -10,13 +10,14 @@ from scipy import ndimage, sparse
 
 
 def resampled_shape(shape: tuple[int, ...], factor: float) -> tuple[int, int]:
-    """The grid that covers `shape` after scaling by `factor`."""
+    """Return the shape of the grid that covers `shape` after scaling by `factor`."""
     return max(1, round(shape[0] * factor)), max(1, round(shape[1] * factor))
 
 
 def height_scale(old: tuple[int, ...], new: tuple[int, ...]) -> float:
-    """How much larger heights are on a grid of shape `new` than on `old`: sizes are whole, so it is
-    not just the factor asked for.
+    """Return the ratio of heights on a grid of shape `new` to those on a grid of shape `old`.
+
+    Sizes are whole numbers, so it differs slightly from the requested factor.
     """
     return float(np.sqrt(new[0] * new[1] / (old[0] * old[1])))
 
@@ -24,10 +25,21 @@ def height_scale(old: tuple[int, ...], new: tuple[int, ...]) -> float:
 def resample_inside(
     values: np.ndarray, inside: np.ndarray, factor: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`values` (H, W) or (H, W, C), averaged over `inside` (H, W) bool, at `factor` times the size.
+    """Resample the values inside a mask.
 
-    Returns the values (0 where nothing was inside) and the share of each new pixel that lies
-    inside, in [0, 1].
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+    inside : (H, W) bool ndarray
+    factor : float
+        New size over old size.
+
+    Returns
+    -------
+    values : ndarray
+        0 where no pixel of the mask contributes.
+    share : (h, w) ndarray
+        Share of each new pixel that lies inside the mask, in [0, 1].
     """
     rows, columns = resampled_shape(inside.shape, factor)
     down, right = _weights(inside.shape[0], rows), _weights(inside.shape[1], columns)
@@ -47,10 +59,21 @@ def resample_inside(
 def resample_height(
     height: np.ndarray, shape: tuple[int, ...], factor: float | None = None
 ) -> np.ndarray:
-    """A smooth height map (h, w) on a grid of `shape`, by cubic splines, in the new grid's pixels.
+    """Resample a smooth height map by cubic splines.
 
-    `factor`: how many new pixels an old one is wide; None where both grids cover exactly the same
-    area.
+    Parameters
+    ----------
+    height : (h, w) ndarray
+        Heights in pixels of its grid.
+    shape : tuple of int
+        (H, W) of the new grid.
+    factor : float, optional
+        Width of an old pixel in new pixels; None where both grids cover exactly the same area.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Heights in pixels of the new grid.
     """
     if height.shape == shape and factor in (None, 1.0):
         return np.array(height, float)
@@ -68,8 +91,19 @@ def resample_height(
 
 
 def nearest_samples(values: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
-    """`values` (h, w) at the centres of a grid of `shape` whose pixels are 1/`factor` old ones
-    wide: holes (NaN) stay and do not grow.
+    """Sample a map at the centres of another grid; holes (NaN) stay and do not grow.
+
+    Parameters
+    ----------
+    values : (h, w) ndarray
+    shape : tuple of int
+        (H, W) of the new grid.
+    factor : float
+        Its pixels are 1 / factor old ones wide.
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     rows, columns = (
         np.minimum(((np.arange(n) + 0.5) / factor).astype(int), m - 1)

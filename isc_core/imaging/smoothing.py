@@ -1,8 +1,9 @@
-"""Averages that stay inside a mask: a Gaussian over the known pixels alone (normalised
-convolution).
+"""Gaussian smoothing of the known pixels alone (normalised convolution).
 
-Equation: sum w G f / sum w G, with w = 1 inside the mask and 0 outside. Citation: H. Knutsson and
-C.-F. Westin, "Normalized and differential convolution", CVPR 1993, doi:10.1109/CVPR.1993.341081.
+Equation: sum w G f / sum w G, with w = 1 inside the mask and 0 outside.
+
+Citation: H. Knutsson and C.-F. Westin, "Normalized and differential convolution", CVPR 1993,
+doi:10.1109/CVPR.1993.341081.
 """
 
 import numpy as np
@@ -12,8 +13,19 @@ _TINY = 1e-9
 
 
 def masked_gaussian(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.ndarray:
-    """`layer` (H, W) or (H, W, C), averaged by a Gaussian of standard deviation `sigma` pixels over
-    `mask` (H, W) bool; 0 far outside.
+    """Smooth a layer by a Gaussian over the pixels of a mask.
+
+    Parameters
+    ----------
+    layer : (H, W) or (H, W, C) ndarray
+    mask : (H, W) bool ndarray
+    sigma : float
+        Standard deviation in pixels; the layer is returned unchanged if it is not positive.
+
+    Returns
+    -------
+    ndarray
+        Of the layer's shape; 0 far outside the mask.
     """
     if sigma <= 0:
         return layer
@@ -23,9 +35,22 @@ def masked_gaussian(layer: np.ndarray, mask: np.ndarray, sigma: float) -> np.nda
 def weighted_gaussian(
     layer: np.ndarray, weight: np.ndarray, sigma: float, floor: float
 ) -> np.ndarray:
-    """`layer` (H, W) or (H, W, C) averaged with `weight` (H, W) >= 0;
+    """Smooth a layer by a Gaussian with a weight for each pixel.
 
-    `floor` > 0 is the weight of a zero that is known everywhere.
+    Parameters
+    ----------
+    layer : (H, W) or (H, W, C) ndarray
+    weight : (H, W) ndarray
+        Not negative.
+    sigma : float
+        Standard deviation in pixels.
+    floor : float
+        Weight, greater than 0, of a zero observed at every pixel.
+
+    Returns
+    -------
+    ndarray
+        Of the layer's shape.
     """
     below = ndimage.gaussian_filter(weight, sigma, truncate=3) + weight.dtype.type(floor)
     if layer.ndim == 2:

@@ -1,17 +1,29 @@
-"""What was found on averages of a photo's pixels, at the pixels themselves: linear between the
-centres of the averages.
+"""Upsampling of block averages: bilinear between the centres of the blocks.
 
-Equation: pixel k of a row lies at (k + 1/2) / f - 1/2 of the averages, f pixels wide each; beyond
-the outermost centres their value holds. Citation: P. Heckbert, "What are the coordinates of a
-pixel?", Graphics Gems (1990), 246-248.
+Equation: pixel k of a row lies at (k + 1/2) / f - 1/2 of the averages, each f pixels wide; beyond
+the outermost centres their value is repeated.
+
+Citation: P. Heckbert, "What are the coordinates of a pixel?", Graphics Gems (1990), 246-248.
 """
 
 import numpy as np
 
 
 def enlarged(layer: np.ndarray, shape: tuple[int, ...], factor: float) -> np.ndarray:
-    """A map (h, w) or (h, w, C) of averages, `factor` >= 1 pixels wide and high, at the pixels of a
-    picture of `shape` (H, W).
+    """Upsample a map of block averages.
+
+    Parameters
+    ----------
+    layer : (h, w) or (h, w, C) ndarray
+        The averages.
+    shape : tuple of int
+        (H, W) of the result.
+    factor : float
+        Width and height of a block in pixels, at least 1.
+
+    Returns
+    -------
+    (H, W) or (H, W, C) ndarray
     """
     for axis, size in enumerate(shape):
         at = np.clip((np.arange(size) + 0.5) / factor - 0.5, 0, layer.shape[axis] - 1)
