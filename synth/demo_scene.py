@@ -22,7 +22,7 @@ from .scene.camera import SMALLEST, Camera
 from .scene.lights import EnvironmentLight, Light, panel_toward_origin
 from .scene.materials import Material
 from .scene.scene import Scene
-from .shapes.gourd import gourd, painted_skin
+from .shapes.gourd import gourd, gourd_albedo
 
 SIZE, SAMPLES = 320, 64
 _IN_VIEW = 2.3  # object units, the side of the picture
@@ -37,7 +37,7 @@ def demo_scene(size: int = SIZE) -> Scene:
     """
     return Scene(
         gourd().turned(14),
-        Material(painted_skin(), "ggx", gloss=0.1, strength=1.0, ior=1.5),
+        Material(gourd_albedo(), "ggx", gloss=0.1, strength=1.0, ior=1.5),
         demo_lights(),
         Camera(size, size, size / _IN_VIEW),
     )
@@ -46,7 +46,7 @@ def demo_scene(size: int = SIZE) -> Scene:
 def demo_lights() -> tuple[Light, ...]:
     """A soft sky, a warm softbox above to the left, and a cool one to the right."""
     return (
-        EnvironmentLight(0.55 * soft_sky()),
+        EnvironmentLight(0.55 * soft_environment()),
         panel_toward_origin((-5.0, 5.5, 7.0), (1.7, 1.7), (88.0, 80.0, 68.0)),
         panel_toward_origin((7.0, 1.5, 4.0), (0.8, 3.2), (16.0, 20.0, 27.0)),
     )
@@ -63,7 +63,7 @@ def demo_object(size: int = SIZE, samples: int = SAMPLES) -> GroundTruth:
     )[1]
 
 
-def soft_sky(rows: int = 64) -> np.ndarray:
+def soft_environment(rows: int = 64) -> np.ndarray:
     """An environment of low frequencies, (rows, 2 rows, 3) float32, linear radiance, row 0 straight
     up: sky, horizon, ground, a window.
     """

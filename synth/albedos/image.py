@@ -10,7 +10,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from isc_core.photo.photo import read_linear
+from isc_core.photo import read_linear
 
 BRIGHTEST, LARGEST = 0.95, 4096
 

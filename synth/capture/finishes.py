@@ -24,7 +24,7 @@ from isc_core.errors import InputError
 from isc_core.shading.brdf.roughness import fitted_alpha, fitted_exponent
 
 from ..albedos.fields import fractal_noise, grid, smooth_noise, step
-from ..scene.materials import MATT, MODELS, Material, Model
+from ..scene.materials import DIFFUSE_MODELS, MODELS, Material, Model
 
 FINISHES: tuple[str, ...] = MODELS
 VARYING: tuple[str, ...] = ("blinn_phong", "ggx")
@@ -55,7 +55,7 @@ def make_material(
         )
     varied_by_chance = bool(rng.random() < _CHANCE)
     exponent = _log_uniform(rng, *EXPONENTS)
-    if model in MATT:
+    if model in DIFFUSE_MODELS:
         return Material(albedo, cast(Model, model), sigma=float(rng.uniform(0.1, 0.6)))
     if model == "blinn_phong":
         material = Material(albedo, "blinn_phong", exponent, _log_uniform(rng, *STRENGTHS))
@@ -77,8 +77,8 @@ def gloss_class(material: Material) -> str:
     """ "matt", "broad" (exponent below 30), "medium" or "sharp" (above 300), by the median over the
     texture.
     """
-    if material.matt or not np.any(material.strength):
-        return "matt"
+    if material.is_diffuse or not np.any(material.strength):
+        return "diffuse"
     gloss = float(np.median(material.gloss))
     exponent = (
         gloss if material.model == "blinn_phong" else float(fitted_exponent(min(gloss, _WIDEST)))

@@ -56,7 +56,7 @@ _FRAMING, _EXPOSURE, _SAMPLES, _NOISE = range(4)  # streams of a scene's seed
 
 
 @dataclass(frozen=True)
-class Part:
+class FamilyMember:
     """A member of a family of objects, materials or lights: the `family`'s name and its `number`,
     from 0 on.
     """
@@ -105,7 +105,7 @@ class Sources:
 
 
 @dataclass(frozen=True)
-class Picture:
+class PictureSettings:
     """How scenes are taken. `size`: of the square picture's side, pixels. `samples`, `bounces`,
     `renderer`: see `RenderOptions`. `perspective`: a pinhole instead of an orthographic camera.
     `exposure`: what 99.5 % of the diffuse layer's values stay below, > 0; None draws it for each
@@ -136,12 +136,12 @@ class Recipe:
     """
 
     seed: int
-    shape: Part
-    material: Part
+    shape: FamilyMember
+    material: FamilyMember
     model: str
     albedo: str
-    light: Part
-    picture: Picture = field(default_factory=Picture)
+    light: FamilyMember
+    picture: PictureSettings = field(default_factory=PictureSettings)
     sources: Sources = field(default_factory=Sources)
 
     @property

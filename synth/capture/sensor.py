@@ -25,8 +25,8 @@ import cv2
 import numpy as np
 
 from isc_core.errors import InputError
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.io.atomic import new_file
-from isc_core.photo.photo import linear_to_srgb, srgb_to_linear
 
 from .truth import GroundTruth
 

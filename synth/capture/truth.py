@@ -105,7 +105,7 @@ def render_truth(
     picture = surface.image
     shading, reflectance, specular = (
         picture(found),
-        picture(surface.paint.albedo),
+        picture(surface.reflectance.albedo),
         picture(lit.specular),
     )
     diffuse = reflectance * shading
@@ -119,8 +119,8 @@ def render_truth(
         normal=picture(surface.normal, (0, 0, 1)),
         height=picture(_height(scene, surface)),
         mask=surface.mask,
-        strength=picture(surface.paint.strength),
-        gloss=picture(surface.paint.gloss),
+        strength=picture(surface.reflectance.strength),
+        gloss=picture(surface.reflectance.gloss),
         shading_variance=picture(lit.shading_variance),
         specular_variance=picture(lit.specular_variance),
         illumination=illumination,

@@ -11,9 +11,9 @@ from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..albedos import ALBEDOS
-from ..capture.recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, Picture, Sources
+from ..capture.recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, PictureSettings, Sources
 from ..capture.sensor import DEPTHS, Sensor
-from ..dataset.generate import Run, make_dataset
+from ..dataset.generate import DatasetSettings, make_dataset
 from ..dataset.splits import SPLITS, Choices
 from ..light_rigs import FROM_FILES, RIGS
 from ..light_rigs.files import PANORAMAS
@@ -104,7 +104,7 @@ def _add_choices(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_picture(parser: argparse.ArgumentParser) -> None:
-    usual = Picture()
+    usual = PictureSettings()
     how = parser.add_argument_group("how they are taken")
     how.add_argument(
         "--size",
@@ -167,7 +167,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         raise InputError("give the folder to write: isc synth -o DIR (see `isc synth --help`)")
     sources = _sources(options)
     sensor = Sensor(clip=options.clip or options.bits > 0, noise=options.noise, bits=options.bits)
-    picture = Picture(
+    picture = PictureSettings(
         options.size,
         options.samples,
         options.bounces,
@@ -176,7 +176,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         sensor,
         options.renderer,
     )
-    wanted = Run(
+    wanted = DatasetSettings(
         options.count, options.seed, _choices(options, sources, sources.check()), picture, sources
     )
     if (advice := slower_without()) and not options.quiet:

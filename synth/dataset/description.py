@@ -13,7 +13,7 @@ import numpy as np
 from isc_core import __version__
 
 from ..capture.finishes import gloss_class
-from ..capture.recipe import Picture, Recipe
+from ..capture.recipe import PictureSettings, Recipe
 from ..capture.sensor import Sensor
 from ..capture.truth import GroundTruth
 from ..scene.camera import Camera
@@ -22,7 +22,7 @@ from ..scene.materials import Material
 from ..scene.scene import Scene
 from ..scene.variant import has_llvm, load_mitsuba
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 2: the gloss class "matt" is called "diffuse"
 KIND = "isc synth scene"
 UNITS = {
     "frame": "x right, y up, z toward the viewer; row 0 at the top",
@@ -75,7 +75,7 @@ def describe(
     }
 
 
-def describe_picture(picture: Picture) -> dict[str, Any]:
+def describe_picture(picture: PictureSettings) -> dict[str, Any]:
     """The settings of a picture that decide what is in the files."""
     return {
         "size": picture.size,
@@ -144,7 +144,7 @@ def _material(material: Material) -> dict[str, Any]:
         "convention": CONVENTIONS[material.model],
         "gloss_class": gloss_class(material),
     }
-    if not material.matt:
+    if not material.is_diffuse:
         described |= {"gloss": _span(material.gloss), "strength": _span(material.strength)}
     if material.model in ("ggx", "roughplastic"):
         described |= {"ior": material.ior, "f0": material.f0}

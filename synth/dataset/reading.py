@@ -1,4 +1,6 @@
-"""Reading a data set of rendered scenes: which scenes there are, what they are, and their truth."""
+"""Reading a data set of rendered scenes: the list of scenes, their properties and their ground
+truth.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,15 +19,34 @@ from .scene_folder import DATA_FILES, VARIANCES, checksum
 from .splits import SPLITS
 
 MANIFEST = "manifest.json"
+_OLD_GLOSS_CLASSES = {"matt": "diffuse"}  # names of schema 1
 _Kind = TypeVar("_Kind", str, int, float)
 
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """What slices of a data set are made by. `name`: of the folder. `split`: of `SPLITS`. `object`,
-    `material`, `light`: names of members ("lathe03"). `albedo`, `model`, `light_kind`: families.
-    `gloss_class`: "matt", "broad", "medium" or "sharp". `specular_share`: of all light inside the
-    mask, [0, 1]. `mask_pixels`: the object's. `seed`: of the scene. `folder`: where it lies.
+    """Properties of a scene, by which slices of a data set are made.
+
+    Attributes
+    ----------
+    name : str
+        Name of the folder.
+    split : str
+        One of `SPLITS`.
+    object, material, light : str
+        Names of family members ("lathe03").
+    albedo, model, light_kind : str
+        Families.
+    gloss_class : str
+        "diffuse", "broad", "medium" or "sharp".
+    specular_share : float
+        Specular share of all light inside the mask, [0, 1].
+    mask_pixels : int
+        Size of the object.
+    seed : int
+        Seed of the scene.
+    folder : Path
+        Its folder.
     """
 
     name: str
@@ -44,15 +65,28 @@ class SceneFacts:
 
 
 def list_scenes(root: Path | str, split: str | None = None) -> tuple[Path, ...]:
-    """The folders of a data set's finished scenes, of one split or of all in the order of `SPLITS`,
-    by name.
+    """Return the folders of a data set's finished scenes, sorted by split and name.
 
-    Raises `InputError` where `root` is no data set of `isc synth`, for an unknown split, and where
-    there is no scene.
+    Parameters
+    ----------
+    root : Path or str
+        Folder of the data set.
+    split : str, optional
+        One of `SPLITS`; all of them by default.
+
+    Returns
+    -------
+    tuple of Path
+        The folders.
+
+    Raises
+    ------
+    InputError
+        If `root` is not a data set of `isc synth`, the split is unknown, or there is no scene.
     """
     root = Path(root)
     if split is not None and split not in SPLITS:
-        raise InputError(f"unknown split {split!r}: choose of {', '.join(SPLITS)}")
+        raise InputError(f"unknown split {split!r}: choose {', '.join(SPLITS)}")
     if not (root / MANIFEST).is_file():
         raise InputError(f"{root} is not a data set of isc synth (it has no {MANIFEST})")
     wanted = SPLITS if split is None else (split,)
@@ -60,16 +94,28 @@ def list_scenes(root: Path | str, split: str | None = None) -> tuple[Path, ...]:
         path.parent for name in wanted for path in sorted((root / name).glob("[!.]*/scene.json"))
     )
     if not found:
-        raise InputError(
-            f"{root} holds no finished scene{f' of the split {split}' if split else ''}: run isc synth to its end"
-        )
+        which = f" of the split {split}" if split else ""
+        raise InputError(f"{root} has no finished scene{which}: let isc synth finish")
     return found
 
 
 def read_facts(folder: Path | str) -> SceneFacts:
-    """What `scene.json` says about a scene.
+    """Read the properties of a scene from its `scene.json`.
 
-    Raises `InputError` where it is absent, damaged, or not ours.
+    Parameters
+    ----------
+    folder : Path or str
+        The scene.
+
+    Returns
+    -------
+    SceneFacts
+        The properties.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged or of another kind.
     """
     place = Path(folder)
     content = read_description(place)
@@ -85,7 +131,7 @@ def read_facts(folder: Path | str) -> SceneFacts:
         light=fact(str, "light", "id"),
         albedo=fact(str, "albedo", "family"),
         model=fact(str, "material", "model"),
-        gloss_class=fact(str, "material", "gloss_class"),
+        gloss_class=current_gloss_class(fact(str, "material", "gloss_class")),
         light_kind=fact(str, "light", "family"),
         specular_share=fact(float, "measured", "specular_share"),
         mask_pixels=fact(int, "measured", "mask_pixels"),
@@ -94,10 +140,28 @@ def read_facts(folder: Path | str) -> SceneFacts:
     )
 
 
-def read_truth(folder: Path | str) -> GroundTruth:
-    """The truth as it was rendered.
+def current_gloss_class(name: str) -> str:
+    """Return the current name of a gloss class; schema 1 called "diffuse" "matt"."""
+    return _OLD_GLOSS_CLASSES.get(name, name)
 
-    Raises `InputError` where a file is absent, is not the one that was written, or does not fit.
+
+def read_truth(folder: Path | str) -> GroundTruth:
+    """Read the ground truth of a scene.
+
+    Parameters
+    ----------
+    folder : Path or str
+        The scene.
+
+    Returns
+    -------
+    GroundTruth
+        The maps as rendered.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, was modified, or does not fit.
     """
     folder = Path(folder)
     content = read_description(folder)
@@ -123,9 +187,22 @@ def read_truth(folder: Path | str) -> GroundTruth:
 
 
 def read_description(folder: Path) -> dict[str, Any]:
-    """The content of `scene.json`.
+    """Read the content of a `scene.json`.
 
-    Raises `InputError` where it is absent, damaged, not ours, or of a newer version.
+    Parameters
+    ----------
+    folder : Path
+        The scene.
+
+    Returns
+    -------
+    dict
+        The JSON object, of the current or an older schema.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, of another kind, or of a newer version.
     """
     path = folder / "scene.json"
     if not path.is_file():
@@ -135,32 +212,50 @@ def read_description(folder: Path) -> dict[str, Any]:
         raise InputError(f"{path} was not written by isc synth")
     if content["schema_version"] > SCHEMA_VERSION:
         raise InputError(
-            f"{path} was written by a newer version (schema {content['schema_version']}): update ISC"
+            f"{path} was written by a newer version (schema {content['schema_version']}): update "
+            "ISC"
         )
     return content
 
 
 def read_object(path: Path) -> dict[str, Any]:
-    """A file that holds one JSON object. Raises `InputError` for anything else."""
+    """Read a file that contains one JSON object.
+
+    Raises
+    ------
+    InputError
+        If it contains anything else.
+    """
     content = read_json(path)
     if not isinstance(content, dict):
-        raise InputError(f"{path} is damaged: it holds no JSON object")
+        raise InputError(f"{path} is damaged: it contains no JSON object")
     return content
 
 
 def require_intact(folder: Path, content: dict[str, Any]) -> None:
-    """Raises `InputError` unless every file beside `scene.json` is the one that was written with
-    it.
+    """Check that every file beside `scene.json` is the one that was written with it.
+
+    Parameters
+    ----------
+    folder : Path
+        The scene.
+    content : dict
+        The content of `scene.json`.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or was modified.
     """
     for name in DATA_FILES:
         path = folder / name
         if not path.is_file():
             raise InputError(
-                f"{path} does not exist: the scene is not whole; make it again with isc synth"
+                f"{path} is missing, the scene is incomplete: render it again with isc synth"
             )
         if checksum(path) != _value(content, folder, str, "files", name):
             raise InputError(
-                f"{path} is not the file that isc synth wrote: it is damaged or was changed; make the scene again"
+                f"{path} is damaged or was modified: render the scene again with isc synth"
             )
 
 
@@ -185,7 +280,7 @@ def _layers(path: Path, layers: dict[str, str]) -> dict[str, np.ndarray]:
         names = [f"{layer}.{letter}" for letter in letters]
         if missing := [name for name in names if name not in channels]:
             raise InputError(
-                f"{path} lacks the channel {missing[0]}: it is not a file of isc synth, or is damaged"
+                f"{path} lacks the channel {missing[0]}: it is damaged or not a file of isc synth"
             )
         stack = np.stack([channels[name] for name in names], -1)
         stacks[layer] = stack if len(names) > 1 else stack[..., 0]

@@ -23,9 +23,17 @@ from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import InputError
 
 from ..albedos import ALBEDOS
-from ..capture.recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, Part, Picture, Recipe, Sources
+from ..capture.recipe import (
+    HEIGHT_FILE,
+    IMAGE_FILE,
+    MESH_FILE,
+    FamilyMember,
+    PictureSettings,
+    Recipe,
+    Sources,
+)
 from ..light_rigs import FROM_FILES, RIGS
-from ..scene.materials import MATT, MODELS
+from ..scene.materials import DIFFUSE_MODELS, MODELS
 from ..shapes import SHAPES
 
 # A scene's split is the entry at its seed modulo ten.
@@ -88,7 +96,7 @@ class Choices:
 class _Member:
     """A part, what else is fixed with it, and whether it is held out."""
 
-    part: Part
+    part: FamilyMember
     held_out: bool
     model: str = ""
     albedo: str = ""
@@ -110,7 +118,7 @@ class Pools:
         """Where the scene of a seed belongs."""
         return self.pattern[seed % len(self.pattern)]
 
-    def recipe(self, seed: int, picture: Picture, sources: Sources) -> Recipe:
+    def recipe(self, seed: int, picture: PictureSettings, sources: Sources) -> Recipe:
         """The scene of a seed."""
         rng = np.random.default_rng(np.random.SeedSequence(seed))
         held = _HELD_OUT[self.split_of(seed)].split()
@@ -167,8 +175,8 @@ def make_pools(choices: Choices, sources: Sources) -> Pools:
     return Pools(shapes, materials, lights, tuple(name for name in _PATTERN if name in wanted))
 
 
-def _members(family: str, many: int) -> list[tuple[Part, bool]]:
-    return [(Part(family, number), number % _EVERY == _EVERY - 1) for number in range(many)]
+def _members(family: str, many: int) -> list[tuple[FamilyMember, bool]]:
+    return [(FamilyMember(family, number), number % _EVERY == _EVERY - 1) for number in range(many)]
 
 
 def _shapes_of(name: str, sources: Sources) -> int:
@@ -198,7 +206,7 @@ def _materials(model: str, albedos: tuple[str, ...]) -> list[_Member]:
             number = turn if own else turn * len(ALBEDOS) + ALBEDOS.index(albedo)
             found.append(
                 _Member(
-                    Part(f"{model}_{albedo}" if own else model, number),
+                    FamilyMember(f"{model}_{albedo}" if own else model, number),
                     turn % _EVERY == _EVERY - 1,
                     model,
                     albedo,
@@ -211,7 +219,7 @@ def _drawn(members: tuple[_Member, ...], held_out: bool, rng: np.random.Generato
     """One of them: first the family, glossy materials more often than matt ones, then the member."""
     eligible = [member for member in members if member.held_out == held_out]
     families = sorted({member.model or member.part.family for member in eligible})
-    weights = np.array([1.0 if name in MATT else _GLOSSY_WEIGHT for name in families])
+    weights = np.array([1.0 if name in DIFFUSE_MODELS else _GLOSSY_WEIGHT for name in families])
     family = families[int(rng.choice(len(families), p=weights / weights.sum()))]
     eligible = [member for member in eligible if (member.model or member.part.family) == family]
     return eligible[int(rng.integers(len(eligible)))]

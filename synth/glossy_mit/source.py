@@ -14,7 +14,7 @@ from isc_core.datasets.mit_berkeley import ILLUMINATIONS, load_object
 from isc_core.errors import InputError
 from isc_core.evaluation.metrics import truth_normal
 from isc_core.io.matlab import read_matrix
-from isc_core.photo.photo import read_raster
+from isc_core.photo import read_raster
 from isc_core.shading.spherical_harmonics import light_from_reference
 
 

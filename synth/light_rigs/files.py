@@ -20,7 +20,7 @@ import numpy as np
 
 from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import InputError
-from isc_core.photo.photo import read_linear
+from isc_core.photo import read_linear
 from isc_core.shading.environment_map import (
     directions,
     environment_from_shading,

@@ -47,7 +47,7 @@ class RenderOptions:
 class Lit:
     """Radiance toward the camera of N points, and how sure it is.
 
-    `shading`: (N, 3) of the body for albedo 1, so that diffuse = albedo * shading. `specular`: (N,
+    `shading`: (N, 3) of the diffuse for albedo 1, so that diffuse = albedo * shading. `specular`: (N,
     3) of the gloss, its strength included. `shading_variance`, `specular_variance`: (N, 3), of
     these estimates (of the mean, not of one sample); 0 where nothing was drawn.
     """

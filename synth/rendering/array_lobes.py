@@ -41,7 +41,11 @@ def light_surface(
 ) -> Lit:
     """Lights the points of `surface`, see `synth.rendering.light_surface`. Raises `Cancelled`."""
     points = Points(
-        surface.position, surface.normal, surface.view, surface.paint.strength, surface.paint.gloss
+        surface.position,
+        surface.normal,
+        surface.view,
+        surface.reflectance.strength,
+        surface.reflectance.gloss,
     )
     samples = (options.samples, options.samples)
     wide = [light for light in lights if isinstance(light, PanelLight | EnvironmentLight)]
@@ -64,7 +68,7 @@ def light_surface(
         _add_bounced(
             total, points, world, samples, (options.seed, len(sampled)), options.bounces, last
         )
-    return Lit(total.body, total.gloss, total.body_variance, total.gloss_variance)
+    return Lit(total.diffuse, total.gloss, total.diffuse_variance, total.gloss_variance)
 
 
 def _add_direct(

@@ -68,7 +68,7 @@ def bounced_paths(
         direction=direction,
         reach=np.full(len(hit), np.inf),
         light=arriving * (cosine / density)[:, None],
-        body=world.reflection.body(many, direction),
+        diffuse=world.reflection.diffuse(many, direction),
         gloss=world.reflection.gloss(many, direction),
     )
 
@@ -79,9 +79,9 @@ def _arriving(
     """Which of M rays from the points meet the object (K,), and what arrives along those (K, 3)."""
     met = world.tracer.hits(points.lifted(), direction)
     hit = np.flatnonzero(met.valid)
-    paint = world.material.at(met.uv[hit])
+    reflectance = world.material.at(met.uv[hit])
     places = Points(
-        met.position[hit], met.normal[hit], -direction[hit], paint.strength, paint.gloss
+        met.position[hit], met.normal[hit], -direction[hit], reflectance.strength, reflectance.gloss
     )
     sums, everything = Sums(len(hit)), slice(0, len(hit))
     for light in world.lights:
@@ -89,9 +89,9 @@ def _arriving(
     for sampler in world.samplers:
         paths = draw_paths(rng, places, world.reflection, sampler, (1, 1))
         sums.add(everything, paths, trace_paths(places, paths, world.tracer))
-    leaving = paint.albedo * sums.body + sums.gloss
+    leaving = reflectance.albedo * sums.diffuse + sums.gloss
     if bounces > 1 and len(hit):
-        leaving += _one_more(rng, places, paint.albedo, world, bounces - 1)
+        leaving += _one_more(rng, places, reflectance.albedo, world, bounces - 1)
     return hit, leaving
 
 
@@ -111,7 +111,7 @@ def _one_more(
     some, direction = places.at(up[hit]), direction[up[hit]]
     density = 0.5 * (cosine_density(some, direction) + world.reflection.density(some, direction))
     reflected = (
-        albedo[up[hit]] * world.reflection.body(some, direction)[:, None]
+        albedo[up[hit]] * world.reflection.diffuse(some, direction)[:, None]
         + world.reflection.gloss(some, direction)[:, None]
     )
     leaving[up[hit]] = reflected * arriving * (cosine[up[hit]] / density)[:, None]

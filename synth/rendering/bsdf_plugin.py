@@ -1,11 +1,11 @@
 """The lobes of `materials` as a plugin that Mitsuba's own integrators render: `{"type":
-"isc_paint", "model": "ggx", ...}`.
+"isc_material", "model": "ggx", ...}`.
 
 Parameters, as in `materials`: `model` (lambert, oren_nayar, blinn_phong or ggx; roughplastic is
 Mitsuba's own); the textures or numbers `albedo` (colour), `gloss` and `strength`; the numbers `ior`
 and `sigma`. `mitsuba.traverse` finds the textures, which may carry gradients.
 
-Equation: f_r = albedo * body + strength * gloss. Component 0 is the body (DiffuseReflection),
+Equation: f_r = albedo * diffuse + strength * gloss. Component 0 is the diffuse (DiffuseReflection),
 component 1 the gloss (GlossyReflection): a `BSDFContext` with one of these flags evaluates one lobe
 alone.
 
@@ -21,9 +21,9 @@ from isc_core.errors import InputError
 
 from ..scene.materials import MODELS
 from ..scene.variant import load_mitsuba
-from .bsdfs import BlinnPhongGloss, GgxGloss, Lanes, PaintLobes, load_drjit
+from .bsdfs import BlinnPhongLobe, GgxLobe, Lanes, MaterialLobes, load_drjit
 
-NAME = "isc_paint"
+NAME = "isc_material"
 _PLASTIC = "roughplastic"
 
 
@@ -43,7 +43,7 @@ def register() -> str:
         "eval_pdf": _eval_pdf,
         "to_string": _to_string,
     }
-    mi.register_bsdf(NAME, type("Paint", (mi.BSDF,), methods))
+    mi.register_bsdf(NAME, type("IscMaterial", (mi.BSDF,), methods))
     return NAME
 
 
@@ -74,12 +74,12 @@ def _traverse(self: Any, callback: Any) -> None:
         callback.put(name, getattr(self, name), load_mitsuba().ParamFlags.Differentiable)
 
 
-def _lobes(self: Any, point: Any, active: Lanes) -> PaintLobes:
+def _lobes(self: Any, point: Any, active: Lanes) -> MaterialLobes:
     if self.model not in ("blinn_phong", "ggx"):
-        return PaintLobes(self.sigma)
+        return MaterialLobes(self.sigma)
     gloss = self.gloss.eval_1(point, active)
-    lobe = BlinnPhongGloss(gloss) if self.model == "blinn_phong" else GgxGloss(gloss, self.f0)
-    return PaintLobes(0.0, self.strength.eval_1(point, active), lobe)
+    lobe = BlinnPhongLobe(gloss) if self.model == "blinn_phong" else GgxLobe(gloss, self.f0)
+    return MaterialLobes(0.0, self.strength.eval_1(point, active), lobe)
 
 
 def _sample(
@@ -97,10 +97,10 @@ def _sample(
 
 def _eval(self: Any, context: Any, point: Any, light: Lanes, active: Lanes = True) -> Lanes:
     mi, dr = load_mitsuba(), load_drjit()
-    body, gloss = _lobes(self, point, active).values(point.wi, light)
+    diffuse, gloss = _lobes(self, point, active).values(point.wi, light)
     total = mi.Color3f(0)
     if context.is_enabled(mi.BSDFFlags.DiffuseReflection, 0):
-        total += self.albedo.eval(point, active) * body
+        total += self.albedo.eval(point, active) * diffuse
     if context.is_enabled(mi.BSDFFlags.GlossyReflection, 1):
         total += gloss
     return dr.select(active, total, 0)
@@ -120,4 +120,4 @@ def _eval_pdf(
 
 
 def _to_string(self: Any) -> str:
-    return f"Paint[{self.model}]"
+    return f"IscMaterial[{self.model}]"

@@ -13,7 +13,7 @@ Blinn-Phong, and to the facets that the view sees for GGX.
 Citation: E. Heitz, "Sampling the GGX distribution of visible normals", Journal of Computer Graphics
 Techniques 7(4), 2018 (no DOI), as Mitsuba does it; the models' own stand in `isc_core.shading.brdf`.
 
-Limits: reflection only. Half of the directions are drawn for the body and half for the gloss,
+Limits: reflection only. Half of the directions are drawn for the diffuse and half for the gloss,
 whatever their strengths.
 """
 
@@ -24,7 +24,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ..scene.materials import Material, Paint
+from ..scene.materials import Material, SurfaceReflectance
 from ..scene.tracing import lanes
 from ..scene.variant import load_mitsuba
 
@@ -41,10 +41,10 @@ def load_drjit() -> ModuleType:
 
 
 class Lobes(Protocol):
-    """What a point reflects, body and gloss apart."""
+    """What a point reflects, diffuse and gloss apart."""
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
-        """f_r cos_light of the body for albedo 1, and of the gloss; 0 below the horizon."""
+        """f_r cos_light of the diffuse for albedo 1, and of the gloss; 0 below the horizon."""
         ...
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
@@ -56,7 +56,7 @@ class Lobes(Protocol):
         ...
 
 
-class Gloss(Protocol):
+class SpecularLobe(Protocol):
     """A glossy lobe of strength 1.
 
     All three as in `Lobes`, but for f_r without the cosine, where view and light are above the
@@ -71,7 +71,7 @@ class Gloss(Protocol):
 
 
 @dataclass(frozen=True)
-class BlinnPhongGloss:
+class BlinnPhongLobe:
     """`exponent`: > 0. The scale is "normalised"."""
 
     exponent: Lanes
@@ -102,7 +102,7 @@ class BlinnPhongGloss:
 
 
 @dataclass(frozen=True)
-class GgxGloss:
+class GgxLobe:
     """`alpha` in (0, 1] of Mitsuba's facets; `f0` in [0, 1] of Schlick's Fresnel term."""
 
     alpha: Lanes
@@ -138,40 +138,40 @@ class GgxGloss:
 
 
 @dataclass(frozen=True)
-class PaintLobes:
-    """A matt body of slope deviation `sigma` (radians; 0 is Lambert) under `strength` times a
+class MaterialLobes:
+    """A diffuse diffuse of slope deviation `sigma` (radians; 0 is Lambert) under `strength` times a
     gloss, or none.
     """
 
     sigma: Lanes = 0.0
     strength: Lanes = 0.0
-    gloss: Gloss | None = None
+    gloss: SpecularLobe | None = None
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
         dr, mi = load_drjit(), load_mitsuba()
         lit = (view.z > 1e-9) & (light.z > 1e-9)
-        body = dr.select(lit, oren_nayar(self.sigma, view, light) * light.z, 0)
+        diffuse = dr.select(lit, oren_nayar(self.sigma, view, light) * light.z, 0)
         if self.gloss is None:
-            return mi.Float(body), mi.Float(0)
-        return mi.Float(body), mi.Float(
+            return mi.Float(diffuse), mi.Float(0)
+        return mi.Float(diffuse), mi.Float(
             dr.select(lit, self.strength * self.gloss.value(view, light) * light.z, 0)
         )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
         dr = load_drjit()
-        matt = dr.maximum(light.z, 0) / math.pi
+        diffuse = dr.maximum(light.z, 0) / math.pi
         if self.gloss is None:
-            return matt
+            return diffuse
         return dr.select(
-            (view.z > 1e-9) & (light.z > 1e-9), 0.5 * (matt + self.gloss.density(view, light)), 0
+            (view.z > 1e-9) & (light.z > 1e-9), 0.5 * (diffuse + self.gloss.density(view, light)), 0
         )
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
         dr, mi = load_drjit(), load_mitsuba()
-        matt = mi.warp.square_to_cosine_hemisphere(place)
+        diffuse = mi.warp.square_to_cosine_hemisphere(place)
         if self.gloss is None:
-            return matt
-        return dr.select(choice < 0.5, matt, self.gloss.sample(view, place))
+            return diffuse
+        return dr.select(choice < 0.5, diffuse, self.gloss.sample(view, place))
 
 
 @dataclass(frozen=True)
@@ -182,16 +182,16 @@ class PlasticLobes:
     """
 
     plugin: Lanes
-    drawn: PaintLobes
+    drawn: MaterialLobes
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
         mi = load_mitsuba()
         parts = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
         contexts = [mi.BSDFContext(mi.TransportMode.Radiance, int(part)) for part in parts]
-        body, gloss = (
+        diffuse, gloss = (
             self.plugin.eval(context, _interaction(view), light).x for context in contexts
         )
-        return body, gloss
+        return diffuse, gloss
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
         return self.drawn.density(view, light)
@@ -210,8 +210,8 @@ def rows_of(colour: Lanes) -> np.ndarray:
     return np.stack([np.array(part, float) for part in colour], axis=1)
 
 
-def lobes_of(material: Material, paint: Paint) -> Lobes:
-    """The lobes of a material at points whose paint is known, a lane each.
+def lobes_of(material: Material, reflectance: SurfaceReflectance) -> Lobes:
+    """The lobes of a material at points whose reflectance is known, a lane each.
 
     Raises `InputError` where Mitsuba is not installed.
     """
@@ -219,26 +219,26 @@ def lobes_of(material: Material, paint: Paint) -> Lobes:
     sigma, f0, strength, gloss = (
         mi.Float(material.sigma),
         mi.Float(material.f0),
-        lanes(paint.strength),
-        lanes(paint.gloss),
+        lanes(reflectance.strength),
+        lanes(reflectance.gloss),
     )
     # What is opaque is no constant of a kernel, so that the next scene finds the kernel compiled.
     dr.make_opaque(sigma, f0)
     if material.model == "blinn_phong":
-        return PaintLobes(0.0, strength, BlinnPhongGloss(gloss))
-    facets = PaintLobes(0.0, strength, GgxGloss(gloss, f0))
+        return MaterialLobes(0.0, strength, BlinnPhongLobe(gloss))
+    facets = MaterialLobes(0.0, strength, GgxLobe(gloss, f0))
     if material.model == "roughplastic":
         return PlasticLobes(rough_plastic(float(material.gloss), material.ior), facets)
     if material.model == "ggx":
         return facets
-    return PaintLobes(sigma if material.model == "oren_nayar" else 0.0)
+    return MaterialLobes(sigma if material.model == "oren_nayar" else 0.0)
 
 
 def rough_plastic(alpha: float, ior: float, albedo: Any = 1.0) -> Lanes:
-    """Mitsuba's plugin as `materials` means it, with a white body unless told otherwise (a number,
+    """Mitsuba's plugin as `materials` means it, with a white diffuse unless told otherwise (a number,
     or a texture as a dictionary).
     """
-    body = albedo if isinstance(albedo, dict) else {"type": "rgb", "value": [float(albedo)] * 3}
+    diffuse = albedo if isinstance(albedo, dict) else {"type": "rgb", "value": [float(albedo)] * 3}
     plastic = {
         "type": "roughplastic",
         "distribution": "ggx",
@@ -247,11 +247,11 @@ def rough_plastic(alpha: float, ior: float, albedo: Any = 1.0) -> Lanes:
         "ext_ior": 1.0,
         "nonlinear": False,
     }
-    return load_mitsuba().load_dict({**plastic, "diffuse_reflectance": body})
+    return load_mitsuba().load_dict({**plastic, "diffuse_reflectance": diffuse})
 
 
 def oren_nayar(sigma: Lanes, view: Lanes, light: Lanes) -> Lanes:
-    """f_r of a white rough matt surface, `sigma` in radians; the number 0 is Lambert's."""
+    """f_r of a white rough diffuse surface, `sigma` in radians; the number 0 is Lambert's."""
     if isinstance(sigma, int | float) and sigma == 0:
         return 1 / math.pi
     dr = load_drjit()

@@ -10,10 +10,10 @@ cosine); with n_k directions of density p_k each adds
 
     f V L cos / sum_k n_k p_k          (the balance heuristic)
 
-Of the body only its loss is estimated: a times the closed form S without shadows, for a body that
+Of the diffuse only its loss is estimated: a times the closed form S without shadows, for a diffuse that
 reflects a constant b, plus (V f - a b) L cos / .... b is f for light along the normal; a is the
 share of the light that is not in shadow, for each half of the samples as the other half sees it,
-which keeps the mean right. So there is no noise on a matt convex body, and none in full shadow.
+which keeps the mean right. So there is no noise on a matt convex diffuse, and none in full shadow.
 
 Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
 rendering", SIGGRAPH 1995, doi:10.1145/218380.218498; control variates: J. M. Hammersley, D. C.
@@ -40,7 +40,9 @@ class Sums:
     """The lobes of N points as they grow, (N, 3) each, and the variances of both."""
 
     def __init__(self, count: int) -> None:
-        self.body, self.gloss, self.body_variance, self.gloss_variance = np.zeros((4, count, 3))
+        self.diffuse, self.gloss, self.diffuse_variance, self.gloss_variance = np.zeros(
+            (4, count, 3)
+        )
 
     def add(
         self,
@@ -54,7 +56,7 @@ class Sums:
         `clear`: (M,), which reach their light. `unshadowed`: of the chunk's points.
         """
         count = chunk.stop - chunk.start
-        body, gloss = clear * paths.body, clear * paths.gloss
+        diffuse, gloss = clear * paths.diffuse, clear * paths.gloss
         halves = min(paths.samples) >= _ENOUGH
         group = 2 * paths.strategy + paths.half if halves else paths.strategy
         sizes = (
@@ -65,13 +67,13 @@ class Sums:
         if unshadowed is not None:
             share = _clear_share(paths, clear, count)[::-1] if halves else np.ones((2, count))
             first = sizes[0] / paths.samples[0]
-            self.body[chunk] += (first * share[0] + (1 - first) * share[1])[
+            self.diffuse[chunk] += (first * share[0] + (1 - first) * share[1])[
                 :, None
-            ] * unshadowed.body
-            body = body - unshadowed.reflected[paths.point] * share[paths.half, paths.point]
+            ] * unshadowed.diffuse
+            diffuse = diffuse - unshadowed.reflected[paths.point] * share[paths.half, paths.point]
         cell = group * count + paths.point
         for lobe, mean, noise in (
-            (body, self.body, self.body_variance),
+            (diffuse, self.diffuse, self.diffuse_variance),
             (gloss, self.gloss, self.gloss_variance),
         ):
             for channel in range(3):
@@ -87,7 +89,7 @@ class Paths:
     """M samples that bring light unless something is in the way. `point`: (M,), which point of the
     chunk. `strategy`: (M,), 0 or 1, what drew it; `samples`: how many each draws at a point.
     `half`: (M,), 0 or 1, each with half of the samples. `direction`: (M, 3); `reach`: (M,), how far
-    the light is; `light`: (M, 3), L cos / sum n p; `body`, `gloss`: (M,), f of both lobes.
+    the light is; `light`: (M, 3), L cos / sum n p; `diffuse`, `gloss`: (M,), f of both lobes.
     """
 
     point: np.ndarray
@@ -97,7 +99,7 @@ class Paths:
     direction: np.ndarray
     reach: np.ndarray
     light: np.ndarray
-    body: np.ndarray
+    diffuse: np.ndarray
     gloss: np.ndarray
 
 
@@ -130,7 +132,7 @@ def draw_paths(
         direction=direction,
         reach=seen.distance[bright],
         light=seen.radiance[bright] * (cosine[point, sample] / density)[:, None],
-        body=reflection.body(many, direction),
+        diffuse=reflection.diffuse(many, direction),
         gloss=reflection.gloss(many, direction),
     )
 
@@ -142,23 +144,23 @@ def trace_paths(points: Points, paths: Paths, tracer: Tracer) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Unshadowed:
-    """The body of N points without shadows, in closed form. `reflected`: (N,), a constant f that is
-    much like the body's; `body`: (N, 3), the radiance under one light of a body that reflects so.
+    """The diffuse of N points without shadows, in closed form. `reflected`: (N,), a constant f that is
+    much like the diffuse's; `diffuse`: (N, 3), the radiance under one light of a diffuse that reflects so.
     """
 
     reflected: np.ndarray
-    body: np.ndarray
+    diffuse: np.ndarray
 
     def at(self, chosen: slice) -> "Unshadowed":
         """That of some of the points."""
-        return Unshadowed(self.reflected[chosen], self.body[chosen])
+        return Unshadowed(self.reflected[chosen], self.diffuse[chosen])
 
 
 def unshadowed(
     points: Points, reflection: Reflection, light: PanelLight | EnvironmentLight
 ) -> Unshadowed:
     """The points under one light that has a size, as if the object cast no shadow."""
-    reflected = reflection.body(points, points.normal)
+    reflected = reflection.diffuse(points, points.normal)
     if isinstance(light, EnvironmentLight):
         shading = unoccluded_shading(light.radiance, points.normal)
     else:
@@ -213,5 +215,5 @@ def add_exactly(
     lit = np.flatnonzero(cosine > 1e-9)
     lit = lit[~tracer.blocked(points.at(lit).lifted(), toward[lit], reach[lit])]
     some, arriving = points.at(lit), beam[lit] * cosine[lit, None]
-    total.body[lit] += reflection.body(some, toward[lit])[:, None] * arriving
+    total.diffuse[lit] += reflection.diffuse(some, toward[lit])[:, None] * arriving
     total.gloss[lit] += reflection.gloss(some, toward[lit])[:, None] * arriving

@@ -2,7 +2,7 @@
 
 Equation: at each point a direction is drawn toward what the lobes reflect, with the density q; it
 brings f_r cos / q times what leaves the part of the object that it meets: direct light there by one
-sample of each light, albedo * body + gloss, and, while bounces remain, what a direction drawn there
+sample of each light, albedo * diffuse + gloss, and, while bounces remain, what a direction drawn there
 brings in the same way. What meets nothing brings nothing: that light is direct.
 
 Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
@@ -17,7 +17,7 @@ import numpy as np
 
 from isc_core.progress import Monitor
 
-from ..scene.materials import Material, Paint
+from ..scene.materials import Material, SurfaceReflectance
 from ..scene.surface import Surface
 from ..scene.tracing import Tracer
 from ..scene.variant import load_mitsuba
@@ -58,11 +58,11 @@ def bounced_light(
         position, normal, view = (
             np.tile(part, (size, 1)) for part in (surface.position, surface.normal, surface.view)
         )
-        paint = surface.paint
-        many = Paint(
-            np.tile(paint.albedo, (size, 1)),
-            np.tile(paint.strength, size),
-            np.tile(paint.gloss, size),
+        reflectance = surface.reflectance
+        many = SurfaceReflectance(
+            np.tile(reflectance.albedo, (size, 1)),
+            np.tile(reflectance.strength, size),
+            np.tile(reflectance.gloss, size),
         )
         lobes = np.stack(
             _arriving(position, normal, view, many, world, options.bounces, random)
@@ -78,16 +78,16 @@ def _arriving(
     position: np.ndarray,
     normal: np.ndarray,
     view: np.ndarray,
-    paint: Paint,
+    reflectance: SurfaceReflectance,
     world: World,
     bounces: int,
     random: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One sample of what other parts of the object give to body (for albedo 1) and gloss of the
+    """One sample of what other parts of the object give to diffuse (for albedo 1) and gloss of the
     points: (N, 3) each.
     """
     dr, mi = load_drjit(), load_mitsuba()
-    points = points_at(position, normal, view, lobes_of(world.material, paint))
+    points = points_at(position, normal, view, lobes_of(world.material, reflectance))
     numbers = generator(len(position), int(random.integers(1 << 32)))
     place = mi.Point2f(numbers.next_float32(), numbers.next_float32())
     local = points.lobes.sample(points.view, numbers.next_float32(), place)
@@ -102,7 +102,7 @@ def _arriving(
     direction = rows_of(toward)
     hits = world.tracer.hits(rows_of(origin), direction)
     met = hits.valid & np.array(useful, bool)
-    body, gloss = np.zeros((2, len(position), 3))
+    diffuse, gloss = np.zeros((2, len(position), 3))
     if met.any():
         leaving = _leaving(
             hits.position[met],
@@ -113,34 +113,36 @@ def _arriving(
             bounces,
             random,
         )
-        body[met], gloss[met] = (np.array(weight, float)[met, None] * leaving for weight in weights)
-    return body, gloss
+        diffuse[met], gloss[met] = (
+            np.array(weight, float)[met, None] * leaving for weight in weights
+        )
+    return diffuse, gloss
 
 
 def _leaving(
     position: np.ndarray,
     normal: np.ndarray,
     view: np.ndarray,
-    paint: Paint,
+    reflectance: SurfaceReflectance,
     world: World,
     bounces: int,
     random: np.random.Generator,
 ) -> np.ndarray:
     """One sample of the radiance that points send toward `view`: (N, 3)."""
     dr = load_drjit()
-    points = points_at(position, normal, view, lobes_of(world.material, paint))
+    points = points_at(position, normal, view, lobes_of(world.material, reflectance))
     numbers = generator(len(position), int(random.integers(1 << 32)))
-    body, gloss = (np.zeros((len(position), 3)) for _ in range(2))
+    diffuse, gloss = (np.zeros((len(position), 3)) for _ in range(2))
     for light in world.lights:
         if isinstance(light, Beam):
-            matt, shiny = beam_light(points, light, world.tracer)
+            diffuse_part, specular_part = beam_light(points, light, world.tracer)
         else:
-            plain, more, shiny = one_sample(points, light, world.tracer, numbers, 1.0)
-            matt = plain + more
-        dr.eval(matt, shiny, numbers)
-        body += rows_of(matt)
-        gloss += rows_of(shiny)
+            plain, more, specular_part = one_sample(points, light, world.tracer, numbers, 1.0)
+            diffuse_part = plain + more
+        dr.eval(diffuse_part, specular_part, numbers)
+        diffuse += rows_of(diffuse_part)
+        gloss += rows_of(specular_part)
     if bounces > 1:
-        further = _arriving(position, normal, view, paint, world, bounces - 1, random)
-        body, gloss = body + further[0], gloss + further[1]
-    return paint.albedo * body + gloss
+        further = _arriving(position, normal, view, reflectance, world, bounces - 1, random)
+        diffuse, gloss = diffuse + further[0], gloss + further[1]
+    return reflectance.albedo * diffuse + gloss

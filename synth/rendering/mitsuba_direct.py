@@ -33,7 +33,7 @@ class Points:
     lobes: Lobes
 
     def values(self, direction: Lanes) -> tuple[Lanes, Lanes]:
-        """f_r cos of body and gloss for light from a direction."""
+        """f_r cos of diffuse and gloss for light from a direction."""
         return self.lobes.values(self.view, self.frame.to_local(direction))
 
 
@@ -62,12 +62,12 @@ def _visible(
 
 
 def beam_light(points: Points, light: Beam, tracer: Tracer) -> tuple[Lanes, Lanes]:
-    """The colours that a directional or point light gives to body and gloss: no noise."""
+    """The colours that a directional or point light gives to diffuse and gloss: no noise."""
     dr = load_drjit()
     direction, distance, irradiance = light.arriving(points.position)
-    body, gloss = points.values(direction)
-    seen = _visible(points, direction, distance, body > 0, tracer)
-    return dr.select(seen, body * irradiance, 0), dr.select(seen, gloss * irradiance, 0)
+    diffuse, gloss = points.values(direction)
+    seen = _visible(points, direction, distance, diffuse > 0, tracer)
+    return dr.select(seen, diffuse * irradiance, 0), dr.select(seen, gloss * irradiance, 0)
 
 
 def generator(lanes: int, seed: int) -> Lanes:
@@ -83,8 +83,8 @@ def generator(lanes: int, seed: int) -> Lanes:
 def one_sample(
     points: Points, light: WideLight, tracer: Tracer, random: Lanes, flat: Lanes
 ) -> tuple[Lanes, Lanes, Lanes]:
-    """The colours that one sample of a light gives: what it gives without shadows to a body that
-    reflects `flat` / pi everywhere, how much more it gives to the body itself, and what it gives to
+    """The colours that one sample of a light gives: what it gives without shadows to a diffuse that
+    reflects `flat` / pi everywhere, how much more it gives to the diffuse itself, and what it gives to
     the gloss.
     """
     dr, mi = load_drjit(), load_mitsuba()
@@ -103,10 +103,10 @@ def one_sample(
         density += points.lobes.density(points.view, local)
         useful = (local.z > 0) & (density > 0)
         radiance = dr.select(useful, radiance / dr.select(useful, density, 1), 0)
-        matt, shiny = points.lobes.values(points.view, local)
+        diffuse_part, specular_part = points.lobes.values(points.view, local)
         seen = _visible(points, direction, distance, useful & (dr.max(radiance) > 0), tracer)
         even = flat * local.z / math.pi
         plain += radiance * even
-        more += radiance * (dr.select(seen, matt, 0) - even)
-        gloss += radiance * dr.select(seen, shiny, 0)
+        more += radiance * (dr.select(seen, diffuse_part, 0) - even)
+        gloss += radiance * dr.select(seen, specular_part, 0)
     return plain, more, gloss

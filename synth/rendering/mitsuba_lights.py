@@ -48,7 +48,7 @@ class WideLight(Protocol):
         ...
 
 
-class Sky:
+class Environment:
     """An environment that is not black."""
 
     def __init__(self, light: EnvironmentLight) -> None:
@@ -169,7 +169,7 @@ class Beam:
 def kernel_light(light: Light) -> Any:
     """The `WideLight` or `Beam` of a light; None for one that is black."""
     if isinstance(light, EnvironmentLight):
-        return Sky(light) if np.any(light.radiance) else None
+        return Environment(light) if np.any(light.radiance) else None
     return Panel(light) if isinstance(light, PanelLight) else Beam(light)
 
 

@@ -1,4 +1,4 @@
-"""Light on a surface by Mitsuba's kernels: body and gloss from the same light paths, for all points
+"""Light on a surface by Mitsuba's kernels: diffuse and gloss from the same light paths, for all points
 at once.
 
 Problem: the radiance that each visible point sends to the camera, the two lobes apart, and the
@@ -11,7 +11,7 @@ reflect with q, and both count as
     V f_r L cos / (p + q)                                        the balance heuristic; V: nothing
     stands between
 
-The body takes its shading without shadows from a closed form, S, so that only what shadows change
+The diffuse takes its shading without shadows from a closed form, S, so that only what shadows change
 is drawn: a k S + (V f_r - a k / pi) L cos / (p + q), k = pi f_r with the light along the normal, a
 the share of the light that gets there. That share is estimated by the other half of the samples, so
 the mean stays right. A convex Lambertian object has no variance, full shadow neither. Samples are
@@ -37,7 +37,7 @@ from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 from ..scene.lights import Light
-from ..scene.materials import Material, Paint
+from ..scene.materials import Material, SurfaceReflectance
 from ..scene.surface import Surface
 from ..scene.tracing import Tracer
 from ..scene.variant import has_llvm, load_mitsuba
@@ -94,8 +94,10 @@ def light_surface(
 
 def _piece(surface: Surface, chosen: slice) -> Surface:
     """Some of the points of a surface, under the same mask."""
-    paint = Paint(
-        surface.paint.albedo[chosen], surface.paint.strength[chosen], surface.paint.gloss[chosen]
+    reflectance = SurfaceReflectance(
+        surface.reflectance.albedo[chosen],
+        surface.reflectance.strength[chosen],
+        surface.reflectance.gloss[chosen],
     )
     return Surface(
         mask=surface.mask,
@@ -103,7 +105,7 @@ def _piece(surface: Surface, chosen: slice) -> Surface:
         normal=surface.normal[chosen],
         view=surface.view[chosen],
         uv=surface.uv[chosen],
-        paint=paint,
+        reflectance=reflectance,
     )
 
 
@@ -116,16 +118,20 @@ def _light(
 ) -> Lit:
     # Two lanes a point, so that each half of the samples has moments of its own.
     halves = 2 if options.samples >= _DIVISIBLE else 1
-    paint = Paint(
+    reflectance = SurfaceReflectance(
         *(
             np.concatenate([part] * halves)
-            for part in (surface.paint.albedo, surface.paint.strength, surface.paint.gloss)
+            for part in (
+                surface.reflectance.albedo,
+                surface.reflectance.strength,
+                surface.reflectance.gloss,
+            )
         )
     )
     position, normal, view = (
         np.tile(part, (halves, 1)) for part in (surface.position, surface.normal, surface.view)
     )
-    points = points_at(position, normal, view, lobes_of(world.material, paint))
+    points = points_at(position, normal, view, lobes_of(world.material, reflectance))
     count = len(surface.position)
     total = _dark(count)
     jobs = len(world.lights) + bool(options.bounces)
@@ -164,14 +170,14 @@ def _exact(points: Points, count: int, light: Beam, tracer: Tracer) -> Lit:
 
 
 def _flat(points: Points) -> Lanes:
-    """The albedo of a Lambertian body that is much like the points' own: as theirs, lit along the
+    """The albedo of a Lambertian diffuse that is much like the points' own: as theirs, lit along the
     normal.
     """
     return math.pi * points.lobes.values(points.view, load_mitsuba().Vector3f(0, 0, 1))[0]
 
 
 def _known(points: Points, surface: Surface, light: WideLight) -> np.ndarray:
-    """The shading, (N, 3), of such a body without shadows."""
+    """The shading, (N, 3), of such a diffuse without shadows."""
     count = len(surface.position)
     return (
         light.unoccluded(surface.position, surface.normal)
@@ -220,12 +226,12 @@ class _Moments:
     def lit(self, known: np.ndarray, share: np.ndarray) -> Lit:
         """With `share` of the plain light replaced by what it is `known` to be, (N, 3)."""
         drawn, pairs = 1 - share, max(self.count * (self.count - 1), 1)
-        body = known + self.means[1] + drawn * (self.means[0] - known)
+        diffuse = known + self.means[1] + drawn * (self.means[0] - known)
         spread = self.spreads[1] + 2 * drawn * self.common + drawn**2 * self.spreads[0]
         # Where no sample met the light at all, nothing is known of its shadow.
         unmet = np.where(self.means[0] > 0, 0, known**2)
         return Lit(
-            body, self.means[2], np.maximum(spread, 0) / pairs + unmet, self.spreads[2] / pairs
+            diffuse, self.means[2], np.maximum(spread, 0) / pairs + unmet, self.spreads[2] / pairs
         )
 
 

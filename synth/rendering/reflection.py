@@ -1,6 +1,6 @@
 """What a material reflects at many points at once, and the directions in which it does so most.
 
-Equation: body and gloss as `synth.scene.materials` says. Directions are drawn from the gloss, matt
+Equation: diffuse and gloss as `synth.scene.materials` says. Directions are drawn from the gloss, matt
 materials' by the cosine (density cos / pi): Blinn-Phong's half vectors have the density (p + 1) /
 (2 pi) cos^p, those of GGX facets that of the facets that the viewer sees, D G1(view) (view . h) /
 cos_view; a half vector stands for a light direction of 1 / (4 view . h) times its density.
@@ -56,25 +56,25 @@ class Reflection:
 
     def __init__(self, material: Material) -> None:
         self._model, self._f0, self._sigma = material.model, material.f0, material.sigma
-        self.matt = material.matt
+        self.is_diffuse = material.is_diffuse
         if material.model == "roughplastic":
             self._plastic = RoughPlastic(float(material.gloss), material.ior)
 
-    def body(self, points: Points, light: np.ndarray) -> np.ndarray:
-        """f_r (N,) in 1/sr of the body for albedo 1, lit from the unit directions (N, 3), all above
+    def diffuse(self, points: Points, light: np.ndarray) -> np.ndarray:
+        """f_r (N,) in 1/sr of the diffuse for albedo 1, lit from the unit directions (N, 3), all above
         the horizon.
         """
         if self._model == "oren_nayar":
             return OrenNayar(1.0, self._sigma).value(points.normal, points.view, light)
         if self._model == "roughplastic":
-            return self._plastic.body(points.normal, points.view, light)
+            return self._plastic.diffuse(points.normal, points.view, light)
         return np.full(len(points), 1 / np.pi)
 
     def gloss(self, points: Points, light: np.ndarray) -> np.ndarray:
         """f_r (N,) in 1/sr of the gloss with its strength, lit from the unit directions (N, 3), all
         above the horizon.
         """
-        if self.matt or not len(points):
+        if self.is_diffuse or not len(points):
             return np.zeros(len(points))
         if self._model == "blinn_phong":
             return BlinnPhong(points.strength, points.gloss, "normalised").value(
@@ -90,7 +90,7 @@ class Reflection:
         """`count` unit directions (N, count, 3) for each point, as the gloss reflects; by the
         cosine for matt materials.
         """
-        if self.matt:
+        if self.is_diffuse:
             return cosine_directions(rng, points, count)
         first, turn = rng.random((2, len(points), count))
         turn = turn * (2 * np.pi)
@@ -111,7 +111,7 @@ class Reflection:
         """Per steradian (N,), how densely `draw` picks the unit directions (N, 3), all above the
         horizon.
         """
-        if self.matt:
+        if self.is_diffuse:
             return cosine_density(points, light)
         half = points.view + light
         half /= np.sqrt(_dot(half, half))[:, None]

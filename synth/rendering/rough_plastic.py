@@ -1,4 +1,4 @@
-"""Mitsuba's rough plastic, in plain arrays: a matt body under a rough dielectric interface.
+"""Mitsuba's rough plastic, in plain arrays: a matt diffuse under a rough dielectric interface.
 
 Equation: f_r = albedo g(cos_view) g(cos_light) / pi + F D G / (4 cos_view cos_light). D, G: GGX
 facets and Smith's separable shadowing as in `isc_core.shading.brdf.ggx`; F: the exact Fresnel term of
@@ -7,7 +7,7 @@ unpolarised light at a dielectric, for the angle between view and half vector,
     F = (r_s^2 + r_p^2) / 2,   r_s = (c - n t) / (c + n t),   r_p = (n c - t) / (n c + t),   t =
     sqrt(1 - (1 - c^2) / n^2)
 
-g, what the interface lets through on the way in or out with light between body and interface shared
+g, what the interface lets through on the way in or out with light between diffuse and interface shared
 evenly between both, is a table over the cosine that Mitsuba integrates; it is read off its own
 plugin, at the table's knots.
 
@@ -15,7 +15,7 @@ Citation: B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet models 
 through rough surfaces", EGSR 2007, 195-206, doi:10.2312/EGWR/EGSR07/195-206; W. Jakob et al.,
 "Mitsuba 3 renderer", 2022, https://mitsuba-renderer.org (the plastic).
 
-Limits: `nonlinear` off: colour does not saturate where light returns to the body more than once.
+Limits: `nonlinear` off: colour does not saturate where light returns to the diffuse more than once.
 One alpha for the whole object.
 """
 
@@ -39,8 +39,8 @@ class RoughPlastic:
         self._alpha, self._ior = alpha, ior
         self._cosines, self._through = _transmission(alpha, ior)
 
-    def body(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr of the body of albedo 1, for unit vectors (..., 3); 0 below the
+    def diffuse(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
+        """f_r (...) in 1/sr of the diffuse of albedo 1, for unit vectors (..., 3); 0 below the
         horizon.
         """
         angles = cosines(normal, view, light)
@@ -82,11 +82,11 @@ def _transmission(alpha: float, ior: float) -> tuple[np.ndarray, np.ndarray]:
     context.type_mask = mi.BSDFFlags.DiffuseReflection
     knots = np.linspace(0, 1, _KNOTS)
     knots[0] = 1e-6  # at 0 the plugin is black
-    products = np.array([_body_toward_zenith(mi, plastic, context, cosine) for cosine in knots])
+    products = np.array([_diffuse_toward_zenith(mi, plastic, context, cosine) for cosine in knots])
     return knots, products / np.sqrt(products[-1])
 
 
-def _body_toward_zenith(mi: object, plastic: object, context: object, cosine: float) -> float:
+def _diffuse_toward_zenith(mi: object, plastic: object, context: object, cosine: float) -> float:
     """pi f_body of a white plastic seen from `cosine` and lit from the zenith."""
     point = mi.SurfaceInteraction3f()  # type: ignore[attr-defined]
     point.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, float(cosine))  # type: ignore[attr-defined]

@@ -28,12 +28,12 @@ from isc_core.errors import InputError
 
 Model = Literal["lambert", "oren_nayar", "blinn_phong", "ggx", "roughplastic"]
 MODELS: tuple[str, ...] = get_args(Model)
-MATT: tuple[str, ...] = ("lambert", "oren_nayar")
+DIFFUSE_MODELS: tuple[str, ...] = ("lambert", "oren_nayar")
 _RANGES = {"blinn_phong": (1.0, 10000.0), "ggx": (0.01, 1.0), "roughplastic": (0.01, 1.0)}
 
 
 @dataclass(frozen=True)
-class Paint:
+class SurfaceReflectance:
     """A material at N points.
 
     `albedo`: (N, 3) in [0, 1]. `strength`, `gloss`: (N,), see the module; 0 for matt models.
@@ -73,7 +73,7 @@ class Material:
             raise InputError("an albedo has to be an (h, w, 3) picture with values from 0 to 1")
         if not (1 < self.ior <= 3 and 0 <= self.sigma <= np.pi / 2):
             raise InputError("ior has to be above 1 and at most 3, sigma within 0 and pi/2")
-        if self.matt:
+        if self.is_diffuse:
             return
         if any(
             np.ndim(values) not in (0, 2) or not np.size(values)
@@ -91,24 +91,24 @@ class Material:
             raise InputError("roughplastic has one gloss for the whole object, and strength 1")
 
     @property
-    def matt(self) -> bool:
+    def is_diffuse(self) -> bool:
         """Whether there is no gloss at all."""
-        return self.model in MATT
+        return self.model in DIFFUSE_MODELS
 
     @property
     def f0(self) -> float:
         """What the gloss mirrors along the normal, of ggx and roughplastic."""
         return ((self.ior - 1) / (self.ior + 1)) ** 2
 
-    def at(self, uv: np.ndarray) -> Paint:
+    def at(self, uv: np.ndarray) -> SurfaceReflectance:
         """The material at texture coordinates (N, 2)."""
         albedo = texture_at(np.asarray(self.albedo, float), uv)
-        if self.matt:
-            return Paint(albedo, np.zeros(len(uv)), np.zeros(len(uv)))
+        if self.is_diffuse:
+            return SurfaceReflectance(albedo, np.zeros(len(uv)), np.zeros(len(uv)))
         strength, gloss = (
             texture_at(_texture(values), uv) for values in (self.strength, self.gloss)
         )
-        return Paint(albedo, strength, gloss)
+        return SurfaceReflectance(albedo, strength, gloss)
 
 
 def texture_at(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""What the camera sees of an object before any light is on: a point, a normal and a paint for each
+"""What the camera sees of an object before any light is on: a point, a normal and a reflectance for each
 pixel.
 
 Place and normal come from the one ray through each pixel's centre, so that nothing is averaged over
-an edge and truth is exact. Paint is averaged over the pixel's footprint, as a camera does, so that
+an edge and truth is exact. SurfaceReflectance is averaged over the pixel's footprint, as a camera does, so that
 prints have no jagged edges.
 
 Limits: what lies before what is decided by the centre alone: outlines are not smoothed.
@@ -14,11 +14,11 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from .materials import Paint
+from .materials import SurfaceReflectance
 from .scene import Scene
 from .tracing import Tracer
 
-_FOOTPRINT = 3  # rays a side of a pixel, for its paint
+_FOOTPRINT = 3  # rays a side of a pixel, for its reflectance
 _SAME_PLACE = (
     3.0  # a ray of the footprint counts where it hits within so many pixels of the centre's hit
 )
@@ -29,7 +29,7 @@ class Surface:
     """The N visible points, in row order of `mask`.
 
     `mask`: (H, W) bool. `position`: (N, 3) object units; `normal`: (N, 3) unit, toward the viewer;
-    `view`: (N, 3) unit, toward the camera; `uv`: (N, 2). `paint`: the material there, `albedo` and
+    `view`: (N, 3) unit, toward the camera; `uv`: (N, 2). `reflectance`: the material there, `albedo` and
     `strength` averaged over the pixel, `gloss` at its centre.
     """
 
@@ -38,7 +38,7 @@ class Surface:
     normal: np.ndarray
     view: np.ndarray
     uv: np.ndarray
-    paint: Paint
+    reflectance: SurfaceReflectance
 
     def image(self, values: np.ndarray, outside: tuple[float, ...] | float = 0.0) -> np.ndarray:
         """Values (N[, C]) of the points as a picture (H, W[, C]) float32 that is `outside`
@@ -58,13 +58,15 @@ def find_surface(scene: Scene, tracer: Tracer) -> Surface:
         raise InputError("the camera sees nothing of the object: its mask would be empty")
     mask = hits.valid.reshape(scene.camera.height, scene.camera.width)
     position, uv = hits.position[hits.valid], hits.uv[hits.valid]
-    paint = _footprint_paint(scene, tracer, mask, position, uv)
-    return Surface(mask, position, hits.normal[hits.valid], -directions[hits.valid], uv, paint)
+    reflectance = _footprint_reflectance(scene, tracer, mask, position, uv)
+    return Surface(
+        mask, position, hits.normal[hits.valid], -directions[hits.valid], uv, reflectance
+    )
 
 
-def _footprint_paint(
+def _footprint_reflectance(
     scene: Scene, tracer: Tracer, mask: np.ndarray, position: np.ndarray, uv: np.ndarray
-) -> Paint:
+) -> SurfaceReflectance:
     centre = scene.material.at(uv)
     if scene.material.albedo.shape[:2] == (1, 1) and np.ndim(scene.material.strength) == 0:
         return centre
@@ -79,4 +81,4 @@ def _footprint_paint(
             found = scene.material.at(np.where(same[:, None], hits.uv, uv))
             albedo += found.albedo
             strength += found.strength
-    return Paint(albedo / _FOOTPRINT**2, strength / _FOOTPRINT**2, centre.gloss)
+    return SurfaceReflectance(albedo / _FOOTPRINT**2, strength / _FOOTPRINT**2, centre.gloss)

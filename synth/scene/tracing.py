@@ -89,7 +89,7 @@ class Tracer:
         import drjit
 
         hit = self.scene.ray_intersect(mi.Ray3f(_points(origins), _vectors(directions)))
-        # Part by part: a whole vector becomes an array by a kernel that is compiled anew for every
+        # FamilyMember by part: a whole vector becomes an array by a kernel that is compiled anew for every
         # number of rays.
         parts = [hit.is_valid(), *hit.p, *hit.sh_frame.n, *hit.uv]
         drjit.eval(parts)

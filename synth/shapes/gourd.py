@@ -76,7 +76,7 @@ def _outline(rows: int) -> tuple[np.ndarray, np.ndarray]:
     return height, np.maximum(radius, 0)
 
 
-def painted_skin(size: int = 1024) -> np.ndarray:
+def gourd_albedo(size: int = 1024) -> np.ndarray:
     """The albedo, (size / 2, size, 3) float32, linear Rec.709 in [0, 1]; row 0 is the top of the
     object, columns go around it.
     """

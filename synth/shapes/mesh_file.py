@@ -29,9 +29,9 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from isc_core.errors import InputError
+from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.limits import USUAL
 from isc_core.io.native_io import suppress_native_output
-from isc_core.photo.photo import srgb_to_linear
 from synth.scene.materials import texture_at
 from synth.scene.meshes import Mesh
 

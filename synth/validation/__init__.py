@@ -1,3 +1,3 @@
-"""Statistics that accept or reject: renders against what they should be, and the stages of a
-decomposition against the truth.
+"""Validation of the decomposition on rendered scenes: run its stages, measure their errors against
+the ground truth, check the data set, and report.
 """

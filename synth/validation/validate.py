@@ -1,4 +1,4 @@
-"""A validation from a dataset's folder to its outcome: run, sum up, check, judge."""
+"""A validation, from a data set's folder to its outcome: run, summarise, check and judge."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -22,11 +22,34 @@ def validate(
     command: str,
     monitor: Monitor,
 ) -> ValidationOutcome:
-    """Validates the stages on the dataset below `root`.
+    """Validate the stages on a data set.
 
-    `bounds` to judge by; `renders`: how many scenes to render again; `command`: what the report
-    says it was made by. Raises `InputError` where the dataset cannot be read or no scene can be
-    run, `Cancelled`.
+    Parameters
+    ----------
+    root : Path
+        Folder of a data set that `isc synth` wrote.
+    options : ValidationOptions
+        What to run.
+    bounds : sequence of Bound
+        Regression bounds to judge by.
+    renders : int
+        How many scenes to render again as a check.
+    command : str
+        The command that repeats the run, for the report.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    ValidationOutcome
+        The result.
+
+    Raises
+    ------
+    InputError
+        If the data set cannot be read or no scene can be run.
+    Cancelled
+        If the user cancels.
     """
     folders = choose_scenes(root, options)
     checks, notes = check_dataset(folders, renders, options.seed, monitor.part(0, 0.1))

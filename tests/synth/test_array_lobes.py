@@ -267,7 +267,7 @@ def test_rough_plastic_is_mitsubas(alpha: float) -> None:
     view, light = (part / np.linalg.norm(part, axis=1, keepdims=True) for part in (view, light))
     ours = RoughPlastic(alpha, ior)
     for part, flag in (
-        (ours.body, mi.BSDFFlags.DiffuseReflection),
+        (ours.diffuse, mi.BSDFFlags.DiffuseReflection),
         (ours.gloss, mi.BSDFFlags.GlossyReflection),
     ):
         context = mi.BSDFContext()
@@ -398,7 +398,7 @@ def test_progress_rises_and_cancel_stops(waisted: Seen, monkeypatch: pytest.Monk
         both,
         waisted.tracer,
         options,
-        Monitor(lambda _, share: shown.append(share)),
+        Monitor(lambda event: shown.append(event.fraction)),
     )
     assert len(shown) > 10
     assert shown == sorted(shown)

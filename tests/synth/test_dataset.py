@@ -15,15 +15,15 @@ pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 from isc_core.datasets.highlight_set import load_rendered
 from isc_core.errors import Cancelled, InputError
 from isc_core.io.exr import read_channels
-from isc_core.photo.photo import read_photo
+from isc_core.photo import read_photo
 from isc_core.progress import Monitor
 from isc_core.result_files.result_folder import LAYERS
 from isc_core.shading.spherical_harmonics import real_sh
-from synth.capture.recipe import Picture, Recipe, photograph
+from synth.capture.recipe import PictureSettings, Recipe, photograph
 from synth.capture.sensor import Sensor
 from synth.dataset import generate as run_module
 from synth.dataset.description import CONVENTIONS
-from synth.dataset.generate import Run, make_dataset, plan
+from synth.dataset.generate import DatasetSettings, make_dataset, plan
 from synth.dataset.reading import list_scenes, read_facts, read_truth
 from synth.dataset.scene_folder import FILES
 from synth.dataset.splits import SPLITS, Choices
@@ -33,8 +33,8 @@ from synth.scene.materials import MODELS
 CHOICES = Choices(
     shapes=("superquadric", "lathe"), albedos=("uniform", "patches"), lights=("directional", "sh")
 )
-PICTURE = Picture(size=32, samples=4, renderer="arrays", sensor=Sensor(noise=0.01, bits=8))
-RUN = Run(5, 5, CHOICES, PICTURE)
+PICTURE = PictureSettings(size=32, samples=4, renderer="arrays", sensor=Sensor(noise=0.01, bits=8))
+RUN = DatasetSettings(5, 5, CHOICES, PICTURE)
 COLOURS = ("image", "diffuse", "specular", "residual", "reflectance", "shading")
 
 
@@ -147,7 +147,7 @@ def test_the_facts_are_those_of_the_recipe(made: Path) -> None:
         assert facts.mask_pixels == truth.mask.sum()
         parts = truth.specular[truth.mask].sum(), truth.diffuse[truth.mask].sum()
         assert facts.specular_share == pytest.approx(parts[0] / sum(parts), rel=1e-4)
-        assert (facts.gloss_class == "matt") == (facts.specular_share == 0)
+        assert (facts.gloss_class == "diffuse") == (facts.specular_share == 0)
 
 
 def test_the_photo_is_the_image_a_camera_stored(made: Path) -> None:
@@ -193,7 +193,9 @@ def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it
     """Heights, taken back into space and through the OpenCV matrix, land on the centres of their
     pixels.
     """
-    make_dataset(Run(1, 5, CHOICES, replace(PICTURE, perspective=perspective)), tmp_path / "set")
+    make_dataset(
+        DatasetSettings(1, 5, CHOICES, replace(PICTURE, perspective=perspective)), tmp_path / "set"
+    )
     folder = list_scenes(tmp_path / "set")[0]
     truth, camera = read_truth(folder), json.loads((folder / "scene.json").read_text())["camera"]
     rows, columns = np.nonzero(truth.mask)
@@ -281,7 +283,7 @@ def test_progress_names_the_scene_and_never_goes_back(tmp_path: Path) -> None:
     make_dataset(
         replace(RUN, count=2),
         tmp_path / "set",
-        Monitor(lambda stage, fraction: seen.append((stage, fraction))),
+        Monitor(lambda event: seen.append((event.stage, event.fraction))),
     )
     texts, fractions = zip(*seen, strict=True)
     assert any(text == "scene 1 of 2" for text in texts)
@@ -309,7 +311,9 @@ def test_a_longer_run_keeps_the_scenes_of_a_shorter_one(root: Path) -> None:
         ),
     ],
 )
-def test_another_run_is_refused_and_nothing_touched(root: Path, other: Run, message: str) -> None:
+def test_another_run_is_refused_and_nothing_touched(
+    root: Path, other: DatasetSettings, message: str
+) -> None:
     before = contents(root)
     with pytest.raises(InputError) as refused:
         make_dataset(other, root)
@@ -347,7 +351,7 @@ def test_a_scene_folder_with_somebody_elses_file_is_kept(root: Path) -> None:
 @pytest.mark.parametrize(("count", "seed"), [(0, 0), (-1, 0), (5, 99_999), (100_001, 0)])
 def test_impossible_counts_are_refused(count: int, seed: int) -> None:
     with pytest.raises(InputError, match="cannot be made"):
-        Run(count, seed)
+        DatasetSettings(count, seed)
 
 
 def test_reading_refuses_what_is_not_ours(root: Path, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ pytest.importorskip("mitsuba", reason="needs the extra `synth`")
 
 from isc_core.io.exr import read_channels
 from synth.capture.truth import GroundTruth
-from synth.demo_scene import demo_object, main, soft_sky
+from synth.demo_scene import demo_object, main, soft_environment
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_light_from_above_left_falls_there(truth: GroundTruth) -> None:
 
 
 def test_the_sky_is_positive_and_brighter_than_the_ground() -> None:
-    sky = soft_sky(32)
+    sky = soft_environment(32)
     assert sky.shape == (32, 64, 3)
     assert sky.min() > 0
     assert sky[:8].mean() > 1.5 * sky[-8:].mean()

@@ -125,8 +125,8 @@ def test_classes_by_alpha() -> None:
 def test_what_does_not_shine_is_matt() -> None:
     assert {
         gloss_class(material) for model in ("lambert", "oren_nayar") for material in drawn(model, 5)
-    } == {"matt"}
-    assert gloss_class(Material(WHITE, "ggx", 0.1, strength=0.0)) == "matt"
+    } == {"diffuse"}
+    assert gloss_class(Material(WHITE, "ggx", 0.1, strength=0.0)) == "diffuse"
 
 
 def test_all_classes_are_drawn() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from isc_core.errors import InputError
-from synth.scene.materials import MATT, MODELS, Material, texture_at
+from synth.scene.materials import DIFFUSE_MODELS, MODELS, Material, texture_at
 
 GREY = np.full((2, 2, 3), 0.5)
 
@@ -65,7 +65,12 @@ def test_a_paint_holds_what_the_material_has_there() -> None:
 def test_only_glossy_models_have_gloss(model: Any) -> None:
     material = Material(GREY, model, 0.2 if model in ("ggx", "roughplastic") else 50.0, 1.0)
     paint = material.at(centres(2, 2))
-    assert material.matt == (model in MATT) == (not paint.strength.any()) == (not paint.gloss.any())
+    assert (
+        material.is_diffuse
+        == (model in DIFFUSE_MODELS)
+        == (not paint.strength.any())
+        == (not paint.gloss.any())
+    )
 
 
 def test_f0_is_that_of_glass() -> None:

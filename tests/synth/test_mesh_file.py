@@ -12,7 +12,7 @@ import trimesh
 from PIL import Image
 
 from isc_core.errors import InputError
-from isc_core.photo.photo import srgb_to_linear
+from isc_core.imaging.srgb import srgb_to_linear
 from synth.shapes import mesh_file
 from synth.shapes.mesh_file import read_mesh, read_mesh_file
 

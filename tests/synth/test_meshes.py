@@ -6,7 +6,7 @@ import numpy as np
 import trimesh
 
 from synth.scene.meshes import Mesh, swept, write_ply
-from synth.shapes.gourd import gourd, painted_skin
+from synth.shapes.gourd import gourd, gourd_albedo
 
 
 def unit_sphere(rows: int = 61, columns: int = 121) -> Mesh:
@@ -58,7 +58,7 @@ def test_ply_files_are_read_back_by_others(tmp_path: Path) -> None:
 
 
 def test_the_skin_is_colourful_and_physical_and_joins_around() -> None:
-    skin = painted_skin(256)
+    skin = gourd_albedo(256)
     assert skin.shape == (128, 256, 3)
     assert skin.min() >= 0.02
     assert skin.max() <= 0.8

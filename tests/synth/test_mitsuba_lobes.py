@@ -348,7 +348,9 @@ def test_gloss_and_strength_are_those_of_each_point() -> None:
     gloss, strength = (
         np.linspace(low, high, len(surface.position)) for low, high in ((0.05, 0.6), (0.0, 2.0))
     )
-    varied = replace(surface, paint=replace(surface.paint, gloss=gloss, strength=strength))
+    varied = replace(
+        surface, reflectance=replace(surface.reflectance, gloss=gloss, strength=strength)
+    )
     found = light_surface(varied, material, (SUN,), tracer, options)
     expected = strength[:, None] * radiance(
         Ggx(gloss, 0.04), surface.normal, surface.view, directional(SUN.direction, SUN.irradiance)

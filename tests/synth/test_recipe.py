@@ -10,18 +10,32 @@ import pytest
 
 from isc_core.errors import InputError
 from synth.albedos import ALBEDOS
-from synth.capture.recipe import Part, Picture, Recipe, Sources, build, camera_around, photograph
+from synth.capture.recipe import (
+    FamilyMember,
+    PictureSettings,
+    Recipe,
+    Sources,
+    build,
+    camera_around,
+    photograph,
+)
 from synth.capture.sensor import Sensor
 from synth.dataset.splits import SPLITS, Choices, Pools, make_pools
 from synth.light_rigs import RIGS
 from synth.scene import Scene
 from synth.scene.lights import EnvironmentLight, PanelLight
-from synth.scene.materials import MATT, MODELS
+from synth.scene.materials import DIFFUSE_MODELS, MODELS
 from synth.shapes import SHAPES
 
-SMALL = Picture(size=32, samples=4, renderer="arrays")
+SMALL = PictureSettings(size=32, samples=4, renderer="arrays")
 RECIPE = Recipe(
-    7, Part("lathe", 3), Part("blinn_phong", 2), "blinn_phong", "print", Part("area", 1), SMALL
+    7,
+    FamilyMember("lathe", 3),
+    FamilyMember("blinn_phong", 2),
+    "blinn_phong",
+    "print",
+    FamilyMember("area", 1),
+    SMALL,
 )
 ASPECTS = ("shape", "material", "light")
 
@@ -54,38 +68,45 @@ def names(pools: Pools) -> dict[str, dict[str, set[str]]]:
 def test_a_member_is_the_same_in_every_scene() -> None:
     one = build(RECIPE)
     other = build(
-        replace(RECIPE, seed=8, material=Part("ggx", 4), model="ggx", light=Part("sh", 0))
+        replace(
+            RECIPE,
+            seed=8,
+            material=FamilyMember("ggx", 4),
+            model="ggx",
+            light=FamilyMember("sh", 0),
+        )
     )
     assert np.array_equal(one.mesh.vertices, other.mesh.vertices)
     assert one.camera.pixels_per_unit != other.camera.pixels_per_unit, (
         "framing belongs to the scene"
     )
-    repainted = build(replace(RECIPE, shape=Part("blobby", 0), light=Part("sh", 0)))
+    repainted = build(replace(RECIPE, shape=FamilyMember("blobby", 0), light=FamilyMember("sh", 0)))
     assert np.array_equal(one.material.albedo, repainted.material.albedo)
     assert np.array_equal(one.material.gloss, repainted.material.gloss)
-    lit = build(replace(RECIPE, shape=Part("blobby", 0), material=Part("ggx", 4)))
+    lit = build(replace(RECIPE, shape=FamilyMember("blobby", 0), material=FamilyMember("ggx", 4)))
     assert np.array_equal(radiance(one), radiance(lit))
 
 
 def test_members_of_a_family_differ() -> None:
     meshes = [
-        build(replace(RECIPE, shape=Part("lathe", number))).mesh.vertices for number in range(3)
+        build(replace(RECIPE, shape=FamilyMember("lathe", number))).mesh.vertices
+        for number in range(3)
     ]
     assert not np.array_equal(meshes[0], meshes[1])
     assert not np.array_equal(meshes[1], meshes[2])
     paints = [
-        build(replace(RECIPE, material=Part("blinn_phong", number))).material.albedo
+        build(replace(RECIPE, material=FamilyMember("blinn_phong", number))).material.albedo
         for number in range(2)
     ]
     assert not np.array_equal(paints[0], paints[1])
 
 
 def test_streams_of_a_member_and_of_a_scene_are_independent() -> None:
-    part = Part("lathe", 3)
+    part = FamilyMember("lathe", 3)
     drawn = [
         part.generator("shape").random(4),
         part.generator("light").random(4),
-        Part("blobby", 3).generator("shape").random(4),
+        FamilyMember("blobby", 3).generator("shape").random(4),
     ]
     drawn += [np.random.default_rng(RECIPE.stream(number)).random(4) for number in range(4)]
     assert len({tuple(values) for values in drawn}) == len(drawn)
@@ -96,7 +117,9 @@ def test_streams_of_a_member_and_of_a_scene_are_independent() -> None:
 def test_the_object_fills_the_picture(perspective: bool) -> None:
     for shape in SHAPES:
         recipe = replace(
-            RECIPE, shape=Part(shape, 1), picture=replace(SMALL, size=200, perspective=perspective)
+            RECIPE,
+            shape=FamilyMember(shape, 1),
+            picture=replace(SMALL, size=200, perspective=perspective),
         )
         scene = build(recipe)
         assert scene.camera.perspective == perspective
@@ -134,10 +157,10 @@ def test_an_object_that_mirrors_more_than_it_scatters_is_not_burnt_out() -> None
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     dark = replace(
         RECIPE,
-        shape=Part("height_field", 15),
-        material=Part("blinn_phong", 17),
+        shape=FamilyMember("height_field", 15),
+        material=FamilyMember("blinn_phong", 17),
         albedo="grey",
-        light=Part("sh", 3),
+        light=FamilyMember("sh", 3),
     )
     burnt = photograph(replace(dark, picture=replace(SMALL, exposure=0.75)))[1]
     truth = photograph(dark)[1]
@@ -189,7 +212,7 @@ def test_held_out_materials_have_every_albedo_and_most_are_glossy(pools: Pools) 
         recipe.albedo for recipe in recipes if pools.split_of(recipe.seed) == "test_materials"
     }
     assert held_out == set(ALBEDOS)
-    assert 0.1 < np.mean([recipe.model in MATT for recipe in recipes]) < 0.25
+    assert 0.1 < np.mean([recipe.model in DIFFUSE_MODELS for recipe in recipes]) < 0.25
 
 
 def test_a_scene_depends_on_its_seed_alone(pools: Pools) -> None:
@@ -264,7 +287,7 @@ def test_families_of_files_need_their_files(choices: dict[str, tuple[str, ...]])
 )
 def test_impossible_pictures_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(InputError):
-        Picture(**wrong)
+        PictureSettings(**wrong)
 
 
 def test_natural_lights_are_told_apart_by_their_number(shared: Path) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from isc_core.errors import InputError
-from isc_core.photo.photo import linear_to_srgb, read_photo, srgb_to_linear
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
+from isc_core.photo import read_photo
 from synth.capture.sensor import READ, Sensor, noise_deviation, observe, write_photo
 from synth.capture.truth import GroundTruth
 

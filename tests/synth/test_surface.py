@@ -55,7 +55,7 @@ def test_pictures_of_points_keep_their_order() -> None:
     np.testing.assert_array_equal(
         picture[~surface.mask], np.broadcast_to((7, 8, 9), picture[~surface.mask].shape)
     )
-    assert surface.image(surface.paint.gloss).shape == (SIZE, SIZE)
+    assert surface.image(surface.reflectance.gloss).shape == (SIZE, SIZE)
 
 
 def test_a_pinhole_sees_less_of_a_ball_and_its_rays_meet() -> None:
@@ -98,7 +98,10 @@ def test_paint_finer_than_pixels_is_averaged() -> None:
     material = checkerboard(128)
     fine = seen(ball(181), material, size=SIZE)
     middle = fine.surface.normal[:, 2] > 0.6
-    for values in (fine.surface.paint.albedo[middle, 0], fine.surface.paint.strength[middle]):
+    for values in (
+        fine.surface.reflectance.albedo[middle, 0],
+        fine.surface.reflectance.strength[middle],
+    ):
         assert abs(values.mean() - 0.5) < 0.03
         assert values.std() < 0.5 * material.at(fine.surface.uv[middle]).strength.std()
 
@@ -108,10 +111,10 @@ def test_paint_coarser_than_pixels_stays_sharp_but_at_edges() -> None:
     surface = seen(ball(181), material, size=2 * SIZE).surface
     centre = material.at(surface.uv)
     middle = surface.normal[:, 2] > 0.6
-    same = np.abs(surface.paint.albedo[middle, 0] - centre.albedo[middle, 0]) < 1e-9
+    same = np.abs(surface.reflectance.albedo[middle, 0] - centre.albedo[middle, 0]) < 1e-9
     assert 0.4 < same.mean() < 0.95
-    assert ((surface.paint.albedo >= 0) & (surface.paint.albedo <= 1)).all()
-    np.testing.assert_array_equal(surface.paint.gloss, 50.0)
+    assert ((surface.reflectance.albedo >= 0) & (surface.reflectance.albedo <= 1)).all()
+    np.testing.assert_array_equal(surface.reflectance.gloss, 50.0)
 
 
 def test_paint_is_not_taken_from_what_lies_behind() -> None:
@@ -133,8 +136,8 @@ def test_paint_is_not_taken_from_what_lies_behind() -> None:
     surface = seen(both, Material(half, "lambert"), size=SIZE).surface
     near = surface.position[:, 2] > 1.05
     assert near.sum() > 50
-    np.testing.assert_allclose(surface.paint.albedo[near], 1)
-    np.testing.assert_allclose(surface.paint.albedo[~near], 0)
+    np.testing.assert_allclose(surface.reflectance.albedo[near], 1)
+    np.testing.assert_allclose(surface.reflectance.albedo[~near], 0)
 
 
 def test_seeing_nothing_is_the_users_mistake() -> None:

@@ -12,7 +12,7 @@ from synth.scene import Scene
 from synth.scene.camera import Camera
 from synth.scene.lights import DirectionalLight, EnvironmentLight, panel_toward_origin
 from synth.scene.materials import Material
-from synth.shapes.gourd import gourd, painted_skin
+from synth.shapes.gourd import gourd, gourd_albedo
 
 RADIOMETRIC = ("image", "diffuse", "specular", "residual", "shading")
 
@@ -31,7 +31,7 @@ def scene() -> Scene:
     )
     return Scene(
         gourd(90, 121).turned(14),
-        Material(painted_skin(256), "ggx", 0.15, 1.0),
+        Material(gourd_albedo(256), "ggx", 0.15, 1.0),
         lights,
         Camera(48, 48, 21),
     )

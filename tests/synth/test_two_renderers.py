@@ -54,7 +54,7 @@ def render(
     scene: Seen, material: str, light: str, renderer: Renderer, seed: int, **options: int
 ) -> Lit:
     paint = materials()[material].at(scene.surface.uv)
-    surface = dataclasses.replace(scene.surface, paint=paint)
+    surface = dataclasses.replace(scene.surface, reflectance=paint)
     chosen = RenderOptions(**{"samples": SAMPLES, **options}, seed=seed, renderer=renderer)
     return light_surface(surface, materials()[material], (lights()[light],), scene.tracer, chosen)
 

@@ -130,7 +130,7 @@ def test_a_whole_report(dataset: Path, tmp_path: Path, capsys: pytest.CaptureFix
     assert (
         "svg" in page.tags
         and "Error budget" in page.words
-        and "What limits the chain most" in page.words
+        and "The largest error source of the chain" in page.words
     )
     content = json.loads((out / "report.json").read_text(encoding="utf-8"))
     assert content["accepted"] and len(content["scenes"]) == 1 and len(content["budget"]) == 8
@@ -339,7 +339,7 @@ def test_text_from_outside_cannot_become_markup() -> None:
     )
     assert (
         page.tags.count("rect") == 19 + 8
-        and "Rejected: 1 of 1 bounds broken, 1 of 1 checks of the data failed." in page.words
+        and "Rejected: 1 of 1 bounds violated, 1 of 1 data checks failed." in page.words
     )
     assert (
         json.loads(json.dumps(to_json(outcome, [evil]), allow_nan=False))["scenes"][0]["facts"][

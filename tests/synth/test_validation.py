@@ -313,7 +313,7 @@ def test_every_kind_of_slice_holds_every_scene_once() -> None:
     scenes = [
         facts(
             f"s{k}",
-            gloss_class=("matt", "sharp")[k % 2],
+            gloss_class=("diffuse", "sharp")[k % 2],
             specular_share=float(rng.uniform(0, 0.5)),
             mask_pixels=int(rng.integers(50, 900)),
         )
@@ -398,7 +398,7 @@ def test_a_run_keeps_its_own_bounds_and_they_survive_the_file(tmp_path: Path) ->
         (SEPARATION,), results(list(np.random.default_rng(1).uniform(0.2, 0.9, 12))), 0
     )
     bounds = bounds_from(figures)
-    assert len(bounds) == len(SEPARATION.metrics) - 1  # no scene is matt
+    assert len(bounds) == len(SEPARATION.metrics) - 1  # no scene is diffuse
     write_bounds(tmp_path / "bounds.json", bounds)
     assert read_bounds(tmp_path / "bounds.json") == bounds
     assert not any(verdict.broken for verdict in judge(bounds, figures))

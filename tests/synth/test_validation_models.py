@@ -17,12 +17,12 @@ pytest.importorskip("mitsuba", reason="rendered scenes need Mitsuba")
 
 from isc_core.cli.main import main
 from isc_core.decompose import layers, shape
-from isc_core.decompose.models import Answer, Settings, Task, solve
+from isc_core.decompose.models import DecompositionTask, SceneEstimate, Settings, solve
 from isc_core.decompose.settings import SEPARATING_MODELS
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import Scores
 from isc_core.numerics.lbfgs import LbfgsOptions
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import separate
@@ -105,7 +105,7 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def alone(truth: GroundTruth, model: str) -> Answer:
+def alone(truth: GroundTruth, model: str) -> SceneEstimate:
     """A model on the photo, as `isc decompose` calls it."""
     h, w = truth.mask.shape
     photo = Photo(
@@ -115,7 +115,7 @@ def alone(truth: GroundTruth, model: str) -> Answer:
         np.zeros((h, w), bool),
         PhotoSource("", (w, h), 16, "linear", "file"),
     )
-    return solve(Task(photo, photo, Settings(model, EVERY.separator, threads=1)))
+    return solve(DecompositionTask(photo, photo, Settings(model, EVERY.separator, threads=1)))
 
 
 def relative(*ratios: float) -> Scores:
@@ -270,7 +270,7 @@ def test_means_and_shares_follow_from_the_scenes() -> None:
         0.25 - 1e-9 <= low < gain.share.value < high <= 0.5 + 1e-9
     )  # of the worst scene and of the best
     assert any(
-        text.startswith("mdr has 0.796 [") and "40 %" in text for text in model_findings(outcome)
+        text.startswith("mdr: 0.796 [") and "40 %" in text for text in model_findings(outcome)
     )
 
 
@@ -289,7 +289,7 @@ def test_tables_have_a_row_for_every_model_and_material_and_escape_names() -> No
     outcome = outcome_of(
         (scene("a", 0.5, 0.8), scene("b", 0.5, 0.9, model=evil), scene("c", 0.5, 1.0))
     )
-    tables = {table.kind: table for table in model_tables(outcome)}
+    tables = {found.kind: found.table for found in model_tables(outcome)}
     assert [row[0] for row in tables["all"].rows] == [
         "plain SIRFS",
         "mdr",

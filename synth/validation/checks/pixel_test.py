@@ -1,31 +1,31 @@
-"""Whether an image is another up to noise: a test of every pixel, and two of all pixels together.
+"""Statistical test whether two images are equal up to noise: one test per pixel, and two of all
+pixels together.
 
-Problem: renders are noisy, and an error may sit in one pixel, or be far below the noise in every
-one.
+Problem: renders are noisy, and an error may affect a single pixel, or be far below the noise of
+each.
 
-Equation: under the hypothesis the difference d of a pixel has the mean 0 and the variance v, known
-or estimated. Each pixel's d / sqrt(v) (Student's t where v was estimated from few samples) becomes
-the z of equal probability. The largest |z| of m pixels is held against the z of the level 1 - (1 -
-a)^(1/m). For all pixels together, with weights w = 1 / (v averaged over the neighbours), which know
-nothing of d:
+Equation: under the null hypothesis the difference d of a pixel has mean 0 and variance v, known or
+estimated. Each pixel's d / sqrt(v) (Student's t if v was estimated from few samples) is converted
+to the z of equal probability. The largest |z| of m pixels is compared with the z of the level
+1 - (1 - a)^(1/m). For all pixels together, with weights w = 1 / (v averaged over the neighbours),
+which are independent of d:
 
-    bias    sum(sqrt(w) d) / sqrt(sum(w v))                      a small shift of many pixels spread
-    sum(w (d^2 - v)) / sqrt(sum(w^2 (d^2 - v)^2))        small errors of either sign, or a variance
-    that claims too little
+    bias    sum(sqrt(w) d) / sqrt(sum(w v))                  a small shift of many pixels
+    spread  sum(w (d^2 - v)) / sqrt(sum(w^2 (d^2 - v)^2))    small errors of either sign, or an
+                                                             underestimated variance
 
-both normal where pixels are many. The level is shared: half for the pixels, a quarter for each of
-the others (twice the channels of them).
+Both are normal for many pixels. The level is shared: half for the pixels, a quarter for each of the
+others (divided by the number of channels, two-sided).
 
 Citation: Z. Sidak, "Rectangular confidence regions for the means of multivariate normal
 distributions", Journal of the American Statistical Association 62, 626-633 (1967),
-doi:10.1080/01621459.1967.10482935 (the level also holds where pixels, or channels, go together);
+doi:10.1080/01621459.1967.10482935 (the level also holds for correlated pixels or channels);
 Student, "The probable error of a mean", Biometrika 6(1), 1-25 (1908), doi:10.1093/biomet/6.1.1; the
-manner: W. Jakob et al., "Mitsuba 3 renderer", 2022, https://mitsuba-renderer.org (tests of its
+approach: W. Jakob et al., "Mitsuba 3 renderer", 2022, https://mitsuba-renderer.org (tests of its
 renders).
 
-Limits: the noise of a pixel has to be near normal in its tails: many samples, none far brighter
-than all others. `pooled` makes it so. Pixels have to be independent of each other for `bias` and
-`spread`.
+Limits: the noise of a pixel must be nearly normal in its tails: many samples, none far brighter
+than the others. `pooled` achieves that. Pixels must be independent for `bias` and `spread`.
 """
 
 from dataclasses import dataclass
@@ -39,16 +39,28 @@ from isc_core.io.atomic import new_folder
 from isc_core.io.exr import write_channels
 
 EVIDENCE = ("pixel_test.exr",)
-_NEIGHBOURS = 5  # a side of the window that a pixel's weight comes from
+_NEIGHBOURS = 5  # side of the window that a pixel's weight is computed from
 _CHANNELS = "RGB"
 
 
 @dataclass(frozen=True)
 class PixelTestOptions:
-    """`level`: the chance that a right image is rejected, in (0, 1). `tolerance`: >= 0, a
-    difference up to this is no error, in the image's unit; the only measure where the variance is
-    0. `samples`: behind each estimated variance, >= 2; infinite for a known one. Raises
-    `InputError` outside these ranges.
+    """Options of a pixel test.
+
+    Attributes
+    ----------
+    level : float
+        Probability that a correct image is rejected, in (0, 1).
+    tolerance : float
+        Differences up to this are no error, in the image's unit, >= 0. Where the variance is 0, the
+        tolerance alone decides.
+    samples : float
+        Samples behind each estimated variance, >= 2; infinite for a known one.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     level: float = 0.01
@@ -58,18 +70,34 @@ class PixelTestOptions:
     def __post_init__(self) -> None:
         if not (0 < self.level < 1 and self.tolerance >= 0 and self.samples >= 2):
             raise InputError(
-                "a pixel test needs a level between 0 and 1, a tolerance of 0 or more, and 2 samples or more"
+                "a pixel test needs a level between 0 and 1, a tolerance of at least 0 and at "
+                "least 2 samples"
             )
 
 
 @dataclass(frozen=True)
 class PixelTestResult:
-    """`accepted`: none of the three is beyond its threshold. `worst`: the largest |z| of a pixel,
-    infinite where the variance is 0 and the difference beyond the tolerance; `threshold`: of
-    `worst`; `beyond`: how many values are above it, of `tested`; `where`: row, column (and channel)
-    of the worst. `bias`, `spread`: of all pixels together, the channel farthest out;
-    `global_threshold`: of both (`spread` counts upward only). `z`: of every value, in the image's
-    shape.
+    """Result of a pixel test.
+
+    Attributes
+    ----------
+    accepted : bool
+        None of the three tests exceeds its threshold.
+    worst : float
+        Largest |z| of a pixel; infinite where the variance is 0 and the difference exceeds the
+        tolerance.
+    threshold : float
+        Threshold of `worst`.
+    beyond, tested : int
+        How many values exceed it, and how many there are.
+    where : tuple of int
+        Row, column (and channel) of the worst value.
+    bias, spread : float
+        z of all pixels together, of the channel with the largest one.
+    global_threshold : float
+        Threshold of both; `spread` is one-sided.
+    z : ndarray
+        z of every value, in the image's shape.
     """
 
     accepted: bool
@@ -84,20 +112,42 @@ class PixelTestResult:
     z: np.ndarray
 
     def text(self) -> str:
-        """One line for people."""
+        """Return the result as one line."""
         place = ", ".join(map(str, self.where))
-        pixels = f"worst pixel z {self.worst:.2f} at ({place}), allowed {self.threshold:.2f}, {self.beyond} of {self.tested} beyond"
-        together = f"bias z {self.bias:.2f}, spread z {self.spread:.2f}, allowed {self.global_threshold:.2f}"
+        pixels = (
+            f"worst pixel z {self.worst:.2f} at ({place}), allowed {self.threshold:.2f}, "
+            f"{self.beyond} of {self.tested} beyond"
+        )
+        together = (
+            f"bias z {self.bias:.2f}, spread z {self.spread:.2f}, "
+            f"allowed {self.global_threshold:.2f}"
+        )
         return f"{'accepted' if self.accepted else 'REJECTED'}: {pixels}; {together}"
 
 
 def pixel_test(
     difference: np.ndarray, variance: np.ndarray, options: PixelTestOptions | None = None
 ) -> PixelTestResult:
-    """Tests a difference of images (H, W) or (H, W, C) against 0; `variance`: of the difference,
-    same shape, >= 0.
+    """Test whether a difference of images is 0 up to noise.
 
-    Raises `InputError` for other shapes, for what is not finite and for negative variances.
+    Parameters
+    ----------
+    difference : (H, W) or (H, W, C) ndarray
+        The difference, finite.
+    variance : ndarray of the same shape
+        Variance of the difference, >= 0.
+    options : PixelTestOptions, optional
+        Level, tolerance and samples.
+
+    Returns
+    -------
+    PixelTestResult
+        The result.
+
+    Raises
+    ------
+    InputError
+        For other shapes, non-finite values or negative variances.
     """
     options = options or PixelTestOptions()
     difference, variance = _checked(difference, variance)
@@ -120,15 +170,31 @@ def pixel_test(
 
 
 def pooled(values: np.ndarray, side: int, *, variance: bool = False) -> np.ndarray:
-    """Means of blocks of `side` x `side` pixels of (H, W[, C]); of a `variance`, that of those
-    means. What fills no block is left out.
+    """Average blocks of pixels; incomplete blocks at the edges are dropped.
 
-    Pixels of a block count as independent. Raises `InputError` where not even one block fits.
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+        An image, or the variance of one with independent pixels.
+    side : int
+        Side of the square blocks in pixels.
+    variance : bool, optional
+        Whether `values` is a variance.
+
+    Returns
+    -------
+    (H // side, W // side[, C]) ndarray
+        The means, or their variance.
+
+    Raises
+    ------
+    InputError
+        If not even one block fits.
     """
     rows, columns = (length // side if side > 0 else 0 for length in np.shape(values)[:2])
     if not (rows and columns):
         raise InputError(
-            f"blocks of {side} pixels do not fit into a picture of shape {np.shape(values)}"
+            f"blocks of {side} pixels do not fit into an image of shape {np.shape(values)}"
         )
     cut = np.asarray(values, float)[: rows * side, : columns * side]
     means = cut.reshape(rows, side, columns, side, *cut.shape[2:]).mean((1, 3))
@@ -138,11 +204,26 @@ def pooled(values: np.ndarray, side: int, *, variance: bool = False) -> np.ndarr
 def keep_evidence(
     folder: Path | str, difference: np.ndarray, variance: np.ndarray, result: PixelTestResult
 ) -> Path | None:
-    """Writes FOLDER/pixel_test.exr with the channels of `difference`, `variance` and `z` if the
-    result is a rejection; else nothing.
+    """Write the maps of a rejected test to `pixel_test.exr`.
 
-    Returns the file. An earlier evidence is replaced. Raises `InputError` where the folder holds
-    anything else or cannot be written.
+    Parameters
+    ----------
+    folder : Path or str
+        The folder to write; an earlier file of this kind is replaced.
+    difference, variance : ndarray
+        As tested.
+    result : PixelTestResult
+        The result.
+
+    Returns
+    -------
+    Path or None
+        The file; None if the test was accepted and nothing was written.
+
+    Raises
+    ------
+    InputError
+        If the folder holds other files or cannot be written.
     """
     if result.accepted:
         return None
@@ -168,22 +249,23 @@ def _checked(difference: np.ndarray, variance: np.ndarray) -> tuple[np.ndarray, 
     difference, variance = np.asarray(difference, float), np.asarray(variance, float)
     if difference.ndim not in (2, 3) or difference.shape != variance.shape or not difference.size:
         raise InputError(
-            f"difference {difference.shape} and variance {variance.shape} have to be pictures of one shape, not empty"
+            f"difference {difference.shape} and variance {variance.shape} must be non-empty images "
+            "of one shape"
         )
     if not (
         np.isfinite(difference).all() and np.isfinite(variance).all() and (variance >= 0).all()
     ):
-        raise InputError("a difference has to be finite, a variance finite and 0 or more")
+        raise InputError("a difference must be finite, a variance finite and at least 0")
     return difference, variance
 
 
 def _equal_probability(error: np.ndarray, variance: np.ndarray, samples: float) -> np.ndarray:
-    """The z of each pixel; infinite for an error without variance."""
+    """The z of each pixel; infinite for an error where the variance is 0."""
     noisy = variance > 0
     z = np.where(error == 0, 0, np.copysign(np.inf, error))
     ratio = error[noisy] / np.sqrt(variance[noisy])
     if np.isfinite(samples):
-        # In the logarithm, or what is far out would be as good as impossible: 0.
+        # Clamped to the smallest normal number: a tail probability of 0 would become an infinite z.
         tail = np.maximum(stats.t.sf(np.abs(ratio), samples - 1), np.finfo(float).tiny)
         ratio = np.copysign(stats.norm.isf(tail), ratio)
     z[noisy] = ratio
@@ -191,7 +273,7 @@ def _equal_probability(error: np.ndarray, variance: np.ndarray, samples: float) 
 
 
 def _sidak(level: float, count: int) -> float:
-    """The level of each of `count` tests whose family has the level."""
+    """Level of each of `count` tests with a common level."""
     return float(-np.expm1(np.log1p(-level) / count))
 
 
@@ -202,7 +284,7 @@ def _planes(image: np.ndarray) -> list[np.ndarray]:
 
 
 def _together(error: np.ndarray, variance: np.ndarray) -> tuple[float, float]:
-    """The z of bias and spread of one channel, over the pixels that have noise."""
+    """The z of bias and spread of one channel, over the pixels with noise."""
     noisy = variance > 0
     if not noisy.any():
         return 0.0, 0.0

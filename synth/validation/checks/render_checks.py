@@ -1,13 +1,13 @@
-"""Whether a dataset's truth can be trusted: its identities, and its shading against an independent
+"""Checks of a data set: the identities of its layers, and its shading against an independent
 render.
 
 Identities, on every scene: image = diffuse + specular + residual and diffuse = reflectance *
-shading, to 1e-5 of the image's maximum. Renders, on a few scenes: the scene is built again from its
-description, painted white and rendered with another seed; the stored shading has to agree within
-the noise of both (`pixel_test`, over blocks of pixels, whose means are near normal).
+shading, to 1e-5 of the image's maximum. Renders, on a few scenes: the scene is rebuilt from its
+description with a white albedo and rendered with another seed; the stored shading must agree within
+the noise of both (`pixel_test`, over blocks of pixels, whose means are nearly normal).
 
-Limits: an independent seed finds errors of sampling and storage, not those of a shared formula,
-which the generator's own tests look for. Scenes that need a user's files cannot be built again.
+Limits: an independent seed reveals errors of sampling and storage, not those of a shared formula,
+which the generator's own tests cover. Scenes that need a user's files cannot be rebuilt.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,23 +20,30 @@ import numpy as np
 from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
-from ...capture.recipe import Part, Picture, Recipe, build
+from ...capture.recipe import FamilyMember, PictureSettings, Recipe, build
 from ...capture.truth import ENVIRONMENT_ROWS, GroundTruth, render_truth
 from ...dataset.reading import read_description, read_truth
 from ...scene.lights import lights_as_environment
 from .pixel_test import PixelTestOptions, PixelTestResult, pixel_test, pooled
 
 _TOLERANCE = 1e-5
-_LEVEL = 0.01  # the chance that right renders are rejected, over all scenes of a run
+_LEVEL = 0.01  # probability that correct renders are rejected, over all scenes of a run
 _BLOCK = 4  # pixels a side
 _OTHER_SEED = 0x5EED
 
 
 @dataclass(frozen=True)
 class RenderCheck:
-    """One check of one scene: the worst `error` and the `limit` that it has to keep.
+    """One check of one scene.
 
-    `maps`: channels of what shows why, if it failed.
+    Attributes
+    ----------
+    scene, what : str
+        The scene, and what is checked.
+    error, limit : float
+        The largest error, and its limit.
+    maps : mapping of str to (H, W) ndarray
+        Channels that show why the check failed, empty if it passed.
     """
 
     scene: str
@@ -47,26 +54,45 @@ class RenderCheck:
 
     @property
     def passed(self) -> bool:
-        """Whether the limit is kept."""
+        """Whether the error is within the limit."""
         return self.error <= self.limit
 
     @property
     def text(self) -> str:
-        """The check in words."""
-        return (
-            f"{self.scene}: {self.what}: {self.error:.3g} "
-            + ("keeps" if self.passed else "is beyond")
-            + f" the limit {self.limit:.3g}"
-        )
+        """The check as one line."""
+        verb = "is within" if self.passed else "exceeds"
+        return f"{self.scene}: {self.what}: {self.error:.3g} {verb} the limit {self.limit:.3g}"
 
 
 def check_dataset(
     folders: Sequence[Path], renders: int, seed: int, monitor: Monitor
 ) -> tuple[tuple[RenderCheck, ...], tuple[str, ...]]:
-    """The identities of every scene, new renders of `renders` of them drawn by `seed`, and notes on
-    what could not be checked.
+    """Check the identities of every scene, and new renders of some.
 
-    Raises `InputError` for a scene that cannot be read, `Cancelled`.
+    Parameters
+    ----------
+    folders : sequence of Path
+        The scenes.
+    renders : int
+        How many to render again, drawn by `seed`.
+    seed : int
+        Seed of the draw.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    checks : tuple of RenderCheck
+        The checks.
+    notes : tuple of str
+        What could not be checked.
+
+    Raises
+    ------
+    InputError
+        If a scene cannot be read.
+    Cancelled
+        If the user cancels.
     """
     checks: list[RenderCheck] = []
     for done, folder in enumerate(folders):
@@ -76,7 +102,7 @@ def check_dataset(
         return tuple(checks), ("no scene was rendered again",)
     if find_spec("mitsuba") is None:
         return tuple(checks), (
-            "no scene was rendered again: that needs Mitsuba, `pip install 'isc3d[synth]'`",
+            "no scene was rendered again: install Mitsuba with `pip install 'isc3d[synth]'`",
         )
     chosen = [folder for folder in folders if not needs_files(folder)]
     order = np.random.default_rng(seed).permutation(len(chosen))[:renders]
@@ -84,12 +110,25 @@ def check_dataset(
         monitor.report("rendering again", 0.2 + 0.8 * done / len(order))
         checks.append(check_shading(chosen[index], _LEVEL / len(order)))
     return tuple(checks), () if chosen else (
-        "no scene was rendered again: all of them need files of yours",
+        "no scene was rendered again: all of them need your own files",
     )
 
 
 def check_identities(name: str, truth: GroundTruth) -> tuple[RenderCheck, ...]:
-    """How well the layers of a scene add and multiply up, relative to the image's maximum."""
+    """Check sum and product of a scene's layers, relative to the image's maximum.
+
+    Parameters
+    ----------
+    name : str
+        The scene.
+    truth : GroundTruth
+        Its layers.
+
+    Returns
+    -------
+    tuple of RenderCheck
+        One per identity.
+    """
     scale = max(float(np.abs(truth.image).max()), 1e-12)
     image, diffuse, specular, residual, reflectance, shading = (
         getattr(truth, layer).astype(float)
@@ -106,10 +145,24 @@ def check_identities(name: str, truth: GroundTruth) -> tuple[RenderCheck, ...]:
 
 
 def check_shading(folder: Path, level: float) -> RenderCheck:
-    """The stored shading of a scene against that of a new render, painted white, with another seed.
+    """Compare the stored shading of a scene with a new render, white and with another seed.
 
-    `level`: the chance that a right scene is rejected. Raises `InputError` where the scene cannot
-    be built again.
+    Parameters
+    ----------
+    folder : Path
+        The scene.
+    level : float
+        Probability that a correct scene is rejected.
+
+    Returns
+    -------
+    RenderCheck
+        The check.
+
+    Raises
+    ------
+    InputError
+        If the scene cannot be rebuilt.
     """
     stored = read_truth(folder)
     recipe = read_recipe(folder)
@@ -125,7 +178,7 @@ def check_shading(folder: Path, level: float) -> RenderCheck:
     if not np.array_equal(again.mask, stored.mask):
         return RenderCheck(
             folder.name,
-            "the object's outline when it is built again: pixels that differ",
+            "silhouette of the rebuilt object, pixels that differ",
             float((again.mask ^ stored.mask).sum()),
             0,
         )
@@ -147,24 +200,37 @@ def check_shading(folder: Path, level: float) -> RenderCheck:
         for name, image in maps.items()
         for k, letter in enumerate("RGB")
     }
-    what = "shading against an independent white render, largest z over what noise explains"
+    what = "shading against an independent white render, largest z relative to its threshold"
     return RenderCheck(folder.name, what, float(worst), 1.0, channels)
 
 
 def read_recipe(folder: Path) -> Recipe:
-    """How a scene was made, from its `scene.json`, the sensor aside.
+    """Read how a scene was made from its `scene.json`, except for the sensor.
 
-    Raises `InputError` where that does not say.
+    Parameters
+    ----------
+    folder : Path
+        The scene.
+
+    Returns
+    -------
+    Recipe
+        The recipe.
+
+    Raises
+    ------
+    InputError
+        If the file does not contain it.
     """
     content = read_description(folder)
     try:
         parts = {
-            what: Part(content[what]["family"], content[what]["number"])
+            what: FamilyMember(content[what]["family"], content[what]["number"])
             for what in ("object", "light")
         }
         model, name = content["material"]["model"], content["material"]["id"]
         number, picture = int(name.removeprefix(model)), content["picture"]
-        settings = Picture(
+        settings = PictureSettings(
             size=picture["size"],
             samples=picture["samples"],
             bounces=picture["bounces"],
@@ -174,7 +240,7 @@ def read_recipe(folder: Path) -> Recipe:
         return Recipe(
             content["seed"],
             parts["object"],
-            Part(model, number),
+            FamilyMember(model, number),
             model,
             content["albedo"]["family"],
             parts["light"],
@@ -182,12 +248,12 @@ def read_recipe(folder: Path) -> Recipe:
         )
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
-            f"{folder / 'scene.json'} does not say how the scene was made: {error}"
+            f"{folder / 'scene.json'} does not describe how the scene was made: {error}"
         ) from error
 
 
 def needs_files(folder: Path) -> bool:
-    """Whether a scene was made with files that a user brought along."""
+    """Return whether a scene was made with a user's files."""
     content = read_description(folder)
     families = [content.get(what, {}).get("family") for what in ("object", "albedo", "light")]
     return any(family in ("mesh", "height", "image", "natural", "hdr") for family in families)

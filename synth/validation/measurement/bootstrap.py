@@ -1,14 +1,14 @@
-"""How sure a mean over scenes is: the percentile bootstrap.
+"""Confidence interval of a mean over scenes by the percentile bootstrap.
 
-Scenes are drawn with replacement, as many as there are, the mean is taken again each time, and the
-middle 95 % of these means are the interval. Errors that span powers of ten are averaged as
-logarithms, so that no single scene decides.
+Scenes are resampled with replacement and the mean is computed again each time; the central 95 % of
+these means are the interval. Errors that span orders of magnitude are averaged as logarithms, so
+that no single scene dominates.
 
 Citation: B. Efron (1979), "Bootstrap methods: another look at the jackknife",
 doi:10.1214/aos/1176344552.
 
-Limits: with fewer than about ten scenes the interval is somewhat too narrow; scenes that share an
-object or a light are not independent.
+Limits: with fewer than about ten scenes the interval is too narrow; scenes that share an object or
+a light are not independent.
 """
 
 from collections.abc import Sequence
@@ -18,14 +18,21 @@ import numpy as np
 
 RESAMPLES = 2000
 LEVEL = 0.95
-_SMALLEST = 1e-30  # what an error of 0 counts as where logarithms are taken
+_SMALLEST = 1e-30  # value of an error of 0 where logarithms are taken
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A value over `scenes` scenes and its interval;
+    """A value over scenes with its confidence interval.
 
-    `low` and `high` are None where one scene is all there is.
+    Attributes
+    ----------
+    value : float
+        The value.
+    low, high : float or None
+        Ends of the interval, None for a single scene.
+    scenes : int
+        Number of scenes.
     """
 
     value: float
@@ -35,8 +42,21 @@ class Interval:
 
 
 def resampled_means(values: np.ndarray, seed: int, resamples: int = RESAMPLES) -> np.ndarray:
-    """Means (resamples, M) over scenes drawn with replacement, of `values` (N, M): every column is
-    drawn with the same scenes.
+    """Compute means over scenes drawn with replacement.
+
+    Parameters
+    ----------
+    values : (N, M) ndarray
+        One row per scene; all columns use the same draws.
+    seed : int
+        Seed of the draws.
+    resamples : int, optional
+        Number of draws.
+
+    Returns
+    -------
+    (resamples, M) ndarray
+        The means.
     """
     scenes = len(values)
     counts = np.random.default_rng(seed).multinomial(
@@ -46,7 +66,22 @@ def resampled_means(values: np.ndarray, seed: int, resamples: int = RESAMPLES) -
 
 
 def percentile_interval(value: float, resampled: np.ndarray, scenes: int) -> Interval:
-    """`value` with the middle 95 % of its resampled values (R,)."""
+    """Return a value with the central 95 % of its resampled values.
+
+    Parameters
+    ----------
+    value : float
+        The value.
+    resampled : (R,) ndarray
+        The same statistic of resampled scenes.
+    scenes : int
+        Number of scenes; below 2 there is no interval.
+
+    Returns
+    -------
+    Interval
+        The interval.
+    """
     if scenes < 2:
         return Interval(value, None, None, scenes)
     low, high = np.quantile(resampled, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
@@ -56,9 +91,28 @@ def percentile_interval(value: float, resampled: np.ndarray, scenes: int) -> Int
 def mean_interval(
     values: Sequence[float], *, geometric: bool, seed: int, resamples: int = RESAMPLES
 ) -> Interval:
-    """The mean of finite numbers, one a scene, and its interval;
+    """Compute a mean over scenes with its interval.
 
-    `geometric`: of numbers >= 0. Raises `ValueError` without any.
+    Parameters
+    ----------
+    values : sequence of float
+        One finite value per scene.
+    geometric : bool
+        Use the geometric mean; values must be >= 0.
+    seed : int
+        Seed of the bootstrap.
+    resamples : int, optional
+        Number of draws.
+
+    Returns
+    -------
+    Interval
+        The mean.
+
+    Raises
+    ------
+    ValueError
+        Without values, or if one is not finite.
     """
     numbers = np.asarray(values, float)
     if not numbers.size or not np.isfinite(numbers).all():
@@ -70,10 +124,10 @@ def mean_interval(
 
 
 def logarithms(errors: np.ndarray) -> np.ndarray:
-    """Natural logarithms of errors >= 0; an error of 0 counts as 1e-30."""
+    """Return natural logarithms of errors >= 0; an error of 0 counts as 1e-30."""
     return np.log(np.maximum(errors, _SMALLEST))
 
 
 def exponentials(logs: np.ndarray | float) -> np.ndarray:
-    """The inverse of `logarithms`: the floor itself becomes 0 again."""
+    """Invert `logarithms`; the floor becomes 0 again."""
     return np.where(logs <= np.log(_SMALLEST) + 1e-9, 0.0, np.exp(logs))

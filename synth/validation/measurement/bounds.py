@@ -1,10 +1,11 @@
-"""Regression bounds: how bad a figure may be before the run is rejected.
+"""Regression bounds: the worst value of a figure that a run may have.
 
-A bound is broken only where the whole interval of the figure lies beyond it, so that luck with the
-scenes rejects nothing. Slices of fewer than `FEWEST` scenes are not judged. Bounds taken from a run
-lie beyond its interval by the metric's margin.
+A bound is violated only if the whole interval of the figure lies beyond it, so that the draw of the
+scenes alone rejects nothing. Slices of fewer than `FEWEST` scenes are not judged. Bounds taken from
+a run lie beyond its interval by the metric's margin.
 
-Limits: bounds speak of the kind of scenes that they were taken from; another dataset needs its own.
+Limits: bounds hold for the kind of scenes that they were taken from; another data set needs its
+own.
 """
 
 import json
@@ -16,24 +17,32 @@ from isc_core.errors import InputError
 from isc_core.io.atomic import new_file
 from isc_core.io.json_files import numbers, read_json
 
+from ...dataset.reading import current_gloss_class
 from ..stages.types import Metric
 from .bootstrap import Interval
 from .figures import Figure
 from .slices import EVERYTHING
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 2: the gloss class "matt" is called "diffuse"
+_READABLE = (1, SCHEMA_VERSION)
 FEWEST = 5
 SHIPPED = Path(__file__).with_name("bounds.json")
-# Slices that mean the same in every dataset; the limits of "mask size" come from the scenes at
-# hand.
+# Slices that mean the same in every data set; the limits of "mask size" depend on the scenes.
 _LASTING = (EVERYTHING, "gloss", "light", "specular share")
 
 
 @dataclass(frozen=True)
 class Bound:
-    """`stage`, `metric`, slice (`kind`, `value`): which figure.
+    """Worst allowed value of one figure.
 
-    `limit`: the worst that it may be.
+    Attributes
+    ----------
+    stage, metric : str
+        The figure.
+    kind, value : str
+        The slice.
+    limit : float
+        Worst allowed value.
     """
 
     stage: str
@@ -45,7 +54,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A bound, the figure that it was held against, and whether it is broken."""
+    """A bound, the interval that was compared with it, and whether the bound is violated."""
 
     bound: Bound
     interval: Interval
@@ -53,35 +62,60 @@ class Verdict:
 
     @property
     def text(self) -> str:
-        """The verdict in words."""
+        """The verdict as one line."""
         place = "" if self.bound.kind == EVERYTHING else f" ({self.bound.kind}: {self.bound.value})"
         low, high = self.interval.low, self.interval.high
         span = "" if low is None or high is None else f" [{low:.4g}, {high:.4g}]"
-        beyond = "is beyond" if self.broken else "keeps"
-        return f"{self.bound.stage} {self.bound.metric}{place}: {self.interval.value:.4g}{span} {beyond} the bound {self.bound.limit:.4g}"
+        verb = "violates" if self.broken else "meets"
+        figure = f"{self.bound.stage} {self.bound.metric}{place}: {self.interval.value:.4g}{span}"
+        return f"{figure} {verb} the bound {self.bound.limit:.4g}"
 
 
 def read_bounds(path: Path) -> tuple[Bound, ...]:
-    """Reads a file of `write_bounds`. Raises `InputError` for anything else."""
+    """Read a file of `write_bounds`.
+
+    Parameters
+    ----------
+    path : Path
+        A JSON file of schema 1 or 2. Schema 1 called the gloss class "diffuse" by its old name
+        "matt".
+
+    Returns
+    -------
+    tuple of Bound
+        The bounds.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged or of another kind.
+    """
     if not path.exists():
         raise InputError(f"{path} does not exist: --update-bounds writes a file of bounds")
     content = read_json(path, "--update-bounds writes a file of bounds")
-    entries = (
-        content.get("bounds")
-        if isinstance(content, dict) and content.get("schema_version") == SCHEMA_VERSION
-        else None
-    )
+    known = isinstance(content, dict) and content.get("schema_version") in _READABLE
+    entries = content.get("bounds") if known else None
     if not isinstance(entries, list):
         raise InputError(
-            f"{path} is not a file of bounds of version {SCHEMA_VERSION}: --update-bounds writes one"
+            f"{path} is not a bounds file of schema {SCHEMA_VERSION}: --update-bounds writes one"
         )
     return tuple(_bound(entry, path) for entry in entries)
 
 
 def write_bounds(path: Path, bounds: Sequence[Bound]) -> None:
-    """Writes a file of bounds, whole or not at all.
+    """Write a file of bounds, completely or not at all.
 
-    Raises `InputError` where that is not possible.
+    Parameters
+    ----------
+    path : Path
+        The JSON file.
+    bounds : sequence of Bound
+        The bounds.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
     """
     content = {"schema_version": SCHEMA_VERSION, "bounds": [asdict(bound) for bound in bounds]}
     with new_file(path) as partial:
@@ -89,8 +123,17 @@ def write_bounds(path: Path, bounds: Sequence[Bound]) -> None:
 
 
 def bounds_from(figures: Sequence[Figure]) -> tuple[Bound, ...]:
-    """Bounds that this run keeps: its intervals, widened by each metric's margin; of slices that
-    last and are large enough to judge.
+    """Return bounds that this run meets: its intervals, widened by each metric's margin.
+
+    Parameters
+    ----------
+    figures : sequence of Figure
+        The figures of the run.
+
+    Returns
+    -------
+    tuple of Bound
+        For slices that exist in every data set and are large enough to judge.
     """
     return tuple(
         Bound(
@@ -106,8 +149,19 @@ def bounds_from(figures: Sequence[Figure]) -> tuple[Bound, ...]:
 
 
 def judge(bounds: Sequence[Bound], figures: Sequence[Figure]) -> tuple[Verdict, ...]:
-    """Holds figures against the bounds that name them; bounds of what was not measured are passed
-    over.
+    """Compare figures with bounds.
+
+    Parameters
+    ----------
+    bounds : sequence of Bound
+        The bounds; those of figures that were not measured are skipped.
+    figures : sequence of Figure
+        The figures of the run.
+
+    Returns
+    -------
+    tuple of Verdict
+        One per bound that could be judged.
     """
     known = {
         (f.stage, f.metric.name, f.group.kind, f.group.value): f
@@ -146,11 +200,12 @@ def _bound(entry: object, path: Path) -> Bound:
         or not all(isinstance(entry[name], str) for name in names)
     ):
         raise InputError(
-            f"{path}: a bound has stage, metric, kind, value (texts) and limit (a number), not {str(entry)[:80]}"
+            f"{path}: a bound has stage, metric, kind, value (strings) and limit (a number), "
+            f"not {str(entry)[:80]}"
         )
     limit = entry["limit"]
     if isinstance(limit, bool) or not isinstance(limit, int | float) or numbers(limit, ()) is None:
-        raise InputError(
-            f"{path}: the limit of {entry['stage']} {entry['metric']} has to be a number, not {str(limit)[:40]}"
-        )
-    return Bound(entry["stage"], entry["metric"], entry["kind"], entry["value"], float(limit))
+        figure = f"{entry['stage']} {entry['metric']}"
+        raise InputError(f"{path}: the limit of {figure} must be a number, not {str(limit)[:40]}")
+    value = current_gloss_class(entry["value"]) if entry["kind"] == "gloss" else entry["value"]
+    return Bound(entry["stage"], entry["metric"], entry["kind"], value, float(limit))

@@ -1,5 +1,5 @@
-"""All figures of a validation as one flat list: a stage's metric over a slice of the scenes, with
-its interval.
+"""All results of a validation as a flat list: one metric of a stage over one slice of the scenes,
+with its interval.
 """
 
 from collections.abc import Iterator, Sequence
@@ -11,14 +11,23 @@ from .measure import SceneResult
 from .slices import Slice, all_slices
 from .substitution import METRICS, chain_value
 
-CHAIN = "chain"  # the whole way from the photo, as if it were a stage
+CHAIN = "chain"  # the whole chain from the photo, named like a stage
 
 
 @dataclass(frozen=True)
 class Figure:
-    """`stage`: its name, or "chain".
+    """The mean of a metric over a slice.
 
-    `interval`: of the metric's mean over the scenes of `group` where it is defined.
+    Attributes
+    ----------
+    stage : str
+        Name of the stage, or "chain".
+    metric : Metric
+        The metric.
+    group : Slice
+        The scenes.
+    interval : Interval
+        Mean over the scenes of `group` where the metric is defined.
     """
 
     stage: str
@@ -30,7 +39,20 @@ class Figure:
 def metrics_of(
     stages: Sequence[AnyStage], scenes: Sequence[SceneResult]
 ) -> tuple[tuple[str, Metric], ...]:
-    """Stage and metric of everything that was measured, the chain last."""
+    """Return stage and metric of everything that was measured, the chain last.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        The stages that were run.
+    scenes : sequence of SceneResult
+        The scenes.
+
+    Returns
+    -------
+    tuple of (str, Metric)
+        Name of the stage (or "chain") and metric.
+    """
     found = [(stage.name, metric) for stage in stages for metric in stage.metrics]
     if any(scene.chain is not None for scene in scenes):
         found += [(CHAIN, metric) for metric in METRICS]
@@ -38,10 +60,21 @@ def metrics_of(
 
 
 def scene_value(scene: SceneResult, stage: str, metric: str) -> float | None:
-    """One scene's value;
+    """Return one scene's value of a metric.
 
-    None where it was not run, or is not defined there. "joint.average": a field of a field of the
-    scores.
+    Parameters
+    ----------
+    scene : SceneResult
+        The scene.
+    stage : str
+        Name of the stage, or "chain".
+    metric : str
+        Field of the scores; "joint.average" is a field of a field.
+
+    Returns
+    -------
+    float or None
+        None where the stage was not run or the metric is undefined.
     """
     if stage == CHAIN:
         return None if scene.chain is None else chain_value(scene.chain.under(()), metric)
@@ -54,7 +87,22 @@ def scene_value(scene: SceneResult, stage: str, metric: str) -> float | None:
 def all_figures(
     stages: Sequence[AnyStage], scenes: Sequence[SceneResult], seed: int
 ) -> tuple[Figure, ...]:
-    """Every metric over every slice; what is defined on no scene of a slice is left out."""
+    """Compute every metric over every slice.
+
+    Parameters
+    ----------
+    stages : sequence of Stage
+        The stages that were run.
+    scenes : sequence of SceneResult
+        The scenes that could be run.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    tuple of Figure
+        Without metrics that are defined on no scene of a slice.
+    """
     return tuple(_figures(stages, scenes, seed))
 
 

@@ -1,15 +1,15 @@
-"""How much of the true diffuse layer's gain a model reaches.
+"""Gain of a model as a share of the gain of the true diffuse layer.
 
-With r the geometric mean over scenes of an error relative to plain SIRFS', the gain is 1 - r, and
-the share of a model m
+Equation: with r the geometric mean over scenes of an error relative to plain SIRFS, the gain is
+1 - r, and the share of a model m is
 
-    (1 - r_m) / (1 - r_true diffuse),   where the true diffuse layer gains at least `LEAST`
+    (1 - r_m) / (1 - r_true diffuse),   if the gain of the true diffuse layer is at least `LEAST`
 
-and its interval is that of scenes drawn again (`bootstrap`), numerator and denominator with the
-same ones.
+Its interval is bootstrapped over scenes (`bootstrap`), with the same draws for numerator and
+denominator.
 
-Limits: an interval of a ratio means nothing where the denominator may be zero: it is left out
-unless the true diffuse layer's gain is sure.
+Limits: the interval of a ratio is undefined where the denominator may be zero; it is omitted unless
+the gain of the true diffuse layer is significant.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,8 +28,16 @@ LEAST = 0.05
 
 @dataclass(frozen=True)
 class Gain:
-    """`model` reaches `share` of what the true diffuse layer gains in `error` (a name of `ERRORS`)
-    over the scenes of `group`.
+    """Share of the true diffuse layer's gain that a model reaches.
+
+    Attributes
+    ----------
+    model, error : str
+        The model, and the name of one of `ERRORS`.
+    group : Slice
+        The scenes.
+    share : Interval
+        The share.
     """
 
     model: str
@@ -39,8 +47,19 @@ class Gain:
 
 
 def all_gains(scenes: Sequence[SceneResult], seed: int) -> tuple[Gain, ...]:
-    """The shares of every model that was run, in every error and slice where the true diffuse layer
-    gains; none without the stage.
+    """Compute the shares of every model, error and slice where the true diffuse layer gains.
+
+    Parameters
+    ----------
+    scenes : sequence of SceneResult
+        The scenes that could be run.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    tuple of Gain
+        Empty if the stage "models" was not run.
     """
     scores = scenes[0].scores(NAME) if scenes else None
     if scores is None:
@@ -76,8 +95,9 @@ def _gains(
 
 
 def _share(gain: np.ndarray, most: np.ndarray, ceiling: Interval) -> Interval:
-    """The share (first of the values) with its interval, where the gain of the true diffuse layer
-    is surely above 0.
+    """The share, with an interval if the gain of the true diffuse layer (`most`) is significant.
+
+    The first of the values is the measured one, the others are resampled.
     """
     value = float(gain[0] / most[0])
     if ceiling.low is None or ceiling.low <= 0:

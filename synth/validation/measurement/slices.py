@@ -1,8 +1,8 @@
-"""Groups of scenes that are looked at by themselves: by gloss, light, albedo, material, size of the
-mask, share of specular light.
+"""Groups of scenes that are reported separately: by gloss, light, albedo, material, mask size and
+share of specular light.
 
-Limits: slices overlap in nothing but their kind, so a difference between two of them may have its
-cause in a third property.
+Limits: slices of different kinds overlap, so a difference between two slices may be caused by a
+third property.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,9 +18,16 @@ _SHARES = (0.02, 0.1, 0.25)
 
 @dataclass(frozen=True)
 class Slice:
-    """`kind`: the property, "all" for all scenes.
+    """A group of scenes.
 
-    `value`: of that property, for people too. `members`: indices of scenes, ascending.
+    Attributes
+    ----------
+    kind : str
+        The property, "all" for all scenes.
+    value : str
+        Its value, as the report shows it.
+    members : tuple of int
+        Indices of scenes, ascending.
     """
 
     kind: str
@@ -29,8 +36,17 @@ class Slice:
 
 
 def all_slices(facts: Sequence[SceneFacts]) -> tuple[Slice, ...]:
-    """All scenes, then the slices of every kind in turn; a kind of which all scenes share one value
-    is left out.
+    """Group scenes by every property that differs between them.
+
+    Parameters
+    ----------
+    facts : sequence of SceneFacts
+        The scenes.
+
+    Returns
+    -------
+    tuple of Slice
+        All scenes first, then the slices of each kind.
     """
     sizes = [float(scene.mask_pixels) for scene in facts]
     limits = tuple(float(limit) for limit in np.quantile(sizes, [1 / 3, 2 / 3])) if sizes else ()
@@ -64,7 +80,7 @@ def all_slices(facts: Sequence[SceneFacts]) -> tuple[Slice, ...]:
 
 
 def _order(kind: str, group: Slice, facts: Sequence[SceneFacts]) -> tuple[float, str]:
-    """Numbers from low to high, words by the alphabet."""
+    """Numeric slices in ascending order, named ones alphabetically."""
     smallest = facts[group.members[0]]
     rank = {
         "specular share": smallest.specular_share,

@@ -1,24 +1,25 @@
-"""The error budget: how much of the chain's final error each stage causes, found by swapping in the
-truth for its answer.
+"""The error budget: how much of the chain's final error each stage causes, measured by substituting
+its ground truth.
 
-The chain is photo -> separation -> shape and light -> shading and reflectance. Three truths can be
-handed over: the diffuse image, the shape, the light; all eight combinations are run. With E(S) the
-error (geometric mean over scenes) when the truths S are given, a stage's share is what its truth
-saves, averaged over the orders in which truths may be handed over, over E(nothing): the shares and
-what is left with all truths add up to 1. A share below 0 says that the chain does better with the
-error than without it: stages make up for each other.
+Problem: the chain is photo -> separation -> shape and light -> shading and reflectance. Three
+ground
+truths can be substituted: the diffuse image, the shape, the light; all eight combinations are run.
+
+Equation: with E(S) the error (geometric mean over scenes) under the ground truths S, a stage's
+share
+is the reduction of the error by its truth, averaged over the orders in which truths can be added,
+divided by E(nothing). The shares and the error that remains with all truths sum to 1. A negative
+share means that the chain does better with the error than without it: stages compensate each other.
 
 Citation: L. S. Shapley (1953), "A value for n-person games", doi:10.1515/9781400881970-018 (the
 average over orders).
 
-What is left with all truths no stage can remove: rendered shading is not exp(SH(normal)) (cast
-shadows, sharp lights), and normals come from differences of heights on the pixel grid; the second
-goes away with exact normals, which is measured too.
+No stage can reduce the error that remains with all truths: rendered shading is not exp(SH(normal))
+(cast shadows, hard lights), and normals are finite differences of heights on the pixel grid. The
+second part vanishes with exact normals, which is measured too. Errors that a truth defines (height
+and normal by the shape, light by the light) are shared among the other truths only.
 
-Errors that a truth hands over (height and normal by the shape, light by the light) are shared out
-among the other truths alone.
-
-Limits: shares are of errors of typical scenes (geometric mean); truths are swapped in at the
+Limits: shares are of errors of typical scenes (geometric mean); truths are substituted at the
 resolution of the picture.
 """
 
@@ -56,9 +57,16 @@ METRICS = (Metric("images", "shading and reflectance"), *SIRFS.metrics)
 class ChainScores:
     """The chain's errors on one scene.
 
-    `swapped`: one for each of `COMBINATIONS`. `untouched`: with the photo taken as diffuse, nothing
-    separated. `exact_normals`: with all truths and the exact normals besides. `light_fit_residual`:
-    of the scene's light, see `truth`.
+    Attributes
+    ----------
+    swapped : tuple of Scores
+        One per entry of `COMBINATIONS`.
+    untouched : Scores
+        With the photo as diffuse image, without separation.
+    exact_normals : Scores
+        With all ground truths and the exact normals.
+    light_fit_residual : float
+        Of the scene's light, see `capture.truth`.
     """
 
     swapped: tuple[Scores, ...]
@@ -67,14 +75,22 @@ class ChainScores:
     light_fit_residual: float
 
     def under(self, truths: tuple[Truth, ...]) -> Scores:
-        """The errors when `truths`, in the order of `TRUTHS`, are handed over."""
+        """Return the errors under ground truths, given in the order of `TRUTHS`."""
         return self.swapped[COMBINATIONS.index(truths)]
 
 
 @dataclass(frozen=True)
 class Share:
-    """What one truth saves: `share` of the final error, averaged over the orders; `alone`: error
-    when it alone is handed over, over that of the chain.
+    """What one ground truth contributes.
+
+    Attributes
+    ----------
+    truth : str
+        The ground truth.
+    share : Interval
+        Reduction of the final error, averaged over orders, as a share of it.
+    alone : Interval
+        Error under this ground truth alone, divided by that of the chain.
     """
 
     truth: Truth
@@ -84,8 +100,20 @@ class Share:
 
 @dataclass(frozen=True)
 class Budget:
-    """One metric's error budget over scenes: the chain's `error`, the shares of the stages, and
-    `rest`, the share that stays with all truths; `exact`: that share with exact normals besides.
+    """One metric's error budget over scenes.
+
+    Attributes
+    ----------
+    metric : Metric
+        The metric.
+    error : Interval
+        The chain's error.
+    shares : tuple of Share
+        The ground truths' shares.
+    rest : Interval
+        Share that remains with all ground truths.
+    exact : Interval
+        Share that remains with exact normals too.
     """
 
     metric: Metric
@@ -98,10 +126,32 @@ class Budget:
 def run_chain(
     truth: GroundTruth, split: Separation, alone: Scores, options: StageOptions, monitor: Monitor
 ) -> ChainScores:
-    """Runs the chain under every combination of truths.
+    """Run the chain under every combination of ground truths.
 
-    `split`: what the separation found; `alone`: SIRFS' errors on the true diffuse image, which are
-    one of the combinations. Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    split : Separation
+        Result of the stage "separation".
+    alone : Scores
+        Errors of SIRFS on the true diffuse image, which is one of the combinations.
+    options : StageOptions
+        Options of the stages.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    ChainScores
+        The errors.
+
+    Raises
+    ------
+    InputError
+        If a stage cannot process the scene.
+    Cancelled
+        If the user cancels.
     """
 
     def scored(truths: tuple[Truth, ...], diffuse: np.ndarray) -> Scores:
@@ -123,8 +173,9 @@ def run_chain(
 
 
 def chain_value(scores: Scores, metric: str) -> float:
-    """One error by the name that `METRICS` gives it; "images" is the geometric mean of shading,
-    reflectance and their local error.
+    """Return one error by its name in `METRICS`.
+
+    "images" is the geometric mean of the errors of shading, reflectance and both locally.
     """
     if metric == "images":
         return geometric_mean((scores.shading, scores.reflectance, scores.rs_mse))
@@ -134,9 +185,28 @@ def chain_value(scores: Scores, metric: str) -> float:
 def budget(
     metric: Metric, scenes: Sequence[ChainScores], seed: int, resamples: int = RESAMPLES
 ) -> Budget:
-    """The error budget of one metric, with intervals by resampling scenes.
+    """Compute the error budget of one metric, with bootstrap intervals over scenes.
 
-    Raises `ValueError` without scenes.
+    Parameters
+    ----------
+    metric : Metric
+        One of `METRICS`.
+    scenes : sequence of ChainScores
+        At least one.
+    seed : int
+        Seed of the bootstrap.
+    resamples : int, optional
+        Number of draws.
+
+    Returns
+    -------
+    Budget
+        The budget.
+
+    Raises
+    ------
+    ValueError
+        Without scenes.
     """
     if not scenes:
         raise ValueError("an error budget needs at least one scene")
@@ -172,8 +242,8 @@ def budget(
 
 
 def _exact(scores: ChainScores, metric: Metric, players: tuple[Truth, ...]) -> float:
-    """The error with all truths and exact normals, where all truths are handed over; else that with
-    all of `players`.
+    """The error with exact normals if all ground truths count, otherwise that with all of
+    `players`.
     """
     return chain_value(
         scores.exact_normals if players == TRUTHS else scores.under(players), metric.name
@@ -186,7 +256,9 @@ def _shapley(
     player: Truth,
     players: tuple[Truth, ...],
 ) -> np.ndarray:
-    """What `player` saves (R,), of errors (R, coalitions), averaged over the orders of the players."""
+    """Reduction (R,) of errors (R, coalitions) by `player`, averaged over the orders of the
+    players.
+    """
     saved = np.zeros(len(errors))
     count = len(players)
     for before in place:

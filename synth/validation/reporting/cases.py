@@ -1,5 +1,5 @@
-"""The best, the median and the worst scene of each stage, run once more for their pictures and
-maps: no run has to keep all of them.
+"""The best, median and worst scene of each stage, run once more for their pictures and maps, so
+that the measurement does not have to keep all of them.
 """
 
 from collections.abc import Sequence
@@ -20,14 +20,24 @@ from ..measurement.substitution import METRICS
 from ..stages.separation import SEPARATION
 from ..stages.sirfs import SIRFS
 from ..stages.types import AnyStage, Metric, StagePicture, stage_inputs
-from .words import number
+from .formatting import number
 
 _RANKS = ("best", "median", "worst")
 
 
 @dataclass(frozen=True)
 class ValidationCase:
-    """A scene to look at: its `rank` on a `stage`, its name, its figure in words, the pictures."""
+    """A scene of the report.
+
+    Attributes
+    ----------
+    stage, rank : str
+        The stage, and "best", "median" or "worst".
+    scene, remark : str
+        Name of the scene, and its error and properties.
+    pictures : tuple of StagePicture
+        Ground truth and result.
+    """
 
     stage: str
     rank: str
@@ -38,7 +48,7 @@ class ValidationCase:
 
 @dataclass(frozen=True)
 class _Place:
-    """Which stage, "chain" being one too, by which metric, which rank, which scene, and its value."""
+    """A scene to show: the stage (or "chain"), the metric that ranks it, its rank and value."""
 
     stage: str
     metric: Metric
@@ -50,9 +60,28 @@ class _Place:
 def make_cases(
     scenes: Sequence[SceneResult], options: ValidationOptions, monitor: Monitor
 ) -> tuple[ValidationCase, ...]:
-    """The cases of the chain, if it was run, and of every stage, by their first metric.
+    """Run the scenes of the report again, for their pictures.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    scenes : sequence of SceneResult
+        The scenes that could be run.
+    options : ValidationOptions
+        The options of the run.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    tuple of ValidationCase
+        For the chain, if it was run, and every stage, ranked by its first metric.
+
+    Raises
+    ------
+    InputError
+        If a scene cannot be read.
+    Cancelled
+        If the user cancels.
     """
     ranked = [(stage.name, stage.metrics[0]) for stage in options.stages]
     if any(scene.chain is not None for scene in scenes):
@@ -62,7 +91,8 @@ def make_cases(
     def run(place: _Place, own: Monitor) -> ValidationCase:
         truth, facts = read_truth(place.scene.facts.folder), place.scene.facts
         kind = f"{facts.gloss_class} {facts.model}, {facts.albedo}, light {facts.light_kind}"
-        remark = f"{place.metric.title} {number(place.value)}; {kind}; specular {100 * facts.specular_share:.1f} % of the light"
+        share = f"{100 * facts.specular_share:.1f} % specular light"
+        remark = f"{place.metric.title} {number(place.value)}; {kind}; {share}"
         pictures = (
             _chain_pictures(truth, options, own)
             if place.stage == CHAIN
@@ -83,7 +113,7 @@ def _stage_pictures(
 def _chain_pictures(
     truth: GroundTruth, options: ValidationOptions, monitor: Monitor
 ) -> tuple[StagePicture, ...]:
-    """What shape and light become of the photo, with the diffuse layers beside the photo."""
+    """Shape and light estimated from the photo, with the diffuse layers beside the photo."""
     split = SEPARATION.run(stage_inputs(truth, ()), options.settings, monitor)
     answer = SIRFS.run(stage_inputs(truth, (), split.diffuse), options.settings, monitor)
     photo, *rest = SIRFS.show(truth, answer)
@@ -98,7 +128,24 @@ def _chain_pictures(
 def worst_scenes(
     verdict: Verdict, figures: Sequence[Figure], scenes: Sequence[SceneResult], many: int = 2
 ) -> tuple[SceneResult, ...]:
-    """The scenes of a bound's slice that break it most."""
+    """Return the scenes of a bound's slice with the largest errors.
+
+    Parameters
+    ----------
+    verdict : Verdict
+        The bound.
+    figures : sequence of Figure
+        All figures.
+    scenes : sequence of SceneResult
+        The scenes that the figures refer to.
+    many : int, optional
+        How many to return.
+
+    Returns
+    -------
+    tuple of SceneResult
+        The worst first.
+    """
     bound = verdict.bound
     figure = next(
         f for f in figures if (f.stage, f.metric.name, f.group.kind, f.group.value) == _key(verdict)
@@ -115,10 +162,32 @@ def worst_scenes(
 def write_evidence(
     folder: Path, scene: SceneResult, stage: str, options: ValidationOptions, monitor: Monitor
 ) -> tuple[str, ...]:
-    """Writes FOLDER/truth.exr and FOLDER/STAGE.exr of one scene; of the chain, what each of its
-    stages made of the photo.
+    """Write the true and the estimated maps of one scene.
 
-    Gives the names of the files. Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    folder : Path
+        Gets `truth.exr` and `STAGE.exr`; for the chain, one file per stage of it.
+    scene : SceneResult
+        The scene.
+    stage : str
+        The stage, or "chain".
+    options : ValidationOptions
+        The options of the run.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    tuple of str
+        Names of the files.
+
+    Raises
+    ------
+    InputError
+        If the scene cannot be read or a file cannot be written.
+    Cancelled
+        If the user cancels.
     """
     truth = read_truth(scene.facts.folder)
     folder.mkdir(parents=True, exist_ok=True)

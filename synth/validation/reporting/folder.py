@@ -1,8 +1,8 @@
 """The folder of a validation: `report.json`, `report.html`, `summary.md`, and
 `evidence/SCENE/*.exr` where something was rejected.
 
-It appears whole or not at all; an earlier report there is replaced, together with the evidence that
-it names.
+It is written completely or not at all. An earlier report is replaced, together with the evidence
+that it lists.
 """
 
 import json
@@ -27,17 +27,37 @@ _EVIDENCE = re.compile(r"evidence/[^/\\.][^/\\]*/[a-z_]+\.exr")
 
 
 def require_writable_report(folder: Path) -> None:
-    """Tries now whether a report could be written there. Raises `InputError`."""
-    require_writable(folder, _ours(folder))
+    """Check that a report can be written to a folder.
+
+    Raises
+    ------
+    InputError
+        If it cannot, for example because the folder holds other files.
+    """
+    require_writable(folder, report_files(folder))
 
 
 def write_report(outcome: ValidationOutcome, folder: Path, monitor: Monitor) -> None:
-    """Writes the folder; runs the scenes to be shown once more.
+    """Write the report of a validation; runs the scenes that it shows once more.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    outcome : ValidationOutcome
+        The validation.
+    folder : Path
+        The folder to write; an earlier report is replaced.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    Cancelled
+        If the user cancels.
     """
     cases = make_cases(outcome.measured, outcome.options, monitor.part(0, 0.7))
-    with new_folder(folder, _ours(folder)) as partial:
+    with new_folder(folder, report_files(folder)) as partial:
         evidence = _write_evidence(outcome, partial, monitor.part(0.7, 0.95))
         monitor.report("writing the report", 0.95)
         text = json.dumps(to_json(outcome, evidence), indent=1, ensure_ascii=False, allow_nan=False)
@@ -47,7 +67,7 @@ def write_report(outcome: ValidationOutcome, folder: Path, monitor: Monitor) -> 
 
 
 def _write_evidence(outcome: ValidationOutcome, folder: Path, monitor: Monitor) -> tuple[str, ...]:
-    """The scenes that broke a bound or a check; the names of the files, relative to `folder`."""
+    """Maps of the scenes that violate a bound or fail a check; file names relative to `folder`."""
     wanted: dict[tuple[str, str], SceneResult] = {}
     for verdict in outcome.verdicts:
         if verdict.broken:
@@ -55,7 +75,7 @@ def _write_evidence(outcome: ValidationOutcome, folder: Path, monitor: Monitor) 
             wanted |= {(scene.facts.name, verdict.bound.stage): scene for scene in worst}
     names: list[str] = []
     for done, ((name, stage), scene) in enumerate(wanted.items()):
-        monitor.report("keeping evidence", done / len(wanted))
+        monitor.report("writing evidence", done / len(wanted))
         files = write_evidence(
             folder / "evidence" / name, scene, stage, outcome.options, monitor.part(1, 1)
         )
@@ -69,8 +89,19 @@ def _write_evidence(outcome: ValidationOutcome, folder: Path, monitor: Monitor) 
     return tuple(dict.fromkeys(names))
 
 
-def _ours(folder: Path) -> Sequence[str]:
-    """The files of a report, and the evidence that the one standing in `folder` names."""
+def report_files(folder: Path) -> Sequence[str]:
+    """Return the names of a report's files, the evidence listed by an existing report included.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder of the report; it need not exist.
+
+    Returns
+    -------
+    sequence of str
+        Paths relative to `folder`. Listed names outside of `evidence/SCENE/` are ignored.
+    """
     try:
         content = read_json(folder / "report.json")
     except InputError:

@@ -1,4 +1,4 @@
-"""A whole validation as one object, and as values for `json.dump`."""
+"""The result of a whole validation, and its JSON form."""
 
 import platform
 from collections.abc import Sequence
@@ -23,9 +23,28 @@ _PACKAGES = ("numpy", "scipy", "numba", "mitsuba")
 
 @dataclass(frozen=True)
 class ValidationOutcome:
-    """`dataset`: as the user named it; `command`: how to run it again. `figures`, `budgets` (none
-    without the chain), `checks` of renders, `verdicts` on bounds. `notes`: what a reader should
-    know. `gains`: of models, none without the stage "models".
+    """The result of a validation.
+
+    Attributes
+    ----------
+    dataset, command : str
+        The data set as named on the command line, and the command that repeats the run.
+    options : ValidationOptions
+        What was run.
+    scenes : tuple of SceneResult
+        All scenes, those that could not be run included.
+    figures : tuple of Figure
+        Every metric over every slice.
+    budgets : tuple of Budget
+        Error budgets; empty if the chain was not run.
+    checks : tuple of RenderCheck
+        Checks of the data set.
+    verdicts : tuple of Verdict
+        Results of the bounds.
+    notes : tuple of str
+        Remarks for the reader.
+    gains : tuple of Gain
+        Gains of the models; empty without the stage "models".
     """
 
     dataset: str
@@ -46,22 +65,33 @@ class ValidationOutcome:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """Every bound that is broken and every check that failed, in words."""
+        """One line per violated bound and per failed check."""
         return tuple(v.text for v in self.verdicts if v.broken) + tuple(
             check.text for check in self.checks if not check.passed
         )
 
 
 def all_budgets(scenes: Sequence[SceneResult], seed: int) -> tuple[Budget, ...]:
-    """The budget of every metric over the scenes on which the chain was run; none where it was run
-    on none.
+    """Compute the error budget of every metric of the chain.
+
+    Parameters
+    ----------
+    scenes : sequence of SceneResult
+        The scenes; those without a chain are skipped.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    tuple of Budget
+        Empty if the chain was run on no scene.
     """
     chains = [scene.chain for scene in scenes if scene.chain is not None]
     return tuple(budget(metric, chains, seed) for metric in METRICS) if chains else ()
 
 
 def versions() -> dict[str, str]:
-    """Of the program, Python and the packages that figures may depend on."""
+    """Return the versions of ISC, Python and the packages that affect the figures."""
     found = {"isc": isc_core.__version__, "python": platform.python_version()}
     for package in _PACKAGES:
         try:
@@ -72,7 +102,20 @@ def versions() -> dict[str, str]:
 
 
 def to_json(outcome: ValidationOutcome, evidence: Sequence[str]) -> dict[str, Any]:
-    """Everything of an outcome; `evidence`: the files that were kept, relative to the report."""
+    """Convert a validation to JSON values.
+
+    Parameters
+    ----------
+    outcome : ValidationOutcome
+        The validation.
+    evidence : sequence of str
+        Files with maps of rejected scenes, relative to the report.
+
+    Returns
+    -------
+    dict
+        The content of `report.json`.
+    """
     options = outcome.options
     return {
         "schema_version": SCHEMA_VERSION,

@@ -1,11 +1,10 @@
-"""The stage "gloss": roughness from the specular layer, with the true shape and the true layers
-given.
+"""The stage "gloss": roughness from the specular layer, with the true shape and the true layers.
 
-The truth of a varying gloss is its median, weighted by the specular light that it gives;
+The ground truth of a spatially varying roughness is its median, weighted by the specular light;
 Blinn-Phong exponents are compared as alpha.
 
-Limits: where light is only smooth nothing can be told: such scenes count by how many of them are
-answered all the same.
+Limits: under low-frequency light the roughness is undetermined. The metric "determined" counts the
+scenes where the fit returns one.
 """
 
 from dataclasses import dataclass
@@ -24,12 +23,12 @@ from ...capture.truth import GroundTruth
 from .pictures import exposure, lit
 from .types import Metric, Stage, StageInputs, StageOptions, StagePicture
 
-_NO_GLOSS = 0.01  # of the image's light: less specular light than this is none
+_NO_GLOSS = 0.01  # of the image's light: less specular light counts as none
 
 
 @dataclass(frozen=True)
 class FittedLobe:
-    """`fit`: the answer. `specular`: (H, W, 3), what it was fitted to."""
+    """The fitted lobe, and the specular layer (H, W, 3) that it was fitted to."""
 
     fit: LobeFit
     specular: np.ndarray
@@ -37,10 +36,20 @@ class FittedLobe:
 
 @dataclass(frozen=True)
 class LobeScores:
-    """`alpha_factor`: by which alpha is off, 1 or more; `explained`: share of the squared specular
-    image; both where gloss was found, the first where the material says how rough it is.
-    `determined`, `invented`: 1 or 0, whether alpha was told where there is gloss, and where there
-    is none. None: not defined.
+    """Errors of the roughness. None: undefined.
+
+    Attributes
+    ----------
+    alpha_factor : float or None
+        Ratio of estimated and true alpha, or its inverse, >= 1. Only if alpha was determined and
+        the
+        material has one.
+    explained : float or None
+        Share of the squared specular image that the fit explains.
+    determined : float or None
+        1 or 0: whether alpha was determined on a glossy scene.
+    invented : float or None
+        1 or 0: whether alpha was determined on a scene without specular light.
     """
 
     alpha_factor: float | None = None
@@ -50,9 +59,29 @@ class LobeScores:
 
 
 def run_lobe(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> FittedLobe:
-    """Fits a lobe to what is not diffuse. Raises `Cancelled`."""
+    """Fit a lobe to the specular layer.
+
+    Parameters
+    ----------
+    inputs : StageInputs
+        Photo, diffuse layer and height.
+    options : StageOptions
+        Unused.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    FittedLobe
+        The fit.
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
+    """
     if inputs.diffuse is None or inputs.height is None:
-        raise ValueError("the gloss is fitted to a known shape and a known diffuse image")
+        raise ValueError("fitting a lobe needs a known shape and a known diffuse image")
     specular = np.where(inputs.mask[..., None], np.maximum(inputs.image - inputs.diffuse, 0), 0)
     normal = normal_from_reference(
         normals(continued_height(inputs.height, inputs.mask).astype(float))
@@ -70,7 +99,20 @@ def run_lobe(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> Fi
 
 
 def score_lobe(truth: GroundTruth, answer: FittedLobe) -> LobeScores:
-    """The answer's roughness against the material's."""
+    """Compare the fitted roughness with the material's.
+
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answer : FittedLobe
+        The fit.
+
+    Returns
+    -------
+    LobeScores
+        The scores.
+    """
     fit, light = answer.fit, truth.specular[truth.mask].sum(axis=1, dtype=float)
     told = fit.determined and fit.alpha is not None
     if light.sum() < _NO_GLOSS * truth.image[truth.mask].sum(dtype=float):
@@ -84,18 +126,18 @@ def score_lobe(truth: GroundTruth, answer: FittedLobe) -> LobeScores:
 
 
 def show_lobe(truth: GroundTruth, answer: FittedLobe) -> tuple[StagePicture, ...]:
-    """The specular layer and the fit's, under one exposure."""
+    """Return the photo, the true and the fitted specular layer, with one exposure."""
     gain = exposure(truth.image, truth.mask)
     pairs = (
         ("photo", truth.image),
         ("specular, true", truth.specular),
-        ("specular, of the fit", answer.fit.predicted),
+        ("specular, fitted", answer.fit.predicted),
     )
     return tuple(StagePicture(caption, lit(gain * values, truth.mask)) for caption, values in pairs)
 
 
 def lobe_maps(answer: FittedLobe) -> dict[str, np.ndarray]:
-    """Channels of the specular layer and of the fit's."""
+    """Return the channels of the specular layer and of the fit."""
     layers = {"specular": answer.specular, "lobe": answer.fit.predicted}
     return {
         f"{name}.{letter}": values[..., k]
@@ -116,25 +158,25 @@ def _alpha(truth: GroundTruth, light: np.ndarray) -> float:
 
 LOBE = Stage(
     name="gloss",
-    title="Roughness of the gloss, shape and layers given",
+    title="Roughness of the specular lobe, with true shape and layers",
     needs=("diffuse", "shape"),
     metrics=(
-        Metric("alpha_factor", "alpha, off by a factor of"),
+        Metric("alpha_factor", "alpha, ratio to the truth"),
         Metric(
             "explained",
-            "of the specular image explained",
+            "explained share of the specular image",
             geometric=False,
             larger_is_better=True,
             margin=0.1,
         ),
         Metric(
             "determined",
-            "told where there is gloss",
+            "determined on glossy scenes",
             geometric=False,
             larger_is_better=True,
             margin=0.1,
         ),
-        Metric("invented", "told where there is none", geometric=False, margin=0.05),
+        Metric("invented", "determined on diffuse scenes", geometric=False, margin=0.05),
     ),
     run=run_lobe,
     score=score_lobe,

@@ -1,15 +1,15 @@
-"""The stage "models": what each model makes of a glossy photo, beside plain SIRFS on the same photo
-and SIRFS on the true diffuse layer.
+"""The stage "models": every model on a glossy photo, beside plain SIRFS on the same photo and SIRFS
+on the true diffuse layer.
 
-Each model is run as `isc decompose` runs it (`isc_core.decompose.models.solve`), and scored as the stage
-"sirfs" is. Errors count relative to plain SIRFS on the same scene, so that a mean over scenes is a
-paired comparison; the true diffuse layer shows what perfect separation would gain.
+Each model runs as in `isc decompose` (`isc_core.decompose.solve`), and is scored like the stage
+"sirfs". Errors are relative to plain SIRFS on the same scene, so that a mean over scenes is a
+paired comparison; the true diffuse layer shows the gain of a perfect separation.
 
-MBP has the shape and light of plain SIRFS by definition: they are found once.
+MBP has the shape and light of plain SIRFS by definition: they are solved once.
 
-Limits: SIRFS is solved with the object 256 pixels long, as for a photo, not at the picture's own
-size as in the stage "sirfs" and the chain: figures of the two do not compare. Black channels, in
-the shadows of lamps in the dark, are raised to half a code, for all alike.
+Limits: SIRFS solves with the object 256 pixels long, as for a photo, not at the image's own size as
+in the stage "sirfs" and the chain: the figures of the two are not comparable. Black channels, in
+the shadows of directional lights, are raised to half a code, for all variants alike.
 """
 
 from collections.abc import Mapping
@@ -19,16 +19,16 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from isc_core.decompose.layers import separated, shaded
-from isc_core.decompose.models import Answer, Settings, Task, solve
+from isc_core.decompose.models import DecompositionTask, SceneEstimate, Settings, solve
 from isc_core.decompose.settings import SEPARATING_MODELS
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.evaluation.metrics import Scores
 from isc_core.networks.light_network import predict_light
 from isc_core.networks.normal_network import predict_normals
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
+from isc_core.scene.known_inputs import SceneConstraints
 from isc_core.shading.spherical_harmonics import light_from_reference
-from isc_core.sirfs.recover import Known
 
 from ...capture.truth import GroundTruth
 from .pictures import directions, exposure, lit
@@ -42,7 +42,7 @@ TITLES = {PLAIN: "plain SIRFS", TRUE_DIFFUSE: "SIRFS on the true diffuse layer"}
     name: name for name in SEPARATING_MODELS
 }
 ERRORS = SIRFS.metrics
-_STARTS = {"mbp": PLAIN}  # whose shape and light a model has
+_STARTS = {"mbp": PLAIN}  # which variant's shape and light a model reuses
 _SMALLEST = 1e-30
 
 Item = TypeVar("Item")
@@ -50,9 +50,16 @@ Item = TypeVar("Item")
 
 @dataclass(frozen=True)
 class Variants(Generic[Item]):
-    """One thing for each way to explain a photo:
+    """One item for each way to decompose a photo. None: not requested.
 
-    `plain` SIRFS, SIRFS on the `true_diffuse` layer, and the models; None: not asked for.
+    Attributes
+    ----------
+    plain : Item
+        SIRFS on the photo.
+    true_diffuse : Item
+        SIRFS on the true diffuse layer.
+    mdr, mbp, joint : Item or None
+        The models.
     """
 
     plain: Item
@@ -62,15 +69,34 @@ class Variants(Generic[Item]):
     joint: Item | None = None
 
     def items(self) -> tuple[tuple[str, Item], ...]:
-        """Names and things, of what was asked for."""
+        """Return names and items of the variants that were requested."""
         found = ((field.name, getattr(self, field.name)) for field in fields(self))
         return tuple((name, item) for name, item in found if item is not None)
 
 
 def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> Variants[Estimate]:
-    """Explains the photo in every way;
+    """Decompose the photo in every way.
 
-    `inputs.split` is used where it is known. Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    inputs : StageInputs
+        The photo with its true diffuse layer; `split` is used if known.
+    options : StageOptions
+        Models, separator, light prior and threads.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    Variants of Estimate
+        The maps.
+
+    Raises
+    ------
+    InputError
+        If a model cannot process the photo.
+    Cancelled
+        If the user cancels.
     """
     if inputs.diffuse is None:
         raise ValueError(
@@ -78,16 +104,16 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
         )
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
-    light_estimate, seen = (
+    light_estimate, normal_estimate = (
         predict_light(photo.image, photo.mask),
         predict_normals(photo.image, photo.mask),
     )  # of the photo, also for its diffuse layer alone
 
-    def solved(model: str, image: Photo, start: Answer | None = None) -> Answer:
-        known = Known() if start is None else Known(start.height, start.light)
+    def solved(model: str, image: Photo, start: SceneEstimate | None = None) -> SceneEstimate:
+        known = SceneConstraints() if start is None else SceneConstraints(start.height, start.light)
         settings = Settings(model, options.separator, options.illumination, threads=options.threads)
         return solve(
-            Task(
+            DecompositionTask(
                 image,
                 image,
                 settings,
@@ -95,7 +121,7 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
                 monitor=monitor,
                 split=split,
                 light_estimate=light_estimate,
-                seen=seen,
+                normal_estimate=normal_estimate,
             )
         )
 
@@ -109,9 +135,24 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
 
 
 def score_models(truth: GroundTruth, answers: Variants[Estimate]) -> Variants[Scores]:
-    """Plain SIRFS' errors, and those of all others relative to them.
+    """Compute the errors of plain SIRFS, and those of all others relative to them.
 
-    Raises `InputError` where the true diffuse image is black.
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answers : Variants of Estimate
+        The estimated maps.
+
+    Returns
+    -------
+    Variants of Scores
+        The errors.
+
+    Raises
+    ------
+    InputError
+        If the true diffuse image is black.
     """
     errors = {name: score_sirfs(truth, answer) for name, answer in answers.items()}
     plain = errors[PLAIN]
@@ -121,8 +162,9 @@ def score_models(truth: GroundTruth, answers: Variants[Estimate]) -> Variants[Sc
 
 
 def show_models(truth: GroundTruth, answers: Variants[Estimate]) -> tuple[StagePicture, ...]:
-    """The photo, then diffuse layers, reflectance and normals: the truth's, and everyone's at the
-    truth's brightness.
+    """Return the photo, then true and estimated diffuse layers, reflectance and normals.
+
+    Estimates are scaled to the truth's brightness.
     """
     mask, items = truth.mask, answers.items()
     gain = exposure(truth.image, mask)
@@ -158,7 +200,7 @@ def show_models(truth: GroundTruth, answers: Variants[Estimate]) -> tuple[StageP
 
 
 def models_maps(answers: Variants[Estimate]) -> Mapping[str, np.ndarray]:
-    """Channels of everyone's maps: "joint.reflectance.R"."""
+    """Return the channels of all maps: "joint.reflectance.R"."""
     return {
         f"{name}.{channel}": values
         for name, own in answers.items()
@@ -167,7 +209,18 @@ def models_maps(answers: Variants[Estimate]) -> Mapping[str, np.ndarray]:
 
 
 def models_stage(models: tuple[str, ...]) -> AnyStage:
-    """The stage for the models of `StageOptions.models`; the first one ranks the scenes."""
+    """Return the stage for some models; the first one ranks the scenes.
+
+    Parameters
+    ----------
+    models : tuple of str
+        As in `StageOptions.models`.
+
+    Returns
+    -------
+    Stage
+        The stage.
+    """
     named = [(name, metric) for name in (*models, TRUE_DIFFUSE, PLAIN) for metric in ERRORS]
     return Stage(
         name=NAME,
@@ -182,12 +235,12 @@ def models_stage(models: tuple[str, ...]) -> AnyStage:
 
 
 def metric_name(variant: str, error: str) -> str:
-    """The metric of one error of one variant: "joint.average"."""
+    """Return the metric of one error of one variant: "joint.average"."""
     return f"{variant}.{error}"
 
 
 def _metric(variant: str, error: Metric) -> Metric:
-    """An error of plain SIRFS as it is; of the others, relative to that."""
+    """An error of plain SIRFS is absolute, of the others relative to it."""
     unit = error.unit if variant == PLAIN else ""
     return Metric(metric_name(variant, error.name), f"{TITLES[variant]}: {error.title}", unit)
 
@@ -195,14 +248,14 @@ def _metric(variant: str, error: Metric) -> Metric:
 def _photo(inputs: StageInputs) -> Photo:
     """The scene's image as a photo with 16-bit codes.
 
-    Noise can take light below zero, which no photo holds.
+    Noise can push light below zero, which no photo contains.
     """
     height, width = inputs.mask.shape
     source = PhotoSource("", (width, height), 16, "linear", "file")
     return Photo(np.maximum(inputs.image, 0), inputs.mask, 2 * BLACK, inputs.clipped, source)
 
 
-def _estimate(inputs: StageInputs, answer: Answer) -> Estimate:
+def _estimate(inputs: StageInputs, answer: SceneEstimate) -> Estimate:
     normal, _ = shaded(answer.height, answer.light, inputs.mask)
     return with_normals(
         replace(inputs, diffuse=answer.split.diffuse),
@@ -213,6 +266,6 @@ def _estimate(inputs: StageInputs, answer: Answer) -> Estimate:
 
 
 def _relative(errors: Scores, plain: Scores) -> Scores:
-    """Each error over plain SIRFS'; 1 where both are zero."""
+    """Each error relative to that of plain SIRFS; 1 if both are zero."""
     pairs = ((getattr(errors, field.name), getattr(plain, field.name)) for field in fields(Scores))
     return Scores(*(max(own, _SMALLEST) / max(other, _SMALLEST) for own, other in pairs))

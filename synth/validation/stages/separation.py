@@ -1,9 +1,9 @@
-"""The stage "separation": the photo's diffuse and specular layers against those that were rendered,
+"""The stage "separation": the estimated diffuse and specular layers against the rendered ones,
 inside the mask.
 
-An error is also given as a ratio to that of doing nothing (diffuse = photo): where there are few
-highlights, doing nothing is hard to beat. Whether the confidence knows where the errors are is told
-by sparsification and rank (see `isc_core.evaluation.image_metrics`).
+The diffuse error is also given relative to that of the unmodified photo, which is hard to beat
+where highlights are few. Sparsification and rank correlation measure whether the confidence map
+predicts the errors (see `isc_core.evaluation.image_metrics`).
 """
 
 import math
@@ -21,22 +21,35 @@ from ...capture.truth import GroundTruth
 from .pictures import exposure, lit, signed_error
 from .types import Metric, Stage, StageInputs, StageOptions, StagePicture
 
-_EQUAL = 120.0  # dB: what equal images count as, near the precision of float32
-_LEAST = 1e-12  # mean square error of doing nothing below which there is no highlight to remove
+_EQUAL = 120.0  # dB, for equal images: near the precision of float32
+_LEAST = 1e-12  # mean square error of the photo below which there is no highlight to remove
 _DROPPED = 0.2
 
 
 @dataclass(frozen=True)
 class SeparationScores:
-    """Inside the mask, of linear values. None: not defined. All but `taken` are of scenes with
-    specular light, since a method that leaves a matt scene alone has errors of zero, which would
-    rule every geometric mean.
+    """Errors inside the mask, of linear values. None: undefined.
 
-    `mse_*`: mean square errors; `lmse_*`: Grosse's local error; `psnr_*`: dB for a white of 1, 120
-    at most. `mse_ratio`: diffuse error over that of the untouched photo. `removed`: share of the
-    squared error that leaves with the least confident fifth of the pixels. `rank`: correlation of
-    confidence and squared error, -1 the best. `taken`: of scenes without specular light, the RMS of
-    what was taken from the photo over the photo's own.
+    All but `taken` are defined on scenes with specular light only: a method that does not modify a
+    diffuse scene has an error of zero, which would dominate every geometric mean.
+
+    Attributes
+    ----------
+    mse_diffuse, mse_specular : float or None
+        Mean square errors.
+    lmse_diffuse, lmse_specular : float or None
+        Local mean square errors after Grosse et al.
+    psnr_diffuse, psnr_specular : float or None
+        dB relative to a white of 1, at most 120.
+    mse_ratio : float or None
+        Diffuse error relative to that of the unmodified photo.
+    removed : float or None
+        Share of the squared error in the least confident fifth of the pixels.
+    rank : float or None
+        Rank correlation of confidence and squared error; -1 is best.
+    taken : float or None
+        On scenes without specular light: RMS of the light removed from the photo, relative to the
+        photo's RMS.
     """
 
     mse_diffuse: float | None = None
@@ -52,12 +65,52 @@ class SeparationScores:
 
 
 def run_separation(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> Separation:
-    """Splits the photo by `options.separator`. Raises `InputError`, `Cancelled`."""
+    """Separate the photo with `options.separator`.
+
+    Parameters
+    ----------
+    inputs : StageInputs
+        Photo, mask and clipped pixels.
+    options : StageOptions
+        Which separator.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    Separation
+        The layers.
+
+    Raises
+    ------
+    InputError
+        If the separator cannot process the photo.
+    Cancelled
+        If the user cancels.
+    """
     return separate(options.separator, inputs.image, inputs.mask, inputs.clipped, monitor=monitor)
 
 
 def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores:
-    """The errors of both layers. Raises `ValueError` for an empty mask."""
+    """Compute the errors of both layers.
+
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answer : Separation
+        The estimated layers.
+
+    Returns
+    -------
+    SeparationScores
+        The errors.
+
+    Raises
+    ------
+    ValueError
+        For an empty mask.
+    """
     mask = truth.mask
     nothing, wrong = mse(truth.diffuse, truth.image, mask), mse(truth.diffuse, answer.diffuse, mask)
     if nothing <= _LEAST:
@@ -83,16 +136,16 @@ def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores
 
 
 def show_separation(truth: GroundTruth, answer: Separation) -> tuple[StagePicture, ...]:
-    """True and found layers under one exposure, and the error of the diffuse layer."""
+    """Return true and estimated layers with one exposure, and the error of the diffuse layer."""
     gain = exposure(truth.image, truth.mask)
     pairs = [
         ("photo", truth.image),
         ("diffuse, true", truth.diffuse),
-        ("diffuse, found", answer.diffuse),
+        ("diffuse, estimated", answer.diffuse),
     ]
-    pairs += [("specular, true", truth.specular), ("specular, found", answer.specular)]
+    pairs += [("specular, true", truth.specular), ("specular, estimated", answer.specular)]
     error = StagePicture(
-        "error: orange left over, blue overdone",
+        "error: orange too bright, blue too dark",
         signed_error(gain * (answer.diffuse - truth.diffuse), truth.mask),
     )
     return (
@@ -102,7 +155,7 @@ def show_separation(truth: GroundTruth, answer: Separation) -> tuple[StagePictur
 
 
 def separation_maps(answer: Separation) -> dict[str, np.ndarray]:
-    """Channels of the layers as `isc separate` names them."""
+    """Return the channels of the layers, named as `isc separate` names them."""
     layers = {"diffuse": answer.diffuse, "specular": answer.specular, "residual": answer.residual}
     planes = {
         f"{name}.{letter}": values[..., k]
@@ -113,7 +166,7 @@ def separation_maps(answer: Separation) -> dict[str, np.ndarray]:
 
 
 def _local(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray) -> float | None:
-    """Grosse's local error, None where a channel of the truth is zero everywhere."""
+    """Grosse's local error, None if a channel of the truth is zero everywhere."""
     if not (truth[mask] > 0).any(axis=0).all():
         return None
     error = lmse(truth, estimate, mask)
@@ -125,7 +178,7 @@ SEPARATION = Stage(
     title="Separation of diffuse and specular light",
     needs=(),
     metrics=(
-        Metric("mse_ratio", "diffuse MSE, of doing nothing"),
+        Metric("mse_ratio", "diffuse MSE, relative to the photo"),
         Metric("mse_diffuse", "diffuse MSE"),
         Metric("mse_specular", "specular MSE"),
         Metric("lmse_diffuse", "diffuse LMSE"),
@@ -143,13 +196,13 @@ SEPARATION = Stage(
         ),
         Metric(
             "removed",
-            "error in the least confident fifth",
+            "error share of the least confident fifth",
             geometric=False,
             larger_is_better=True,
             margin=0.05,
         ),
-        Metric("rank", "rank of confidence and error", geometric=False, margin=0.05),
-        Metric("taken", "taken from matt scenes, RMS", geometric=False, margin=0.005),
+        Metric("rank", "rank correlation of confidence and error", geometric=False, margin=0.05),
+        Metric("taken", "removed from diffuse scenes, RMS", geometric=False, margin=0.005),
     ),
     run=run_separation,
     score=score_separation,

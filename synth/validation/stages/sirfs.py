@@ -1,12 +1,12 @@
-"""The stage "sirfs": shape, light, shading and reflectance from a diffuse image, with what is known
-of shape or light kept.
+"""The stage "sirfs": shape, light, shading and reflectance from a diffuse image; known shape or
+light is kept.
 
-The picture is solved at its own size, as on the MIT-Berkeley set (J. T. Barron, J. Malik 2015,
-doi:10.1109/TPAMI.2014.2377712), where it is not black; errors are those of `isc_core.evaluation.metrics`,
-against the exact normals of the rays that hit the object.
+The image is solved at its own size, as on the MIT-Berkeley set (J. T. Barron, J. Malik 2015,
+doi:10.1109/TPAMI.2014.2377712), where it is not black; errors are those of
+`isc_core.evaluation.metrics`, against the exact normals of the rays that hit the object.
 
-Limits: shading is exp(SH(normal)), which rendered light is not; how far off that is, the budget
-tells (`substitution`).
+Limits: shading is exp(SH(normal)), which rendered shading is not; the budget measures the
+difference (`measurement.substitution`).
 """
 
 from functools import cache
@@ -38,21 +38,40 @@ from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.priors.priors import Priors
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import isc_weights
-from isc_core.sirfs.silhouette import silhouette_field
+from isc_core.sirfs.silhouette import normals_from_silhouette
 from isc_core.sirfs.solver import SolverOptions, solve
 
 from ...capture.truth import GroundTruth
 from .pictures import directions, exposure, lit, relief
 from .types import BLACK, Metric, Stage, StageInputs, StageOptions, StagePicture
 
-_MARGIN = 20  # pixels of empty space around the object's box, where the picture has them
-_BRIGHTEST = 50.0  # of log shading: beyond it exp overflows float32
+_MARGIN = 20  # pixels of background around the object's box, where the image has them
+_BRIGHTEST = 50.0  # log shading: beyond it exp overflows float32
 
 
 def run_sirfs(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> Estimate:
-    """Solves for what is not given.
+    """Solve for what is not given.
 
-    Raises `InputError` where the diffuse image is black everywhere; `Cancelled`.
+    Parameters
+    ----------
+    inputs : StageInputs
+        Diffuse image and mask; height and light if known.
+    options : StageOptions
+        Light prior and threads.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    Estimate
+        Maps of the whole frame.
+
+    Raises
+    ------
+    InputError
+        If the diffuse image is black everywhere.
+    Cancelled
+        If the user cancels.
     """
     if inputs.diffuse is None:
         raise ValueError("SIRFS needs a diffuse image")
@@ -70,14 +89,29 @@ def run_sirfs(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> E
 
 
 def score_sirfs(truth: GroundTruth, answer: Estimate) -> Scores:
-    """The six errors; shading and reflectance where the true diffuse image is not black.
+    """Compute the six errors; shading and reflectance where the true diffuse image is not black.
 
-    Raises `InputError` where it is so everywhere.
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answer : Estimate
+        The estimated maps.
+
+    Returns
+    -------
+    Scores
+        The errors.
+
+    Raises
+    ------
+    InputError
+        If the true diffuse image is black everywhere.
     """
     mask = truth.mask
     seen = mask & (truth.diffuse > BLACK).all(axis=2)
     if not seen.any():
-        raise InputError("the scene's diffuse image is black everywhere: there is nothing to score")
+        raise InputError("the diffuse image of the scene is black everywhere: nothing to score")
     layers = (
         (truth.shading.astype(float), answer.shading),
         (truth.reflectance.astype(float), answer.reflectance),
@@ -94,8 +128,9 @@ def score_sirfs(truth: GroundTruth, answer: Estimate) -> Scores:
 
 
 def show_sirfs(truth: GroundTruth, answer: Estimate) -> tuple[StagePicture, ...]:
-    """Photo, then shape, normals, shading and reflectance: true and found, each brought to the
-    truth's brightness.
+    """Return the photo, then true and estimated shading, reflectance, normals and height.
+
+    Estimates are scaled to the truth's brightness.
     """
     mask = truth.mask
     shown = [StagePicture("photo", lit(exposure(truth.image, mask) * truth.image, mask))]
@@ -105,24 +140,24 @@ def show_sirfs(truth: GroundTruth, answer: Estimate) -> tuple[StagePicture, ...]
         scale = (true[mask] * found[mask]).sum() / max(np.square(found[mask]).sum(), 1e-30)
         shown += [
             StagePicture(f"{name}, true", lit(gain * true, mask)),
-            StagePicture(f"{name}, found", lit(gain * scale * found, mask)),
+            StagePicture(f"{name}, estimated", lit(gain * scale * found, mask)),
         ]
     shown += [
         StagePicture(f"normals, {word}", directions(side.normal, mask))
-        for word, side in (("true", truth), ("found", answer))
+        for word, side in (("true", truth), ("estimated", answer))
     ]
     span = float(np.ptp(truth.height[mask])) or 1.0
     return (
         *shown,
         *(
             StagePicture(f"height, {word}", relief(side.height, mask, span))
-            for word, side in (("true", truth), ("found", answer))
+            for word, side in (("true", truth), ("estimated", answer))
         ),
     )
 
 
 def sirfs_maps(answer: Estimate) -> dict[str, np.ndarray]:
-    """Channels of the maps as `isc decompose` names them."""
+    """Return the channels of the maps, named as `isc decompose` names them."""
     layers = {
         "reflectance": (answer.reflectance, "RGB"),
         "shading": (answer.shading, "RGB"),
@@ -151,11 +186,11 @@ def _solved(
     options: StageOptions,
     monitor: Monitor,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Height (h, w) and light (9, C), reference convention, in the window."""
+    """Height (h, w) and light (9, C) in the window, reference convention."""
     valid = mask & (diffuse > BLACK).all(axis=2)
     if not valid.any():
         raise InputError(
-            "the diffuse image is black everywhere inside the mask: no shape can be read from it"
+            "the diffuse image is black everywhere inside the mask: it has no shape cue"
         )
     inside = diffuse[valid]
     channels = (
@@ -168,7 +203,7 @@ def _solved(
     log_image = np.where(
         valid[..., None], np.log(np.maximum(diffuse[..., :channels].astype(float), BLACK)), 0.0
     )
-    field = None if priors.silhouette is None else silhouette_field(mask, priors.silhouette)
+    field = None if priors.silhouette is None else normals_from_silhouette(mask, priors.silhouette)
     weights = isc_weights(options.illumination, channels)
     problem = Problem(
         log_image, valid, mask, occluding_contour(mask), priors, weights, silhouette=field
@@ -192,9 +227,7 @@ def _priors(illumination: str, channels: int) -> Priors:
 def _estimate(
     inputs: StageInputs, part: tuple[slice, slice], height: np.ndarray, light: np.ndarray
 ) -> Estimate:
-    """The maps of the whole frame that follow from height (h, w) in the window and light (9, 3),
-    our convention.
-    """
+    """Maps of the whole frame from height (h, w) in the window and light (9, 3), camera frame."""
     mask = inputs.mask
     whole_height, normal = np.zeros(mask.shape), np.zeros((*mask.shape, 3))
     whole_height[part], normal[part] = height, normal_from_reference(normals(height))
@@ -205,8 +238,23 @@ def _estimate(
 def with_normals(
     inputs: StageInputs, height: np.ndarray, normal: np.ndarray, light: np.ndarray
 ) -> Estimate:
-    """The answer that height (H, W), normals (H, W, 3) and light (9, 3) stand for: shading =
-    exp(SH), reflectance = diffuse / shading.
+    """Derive shading and reflectance: shading = exp(SH(normal)), reflectance = diffuse / shading.
+
+    Parameters
+    ----------
+    inputs : StageInputs
+        Mask and diffuse image.
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    normal : (H, W, 3) ndarray
+        Unit normals, camera frame.
+    light : (9, 3) ndarray
+        Log-shading coefficients, camera frame.
+
+    Returns
+    -------
+    Estimate
+        The maps.
     """
     assert inputs.diffuse is not None
     inside = inputs.mask[..., None]

@@ -1,0 +1,23 @@
+"""Numbers as the report shows them: three significant digits, with their interval."""
+
+from ..measurement.bootstrap import Interval
+
+
+def number(value: float) -> str:
+    """Format a number with three significant digits."""
+    return f"{value:.3g}"
+
+
+def with_interval(interval: Interval) -> str:
+    """Format a value and its interval: "0.031 [0.024, 0.040]"."""
+    if interval.low is None or interval.high is None:
+        return number(interval.value)
+    return f"{number(interval.value)} [{number(interval.low)}, {number(interval.high)}]"
+
+
+def percent(interval: Interval) -> str:
+    """Format a share and its interval in per cent: "42 % [30, 55]"."""
+    share = f"{round(100 * interval.value)} %"
+    if interval.low is None or interval.high is None:
+        return share
+    return f"{share} [{round(100 * interval.low)}, {round(100 * interval.high)}]"
