@@ -1,5 +1,7 @@
-"""Every table and figure of the thesis, regenerated on open data, beside what the thesis claims:
-`isc thesis`.
+"""Every table and figure of the thesis, regenerated on open data: `isc thesis`.
+
+Imports point one way: images -> measuring -> report -> items -> registry -> making -> command;
+drawing is used by report and items.
 
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image",
 thesis (2016).

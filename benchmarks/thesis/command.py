@@ -1,4 +1,4 @@
-"""`isc thesis`: the thesis' tables and figures, made again."""
+"""`isc thesis`: the tables and figures of the thesis, regenerated."""
 
 import argparse
 import importlib.util
@@ -13,43 +13,69 @@ from isc_core.errors import InputError
 from isc_core.progress import Monitor
 
 if TYPE_CHECKING:
-    pass
+    from .report.item import ThesisItem
 
-_DEFAULT = Path("docs") / "thesis"
+_DEFAULT = Path("build") / "thesis"
+_PUBLISHED = Path("docs") / "thesis"
 _LIBRARIES = ("matplotlib", "skimage")
+_DESCRIPTION = (
+    "Regenerate the tables and figures of the thesis on open data and compare them with its "
+    "claims. Writes Markdown, CSV and PNG files, a picture sheet per chapter and an index."
+)
 _EXAMPLES = """  isc thesis list
   isc thesis table 4.5 --quick -o results
   isc thesis figure 4.50 -o results
-  isc thesis all --data ROOT -o results     ROOT: a folder with MIT-Berkeley-Laboratory/ (or mit_berkeley_train/), highlight/, photos/
+  isc thesis all --data ROOT -o results
+  isc thesis publish -o results --to docs/thesis
 
-Without --data everything is made on images that the project renders itself. An interrupted run goes on where it stopped."""
+ROOT is a folder with MIT-Berkeley-Laboratory/ (or mit_berkeley_train/), highlight/ and photos/.
+Without --data, the project renders all images itself. An interrupted run resumes."""
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command, and those below it, to the parser."""
+    """Add the command and its subcommands to the parser.
+
+    Parameters
+    ----------
+    commands : Commands
+        Subparsers of `isc`.
+    """
     parser = add_command(
         commands,
         "thesis",
-        _nothing,
-        "the thesis' tables and figures, made again",
-        "Makes the tables and figures of the thesis again on open data, beside what it claims: Markdown, CSV and PNG files with an index.",
+        _no_subcommand,
+        "regenerate the tables and figures of the thesis",
+        _DESCRIPTION,
         _EXAMPLES,
     )
-    below = parser.add_subparsers(title="commands", metavar="list | table N | figure N | all")
-    listing = below.add_parser(
-        "list", help="every table and figure, and what is made of it", parents=[_common()]
+    below = parser.add_subparsers(
+        title="commands", metavar="list | table N | figure N | all | publish"
     )
+    listing = below.add_parser("list", help="list every item and its state", parents=[_common()])
     listing.set_defaults(run=run_list)
     for kind in ("table", "figure"):
-        one = below.add_parser(kind, help=f"one {kind}", parents=[_common()])
-        one.add_argument("number", metavar="N", help="its number, as in 4.5")
+        one = below.add_parser(kind, help=f"make one {kind}", parents=[_common()])
+        one.add_argument("number", metavar="N", help="number, as in 4.5")
         one.set_defaults(run=run_one, kind=kind)
-    everything = below.add_parser("all", help="every table and figure", parents=[_common()])
+    everything = below.add_parser("all", help="make every table and figure", parents=[_common()])
     everything.set_defaults(run=run_all)
+    publishing = below.add_parser(
+        "publish",
+        help="copy the index, the pages of the tables and the picture sheets",
+        parents=[_output()],
+    )
+    publishing.add_argument(
+        "--to",
+        type=Path,
+        default=_PUBLISHED,
+        metavar="DIR",
+        help="folder to write (default: %(default)s)",
+    )
+    publishing.set_defaults(run=run_publish)
 
 
-def _common() -> argparse.ArgumentParser:
-    """The options that all of them have."""
+def _output() -> argparse.ArgumentParser:
+    """Options of every subcommand."""
     parser = argparse.ArgumentParser(add_help=False)
     parser.add_argument(
         "-o",
@@ -57,46 +83,68 @@ def _common() -> argparse.ArgumentParser:
         type=Path,
         default=_DEFAULT,
         metavar="DIR",
-        help="the folder to write (default: %(default)s)",
+        help="output folder (default: %(default)s)",
     )
+    add_speech(parser)
+    return parser
+
+
+def _common() -> argparse.ArgumentParser:
+    """Options of the subcommands that make items."""
+    parser = argparse.ArgumentParser(add_help=False, parents=[_output()])
     parser.add_argument(
         "--data",
         type=Path,
         metavar="ROOT",
-        help="a folder of public data sets (default: the project's own rendered images)",
+        help="folder of public data sets (default: images rendered by the project)",
     )
     parser.add_argument(
         "--quick",
         action="store_true",
-        help="small images and few repetitions: minutes instead of hours",
+        help="small images and few repetitions; takes minutes instead of hours",
     )
     parser.add_argument(
         "--seed",
         type=count,
         default=0,
         metavar="S",
-        help="of all random numbers (default: %(default)s)",
+        help="random seed (default: %(default)s)",
     )
     parser.add_argument(
         "--again",
         action="store_true",
-        help="make what is complete once more, and compute kept rows anew",
+        help="recompute items and rows that are already complete",
     )
-    add_speech(parser)
     return parser
 
 
-def _nothing(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+def _no_subcommand(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     del options, monitor
     raise InputError(
-        "say what to make: isc thesis list, table N, figure N or all (see `isc thesis --help`)"
+        "choose a subcommand: isc thesis list, table N, figure N, all or publish "
+        "(see `isc thesis --help`)"
     )
 
 
 def run_list(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """A line for each item: number, title, state, claims.
+    """List every item: number, state, title and verdicts.
 
-    Raises `InputError` where a library is missing.
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Parsed options.
+    monitor : Monitor
+        Not used.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If a library is missing.
     """
     _require_libraries()
     from .making import item_states
@@ -107,52 +155,116 @@ def run_list(options: argparse.Namespace, monitor: Monitor) -> list[str]:
 
 
 def run_one(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Makes one item.
+    """Make one item.
 
-    Raises `InputError` for an unknown number and what cannot be made; `Cancelled`.
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Parsed options.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If the number is unknown or the item cannot be made.
+    Cancelled
+        If the user cancels.
     """
     _require_libraries()
     from .registry import find_item
 
     item = find_item(options.kind, options.number)
     if item.make is None:
-        raise InputError(f"{item.kind} {item.number} cannot be made again: {item.reason}")
-    return _made(options, [item], monitor)
+        raise InputError(f"{item.kind} {item.number} cannot be regenerated: {item.reason}")
+    return _make(options, [item], monitor)
 
 
 def run_all(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Makes all items that can be made.
+    """Make every item that can be made, and a picture sheet per chapter.
 
-    Raises `InputError` for data and folders that cannot be used; `Cancelled`.
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Parsed options.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If data or folders cannot be used.
+    Cancelled
+        If the user cancels.
     """
     _require_libraries()
     from .registry import all_items
+    from .report.chapter_sheets import write_chapter_sheets
+    from .report.records import read_records
 
-    return _made(options, [item for item in all_items() if item.make is not None], monitor)
+    items, folder = all_items(), options.output
+    lines = _make(options, [item for item in items if item.make is not None], monitor)
+    write_chapter_sheets(folder, folder, items, read_records(folder, items))
+    return lines
+
+
+def run_publish(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Copy the index, the pages of the tables and the picture sheets.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        Parsed options.
+    monitor : Monitor
+        Not used.
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If the output folder has no items.
+    """
+    _require_libraries()
+    from .registry import all_items
+    from .report.files import publish
+
+    del monitor
+    written = publish(options.output, options.to, all_items())
+    return hints(options, f"wrote {len(written)} files to {options.to}")
 
 
 def _require_libraries() -> None:
-    """What draws and what brings the nine images;
-
-    Mitsuba is asked for where something has to be rendered.
-    """
+    """Check for the drawing library and the nine images; Mitsuba is checked where it renders."""
     if missing := [name for name in _LIBRARIES if importlib.util.find_spec(name) is None]:
         raise InputError(
-            f"isc thesis needs {' and '.join(missing)}: install them with `pip install 'isc3d[thesis]'`"
+            f"isc thesis needs {' and '.join(missing)}; install with `pip install 'isc3d[thesis]'`"
         )
 
 
-def _made(options: argparse.Namespace, wanted: "Sequence[Item]", monitor: Monitor) -> list[str]:
+def _make(
+    options: argparse.Namespace, wanted: "Sequence[ThesisItem]", monitor: Monitor
+) -> list[str]:
     from .making import make_items
     from .measuring.context import Context
 
     context = Context(options.output, options.data, options.quick, options.seed, monitor)
     if options.again:
         context = replace(context, fresh_since=time.time())
-    outcome = make_items(wanted, context, again=options.again)
-    lines = [
-        f"{outcome.made} made, {outcome.kept} were complete already: {options.output / 'README.md'} lists them"
-    ]
-    return hints(
-        options, *lines, *(f"not made: {name}: {reason}" for name, reason in outcome.failed)
-    )
+    summary = make_items(wanted, context, again=options.again)
+    lines = [f"{summary.made} made, {summary.kept} kept; index: {options.output / 'README.md'}"]
+    lines += [f"not made: {name}: {reason}" for name, reason in summary.failed]
+    return hints(options, *lines)

@@ -1,4 +1,4 @@
-"""All items, in the order of the thesis' lists."""
+"""List of all items, in the order of the thesis."""
 
 import importlib
 from functools import cache
@@ -26,36 +26,59 @@ _MODULES = (
 
 @cache
 def all_items() -> tuple[ThesisItem, ...]:
-    """Every item. matplotlib and scikit-image have to be installed."""
+    """Return every item.
+
+    Returns
+    -------
+    tuple of ThesisItem
+        Tables first, then figures, by number. matplotlib and scikit-image must be installed.
+    """
     modules = [importlib.import_module(f".items.{name}", __package__) for name in _MODULES]
-    found: list[ThesisItem] = sorted(
+    items: list[ThesisItem] = sorted(
         (item for module in modules for item in module.ITEMS), key=lambda item: item.order
     )
-    names = [item.name for item in found]
-    if twice := {name for name in names if names.count(name) > 1}:
-        raise ValueError(f"listed twice: {', '.join(sorted(twice))}")
-    return tuple(found)
+    names = [item.name for item in items]
+    if duplicates := {name for name in names if names.count(name) > 1}:
+        raise ValueError(f"duplicate items: {', '.join(sorted(duplicates))}")
+    return tuple(items)
 
 
 def find_item(kind: str, number: str) -> ThesisItem:
-    """One item. Raises `InputError` that names the nearest numbers where there is none."""
-    known = {item.number: item for item in all_items() if item.kind == kind}
-    if number not in known:
-        near = sorted(known, key=lambda other: _distance(number, other))[:3]
-        raise InputError(
-            f"there is no {kind} {number!r}: the nearest are {', '.join(near)} (`isc thesis list` shows all)"
-        )
-    return known[number]
+    """Find an item by its number.
 
+    Parameters
+    ----------
+    kind : str
+        "table" or "figure".
+    number : str
+        As in "4.5".
 
-def _distance(asked: str, known: str) -> tuple[float, float]:
-    """How far apart two numbers like "4.5" are: by chapter, then by what follows; words are
-    infinitely far.
+    Returns
+    -------
+    ThesisItem
+        The item.
+
+    Raises
+    ------
+    InputError
+        If there is no such item; the message names the nearest numbers.
     """
+    items = {item.number: item for item in all_items() if item.kind == kind}
+    if number not in items:
+        nearest = sorted(items, key=lambda other: _distance(number, other))[:3]
+        raise InputError(
+            f"there is no {kind} {number!r}; the nearest are {', '.join(nearest)} "
+            "(`isc thesis list` shows all)"
+        )
+    return items[number]
+
+
+def _distance(wanted: str, number: str) -> tuple[float, float]:
+    """Distance of two numbers like "4.5": chapters, then places; infinite for other text."""
     try:
-        chapter, _, place = asked.partition(".")
-        wanted = float(chapter), float(place or 0)
+        chapter, _, place = wanted.partition(".")
+        parts = float(chapter), float(place or 0)
     except ValueError:
-        wanted = float("inf"), float("inf")
-    own = [float(part) for part in known.split(".")]
-    return abs(wanted[0] - own[0]), abs(wanted[1] - own[1])
+        parts = float("inf"), float("inf")
+    own = [float(part) for part in number.split(".")]
+    return abs(parts[0] - own[0]), abs(parts[1] - own[1])

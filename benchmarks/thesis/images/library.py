@@ -25,8 +25,8 @@ from isc_core.datasets.highlight_set import list_shen_zheng, load_shen_zheng
 from isc_core.datasets.mit_berkeley import list_objects, load_object
 from isc_core.errors import InputError
 from isc_core.imaging.bounding_box import mask_slices
-from isc_core.photo import read_photo
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.photo import read_photo
 from isc_core.progress import Monitor
 
 from .subject import QUICK_SIZE, Subject, downsample_subject

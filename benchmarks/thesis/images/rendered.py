@@ -25,7 +25,7 @@ from isc_core.progress import Monitor
 from isc_core.shading.environment_map import shading_under
 from isc_core.shading.spherical_harmonics import light_to_reference
 from synth.albedos import make_albedo
-from synth.capture.recipe import Part, Picture, Sources, camera_around, photograph
+from synth.capture.recipe import FamilyMember, PictureSettings, Sources, camera_around, photograph
 from synth.capture.truth import GroundTruth, exposed, fit_light, render_truth
 from synth.dataset.splits import Choices, make_pools
 from synth.demo_scene import demo_scene
@@ -60,9 +60,9 @@ class _RenderedObject:
     exponent: float = 100.0
     strength: float = 0.1
 
-    def part(self, seed: int) -> Part:
+    def part(self, seed: int) -> FamilyMember:
         """Return the shape's member; another seed selects another one."""
-        return Part(self.shape, self.member + seed)
+        return FamilyMember(self.shape, self.member + seed)
 
 
 _SCENES = (
@@ -181,7 +181,7 @@ def _of_scene(make: Callable[[int], Scene], size: int, seed: int, monitor: Monit
 def _of_synth(number: int, size: int, monitor: Monitor) -> Layers:
     """Render a glossy scene of `isc synth`."""
     choices = Choices(materials=("blinn_phong", "ggx", "roughplastic"), splits=("train",))
-    picture = Picture(size, _QUICK_SAMPLES if size <= QUICK_SIZE else _SAMPLES)
+    picture = PictureSettings(size, _QUICK_SAMPLES if size <= QUICK_SIZE else _SAMPLES)
     recipe = make_pools(choices, Sources()).recipe(number, picture, Sources())
     return _layers(photograph(recipe, monitor)[1], recipe.name)
 

@@ -42,6 +42,7 @@ from ..measuring.decompositions import decompose_subject
 from ..measuring.specular_free_images import (
     KINDS,
     residual_highlight,
+    subject_title,
     subjects_with_highlights,
 )
 from ..report.item import ItemContent, ItemTable, ThesisItem
@@ -175,7 +176,7 @@ def _specular_free(context: Context) -> ItemContent:
     )
     text = (
         "min and max are over the channels of a pixel, Σ their sum. What is left of the highlights is measured on "
-        f"{', '.join(map(titled, subjects))}, without what lies evenly on the whole object. Two methods have "
+        f"{', '.join(map(subject_title, subjects))}, without what lies evenly on the whole object. Two methods have "
         "invariants that are no images: `mallick_2006` the hue and chroma in a plane across white, `isc` the chroma max I − min I."
     )
     return ItemContent((ItemTable(header, tuple(rows)),), text=text)

@@ -58,7 +58,7 @@ from ..report.item import Cell, ItemContent, ItemTable, ThesisItem
 from ..report.layer_tables import KINDS
 from .characteristics import error_table
 from .removal import METHODS
-from .segmentation import WAYS as SEGMENTATIONS
+from .segmentation import SETTINGS as SEGMENTATIONS
 from .sparse_coding import METHOD as SPARSE_CODING
 from .sparse_coding import OURS as SPECULAR_FREE
 

@@ -29,6 +29,7 @@ from ..measuring.threshold_runs import (
     EVALUATIONS,
     SEARCHES,
     ThresholdRuns,
+    count_iterations,
     holm_correction,
     image_names,
     image_objective,
@@ -38,7 +39,7 @@ from ..measuring.threshold_runs import (
     wilson_interval,
 )
 from ..report.claims import CHAOS_FINDS_OPTIMUM, CHAOS_HELPS
-from ..report.item import Cell, ClaimVerdict, ItemContent, ItemTable, ThesisItem
+from ..report.item import Cell, ClaimVerdict, Holds, ItemContent, ItemTable, ThesisItem
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -140,7 +141,7 @@ def objectives(context: Context) -> ItemContent:
     )
     rows = []
     for place, (name, count) in enumerate((i, k) for i in names for k in COUNTS):
-        cells: list[Cell] = [name, count, f"{exact(objective(name), count).value:.3f}"]
+        cells: list[Cell] = [name, count, f"{exact(image_objective(name), count).value:.3f}"]
         for search in COMPARED:
             values = found[search, name, count].values
             cells += [f"{values.mean():.3f}", f"{values.std(ddof=1):.4f}"]
@@ -306,18 +307,14 @@ def _objective_verdicts(
     total = sum(len(found["CS", i, k].values) for i in names for k in COUNTS)
     low, _ = wilson_interval(hits["CS"], total)
     share = {search: f"{100 * many / total:.1f} %" for search, many in hits.items()}
-    best = "yes" if hits["CS"] == total else "partly" if hits["CS"] > 0.95 * total else "no"
+    best = Holds.NO
+    if hits["CS"] > 0.95 * total:
+        best = Holds.YES if hits["CS"] == total else Holds.PARTLY
     over_swarm = wilson_interval(hits["CS"], total)[0] > wilson_interval(hits["PSO"], total)[1]
     over_clonal = wilson_interval(hits["CS"], total)[0] > wilson_interval(hits["ClonalG"], total)[1]
-    holds = (
-        "yes"
-        if over_swarm and over_clonal
-        else "partly"
-        if over_swarm
-        else "cannot be told"
-        if hits["CS"] > hits["PSO"]
-        else "no"
-    )
+    holds = Holds.UNDETERMINED if hits["CS"] > hits["PSO"] else Holds.NO
+    if over_swarm:
+        holds = Holds.YES if over_clonal else Holds.PARTLY
     return (
         ClaimVerdict(
             CHAOS_FINDS_OPTIMUM,
@@ -326,10 +323,11 @@ def _objective_verdicts(
         ),
         ClaimVerdict(
             CHAOS_HELPS,
-            f"Optimum found in {share['CS']} of runs by CS, {share['ClonalG']} by ClonalG, {share['PSO']} by PSO; {share['CS, one orbit']} "
-            "by CS on one orbit.",
+            f"CS reaches the optimum in {share['CS']} of runs, ClonalG in {share['ClonalG']}, PSO in "
+            f"{share['PSO']}; CS on one orbit in {share['CS, one orbit']}.",
             holds,
-            "It beats the swarm, but so does plain ClonalG: the operators decide, not the source of numbers."
+            "It beats the swarm, but so does plain ClonalG: the operators decide, not the source of "
+            "numbers."
             if over_swarm and not over_clonal
             else "",
         ),
@@ -351,12 +349,13 @@ def _speed_verdict(
     medians = [np.median(needed[np.isfinite(needed)]) for needed in (chaotic, plain, swarm)]
     return ClaimVerdict(
         CHAOS_HELPS,
-        f"CS needs {medians[0]:.0f} evaluations, ClonalG {medians[1]:.0f}, PSO {medians[2]:.0f} where it arrives (medians). CS needs more "
-        f"than ClonalG in {100 * more:.0f} % of pairs of runs (p = {p:.2g}); {different} of {len(cases)} cases differ.",
-        "yes" if faster else "no",
+        f"CS needs {medians[0]:.0f} evaluations, ClonalG {medians[1]:.0f}, PSO {medians[2]:.0f} in "
+        "successful runs (medians). CS needs more than ClonalG in "
+        f"{100 * more:.0f} % of pairs of runs (p = {p:.2g}); {different} of {len(cases)} cases differ.",
+        Holds.YES if faster else Holds.NO,
         ""
         if faster
-        else "Chaotic and pseudo-random numbers cannot be told apart by the speed of the search.",
+        else "Chaotic and pseudo-random numbers give indistinguishable speed of the search.",
     )
 
 
@@ -421,7 +420,7 @@ def _hit_figure(
 
 def _median_iterations(search: str, runs: ThresholdRuns) -> str:
     hit = runs.needed[np.isfinite(runs.needed)]
-    return f"{np.median(iterations(search, hit)):.0f}" if len(hit) else "never"
+    return f"{np.median(count_iterations(search, hit)):.0f}" if len(hit) else "never"
 
 
 def _milliseconds(of: OtsuObjective, count: int) -> float:

@@ -1,12 +1,11 @@
-"""What every item works with: where results go, which data there is, how much is wanted; and rows
-that are computed once.
+"""Input of every item: output folder, data, size of the run; and rows that are computed once.
 
-Rows are JSON objects. Those of a key are kept below `output/.work/rows`, so that an interrupted run
-goes on where it stopped and items share what is expensive. They are taken up again only under the
-same seed, size of run, data and version of the program.
+Rows are JSON objects. The rows of a key are kept below `output/.work/rows`, so that an interrupted
+run resumes and items share expensive results. They are reused only for the same seed, size of the
+run, data and program version.
 
-Limits: a row that was kept does not know that the code behind it changed within one version:
-`--again` computes it anew.
+Limits: a kept row does not depend on the code that made it: after a change within one version,
+`--again` recomputes it.
 """
 
 import hashlib
@@ -31,9 +30,22 @@ WORK = ".work"
 
 @dataclass(frozen=True)
 class Context:
-    """One run. `output`: the folder of the results. `data`: a folder of public data, or None.
-    `quick`: small images, few repetitions. `seed`: of all random numbers. `monitor`: progress and
-    cancel. `fresh_since`: rows kept before this time (seconds, as of files) are computed anew.
+    """One run.
+
+    Attributes
+    ----------
+    output : Path
+        Output folder.
+    data : Path or None
+        Folder of public data sets.
+    quick : bool
+        Small images, few repetitions.
+    seed : int
+        Seed of all random numbers.
+    monitor : Monitor
+        Progress and cancellation.
+    fresh_since : float
+        Rows kept before this time (file time, seconds) are recomputed.
     """
 
     output: Path
@@ -44,26 +56,54 @@ class Context:
     fresh_since: float = 0.0
 
     def subjects(self, kind: str) -> tuple[Subject, ...]:
-        """The images of a kind: "specular" (significant specularity), "synthetic" (rendered
-        scenes), "diffuse" (without highlights).
+        """Load the images of a kind.
 
-        Raises `InputError` where data are damaged or nothing can be rendered here.
+        Parameters
+        ----------
+        kind : str
+            "specular" (significant specularity), "synthetic" (rendered scenes) or "diffuse"
+            (without highlights).
+
+        Returns
+        -------
+        tuple of Subject
+            The images.
+
+        Raises
+        ------
+        InputError
+            If data are damaged, or rendering is not possible.
         """
         return self._library.subjects(kind, self.monitor)
 
     def photos(self) -> tuple[Subject, ...]:
-        """Photos of real objects without a known truth; without data, rendered stand-ins."""
+        """Load photos of real objects without ground truth; rendered objects if there are none."""
         return self._library.photos(self.monitor)
 
     @property
     def has_photos(self) -> bool:
-        """Whether `photos` are photos, not rendered stand-ins."""
+        """Whether `photos` returns photos, not rendered objects."""
         return bool(self._library.photo_paths)
 
     def rows(self, key: str, compute: Callable[[], Sequence[JsonRow]]) -> list[JsonRow]:
-        """The rows of `key`, computed only if they are not kept.
+        """Return the rows of a key; compute them if they are not kept.
 
-        Raises `Cancelled` before it computes, where the user asked to stop.
+        Parameters
+        ----------
+        key : str
+            Name of the rows, unique within a run.
+        compute : callable
+            Computes the rows.
+
+        Returns
+        -------
+        list of dict
+            One JSON object per row.
+
+        Raises
+        ------
+        Cancelled
+            If the user cancelled before the computation.
         """
         path = self._path(key)
         if (
@@ -80,12 +120,18 @@ class Context:
         return found
 
     def check(self) -> None:
-        """Raises `InputError` where the data folder holds nothing that is known here."""
+        """Check the data folder.
+
+        Raises
+        ------
+        InputError
+            If it holds no known data set.
+        """
         self._library.check()
 
     @property
     def fingerprint(self) -> str:
-        """Changes with whatever decides the results: seed, size of run, data, version."""
+        """Digest of all that determines results: seed, size of the run, data, version."""
         parts = (__version__, self.seed, self.quick, self._library.fingerprint)
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:12]
 
@@ -100,7 +146,7 @@ class Context:
 
 
 def _read(path: Path) -> list[JsonRow] | None:
-    """The rows of a file; None where it is damaged."""
+    """Read the rows of a file; None if it is damaged."""
     try:
         return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
     except ValueError:

@@ -1,8 +1,7 @@
-"""Real runs of the models on subjects, kept as result folders below the output, so that items share
-them and a run resumes.
+"""Decompositions of subjects, kept as result folders below the output and shared by items.
 
-Limits: photos without a known coding count as linear floats; where nothing exceeds 1, values of 1
-are taken for clipped.
+Limits: photos of unknown coding count as linear floats; if no value exceeds 1, values of 1 count as
+clipped.
 """
 
 import numpy as np
@@ -17,7 +16,18 @@ from .context import WORK, Context
 
 
 def subject_as_photo(subject: Subject) -> Photo:
-    """The subject as a photo that a model takes."""
+    """Convert a subject to a photo.
+
+    Parameters
+    ----------
+    subject : Subject
+        The subject.
+
+    Returns
+    -------
+    Photo
+        Input of a decomposition model.
+    """
     bright = subject.image[subject.mask]
     height, width = subject.mask.shape
     clipped = subject.mask & (subject.image.max(axis=2) >= 1) & (float(bright.max()) <= 1)
@@ -34,9 +44,30 @@ def subject_as_photo(subject: Subject) -> Photo:
 def decompose_subject(
     context: Context, subject: Subject, model: str = "mdr", illumination: str | None = None
 ) -> Decomposition:
-    """What a model of `pipeline.MODELS` makes of the subject, pixel by pixel. `illumination`: which
-    lights to expect; None for those of the subject's truth, or natural ones. Raises `InputError`,
-    `Cancelled`.
+    """Decompose a subject at its own resolution, or load the kept result.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+    subject : Subject
+        The subject.
+    model : str
+        One of `pipeline.MODELS`.
+    illumination : str, optional
+        Light prior; by default that of the subject's ground truth, or "natural".
+
+    Returns
+    -------
+    Decomposition
+        The result as saved.
+
+    Raises
+    ------
+    InputError
+        If the model refuses the photo.
+    Cancelled
+        If the user cancels.
     """
     lit = illumination or ("natural" if subject.truth is None else subject.truth.illumination)
     folder = (

@@ -1,15 +1,13 @@
-"""What the frameworks make of subjects whose shape and light are known: run and timed once, kept
-with their maps for tables and figures.
+"""Frameworks on subjects with known shape and light: run and timed once, kept with their maps.
 
-SIRFS-X takes what SIRFS found and separates its reflectance by X (the model mbp); X-SIRFS separates
-first and gives SIRFS the diffuse image (the model mdr). SIRFS-MBP and MDR-SIRFS are these with the
-separator that ISC uses.
+SIRFS-X separates the reflectance of a SIRFS result by X (model mbp); X-SIRFS separates first and
+gives SIRFS the diffuse image (model mdr). SIRFS-MBP and MDR-SIRFS use the separation of ISC.
 
 Citation: H. Akbar, thesis (2016); J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
 
-Limits: the priors were fitted to objects of MIT-Berkeley, and the joint model's network has seen
-them: on these objects all are somewhat better than elsewhere. Seconds are of the machine as it was;
-evaluations of the energy do not depend on it.
+Limits: the priors were fitted to objects of MIT-Berkeley, and the network of the joint model was
+trained on them: all frameworks are somewhat better on these objects than elsewhere. Seconds depend
+on the load of the machine; evaluations of the energy do not.
 """
 
 import time
@@ -40,9 +38,18 @@ _QUICK = 64  # longest side, pixels
 
 @dataclass(frozen=True)
 class Framework:
-    """A framework under the name that the thesis has for it.
+    """A framework under the thesis' name.
 
-    `on_truth`: SIRFS is given the true diffuse image, as a bound.
+    Attributes
+    ----------
+    label : str
+        Name in tables.
+    model : str
+        Decomposition model.
+    separator : str
+        Separation method.
+    on_truth : bool
+        Use the true diffuse image, as a bound.
     """
 
     label: str
@@ -69,9 +76,14 @@ BEFORE = (
 
 @dataclass(frozen=True)
 class FrameworkRun:
-    """One framework on one subject: its answer, and how long it took.
+    """One framework on one subject.
 
-    `answer` is None where the photo was refused.
+    Attributes
+    ----------
+    answer : Estimate or None
+        The result; None if the photo was refused.
+    seconds : float
+        Wall-clock time.
     """
 
     answer: Estimate | None
@@ -80,7 +92,21 @@ class FrameworkRun:
 
 @dataclass(frozen=True)
 class FrameworkErrors:
-    """A run's errors by the names of `METRICS`, its seconds, and the evaluations of the energy."""
+    """Errors of one run.
+
+    Attributes
+    ----------
+    subject : str
+        Kind and name of the subject.
+    framework : str
+        Label of the framework.
+    errors : dict of str to float
+        Errors by the names of `METRICS`.
+    seconds : float
+        Wall-clock time.
+    evaluations : int
+        Evaluations of the energy.
+    """
 
     subject: str
     framework: str
@@ -90,8 +116,19 @@ class FrameworkErrors:
 
 
 def subjects_with_truth(context: Context, kinds: Sequence[str]) -> list[Subject]:
-    """The subjects of some kinds whose shape and light are known; smaller still, if it must be
-    quick.
+    """Load the subjects with known shape and light; a quick run reduces them further.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+    kinds : sequence of str
+        Kinds of subjects, see `Context.subjects`.
+
+    Returns
+    -------
+    list of Subject
+        The subjects.
     """
     found = [
         subject for kind in kinds for subject in context.subjects(kind) if subject.truth is not None
@@ -102,7 +139,22 @@ def subjects_with_truth(context: Context, kinds: Sequence[str]) -> list[Subject]
 def score_frameworks(
     context: Context, subjects: Sequence[Subject], frameworks: Sequence[Framework]
 ) -> list[FrameworkErrors]:
-    """A row for each framework on each subject, without those that a framework refuses."""
+    """Score frameworks on subjects; refused photos are omitted.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+    subjects : sequence of Subject
+        Subjects with ground truth.
+    frameworks : sequence of Framework
+        The frameworks.
+
+    Returns
+    -------
+    list of FrameworkErrors
+        One entry per framework and subject.
+    """
     rows = []
     for subject in subjects:
         assert subject.truth is not None
@@ -124,9 +176,28 @@ def score_frameworks(
 
 
 def run_framework(context: Context, subject: Subject, framework: Framework) -> FrameworkRun:
-    """What a framework answers, kept below the output.
+    """Run a framework on a subject, or load the kept result.
 
-    Raises `InputError` for a subject without a truth; `Cancelled`.
+    Parameters
+    ----------
+    context : Context
+        The run.
+    subject : Subject
+        A subject with ground truth.
+    framework : Framework
+        The framework.
+
+    Returns
+    -------
+    FrameworkRun
+        The result with its time.
+
+    Raises
+    ------
+    InputError
+        If the subject has no ground truth.
+    Cancelled
+        If the user cancels.
     """
     name = f"{subject.kind}-{subject.name}-{framework.label}-{context.fingerprint}.npz".replace(
         " ", "-"
@@ -149,7 +220,7 @@ def _timed(context: Context, subject: Subject, framework: Framework) -> Framewor
     )
     begun = time.perf_counter()
     try:
-        answer = runner(_seen(subject, framework), context.monitor)
+        answer = runner(_input(subject, framework), context.monitor)
     except InputError:
         return FrameworkRun(None, 0.0)
     return FrameworkRun(answer, time.perf_counter() - begun)
@@ -157,9 +228,7 @@ def _timed(context: Context, subject: Subject, framework: Framework) -> Framewor
 
 @cache
 def _warm(model: str, separator: str) -> None:
-    """Runs a framework on a small ball, so that what is compiled or read at the first call is not
-    on the clock of the second.
-    """
+    """Run a framework on a small ball, so that compilation and file reading are not timed."""
     axis = np.linspace(-1.2, 1.2, _WARM)
     distance = np.hypot(axis, axis[:, None])
     mask, height = distance < 1, np.sqrt(np.maximum(0, 1 - distance**2)) * _WARM / 2.4
@@ -172,14 +241,16 @@ def _warm(model: str, separator: str) -> None:
     make_runner(RunnerOptions(model, separator, threads=2), shipped_prior_set())(ball, Monitor())
 
 
-def _seen(subject: Subject, framework: Framework) -> MitBerkeleyObject:
-    """What the framework is given: the photo, or the true diffuse image."""
+def _input(subject: Subject, framework: Framework) -> MitBerkeleyObject:
+    """Return the framework's input: the photo, or the true diffuse image."""
     if subject.truth is None:
-        raise InputError(f"{subject.name} has no known shape: choose a subject that has")
+        raise InputError(f"{subject.name} has no known shape; choose a subject with ground truth")
     if not framework.on_truth:
         return subject.truth
     if subject.diffuse is None:
-        raise InputError(f"{subject.name} has no known diffuse layer: choose a subject that has")
+        raise InputError(
+            f"{subject.name} has no known diffuse layer; choose a subject with known layers"
+        )
     image = subject.diffuse.astype(float)
     return replace(subject.truth, image=image, valid=subject.truth.valid & (image > 0).all(axis=-1))
 

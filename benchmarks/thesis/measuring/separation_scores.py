@@ -1,17 +1,14 @@
-"""What separations make of subjects whose layers are known: run, timed and scored once, for all
-tables and figures that need them.
+"""Separations of subjects with known layers: run, timed and scored once for all items.
 
-Errors are those of `isc_core.evaluation.metrics` and `isc_core.evaluation.image_metrics`, inside the mask, of linear
-values; the peak of PSNR and SSIM is 1. A method that draws random numbers is run with several
-seeds, the others once.
+Errors are those of `isc_core.evaluation`, inside the mask, of linear values; the peak of PSNR and
+SSIM is 1. A method with random numbers runs with several seeds, others once.
 
 Citation: LMSE: R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman (2009),
 doi:10.1109/ICCV.2009.5459428; SSIM: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli (2004),
 doi:10.1109/TIP.2003.819861.
 
-Limits: of a subject without highlights no ratio to doing nothing exists, since doing nothing is
-right; its error is given as such. Seconds are of the machine as it was: compare those of one run of
-a table only.
+Limits: for a subject without highlights, doing nothing is right and no ratio to it exists; its
+error is given as it is. Seconds depend on the load of the machine: compare those of one table only.
 """
 
 import math
@@ -36,9 +33,18 @@ SEGMENTATION = "chaotic_segmentation"
 
 @dataclass(frozen=True)
 class SeparatorSetting:
-    """A separation under the name that the thesis has for it:
+    """A separation method with its options, under the thesis' name.
 
-    `label`; `method`, `variant` and the options that differ from it.
+    Attributes
+    ----------
+    label : str
+        Name in tables.
+    method : str
+        Name of the method in `isc_core.separation`.
+    variant : str
+        Named set of options.
+    changes : tuple of (str, object)
+        Options that differ from the variant.
     """
 
     label: str
@@ -48,13 +54,13 @@ class SeparatorSetting:
 
     @property
     def key(self) -> str:
-        """A name that differs from that of every other way."""
+        """Name that differs from that of every other setting."""
         return "-".join(
             [self.method, self.variant, *(f"{name}={value}" for name, value in self.changes)]
         )
 
     def options(self, seed: int) -> dict[str, object]:
-        """The options by name; the seed goes to the method that draws random numbers."""
+        """Return the options by name; the seed is added for the method with random numbers."""
         return dict(self.changes) | ({"seed": seed} if self.method == SEGMENTATION else {})
 
 
@@ -63,16 +69,36 @@ NOTHING = SeparatorSetting("doing nothing", "none")
 
 @dataclass(frozen=True)
 class SeparationScores:
-    """One run of a way on one subject; None: not defined, or not measured.
+    """Scores of one run of a setting on one subject; None where not defined or not measured.
 
-    `mse`, `lmse`, `ssim` of the diffuse layer; `specular_*` of the specular one. `removed`: RMS of
-    what was taken off over the photo's RMS. `seconds` of the whole; `search`: processor seconds of
-    finding the highlights' mask by thresholds; `exact`: whether those are the pixels that the exact
-    search marks; `megapixels` inside the mask; `refused`: why there is no answer.
+    Attributes
+    ----------
+    subject : str
+        Name of the subject.
+    setting : str
+        Label of the setting.
+    run : int
+        Number of the run, from 0.
+    megapixels : float
+        Pixels inside the mask / 1e6.
+    mse, lmse, ssim : float or None
+        Scores of the diffuse layer.
+    specular_mse, specular_lmse, specular_ssim : float or None
+        Scores of the specular layer.
+    removed : float or None
+        RMS of the light removed / RMS of the photo.
+    seconds : float or None
+        Wall-clock time of the separation.
+    search : float or None
+        Processor time of the threshold search, seconds.
+    exact : bool or None
+        Whether the search marks the pixels of the exact search.
+    refused : str
+        Reason if the method gives no result.
     """
 
     subject: str
-    way: str
+    setting: str
     run: int
     megapixels: float
     mse: float | None = None
@@ -89,27 +115,81 @@ class SeparationScores:
 
 
 def score_separations(
-    context: Context, subject: Subject, way: SeparatorSetting, runs: int = 1
+    context: Context, subject: Subject, setting: SeparatorSetting, runs: int = 1
 ) -> list[SeparationScores]:
-    """The scores of `runs` runs, seeds counting on from the context's. Kept, see `Context.rows`."""
-    key = f"separation-{subject.kind}-{subject.name}-{way.key}-{runs}"
+    """Score repeated runs of a setting on a subject, or load the kept scores.
+
+    Parameters
+    ----------
+    context : Context
+        The run; seeds count up from its seed.
+    subject : Subject
+        A subject with known layers.
+    setting : SeparatorSetting
+        The method and its options.
+    runs : int
+        Number of runs.
+
+    Returns
+    -------
+    list of SeparationScores
+        One entry per run.
+    """
+    key = f"separation-{subject.kind}-{subject.name}-{setting.key}-{runs}"
     rows: list[dict[str, Any]] = context.rows(
-        key, lambda: [asdict(_run(context, subject, way, run)) for run in range(runs)]
+        key, lambda: [asdict(_run(context, subject, setting, run)) for run in range(runs)]
     )
     return [SeparationScores(**row) for row in rows]
 
 
-def separate_subject(subject: Subject, way: SeparatorSetting, seed: int) -> Separation:
-    """The layers that a way finds. Raises `InputError` where the method refuses the photo."""
+def separate_subject(subject: Subject, setting: SeparatorSetting, seed: int) -> Separation:
+    """Separate a subject into layers.
+
+    Parameters
+    ----------
+    subject : Subject
+        The subject.
+    setting : SeparatorSetting
+        The method and its options.
+    seed : int
+        Random seed.
+
+    Returns
+    -------
+    Separation
+        The layers.
+
+    Raises
+    ------
+    InputError
+        If the method refuses the photo.
+    """
     return separate(
-        way.method, subject.image, subject.mask, variant=way.variant, changes=way.options(seed)
+        setting.method,
+        subject.image,
+        subject.mask,
+        variant=setting.variant,
+        changes=setting.options(seed),
     )
 
 
 def true_layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
-    """The true diffuse and specular layer; of a subject without highlights the photo and nothing.
+    """Return the true layers of a subject.
 
-    Raises `InputError` for a subject whose layers nobody knows.
+    Parameters
+    ----------
+    subject : Subject
+        A subject with a known diffuse layer, or without highlights.
+
+    Returns
+    -------
+    diffuse, specular : (H, W, 3) ndarray
+        The layers.
+
+    Raises
+    ------
+    InputError
+        If the layers are unknown.
     """
     if subject.diffuse is not None:
         specular = (
@@ -121,27 +201,56 @@ def true_layers(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
     if subject.kind == "diffuse":
         return subject.image, np.zeros_like(subject.image)
     raise InputError(
-        f"{subject.name} has no true diffuse layer: choose a subject whose layers are known"
+        f"{subject.name} has no known diffuse layer; choose a subject with known layers"
     )
 
 
-def segment_highlights(subject: Subject, way: SeparatorSetting, seed: int) -> np.ndarray:
-    """The pixels (H, W) bool that a segmentation takes for specular."""
+def segment_highlights(subject: Subject, setting: SeparatorSetting, seed: int) -> np.ndarray:
+    """Mark the pixels that a segmentation takes for specular.
+
+    Parameters
+    ----------
+    subject : Subject
+        The subject.
+    setting : SeparatorSetting
+        A setting of Chaotic Segmentation.
+    seed : int
+        Random seed.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Boolean.
+    """
     peak = max(float(subject.image[subject.mask].max()), 1e-30)
-    options = method_options(way.method, way.variant, way.options(seed))
+    options = method_options(setting.method, setting.variant, setting.options(seed))
     if not isinstance(options, ChaoticSegmentationOptions):
-        raise TypeError(f"{way.label} is no segmentation")
+        raise TypeError(f"{setting.label} is not a segmentation")
     return find_specular((subject.image / peak).astype(np.float32), subject.mask, options)
 
 
-def layer_errors(subject: Subject, found: Separation) -> dict[str, Any]:
-    """The errors of an answer, by the names of `Scores`."""
+def layer_errors(subject: Subject, separation: Separation) -> dict[str, Any]:
+    """Compute the errors of a separation.
+
+    Parameters
+    ----------
+    subject : Subject
+        A subject with known layers.
+    separation : Separation
+        The result.
+
+    Returns
+    -------
+    dict of str to float or None
+        Fields of `SeparationScores`.
+    """
     mask, inside = subject.mask, subject.mask[..., None]
     diffuse, specular = (
         np.where(inside, layer, 0).astype(np.float64) for layer in true_layers(subject)
     )
     answer, light = (
-        np.where(inside, layer, 0).astype(np.float64) for layer in (found.diffuse, found.specular)
+        np.where(inside, layer, 0).astype(np.float64)
+        for layer in (separation.diffuse, separation.specular)
     )
     photo = np.where(inside, subject.image, 0).astype(np.float64)
     glossy = bool((specular[mask] > 0).any(axis=0).all())
@@ -158,33 +267,37 @@ def layer_errors(subject: Subject, found: Separation) -> dict[str, Any]:
     }
 
 
-def _run(context: Context, subject: Subject, way: SeparatorSetting, run: int) -> SeparationScores:
-    context.monitor.report(f"{way.label} on {subject.name}, run {run + 1}", 0.0)
-    known = SeparationScores(subject.name, way.label, run, float(subject.mask.sum()) / 1e6)
+def _run(
+    context: Context, subject: Subject, setting: SeparatorSetting, run: int
+) -> SeparationScores:
+    context.monitor.report(f"{setting.label} on {subject.name}, run {run + 1}", 0.0)
+    known = SeparationScores(subject.name, setting.label, run, float(subject.mask.sum()) / 1e6)
     try:
-        if run == 0:  # what is compiled or imported at the first call shall not count
-            separate_subject(subject, way, context.seed)
+        if run == 0:  # warm-up: compilation and imports do not count
+            separate_subject(subject, setting, context.seed)
         start = time.perf_counter()
-        found = separate_subject(subject, way, context.seed + run)
+        found = separate_subject(subject, setting, context.seed + run)
         seconds = time.perf_counter() - start
     except InputError as error:
         return replace(known, refused=str(error))
-    searched = _searched(subject, way, context.seed + run) if way.method == SEGMENTATION else {}
+    searched = (
+        _searched(subject, setting, context.seed + run) if setting.method == SEGMENTATION else {}
+    )
     return replace(known, **layer_errors(subject, found), **searched, seconds=round(seconds, 5))
 
 
-def _searched(subject: Subject, way: SeparatorSetting, seed: int) -> dict[str, Any]:
-    """How long the search for thresholds takes, and whether it ends where the exact one does.
+def _searched(subject: Subject, setting: SeparatorSetting, seed: int) -> dict[str, Any]:
+    """Time the threshold search and compare its pixels with those of the exact search.
 
-    The least processor time of three runs: a search runs on one thread, so that what else the
-    machine does hardly counts.
+    The least processor time of three runs: a search uses one thread, so that other load hardly
+    counts.
     """
     times = []
     for _ in range(3):
         start = time.process_time()
-        marked = segment_highlights(subject, way, seed)
+        marked = segment_highlights(subject, setting, seed)
         times.append(time.process_time() - start)
     best = segment_highlights(
-        subject, replace(way, changes=(*way.changes, ("optimiser", "exact"))), seed
+        subject, replace(setting, changes=(*setting.changes, ("optimiser", "exact"))), seed
     )
     return {"search": round(min(times), 6), "exact": bool((marked == best).all())}

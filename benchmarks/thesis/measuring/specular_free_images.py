@@ -1,15 +1,14 @@
-"""The specular-free images that the code has, and how much of a highlight is left in each: measured
-where the diffuse layer is known.
+"""Specular-free images of the code, and the share of a highlight that remains in each.
 
 Equation: with P(I) an image made of the photo I and P(D) the same made of its diffuse layer,
 
-    left = sum |P(I) - P(D) - m| / sum |I - D|   over the mask and the channels,
+    residual = sum |P(I) - P(D) - m| / sum |I - D|   over the mask and the channels,
 
-m being the median of P(I) - P(D), since an image that is brighter everywhere shows no highlight:
-0 where highlights do not reach it at all, 1 where all of their light is in it.
+where m is the median of P(I) - P(D), since an offset common to all pixels shows no highlight: 0 if
+the image contains no specular light, 1 if it contains all of it.
 
-Limits: of images that have a unit of their own (chromaticities, angles) no such share exists; they
-are not listed.
+Limits: images with a unit of their own (chromaticities, angles) have no such share and are not
+listed.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,8 +26,22 @@ Images = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class SpecularFreeImage:
-    """A kind of them. `formula`: in words of mathematics; `citation`: with DOI; `function`: where
-    it is; `methods`: which separations compare with it; `make(image, mask)`: (H, W, 3).
+    """A kind of specular-free image.
+
+    Attributes
+    ----------
+    name : str
+        Name in tables.
+    formula : str
+        Its formula.
+    citation : str
+        Source with DOI.
+    function : str
+        Full name of the function.
+    methods : str
+        Separation methods that use it.
+    make : callable
+        `make(image, mask)` returns the image, (H, W, 3).
     """
 
     name: str
@@ -44,13 +57,13 @@ def _dark(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
     return np.repeat(dark[..., None], 3, axis=2)
 
 
-_HOME = "isc_core.separation.support.specular_free"
+_MODULE = "isc_core.separation.support.specular_free"
 KINDS = (
     SpecularFreeImage(
         "fixed chromaticity (SF1)",
         "I − w, w = (max I − c ΣI) / (1 − 3c), c = .6",
         "Tan & Ikeuchi 2005, doi:10.1109/TPAMI.2005.36",
-        f"{_HOME}.fixed_chromaticity",
+        f"{_MODULE}.fixed_chromaticity",
         "tan_2005, sparse_coding",
         lambda image, mask: specular_free.fixed_chromaticity(image),
     ),
@@ -58,7 +71,7 @@ KINDS = (
         "two-band (SF2)",
         "I − min I",
         "Yoon, Choi & Kweon 2006, doi:10.1109/ICIP.2006.312650",
-        f"{_HOME}.two_band",
+        f"{_MODULE}.two_band",
         "yoon_2006, sparse_coding, chaotic_segmentation",
         lambda image, mask: specular_free.two_band(image),
     ),
@@ -66,7 +79,7 @@ KINDS = (
         "lifted two-band",
         "I − min I + u, u = mean of min I",
         "Shen & Zheng 2013, doi:10.1364/AO.52.004483",
-        f"{_HOME}.lifted_two_band",
+        f"{_MODULE}.lifted_two_band",
         "shen_2013",
         specular_free.lifted_two_band,
     ),
@@ -74,7 +87,7 @@ KINDS = (
         "modified",
         "I − max(min I − T, 0), T = mean + ½ deviation of min I",
         "Shen & Cai 2009, doi:10.1364/AO.48.002711",
-        f"{_HOME}.modified",
+        f"{_MODULE}.modified",
         "shen_2009",
         specular_free.modified,
     ),
@@ -82,7 +95,7 @@ KINDS = (
         "less the dark channel",
         "I − min of all channels in 7 × 7 pixels",
         "Kim, Jin, Hadap & Kweon 2013, doi:10.1109/CVPR.2013.192",
-        f"{_HOME}.less_dark_channel",
+        f"{_MODULE}.less_dark_channel",
         "kim_2013",
         specular_free.less_dark_channel,
     ),
@@ -92,16 +105,26 @@ DARK = SpecularFreeImage(
     "dark channel",
     "min of all channels in 7 × 7 pixels",
     KINDS[-1].citation,
-    f"{_HOME}.dark_channel",
+    f"{_MODULE}.dark_channel",
     "kim_2013",
     _dark,
 )
 
 
 def residual_highlight(kind: SpecularFreeImage, subject: Subject) -> float:
-    """The share of the highlights' light that is left in the image.
+    """Compute the share of the specular light that remains in an image.
 
-    `subject` has a diffuse layer, and highlights.
+    Parameters
+    ----------
+    kind : SpecularFreeImage
+        The image.
+    subject : Subject
+        A subject with a known diffuse layer and highlights.
+
+    Returns
+    -------
+    float
+        Share, 0 for a specular-free image.
     """
     assert subject.diffuse is not None
     made, bare = (
@@ -114,7 +137,7 @@ def residual_highlight(kind: SpecularFreeImage, subject: Subject) -> float:
 
 
 def subjects_with_highlights(subjects: Sequence[Subject]) -> list[Subject]:
-    """Those whose diffuse layer is known and differs from the image."""
+    """Select the subjects whose known diffuse layer differs from the image."""
     return [
         one
         for one in subjects
@@ -123,5 +146,5 @@ def subjects_with_highlights(subjects: Sequence[Subject]) -> list[Subject]:
 
 
 def subject_title(subject: Subject) -> str:
-    """Its name and kind: kinds share objects."""
+    """Return name and kind; kinds share objects."""
     return f"{subject.name} ({subject.kind})"

@@ -1,8 +1,7 @@
-"""Repeated searches for the thresholds of nine images: what tables 4.1 to 4.4 and figures 4.1 to
-4.9 have in common.
+"""Repeated threshold searches on nine images, shared by tables 4.1 to 4.4 and figures 4.1 to 4.9.
 
-Problem: 50 runs of each optimiser on nine images with 3, 4 and 5 thresholds, each run from another
-seed, with one budget of evaluations.
+Problem: 50 runs of each optimiser on nine images with 3, 4 and 5 thresholds, each run with another
+seed, all with the same budget of evaluations.
 
 Equation: a share of k of n runs has the 95 % interval of Wilson, (p + z^2 / 2n ± z sqrt(p (1 - p) /
 n + z^2 / 4n^2)) / (1 + z^2 / n); two samples of runs are compared by the rank-sum test, several
@@ -13,7 +12,7 @@ doi:10.1214/aoms/1177730491; S. Holm, "A simple sequentially rejective multiple 
 Scandinavian Journal of Statistics 6(2), 65-70 (1979).
 
 Limits: the images are scikit-image's: the thesis' own nine are not freely packaged. A run that
-misses the optimum counts as one that would need more evaluations than any other.
+misses the optimum counts as one that needs more evaluations than any other.
 """
 
 import time
@@ -45,8 +44,16 @@ _SURE = 1.959964  # standard deviations, of 95 %
 
 @dataclass(frozen=True)
 class ThresholdRuns:
-    """The n runs of one optimiser on one image. `values` (n,): the objective found. `needed` (n,):
-    evaluations until the optimum, infinite where it was missed. `thresholds` (n, K).
+    """The n runs of one optimiser on one image.
+
+    Attributes
+    ----------
+    values : (n,) ndarray
+        Objective reached.
+    needed : (n,) ndarray
+        Evaluations until the optimum; infinite if missed.
+    thresholds : (n, K) ndarray
+        Thresholds.
     """
 
     values: np.ndarray
@@ -55,23 +62,45 @@ class ThresholdRuns:
 
     @property
     def hits(self) -> int:
-        """How many runs found the optimum."""
+        """Number of runs that reach the optimum."""
         return int(np.isfinite(self.needed).sum())
 
 
 def image_names(context: Context) -> tuple[str, ...]:
-    """The names of the images that are looked at."""
+    """Return the names of the images; three in a quick run."""
     return IMAGES[:_QUICK_IMAGES] if context.quick else IMAGES
 
 
 @cache
 def image_objective(image: str) -> OtsuObjective:
-    """Otsu's objective of one of the images."""
+    """Return Otsu's objective of an image."""
     return OtsuObjective.of(levels(image))
 
 
 def threshold_runs(context: Context, search: str, image: str, count: int) -> ThresholdRuns:
-    """The runs of one of `SEARCHES`, computed once. Raises `Cancelled`."""
+    """Run a search repeatedly on one image, or load the kept runs.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+    search : str
+        One of `SEARCHES`.
+    image : str
+        Name of the image.
+    count : int
+        Number of thresholds.
+
+    Returns
+    -------
+    ThresholdRuns
+        All runs.
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
+    """
     rows = context.rows(
         f"thresholds {search} {image} {count}", lambda: _searched(context, search, image, count)
     )
@@ -83,8 +112,28 @@ def threshold_runs(context: Context, search: str, image: str, count: int) -> Thr
 
 
 def search_times(context: Context, search: str, image: str, count: int) -> np.ndarray:
-    """(n,) milliseconds of whole runs, on the processor's clock, which other programs do not slow
-    down. Raises `Cancelled`.
+    """Time repeated runs of a search by the processor clock, which other load does not affect.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+    search : str
+        One of `SEARCHES`.
+    image : str
+        Name of the image.
+    count : int
+        Number of thresholds.
+
+    Returns
+    -------
+    (n,) ndarray
+        Milliseconds per run.
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
     """
 
     def timed() -> list[JsonRow]:
@@ -109,9 +158,24 @@ def search_times(context: Context, search: str, image: str, count: int) -> np.nd
 def run_searches(
     context: Context, searches: Sequence[str]
 ) -> dict[tuple[str, str, int], ThresholdRuns]:
-    """The runs of several searches on all images, by search, image and number of thresholds.
+    """Run several searches on all images.
 
-    Raises `Cancelled`.
+    Parameters
+    ----------
+    context : Context
+        The run.
+    searches : sequence of str
+        Of `SEARCHES`.
+
+    Returns
+    -------
+    dict of (str, str, int) to ThresholdRuns
+        Runs by search, image and number of thresholds.
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
     """
     cases = [
         (search, image, count)
@@ -127,7 +191,20 @@ def run_searches(
 
 
 def count_iterations(search: str, evaluations: np.ndarray) -> np.ndarray:
-    """Generations of a search, or steps of the swarm, in which so many evaluations (n,) lie."""
+    """Convert evaluations to generations of a search, or steps of the swarm.
+
+    Parameters
+    ----------
+    search : str
+        One of `SEARCHES`.
+    evaluations : (n,) ndarray
+        Numbers of evaluations.
+
+    Returns
+    -------
+    (n,) ndarray
+        Numbers of iterations.
+    """
     if search == "PSO":
         first = each = particle_swarm.SwarmOptions().particles
     else:
@@ -140,7 +217,18 @@ def count_iterations(search: str, evaluations: np.ndarray) -> np.ndarray:
 
 
 def wilson_interval(hits: int, total: int) -> tuple[float, float]:
-    """The 95 % interval of a share, by Wilson."""
+    """Compute the 95 % interval of a share, by Wilson.
+
+    Parameters
+    ----------
+    hits, total : int
+        Successes and trials.
+
+    Returns
+    -------
+    low, high : float
+        The interval, within [0, 1].
+    """
     share, square = hits / total, _SURE**2
     middle = (share + square / (2 * total)) / (1 + square / total)
     half = (
@@ -152,8 +240,19 @@ def wilson_interval(hits: int, total: int) -> tuple[float, float]:
 
 
 def rank_sum_test(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
-    """In which share of pairs the first sample (n,) is larger than the second (m,), ties counting
-    half; and p that they are alike.
+    """Compare two samples by the rank-sum test.
+
+    Parameters
+    ----------
+    first, second : (n,), (m,) ndarray
+        The samples; infinite values count as larger than any other.
+
+    Returns
+    -------
+    share : float
+        Share of pairs in which the first is larger, ties counting half.
+    p : float
+        Two-sided p value.
     """
     top = 2 * max(
         1.0, *(float(values[np.isfinite(values)].max(initial=0.0)) for values in (first, second))
@@ -166,7 +265,18 @@ def rank_sum_test(first: np.ndarray, second: np.ndarray) -> tuple[float, float]:
 
 
 def holm_correction(p_values: Sequence[float]) -> np.ndarray:
-    """The p values (n,) corrected for their number."""
+    """Correct p values for their number, by Holm.
+
+    Parameters
+    ----------
+    p_values : sequence of float
+        p values.
+
+    Returns
+    -------
+    (n,) ndarray
+        Corrected p values.
+    """
     order = np.argsort(p_values)
     scaled = np.asarray(p_values, float)[order] * np.arange(len(order), 0, -1)
     corrected = np.empty(len(order))
@@ -175,7 +285,7 @@ def holm_correction(p_values: Sequence[float]) -> np.ndarray:
 
 
 def _searched(context: Context, search: str, image: str, count: int) -> list[JsonRow]:
-    """A row for each run."""
+    """Run a search repeatedly; one row per run."""
     best = exact(image_objective(image), count).value
     rows: list[JsonRow] = []
     for run in range(_QUICK_RUNS if context.quick else _RUNS):

@@ -1,12 +1,12 @@
-"""How two methods compare over the same subjects, in a table's cell and in a verdict.
+"""Comparison of two methods over the same subjects, for table cells and verdicts.
 
 Equation: the ratio of geometric means, exp(mean_k log a_k / b_k), with the percentile interval of
-resampled subjects k; for runs that are repeated on one subject, the two-sided rank-sum test.
+resampled subjects k; for repeated runs on one subject, the two-sided rank-sum test.
 
 Citation: B. Efron (1979), doi:10.1214/aos/1176344552; H. B. Mann, D. R. Whitney (1947),
 doi:10.1214/aoms/1177730491.
 
-Limits: below two subjects there is no interval; with few, it is too narrow.
+Limits: fewer than two subjects give no interval; few subjects give one that is too narrow.
 """
 
 import math
@@ -16,13 +16,23 @@ from scipy.stats import mannwhitneyu
 
 from isc_core.evaluation.evaluate import Ratio, paired_bootstrap
 
-from .item import ClaimVerdict
+from .item import ClaimVerdict, Holds
 
 
 def paired_ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: int) -> Ratio | None:
-    """Ours over theirs, over the subjects that both have with errors above 0;
+    """Compute the ratio of geometric means over common subjects.
 
-    None for fewer than two.
+    Parameters
+    ----------
+    ours, theirs : mapping of str to float
+        Errors by subject; subjects with an error of 0 are skipped.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    Ratio or None
+        Ratio with its 95 % interval; None for fewer than two subjects.
     """
     both = [name for name, value in ours.items() if value > 0 and theirs.get(name, 0) > 0]
     if len(both) < 2:
@@ -32,55 +42,69 @@ def paired_ratio(ours: Mapping[str, float], theirs: Mapping[str, float], seed: i
     )
 
 
-def format_ratio(found: Ratio | None) -> str:
-    """A cell: the ratio and its interval."""
-    return (
-        "-"
-        if found is None
-        else f"{_brief(found.ratio)} ({_brief(found.low)} to {_brief(found.high)})"
-    )
+def format_ratio(ratio: Ratio | None) -> str:
+    """Format a ratio and its interval for a table cell; a dash for None."""
+    if ratio is None:
+        return "-"
+    return f"{_brief(ratio.ratio)} ({_brief(ratio.low)} to {_brief(ratio.high)})"
 
 
 def _brief(value: float) -> str:
-    """With three decimals, from a hundred on without any."""
+    """Format with three decimals, from 100 on without any."""
     return f"{value:.3f}" if value < 100 else f"{value:,.0f}"
 
 
 def rank_sum_p(ours: Sequence[float], theirs: Sequence[float]) -> float | None:
-    """The probability of a difference like this between repeated runs by chance;
+    """Compute the two-sided p value of the rank-sum test.
 
-    None for fewer than three runs.
+    Parameters
+    ----------
+    ours, theirs : sequence of float
+        Results of repeated runs.
+
+    Returns
+    -------
+    float or None
+        p value; None for fewer than three runs.
     """
     if min(len(ours), len(theirs)) < 3:
         return None
     return 1.0 if len({*ours, *theirs}) == 1 else float(mannwhitneyu(ours, theirs).pvalue)
 
 
-def judge_reduction(claim: str, claimed: float, found: Ratio | None, what: str) -> ClaimVerdict:
-    """Whether an error is lower by `claimed`, a share of 1: yes, if by that much or more and
-    surely; partly, if lower and surely; no, if the interval holds no difference but not the claim.
-    Where it holds both, nobody can tell.
+def judge_reduction(claim: str, claimed: float, ratio: Ratio | None, what: str) -> ClaimVerdict:
+    """Judge whether an error is reduced as claimed.
+
+    Parameters
+    ----------
+    claim : str
+        The claim.
+    claimed : float
+        Claimed reduction, a share of 1.
+    ratio : Ratio or None
+        Measured ratio of the errors.
+    what : str
+        Name of the error in the verdict.
+
+    Returns
+    -------
+    ClaimVerdict
+        YES if the error is lower by the claimed share and the interval excludes 1; PARTLY if lower
+        by less; NO if the interval includes 1 but not the claim; UNDETERMINED if it includes both.
     """
-    if found is None:
-        return ClaimVerdict(claim, "-", "cannot be told", "fewer than two subjects with an error")
-    change = f"{100 * abs(1 - found.ratio):.1f} % {'lower' if found.ratio <= 1 else 'higher'}"
-    here = f"{what} {change}: ratio {in_words(found)}"
-    if found.high >= 1 and found.low <= 1 - claimed:
-        return ClaimVerdict(
-            claim,
-            here,
-            "cannot be told",
-            "too few subjects: the interval holds the claim, and no difference as well",
-        )
-    if found.high >= 1:
-        return ClaimVerdict(
-            claim,
-            here,
-            "no",
-            "the interval holds no difference, and not the claim"
-            if found.low < 1
-            else "not lower at all",
-        )
-    if 1 - found.ratio >= claimed:
-        return ClaimVerdict(claim, here, "yes")
-    return ClaimVerdict(claim, here, "partly", "lower, by less than is claimed")
+    if ratio is None:
+        reason = "fewer than two subjects with an error"
+        return ClaimVerdict(claim, "-", Holds.UNDETERMINED, reason)
+    change = f"{100 * abs(1 - ratio.ratio):.1f} % {'lower' if ratio.ratio <= 1 else 'higher'}"
+    here = f"{what} {change}: ratio {format_ratio(ratio)}"
+    if ratio.high >= 1 and ratio.low <= 1 - claimed:
+        reason = "too few subjects: the interval includes both the claim and no change"
+        return ClaimVerdict(claim, here, Holds.UNDETERMINED, reason)
+    if ratio.high >= 1 > ratio.low:
+        reason = "the interval includes no change and excludes the claim"
+        return ClaimVerdict(claim, here, Holds.NO, reason)
+    if ratio.high >= 1:
+        return ClaimVerdict(claim, here, Holds.NO, "not lower at all")
+    if 1 - ratio.ratio >= claimed:
+        return ClaimVerdict(claim, here, Holds.YES)
+    return ClaimVerdict(claim, here, Holds.PARTLY, "lower, but by less than claimed")

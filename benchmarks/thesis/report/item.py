@@ -1,12 +1,13 @@
-"""What a table or figure of the thesis is here: its number, and the function that makes it again.
+"""An item of the thesis (a table or a figure) and the content made for it.
 
-Limits: nothing here draws or computes; `registry` lists the items, `written` puts them into files.
+Limits: nothing here draws or computes; `registry` lists the items, `files` writes them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -14,14 +15,31 @@ if TYPE_CHECKING:
 
     from ..measuring.context import Context
 
-HOLDS = ("yes", "partly", "no", "cannot be told")
 Cell = str | int | float
+
+
+class Holds(StrEnum):
+    """Whether a claim of the thesis holds on the data used here."""
+
+    YES = "yes"
+    PARTLY = "partly"
+    NO = "no"
+    UNDETERMINED = "undetermined"
 
 
 @dataclass(frozen=True)
 class ItemTable:
-    """One table. `header`: column names. `rows`: as many cells each; numbers are shown with four
-    digits in Markdown and in full in the CSV file. `caption`: one line.
+    """One table.
+
+    Attributes
+    ----------
+    header : tuple of str
+        Column names.
+    rows : tuple of tuple of Cell
+        Rows of the header's length. Numbers are shown with four digits in Markdown and in full in
+        the CSV file.
+    caption : str
+        One line.
     """
 
     header: tuple[str, ...]
@@ -37,26 +55,40 @@ class ItemTable:
 
 @dataclass(frozen=True)
 class ClaimVerdict:
-    """A claim of the thesis beside what was measured.
+    """A claim of the thesis and the corresponding measurement.
 
-    `claim`: what the thesis says, with its figure (see `claims`). `here`: what was measured.
-    `holds`: of `HOLDS`. `why`: one line.
+    Attributes
+    ----------
+    claim : str
+        The claim with its figure, see `claims`.
+    here : str
+        The measurement.
+    holds : Holds
+        Whether the claim holds.
+    why : str
+        Reason, one line; may be empty.
     """
 
     claim: str
     here: str
-    holds: str
+    holds: Holds
     why: str = ""
-
-    def __post_init__(self) -> None:
-        if self.holds not in HOLDS:
-            raise ValueError(f"a claim holds {' or '.join(HOLDS)}, not {self.holds!r}")
 
 
 @dataclass(frozen=True)
 class ItemContent:
-    """What an item is made of: tables, figures (written and closed by `written`), `text` in
-    Markdown (what one sees), and verdicts.
+    """Content of an item.
+
+    Attributes
+    ----------
+    tables : tuple of ItemTable
+        Tables, the main one first.
+    figures : tuple of Figure
+        Figures; `files.write_item` saves them.
+    text : str
+        Explanation in Markdown.
+    verdicts : tuple of ClaimVerdict
+        Verdicts on claims of the abstract.
     """
 
     tables: tuple[ItemTable, ...] = ()
@@ -67,8 +99,20 @@ class ItemContent:
 
 @dataclass(frozen=True)
 class ThesisItem:
-    """A table or figure of the thesis. `kind`: "table" or "figure". `number`: as "4.5". `title`: in
-    our words. `make`: computes it; None where it cannot be regenerated, which `reason` explains.
+    """A table or figure of the thesis.
+
+    Attributes
+    ----------
+    kind : str
+        "table" or "figure".
+    number : str
+        As in "4.5".
+    title : str
+        Title in this project's words.
+    make : callable or None
+        Computes the content; None if the item cannot be regenerated.
+    reason : str
+        Why the item cannot be regenerated.
     """
 
     kind: str
@@ -79,10 +123,15 @@ class ThesisItem:
 
     @property
     def name(self) -> str:
-        """What its files are called: "table-4.5"."""
+        """Stem of its files, as in "table-4.5"."""
         return f"{self.kind}-{self.number}"
 
     @property
+    def chapter(self) -> int:
+        """Chapter of the thesis."""
+        return int(self.number.partition(".")[0])
+
+    @property
     def order(self) -> tuple[int, ...]:
-        """Sorts items as the thesis lists them: tables first, then by chapter and number."""
+        """Sort key: tables first, then chapter and number."""
         return (self.kind != "table", *(int(part) for part in self.number.split(".")))

@@ -63,8 +63,7 @@ def score_settings(
     }
     for setting in settings:
         scores[setting.label] = {
-            subject.name: score_separations(context, subject, setting, runs)
-            for subject in subjects
+            subject.name: score_separations(context, subject, setting, runs) for subject in subjects
         }
     return scores
 
@@ -271,7 +270,10 @@ def speed_table(
     rows = []
     for label, subjects in runs.items():
         rates = [
-            run.megapixels / run.seconds for each in subjects.values() for run in each if run.seconds
+            run.megapixels / run.seconds
+            for each in subjects.values()
+            for run in each
+            if run.seconds
         ]
         times = [
             format_cell(times_thousand(geometric_or_none(mean_scores(subjects, name).values())))

@@ -15,16 +15,17 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
+from benchmarks.thesis.report.written import index_page, is_complete, read_record, write_item
+
 from benchmarks.thesis.drawing.style import figure
 from benchmarks.thesis.making import item_states, make_items
 from benchmarks.thesis.measuring.context import WORK, Context
 from benchmarks.thesis.registry import all_items, find_item
 from benchmarks.thesis.report.claims import ABSTRACT, MDR_HEIGHT
 from benchmarks.thesis.report.item import ClaimVerdict, ItemContent, ItemTable, ThesisItem
-from benchmarks.thesis.report.written import index_page, is_complete, read_record, write_item
 from isc_core.cli.main import main as isc
 from isc_core.errors import Cancelled, InputError
-from isc_core.progress import Monitor
+from isc_core.progress import Monitor, ProgressEvent
 from tests.core.command_line import ROOT, isc_command, run_isc
 
 TABLE = ItemTable(
@@ -196,7 +197,7 @@ def test_a_cancelled_run_leaves_whole_items_and_goes_on_there(tmp_path: Path) ->
 
 
 def test_progress_names_the_item_and_only_grows(tmp_path: Path) -> None:
-    heard: list[tuple[str, float]] = []
+    heard: list[ProgressEvent] = []
 
     def make(context: Context) -> ItemContent:
         for step in range(4):
@@ -205,12 +206,12 @@ def test_progress_names_the_item_and_only_grows(tmp_path: Path) -> None:
 
     make_items(
         [item("9.1", make), item("9.2", make)],
-        Context(tmp_path, monitor=Monitor(lambda *said: heard.append(said))),
+        Context(tmp_path, monitor=Monitor(heard.append)),
     )
-    shares = [fraction for _, fraction in heard]
+    shares = [event.fraction for event in heard]
     assert shares == sorted(shares) and shares[0] >= 0 and shares[-1] <= 1
-    assert heard[0][0] == "table 9.1 (1 of 2)" and re.fullmatch(
-        r"table 9\.2 \(2 of 2\): step, \d+ s left", heard[-1][0]
+    assert heard[0].stage == "table 9.1 (1 of 2)" and re.fullmatch(
+        r"table 9\.2 \(2 of 2\): step, \d+ s left", str(heard[-1])
     )
 
 

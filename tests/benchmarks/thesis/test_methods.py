@@ -142,10 +142,10 @@ def test_doing_nothing_stands_in_every_table_of_layers_and_is_one(context: Conte
 
 def test_every_search_marks_the_pixels_of_the_exact_one(context: Context) -> None:
     subject = context.subjects("specular")[0]
-    exact = next(way for way in segmentation.WAYS if way.label == "exact search, as published")
+    exact = next(way for way in segmentation.SETTINGS if way.label == "exact search, as published")
     marked = separation_scores.segment_highlights(subject, exact, 0)
     assert 0 < marked.sum() < subject.mask.sum() / 2
-    for way in segmentation.WAYS[:3]:
+    for way in segmentation.SETTINGS[:3]:
         assert (separation_scores.segment_highlights(subject, way, 3) == marked).all(), way.label
 
 
@@ -153,7 +153,7 @@ def test_runs_are_repeated_with_other_seeds_and_taken_up_again(
     context: Context, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     subject = context.subjects("specular")[0]
-    way = next(way for way in segmentation.WAYS if way.label == "CS, as published")
+    way = next(way for way in segmentation.SETTINGS if way.label == "CS, as published")
     first = separation_scores.score_separations(context, subject, way, 3)
     assert [run.run for run in first] == [0, 1, 2]
     assert all(
