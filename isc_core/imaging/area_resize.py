@@ -63,7 +63,20 @@ def _overlaps(count: int, factor: float) -> Any:
 def averaged_object(
     image: np.ndarray, mask: np.ndarray, long_side: int
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """Apply `averaged` to the box of an object so that its long side is at most `long_side` pixels."""
+    """Apply `averaged` to the box of an object.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    long_side : int
+        Largest long side of the result, in pixels.
+
+    Returns
+    -------
+    image, mask, factor
+        See `averaged`.
+    """
     box = mask_slices(mask)
     return averaged(image[box], mask[box], min(1.0, long_side / max(mask[box].shape)))
 
@@ -102,13 +115,14 @@ def averaged(
 def resize_apart(
     image: np.ndarray, mask: np.ndarray, new_mask: np.ndarray, area: AreaFilter
 ) -> np.ndarray:
-    """Downscale an image; pixels of the new mask average the object alone, all others the background.
+    """Downscale an image, averaging object and background apart.
 
     Parameters
     ----------
     image : (H, W, C) ndarray
     mask : (H, W) bool ndarray
     new_mask : (h, w) bool ndarray
+        Its pixels average the object alone, all others the background.
     area : AreaFilter
         From the old grid to the new one.
 

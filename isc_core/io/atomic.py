@@ -1,18 +1,20 @@
 """Writing a folder or a file completely or not at all.
 
-The content is written beside its final place under a temporary name, brought to the disk, and
-renamed once it is complete, so that the final name never holds half of a result. What stood there
-before is replaced only then, in one step where the system has one (Linux), and a folder only if
-everything in it is of the kind that we write: nothing of anybody else's is ever deleted.
+The content is written beside its final place under a temporary name, flushed to disk, and renamed
+once it is complete, so that the final name never holds half of a result. What stood there before is
+replaced only then, in one step where the system supports it (Linux), and a folder only if
+everything in it is of the kind that this program writes: foreign files are never deleted.
 
-A process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next one that
-writes the same name removes those that nobody holds, which are of processes killed by force.
 
-Limits: without such locks (Windows, some network disks) and of other machines, siblings of killed
-processes stay; they may be deleted by hand, or by `remove_unfinished` where nobody else is at work.
-What is removed is renamed to `.NAME.xxxxxxxx.gone` first. Without the one step a process killed
-between two renames leaves what stood there before as `.NAME.xxxxxxxx.old`, which the next one puts
-back.
+Limits: without such locks (Windows, some network disks) and for other machines, siblings of killed
+processes stay; delete them by hand, or by `remove_unfinished` where nobody else is at work. What is
+removed is renamed to `.NAME.xxxxxxxx.gone` first. Without the exchange in one step, a process
+killed between two renames leaves the old content as `.NAME.xxxxxxxx.old`, which the next process
+puts back.
+
+Attributes
+----------
+process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process that writes the same name removes siblings without a lock, which belong to killed processes. The lock is on the sibling itself, not on a lock file beside it, so that it moves with the rename: that is why `flock` is used here and not the library `filelock`.
 """
 
 import contextlib
@@ -63,13 +65,22 @@ _REASONS = {
 
 @contextmanager
 def new_folder(folder: Path | str, ours: Sequence[str]) -> Iterator[Path]:
-    """Gives an empty temporary folder to fill; renames it to `folder` when the block ends well,
-    else removes it.
+    """Provide an empty temporary folder and rename it to `folder` when the block succeeds.
 
-    `ours`: the files that a folder of this kind holds, as relative paths with `/`; the first is its
-    mark, without which a folder is not ours. An existing `folder` is replaced if it is empty, or
-    holds the mark and nothing but these files. Raises `InputError` if `folder` is something else,
-    or cannot be written.
+    An existing `folder` is replaced if it is empty, or holds the marker file and nothing but
+    `ours`.
+
+    Parameters
+    ----------
+    folder : Path or str
+    ours : sequence of str
+        Files that a folder of this kind holds, as relative paths with `/`. The first one is the
+        marker, without which a folder counts as foreign.
+
+    Raises
+    ------
+    InputError
+        If `folder` is something else, or cannot be written.
     """
     target = _resolved(folder)
     require_replaceable(target, ours)
@@ -83,11 +94,18 @@ def new_folder(folder: Path | str, ours: Sequence[str]) -> Iterator[Path]:
 
 @contextmanager
 def new_file(path: Path | str) -> Iterator[Path]:
-    """Gives an empty temporary file to write to; renames it to `path` when the block ends well,
-    else removes it.
+    """Provide an empty temporary file and rename it to `path` when the block succeeds.
 
-    An existing file is replaced. Raises `InputError` if `path` is a folder or a device, or cannot
-    be written.
+    An existing file is replaced.
+
+    Parameters
+    ----------
+    path : Path or str
+
+    Raises
+    ------
+    InputError
+        If `path` is a folder or a device, or cannot be written.
     """
     target = _resolved(path)
     _require_replaceable_file(target)
@@ -101,9 +119,20 @@ def new_file(path: Path | str) -> Iterator[Path]:
 def require_writable(
     folder: Path | str, ours: Sequence[str], inputs: Iterable[Path | None] = ()
 ) -> None:
-    """Tries now whether `new_folder` could begin, before hours of work are spent. Leaves no trace.
-    Raises `InputError`, also where one of the `inputs` of the work lies in the folder that would be
-    replaced.
+    """Check that `new_folder` can begin, before hours of work are spent; leaves no trace.
+
+    Parameters
+    ----------
+    folder : Path or str
+    ours : sequence of str
+        See `new_folder`.
+    inputs : iterable of Path
+        Inputs of the work, which must not lie in the folder.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or would replace an input.
     """
     target = _resolved(folder)
     require_replaceable(target, ours)
@@ -120,9 +149,16 @@ def require_writable(
 
 
 def require_writable_file(path: Path | str) -> None:
-    """Tries now whether `new_file` could begin, before hours of work are spent.
+    """Check that `new_file` can begin, before hours of work are spent; leaves no trace.
 
-    Leaves no trace. Raises `InputError`.
+    Parameters
+    ----------
+    path : Path or str
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
     """
     target = _resolved(path)
     _require_replaceable_file(target)
@@ -130,8 +166,15 @@ def require_writable_file(path: Path | str) -> None:
 
 
 def unfinished(path: Path | str) -> frozenset[Path]:
-    """The temporary siblings of `path` that there are now: of processes at work, or killed by
-    force.
+    """Return the temporary siblings of `path`, of processes at work or killed.
+
+    Parameters
+    ----------
+    path : Path or str
+
+    Returns
+    -------
+    frozenset of Path
     """
     target = _resolved(path)
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
@@ -142,9 +185,15 @@ def unfinished(path: Path | str) -> frozenset[Path]:
 
 
 def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None:
-    """Tidies up after processes that were killed by force while they wrote `path`: removes their
-    temporary siblings, but for those `spared` and those that somebody holds, and puts back what
-    they had moved aside.
+    """Clean up after processes that were killed while they wrote `path`.
+
+    Removes their temporary siblings and restores what they had moved aside.
+
+    Parameters
+    ----------
+    path : Path or str
+    spared : set of Path
+        Siblings to keep; so are all that a process holds a lock on.
     """
     target = _resolved(path)
     for left in sorted(unfinished(target) - spared):
@@ -153,7 +202,7 @@ def remove_unfinished(path: Path | str, spared: Set[Path] = frozenset()) -> None
 
 
 def remove_unfinished_in(folder: Path) -> None:
-    """The same for everything that is written in `folder`; nothing where there is no such folder."""
+    """Apply `remove_unfinished` to everything in `folder`, which need not exist."""
     with contextlib.suppress(FileNotFoundError, NotADirectoryError):
         for name in {
             origin for entry in folder.iterdir() if (origin := _origin(entry)) is not None
@@ -162,7 +211,7 @@ def remove_unfinished_in(folder: Path) -> None:
 
 
 def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
-    """Raises `InputError` unless `folder` may be created or replaced (see `new_folder`)."""
+    """Raise `InputError` unless `folder` may be created or replaced (see `new_folder`)."""
     with _explained(folder):
         if not folder.exists():
             return
@@ -187,7 +236,8 @@ def require_replaceable(folder: Path, ours: Sequence[str]) -> None:
         )
     if foreign := [name for name in found if name not in ours]:
         raise InputError(
-            f"{folder} also holds {foreign[0]}, which is not part of a result: move it away or choose another folder"
+            f"{folder} also holds {foreign[0]}, which is not part of a result: move it away or "
+            "choose another folder"
         )
 
 

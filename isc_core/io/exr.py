@@ -1,6 +1,6 @@
 """Float32 OpenEXR files from and to plain arrays, channel by channel.
 
-Channels keep their full names (`diffuse.R`, `height.Z`); compression is lossless (ZIP), and equal
+Channels keep their full names (`diffuse.R`, `height.Z`). Compression is lossless (ZIP), and equal
 arrays give equal bytes.
 """
 
@@ -20,9 +20,18 @@ from .native_io import memory_file, suppress_native_output
 
 
 def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
-    """Writes one scanline file.
+    """Write one scanline file.
 
-    `channels`: name -> (H, W), all of one shape. Raises `OSError` when it cannot be written whole.
+    Parameters
+    ----------
+    path : Path
+    channels : mapping of str to (H, W) ndarray
+        All of one shape.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written completely.
     """
     # The writer stores garbage from strided arrays without a word: every channel is made contiguous
     # here.
@@ -38,9 +47,21 @@ def write_channels(path: Path, channels: Mapping[str, np.ndarray]) -> None:
 
 
 def read_channels(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
-    """All channels of a file's first part: name -> (H, W) float32.
+    """Read all channels of a file's first part.
 
-    Raises `InputError` if it is no readable OpenEXR file.
+    Parameters
+    ----------
+    path : Path
+    limits : Limits
+
+    Returns
+    -------
+    dict of str to (H, W) float32 ndarray
+
+    Raises
+    ------
+    InputError
+        If it is not a readable OpenEXR file.
     """
     if not path.is_file():
         raise InputError(f"{path} does not exist")

@@ -1,13 +1,16 @@
 """What an OpenEXR file claims, read before the library sees it.
 
-Problem: the library allocates what a header asks for, for every channel, before it looks whether
-the file holds it; and its bindings read whatever a header names. Here windows, channels and chunks
-are held against `Limits` and against the size of the file first. Layout: a mark, the version with
-its flags, one header a part (name, type, size, value; ended by an empty name), then for each part a
-table of 8 bytes a chunk: a block of lines or a tile. Citation: OpenEXR, "OpenEXR File Layout"
-(Academy Software Foundation, 2023), https://openexr.com/en/latest/OpenEXRFileLayout.html. Limits:
-flat images of full resolution; deep ones are refused, and channels that are sampled more coarsely
-than the pixels.
+Problem: the library allocates what a header claims, for every channel, before it checks whether the
+file holds it; and its bindings read whatever a header names, with `header_only` too. Here windows,
+channels and chunks are checked against `Limits` and against the size of the file first.
+
+Layout: a magic number, the version with its flags, one header a part (name, type, size, value;
+ended by an empty name), then for each part a table of 8 bytes a chunk: a block of lines or a tile.
+
+Citation: OpenEXR, "OpenEXR File Layout" (Academy Software Foundation, 2023),
+https://openexr.com/en/latest/OpenEXRFileLayout.html.
+
+Limits: flat images of full resolution; deep images and subsampled channels are refused.
 """
 
 import math
@@ -27,9 +30,13 @@ _MOST_CHANNELS, _MOST_PARTS, _MOST_HEADER, _LONGEST, _LARGEST_TILE = 1024, 64, 1
 
 @dataclass(frozen=True)
 class ExrPart:
-    """`data`, `display`: windows, (left, top, right, bottom), the last two inside.
+    """One part of a file.
 
-    `channels`: names.
+    Attributes
+    ----------
+    data, display : tuple of int
+        Windows (left, top, right, bottom), right and bottom inclusive.
+    channels : tuple of str
     """
 
     data: tuple[int, int, int, int]
@@ -38,7 +45,7 @@ class ExrPart:
 
 
 def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
-    """Width and height of a window."""
+    """Return the width and height of a window (left, top, right, bottom)."""
     left, top, right, bottom = window
     return right - left + 1, bottom - top + 1
 
@@ -46,11 +53,28 @@ def size_of(window: tuple[int, int, int, int]) -> tuple[int, int]:
 def check_exr(
     data: bytes, path: Path, limits: Limits, stored: int | None = None
 ) -> tuple[ExrPart, ...]:
-    """The parts of a file that begins with `data` (all of it, or a MiB) and has `stored` bytes
-    (None: those of `data`).
+    """Check the headers of a file.
 
-    Raises `InputError` for one that claims more than `limits` allows, and `ValueError` or
-    `struct.error` for a damaged one.
+    Parameters
+    ----------
+    data : bytes
+        The beginning of the file: all of it, or a MiB.
+    path : Path
+        Opens the error message.
+    limits : Limits
+    stored : int, optional
+        Size of the file; that of `data` by default.
+
+    Returns
+    -------
+    tuple of ExrPart
+
+    Raises
+    ------
+    InputError
+        If the file claims more than `limits` allows.
+    ValueError, struct.error
+        If the file is damaged.
     """
     stored = len(data) if stored is None else stored
     mark, version = struct.unpack_from("<4sI", data)
@@ -131,7 +155,8 @@ def _channels(path: Path, value: bytes) -> tuple[tuple[str, ...], int]:
         kind, _, across, down = struct.unpack_from("<iB3xii", value, end + 1)
         if (across, down) != (1, 1):
             raise InputError(
-                f"{path}: a channel is stored more coarsely than the pixels: save it as a plain RGB EXR"
+                f"{path}: a channel is stored more coarsely than the pixels: save it as a plain "
+                "RGB EXR"
             )
         if kind not in _BYTES:
             raise ValueError("a channel of an unknown kind")

@@ -1,4 +1,4 @@
-"""Reading JSON files that may be absent, damaged or somebody else's."""
+"""Reading JSON files that may be absent, damaged or foreign."""
 
 import json
 from pathlib import Path
@@ -12,15 +12,28 @@ MOST_BYTES = 1 << 28
 
 
 def read_json(path: Path, remedy: str = "write it again") -> Any:
-    """What the file holds; the caller looks at whether that is what it expects.
+    """Read a JSON file; the caller checks its content.
 
-    Raises `InputError`, its line ended by `remedy`, where it is not readable JSON or larger than
-    256 MB.
+    Parameters
+    ----------
+    path : Path
+    remedy : str
+        Ends the error message.
+
+    Returns
+    -------
+    object
+
+    Raises
+    ------
+    InputError
+        If it is not readable JSON or is larger than 256 MB.
     """
     try:
         if (size := path.stat().st_size) > MOST_BYTES:
             raise InputError(
-                f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB of JSON are read: is it the right file?"
+                f"{path} has {size / 1e6:.0f} MB; at most {MOST_BYTES / 1e6:.0f} MB of JSON are "
+                "read: is it the right file?"
             )
         return json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
@@ -32,8 +45,17 @@ def read_json(path: Path, remedy: str = "write it again") -> Any:
 
 
 def numbers(value: Any, shape: tuple[int, ...]) -> np.ndarray | None:
-    """A part of what a file holds as an array, float64, if it is finite numbers of that shape; else
-    None.
+    """Convert part of a JSON document to an array.
+
+    Parameters
+    ----------
+    value : object
+    shape : tuple of int
+
+    Returns
+    -------
+    ndarray of float64 or None
+        None unless it is finite numbers of this shape.
     """
     try:
         found = np.array(value)

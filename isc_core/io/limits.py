@@ -1,12 +1,12 @@
-"""How much a file may ask for, known before any of its content is unpacked.
+"""How much a file may claim, checked before any of its content is unpacked.
 
 Problem: a hundred bytes can claim a picture of a million pixels a side, and a small archive can
 unpack to more than a machine holds. What a file claims stands in its header: width and height, the
-shape and kind of an array, the unpacked size of an archive's member. Readers hold these against
-`Limits` first, and decode afterwards.
+shape and dtype of an array, the unpacked size of an archive's member. Readers check these against
+`Limits` first and decode afterwards.
 
 Limits: they bound what a file unpacks to. What a command then needs for its own work is a multiple
-of it; see docs/operations.md.
+of it.
 """
 
 from dataclasses import dataclass
@@ -19,9 +19,17 @@ from ..errors import InputError
 class Limits:
     """What is read of one file at most.
 
-    `max_pixels`: width x height of a picture. A file may unpack to `max_bytes` bytes of values, or
-    to `max_ratio` times its own size, whichever is more: large files hold what they hold, small
-    ones that unpack to much are bombs.
+    Large files hold what they hold; small ones that unpack to much are bombs. So the larger of
+    `max_bytes` and `max_ratio` times the size of the file counts.
+
+    Attributes
+    ----------
+    max_pixels : int
+        Width times height of a picture.
+    max_bytes : int
+        Unpacked size of a file, in bytes.
+    max_ratio : int
+        Unpacked size over the size of the file.
     """
 
     max_pixels: int = 100_000_000
@@ -29,30 +37,37 @@ class Limits:
     max_ratio: int = 20
 
     def check_pixels(self, path: Path | str, width: int, height: int) -> None:
-        """Raises `InputError` for a picture of more pixels."""
+        """Raise `InputError` for a picture with more pixels."""
         if width * height > self.max_pixels:
             most = f"{self.max_pixels / 1e6:g} megapixels"
             raise InputError(
-                f"{path}: {width} x {height} pixels; at most {most} are read: make it smaller, or raise --max-pixels"
+                f"{path}: {width} x {height} pixels; at most {most} are read: make it smaller, or "
+                "raise --max-pixels"
             )
 
     def check_stored(self, path: Path | str, stored: int) -> None:
-        """Raises `InputError` for a picture's file of more than `max_bytes` bytes, which is held in
-        memory whole.
-        """
+        """Raise `InputError` for a file larger than `max_bytes`, because it is held in memory whole."""
         if stored > self.max_bytes:
             raise InputError(
-                f"{path} has {stored / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are read: make it smaller first"
+                f"{path} has {stored / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are "
+                "read: make it smaller first"
             )
 
     def check_unpacked(self, path: Path | str, unpacked: int, stored: int) -> None:
-        """Raises `InputError` for a file of `stored` bytes whose values would take more than it
-        may, `unpacked` bytes.
+        """Raise `InputError` for a file that unpacks to too much.
+
+        Parameters
+        ----------
+        path : Path or str
+            Opens the error message.
+        unpacked, stored : int
+            Bytes of its values, and of the file.
         """
         most = max(self.max_bytes, self.max_ratio * stored)
         if unpacked > most:
             raise InputError(
-                f"{path}: unpacks to {unpacked / 1e9:.1f} GB, at most {most / 1e9:.1f} are read: store less in it"
+                f"{path}: unpacks to {unpacked / 1e9:.1f} GB, at most {most / 1e9:.1f} are read: "
+                "store less in it"
             )
 
 

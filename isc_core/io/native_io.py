@@ -24,7 +24,7 @@ _DESCRIPTORS = Path("/proc/self/fd")
 
 @contextmanager
 def memory_file(content: bytes = b"") -> Iterator[Path]:
-    """The path of a file that holds `content`; it is gone after the block."""
+    """Provide a path to a file that holds `content`; the file is gone after the block."""
     if hasattr(os, "memfd_create") and _DESCRIPTORS.is_dir():
         with open(os.memfd_create("isc"), "wb") as file:
             file.write(content)
@@ -39,7 +39,7 @@ def memory_file(content: bytes = b"") -> Iterator[Path]:
 
 @contextlib.contextmanager
 def suppress_native_output() -> Iterator[None]:
-    """No warnings, and nothing printed, while it lasts."""
+    """Mute warnings and all output within the block."""
     with (
         warnings.catch_warnings(),
         contextlib.redirect_stdout(io.StringIO()),

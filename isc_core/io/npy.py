@@ -1,12 +1,15 @@
-"""Reading NumPy's files, single arrays and archives of them, from anybody.
+"""Reading NumPy's files, single arrays and archives of them, from untrusted sources.
 
-Problem: `numpy.load` believes a header: it allocates what the shape asks for before it looks
-whether the file holds it, and unpacks an archive's member whatever its size. Here shape, kind and
-size are held against what is there, and against `Limits`, first. Citation: NumPy Enhancement
-Proposal 1, "A simple file format for NumPy arrays" (2007),
+Problem: `numpy.load` trusts the header: it allocates what the shape claims before it checks whether
+the file holds it, and unpacks an archive's member whatever its size. Here shape, dtype and size are
+checked against the data, and against `Limits`, first.
+
+Citation: NumPy Enhancement Proposal 1, "A simple file format for NumPy arrays" (2007),
 https://numpy.org/neps/nep-0001-npy-format.html; PKWARE, "APPNOTE.TXT - .ZIP File Format
-Specification", version 6.3.10 (2022). Limits: arrays of numbers, truth values and texts; no objects
-(which are pickles), no records. Members are stored or deflated.
+Specification", version 6.3.10 (2022).
+
+Limits: arrays of numbers, Booleans and strings; no objects (which are pickles), no structured
+dtypes. Members are stored or deflated.
 """
 
 import io
@@ -52,27 +55,68 @@ _UNPACKING = (
 
 
 def read_array(path: Path, limits: Limits = USUAL) -> np.ndarray:
-    """The array of a `.npy` file, writable.
+    """Read a `.npy` file.
 
-    Raises `InputError` where the file is absent, damaged, or holds no plain numbers.
+    Parameters
+    ----------
+    path : Path
+    limits : Limits
+
+    Returns
+    -------
+    ndarray
+        Writable.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, damaged, or holds no plain numbers.
     """
     return parse_array(_bytes(path), str(path), limits=limits).copy()
 
 
 def read_arrays(path: Path, limits: Limits = USUAL) -> dict[str, np.ndarray]:
-    """The arrays of a `.npz` file by name, writable.
+    """Read a `.npz` file.
 
-    Raises `InputError` as `parse_arrays` does, and where the file is absent.
+    Parameters
+    ----------
+    path : Path
+    limits : Limits
+
+    Returns
+    -------
+    dict of str to ndarray
+        Writable.
+
+    Raises
+    ------
+    InputError
+        If the file is absent, or as `parse_arrays`.
     """
     return parse_arrays(_bytes(path), str(path), limits)
 
 
 def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USUAL) -> np.ndarray:
-    """The array that the bytes of a `.npy` file hold: a view of them. `kinds`: the kinds of value
-    that may be in it, as NumPy's letters.
+    """Parse the bytes of a `.npy` file.
 
-    Raises `InputError`, its line opened by `name`, where the bytes are damaged, cut short, or hold
-    something else.
+    Parameters
+    ----------
+    data : bytes
+    name : str
+        Opens the error message.
+    kinds : str
+        Permitted dtype kinds, as NumPy's letters.
+    limits : Limits
+
+    Returns
+    -------
+    ndarray
+        A view of `data`.
+
+    Raises
+    ------
+    InputError
+        If the bytes are damaged, cut short, or hold something else.
     """
     try:
         shape, by_columns, kind, start = array_header(data)
@@ -88,12 +132,14 @@ def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USU
     ):
         what = "objects" if kind.hasobject else str(kind)[:40]
         raise InputError(
-            f"{name} is not a readable array of numbers, it holds {what}: save plain numbers with numpy.save"
+            f"{name} is not a readable array of numbers, it holds {what}: save plain numbers with "
+            "numpy.save"
         )
     count = math.prod(shape)
     if min(shape, default=0) < 0 or len(shape) > 8 or count * kind.itemsize > len(data) - start:
         raise InputError(
-            f"{name} is not a readable array (it is damaged or cut short): save it again with numpy.save"
+            f"{name} is not a readable array (it is damaged or cut short): save it again with "
+            "numpy.save"
         )
     limits.check_unpacked(name, count * kind.itemsize, len(data))
     if count == 0:
@@ -102,10 +148,24 @@ def parse_array(data: bytes, name: str, kinds: str = KINDS, limits: Limits = USU
 
 
 def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np.ndarray]:
-    """The arrays of the bytes of a `.npz` file by name, writable; texts too.
+    """Parse the bytes of a `.npz` file.
 
-    Raises `InputError`, its line opened by `name`, where the bytes are damaged, hold something
-    else, or unpack to more than `limits`.
+    Parameters
+    ----------
+    data : bytes
+    name : str
+        Opens the error message.
+    limits : Limits
+
+    Returns
+    -------
+    dict of str to ndarray
+        Writable; strings too.
+
+    Raises
+    ------
+    InputError
+        If the bytes are damaged, hold something else, or unpack to more than `limits`.
     """
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -135,10 +195,24 @@ def parse_arrays(data: bytes, name: str, limits: Limits = USUAL) -> dict[str, np
 
 
 def array_header(data: bytes) -> tuple[tuple[int, ...], bool, np.dtype, int]:
-    """Of the bytes of a `.npy` file: the shape, whether columns come first, the kind of value, and
-    where the values begin.
+    """Parse the header of a `.npy` file.
 
-    Raises `ValueError` where they do not begin with such a header.
+    Parameters
+    ----------
+    data : bytes
+
+    Returns
+    -------
+    shape : tuple of int
+    fortran_order : bool
+    dtype : dtype
+    start : int
+        Offset of the first value.
+
+    Raises
+    ------
+    ValueError
+        If the bytes do not begin with such a header.
     """
     stream = io.BytesIO(data)
     try:

@@ -1,8 +1,8 @@
 """File names as people and other programs can read them.
 
-Problem: on Linux a file's name is any bytes but `/` and zero. Python carries bytes that are not
-UTF-8 as lone surrogates, which no text file, terminal or font takes; and a name may hold line
-breaks, or characters that move the cursor or turn the direction of writing.
+Problem: on Linux a file name is any bytes but `/` and zero. Python carries bytes that are not UTF-8
+as lone surrogates, which no text file, terminal or font accepts; and a name may hold line breaks,
+or characters that move the cursor or change the writing direction.
 """
 
 import unicodedata
@@ -12,8 +12,9 @@ _TURNING = {"LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI"}
 
 
 def readable(text: str) -> str:
-    """`text` on one line, in characters that can be seen and coded as UTF-8: all others are escaped
-    as in Python, `\\n`, `\\xe9`.
+    """Return `text` on one line, in printable characters that UTF-8 can encode.
+
+    All others are escaped as in Python: `\\n`, `\\xe9`.
     """
     return "".join(map(_readable, text))
 

@@ -1,13 +1,18 @@
-"""Cutting an object out of a photo, from a box that a person draws around it.
+"""Segmenting an object inside a box that a person draws around it.
 
 Problem: a photo whose background is not black has no mask; everything outside the box is
-background, inside it is unknown. Equation: GrabCut minimises, over the labels a of all pixels, E(a)
-= sum_p D(a_p, z_p) + sum_pq V(a_p, a_q, z_p, z_q), where D is the negative log-likelihood of the
-colour z_p under a Gaussian mixture of the object or of the background and V a contrast-weighted
-cost of the border; minimum cuts and fits of the mixtures take turns. Citation: Rother, Kolmogorov,
-Blake, "GrabCut" (ACM Transactions on Graphics 23, 2004), doi:10.1145/1015706.1015720; OpenCV's
-solver. Limits: colours alone decide, so an object of the background's colour is cut badly: the mask
-should be looked at. Large boxes are solved at one megapixel and the border is interpolated.
+background, inside it is unknown.
+
+Equation: GrabCut minimises, over the labels a of all pixels, E(a) = sum_p D(a_p, z_p) + sum_pq
+V(a_p, a_q, z_p, z_q), where D is the negative log-likelihood of the colour z_p under a Gaussian
+mixture of the object or of the background and V a contrast-weighted cost of the border; minimum
+cuts and fits of the mixtures alternate.
+
+Citation: C. Rother, V. Kolmogorov, A. Blake, "GrabCut", ACM Transactions on Graphics 23 (2004),
+doi:10.1145/1015706.1015720; OpenCV's solver.
+
+Limits: only colours count, so an object of the background's colour is segmented badly: check the
+mask. Large boxes are solved at one megapixel and the border is interpolated.
 """
 
 import os
@@ -31,12 +36,28 @@ Box = tuple[int, int, int, int]
 
 
 def grabcut(image: np.ndarray, box: Box, iterations: int = 5) -> np.ndarray:
-    """The object within a box, by GrabCut: an (H, W) bool mask, false outside the box, holes
-    filled, specks dropped; always the same.
+    """Segment the object within a box.
 
-    `image`: (H, W, 3) RGB, uint8 codes or float linear light in [0, 1]. `box`: (x, y, width,
-    height) in pixels from the top left. Raises `InputError` for a box outside of the image, thinner
-    than 8 pixels or without background around it, and where nothing is found.
+    The result is deterministic.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        RGB; uint8 codes or float linear light in [0, 1].
+    box : tuple of int
+        (x, y, width, height) in pixels from the top left.
+    iterations : int
+
+    Returns
+    -------
+    (H, W) bool ndarray
+        False outside the box; holes filled, specks dropped.
+
+    Raises
+    ------
+    InputError
+        If the box lies outside the image, is thinner than 8 pixels, leaves no background, or holds
+        no object.
     """
     height, width = image.shape[:2]
     _check_box(box, width, height)
@@ -66,7 +87,8 @@ def _check_box(box: Box, width: int, height: int) -> None:
     name = f"--box {x},{y},{w},{h}"
     if w < MIN_SIDE or h < MIN_SIDE:
         raise InputError(
-            f"{name}: the box is x,y,width,height, at least {MIN_SIDE} pixels both ways: draw it around the object"
+            f"{name}: the box is x,y,width,height, at least {MIN_SIDE} pixels both ways: draw it "
+            "around the object"
         )
     if x < 0 or y < 0 or x + w > width or y + h > height:
         raise InputError(
@@ -74,7 +96,8 @@ def _check_box(box: Box, width: int, height: int) -> None:
         )
     if (x, y, w, h) == (0, 0, width, height):
         raise InputError(
-            f"{name}: covers the whole image: leave some background around the box to learn its colours from"
+            f"{name}: covers the whole image: leave some background around the box to learn its "
+            "colours from"
         )
 
 
@@ -91,7 +114,8 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
     labels[y : y + h, x : x + w] = cv2.GC_PR_FGD
     if labels.all():
         raise InputError(
-            "--box: leaves too little background to learn its colours from: draw it closer to the object"
+            "--box: leaves too little background to learn its colours from: draw it closer to the "
+            "object"
         )
     cv2.setRNGSeed(_SEED)
     cv2.grabCut(
@@ -102,9 +126,17 @@ def _solve(coded: np.ndarray, box: Box, iterations: int) -> np.ndarray:
 
 
 def write_mask(path: str | Path, mask: np.ndarray) -> None:
-    """Writes an (H, W) bool mask as an 8-bit grey PNG, 255 inside; whole or not at all.
+    """Write a mask as an 8-bit grey PNG, 255 inside, completely or not at all.
 
-    Raises `InputError` where it cannot.
+    Parameters
+    ----------
+    path : str or Path
+    mask : (H, W) bool ndarray
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
     """
     _require_png(path)
     data = cv2.imencode(".png", np.where(mask, 255, 0).astype(np.uint8))[1].tobytes()
@@ -124,12 +156,27 @@ def cut_out(
     transfer: str = "auto",
     limits: Limits = USUAL,
 ) -> np.ndarray:
-    """Reads a photo, finds the object within the box (x, y, width, height; of the upright photo),
-    writes the mask and returns it.
+    """Segment the object within a box of a photo and write its mask.
 
-    `transfer` and `limits` as for `photo.photo.read_photo`; the mask as `grabcut` gives it. Raises
-    `InputError` where the photo cannot be read, the box does not fit, nothing is found or the mask
-    cannot be written or would take the photo's place.
+    Parameters
+    ----------
+    photo_path : str or Path
+    box : tuple of int
+        (x, y, width, height) in pixels of the upright photo.
+    out_path : str or Path
+        A PNG.
+    transfer : {"auto", "srgb", "linear"}
+    limits : Limits
+
+    Returns
+    -------
+    (H, W) bool ndarray
+
+    Raises
+    ------
+    InputError
+        If the photo cannot be read, the box does not fit, nothing is found, or the mask cannot be
+        written or would replace the photo.
     """
     _require_png(out_path)
     if (

@@ -17,26 +17,40 @@ BLACK = 2.0 / 255.0
 
 
 def check_mask(mask: np.ndarray, what: str) -> None:
-    """Raises `InputError`, its line opened by `what`, for an (H, W) mask that is empty, has fewer
-    than 64 pixels or is thinner than 8.
+    """Raise `InputError` for a mask that is empty, has fewer than 64 pixels or is thinner than 8.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    what : str
+        Opens the error message.
     """
     count = int(mask.sum())
     if count == 0:
         raise InputError(f"{what} is empty: mark the object in white on black")
     if count < MIN_MASK_PIXELS:
         raise InputError(
-            f"{what} has only {count} pixels: at least {MIN_MASK_PIXELS} are needed; use a larger photo or mask"
+            f"{what} has only {count} pixels: at least {MIN_MASK_PIXELS} are needed; use a larger "
+            "photo or mask"
         )
     width, height = mask_box(mask)[2:]
     if min(width, height) < MIN_SIDE:
         raise InputError(
-            f"{what} is only {width} x {height} pixels: at least {MIN_SIDE} are needed both ways; use a larger photo or mask"
+            f"{what} is only {width} x {height} pixels: at least {MIN_SIDE} are needed both ways; "
+            "use a larger photo or mask"
         )
 
 
 def tidy_mask(mask: np.ndarray) -> np.ndarray:
-    """An (H, W) mask with its holes filled, without the parts that are smaller than 1 % of the
-    largest part.
+    """Fill the holes of a mask and drop parts smaller than 1 % of the largest part.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W) bool ndarray
     """
     _, labels = cv2.connectedComponents((~mask).astype(np.uint8), connectivity=4)
     outside = np.unique(np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]]))
@@ -55,6 +69,32 @@ def find_mask(
     whole_frame: bool,
     limits: Limits,
 ) -> tuple[np.ndarray, str]:
+    """Find the object's mask, and where it comes from.
+
+    Parameters
+    ----------
+    path : str or Path
+        The photo; opens the error message.
+    raster : Raster
+        Of the photo.
+    linear : (H, W, 1 or 3) ndarray
+        Its linear light.
+    mask_path : str or Path, optional
+    whole_frame : bool
+        Take all pixels where there is no mask, no alpha channel and no black border.
+    limits : Limits
+
+    Returns
+    -------
+    mask : (H, W) bool ndarray
+    source : str
+        "file", "alpha", "black border" or "whole frame".
+
+    Raises
+    ------
+    InputError
+        If no mask is found.
+    """
     if mask_path is not None:
         return _mask_of_file(mask_path, raster, limits), "file"
     if raster.transparency is not None:
@@ -86,7 +126,8 @@ def _mask_of_file(mask_path: str | Path, photo: Raster, limits: Limits) -> np.nd
     if raster.values.shape[:2] != photo.values.shape[:2]:
         (h, w), (mask_h, mask_w) = photo.values.shape[:2], raster.values.shape[:2]
         raise InputError(
-            f"{mask_path}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: give a mask of the photo's size"
+            f"{mask_path}: the mask is {mask_w} x {mask_h} pixels, the photo {w} x {h}: give a "
+            "mask of the photo's size"
         )
     if raster.transparency is not None:
         return raster.transparency >= 0.5
@@ -96,7 +137,7 @@ def _mask_of_file(mask_path: str | Path, photo: Raster, limits: Limits) -> np.nd
 
 
 def largest_channel(values: np.ndarray) -> np.ndarray:
-    """(H, W): the largest channel of (H, W, C).
+    """Return the largest channel (H, W) of (H, W, C) values.
 
     NumPy's own maximum over a short last axis is ten times slower.
     """
@@ -104,4 +145,5 @@ def largest_channel(values: np.ndarray) -> np.ndarray:
 
 
 def finite_or_zero(values: np.ndarray) -> np.ndarray:
+    """Replace values that are not finite by 0."""
     return np.where(np.isfinite(values), values, np.zeros(1, values.dtype))

@@ -14,8 +14,18 @@ from ..io.decoders import MIN_SIDE
 class PhotoSource:
     """The file a photo comes from.
 
-    `sha256` of the file; `size` = (width, height) after rotation; `bit_depth` a channel; `transfer`
-    used, "srgb" or "linear"; `mask_from`: "file", "alpha", "black border" or "whole frame".
+    Attributes
+    ----------
+    sha256 : str
+        Of the file.
+    size : tuple of int
+        (width, height), after rotation.
+    bit_depth : int
+        Bits a channel.
+    transfer : str
+        The transfer curve used, "srgb" or "linear".
+    mask_from : str
+        "file", "alpha", "black border" or "whole frame".
     """
 
     sha256: str
@@ -29,19 +39,27 @@ class PhotoSource:
 class Photo:
     """One photo of an object.
 
-    `image`: (H, W, 3) float32, linear Rec.709, finite and >= 0 everywhere; a grey file has three
-    equal channels. `mask`: (H, W) bool, the object. A pixel of the object may have channels that
-    are zero. `code_value`: the smallest step of the file's coding near black, in linear light:
-    `srgb_to_linear(1/255)` for 8-bit sRGB, 1/65535
-        for 16-bit linear. Floats have no such step: 2^-14 of the object's white (its 99.9th
-        percentile), the step of a 14-bit sensor, so that the exposure of a file does not matter.
-        Zero channels are floored at half of it, in logarithms only.
-    `clipped`: (H, W) bool, some channel is at the coding's maximum, so the light may have been
-    brighter; never in float files.
-        After resizing: some part of the object's pixel is.
-    `exposed`: whether the numbers tell how bright the scene was exposed, 1 being white: of codes
-    they do, of floats they need not. `original`: the file. `scale`: working size / original size; a
-    working pixel coordinate is `scale` times the original's.
+    Attributes
+    ----------
+    image : (H, W, 3) float32 ndarray
+        Linear Rec.709, finite and not negative; a grey file has three equal channels.
+    mask : (H, W) bool ndarray
+        The object. Its pixels may have channels that are zero.
+    code_value : float
+        Smallest step of the file's coding near black, in linear light: `srgb_to_linear(1/255)` for
+        8-bit sRGB, 1/65535 for 16-bit linear. Floats have no such step: 2^-14 of the object's white
+        (its 99.9th percentile), the step of a 14-bit sensor, so that the exposure of a file does
+        not matter. Zero channels are floored at half of it, in logarithms only.
+    clipped : (H, W) bool ndarray
+        Some channel is at the coding's maximum, so the light may have been brighter; never in float
+        files. After resizing: some part of the object's pixel is.
+    original : PhotoSource
+        The file.
+    scale : float
+        Working size over original size; a working pixel coordinate is `scale` times the original
+        one.
+    exposed : bool
+        Whether the numbers tell the exposure, 1 being white: codes do, floats need not.
     """
 
     image: np.ndarray
@@ -54,20 +72,33 @@ class Photo:
 
     @property
     def box(self) -> tuple[int, int, int, int]:
-        """(x, y, width, height) of the mask, in pixels of `image`."""
+        """(x, y, width, height) of the mask's box, in pixels of `image`."""
         return mask_box(self.mask)
 
     def resized_to_object(self, max_size: int = 512) -> "Photo":
-        """The photo at the scale where the long side of the mask's box is at most `max_size`
-        pixels; 0 keeps the size; never enlarges.
+        """Downscale the photo so that the long side of the mask's box has at most `max_size` pixels.
 
         Linear light is averaged over the area of each new pixel, object and background apart; the
-        mask is where the object covers half. Raises `InputError` where `max_size` is negative or
-        leaves the object thinner than 8 pixels.
+        mask is where the object covers half.
+
+        Parameters
+        ----------
+        max_size : int
+            0 keeps the size; photos are never enlarged.
+
+        Returns
+        -------
+        Photo
+
+        Raises
+        ------
+        InputError
+            If `max_size` is negative or leaves the object thinner than 8 pixels.
         """
         if max_size < 0:
             raise InputError(
-                f"--max-size {max_size}: give the long side of the object in pixels, or 0 to keep the photo's size"
+                f"--max-size {max_size}: give the long side of the object in pixels, or 0 to keep "
+                "the photo's size"
             )
         longest = max(self.box[2:])
         if max_size == 0 or longest <= max_size:
@@ -83,7 +114,8 @@ class Photo:
         thin = min(mask_box(mask)[2:]) if mask.any() else 0
         if thin < MIN_SIDE:
             raise InputError(
-                f"--max-size {max_size} leaves the object only {thin} pixels thin: use {_size_needed(self.box)} or more, or 0"
+                f"--max-size {max_size} leaves the object only {thin} pixels thin: use "
+                f"{_size_needed(self.box)} or more, or 0"
             )
         clipped = mask & (area(self.clipped & self.mask) > 1e-6)
         return replace(

@@ -31,16 +31,33 @@ def read_photo(
     whole_frame: bool = False,
     limits: Limits = USUAL,
 ) -> Photo:
-    """Reads a photo at full size.
+    """Read a photo at full size.
 
-    Files: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM, NumPy's .npy (its integers are codes),
-    told apart by their content. `transfer`: "srgb", "linear", or "auto" = floats linear, all others
-    sRGB. The mask is `mask_path` (inside = above half of its largest value, or its alpha channel
-    where that is not opaque); else the photo's alpha channel (>= 0.5) where that is not opaque;
-    else, on a black border (at most 2/255 in sRGB coding), the pixels that are not black: holes
-    filled, parts smaller than 1 % of the largest dropped. Where there is none of these,
-    `whole_frame` takes all pixels. Raises `InputError`, one line with the remedy, for anything that
-    cannot be used; what is beyond `limits` is told from the file's header.
+    Formats: PNG, JPEG, TIFF, EXR, Radiance HDR, BMP, PPM, PGM and NumPy's .npy (its integers are
+    codes), recognised by their content. The mask is `mask_path` (inside: above half of its largest
+    value, or its alpha channel where that is not opaque); else the photo's alpha channel (>= 0.5)
+    where that is not opaque; else, on a black border (at most 2/255 in sRGB), the pixels that are
+    not black, with holes filled and parts smaller than 1 % of the largest dropped.
+
+    Parameters
+    ----------
+    path : str or Path
+    mask_path : str or Path, optional
+    transfer : {"auto", "srgb", "linear"}
+        "auto": floats are linear, all others sRGB.
+    whole_frame : bool
+        Take all pixels where there is no mask, alpha channel or black border.
+    limits : Limits
+        Checked by the header, before the file is unpacked.
+
+    Returns
+    -------
+    Photo
+
+    Raises
+    ------
+    InputError
+        If anything cannot be used; the message names the remedy.
     """
     raster = read_raster(path, limits)
     used = resolve_transfer(transfer, raster)
@@ -65,15 +82,31 @@ def read_photo(
 def read_linear(
     path: str | Path, transfer: str = "auto", limits: Limits = USUAL, *, finite: bool = False
 ) -> np.ndarray:
-    """The whole image without a mask: (H, W, 3) float32, linear Rec.709; what is not finite or
-    negative in a float file becomes 0.
+    """Read a whole image as linear light, without a mask.
 
-    Raises `InputError` as `read_photo` does, and with `finite` for values that are not.
+    Parameters
+    ----------
+    path : str or Path
+    transfer : {"auto", "srgb", "linear"}
+    limits : Limits
+    finite : bool
+        Refuse values that are not finite.
+
+    Returns
+    -------
+    (H, W, 3) float32 ndarray
+        Linear Rec.709; values of float files that are negative or not finite become 0.
+
+    Raises
+    ------
+    InputError
+        As `read_photo`.
     """
     raster = read_raster(path, limits)
     if finite and not np.isfinite(raster.values).all():
         raise InputError(
-            f"{path} holds NaN or infinite values: light that bright has to be clipped, or saved as 32-bit floats"
+            f"{path} holds NaN or infinite values: light that bright has to be clipped, or saved "
+            "as 32-bit floats"
         )
     linear = as_rgb(to_linear(raster, resolve_transfer(transfer, raster)))
     return np.where(np.isfinite(linear) & (linear > 0), linear, np.float32(0))
@@ -83,7 +116,8 @@ def _refuse_constant(values: np.ndarray, what: str) -> None:
     first = values.reshape(-1, values.shape[-1])[0]
     if (values == first).all():
         raise InputError(
-            f"{what} is {'the same' if first.any() else 'black'}: there is nothing to recover; use another photo"
+            f"{what} is {'the same' if first.any() else 'black'}: there is nothing to recover; use "
+            "another photo"
         )
 
 
@@ -100,7 +134,8 @@ def _valid_light(linear: np.ndarray, mask: np.ndarray, path: str | Path) -> np.n
         count = int((bad & mask).sum())
         if count:
             raise InputError(
-                f"{path}: {count} pixels inside the mask are {what}: mend them, or leave them out of the mask"
+                f"{path}: {count} pixels inside the mask are {what}: mend them, or leave them out "
+                "of the mask"
             )
         if bad.any():
             linear = np.where(bad[..., None], np.float32(0), linear)

@@ -24,6 +24,22 @@ TRANSFERS = ("auto", "srgb", "linear")
 
 
 def resolve_transfer(transfer: str, raster: Raster) -> str:
+    """Return the transfer curve to use, "srgb" or "linear".
+
+    Parameters
+    ----------
+    transfer : {"auto", "srgb", "linear"}
+    raster : Raster
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        If the name is unknown.
+    """
     if transfer not in TRANSFERS:
         raise InputError(f"--transfer {transfer}: choose one of {', '.join(TRANSFERS)}")
     if transfer == "auto":
@@ -32,8 +48,18 @@ def resolve_transfer(transfer: str, raster: Raster) -> str:
 
 
 def to_linear(raster: Raster, transfer: str) -> np.ndarray:
-    """(H, W, 1 or 3) float32 linear light; integer codes go through a table, so that each has one
-    exact value.
+    """Convert a raster to linear light.
+
+    Integer codes go through a table, so that each code has one exact value.
+
+    Parameters
+    ----------
+    raster : Raster
+    transfer : {"srgb", "linear"}
+
+    Returns
+    -------
+    (H, W, 1 or 3) float32 ndarray
     """
     decode: Callable[[np.ndarray], np.ndarray] = (
         srgb_to_linear if transfer == "srgb" else np.asarray
@@ -47,9 +73,20 @@ def to_linear(raster: Raster, transfer: str) -> np.ndarray:
 
 
 def encode_like(raster: Raster, transfer: str, image: np.ndarray, changed: np.ndarray) -> Raster:
-    """`raster` with `image` (H, W, 3), linear, coded as the file is ("srgb" or "linear") where
-    `changed` (H, W); other values stay bit by bit. Codes are rounded and cut to the coding's range;
-    a grey file gets three channels if its new pixels have colour.
+    """Encode an image as a raster is encoded, where it changed; other values keep every bit.
+
+    Parameters
+    ----------
+    raster : Raster
+        A grey one gets three channels if the new pixels have colour.
+    transfer : {"srgb", "linear"}
+    image : (H, W, 3) ndarray
+        Linear; codes are rounded and clipped to the coding's range.
+    changed : (H, W) bool ndarray
+
+    Returns
+    -------
+    Raster
     """
     values = raster.values
     if values.shape[2] == 1 and (np.ptp(image[changed], axis=-1) > 0).any():

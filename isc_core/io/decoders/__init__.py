@@ -1,4 +1,4 @@
-"""Image files to arrays: one format a file, told apart by their first bytes, not by their names."""
+"""Image files to arrays: one format a file, recognised by their first bytes, not by their names."""
 
 import hashlib
 import struct
@@ -58,9 +58,21 @@ _READERS: tuple[tuple[bytes, str, Callable[[bytes, Path, Limits], Raster]], ...]
 
 
 def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
-    """The values that an image file stores, upright.
+    """Read the values that an image file stores, upright.
 
-    Raises `InputError` where it is missing, damaged, too large or of no known kind.
+    Parameters
+    ----------
+    path : str or Path
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, too large or of an unknown format.
     """
     path = Path(path)
     if path.is_dir():
@@ -81,7 +93,8 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
     )
     if reader is None:
         raise InputError(
-            f"{path}: not an image of a known kind (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, NPY): convert it to PNG"
+            f"{path}: not an image of a known kind (PNG, JPEG, TIFF, EXR, HDR, BMP, PPM, PGM, "
+            "NPY): convert it to PNG"
         )
     try:
         with suppress_native_output():
@@ -90,7 +103,8 @@ def read_raster(path: str | Path, limits: Limits = USUAL) -> Raster:
         raise
     except _DECODING_ERRORS as error:
         raise InputError(
-            f"{path}: the {kind} file is damaged, incomplete or of an unusual kind: save it again as a plain PNG"
+            f"{path}: the {kind} file is damaged, incomplete or of an unusual kind: save it again "
+            "as a plain PNG"
         ) from error
     values = np.ascontiguousarray(raster.values)
     return replace(raster, values=values, sha256=hashlib.sha256(data).hexdigest())

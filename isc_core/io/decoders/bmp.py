@@ -11,4 +11,5 @@ from .raster import Raster
 
 
 def read_bmp(data: bytes, path: Path, limits: Limits) -> Raster:
+    """Decode a Windows bitmap."""
     return decode_pillow(BmpImagePlugin.BmpImageFile(io.BytesIO(data)), path, limits)

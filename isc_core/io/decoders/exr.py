@@ -15,8 +15,9 @@ from .raster import Raster, check_size, raster_of_codes
 
 
 def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
-    """The RGB or Y channels, and A, which EXR colours are premultiplied by; the frame is the
-    display window, black without data.
+    """Decode the RGB or Y channels, and A, which EXR colours are premultiplied by.
+
+    The frame is the display window, black where it has no data.
     """
     for claimed in check_exr(data, path, limits):
         for window in (claimed.data, claimed.display):
@@ -64,10 +65,12 @@ def _exr_channels(names: list[str], path: Path) -> list[str]:
             return [layers[chosen][c] for c in wanted + "A" if c in layers[chosen]]
         if fitting:
             raise InputError(
-                f"{path}: which layer is the photo: {', '.join(fitting)}? Save that one as an EXR of its own"
+                f"{path}: which layer is the photo: {', '.join(fitting)}? Save that one as an EXR "
+                "of its own"
             )
     raise InputError(
-        f"{path}: has no R, G, B and no Y channels but {', '.join(names[:8])}: save it as a plain RGB EXR"
+        f"{path}: has no R, G, B and no Y channels but {', '.join(names[:8])}: save it as a plain "
+        "RGB EXR"
     )
 
 

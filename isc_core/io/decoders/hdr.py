@@ -9,6 +9,7 @@ from .raster import Raster, check_size, raster_of_codes
 
 
 def read_hdr(data: bytes, path: Path, limits: Limits) -> Raster:
+    """Decode a Radiance HDR."""
     size = re.search(rb"\n-Y (\d+) \+X (\d+)\n", data)
     if size is None:
         raise ValueError("no upright resolution line")

@@ -11,4 +11,5 @@ from .raster import Raster
 
 
 def read_jpeg(data: bytes, path: Path, limits: Limits) -> Raster:
+    """Decode a JPEG."""
     return decode_pillow(JpegImagePlugin.JpegImageFile(io.BytesIO(data)), path, limits)

@@ -12,18 +12,20 @@ from .raster import Raster, check_size, raster_of_codes
 
 
 def read_npy(data: bytes, path: Path, limits: Limits) -> Raster:
-    """(H, W), (H, W, 1), (H, W, 3) or (H, W, 4), alpha last and not multiplied in.
+    """Decode a NumPy array (H, W), (H, W, 1), (H, W, 3) or (H, W, 4).
 
-    The header alone says how much is to come.
+    Alpha comes last and is not multiplied in. The size is checked by the header alone.
     """
     shape, by_columns, kind, start = array_header(data)
     if len(shape) not in (2, 3) or shape[2:] not in ((), (1,), (3,), (4,)):
         raise InputError(
-            f"{path}: an array of shape {shape}: a photo is (H, W, 3), or (H, W, 4) with alpha, a mask (H, W)"
+            f"{path}: an array of shape {shape}: a photo is (H, W, 3), or (H, W, 4) with alpha, a "
+            "mask (H, W)"
         )
     if kind.kind not in "fbu" or kind.itemsize > 8 or (kind.kind == "u" and kind.itemsize > 2):
         raise InputError(
-            f"{path}: values of type {kind}: give floats of linear light, codes of 8 or 16 bits (uint8, uint16), or bool"
+            f"{path}: values of type {kind}: give floats of linear light, codes of 8 or 16 bits "
+            "(uint8, uint16), or bool"
         )
     check_size(path, limits, shape[1], shape[0])
     stored = np.frombuffer(data, kind, math.prod(shape), start).reshape(

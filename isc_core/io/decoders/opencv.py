@@ -5,9 +5,20 @@ import numpy as np
 
 
 def decode_opencv(data: bytes) -> np.ndarray:
-    """(H, W) or (H, W, C) in RGB(A) order, bits and values as stored.
+    """Decode an image with its bits and values as stored, channels in RGB(A) order.
 
-    Raises ValueError where OpenCV gives nothing.
+    Parameters
+    ----------
+    data : bytes
+
+    Returns
+    -------
+    (H, W) or (H, W, C) ndarray
+
+    Raises
+    ------
+    ValueError
+        If OpenCV cannot decode it.
     """
     pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
     if pixels is None:

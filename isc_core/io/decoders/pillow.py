@@ -14,6 +14,7 @@ _ORIENTATION_TAG = 0x0112
 
 
 def exif_orientation(image: Image.Image) -> int:
+    """Return the EXIF orientation of an image, 1 if unknown."""
     try:
         return int(image.getexif().get(_ORIENTATION_TAG, 1))
     except (OSError, SyntaxError, ValueError, TypeError, KeyError, struct.error):
@@ -23,14 +24,31 @@ def exif_orientation(image: Image.Image) -> int:
 
 
 def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool = False) -> Raster:
-    """`oriented`: the decoder turns the image itself.
+    """Decode an image of 8 bits a channel. Stricter than OpenCV: a truncated file raises OSError.
 
-    Stricter than OpenCV: a file cut short raises OSError.
+    Parameters
+    ----------
+    image : PIL.Image.Image
+    path : Path
+        Opens the error message.
+    limits : Limits
+    oriented : bool
+        Whether the decoder applies the orientation itself.
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the size or the colour mode is not supported.
     """
     check_size(path, limits, *image.size)
     if image.mode in ("CMYK", "LAB", "HSV"):
         raise InputError(
-            f"{path}: its colours are {image.mode}, made for printing or editing: convert it to RGB, for example as a PNG"
+            f"{path}: its colours are {image.mode}, made for printing or editing: convert it to "
+            "RGB, for example as a PNG"
         )
     orientation = 1 if oriented else exif_orientation(image)
     image.load()
@@ -49,5 +67,6 @@ def decode_pillow(image: Image.Image, path: Path, limits: Limits, oriented: bool
     ):
         return raster_of_codes(np.asarray(image.convert(mode)), 255, orientation)
     raise InputError(
-        f"{path}: pixels of kind {image.mode} are not read: convert it to an 8- or 16-bit PNG or an EXR"
+        f"{path}: pixels of kind {image.mode} are not read: convert it to an 8- or 16-bit PNG or "
+        "an EXR"
     )

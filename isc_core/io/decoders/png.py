@@ -1,4 +1,4 @@
-"""PNG files, of 8 and 16 bits; and writing them."""
+"""PNG files of 8 and 16 bits a channel, and writing them."""
 
 import errno
 import io
@@ -17,8 +17,10 @@ from .raster import Raster, as_rgb, check_size, raster_of_codes
 
 
 def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
-    """16 bits go through OpenCV, for Pillow would cut RGB to 8; each chunk's checksum is verified
-    first, which decoders skip.
+    """Decode a PNG.
+
+    16 bits go through OpenCV, because Pillow reduces RGB to 8. The checksum of each chunk is
+    verified first, which decoders skip.
     """
     width, height, bits = struct.unpack(">IIB", data[16:25])
     check_size(path, limits, width, height)
@@ -52,9 +54,18 @@ def _plain_png(data: bytes) -> bytes:
 
 
 def write_png(path: Path, raster: Raster) -> None:
-    """Writes integer codes and their alpha as a PNG of 8 or 16 bits, as they are.
+    """Write integer codes and their alpha as a PNG of 8 or 16 bits, unchanged.
 
-    Raises `OSError` when it cannot be written.
+    Parameters
+    ----------
+    path : Path
+    raster : Raster
+        Of integer codes.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be written.
     """
     assert raster.peak is not None, "floats have no codes"
     kind = raster.values.dtype

@@ -13,6 +13,7 @@ from .raster import Raster, check_size, raster_of_codes
 
 
 def read_pnm(data: bytes, path: Path, limits: Limits) -> Raster:
+    """Decode a PPM or PGM."""
     gap = rb"(?:\s|#[^\n]*\n)+"
     header = re.match(rb"P([56])" + gap + rb"(\d+)" + gap + rb"(\d+)" + gap + rb"(\d+)\s", data)
     if header is None or int(header[4]) < 256:

@@ -14,12 +14,20 @@ MIN_SIDE = 8
 
 @dataclass(frozen=True)
 class Raster:
-    """What an image file stores, upright (its rotation flag applied), before any transfer curve.
+    """What an image file stores, upright (its orientation applied), before any transfer curve.
 
-    `values`: (H, W, 1) grey or (H, W, 3) RGB; uint8 or uint16 codes, or float32.
-    `alpha`: (H, W) float32 in [0, 1], or None. `values` are not multiplied by it.
-    `peak`: the largest code that the file can hold; None for floats.
-    `bit_depth`: bits a channel. `sha256`: of the whole file.
+    Attributes
+    ----------
+    values : (H, W, 1) or (H, W, 3) ndarray
+        Grey or RGB; uint8 or uint16 codes, or float32. Not multiplied by alpha.
+    alpha : (H, W) float32 ndarray or None
+        In [0, 1].
+    peak : int or None
+        Largest code the file can hold; None for floats.
+    bit_depth : int
+        Bits a channel.
+    sha256 : str
+        Of the whole file.
     """
 
     values: np.ndarray
@@ -30,28 +38,53 @@ class Raster:
 
     @property
     def transparency(self) -> np.ndarray | None:
-        """The alpha channel where it tells something: None where it is opaque everywhere."""
+        """The alpha channel, or None where it is opaque everywhere."""
         return None if self.alpha is None or not (self.alpha < 1).any() else self.alpha
 
 
 def check_size(path: Path, limits: Limits, width: int, height: int) -> None:
-    """Refuses, from the header alone, what would not fit or cannot be an object's photo."""
+    """Raise `InputError` for a size that does not fit or cannot be a photo of an object.
+
+    Parameters
+    ----------
+    path : Path
+        Opens the error message.
+    limits : Limits
+    width, height : int
+        From the header alone.
+    """
     limits.check_pixels(path, width, height)
     if min(width, height) < MIN_SIDE:
         raise InputError(
-            f"{path}: {width} x {height} pixels; at least {MIN_SIDE} are needed both ways: use a larger photo"
+            f"{path}: {width} x {height} pixels; at least {MIN_SIDE} are needed both ways: use a "
+            "larger photo"
         )
     if max(width, height) > MAX_ASPECT * min(width, height):
         raise InputError(
-            f"{path}: {width} x {height} pixels; one side is over {MAX_ASPECT} times the other: crop it to the object"
+            f"{path}: {width} x {height} pixels; one side is over {MAX_ASPECT} times the other: "
+            "crop it to the object"
         )
 
 
 def raster_of_codes(
     codes: np.ndarray, peak: int, orientation: int = 1, premultiplied: bool = False
 ) -> Raster:
-    """A raster of (H, W), (H, W, 1), (H, W, 3) or (H, W, 4) integer codes or float values, alpha
-    last.
+    """Build a raster from integer codes or floats.
+
+    Parameters
+    ----------
+    codes : ndarray
+        (H, W), (H, W, 1), (H, W, 3) or (H, W, 4), alpha last.
+    peak : int
+        Largest code; ignored for floats.
+    orientation : int
+        EXIF orientation.
+    premultiplied : bool
+        Whether colours are multiplied by alpha.
+
+    Returns
+    -------
+    Raster
     """
     codes = _upright(codes if codes.ndim == 3 else codes[..., None], orientation)
     is_float = codes.dtype.kind == "f"
@@ -82,4 +115,5 @@ def _upright(pixels: np.ndarray, orientation: int) -> np.ndarray:
 
 
 def as_rgb(values: np.ndarray) -> np.ndarray:
+    """Repeat a single channel three times: (H, W, 3) of (H, W, 1 or 3)."""
     return np.repeat(values, 3, axis=2) if values.shape[2] == 1 else values

@@ -18,9 +18,7 @@ _TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (339, 1), (338, 0))
 
 
 def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
-    """8 bits go through Pillow, 16 bits and floats through OpenCV; both apply the rotation flag
-    themselves.
-    """
+    """Decode a TIFF: 8 bits by Pillow, 16 bits and floats by OpenCV, which apply the orientation."""
     stream = io.BytesIO(data)
     tags = TiffImagePlugin.ImageFileDirectory_v2(
         stream.read(16 if data[2:3] == b"+" or data[3:4] == b"+" else 8)
@@ -33,7 +31,8 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
     )
     if photometric == 5:
         raise InputError(
-            f"{path}: its colours are CMYK, made for printing: convert it to RGB, for example as a PNG"
+            f"{path}: its colours are CMYK, made for printing: convert it to RGB, for example as a "
+            "PNG"
         )
     if bits <= 8:
         return decode_pillow(
@@ -47,7 +46,8 @@ def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
         or samples != (pixels.shape[2] if pixels.ndim == 3 else 1)
     ):
         raise InputError(
-            f"{path}: a TIFF with {samples} channels of {bits} bits of this kind is not read: save it as a 16-bit RGB PNG"
+            f"{path}: a TIFF with {samples} channels of {bits} bits of this kind is not read: save "
+            "it as a 16-bit RGB PNG"
         )
     if pixels.dtype.kind == "f":
         pixels = pixels.astype(np.float32)
