@@ -14,7 +14,10 @@ puts back.
 
 Attributes
 ----------
-process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process that writes the same name removes siblings without a lock, which belong to killed processes. The lock is on the sibling itself, not on a lock file beside it, so that it moves with the rename: that is why `flock` is used here and not the library `filelock`.
+process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process
+that writes the same name removes siblings without a lock, which belong to killed processes. The
+lock is on the sibling itself, not on a lock file beside it, so that it moves with the rename: that
+is why `flock` is used here and not the library `filelock`.
 """
 
 import contextlib
@@ -274,7 +277,7 @@ def _resolved(path: Path | str) -> Path:
 
 
 def _label(target: Path) -> str:
-    """The target's part of a sibling's name; a digest of names so long that nothing could be added."""
+    """The target's part of a sibling's name; a digest of names that are too long."""
     coded = os.fsencode(target.name)
     return target.name if len(coded) <= _LONGEST else hashlib.sha256(coded).hexdigest()
 
@@ -459,7 +462,7 @@ def _put_in_place(partial: Path, target: Path) -> None:
 
 
 def _exchanged(one: Path, other: Path) -> bool:
-    """Gives two folders each other's name in one step; false where the system or the disk cannot."""
+    """Exchange the names of two folders in one step; False if this is not supported."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except (AttributeError, OSError, TypeError):

@@ -46,7 +46,7 @@ class Limits:
             )
 
     def check_stored(self, path: Path | str, stored: int) -> None:
-        """Raise `InputError` for a file larger than `max_bytes`, because it is held in memory whole."""
+        """Raise `InputError` for a file larger than `max_bytes`; it would be held in memory."""
         if stored > self.max_bytes:
             raise InputError(
                 f"{path} has {stored / 1e9:.1f} GB; at most {self.max_bytes / 1e9:.1f} GB are "

@@ -76,7 +76,7 @@ class Photo:
         return mask_box(self.mask)
 
     def resized_to_object(self, max_size: int = 512) -> "Photo":
-        """Downscale the photo so that the long side of the mask's box has at most `max_size` pixels.
+        """Downscale the photo to an object of at most `max_size` pixels.
 
         Linear light is averaged over the area of each new pixel, object and background apart; the
         mask is where the object covers half.
@@ -84,7 +84,7 @@ class Photo:
         Parameters
         ----------
         max_size : int
-            0 keeps the size; photos are never enlarged.
+            Long side of the mask's box; 0 keeps the size. Photos are never enlarged.
 
         Returns
         -------

@@ -18,7 +18,7 @@ _TIFF_TAGS = ((258, 1), (277, 1), (262, -1), (339, 1), (338, 0))
 
 
 def read_tiff(data: bytes, path: Path, limits: Limits) -> Raster:
-    """Decode a TIFF: 8 bits by Pillow, 16 bits and floats by OpenCV, which apply the orientation."""
+    """Decode a TIFF: 8 bits by Pillow, others by OpenCV, which apply the orientation."""
     stream = io.BytesIO(data)
     tags = TiffImagePlugin.ImageFileDirectory_v2(
         stream.read(16 if data[2:3] == b"+" or data[3:4] == b"+" else 8)
