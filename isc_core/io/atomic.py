@@ -6,18 +6,16 @@ replaced only then, in one step where the system supports it (Linux), and a fold
 everything in it is of the kind that this program writes: foreign files are never deleted.
 
 
+A process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process
+that writes the same name removes siblings without a lock, which belong to killed processes. The
+lock is on the sibling itself, not on a lock file beside it, so that it moves with the rename: that
+is why `flock` is used here and not the library `filelock`.
+
 Limits: without such locks (Windows, some network disks) and for other machines, siblings of killed
 processes stay; delete them by hand, or by `remove_unfinished` where nobody else is at work. What is
 removed is renamed to `.NAME.xxxxxxxx.gone` first. Without the exchange in one step, a process
 killed between two renames leaves the old content as `.NAME.xxxxxxxx.old`, which the next process
 puts back.
-
-Attributes
-----------
-process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process
-that writes the same name removes siblings without a lock, which belong to killed processes. The
-lock is on the sibling itself, not on a lock file beside it, so that it moves with the rename: that
-is why `flock` is used here and not the library `filelock`.
 """
 
 import contextlib
