@@ -5,7 +5,6 @@ once it is complete, so that the final name never holds half of a result. What s
 replaced only then, in one step where the system supports it (Linux), and a folder only if
 everything in it is of the kind that this program writes: foreign files are never deleted.
 
-
 A process at work holds a lock on its temporary sibling, `.NAME.xxxxxxxx.partial`. The next process
 that writes the same name removes siblings without a lock, which belong to killed processes. The
 lock is on the sibling itself, not on a lock file beside it, so that it moves with the rename: that
