@@ -21,7 +21,8 @@ def declare(commands: Commands) -> None:
         "arrays",
         run,
         "a result as plain NumPy arrays",
-        f"Adds {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, for programs that have NumPy alone. "
+        f"Adds {ARRAYS} to the folder of a result: maps, mesh, light and gloss as plain arrays, "
+        "for programs that have NumPy alone. "
         "isc decompose --arrays writes it at once.",
         _EXAMPLES,
     )

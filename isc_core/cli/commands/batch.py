@@ -42,7 +42,8 @@ def declare(commands: Commands) -> None:
         "batch",
         run,
         "isc decompose for many photos, resumable",
-        "Decomposes many photos, one folder each in DIR. Writes summary.html (look at this first), summary.csv, summary.jsonl and "
+        "Decomposes many photos, one folder each in DIR. Writes summary.html (look at this first), "
+        "summary.csv, summary.jsonl and "
         "failures.jsonl beside them.",
         _EXAMPLES,
     )
@@ -120,10 +121,12 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     look = f"look at {options.output / 'summary.html'}"
     if counts[FAILED]:
         raise Rejected(
-            f"{counts[FAILED]} of {sum(counts.values())} images failed, the reasons are in failures.jsonl: {look}"
+            f"{counts[FAILED]} of {sum(counts.values())} images failed, the reasons are in "
+            f"failures.jsonl: {look}"
         )
     done, there = counts[DONE], counts[SKIPPED]
     return hints(
         options,
-        f"{done} image{'s' * (done != 1)} done, {there} {'was' if there == 1 else 'were'} there already: {look}",
+        f"{done} image{'s' * (done != 1)} done, {there} {'was' if there == 1 else 'were'} there "
+        f"already: {look}",
     )

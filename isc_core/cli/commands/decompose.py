@@ -4,7 +4,7 @@ import argparse
 from dataclasses import fields
 from pathlib import Path
 
-from ...decompose.pipeline import Evidence, Settings, decompose
+from ...decompose.pipeline import KnownInputs, Settings, decompose
 from ...photo import Photo, read_photo
 from ...progress import Monitor
 from ...result_files.known_inputs import read_height, read_light
@@ -39,7 +39,8 @@ def declare(commands: Commands) -> None:
         "decompose",
         run,
         "everything: layers, shape, light, shading, reflectance, mesh",
-        "Takes a photo of one glossy object apart: diffuse and specular light, shape, illumination, shading, reflectance. Writes a folder "
+        "Takes a photo of one glossy object apart: diffuse and specular light, shape, "
+        "illumination, shading, reflectance. Writes a folder "
         "with preview.png (look at this first), maps.exr, mesh.glb and decomposition.json.",
         _EXAMPLES,
     )
@@ -58,7 +59,7 @@ def declare(commands: Commands) -> None:
 
 
 def _add_evidence(parser: argparse.ArgumentParser) -> None:
-    usual = Evidence()
+    usual = KnownInputs()
     known = parser.add_argument_group("what is known already")
     known.add_argument(
         "--shape",
@@ -122,9 +123,9 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     )
 
 
-def _evidence(options: argparse.Namespace, photo: Photo) -> Evidence:
+def _evidence(options: argparse.Namespace, photo: Photo) -> KnownInputs:
     size, scale, limits = photo.mask.shape, options.height_scale, limits_of(options)
-    return Evidence(
+    return KnownInputs(
         height=None if options.shape is None else read_height(options.shape, size, scale, limits),
         light=None if options.light is None else read_light(options.light),
         depth=None if options.depth is None else read_height(options.depth, size, scale, limits),

@@ -31,7 +31,8 @@ def declare(commands: Commands) -> None:
         "evaluate",
         run,
         "accuracy on a data set with ground truth",
-        "Prints the errors of height, normals, shading, reflectance and light for each object, and their geometric means.",
+        "Prints the errors of height, normals, shading, reflectance and light for each object, "
+        "and their geometric means.",
         _EXAMPLES,
     )
     parser.add_argument("root", metavar="ROOT", type=Path, help="the folder of the data set")

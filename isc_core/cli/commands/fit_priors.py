@@ -23,7 +23,8 @@ def declare(commands: Commands) -> None:
         "fit-priors",
         run,
         "learn the statistics of shapes, paints and lights anew",
-        "Fits the priors of SIRFS to the objects of a data set (the MIT-Berkeley set, with natural_lights.mat) and writes them to a file "
+        "Fits the priors of SIRFS to the objects of a data set (the MIT-Berkeley set, with "
+        "natural_lights.mat) and writes them to a file "
         "for --priors.",
         _EXAMPLES,
     )

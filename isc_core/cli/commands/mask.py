@@ -17,7 +17,8 @@ def declare(commands: Commands) -> None:
         "mask",
         run,
         "cut the object out of a box drawn around it",
-        "Finds the object inside a box and writes its mask, white on black. Look at it before you use it: colours alone decide.",
+        "Finds the object inside a box and writes its mask, white on black. Look at it before you "
+        "use it: colours alone decide.",
         _EXAMPLES,
     )
     parser.add_argument("photo", metavar="PHOTO", type=Path, help="the photo, as for isc decompose")

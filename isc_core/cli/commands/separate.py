@@ -30,7 +30,8 @@ def declare(commands: Commands) -> None:
         "separate",
         run,
         "diffuse and specular light only",
-        "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and pictures of both. A photo without mask, "
+        "Splits a photo into diffuse and specular light. Writes a folder with separation.exr and "
+        "pictures of both. A photo without mask, "
         "transparency and black border is taken as a whole.",
         _EXAMPLES,
     )

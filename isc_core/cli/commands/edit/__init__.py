@@ -1,0 +1,178 @@
+"""`isc edit`: another light, gloss or colour for a decomposed photo; one file an action."""
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from ....editing.edit_folder import Original, Record, Sheet, require_writable_edit, save_edit
+from ....errors import InputError
+from ....imaging.srgb import linear_to_srgb
+from ....photo import read_photo, read_raster
+from ....progress import Monitor
+from ....result_files.result_folder import load
+from ....scene.decomposition import Decomposition
+from ...interface.options import Commands, Parser, add_command, hints, limits_of
+from . import dichromatic, gloss, highlight, light_direction, recolour, relight
+from .action import ActionResult, EditAction
+from .options import add_common, plain
+
+_EXAMPLES = """  isc edit cup light-direction -o light                                where the light is, and how sure that is
+  isc edit cup highlight --direction -0.5 0.6 0.6 -o glint             a new highlight
+  isc edit cup gloss --look metallic -o metal
+  isc edit cup dichromatic --remove specular --photo cup.png -o matt   the same in the photo itself, at its size
+  isc edit cup recolour --cluster 2 --color 2060c0 -o blue             clusters.png shows the parts
+  isc edit cup relight --yaw 60 -o turned
+
+every action takes --photo, --mask, --transfer and -o; `isc edit RESULT ACTION --help` shows what else."""
+
+
+_NOT_PARAMETERS = ("run", "act", "quiet", "progress", "output", "action", "usual", "max_pixels")
+
+
+ACTIONS: tuple[EditAction, ...] = (
+    light_direction.ACTION,
+    highlight.ACTION,
+    gloss.ACTION,
+    dichromatic.ACTION,
+    recolour.ACTION,
+    relight.ACTION,
+)
+
+
+def declare(commands: Commands) -> None:
+    """Adds the command to the parser."""
+    parser = add_command(
+        commands,
+        "edit",
+        run,
+        "other light, gloss or colour for a decomposed photo",
+        "Edits what isc decompose found: RESULT is its folder. Writes a folder with the picture "
+        "(edited.png, edited.exr), "
+        "before_after.png (look at this first) and edit.json. With --photo the edit is brought "
+        "back into the photo, "
+        "at its size and in its coding.",
+        _EXAMPLES,
+    )
+    parser.add_argument(
+        "result", type=Path, metavar="RESULT", help="a folder that isc decompose wrote"
+    )
+    actions = parser.add_subparsers(
+        title="actions", metavar="ACTION", required=True, dest="action", parser_class=Parser
+    )
+    for action in ACTIONS:
+        added = actions.add_parser(
+            action.name,
+            help=action.summary,
+            description=f"{action.summary[0].upper()}{action.summary[1:]}.",
+        )
+        added.set_defaults(act=action.act)
+        action.add_options(added)
+        add_common(added)
+
+
+def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
+    """Does the work; what can be wrong is found before anything is written."""
+    read = (getattr(options, name, None) for name in ("photo", "mask", "region", "light"))
+    require_writable_edit(options.output, read)
+    if options.photo is None and (options.mask is not None or options.transfer is not None):
+        raise InputError("--mask and --transfer say how --photo is read: give it too")
+    monitor.report("reading", 0.0)
+    d = load(options.result)
+    if not d.mask.any():
+        raise InputError(
+            f"{options.result} has an empty mask: it is damaged; decompose the photo again"
+        )
+    _require_sound(d, options.result)
+    monitor.report("editing", 0.2)
+    done = options.act(d, options)
+    original = None if options.photo is None else _original(d, options)
+    notes = [*done.edit.notes, *_notes(d, done, original)]
+    monitor.report("writing", 0.7)
+    parameters = {
+        name: plain(value) for name, value in vars(options).items() if name not in _NOT_PARAMETERS
+    }
+    name = Path(str(d.provenance.input.get("name", ""))).name or options.result.name
+    sheet = Sheet(f"{name}: {options.action}", _changed_options(options), done.panels, done.layers)
+    record = Record(options.action, parameters, done.measured)
+    edit = replace(done.edit, notes=tuple(notes))
+    save_edit(d, edit, options.output, record, sheet, original=original, clusters=done.clusters)
+    monitor.report("writing", 1.0)
+    return [
+        *done.lines,
+        *hints(
+            options,
+            *(f"note: {note}" for note in notes),
+            f"look at {options.output / 'before_after.png'}",
+        ),
+    ]
+
+
+def _require_sound(d: Decomposition, folder: Path) -> None:
+    """Raises `InputError` for a result that no decomposition gives: an edit would divide by its
+    zeros.
+    """
+    broken = list(d.identity_errors().broken())
+    broken += [
+        f"{name} >= 0"
+        for name in ("image", "diffuse", "specular", "reflectance", "shading")
+        if getattr(d, name)[d.mask].min() < 0
+    ]
+    if broken:
+        raise InputError(
+            f"{folder} does not keep to {broken[0]}: it is damaged; decompose the photo again"
+        )
+
+
+def _notes(d: Decomposition, done: ActionResult, original: Original | None) -> list[str]:
+    """What is to be said beside what the edit itself says."""
+    notes = []
+    if original is not None and d.provenance.input.get("sha256") != original.photo.original.sha256:
+        notes.append(
+            "the photo's file is not the one that was decomposed; the edit is brought into it all "
+            "the same"
+        )
+    if done.layers and np.array_equal(done.edit.image, d.image):
+        notes.append("the picture stays as it was: nothing of what was asked for changes it")
+    return notes
+
+
+def _changed_options(options: argparse.Namespace) -> str:
+    """What differs from the usual, for the sheet."""
+    skip = (*_NOT_PARAMETERS, "result", "photo", "mask", "transfer")
+    words = []
+    for name, value in vars(options).items():
+        if (
+            name in skip
+            or value is None
+            or value is False
+            or np.array_equal(value, options.usual.get(name))
+        ):
+            continue
+        shown = value
+        if isinstance(value, np.ndarray):
+            shown = "".join(
+                f"{code:02x}" for code in np.rint(255 * linear_to_srgb(value)).astype(int)
+            )
+        elif isinstance(value, list):
+            shown = " ".join(f"{n:g}" for n in value)
+        words.append(
+            name.replace("_", "-") if value is True else f"{name.replace('_', '-')} {shown}"
+        )
+    return "   ·   ".join(map(str, words))
+
+
+def _original(d: Decomposition, options: argparse.Namespace) -> Original:
+    given = d.provenance.input
+    transfer = options.transfer or str(given.get("transfer", "auto"))
+    if given.get("mask_from") == "file" and options.mask is None:
+        raise InputError(
+            "the result was made with a mask of its own: give the same one with --mask"
+        )
+    limits = limits_of(options)
+    photo = read_photo(options.photo, options.mask, transfer, limits=limits)
+    raster = read_raster(options.photo, limits)
+    if raster.sha256 != photo.original.sha256:
+        raise InputError(f"{options.photo} changed while it was read: run the command again")
+    return Original(photo, raster, options.photo)

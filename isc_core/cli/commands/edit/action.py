@@ -1,0 +1,60 @@
+"""What every action of `isc edit` declares, and what it returns."""
+
+import argparse
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from ....editing.clusters import Clusters
+from ....editing.edited import Edited
+from ....result_files.contact_sheet import Panel
+from ....scene.decomposition import Decomposition
+
+
+@dataclass(frozen=True)
+class ActionResult:
+    """What an action returns.
+
+    Attributes
+    ----------
+    edit : Edited
+        The edited layers.
+    measured : mapping
+        Measurements, ready for JSON.
+    panels : tuple of Panel
+        Panels for the contact sheet.
+    clusters : Clusters or None
+        The clusters of reflectance, where the action found them.
+    lines : tuple of str
+        Lines to print.
+    layers : bool
+        Whether the contact sheet shows the layers.
+    """
+
+    edit: Edited
+    measured: Mapping[str, object]
+    panels: tuple[Panel, ...] = ()
+    clusters: Clusters | None = None
+    lines: tuple[str, ...] = ()
+    layers: bool = True
+
+
+@dataclass(frozen=True)
+class EditAction:
+    """One action of `isc edit`.
+
+    Attributes
+    ----------
+    name : str
+        As typed on the command line.
+    summary : str
+        One line of help.
+    act : callable
+        Does the work.
+    add_options : callable
+        Adds the action's options to its parser.
+    """
+
+    name: str
+    summary: str
+    act: Callable[[Decomposition, argparse.Namespace], ActionResult]
+    add_options: Callable[[argparse.ArgumentParser], None]

@@ -1,0 +1,54 @@
+"""`isc edit RESULT dichromatic`: the diffuse and the specular layer, edited separately."""
+
+import argparse
+
+from ....editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
+from ....errors import InputError
+from ....scene.decomposition import Decomposition
+from .action import ActionResult, EditAction
+from .options import number
+
+
+def edit(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+    layers = []
+    for layer in ("diffuse", "specular"):
+        values = {
+            name: getattr(options, f"{layer}_{name}")
+            for name in ("gain", "gamma", "sharpen", "radius")
+        }
+        if options.remove == layer:
+            if LayerEdit(**values) != LayerEdit():
+                raise InputError(
+                    f"--remove {layer} leaves nothing that --{layer}-... could change: give one of "
+                    "them"
+                )
+            values["gain"] = 0.0
+        layers.append(LayerEdit(**values))
+    return ActionResult(edit_layers(d, DichromaticEdit(*layers)), {})
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    usual = LayerEdit()
+    parser.add_argument(
+        "--remove", choices=("diffuse", "specular"), help="leave the other layer alone"
+    )
+    for layer in ("diffuse", "specular"):
+        group = parser.add_argument_group(f"the {layer} layer")
+        for name, text in (
+            ("gain", "factor of its light, from 0 on"),
+            ("gamma", "above 1: more contrast"),
+            ("sharpen", "how much detail is added; -1 takes it away"),
+            ("radius", "what counts as detail, in pixels of the maps"),
+        ):
+            group.add_argument(
+                f"--{layer}-{name}",
+                type=number,
+                default=getattr(usual, name),
+                metavar="N",
+                help=f"{text} (default %(default)s)",
+            )
+
+
+ACTION = EditAction(
+    "dichromatic", "the diffuse and the specular layer, edited separately", edit, add_options
+)

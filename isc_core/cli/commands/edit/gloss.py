@@ -1,0 +1,68 @@
+"""`isc edit RESULT gloss`: sharper, rougher or metallic gloss."""
+
+import argparse
+
+from ....editing.blinn_phong_extension import METHODS, Gloss, change_gloss
+from ....errors import InputError
+from ....scene.decomposition import Decomposition
+from .action import ActionResult, EditAction
+from .options import number
+
+_LOOKS = {
+    "glossier": {"sharper": 2.5, "gain": 1.5},
+    "rougher": {"sharper": 0.4},
+    "metallic": {"metal": 1.0},
+}
+
+
+def change(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+    usual: dict[str, float] = _LOOKS.get(options.look, {})
+    if options.present is not None and options.exponent is None and "sharper" not in usual:
+        raise InputError(
+            "--present says how sharp the gloss is now: say how sharp it shall be, with --exponent "
+            "or --look"
+        )
+    if options.exponent is not None and "sharper" in usual:
+        raise InputError(
+            f"--exponent says how sharp, and so does --look {options.look}: give one of them"
+        )
+    sharper = usual.get("sharper", 1.0)
+    metal = options.metal if options.metal is not None else usual.get("metal", 0.0)
+    gain = options.gain if options.gain is not None else usual.get("gain", 1.0)
+    gloss = Gloss(options.exponent, sharper, options.present, gain, metal, options.method)
+    return ActionResult(change_gloss(d, gloss), {})
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--look",
+        choices=tuple(_LOOKS),
+        help="a good start: a sharper and stronger lobe, a wider one, or metal",
+    )
+    parser.add_argument(
+        "--exponent", type=number, metavar="P", help="the new Blinn-Phong exponent, 1 to 1e5"
+    )
+    parser.add_argument(
+        "--present", type=number, metavar="P", help="the present one (default: fitted)"
+    )
+    parser.add_argument(
+        "--gain",
+        type=number,
+        metavar="G",
+        help="factor of the highlights (default 1; 1.5 for --look glossier)",
+    )
+    parser.add_argument(
+        "--metal",
+        type=number,
+        metavar="M",
+        help="how much of a metal, 0 to 1 (default 0; 1 for --look metallic)",
+    )
+    parser.add_argument(
+        "--method",
+        choices=METHODS,
+        default=Gloss().method,
+        help="change the present highlights (default), or render new ones on the shape",
+    )
+
+
+ACTION = EditAction("gloss", "glossier, rougher or metallic", change, add_options)

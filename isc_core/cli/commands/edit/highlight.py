@@ -1,0 +1,72 @@
+"""`isc edit RESULT highlight`: a new highlight on the recovered shape."""
+
+import argparse
+
+import numpy as np
+
+from ....editing.highlights import add_highlight
+from ....editing.lobes import known_lobe
+from ....editing.spheres import render_sphere
+from ....errors import InputError
+from ....lobe_fitting.light_direction import (
+    explain_shading,
+    explain_specular,
+)
+from ....scene.decomposition import Decomposition
+from ....shading.lights import DirectionalLight, toward
+from ....shading.lobe_rendering import Lobe
+from .action import ActionResult, EditAction
+from .options import add_direction, add_lobe, lobe_of, number, plain
+from .panels import ball_panel
+
+_USUAL_LEVEL = 0.7
+
+
+def add_new_highlight(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+    lobe = lobe_of(options) or known_lobe(d) or Lobe()
+    light = _chosen_light(d, options)
+    level = options.strength if options.replace or options.strength is not None else _USUAL_LEVEL
+    edit = add_highlight(d, light, lobe, level=level, replacing=options.replace)
+    ball = ball_panel(
+        render_sphere(light, exponent=lobe.nearest_exponent)[0], "The light", "on a white ball"
+    )
+    return ActionResult(edit, {"direction": plain(light.direction)}, (ball,))
+
+
+def _chosen_light(d: Decomposition, options: argparse.Namespace) -> DirectionalLight:
+    color = np.ones(3) if options.color is None else options.color
+    if options.direction is not None:
+        if options.like is not None:
+            raise InputError("--direction and --like both say where the light is: give one of them")
+        return DirectionalLight(toward(*options.direction), np.pi * color)
+    found = explain_specular(d) if options.like == "specular" else explain_shading(d)
+    if not found.light.irradiance.any():
+        raise InputError(
+            f"the {options.like or 'shading'} tells no light here: give --direction X Y Z"
+        )
+    own = found.light.irradiance / found.light.irradiance.max()
+    return DirectionalLight(
+        found.light.direction, np.pi * (own if options.color is None else color)
+    )
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    add_direction(parser)
+    parser.add_argument(
+        "--like",
+        choices=("shading", "specular"),
+        help="without --direction: the one light that best explains the shading (default) or the present highlights",
+    )
+    add_lobe(parser)
+    parser.add_argument(
+        "--strength",
+        type=number,
+        metavar="S",
+        help="1: as bright as the photo's white (default 0.7; with --replace, as much light as was there)",
+    )
+    parser.add_argument("--replace", action="store_true", help="take the present highlights away")
+
+
+ACTION = EditAction(
+    "highlight", "a new highlight on the recovered shape", add_new_highlight, add_options
+)

@@ -1,0 +1,147 @@
+"""`isc edit RESULT light-direction`: the best single light for the shading and the highlights."""
+
+import argparse
+
+from ....editing.relight import NewLight, Relighting, relight
+from ....lobe_fitting.light_direction import (
+    DirectionEstimate,
+    explain_shading,
+    explain_specular,
+    share_explained,
+)
+from ....networks.light_network import predict_light
+from ....result_files.contact_sheet import Panel
+from ....scene.decomposition import Decomposition
+from ....scene.light_estimate import LightEstimate
+from ....shading.lights import DirectionalLight, toward
+from .action import ActionResult, EditAction
+from .options import plain
+from .panels import ball_panel, directional_ball, empty_panel, recovered_light_panel
+
+_OTHER_LIGHTS = (
+    ("from the left", (-0.8, 0.2, 0.5)),
+    ("from the right", (0.8, 0.2, 0.5)),
+    ("from above", (0.0, 0.85, 0.5)),
+    ("from below", (0.0, -0.85, 0.5)),
+    ("from the front", (0.0, 0.0, 1.0)),
+)
+
+
+def find_direction(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+    del options
+    shading, specular = explain_shading(d), explain_specular(d)
+    edit = relight(d, NewLight(sun=shading.light), Relighting(highlights="keep"))
+    panels = [recovered_light_panel(d)]
+    for label, found in (("Best for the shading", shading), ("Best for the highlights", specular)):
+        remark = _remark(found)
+        panels.append(
+            ball_panel(directional_ball(found.light, found.exponent), label, remark)
+            if found.determined
+            else empty_panel(label, remark)
+        )
+    light_estimate = predict_light(d.image, d.mask)
+    panels.append(_predicted_panel(d, light_estimate))
+    for label, direction in _OTHER_LIGHTS:
+        _, share = share_explained(d, toward(*direction))
+        panels.append(
+            ball_panel(
+                directional_ball(DirectionalLight(toward(*direction))),
+                f"Light {label}",
+                f"explains {100 * share:.0f} %",
+            )
+        )
+    measured = {
+        "shading": _record(shading),
+        "specular": _record(specular),
+        "light_estimate": _predicted_record(light_estimate),
+    }
+    lines = [
+        f"{label}: {_line(found)}"
+        for label, found in (("shading", shading), ("highlights", specular))
+    ]
+    lines.append(f"at first sight: {_predicted_line(light_estimate)}")
+    return ActionResult(edit, measured, tuple(panels), None, tuple(lines), layers=False)
+
+
+def _remark(found: DirectionEstimate) -> str:
+    return (
+        f"explains {100 * found.explained:.0f} %, ± {found.cone:.0f}°"
+        if found.determined
+        else "undetermined"
+    )
+
+
+def _line(found: DirectionEstimate) -> str:
+    if not found.determined:
+        return f"undetermined: no single light explains it ({100 * found.explained:.0f} % at best)"
+    x, y, z = found.light.direction
+    lobe = "" if found.exponent is None else f", exponent {found.exponent:.0f}"
+    share = f"explains {100 * found.explained:.0f} %"
+    return f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees on this shape, {share}{lobe}"
+
+
+def _record(found: DirectionEstimate) -> dict[str, object]:
+    light = found.light
+    return {
+        "determined": found.determined,
+        "direction": plain(light.direction),
+        "irradiance": plain(light.irradiance),
+        "ambient": plain(light.ambient),
+        "explained": found.explained,
+        "cone_degrees": found.cone,
+        "exponent": found.exponent,
+    }
+
+
+def _predicted_panel(d: Decomposition, light_estimate: LightEstimate) -> Panel:
+    label, remark = "At first sight", _likeliest(light_estimate)
+    if not light_estimate.determined:
+        return empty_panel(label, remark)
+    light, share = share_explained(d, light_estimate.direction)
+    return ball_panel(
+        directional_ball(light),
+        label,
+        f"explains {100 * share:.0f} %, ± {light_estimate.cone:.0f}°, {remark}",
+    )
+
+
+def _likeliest(light_estimate: LightEstimate) -> str:
+    shares = {
+        "smooth light": light_estimate.none,
+        "one lamp": light_estimate.one,
+        "several lamps": light_estimate.several,
+    }
+    likely = max(shares, key=lambda name: shares[name])
+    return f"{likely} ({100 * shares[likely]:.0f} %)"
+
+
+def _predicted_line(light_estimate: LightEstimate) -> str:
+    if not light_estimate.determined:
+        return f"{_likeliest(light_estimate)}, no direction that could be told"
+    x, y, z = light_estimate.direction
+    return f"{_likeliest(light_estimate)}, the strongest from {x:.3f} {y:.3f} {z:.3f} ± {light_estimate.cone:.1f} degrees, whatever the shape"
+
+
+def _predicted_record(light_estimate: LightEstimate) -> dict[str, object]:
+    return {
+        "determined": light_estimate.determined,
+        "direction": plain(light_estimate.direction),
+        "cone_degrees": light_estimate.cone,
+        "lamps": {
+            "none": light_estimate.none,
+            "one": light_estimate.one,
+            "several": light_estimate.several,
+        },
+    }
+
+
+def _add_nothing(parser: argparse.ArgumentParser) -> None:
+    del parser
+
+
+ACTION = EditAction(
+    "light-direction",
+    "the single light that best explains the shading, and the highlights",
+    find_direction,
+    _add_nothing,
+)

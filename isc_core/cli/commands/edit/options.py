@@ -1,0 +1,108 @@
+"""Options that several actions share, and their types."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from ....errors import InputError
+from ....imaging.srgb import srgb_to_linear
+from ....io.printable_names import readable
+from ....photo import TRANSFERS
+from ....shading.lobe_rendering import USUAL_EXPONENT, Lobe
+from ...interface.options import (
+    add_limits,
+    add_speech,
+)
+
+
+def add_common(parser: argparse.ArgumentParser) -> None:
+    picture = parser.add_argument_group("the photo")
+    picture.add_argument(
+        "--photo",
+        type=Path,
+        metavar="PHOTO",
+        help="the photo that RESULT was made of: the edit is brought back into it",
+    )
+    picture.add_argument(
+        "--mask", type=Path, metavar="MASK", help="its mask, where the result was made with one"
+    )
+    picture.add_argument(
+        "--transfer", choices=TRANSFERS, help="how it is coded (default: as isc decompose read it)"
+    )
+    add_limits(parser)
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        required=True,
+        metavar="DIR",
+        help="the folder to write; an earlier edit is replaced",
+    )
+    add_speech(parser, again=True)
+    parser.set_defaults(usual=vars(parser.parse_args(["-o", "."])))
+
+
+def add_lobe(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--exponent", type=number, metavar="P", help="Blinn-Phong's, 1 to 1e5, larger is sharper"
+    )
+    parser.add_argument(
+        "--alpha",
+        type=number,
+        metavar="A",
+        help="of GGX facets instead, 0.01 to 1, smaller is sharper",
+    )
+
+
+def add_direction(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--direction",
+        type=number,
+        nargs=3,
+        metavar=("X", "Y", "Z"),
+        help="toward the light: right, up, toward the viewer; of any length",
+    )
+    parser.add_argument(
+        "--color",
+        type=color,
+        metavar="RRGGBB",
+        help="of that light, as in web pages (default ffffff, the photo's own white)",
+    )
+
+
+def lobe_of(options: argparse.Namespace) -> Lobe | None:
+    if options.exponent is not None and options.alpha is not None:
+        raise InputError("--exponent and --alpha both say how rough the lobe is: give one of them")
+    if options.exponent is None and options.alpha is None:
+        return None
+    return Lobe(USUAL_EXPONENT if options.exponent is None else options.exponent, options.alpha)
+
+
+def number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number")
+    return value
+
+
+def color(text: str) -> np.ndarray:
+    digits = text.removeprefix("#")
+    try:
+        codes = np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)])
+    except ValueError:
+        codes = np.zeros(0)
+    if len(digits) != 6 or len(codes) != 3 or not (digits.isascii() and digits.isalnum()):
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a colour: write red, green and blue as rrggbb, like 2060c0"
+        )
+    return srgb_to_linear(codes / 255)
+
+
+def plain(value: object) -> object:
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    return readable(str(value)) if isinstance(value, Path) else value

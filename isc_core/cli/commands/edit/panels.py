@@ -1,0 +1,38 @@
+"""Panels of the contact sheet that show a light on a white ball."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ....editing.spheres import render_sphere, sphere_normals
+from ....result_files.contact_sheet import Panel
+from ....scene.decomposition import Decomposition
+from ....shading.lights import DirectionalLight
+from ....shading.spherical_harmonics import real_sh
+
+
+def ball_panel(color: np.ndarray, label: str, remark: str) -> Panel:
+    coverage = sphere_normals(len(color))[1]
+    return Panel(
+        color * 0.95 / max(float(np.percentile(color[coverage > 0.5].max(-1), 99.5)), 1e-9),
+        coverage,
+        label,
+        remark,
+    )
+
+
+def recovered_light_panel(d: Decomposition) -> Panel:
+    return ball_panel(
+        np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination),
+        "Recovered light",
+        "on a white ball",
+    )
+
+
+def directional_ball(light: DirectionalLight, exponent: float | None = None) -> np.ndarray:
+    """A ball in the directed part of the light alone: an ambient rest hides where it comes from."""
+    return render_sphere(replace(light, ambient=np.zeros(3)), exponent=exponent)[0]
+
+
+def empty_panel(label: str, remark: str) -> Panel:
+    return Panel(np.full((320, 320, 3), 0.03), sphere_normals(320)[1], label, remark)

@@ -1,0 +1,126 @@
+"""`isc edit RESULT recolour`: another reflectance under the same light and gloss."""
+
+import argparse
+from pathlib import Path
+
+import numpy as np
+
+from ....editing.clusters import find_clusters
+from ....editing.recolour import Paint, recolour
+from ....errors import InputError
+from ....io.limits import Limits
+from ....photo import read_raster
+from ....scene.decomposition import Decomposition
+from ...interface.options import (
+    count,
+    limits_of,
+)
+from .action import ActionResult, EditAction
+from .options import color, number, plain
+
+
+def recolour_object(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+    paint = Paint(
+        options.hue, options.saturation, options.value, options.color, options.match_brightness
+    )
+    if options.cluster is not None and options.region is not None:
+        raise InputError("--cluster and --region both say where: give one of them")
+    clusters = find_clusters(d, options.clusters, options.seed)
+    region = None
+    if options.cluster is not None:
+        region = clusters.weight(options.cluster)
+    elif options.region is not None:
+        region = _read_region(options.region, d, limits_of(options))
+    measured = {
+        "clusters": [
+            {"color": plain(c), "share": float(s)}
+            for c, s in zip(clusters.colors, clusters.shares, strict=True)
+        ]
+    }
+    return ActionResult(recolour(d, paint, region), measured, (), clusters)
+
+
+def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
+    """(H, W) in [0, 1] of the maps' size, from a picture of that size or the photo's: its alpha
+    where that is not opaque; else its codes, of which 1 is white where none is larger.
+    """
+    raster = read_raster(path, limits)
+    region = raster.transparency
+    if region is None:
+        codes = np.nan_to_num(raster.values.astype(float), nan=0.0, posinf=1.0, neginf=0.0)
+        white = 1.0 if raster.peak is None or codes.max() <= 1 else float(raster.peak)
+        region = np.clip(codes.mean(axis=2) / white, 0, 1)
+    if region.shape == d.mask.shape:
+        return region
+    scale, size = d.provenance.input.get("scale"), d.provenance.input.get("size")
+    if not isinstance(scale, int | float) or [*region.shape[::-1]] != size:
+        raise InputError(
+            f"{path}: the region is {region.shape[1]} x {region.shape[0]} pixels: give one of the "
+            "photo's size"
+        )
+    rows, columns = (
+        np.clip(((np.arange(n) + 0.5) / scale).astype(int), 0, m - 1)
+        for n, m in zip(d.mask.shape, region.shape, strict=True)
+    )
+    return region[np.ix_(rows, columns)]
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    usual = Paint()
+    parser.add_argument(
+        "--hue", type=number, default=usual.hue, metavar="DEGREES", help="turns the hue"
+    )
+    parser.add_argument(
+        "--saturation",
+        type=number,
+        default=usual.saturation,
+        metavar="F",
+        help="factor (default %(default)s)",
+    )
+    parser.add_argument(
+        "--value",
+        type=number,
+        default=usual.value,
+        metavar="F",
+        help="factor of the brightness (default %(default)s)",
+    )
+    parser.add_argument(
+        "--color",
+        type=color,
+        metavar="RRGGBB",
+        help="the paint, as in web pages; its brightness stays the object's",
+    )
+    parser.add_argument(
+        "--match-brightness", action="store_true", help="takes the brightness of --color too"
+    )
+    parser.add_argument(
+        "--region",
+        type=Path,
+        metavar="FILE",
+        help="where: an image, white on black, of the photo's size",
+    )
+    parser.add_argument(
+        "--cluster",
+        type=count,
+        metavar="N",
+        help="where: the cluster N of the object's paints, see clusters.png",
+    )
+    parser.add_argument(
+        "--clusters",
+        type=count,
+        default=4,
+        metavar="K",
+        help="how many there are at most (default %(default)s)",
+    )
+    parser.add_argument(
+        "--seed",
+        type=count,
+        default=0,
+        metavar="N",
+        help="of the clusters' random numbers (default %(default)s)",
+    )
+
+
+ACTION = EditAction(
+    "recolour", "another reflectance under the same gloss", recolour_object, add_options
+)
