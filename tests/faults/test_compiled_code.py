@@ -6,7 +6,7 @@ import os
 import pickle
 from pathlib import Path
 
-from isc_core.compiled import drop_broken
+from isc_core.numerics.jit import drop_broken
 
 
 def test_kept_code_that_was_cut_short_is_dropped(tmp_path: Path) -> None:

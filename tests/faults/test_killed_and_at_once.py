@@ -15,9 +15,9 @@ from pathlib import Path
 
 import pytest
 
-from isc_core import atomic
-from isc_core.atomic import new_file, new_folder, remove_unfinished, unfinished
 from isc_core.errors import InputError
+from isc_core.io import atomic
+from isc_core.io.atomic import new_file, new_folder, remove_unfinished, unfinished
 
 ROOT = Path(__file__).resolve().parents[2]
 OURS = ("mark.json", "data.bin")

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from isc_core.cli import main
-from isc_core.exr import read_channels
-from isc_core.names import readable
+from isc_core.cli.main import main
+from isc_core.io.exr import read_channels
+from isc_core.io.printable_names import readable
 from isc_core.photo import read_photo
-from isc_core.result_folder import load
+from isc_core.result_files.result_folder import load
 from tests.core.command_line import ball_codes, ball_photo, run_isc, write_image
 
 NAMES = {

@@ -1,4 +1,0 @@
-"""What holds for any photo, mask and options: laws, tried on drawn cases.
-
-`python -m benchmarks.properties --help`; docs/properties.md.
-"""

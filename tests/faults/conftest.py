@@ -1,0 +1,44 @@
+"""Inputs and trials that the fault tests share."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.faults.commands import Command, Trial, digests, make_inputs, run
+
+Trials = Callable[[Command], Trial]
+
+
+@pytest.fixture(scope="session")
+def inputs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a photo, its mask, another photo and a result."""
+    return make_inputs(tmp_path_factory.mktemp("inputs"))
+
+
+@pytest.fixture(scope="session")
+def complete(inputs: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., dict]:
+    """The digests of a command's complete output; each command runs once."""
+    known: dict[str, dict[str, str]] = {}
+
+    def of(command: Command) -> dict[str, str]:
+        if command.name not in known:
+            output = tmp_path_factory.mktemp("complete") / command.output
+            code, text = run(command.words(inputs, output))
+            assert code == 0, text
+            known[command.name] = digests(output)
+        return known[command.name]
+
+    return of
+
+
+@pytest.fixture
+def trial(inputs: Path, complete: Callable[..., dict], tmp_path: Path) -> Trials:
+    """Makes a trial of a command in an empty folder."""
+
+    def make(command: Command) -> Trial:
+        made = Trial(command, inputs, tmp_path / "place", complete(command))
+        made.reset()
+        return made
+
+    return make
