@@ -1,12 +1,13 @@
 # make demo   renders one glossy object, decomposes it, says where the pictures are
 # make test   linter, type checker and tests
+# make docs   the documentation site, in build/site (open build/site/index.html)
 # make extension   Blender's add-on: one zip a platform and Python in dist/; TARGET=here builds only this machine's
 # The first call makes .venv; later ones reuse it until pyproject.toml or constraints.txt change. PYTHON=... picks an interpreter.
 
 BIN := .venv/bin
 INPUTS := pyproject.toml constraints.txt tools/setup.sh
 
-.PHONY: demo test lint extension clean
+.PHONY: demo test lint docs extension clean
 .DEFAULT_GOAL := demo
 
 demo: .venv/.ready-demo
@@ -25,6 +26,10 @@ lint: .venv/.ready-dev
 	$(BIN)/ruff check .
 	$(BIN)/mypy
 
+docs: .venv/.ready-docs
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --clean --quiet
+	@echo "The documentation: build/site/index.html"
+
 TARGET := all
 
 extension: .venv/.ready-dev
@@ -36,8 +41,12 @@ extension: .venv/.ready-dev
 	@touch $@
 
 .venv/.ready-dev: $(INPUTS)
-	@sh tools/setup.sh synth,blender,batch,dev
-	@touch $@ .venv/.ready-demo
+	@sh tools/setup.sh synth,blender,batch,dev,docs
+	@touch $@ .venv/.ready-demo .venv/.ready-docs
+
+.venv/.ready-docs: $(INPUTS)
+	@sh tools/setup.sh docs
+	@touch $@
 
 clean:
 	rm -rf .venv demo build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis

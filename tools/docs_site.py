@@ -1,0 +1,136 @@
+"""MkDocs hooks: pages of the documentation site that are derived from other files.
+
+One API page for each package folder of `isc_core`, written as mkdocstrings directives, and one page
+with the help text of every command, so that both references follow the code. CHANGELOG.md and SECURITY.md stay at the root of the repository
+and appear as pages; links that climb out of docs/ to them work in both places.
+"""
+
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).resolve().parents[1]
+CORE = ROOT / "isc_core"
+ROOT_PAGES = {"CHANGELOG.md": "changelog.md", "SECURITY.md": "security.md"}
+
+
+def on_config(config: MkDocsConfig) -> MkDocsConfig:
+    """List the API pages in the navigation."""
+    for section in config.nav or []:
+        if "API" in section:
+            section["API"] = ["api/index.md"] + [
+                {_title(folder): _page(folder)} for folder in _folders()
+            ]
+    return config
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the generated pages."""
+    pages = {_page(folder): _api_page(folder) for folder in _folders()}
+    pages["api/index.md"] = _api_index()
+    pages["reference/command_line.md"] = _command_line()
+    for source, target in ROOT_PAGES.items():
+        pages[target] = (ROOT / source).read_text(encoding="utf-8").replace("](docs/", "](")
+    for name, content in pages.items():
+        files.append(File.generated(config, name, content=content))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Point links to files at the root of the repository to their pages."""
+    for source, target in ROOT_PAGES.items():
+        markdown = re.sub(
+            rf"\]\(((?:\.\./)+){re.escape(source)}", lambda m, t=target: _inside(m[1]) + t, markdown
+        )
+    return markdown
+
+
+def _inside(climb: str) -> str:
+    return "](" + climb.removeprefix("../")
+
+
+def _folders() -> list[Path]:
+    """The folders of `isc_core` that hold modules, the top first."""
+    folders = {path.parent for path in CORE.rglob("*.py") if "__pycache__" not in path.parts}
+    return sorted(folders, key=lambda folder: folder.relative_to(ROOT).parts)
+
+
+def _title(folder: Path) -> str:
+    return ".".join(folder.relative_to(ROOT).parts)
+
+
+def _page(folder: Path) -> str:
+    return f"api/{'_'.join(folder.relative_to(ROOT).parts)}.md"
+
+
+def _modules(folder: Path) -> list[str]:
+    names = [path.stem for path in sorted(folder.glob("*.py"))]
+    public = [name for name in names if not name.startswith("_")]
+    return [_title(folder)] * ("__init__" in names) + [f"{_title(folder)}.{n}" for n in public]
+
+
+def _api_page(folder: Path) -> str:
+    blocks = [
+        f"::: {module}\n    options:\n      show_submodules: false\n" for module in _modules(folder)
+    ]
+    return f"# {_title(folder)}\n\n" + "\n".join(blocks)
+
+
+def _summary(folder: Path) -> str:
+    """The first line of a package's docstring."""
+    init = folder / "__init__.py"
+    match = re.match(r'\s*"""(.+?)(?:\n\n|""")', init.read_text(encoding="utf-8"), re.DOTALL)
+    return " ".join(match[1].split()) if match else ""
+
+
+def _api_index() -> str:
+    rows = [
+        f"| [{_title(folder)}]({Path(_page(folder)).name}) | {_summary(folder)} |"
+        for folder in _folders()
+        if (folder / "__init__.py").is_file()
+    ]
+    return (
+        "# API reference\n\n"
+        "Generated from the docstrings, one page for each folder of `isc_core`. Conventions of "
+        "arrays, frames and units: [Concepts](../concepts.md).\n\n"
+        "| package | contents |\n| --- | --- |\n" + "\n".join(rows) + "\n"
+    )
+
+
+def _help(*command: str) -> str:
+    """What `isc COMMAND --help` prints."""
+    done = subprocess.run(
+        [sys.executable, "-m", "isc_core", *command, "--help"],
+        cwd=ROOT,
+        env={**os.environ, "COLUMNS": "96"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return done.stdout
+
+
+def _choices(text: str) -> list[str]:
+    """The names in the first list of choices of a help text that are subcommands."""
+    return re.findall(r"^ {4}([a-z][a-z-]+)(?: |$)", text, re.MULTILINE)
+
+
+def _command_line() -> str:
+    top = _help()
+    parts = ["# Command line", "Generated from the help texts.", f"```text\n{top}```"]
+    for command in _choices(top):
+        text = _help(command)
+        parts += [f"## isc {command}", f"```text\n{text}```"]
+        if command == "edit":
+            for action in _choices(_help("edit", "RESULT")):
+                parts += [
+                    f"### isc edit RESULT {action}",
+                    f"```text\n{_help('edit', 'RESULT', action)}```",
+                ]
+    return "\n\n".join(parts) + "\n"
