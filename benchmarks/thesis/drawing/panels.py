@@ -1,7 +1,6 @@
-"""Pictures of what a model finds, each with its name, as figures of labelled panels.
+"""Figures of labelled panels: images, maps and lights of a decomposition.
 
-Limits: an image is shown in an exposure of its own unless a gain is given; the light is shown as a
-white ball in it.
+Limits: an image has its own exposure unless a gain is given; a light is shown on a white ball.
 """
 
 import textwrap
@@ -21,16 +20,31 @@ from .style import LETTERS, WIDTH, exposure, figure, normal_colours, show, show_
 _LINE = 0.16  # inches of a line of letters
 _LETTERS_AN_INCH = 15  # that fit above a panel
 COLOURS = (
-    "Height grows toward the viewer; normals are red to the right, green up, blue toward the viewer. Light and reflectance share their "
-    "colour: blue light on grey paint and white light on blue paint give one photo, and any model may choose the wrong one."
+    "Height increases toward the viewer. Normals: red to the right, green up, blue "
+    "toward the viewer. Light and reflectance share their colour: blue light on a "
+    "grey surface and white light on a blue surface give the same photo, and any "
+    "model may choose the wrong one."
 )
 
 
 @dataclass(frozen=True)
 class Panel:
-    """One picture. `values`: (H, W, 3) an image of linear light, or (H, W) numbers; `mask` (H, W)
-    bool or None; `limits`: the ends of the numbers' colours; `gain`: of an image, None for one of
-    its own; `bar`: whether the numbers have a bar of colours.
+    """One labelled picture.
+
+    Attributes
+    ----------
+    title : str
+        Title.
+    values : (H, W, 3) or (H, W) ndarray
+        Linear image, or map of numbers.
+    mask : (H, W) ndarray or None
+        Pixels outside are white.
+    limits : (float, float) or None
+        Values at the ends of the colour scale of a map.
+    gain : float or None
+        Exposure of an image; None computes one.
+    bar : bool
+        Whether a map has a colour bar.
     """
 
     title: str
@@ -42,7 +56,22 @@ class Panel:
 
 
 def panel_figure(shown: Sequence[Panel], columns: int, *, width: float = WIDTH) -> Figure:
-    """The panels, row by row, each cut to its mask's box."""
+    """Draw panels row by row, each cropped to its mask.
+
+    Parameters
+    ----------
+    shown : sequence of Panel
+        The panels.
+    columns : int
+        Panels per row.
+    width : float
+        Inches.
+
+    Returns
+    -------
+    Figure
+        The figure.
+    """
     rows = -(-len(shown) // columns)
     cut = [_cut(panel) for panel in shown]
     cell = width / columns
@@ -94,18 +123,27 @@ def _cut(panel: Panel) -> Panel:
 
 
 def normals_panel(title: str, normal: np.ndarray, mask: np.ndarray) -> Panel:
-    """Normals (H, W, 3) in the usual colours."""
+    """Create a panel of normals (H, W, 3), coloured as (n + 1) / 2."""
     return Panel(title, normal_colours(normal, mask), mask, gain=1.0)
 
 
 def light_panel(title: str, illumination: np.ndarray) -> Panel:
-    """A white ball under the light of coefficients (9, 3)."""
+    """Create a panel of a white ball under a light, (9, 3) SH coefficients of log shading."""
     return Panel(title, *light_ball(illumination))
 
 
 def characteristic_panels(d: Decomposition) -> list[Panel]:
-    """Everything that a decomposition holds: photo and layers in one exposure, the rest each in its
-    own.
+    """Create a panel for each map of a decomposition.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+
+    Returns
+    -------
+    list of Panel
+        Photo and layers share an exposure; every other panel has its own.
     """
     gain = exposure(d.image, d.mask)
     return [

@@ -1,5 +1,4 @@
-"""How every figure looks: one size of letters, colours that colour-blind people tell apart, images
-in sRGB.
+"""Style of all figures: one letter size, colour-blind-safe colours, images in sRGB.
 
 matplotlib's objects are used directly, without its global state, so that nothing has to be closed
 or reset.
@@ -40,9 +39,25 @@ def figure(
     sharex: bool = False,
     sharey: bool = False,
 ) -> tuple[Figure, np.ndarray]:
-    """A figure and its axes (rows, columns).
+    """Create a figure with axes.
 
-    `width`, `height`: inches; without a height, rows get three quarters of a column's width.
+    Parameters
+    ----------
+    rows, columns : int
+        Grid of the axes.
+    width : float
+        Inches.
+    height : float, optional
+        Inches; by default rows are three quarters as high as columns are wide.
+    sharex, sharey : bool
+        Share axes between columns and rows.
+
+    Returns
+    -------
+    figure : Figure
+        The figure.
+    axes : (rows, columns) ndarray
+        Its axes.
     """
     tall = height if height is not None else max(2.2, 0.75 * width * rows / columns)
     with matplotlib.rc_context(
@@ -59,14 +74,27 @@ def figure(
 
 
 def unify_titles(made: Figure) -> None:
-    """Gives all titles the size of the other letters, whichever way they were set."""
+    """Set all titles to the common letter size."""
     for axes in made.axes:
         axes.title.set_fontsize(LETTERS)
 
 
 def table_figure(header: Sequence[str], rows: Sequence[Sequence[str]], caption: str = "") -> Figure:
-    """A picture of a table, for where Markdown is not shown: columns as wide as their longest cell,
-    every second row shaded.
+    """Draw a table as a picture, for viewers without Markdown.
+
+    Parameters
+    ----------
+    header : sequence of str
+        Column names.
+    rows : sequence of sequence of str
+        Cells as shown.
+    caption : str
+        One line above the table.
+
+    Returns
+    -------
+    Figure
+        Columns as wide as their longest cell, every second row shaded.
     """
     columns = zip(header, *rows, strict=True)
     lengths = [max([round(_BOLD * len(head)), *map(len, cells)]) + 2 for head, *cells in columns]
@@ -105,15 +133,35 @@ def table_figure(header: Sequence[str], rows: Sequence[Sequence[str]], caption: 
 
 
 def legend(axes: Axes, where: str = "best", columns: int = 1) -> None:
-    """The legend of what was drawn with a label."""
+    """Add a legend of the labelled artists.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes.
+    where : str
+        Location, as in matplotlib.
+    columns : int
+        Number of columns.
+    """
     axes.legend(fontsize=LETTERS - 1, frameon=False, loc=where, ncols=columns)
 
 
 def show(
     axes: Axes, image_linear: np.ndarray, title: str = "", mask: np.ndarray | None = None
 ) -> None:
-    """Draws an image (H, W, 3), or (H, W) as grey, of linear light in sRGB, white outside `mask`
-    (H, W), without ticks.
+    """Draw a linear image in sRGB, without ticks.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes.
+    image_linear : (H, W, 3) or (H, W) ndarray
+        Linear image; two dimensions are shown as grey.
+    title : str
+        Title.
+    mask : (H, W) ndarray, optional
+        Pixels outside are white.
     """
     image = np.asarray(image_linear, float)
     image = np.repeat(image[..., None], 3, -1) if image.ndim == 2 else image
@@ -127,11 +175,33 @@ def show(
 
 
 def show_map(
-    axes: Axes, values: np.ndarray, title: str = "", mask: np.ndarray | None = None, *, limits: tuple[float, float] | None = None,
-    colours: str = "viridis", label: str = "",
-) -> None:  # fmt: skip
-    """Draws a map of numbers (H, W) in the colours of "viridis" or "cividis", white outside `mask`;
-    a `label` adds a bar of colours.
+    axes: Axes,
+    values: np.ndarray,
+    title: str = "",
+    mask: np.ndarray | None = None,
+    *,
+    limits: tuple[float, float] | None = None,
+    colours: str = "viridis",
+    label: str = "",
+) -> None:
+    """Draw a map of numbers in colours.
+
+    Parameters
+    ----------
+    axes : Axes
+        The axes.
+    values : (H, W) ndarray
+        The map.
+    title : str
+        Title.
+    mask : (H, W) ndarray, optional
+        Pixels outside are white.
+    limits : (float, float), optional
+        Values at the ends of the colour scale.
+    colours : str
+        "viridis" or "cividis".
+    label : str
+        Label of a colour bar; empty draws none.
     """
     shown = np.ma.masked_invalid(values if mask is None else np.where(mask, values, np.nan))
     low, high = limits if limits is not None else (None, None)
@@ -144,8 +214,19 @@ def show_map(
 
 
 def normal_colours(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Unit normals (H, W, 3) as an image of linear light that `show` draws in the usual colours, (n
-    + 1) / 2; white outside the mask.
+    """Convert normals to a linear image that `show` draws as (n + 1) / 2.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) ndarray
+        Unit normals, camera frame.
+    mask : (H, W) ndarray
+        Pixels outside are white.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Linear image.
     """
     coded = np.where(mask[..., None], (np.asarray(normal, float) + 1) / 2, 1.0)
     return np.where(
@@ -154,7 +235,20 @@ def normal_colours(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def exposure(image_linear: np.ndarray, mask: np.ndarray | None = None) -> float:
-    """The gain with which an image is shown: all but its brightest hundredth stays below .9."""
+    """Compute the gain that keeps all but the brightest 1 % of an image below 0.9.
+
+    Parameters
+    ----------
+    image_linear : (H, W, 3) or (H, W) ndarray
+        Linear image.
+    mask : (H, W) ndarray, optional
+        Pixels to consider.
+
+    Returns
+    -------
+    float
+        The gain; 1 for a black image.
+    """
     inside = (
         image_linear[mask]
         if mask is not None
@@ -175,11 +269,23 @@ def image_sheet(
     width: float = WIDTH,
     expose: bool | Sequence[bool] = True,
 ) -> Figure:
-    """A labelled contact sheet of linear images, (H, W, 3) or (H, W) each; None leaves a cell
-    empty.
+    """Draw a labelled contact sheet.
 
-    `expose`: whether the images of a row are brightened together, by what its first image needs;
-    one answer for each column, or for all.
+    Parameters
+    ----------
+    columns : sequence of str
+        Column titles.
+    rows : sequence of (str, sequence of ndarray or None)
+        Row label and linear images, (H, W, 3) or (H, W); None leaves a cell empty.
+    width : float
+        Inches.
+    expose : bool or sequence of bool
+        Whether a row's images share the exposure of its first one; one value, or one per column.
+
+    Returns
+    -------
+    Figure
+        The sheet.
     """
     exposed = [expose] * len(columns) if isinstance(expose, bool) else list(expose)
     cell = (width - _LABEL) / len(columns)

@@ -1,19 +1,17 @@
-"""Figures of the applications: highlights on a sphere and where their light is, dichromatic
-editing, reflectance editing.
+"""Figures 4.49 to 4.51: light direction from highlights, dichromatic editing, reflectance editing.
 
-The sphere is a painted ball under one lamp with a little ambient light and a Blinn-Phong gloss of a
-known exponent. Its light is looked for five times: by the shading and by the highlight when shape
-and layers are the true ones, by the highlight when the layers are separated by `isc` from the
-picture, and by both when nothing but the picture is known (model MDR). Errors are angles between
-directions.
+The sphere is a coloured ball under one distant light with little ambient light and a Blinn-Phong
+lobe of known exponent. The light is estimated in five ways: from the shading and from the highlight
+with the true shape and layers, from the highlight with layers separated by `isc`, and from both
+with everything estimated from the picture (model MDR). Errors are angles between directions.
 
-The edits are those of `isc edit`, on photos where data are given, else on rendered things.
+The edits are those of `isc edit`, on photos where data are given, else on rendered objects.
 
 Citation: J. F. Blinn (1977), doi:10.1145/563858.563893; S. A. Shafer (1985),
 doi:10.1002/col.5080100409; H. Akbar, thesis (2016).
 
-Limits: a convex ball without shadows is the easiest object there is. How good an edit looks is not
-measured, only that it does what was asked for and nothing else.
+Limits: a convex ball without shadows is the easiest object. The quality of an edit is not
+measured, only that it changes what it should and nothing else.
 """
 
 from collections.abc import Callable
@@ -41,8 +39,8 @@ from ..measuring.context import Context, JsonRow
 from ..measuring.decompositions import decompose_subject, subject_as_photo
 from ..report.item import ItemContent, ItemTable, ThesisItem
 
-PAINT = np.array([0.62, 0.18, 0.10])
-EXPONENT, _GLOSS, _AMBIENT = 60.0, 0.06, 0.08
+ALBEDO = np.array([0.62, 0.18, 0.10])
+EXPONENT, _STRENGTH, _AMBIENT = 60.0, 0.06, 0.08
 DIRECTIONS = (
     (-0.6, 0.6, 1.0),
     (0.7, 0.5, 1.0),
@@ -54,52 +52,79 @@ DIRECTIONS = (
 
 
 def render_ball(direction: np.ndarray, size: int) -> Decomposition:
-    """A glossy ball under a light from the unit vector `direction` (3,): the truth of every layer,
-    in a picture of `size` pixels a side.
+    """Render a glossy ball under a directional light, with the ground truth of every layer.
 
-    Its `illumination` is the smooth light that is nearest to the lamp; `shading` is the lamp's own.
+    Parameters
+    ----------
+    direction : (3,) ndarray
+        Unit vector toward the light, camera frame.
+    size : int
+        Side of the picture, pixels.
+
+    Returns
+    -------
+    Decomposition
+        The truth. `illumination` is the smooth light nearest to the directional light; `shading` is
+        that of the directional light itself.
     """
     normal, coverage = sphere_normals(size)
     mask = coverage > 0.5
     light = DirectionalLight(direction, ambient=np.full(3, _AMBIENT))
     shading = light.shading(normal)
-    specular = _GLOSS * lobe_light(normal, direction, EXPONENT)[..., None] * light.irradiance
+    specular = _STRENGTH * lobe_light(normal, direction, EXPONENT)[..., None] * light.irradiance
     illumination, _ = fit_light(normal[mask], shading[mask])
 
     def inside(values: np.ndarray) -> np.ndarray:
         return np.where(mask[..., None], values, 0).astype(np.float32)
 
-    diffuse, gloss, paint = (
-        inside(PAINT * shading),
+    diffuse, specular_layer, albedo = (
+        inside(ALBEDO * shading),
         inside(specular),
-        inside(np.broadcast_to(PAINT, shading.shape)),
+        inside(np.broadcast_to(ALBEDO, shading.shape)),
     )
     facing = np.where(mask[..., None], normal, [0.0, 0, 1]).astype(np.float32)
     height, sure = (
         np.where(mask, 0.45 * size * normal[..., 2], 0).astype(np.float32),
         mask.astype(np.float32),
     )
-    layers = (diffuse + gloss, diffuse, gloss, np.zeros_like(diffuse), paint, inside(shading))
+    layers = (
+        diffuse + specular_layer,
+        diffuse,
+        specular_layer,
+        np.zeros_like(diffuse),
+        albedo,
+        inside(shading),
+    )
     return Decomposition(*layers, facing, height, mask, sure, illumination, Provenance())
 
 
 def with_separated_layers(d: Decomposition) -> Decomposition:
-    """The same scene with the layers that `isc` finds in its image."""
+    """Replace the layers of a decomposition by those that `isc` separates from its image."""
     split: Separation = separate("isc", d.image, d.mask)
     return replace(d, diffuse=split.diffuse, specular=split.specular, residual=split.residual)
 
 
 def degrees_between(one: np.ndarray, other: np.ndarray) -> float:
-    """Of unit vectors (3,)."""
+    """Compute the angle between two unit vectors (3,), degrees."""
     return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other)))
 
 
 def estimate_directions(
     ball: Decomposition, picture_only: Decomposition | None = None
 ) -> dict[str, np.ndarray]:
-    """Directions (3,) of the light by each way of finding it;
+    """Estimate the direction of the light in several ways.
 
-    `picture_only`: what a model makes of the ball's image, or None.
+    Parameters
+    ----------
+    ball : Decomposition
+        True layers and shape.
+    picture_only : Decomposition, optional
+        A model's result for the image of the ball.
+
+    Returns
+    -------
+    dict of str to (3,) ndarray
+        Unit directions by method.
     """
     ways = {
         "shading, true shape": explain_shading(ball),
@@ -144,15 +169,17 @@ def _spheres(context: Context) -> ItemContent:
     table = ItemTable(
         header,
         tuple(rows),
-        "Degrees between the true direction and the one found; x right, y up, z toward the viewer.",
+        "Degrees between the true and the estimated direction; x right, y up, z toward the viewer.",
     )
     text = (
-        "Each row: the ball under one lamp, its highlight as `isc` finds it, and balls lit from the directions that the separated "
-        "highlight, the true shading and the shading by MDR tell. With the true shape both tell the light; from the picture alone they are "
-        "as good as the recovered shape is."
+        "Each row: the ball under one directional light, its highlight as separated by "
+        "`isc`, and balls lit from the directions estimated from the separated "
+        "highlight, from the true shading, and from the shading by MDR. With the true "
+        "shape, shading and highlight both determine the light; from the picture "
+        "alone, the error follows that of the recovered shape."
     )
     if context.quick:
-        text += " In a quick run the model sees the first ball only."
+        text += " In a quick run, MDR decomposes the first ball only."
     return ItemContent((table,), (panel_figure(shown, 4 if context.quick else 5),), text)
 
 
@@ -187,7 +214,7 @@ def _ball_panels(
     )
     for title, name in ways if _WAYS[3] in found and not quick else ways[:2]:
         lit, coverage = render_sphere(
-            DirectionalLight(found[name], ambient=np.full(3, _AMBIENT)), size, EXPONENT, _GLOSS
+            DirectionalLight(found[name], ambient=np.full(3, _AMBIENT)), size, EXPONENT, _STRENGTH
         )
         shown.append(Panel(f"{title}: {off[name]:.2f}° off", lit, coverage > 0.5, gain=0.6))
     return shown
@@ -198,15 +225,15 @@ def _word(direction: np.ndarray) -> str:
 
 
 def _photographed(
-    context: Context, best: Callable[[Subject], float]
+    context: Context, rank: Callable[[Subject], float]
 ) -> tuple[Subject, Decomposition]:
-    """The masked photo with the most of what an edit needs; SIRFS needs an outline."""
+    """Decompose the photo with the largest score, with a silhouette if possible."""
     photos = context.photos()
-    chosen = max([one for one in photos if not one.mask.all()] or photos, key=best)
+    chosen = max([one for one in photos if not one.mask.all()] or photos, key=rank)
     return chosen, decompose_subject(context, chosen)
 
 
-def _glossy(subject: Subject) -> float:
+def _specular_share(subject: Subject) -> float:
     """The share of its light that `isc` takes for specular."""
     split = separate("isc", subject.image, subject.mask, subject_as_photo(subject).clipped)
     return float(
@@ -235,10 +262,10 @@ EDITS: tuple[tuple[str, DichromaticEdit], ...] = (
 
 
 def _dichromatic(context: Context) -> ItemContent:
-    subject, d = _photographed(context, _glossy)
+    subject, d = _photographed(context, _specular_share)
     gain = exposure(d.image, d.mask)
     shown = [Panel("photo", d.image, d.mask, gain=gain)]
-    rows = [_change("nothing asked for", d, edit_layers(d, DichromaticEdit()))]
+    rows = [_change("no edit", d, edit_layers(d, DichromaticEdit()))]
     for name, edit in EDITS:
         after = edit_layers(d, edit)
         shown.append(Panel(name, after.image, d.mask, gain=gain))
@@ -249,8 +276,14 @@ def _dichromatic(context: Context) -> ItemContent:
         "of the diffuse layer (%)",
         "of the specular layer (%)",
     )
-    caption = f"{subject.name}: RMS of the change, of the layer's or the image's own RMS. A layer that an edit leaves alone changes by nothing."
-    text = f"{subject.name}: each layer edited by itself, then added up again; one exposure for all. A layer's removal shows the other one."
+    caption = (
+        f"{subject.name}: RMS of the change relative to the RMS of the layer or image. "
+        "An unedited layer changes by 0."
+    )
+    text = (
+        f"{subject.name}: each layer edited separately, then summed; one exposure for "
+        "all. Removing one layer shows the other."
+    )
     return ItemContent((ItemTable(header, tuple(rows), caption),), (panel_figure(shown, 4),), text)
 
 
@@ -272,8 +305,17 @@ def _moved(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def soft_disc_mask(d: Decomposition) -> np.ndarray:
-    """A mask (H, W) in [0, 1] as a person might paint it: a soft disc on the object's middle, a
-    quarter of its size.
+    """Create a soft disc on the middle of the object, a quarter of its size.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The object.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Weights in [0, 1].
     """
     rows, columns = np.nonzero(d.mask)
     y, x = np.mgrid[: d.mask.shape[0], : d.mask.shape[1]]
@@ -288,23 +330,23 @@ def _recolouring(context: Context) -> ItemContent:
     clusters = find_clusters(d, 4, context.seed)
     numbers = range(1, min(len(clusters.shares), 3) + 1)
     target = np.array([0.05, 0.18, 0.55])
-    asked: list[tuple[str, Paint, np.ndarray | None]] = [
+    edits: list[tuple[str, Paint, np.ndarray | None]] = [
         ("hue turned by 120°, everywhere", Paint(hue=120), None),
         ("less saturation, everywhere", Paint(saturation=0.3), None),
-        ("blue in a painted mask", Paint(target=target), soft_disc_mask(d)),
+        ("blue inside a mask", Paint(target=target), soft_disc_mask(d)),
     ]
-    asked += [
+    edits += [
         (f"blue in cluster {number}", Paint(target=target), clusters.weight(number))
         for number in numbers
     ]
     shown = [
         Panel("photo", d.image, d.mask, gain=gain),
-        Panel("clusters of paint", _cluster_picture(clusters), d.mask),
+        Panel("clusters of reflectance", _cluster_picture(clusters), d.mask),
     ]
-    shown.append(Panel("painted mask", soft_disc_mask(d), d.mask, (0, 1)))
+    shown.append(Panel("mask", soft_disc_mask(d), d.mask, (0, 1)))
     rows: list[tuple[str | float, ...]] = []
-    for name, paint, region in asked:
-        after = recolour(d, paint, region)
+    for name, edit, region in edits:
+        after = recolour(d, edit, region)
         shown.append(Panel(name, after.image, d.mask, gain=gain))
         rows.append((name, *_recoloured(d, after, region)))
     header = (
@@ -315,10 +357,14 @@ def _recolouring(context: Context) -> ItemContent:
         "change of luminance (%)",
         "of the highlights (%)",
     )
-    caption = f"{subject.name}: RMS of the change of the diffuse layer, of its own RMS; luminance of the diffuse layer, inside."
+    caption = (
+        f"{subject.name}: RMS of the change of the diffuse layer relative to its own "
+        "RMS; luminance of the diffuse layer, inside."
+    )
     text = (
-        f"{subject.name}: another paint under the same light and gloss. Clusters are numbered by size; their picture shows each in its "
-        "mean colour. Luminance stays, unless a colour cannot be that bright and becomes paler."
+        f"{subject.name}: another reflectance under the same light and specular lobe. "
+        "Clusters are numbered by size and drawn in their mean colour. Luminance is "
+        "kept, unless a colour cannot be that bright and becomes paler."
     )
     return ItemContent((ItemTable(header, tuple(rows), caption),), (panel_figure(shown, 3),), text)
 
@@ -343,7 +389,7 @@ def _recoloured(d: Decomposition, after: Edited, region: np.ndarray | None) -> t
 
 _figure: Callable[..., ThesisItem] = partial(ThesisItem, "figure")
 ITEMS: tuple[ThesisItem, ...] = (
-    _figure("4.49", "Highlights on a sphere, and the light directions found from them", _spheres),
+    _figure("4.49", "Highlights on a sphere and the estimated light directions", _spheres),
     _figure("4.50", "Dichromatic editing", _dichromatic),
     _figure("4.51", "Reflectance editing", _recolouring),
 )

@@ -1,9 +1,8 @@
-"""Figures of the background: lobes of reflectance, Phong's components, shading and its model,
-intrinsic images, specular-free images.
+"""Figures 2.1 to 2.5: reflectance lobes, Phong's components, shading models, intrinsic images,
+specular-free images.
 
-Lobes are drawn in the plane of incidence as the code has them: f_r(view) cos(view) for light from
-0, 30 and 60 degrees. The sphere is lit as Phong did: ambient + diffuse + strength cos^n of the
-mirrored view.
+Lobes are drawn in the plane of incidence as f_r(view) cos(view), for light from 0, 30 and 60
+degrees. The sphere is lit as by Phong: ambient + diffuse + strength cos^n of the mirrored view.
 
 Citation: B. T. Phong (1975), doi:10.1145/360825.360839; J. F. Blinn (1977),
 doi:10.1145/563858.563893; M. Oren and S. K. Nayar (1994), doi:10.1145/192161.192213; B. Walter et
@@ -11,8 +10,8 @@ al. (2007), doi:10.2312/EGWR/EGSR07/195-206; H. G. Barrow and J. M. Tenenbaum, "
 scene characteristics from images", Computer Vision Systems (1978), which has no DOI (intrinsic
 images).
 
-Limits: what exactly the thesis draws at each number is not known to us; the choice within the
-titles is ours.
+Limits: it is not known what exactly the thesis draws under each number; the choice within the
+titles is this project's.
 """
 
 from functools import partial
@@ -59,16 +58,28 @@ LOBES: tuple[tuple[str, Model], ...] = (
     ("Blinn-Phong, exponent 80", BlinnPhong(exponent=80.0)),
     ("GGX, alpha .25, f0 .04", Ggx(0.25)),
     (
-        "Dichromatic: paint .5, gloss .2",
+        "Dichromatic: albedo .5, specular .2",
         Dichromatic(np.full(3, 0.5), Lambert(), BlinnPhong(0.2, 80.0)),
     ),
 )
 
 
 def lobe(model: Model, incident: float, views: np.ndarray) -> np.ndarray:
-    """f_r cos(view) (n,) in 1/sr toward `views` (n,), degrees from the normal in the plane of
-    incidence, positive on the side that light is mirrored to; light comes from `incident` degrees
-    on the other side.
+    """Evaluate a reflectance model in the plane of incidence.
+
+    Parameters
+    ----------
+    model : Model
+        The reflectance model.
+    incident : float
+        Angle of the light from the normal, degrees.
+    views : (n,) ndarray
+        Angles of the view, degrees; positive on the side of the mirror direction.
+
+    Returns
+    -------
+    (n,) ndarray
+        f_r cos(view), 1/sr.
     """
     light = np.array([-np.sin(np.deg2rad(incident)), 0, np.cos(np.deg2rad(incident))])
     angle = np.deg2rad(views)
@@ -103,12 +114,15 @@ def _lobes(context: Context) -> ItemContent:
         "light from (degrees)",
         "largest at (degrees)",
         "largest f_r cos (1/sr)",
-        "share of the light that leaves",
+        "share of the light reflected",
     )
     text = (
-        "f_r cos, the intensity that a small patch sends each way, in the plane of incidence; each half circle at a scale of its own (the "
-        "number at its rim, 1/sr); dashed: where the light comes from. A Lambertian patch sends most along its normal wherever light comes "
-        "from, Oren-Nayar more of it back. GGX grows toward grazing light, as real gloss does; Phong and Blinn-Phong do not."
+        "f_r cos, the intensity that a small patch reflects in each direction, in the "
+        "plane of incidence. Each half circle has its own scale (the number at its "
+        "rim, 1/sr); dashed: the direction of the light. A Lambertian patch reflects "
+        "most along its normal for every light; Oren-Nayar reflects more back toward "
+        "the light. GGX increases toward grazing light, as measured surfaces do; Phong "
+        "and Blinn-Phong do not."
     )
     return ItemContent((ItemTable(header, tuple(rows)),), (made,), text)
 
@@ -150,16 +164,29 @@ def _polar(place: Axes, views: np.ndarray, curves: list[np.ndarray], title: str)
 
 
 def phong_sphere(size: int, exponent: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Phong's ambient, diffuse and specular light and their sum on a ball, each (size, size, 3),
-    and the ball's mask.
+    """Render Phong's components on a ball.
+
+    Parameters
+    ----------
+    size : int
+        Side of the picture, pixels.
+    exponent : float
+        Phong exponent.
+
+    Returns
+    -------
+    layers : dict of str to (size, size, 3) ndarray
+        Ambient, diffuse and specular light and their sum.
+    mask : (size, size) ndarray
+        Pixels of the ball.
     """
     normal, coverage = sphere_normals(size)
     mask = coverage > 0.5
     light = DirectionalLight(toward(-0.5, 0.6, 0.8), ambient=np.full(3, 0.12))
-    paint = np.array([0.65, 0.16, 0.10])
+    albedo = np.array([0.65, 0.16, 0.10])
     source = directional(light.direction, light.irradiance)
-    ambient = np.broadcast_to(paint * light.ambient, normal.shape)
-    diffuse = radiance(Dichromatic(paint, Lambert(), Lambert(0.0)), normal, VIEW, source)
+    ambient = np.broadcast_to(albedo * light.ambient, normal.shape)
+    diffuse = radiance(Dichromatic(albedo, Lambert(), Lambert(0.0)), normal, VIEW, source)
     specular = radiance(Phong(0.6 / np.pi, exponent, normalised=False), normal, VIEW, source)
     layers = {
         "ambient": ambient,
@@ -178,7 +205,10 @@ def _phong(context: Context) -> ItemContent:
         level = layers["specular"][mask].max(axis=1)
         cells.append((exponent, float(level.max()), 100 * float((level > level.max() / 2).mean())))
     header = ("exponent", "brightest specular light", "share of the ball above half of it (%)")
-    text = "Ambient, diffuse and specular light of one lamp on a ball, and their sum; the higher the exponent, the smaller the highlight."
+    text = (
+        "Ambient, diffuse and specular light of one distant light on a ball, and their "
+        "sum. The higher the exponent, the smaller the highlight."
+    )
     return ItemContent(
         (ItemTable(header, tuple(cells)),),
         (image_sheet(("ambient", "diffuse", "specular", "sum"), rows, expose=False),),
@@ -187,11 +217,24 @@ def _phong(context: Context) -> ItemContent:
 
 
 def shading_models(subject: Subject) -> tuple[np.ndarray, dict[str, np.ndarray], np.ndarray]:
-    """The true shading (H, W, 3) of a subject whose truth is known; what models of it make of the
-    true normals, by name; and the normals.
+    """Fit models of the shading to a subject's true normals.
 
-    The models: exp of nine spherical harmonics, one distant light with an ambient rest, and a
-    constant. 0 where nothing is known.
+    The models: exp of nine spherical harmonics, one distant light with ambient light, and a
+    constant.
+
+    Parameters
+    ----------
+    subject : Subject
+        A subject with ground truth.
+
+    Returns
+    -------
+    shading : (H, W, 3) ndarray
+        True shading; 0 where unknown.
+    models : dict of str to (H, W, 3) ndarray
+        Fitted shadings.
+    normal : (H, W, 3) ndarray
+        True normals.
     """
     truth = subject.truth
     assert truth is not None
@@ -213,7 +256,7 @@ def shading_models(subject: Subject) -> tuple[np.ndarray, dict[str, np.ndarray],
 
 
 def _one_light(normal: np.ndarray, shading: np.ndarray) -> np.ndarray:
-    """The best S = E max(0, n . l) + A of many directions l, for normals and shadings (N, 3)."""
+    """Fit S = E max(0, n . l) + A over a grid of directions l to normals and shadings (N, 3)."""
     best, least = shading, np.inf
     for azimuth in np.deg2rad(np.arange(0, 360, 15)):
         for tilt in np.deg2rad(np.arange(0, 100, 10)):
@@ -252,9 +295,9 @@ def _shading(context: Context) -> ItemContent:
                 ]
     header = ("subject", "model of the shading", "RMS error (% of the shading's RMS)")
     text = (
-        "Shading is what a white object would show. The models see the true normals only: shadows that parts of the object cast on "
-        "others, and light between them, no function of the normal can have. Normals are differences of the true height, "
-        "wrong where it has steps."
+        "Shading is the image of a white object. The models depend on the true normals "
+        "only: cast shadows and interreflections are no function of the normal. "
+        "Normals are differences of the true height and wrong at its steps."
     )
     return ItemContent((ItemTable(header, tuple(cells)),), (panel_figure(shown, 6),), text)
 
@@ -300,11 +343,12 @@ def _intrinsic(context: Context) -> ItemContent:
     table = ItemTable(
         ("intrinsic image", "RMS error after the best scale (% of its RMS)"),
         cells,
-        f"{subject.name}: found by `--model mdr`.",
+        f"{subject.name}: estimated by `--model mdr`.",
     )
     text = (
-        "image = reflectance × shading + specular; above the true layers, below what was found. Reflectance and shading are in exposures "
-        "of their own, since one photo leaves their scale open."
+        "image = reflectance × shading + specular. Top: ground truth; bottom: "
+        "estimate. Reflectance and shading have their own exposures, since one photo "
+        "leaves their scale undetermined."
     )
     return ItemContent((table,), (panel_figure(shown, 5),), text)
 
@@ -338,14 +382,19 @@ def _specular_free(context: Context) -> ItemContent:
             for title, one, gain in zip(names, made, gains, strict=True)
         ]
     text = (
-        f"{chosen.name}: each image made of the photo (above) and of its diffuse layer (below), in one exposure per column. Where both "
-        "rows look alike, highlights do not reach the image. The dark channel is the opposite: mostly highlight, and what is left of pale "
-        "paint. SF1 and SF2 take highlights for white: what is left in them is noise, clipping, and the tint of the light."
+        f"{chosen.name}: each image made of the photo (top) and of its diffuse layer "
+        "(bottom), one exposure per column. Where both rows agree, the image contains "
+        "no specular light. The dark channel is the opposite: mostly highlight, and "
+        "the rest of pale surfaces. SF1 and SF2 assume white highlights: the residue "
+        "is noise, clipping, and the tint of the light."
     )
     return ItemContent((table,), (panel_figure(shown, len(kinds)),), text)
 
 
-_LEFT = "Share of the highlights' light that is left in each image (%), without what lies evenly on the whole object."
+_LEFT = (
+    "Share of the specular light that remains in each image (%), offsets common to "
+    "the whole object excluded."
+)
 _figure = partial(ThesisItem, "figure")
 ITEMS: tuple[ThesisItem, ...] = (
     _figure("2.1", "Lobes of the reflectance models", _lobes),

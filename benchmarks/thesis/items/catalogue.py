@@ -1,20 +1,20 @@
-"""Tables of the background as documentation of what the code has: constraints of reflectance
-models, specular-free images, characteristics.
+"""Tables 2.1 to 2.3, documentation of the code: constraints of reflectance models, specular-free
+images, characteristics.
 
-Table 2.1 measures what a reflectance model has to obey, on the models as they are called:
+Table 2.1 measures the constraints of a reflectance model on the models as they are called:
 
     positivity    f_r(v, l) >= 0 for all v, l;      reciprocity    f_r(v, l) = f_r(l, v);
     energy        a(l) = integral of f_r(v, l) cos(v) over the hemisphere of views <= 1 for all l.
 
-Table 2.3 is held against a result that was saved: a characteristic without its channels, or a
-channel without a characteristic, is wrong.
+Table 2.3 is compared with a saved result: a characteristic without its channels, or a channel
+without a characteristic, is an error.
 
 Citation: F. E. Nicodemus et al., "Geometrical considerations and nomenclature for reflectance"
 (1977), doi:10.6028/NBS.MONO.160; E. Veach, "Robust Monte Carlo methods for light transport
 simulation", thesis, Stanford (1997), which has no DOI (the constraints).
 
-Limits: numbers are the worst over random pairs of directions and over twelve angles; a violation
-between them is not seen.
+Limits: numbers are the worst over random pairs of directions and over twelve angles; violations
+between them are missed.
 """
 
 import tempfile
@@ -48,10 +48,8 @@ from ..measuring.specular_free_images import (
 from ..report.item import ItemContent, ItemTable, ThesisItem
 
 _PAIRS = 4000
-_RECIPROCAL, _KEPT = (
-    1e-9,
-    1e-3,
-)  # what counts as equal, and how much more than all light the integrals' own error may give
+_RECIPROCAL = 1e-9  # tolerance of reciprocity
+_KEPT = 1e-3  # numerical error of the energy integral
 MODELS: tuple[tuple[str, Model], ...] = (
     ("Lambert, albedo 1", Lambert()),
     ("Oren-Nayar, albedo 1, sigma .2", OrenNayar(sigma=0.2)),
@@ -77,9 +75,18 @@ MODELS: tuple[tuple[str, Model], ...] = (
 
 @dataclass(frozen=True)
 class ConstraintCheck:
-    """What was measured of a model. `least`: the smallest f_r (1/sr). `asymmetry`: the largest
-    |f_r(v, l) - f_r(l, v)| over the largest f_r. `most`: the largest share of the light that
-    leaves, and `at`, for light from how many degrees.
+    """Constraints measured for a model.
+
+    Attributes
+    ----------
+    least : float
+        Smallest f_r, 1/sr.
+    asymmetry : float
+        Largest |f_r(v, l) - f_r(l, v)| / largest f_r.
+    most : float
+        Largest share of the light that is reflected.
+    at : float
+        Angle of the light for `most`, degrees.
     """
 
     least: float
@@ -89,12 +96,25 @@ class ConstraintCheck:
 
     @property
     def obeyed(self) -> tuple[bool, bool, bool]:
-        """Positivity, reciprocity, conservation of energy."""
+        """Whether positivity, reciprocity and conservation of energy hold."""
         return self.least >= 0, self.asymmetry <= _RECIPROCAL, self.most <= 1 + _KEPT
 
 
 def check_constraints(model: Model, seed: int = 0) -> ConstraintCheck:
-    """The constraints of a model, over random pairs of directions and light from 0 to 85 degrees."""
+    """Measure the constraints over random pairs of directions and light from 0 to 85 degrees.
+
+    Parameters
+    ----------
+    model : Model
+        The reflectance model.
+    seed : int
+        Random seed.
+
+    Returns
+    -------
+    ConstraintCheck
+        The measurements.
+    """
     directions = np.random.default_rng(seed).normal(size=(2, _PAIRS, 3))
     directions[..., 2] = np.abs(directions[..., 2])
     view, light = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
@@ -124,16 +144,20 @@ def _constraints(context: Context) -> ItemContent:
         "positive",
         "asymmetry",
         "reciprocal",
-        "most light that leaves",
-        "from (degrees)",
+        "largest share reflected",
+        "light from (degrees)",
         "conserves energy",
     )
     text = (
-        "A model that stands in a balance of energy, or in a renderer, has to obey all three. What is scaled by a strength is shown at "
-        "strength 1, the most that it can ask for. Plain Phong and Blinn-Phong, as published, are radiance per irradiance across the beam: "
-        "not reciprocal, and what they keep of the light depends on the exponent. The factor that is usual for Blinn-Phong keeps up to "
-        "7.5 % too much, which the conserving one mends; Oren-Nayar's short form up to 1.5 % at grazing light. A body under a gloss can "
-        "give back more than it gets, since the gloss takes nothing from the body: the dichromatic model is one of images, not of energy."
+        "A model used in an energy balance or a renderer must obey all three. Models "
+        "with a strength are tested at strength 1, the maximum. Plain Phong and "
+        "Blinn-Phong, as published, are radiance per irradiance across the beam: not "
+        "reciprocal, and the reflected share depends on the exponent. The usual factor "
+        "of Blinn-Phong reflects up to 7.5 % too much, which the conserving one "
+        "corrects; Oren-Nayar's short form up to 1.5 % at grazing light. A diffuse "
+        "body with a specular lobe can reflect more than it receives, since the lobe "
+        "takes nothing from the body: the dichromatic model describes images, not "
+        "energy."
     )
     return ItemContent(
         (
@@ -171,22 +195,33 @@ def _specular_free(context: Context) -> ItemContent:
         "citation",
         "function",
         "used by",
-        "highlight left (%), mean",
+        "residual highlight (%), mean",
         "largest",
     )
     text = (
-        "min and max are over the channels of a pixel, Σ their sum. What is left of the highlights is measured on "
-        f"{', '.join(map(subject_title, subjects))}, without what lies evenly on the whole object. Two methods have "
-        "invariants that are no images: `mallick_2006` the hue and chroma in a plane across white, `isc` the chroma max I − min I."
+        "min and max are over the channels of a pixel, Σ is their sum. The residual "
+        f"highlight is measured on {', '.join(map(subject_title, subjects))}, offsets "
+        "common to the whole object excluded. Two methods have invariants that are not "
+        "images: `mallick_2006` the hue and chroma in a plane across white, `isc` the "
+        "chroma max I − min I."
     )
     return ItemContent((ItemTable(header, tuple(rows)),), text=text)
 
 
 @dataclass(frozen=True)
 class CharacteristicEntry:
-    """What a decomposition holds. `symbol`, `unit`, `frame`: as one writes them; `field`: of
-    `Decomposition`; `shape`: of the array, H and W being the picture's; `stored`: under which keys
-    of `decomposition.json`, for what has no channels.
+    """One part of a decomposition, as documented.
+
+    Attributes
+    ----------
+    name, symbol, unit, frame : str
+        As written in the table.
+    field : str
+        Field of `Decomposition`.
+    shape : str
+        Shape of the array; H and W are those of the picture.
+    stored : str
+        Keys of `decomposition.json`, for parts without channels.
     """
 
     name: str
@@ -243,7 +278,7 @@ CHARACTERISTICS = (
         "illumination",
     ),
     CharacteristicEntry(
-        "gloss",
+        "specular lobe",
         "α, f0, lights",
         "none; strength in the photo's unit",
         "camera",
@@ -264,15 +299,26 @@ CHARACTERISTICS = (
 
 
 def channels_of(characteristic: CharacteristicEntry) -> tuple[str, ...]:
-    """Its channels in `maps.exr`; none for what is stored elsewhere."""
+    """Return the channels of a part in `maps.exr`; none if it is stored elsewhere."""
     return tuple(
         f"{characteristic.field}.{letter}" for letter in LAYERS.get(characteristic.field, "")
     )
 
 
 def check_characteristics(d: Decomposition, folder: Path) -> tuple[str, ...]:
-    """What differs between the list and a result, saved in `folder`: fields, shapes and channels;
-    empty where all agree.
+    """Compare the list of characteristics with a saved result.
+
+    Parameters
+    ----------
+    d : Decomposition
+        A result.
+    folder : Path
+        Folder to save it to.
+
+    Returns
+    -------
+    tuple of str
+        Differences in fields, shapes and channels; empty if all agree.
     """
     save(d, folder)
     channels = read_channels(folder / "maps.exr")
@@ -326,10 +372,12 @@ def _characteristics(context: Context) -> ItemContent:
         "in the result folder",
     )
     text = (
-        "Y_k are orthonormal real spherical harmonics in the order (0,0) (1,-1) (1,0) (1,1) (2,-2) (2,-1) (2,0) (2,1) (2,2). Maps are 0 "
-        "outside the mask, normals (0, 0, 1). Where a lobe was fitted, `lobe.R .G .B` is the specular light that it predicts. "
+        "Y_k are orthonormal real spherical harmonics in the order (0,0) (1,-1) (1,0) "
+        "(1,1) (2,-2) (2,-1) (2,0) (2,1) (2,2). Maps are 0 outside the mask, normals "
+        "(0, 0, 1). If a lobe was fitted, `lobe.R .G .B` is the specular light that it "
+        "predicts."
         + (
-            "Held against a saved result: all fields, shapes and channels are as listed."
+            "Compared with a saved result: all fields, shapes and channels are as listed."
             if not wrong
             else f"NOT as listed: {'; '.join(wrong)}."
         )
@@ -350,5 +398,5 @@ _table: Callable[..., ThesisItem] = partial(ThesisItem, "table")
 ITEMS: tuple[ThesisItem, ...] = (
     _table("2.1", "Functional constraints of reflectance models", _constraints),
     _table("2.2", "Specular-free images", _specular_free),
-    _table("2.3", "The characteristics and how they are stored", _characteristics),
+    _table("2.3", "Characteristics and their storage", _characteristics),
 )

@@ -1,20 +1,19 @@
-"""Tables 4.19 to 4.22: shape, light, shading and reflectance by the frameworks, relative to SIRFS
-on the photo as it is.
+"""Tables 4.19 to 4.22: shape, light, shading and reflectance by the frameworks, relative to SIRFS.
 
-4.19 and 4.20: SIRFS first, separation of its reflectance afterwards; errors, and time. 4.21 and
-4.22: separation first; errors, and time. Subjects: the glossy photos and rendered scenes whose
-shape and light are known. `joint`, ours, and SIRFS on the true diffuse image, which is what a
-perfect separation would give, stand beside them.
+Problem: 4.19 and 4.20 run SIRFS first and separate its reflectance; 4.21 and 4.22 separate first.
+Of each pair, the first table has errors and the second time. Subjects: glossy photos and rendered
+scenes with known shape and light. Two rows are added: `joint`, this project's model, and SIRFS on
+the true diffuse image, which is the result of a perfect separation.
 
-Equation: errors as in `isc_core.evaluation.metrics.Scores`; the ratio of geometric means over the subjects,
-with the interval of resampled subjects.
+Equation: errors as in `isc_core.evaluation.metrics.Scores`; the ratio of geometric means over the
+subjects, with the interval of resampled subjects.
 
 Citation: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712; B. Efron (1979),
 doi:10.1214/aos/1176344552.
 
-Limits: how the thesis splits its figures over the two tables of each pair is not known; errors and
-time is our choice. Its MIT-Berkeley-UTeM set is not public: glossy-mit stands in for it. On a few
-subjects the intervals are wide.
+Limits: it is not known how the thesis divides its figures between the tables of each pair; errors
+and time are this project's choice. MIT-Berkeley-UTeM is not public; glossy-mit replaces it. With
+few subjects the intervals are wide.
 """
 
 from collections.abc import Callable, Sequence
@@ -92,7 +91,22 @@ def _times(
 
 
 def relative_error_table(rows: Sequence[FrameworkErrors], words: str, seed: int) -> ItemTable:
-    """Each framework's errors over those of SIRFS, with their intervals; a line a framework."""
+    """Tabulate each framework's errors relative to SIRFS.
+
+    Parameters
+    ----------
+    rows : sequence of FrameworkErrors
+        Errors of all runs.
+    words : str
+        Description of the subjects.
+    seed : int
+        Seed of the bootstrap.
+
+    Returns
+    -------
+    ItemTable
+        One row per framework, with intervals.
+    """
     lines: list[tuple[str, ...]] = []
     for label in dict.fromkeys(row.framework for row in rows):
         cells = [
@@ -110,7 +124,18 @@ def relative_error_table(rows: Sequence[FrameworkErrors], words: str, seed: int)
 
 
 def error_table(rows: Sequence[FrameworkErrors]) -> ItemTable:
-    """Each run's errors as they are."""
+    """Tabulate the errors of each run.
+
+    Parameters
+    ----------
+    rows : sequence of FrameworkErrors
+        Errors of all runs.
+
+    Returns
+    -------
+    ItemTable
+        One row per run.
+    """
     lines: list[tuple[Cell, ...]] = [
         (row.subject, row.framework, *(row.errors[name] for name in METRICS)) for row in rows
     ]
@@ -126,22 +151,27 @@ def _speed(rows: Sequence[FrameworkErrors], seed: int) -> ItemTable:
     for label in dict.fromkeys(row.framework for row in rows):
         seconds, evaluations = _seconds(rows, label), _evaluations(rows, label)
         plain = label == SIRFS.label
-        lines.append((
-            label, geometric_mean(seconds.values()), geometric_mean(evaluations.values()),
-            "1" if plain else format_ratio(paired_ratio(seconds, _seconds(rows, SIRFS.label), seed)),
-            "1" if plain else format_ratio(paired_ratio(evaluations, _evaluations(rows, SIRFS.label), seed)),
-        ))  # fmt: skip
+        ratios = [
+            "1" if plain else format_ratio(paired_ratio(ours, reference, seed))
+            for ours, reference in (
+                (seconds, _seconds(rows, SIRFS.label)),
+                (evaluations, _evaluations(rows, SIRFS.label)),
+            )
+        ]
+        means = [geometric_mean(each.values()) for each in (seconds, evaluations)]
+        lines.append((label, *means, *ratios))
     header = (
         "framework",
         "seconds",
         "evaluations",
-        "seconds over SIRFS (95 %)",
-        "evaluations over SIRFS (95 %)",
+        "seconds / SIRFS (95 %)",
+        "evaluations / SIRFS (95 %)",
     )
     return ItemTable(
         header,
         tuple(lines),
-        "Geometric means over the subjects, warm, two threads; evaluations of the energy by the solver",
+        "Geometric means over the subjects, after a warm-up run, two threads; "
+        "evaluations of the energy",
     )
 
 
@@ -172,7 +202,7 @@ def _time_verdict(rows: Sequence[FrameworkErrors], seed: int) -> ClaimVerdict:
         judged.claim,
         judged.here,
         judged.holds,
-        f"{why}evaluations, which no load of the machine changes: {found} of SIRFS'",
+        f"{why}evaluations, which do not depend on the load of the machine: {found} of SIRFS",
     )
 
 
@@ -193,15 +223,18 @@ def _of_kind(rows: Sequence[FrameworkErrors], kind: str) -> list[FrameworkErrors
 
 
 _AFTER_TEXT = (
-    "Below 1 is better than SIRFS on the photo as it is. Height, normals and light of SIRFS-X are those of SIRFS, since X sees its result: "
-    "only reflectance can change, and with it the last two columns."
+    "Below 1 is better than SIRFS on the photo. Height, normals and light of "
+    "SIRFS-X are those of SIRFS, since X separates its result: only the "
+    "reflectance can change, and with it the last two columns."
 )
 _BEFORE_TEXT = (
-    "Below 1 is better than SIRFS on the photo as it is. MZK06 and YCK06 in their improved settings, SC with both specular-free images; "
-    "MDR-SIRFS with the separator `isc`. The last line is what a perfect separation would give, the gain that there is to be "
-    "had. docs/results.md has more objects and levels of gloss, cross-validated."
+    "Below 1 is better than SIRFS on the photo. MZK06 and YCK06 in their improved "
+    "variants, SC with both specular-free images; MDR-SIRFS with the separation "
+    "`isc`. The last row is the result of a perfect separation and bounds the "
+    "possible gain. docs/results.md has more objects and levels of specular light, "
+    "cross-validated."
 )
-_TIME_TEXT = "Seconds hold the separation as well as SIRFS; they are worth no more than the quiet of the machine they were taken on."
+_TIME_TEXT = "Seconds include separation and SIRFS. They depend on the load of the machine."
 
 ITEMS: tuple[ThesisItem, ...] = (
     ThesisItem(

@@ -1,15 +1,14 @@
-"""Figure 3.12: histograms of filter outputs on diffuse and on specular layers, how far apart they
-are, and whether that is chance.
+"""Figure 3.12: histograms of filter outputs on diffuse and specular layers, and their significance.
 
 Equation: with h_s,f and g_s,f the histograms of filter f on the specular and the diffuse layer of
-subject s, means over the subjects h_f, g_f, the distance is the total variation 1/2 sum |h_f -
-g_f|, in [0, 1]. If layers did not matter, h_s and g_s could be exchanged in any subject: p is the
-share of all exchanges (of up to 4096 of them, at random) that give no smaller distance.
-Neighbouring pixels are alike, so that tests which count pixels would promise far too much; subjects
-are counted. The nine p are corrected by Holm's rule.
+subject s, and h_f, g_f their means over the subjects, the distance is the total variation
+1/2 sum |h_f - g_f|, in [0, 1]. If layers did not matter, h_s and g_s could be exchanged in any
+subject: p is the share of all exchanges (at most 4096 random ones) with no smaller distance.
+Neighbouring pixels are correlated, so that tests that count pixels are far too optimistic;
+subjects are counted. The nine p values are corrected by Holm's rule.
 
-The area is that under the curve of hits against false alarms, of single pixels of a subject judged
-by the histograms of the others.
+The area is that under the ROC curve of single pixels of a subject, classified by the histograms of
+the others.
 
 Citation: H. Akbar (2016), section 3.6.5.1; E. J. G. Pitman, "Significance tests which may be
 applied to samples from any populations", Supplement to the Journal of the Royal Statistical Society
@@ -42,11 +41,22 @@ from ..measuring.specular_free_images import subject_title, subjects_with_highli
 from ..report.item import ItemContent, ItemTable, ThesisItem
 
 _EXCHANGES = 4096
-_LEAST = 30  # pixels of either kind, below which a subject has no histogram of its own
+_LEAST = 30  # pixels of either kind, minimum of either layer for a histogram
 
 
 def layer_samples(subjects: list[Subject]) -> list[Sample]:
-    """The filters' outputs on the layers of each subject that has enough of both."""
+    """Filter the layers of each subject with enough pixels of both.
+
+    Parameters
+    ----------
+    subjects : list of Subject
+        Subjects with known layers.
+
+    Returns
+    -------
+    list of Sample
+        Filter outputs.
+    """
     found = []
     for one in subjects:
         assert one.diffuse is not None
@@ -66,7 +76,20 @@ def layer_samples(subjects: list[Subject]) -> list[Sample]:
 
 
 def layer_histograms(sample: Sample, spread: np.ndarray) -> np.ndarray:
-    """(2, F, BINS): of the specular and of the diffuse layer, each of sum 1."""
+    """Compute the histograms of the filter outputs.
+
+    Parameters
+    ----------
+    sample : Sample
+        Filter outputs of a subject.
+    spread : (F,) ndarray
+        Scale of each filter.
+
+    Returns
+    -------
+    (2, F, BINS) ndarray
+        Histograms of the specular and the diffuse layer, each with sum 1.
+    """
     pair = np.zeros((2, len(FILTERS), BINS))
     for kind, outputs in enumerate((sample.of_highlight, sample.of_without)):
         for f in range(len(FILTERS)):
@@ -77,14 +100,35 @@ def layer_histograms(sample: Sample, spread: np.ndarray) -> np.ndarray:
 
 
 def total_variation(pairs: np.ndarray) -> np.ndarray:
-    """Total variation (F,) of the means of histograms (S, 2, F, BINS) over the subjects."""
+    """Compute the distance of the mean histograms of both layers.
+
+    Parameters
+    ----------
+    pairs : (S, 2, F, BINS) ndarray
+        Histograms by subject and layer.
+
+    Returns
+    -------
+    (F,) ndarray
+        Total variation per filter.
+    """
     return np.abs(pairs[:, 0].mean(axis=0) - pairs[:, 1].mean(axis=0)).sum(axis=1) / 2
 
 
 def exchange_test(pairs: np.ndarray, seed: int) -> np.ndarray:
-    """p (F,): the share of exchanges of layers within subjects that give no smaller distance;
+    """Test the distances by exchanging the layers within subjects.
 
-    `pairs` (S, 2, F, BINS).
+    Parameters
+    ----------
+    pairs : (S, 2, F, BINS) ndarray
+        Histograms by subject and layer.
+    seed : int
+        Random seed.
+
+    Returns
+    -------
+    (F,) ndarray
+        p values.
     """
     count = len(pairs)
     if 2**count <= _EXCHANGES:
@@ -109,8 +153,17 @@ def holm_correction(p: np.ndarray) -> np.ndarray:
 
 
 def left_out_area(samples: list[Sample]) -> float:
-    """The mean over the subjects of the area for single pixels, judged by histograms of the other
-    subjects.
+    """Classify single pixels of each subject by the histograms of the others.
+
+    Parameters
+    ----------
+    samples : list of Sample
+        Filter outputs by subject.
+
+    Returns
+    -------
+    float
+        Mean area under the ROC curve.
     """
     areas = []
     for number, one in enumerate(samples):
@@ -125,7 +178,10 @@ def _filters(context: Context) -> ItemContent:
     )
     if len(samples) < 2:
         return ItemContent(
-            text="Fewer than two subjects here have enough of both layers: nothing can be compared."
+            text=(
+                "Fewer than two subjects have enough pixels of both layers: nothing can be "
+                "compared."
+            )
         )
     spread = fitted(samples).spread
     pairs = np.stack([layer_histograms(sample, spread) for sample in samples])
@@ -140,11 +196,14 @@ def _filters(context: Context) -> ItemContent:
     names = ", ".join(sample.thing for sample in samples)
     nearest, furthest = min(cell[2] for cell in cells), max(cell[2] for cell in cells)
     text = (
-        f"{len(samples)} subjects: {names}; of the specular layers those pixels in which they are at least a quarter of the light. "
-        f"Distances are {nearest:.2f} to {furthest:.2f} of at most 1; with so many subjects p cannot be below {2 / 2 ** len(samples):.2g}. "
-        "Single pixels of a subject, judged by the histograms of the others, are told apart with an area under the curve of "
-        f"{left_out_area(samples):.2f} (.5 is chance, 1 always right). In a photo only the sum of the layers is seen: what that leaves of "
-        "it is in docs/methods/filter_statistics.md. Widths are shares of the object's diagonal."
+        f"{len(samples)} subjects: {names}. Of the specular layers, only pixels with at "
+        f"least a quarter of the light count. Distances are {nearest:.2f} to "
+        f"{furthest:.2f} of at most 1; with so many subjects, p cannot be below "
+        f"{2 / 2 ** len(samples):.2g}. Single pixels of a subject, classified by the "
+        "histograms of the others, reach an area under the ROC curve of "
+        f"{left_out_area(samples):.2f} (.5 is chance, 1 is perfect). A photo contains "
+        "only the sum of the layers; docs/methods/filter_statistics.md measures what "
+        "remains of the difference. Widths are shares of the object's diagonal."
     )
     return ItemContent((ItemTable(header, cells),), (_picture(pairs, cells),), text)
 

@@ -1,5 +1,5 @@
-"""Figures of the framework: its stages, those of Chaotic Segmentation, Sparse Coding, MBP and MDR,
-as sheets of real runs.
+"""Figures 3.2 to 3.4 and 3.9 to 3.11: the stages of the framework, of Chaotic Segmentation, Sparse
+Coding, MBP and MDR, in real runs.
 
 Every picture is an intermediate result of the functions that separate and decompose, on the subject
 with the most specular light; nothing is drawn by hand. Specular layers have the photo's exposure.
@@ -7,8 +7,8 @@ with the most specular light; nothing is drawn by hand. Specular layers have the
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image",
 thesis (2016).
 
-Limits: the thesis' own drawings are not public; which stages belong to which of the numbers 3.2 to
-3.4 and 3.9 to 3.11 is our reading.
+Limits: the thesis' own drawings are not public; the assignment of stages to the numbers 3.2 to 3.4
+and 3.9 to 3.11 is this project's.
 """
 
 from dataclasses import replace
@@ -52,9 +52,7 @@ _LEAST_EXPLAINED = 0.1  # share of the specular layer, below which a lobe's pict
 
 
 def _subject(context: Context) -> Subject:
-    """The one with the most specular light of those with significant specularity and an outline: of
-    it the stages have most to show.
-    """
+    """Select the subject with the most specular light among those with a silhouette."""
 
     def share(subject: Subject) -> float:
         specular = np.zeros(1) if subject.specular is None else subject.specular[subject.mask]
@@ -65,7 +63,7 @@ def _subject(context: Context) -> Subject:
 
 
 def _framework(context: Context) -> ItemContent:
-    """3.2: from the photo to the picture under another light."""
+    """Figure 3.2: from the photo to the picture under another light."""
     subject = _subject(context)
     d = decompose_subject(context, subject)
     gain = exposure(d.image, d.mask)
@@ -74,22 +72,22 @@ def _framework(context: Context) -> ItemContent:
         shown.append(Panel("the fitted lobe's highlights", d.brdf.predicted, d.mask, gain=gain))
     sun = explain_shading(d).light.direction
     white = np.repeat(np.maximum(d.normal @ sun, 0)[..., None], 3, axis=2)
-    shown.append(Panel("white, under the one light that explains most", white, d.mask, gain=0.9))
+    shown.append(Panel("white, under the single light that explains most", white, d.mask, gain=0.9))
     turned = relight(d, NewLight(coefficients=turned_light(d.illumination, turn(yaw=70))))
     shown.append(Panel("relit: the light turned by 70°", turned.image, d.mask, gain=gain))
     rebuilt = d.reflectance * d.shading + d.specular + d.residual
     shown.append(Panel("rebuilt: reflectance × shading + specular", rebuilt, d.mask, gain=gain))
     seconds = tuple((name, float(value)) for name, value in d.provenance.timings.items())
-    table = ItemTable(("stage", "seconds"), seconds, f"{subject.name}: what the stages took.")
+    table = ItemTable(("stage", "seconds"), seconds, f"{subject.name}: time per stage.")
     text = (
-        f"{subject.name}: specular removal, shape, light, shading and reflectance, the lobe, and what the result is good for."
-        f"{_lobe_words(d)} {COLOURS}"
+        f"{subject.name}: specular removal, shape, light, shading and reflectance, the "
+        f"lobe, and applications.{_lobe_words(d)} {COLOURS}"
     )
     return ItemContent((table,), (panel_figure(shown, 4),), text)
 
 
 def _segmentation(context: Context) -> ItemContent:
-    """3.3: the stages of Chaotic Segmentation."""
+    """Figure 3.3: the stages of Chaotic Segmentation."""
     subject = _subject(context)
     image, mask = _inside(subject)
     gain = exposure(image, mask)
@@ -112,7 +110,7 @@ def _segmentation(context: Context) -> ItemContent:
         hole = np.where(found[..., None], 0, image)
         shown += [
             Panel(f"{name}: specular pixels cut out", hole, mask, gain=gain),
-            Panel(f"{name}: repainted, diffuse", split.diffuse, mask, gain=gain),
+            Panel(f"{name}: inpainted, diffuse", split.diffuse, mask, gain=gain),
             Panel(f"{name}: specular", split.specular, mask, gain=gain),
         ]
         rows.append(
@@ -120,14 +118,16 @@ def _segmentation(context: Context) -> ItemContent:
         )
     header = ("variant", "thresholds K", "specular pixels (%)", "diffuse error / doing nothing")
     text = (
-        f"{subject.name}. As published: pixels above the highest of three thresholds are replaced as a whole, from patches of the rest. "
-        "Ours: one threshold, a rim around it, and only white light is taken off, by the ratio of the channels that the patches hand over."
+        f"{subject.name}. As published: pixels above the highest of three thresholds "
+        "are replaced completely, from patches of the rest. Improved: one threshold, a "
+        "rim around it, and only white light is removed, by the ratio of the channels "
+        "in the patches."
     )
     return ItemContent((ItemTable(header, tuple(rows)),), (panel_figure(shown, 3),), text)
 
 
 def _search(context: Context) -> ItemContent:
-    """3.4: how Chaotic Segmentation finds its thresholds."""
+    """Figure 3.4: the threshold search of Chaotic Segmentation."""
     subject = _subject(context)
     image, mask = _inside(subject)
     published = VARIANTS["paper"]
@@ -176,9 +176,12 @@ def _search(context: Context) -> ItemContent:
         frameon=False,
     )
     box = np.where(mask, np.digitize(levels, thresholds, right=True), np.nan)
-    show_map(axes[0, 2], box, "classes of the thresholds found")
+    show_map(axes[0, 2], box, "classes by these thresholds")
     header = ("search", "thresholds", "objective / optimum", "evaluations until then")
-    text = f"{subject.name}: one search with each optimiser, of the smallest channel's histogram. Repeated runs are in tables 4.1 to 4.4."
+    text = (
+        f"{subject.name}: one search with each optimiser on the histogram of the "
+        "smallest channel. Tables 4.1 to 4.4 repeat the runs."
+    )
     return ItemContent((ItemTable(header, tuple(rows)),), (made,), text)
 
 
@@ -202,9 +205,7 @@ def _histogram(place: Axes, levels: np.ndarray, thresholds: np.ndarray) -> None:
 def _thresholds(
     image: np.ndarray, mask: np.ndarray, options: ChaoticSegmentationOptions, seed: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The smallest channel in levels (H, W), as the method quantises it, and the thresholds that
-    its search finds.
-    """
+    """Return the smallest channel in quantised levels (H, W) and the thresholds of the search."""
     low = smallest(image)
     levels = quantise(low, float(low.max()))
     found = maximise(
@@ -218,7 +219,7 @@ def _thresholds(
 
 
 def _sparse(context: Context) -> ItemContent:
-    """3.9: the stages of Sparse Coding."""
+    """Figure 3.9: the stages of Sparse Coding."""
     subject = _subject(context)
     image, mask = _inside(subject)
     gain = exposure(image, mask)
@@ -252,8 +253,9 @@ def _sparse(context: Context) -> ItemContent:
         ("diffuse error / doing nothing", *_left(subject, split.diffuse)),
     )
     text = (
-        f"{subject.name}. Paint has an atom for each hue; what a pixel has too much of white for its atom is the highlight's code, if its "
-        "group of pixels looks like a highlight. Groups have arbitrary colours; where there is none it is darkest."
+        f"{subject.name}. Each hue has a diffuse atom; the white in excess of that atom "
+        "is the code of the highlight, if its group of pixels looks like a highlight. "
+        "Groups have arbitrary colours; pixels without a group are darkest."
     )
     return ItemContent((ItemTable(("measure", "value"), rows),), (panel_figure(shown, 5),), text)
 
@@ -265,7 +267,7 @@ def _mbp(context: Context) -> ItemContent:
         decompose_subject(context, subject, "sirfs"),
         decompose_subject(context, subject, "mbp"),
     )
-    gain, paint = exposure(d.image, d.mask), exposure(plain.reflectance, d.mask)
+    gain, albedo_gain = exposure(d.image, d.mask), exposure(plain.reflectance, d.mask)
     again = split_reflectance(
         plain.image, plain.shading, plain.mask, subject_as_photo(subject).clipped, "isc"
     )
@@ -274,8 +276,13 @@ def _mbp(context: Context) -> ItemContent:
         normals_panel("1. SIRFS: normals", plain.normal, plain.mask),
         light_panel("1. SIRFS: light", plain.illumination),
         Panel("1. SIRFS: shading", plain.shading, plain.mask),
-        Panel("1. SIRFS: reflectance, highlights in it", plain.reflectance, plain.mask, gain=paint),
-        Panel("2. separated: reflectance", d.reflectance, d.mask, gain=paint),
+        Panel(
+            "1. SIRFS: reflectance, highlights in it",
+            plain.reflectance,
+            plain.mask,
+            gain=albedo_gain,
+        ),
+        Panel("2. separated: reflectance", d.reflectance, d.mask, gain=albedo_gain),
         Panel("2. separated: diffuse", d.diffuse, d.mask, gain=gain),
         Panel("2. separated: specular", d.specular, d.mask, gain=gain),
     ]
@@ -287,14 +294,15 @@ def _mbp(context: Context) -> ItemContent:
         *_lobe_rows(d),
     )
     text = (
-        f"{subject.name}: SIRFS explains the photo as it is; highlights are then pale paint on evenly lit paint, and taken off there."
-        f"{_lobe_words(d)}"
+        f"{subject.name}: SIRFS explains the photo including its highlights; they "
+        "appear as pale spots of reflectance on evenly lit surfaces and are removed "
+        f"there.{_lobe_words(d)}"
     )
     return ItemContent((ItemTable(("measure", "value"), rows),), (panel_figure(shown, 5),), text)
 
 
 def _mdr(context: Context) -> ItemContent:
-    """3.11: separation first, then SIRFS of the diffuse image."""
+    """Figure 3.11: separation first, then SIRFS on the diffuse image."""
     subject = _subject(context)
     d = decompose_subject(context, subject)
     gain = exposure(d.image, d.mask)
@@ -317,7 +325,10 @@ def _mdr(context: Context) -> ItemContent:
         ("largest difference, stage 1 run by itself", same),
         *_lobe_rows(d),
     )
-    text = f"{subject.name}: highlights are taken off the photo; shape, light and paint are those of the diffuse image.{_lobe_words(d)}"
+    text = (
+        f"{subject.name}: highlights are removed from the photo; shape, light and "
+        f"reflectance are those of the diffuse image.{_lobe_words(d)}"
+    )
     return ItemContent((ItemTable(("measure", "value"), rows),), (panel_figure(shown, 5),), text)
 
 
@@ -341,10 +352,13 @@ def _lobe_rows(d: Decomposition) -> tuple[tuple[str, str | float], ...]:
 
 
 def _lobe_words(d: Decomposition) -> str:
-    """A space and a sentence on a lobe whose highlights are not those of the photo; else nothing."""
+    """Return a sentence if the fitted lobe explains little of the specular layer; else nothing."""
     if d.brdf is None or d.brdf.explained >= _LEAST_EXPLAINED:
         return ""
-    return " The fitted lobe explains little of the specular layer: on the shape that was found its highlight falls elsewhere."
+    return (
+        " The fitted lobe explains little of the specular layer: with the estimated "
+        "shape, its highlight is elsewhere."
+    )
 
 
 def _specular_share(d: Decomposition) -> float:
@@ -352,12 +366,12 @@ def _specular_share(d: Decomposition) -> float:
 
 
 def _inside(subject: Subject) -> tuple[np.ndarray, np.ndarray]:
-    """Image, 0 outside the mask, and mask."""
+    """Return the image, 0 outside the mask, and the mask."""
     return np.where(subject.mask[..., None], subject.image, 0).astype(np.float32), subject.mask
 
 
 def _left(subject: Subject, diffuse: np.ndarray) -> tuple[float | str]:
-    """Squared error of a diffuse layer over that of the photo itself, where the truth is known."""
+    """Return the squared error relative to that of the photo itself, if the truth is known."""
     if subject.diffuse is None:
         return ("",)
     nothing = float(np.square((subject.image - subject.diffuse)[subject.mask]).sum())
@@ -373,11 +387,11 @@ ITEMS: tuple[ThesisItem, ...] = (
         "3.1",
         "Diagram of the research",
         None,
-        "a diagram of how the research went: there is no computation behind it",
+        "a diagram of the course of the research, without computation",
     ),
     _figure("3.2", "The stages of the framework", _framework),
     _figure("3.3", "The stages of Chaotic Segmentation", _segmentation),
-    _figure("3.4", "How Chaotic Segmentation searches its thresholds", _search),
+    _figure("3.4", "The threshold search of Chaotic Segmentation", _search),
     _figure("3.9", "The stages of Sparse Coding", _sparse),
     _figure("3.10", "The stages of MBP: SIRFS first, then separation", _mbp),
     _figure("3.11", "The stages of MDR: separation first, then SIRFS", _mdr),

@@ -1,17 +1,16 @@
-"""Figures of the introduction: shape from shading by the two classical methods, and images with
-their characteristics.
+"""Figures 1.2 to 1.5: classical shape from shading, and images with their characteristics.
 
 The sphere and the vase are closed forms, lit by one distant light as both methods assume:
 brightness = max(0, n . l). The vase is z = sqrt(f(y)^2 - x^2) with f(y) = .15 - .1 y (6 y + 1)^2 (y
-- 1)^2 (3 y - 2), the one on which such methods are usually compared. Of the third object the true
-height is known, and its paint and light are what they are. Both methods are the models of
-`isc_core.baselines`, which also estimate the light.
+- 1)^2 (3 y - 2), the usual one in comparisons of such methods. The third object has known height,
+but its own albedo and light. Both methods are models of `isc_core.baselines`, which also estimate
+the light.
 
 Citation: P.-S. Tsai and M. Shah (1994), doi:10.1016/0262-8856(94)90002-7; K. Ikeuchi and B. K. P.
 Horn (1981), doi:10.1016/0004-3702(81)90023-0; the vase: R. Zhang, P.-S. Tsai, J. E. Cryer and M.
 Shah, "Shape from shading: a survey" (1999), doi:10.1109/34.784284.
 
-Limits: which methods and objects the thesis shows in 1.2 and 1.3 is not known to us.
+Limits: it is not known which methods and objects the thesis shows in 1.2 and 1.3.
 """
 
 from collections.abc import Callable
@@ -41,9 +40,18 @@ _NAMES = {
 
 @dataclass(frozen=True)
 class ShadedObject:
-    """An object whose shape is known.
+    """An object of known shape.
 
-    `image`: (H, W, 3) linear; `mask`: (H, W) bool; `height`: (H, W) pixels, NaN where unknown.
+    Attributes
+    ----------
+    name : str
+        Name in tables.
+    image : (H, W, 3) ndarray
+        Linear image.
+    mask : (H, W) ndarray
+        Boolean mask.
+    height : (H, W) ndarray
+        Pixels; NaN where unknown.
     """
 
     name: str
@@ -53,7 +61,7 @@ class ShadedObject:
 
 
 def sphere(size: int) -> ShadedObject:
-    """A ball that fills 90 % of a picture of `size` pixels a side, under `LIGHT`."""
+    """Render a ball under `LIGHT` that fills 90 % of a picture of `size` pixels per side."""
     radius = 0.45 * size
     axis = (np.arange(size) + 0.5 - size / 2) / radius
     x, y = np.meshgrid(axis, -axis)
@@ -64,7 +72,7 @@ def sphere(size: int) -> ShadedObject:
 
 
 def vase(size: int) -> ShadedObject:
-    """The vase of the survey, as high as a picture of `size` pixels a side, under `LIGHT`."""
+    """Render the vase of the survey under `LIGHT`, as high as the picture, `size` pixels."""
     x, y = np.meshgrid((np.arange(size) + 0.5) / size - 0.5, 1 - (np.arange(size) + 0.5) / size)
     f = 0.15 - 0.1 * y * (6 * y + 1) ** 2 * (y - 1) ** 2 * (3 * y - 2)
     slope = np.gradient(f[:, 0], y[:, 0])[:, None]
@@ -89,7 +97,7 @@ def _lit(name: str, normal: np.ndarray, mask: np.ndarray, height: np.ndarray) ->
 
 
 def shaded_objects(context: Context) -> tuple[ShadedObject, ...]:
-    """The sphere, the vase, and the first object of the matt ones whose height is known."""
+    """Return the sphere, the vase, and the first diffuse subject of known height."""
     size = 64 if context.quick else 160
     found: list[ShadedObject] = [sphere(size), vase(size)]
     for subject in context.subjects("diffuse"):
@@ -101,9 +109,16 @@ def shaded_objects(context: Context) -> tuple[ShadedObject, ...]:
 
 @dataclass(frozen=True)
 class RecoveredShape:
-    """A method's answer. `height`: (H, W) pixels. `angle`: (H, W) degrees between true and found
-    normals, NaN where unknown. `height_share`: mean error of the height after the best offset, of
-    the true height's range.
+    """Result of a method.
+
+    Attributes
+    ----------
+    height : (H, W) ndarray
+        Pixels.
+    angle : (H, W) ndarray
+        Degrees between true and estimated normals; NaN where unknown.
+    height_share : float
+        Mean height error after the best offset / range of the true height.
     """
 
     height: np.ndarray
@@ -112,14 +127,29 @@ class RecoveredShape:
 
     @property
     def mean_angle(self) -> float:
-        """Degrees."""
+        """Mean angle, degrees."""
         return float(np.nanmean(self.angle))
 
 
 def recover_shape(shaded: ShadedObject, method: str) -> RecoveredShape:
-    """What a method of `baselines.METHODS` makes of the image.
+    """Estimate the shape of an object.
 
-    Raises `InputError` for an unknown one.
+    Parameters
+    ----------
+    shaded : ShadedObject
+        The object.
+    method : str
+        One of `baselines.METHODS`.
+
+    Returns
+    -------
+    RecoveredShape
+        Shape and errors.
+
+    Raises
+    ------
+    InputError
+        If the method is unknown.
     """
     log_image = np.log(
         np.maximum(
@@ -169,7 +199,7 @@ def _shape_from_shading(method: str, context: Context) -> ItemContent:
             Panel(f"{shaded.name}: image", shaded.image, shaded.mask),
             Panel("true height (pixels)", true, shaded.mask, ends),
             Panel(
-                "found height (pixels)",
+                "estimated height (pixels)",
                 found.height + np.nanmedian((true - found.height)[shaded.mask]),
                 shaded.mask,
                 ends,
@@ -190,16 +220,21 @@ def _shape_from_shading(method: str, context: Context) -> ItemContent:
     table = ItemTable(
         header,
         tuple(cells),
-        "Mean errors inside the mask; heights after the best offset. The light is estimated, too.",
+        "Mean errors inside the mask; heights after the best offset. The light is "
+        "estimated as well.",
     )
     own = [float(r["angle"] or 0) for r in rows if r["method"] == method]
     flat = [float(r["angle"] or 0) for r in rows if r["method"] == "naive"]
     better = sum(a < b for a, b in zip(own, flat, strict=True))
     angles = ", ".join(f"{angle:.0f}" for angle in own)
-    here = f"{_NAMES[method]}: normals off by {angles} degrees; better than a flat shape on {better} of {len(own)}."
+    here = (
+        f"{_NAMES[method]}: normals off by {angles} degrees; better than a flat shape "
+        f"on {better} of {len(own)} objects."
+    )
     text = (
-        f"{here} Heights are in one scale of colours for each object; errors above 60 degrees are drawn as 60. The last object's "
-        "brightness is paint as well as shape."
+        f"{here} Heights share a colour scale per object; errors above 60 degrees are "
+        "drawn as 60. The brightness of the last object depends on albedo as well as "
+        "shape."
     )
     return ItemContent((table,), (panel_figure(shown, 4),), text)
 
@@ -216,16 +251,17 @@ def _characteristics(kind: str, context: Context) -> ItemContent:
             ("shading = exp(SH(normal))", errors.sh),
             ("length of the normals = 1", errors.normal_length),
         ),
-        f"{subject.name}: how exactly the characteristics make up the image. Errors of images are shares of its largest value, that of the "
-        "shading is relative.",
+        f"{subject.name}: accuracy of the identities. Errors of images are shares of "
+        "the largest value; that of the shading is relative.",
     )
     share = float(d.specular[d.mask].sum() / d.image[d.mask].sum())
     state = (
         "all identities hold" if not errors.broken() else f"broken: {'; '.join(errors.broken())}"
     )
     text = (
-        f"{subject.name}, the first subject of its kind, in a real run of `isc decompose --model mdr`: {100 * share:.1f} % of its "
-        f"light was found to be specular; {state}. {COLOURS}"
+        f"{subject.name}, the first subject of its kind, by `isc decompose --model "
+        f"mdr`: {100 * share:.1f} % of its light was estimated as specular; {state}. "
+        f"{COLOURS}"
     )
     return ItemContent((table,), (panel_figure(characteristic_panels(d), 4),), text)
 
@@ -240,16 +276,16 @@ ITEMS: tuple[ThesisItem, ...] = (
         "1.1",
         "Illustration of the introduction",
         None,
-        "an illustration: nothing is computed or measured in it",
+        "an illustration without computation or measurement",
     ),
     _item(
         "1.2",
-        "Shape from shading: Tsai & Shah against the truth",
+        "Shape from shading: Tsai & Shah compared with the truth",
         partial(_shape_from_shading, "sfs-tsai-shah"),
     ),
     _item(
         "1.3",
-        "Shape from shading: Ikeuchi & Horn against the truth",
+        "Shape from shading: Ikeuchi & Horn compared with the truth",
         partial(_shape_from_shading, "sfs-ikeuchi-horn"),
     ),
     _item(

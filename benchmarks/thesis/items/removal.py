@@ -1,15 +1,14 @@
-"""Tables 4.11 and 4.12: accuracy and speed of four published separations, MZK06, YCK06, YWA10 and
-SC09.
+"""Tables 4.11 and 4.12: accuracy and speed of the separations MZK06, YCK06, YWA10 and SC09.
 
-Each as published, as the public toolbox has it where there is one, and improved (ours: statistics
-inside the mask, guards for pale objects).
+Each as published, as in the public toolbox where it contains the method, and improved by this
+project: statistics inside the mask, guards for pale objects.
 
 Citation: S. P. Mallick, T. Zickler, D. J. Kriegman, P. N. Belhumeur (2006),
 doi:10.1007/11744023_43; K.-J. Yoon, Y. Choi, I. S. Kweon (2006), doi:10.1109/ICIP.2006.312650; Q.
 Yang, S. Wang, N. Ahuja (2010), doi:10.1007/978-3-642-15561-1_7; H.-L. Shen, Q.-Y. Cai (2009),
 doi:10.1364/AO.48.002711.
 
-Limits: which images the thesis' own tables are made on is not known.
+Limits: it is not known which images the thesis' own tables use.
 """
 
 from isc_core.separation import variants
@@ -32,7 +31,7 @@ VARIANT_LABELS = {"paper": "as published", "sihr": "as in the toolbox", "improve
 
 
 def settings() -> tuple[SeparatorSetting, ...]:
-    """Every method in every setting that it has."""
+    """Return every method in each of its variants."""
     return tuple(
         SeparatorSetting(f"{label}, {words}", method, variant)
         for label, method in METHODS.items()
@@ -67,10 +66,15 @@ def _quickest(label: str) -> str | None:
 
 
 _ACCURACY = (
-    "Below 1 in the first column a method helps, above it does harm: as published, most "
-    "take pale paint for light. The improved settings mostly know when to leave a photo alone, which is caution more than skill."
+    "Below 1 in the first column, a method helps; above 1, it is harmful. As "
+    "published, most methods confuse pale surfaces with light. The improved "
+    "variants mostly leave such photos unchanged, which is caution rather than "
+    "accuracy."
 )
-_SPEED = "All kinds of images together; one warm run each, seconds as the machine was."
+_SPEED = (
+    "All kinds of images; one run per image after a warm-up run. Seconds depend on "
+    "the load of the machine."
+)
 
 ITEMS: tuple[ThesisItem, ...] = (
     ThesisItem("table", "4.11", "MZK06, YCK06, YWA10 and SC09: accuracy", _accuracy),

@@ -1,12 +1,12 @@
-"""Figures 4.10 to 4.48: what every method makes of single images, as sheets to look at.
+"""Figures 4.10 to 4.48: results of every method on single images, as picture sheets.
 
 4.10-4.15 segmentation and inpainting, 4.16-4.24 published separations, 4.25-4.28 Sparse Coding with
-SF1, SF2 and both, 4.29-4.31 the thesis' methods beside the iterative one and ours, 4.32-4.34 SIRFS
+SF1, SF2 and both, 4.29-4.31 the thesis' methods with the iterative one and ISC, 4.32-4.34 SIRFS
 before and 4.35-4.40 after a separation, 4.41-4.48 photos of real objects.
 
-Limits: what the thesis shows under each number of this range is not known: the order within it is
-ours. Where there are fewer subjects than numbers, the next ones show the first subjects in other
-settings, or by other models, so that no two figures are the same.
+Limits: it is not known what the thesis shows under each number of this range: the order within it
+is this project's. If there are fewer subjects than numbers, the remaining figures show the first
+subjects with other settings or models, so that no two figures are the same.
 """
 
 import functools
@@ -64,7 +64,7 @@ from .sparse_coding import OURS as SPECULAR_FREE
 
 Rows = list[tuple[str, Sequence[np.ndarray | None]]]
 _OPTIMISERS = SEGMENTATIONS[:3]
-_PAINTED = (*_OPTIMISERS, SeparatorSetting("CS, improved", SEGMENTATION))
+_INPAINTED = (*_OPTIMISERS, SeparatorSetting("CS, improved", SEGMENTATION))
 _PUBLISHED = tuple(
     SeparatorSetting(f"{label}, as published", method, "paper") for label, method in METHODS.items()
 )
@@ -87,21 +87,57 @@ _PREFERRED = ("Cup", "Helmet", "Basketball", "Goldfish", "Hydrant", "Bag", "Guit
 
 
 def subject_for_figure(index: int, subjects: Sequence[Subject], rounds: int) -> tuple[Subject, int]:
-    """The subject of the `index`-th figure of a family, and in which of its rounds.
+    """Select the subject of a figure of a family.
 
-    Raises `InputError` where there are too few.
+    Parameters
+    ----------
+    index : int
+        Number of the figure within the family, from 0.
+    subjects : sequence of Subject
+        Subjects of the family.
+    rounds : int
+        Number of groups of settings.
+
+    Returns
+    -------
+    subject : Subject
+        The subject.
+    which : int
+        The group of settings.
+
+    Raises
+    ------
+    InputError
+        If there are too few subjects.
     """
     if not subjects or index >= rounds * len(subjects):
         raise InputError(
-            f"{len(subjects)} images of this kind are too few for so many figures: give more with --data"
+            f"{len(subjects)} images of this kind are too few for this figure; add more with --data"
         )
     return subjects[index % len(subjects)], index // len(subjects)
 
 
 def separation_rows(
-    subject: Subject, ways: Sequence[SeparatorSetting], seed: int
+    subject: Subject, settings: Sequence[SeparatorSetting], seed: int
 ) -> tuple[Rows, ItemTable]:
-    """The truth and the photo, then each way's layers and its error; and the errors as numbers."""
+    """Build the rows of a sheet of separations, and a table of errors.
+
+    Parameters
+    ----------
+    subject : Subject
+        A subject with known layers.
+    settings : sequence of SeparatorSetting
+        The methods.
+    seed : int
+        Random seed.
+
+    Returns
+    -------
+    rows : Rows
+        Truth and photo, then the layers and errors of each setting.
+    table : ItemTable
+        Errors as numbers.
+    """
     diffuse, specular = true_layers(subject)
     mask, gain = subject.mask, exposure(subject.image, subject.mask)
     rows: Rows = [
@@ -115,19 +151,19 @@ def separation_rows(
         )
     ]
     nothing, lines = mse(diffuse, subject.image, mask), []
-    for way in ways:
+    for setting in settings:
         try:
-            found = separate_subject(subject, way, seed)
+            found = separate_subject(subject, setting, seed)
         except InputError:
-            rows.append((f"{_wrapped(way.label)}\nrefuses", [None, None, None]))
-            lines.append((way.label, "refuses", "-", "-"))
+            rows.append((f"{_wrapped(setting.label)}\nrefuses", [None, None, None]))
+            lines.append((setting.label, "refuses", "-", "-"))
             continue
         error = mse(diffuse, found.diffuse, mask)
         words = f"MSE × {_short(error / nothing)}" if nothing > 0 else f"RMS {error**0.5:.2g}"
         wrong = signed_error(found.diffuse - diffuse, mask, gain)
         rows.append(
             (
-                f"{_wrapped(way.label)}\n{words}",
+                f"{_wrapped(setting.label)}\n{words}",
                 [
                     crop_image(found.diffuse, mask, gain),
                     crop_image(found.specular, mask, gain),
@@ -137,13 +173,13 @@ def separation_rows(
         )
         lines.append(
             (
-                way.label,
+                setting.label,
                 f"{error:.3g}",
                 _short(error / nothing) if nothing > 0 else "-",
                 _share(found.specular, subject),
             )
         )
-    header = ("method", "MSE of the diffuse layer", "over doing nothing", "light taken off, %")
+    header = ("method", "MSE of the diffuse layer", "MSE / doing nothing", "light taken off, %")
     return rows, ItemTable(
         header,
         tuple(lines),
@@ -154,7 +190,22 @@ def separation_rows(
 def characteristics_rows(
     context: Context, subject: Subject, frameworks: Sequence[Framework]
 ) -> Rows:
-    """The truth and each framework's height, normals, shading, reflectance and light."""
+    """Build the rows of a sheet of characteristics.
+
+    Parameters
+    ----------
+    context : Context
+        The run.
+    subject : Subject
+        A subject with ground truth.
+    frameworks : sequence of Framework
+        The frameworks.
+
+    Returns
+    -------
+    Rows
+        Truth and each framework: height, normals, shading, reflectance and light.
+    """
     truth = subject.truth
     assert truth is not None
     errors = {
@@ -185,17 +236,21 @@ def characteristics_rows(
 def _maps(
     answer: Estimate, truth: MitBerkeleyObject, limits: tuple[float, float]
 ) -> list[np.ndarray]:
-    """One row of a sheet: an answer's maps, those of free scale in the truth's scale and exposure."""
-    seen, mask = truth.valid & np.isfinite(truth.height), truth.mask
+    """Draw the maps of a result; maps of free scale in the scale and exposure of the truth."""
+    valid, mask = truth.valid & np.isfinite(truth.height), truth.mask
     colours = [
-        crop_image(fit_scale(getattr(answer, name), true, seen), seen, exposure(true, seen), mask)
+        crop_image(
+            fit_scale(getattr(answer, name), true, valid), valid, exposure(true, valid), mask
+        )
         for name, true in (("shading", truth.shading), ("reflectance", truth.reflectance))
     ]
-    (true_lamp, covered), (lamp, _) = (
+    (true_ball, covered), (own_ball, _) = (
         light_ball(light_from_reference(truth.light)),
         light_ball(answer.light),
     )
-    light = crop_image(fit_scale(lamp, true_lamp, covered), covered, exposure(true_lamp, covered))
+    light = crop_image(
+        fit_scale(own_ball, true_ball, covered), covered, exposure(true_ball, covered)
+    )
     height = np.where(np.isfinite(truth.height), answer.height, np.nan)
     return [
         height_colours(height, mask, limits),
@@ -206,7 +261,7 @@ def _maps(
 
 
 def _known(truth: MitBerkeleyObject) -> Estimate:
-    """The truth as if it were an answer."""
+    """Return the ground truth as an estimate."""
     light = light_from_reference(truth.light)
     answer = Estimate(
         truth.height, truth_normal(truth.height), truth.shading, truth.reflectance, light
@@ -215,7 +270,7 @@ def _known(truth: MitBerkeleyObject) -> Estimate:
 
 
 def _levelled(answer: Estimate, truth: MitBerkeleyObject) -> Estimate:
-    """The answer with its median height at 0: the offset is not known."""
+    """Shift the heights to a median of 0, since their offset is undetermined."""
     return replace(
         answer, height=answer.height - np.median(answer.height[np.isfinite(truth.height)])
     )
@@ -224,11 +279,11 @@ def _levelled(answer: Estimate, truth: MitBerkeleyObject) -> Estimate:
 def _masks(kind: str, context: Context) -> ItemContent:
     rows: Rows = []
     lines: list[tuple[Cell, ...]] = []
-    names = [way.label.partition(",")[0] for way in _OPTIMISERS]
+    names = [setting.label.partition(",")[0] for setting in _OPTIMISERS]
     for subject in context.subjects(kind):
         gain = exposure(subject.image, subject.mask)
         true = highlight_region(true_layers(subject)[1], subject.mask)
-        found = [segment_highlights(subject, way, context.seed) for way in _OPTIMISERS]
+        found = [segment_highlights(subject, setting, context.seed) for setting in _OPTIMISERS]
         pictures = [
             mark_pixels(subject.image, subject.mask, pixels, gain) for pixels in (*found, true)
         ]
@@ -245,12 +300,13 @@ def _masks(kind: str, context: Context) -> ItemContent:
                 )
             )
     table = ItemTable(
-        ("image", "search", "pixels marked", "of them highlights, %", "of the highlights, %"),
+        ("image", "search", "pixels marked", "precision, %", "recall, %"),
         tuple(lines),
     )
     text = (
-        "Orange: the pixels above the highest of three thresholds of the smallest channel, as each search finds them; in the last column, "
-        "those where the true specular layer has at least a tenth of its strongest light."
+        "Orange: the pixels above the highest of three thresholds of the smallest "
+        "channel, for each search; in the last column, those whose true specular layer "
+        "has at least a tenth of its maximum."
     )
     return ItemContent(
         (table,), (image_sheet(("photo", *names, "true highlights"), rows, expose=False),), text
@@ -263,9 +319,10 @@ def _layers(
     subject, which = subject_for_figure(index, context.subjects(kind), len(rounds))
     rows, table = separation_rows(subject, rounds[which], context.seed)
     text = (
-        f"{subject.name}. Under each name: the diffuse layer's mean square error over that of doing nothing, or, where there is no "
-        "highlight, its RMS error. Errors: orange is light left over, blue is paint taken for light, in full colour from a tenth of the "
-        "photo's white on."
+        f"{subject.name}. Below each name: the diffuse layer's mean square error "
+        "relative to doing nothing, or, without a highlight, its RMS error. Errors: "
+        "orange where light remains, blue where too much was removed, in full colour "
+        "from a tenth of the photo's white."
     )
     return ItemContent(
         (table,),
@@ -282,8 +339,9 @@ def _characteristics(
     )
     rows = characteristics_rows(context, subject, rounds[which])
     text = (
-        f"{subject.name} ({subject.kind}). Under each name the geometric mean of the six errors. Heights of all in one range, shading, "
-        f"reflectance and light in the scale nearest to the truth; the light on a white ball. {COLOURS}"
+        f"{subject.name} ({subject.kind}). Below each name the geometric mean of the "
+        "six errors. Heights share one range; shading, reflectance and light are "
+        f"scaled to the truth; the light is shown on a white ball. {COLOURS}"
     )
     drawn = image_sheet(
         ("height", "normals", "shading", "reflectance", "light"), rows, expose=False
@@ -299,15 +357,18 @@ def _photo(index: int, context: Context) -> ItemContent:
     subject, which = subject_for_figure(index, subjects, len(_MODELS))
     model = list(_MODELS)[which]
     source = (
-        "its truth is not known"
+        "without ground truth"
         if context.has_photos
-        else "no photos were given, a rendered object stands in for one"
+        else "a rendered object, since no photos were given"
     )
-    text = f"{subject.name}, by {_MODELS[model]}; {source}. Photo, diffuse and specular share an exposure, the rest has its own. {COLOURS}"
+    text = (
+        f"{subject.name}, by {_MODELS[model]}; {source}. Photo, diffuse and specular "
+        f"layer share an exposure; every other panel has its own. {COLOURS}"
+    )
     found = decompose_subject(context, subject, model)
     heights = found.height[found.mask]
     lines = (
-        ("light taken off, %", _share(found.specular, subject)),
+        ("light removed, %", _share(found.specular, subject)),
         ("range of heights, pixels", f"{np.ptp(heights):.0f}"),
     )
     return ItemContent(
@@ -318,7 +379,7 @@ def _photo(index: int, context: Context) -> ItemContent:
 
 
 def _share(specular: np.ndarray, subject: Subject) -> str:
-    """How much of the subject's light a layer holds, per cent; a model may work at another size."""
+    """Return the share of the subject's light in a layer, per cent; sizes may differ."""
     layer = specular.astype(float).sum() / specular.shape[0] / specular.shape[1]
     photo = (
         np.where(subject.mask[..., None], subject.image, 0).astype(float).mean(axis=(0, 1)).sum()
@@ -335,7 +396,7 @@ def _short(value: float) -> str:
 
 
 def _wrapped(label: str) -> str:
-    """A label of a row in lines that fit beside the sheet."""
+    """Break a row label into lines that fit next to the sheet."""
     return (
         label.replace(", ", ",\n")
         .replace(" with ", "\nwith ")
@@ -362,11 +423,11 @@ def _family(
 
 def _plans() -> list[_Plan]:
     plans: list[_Plan] = [
-        (f"Highlights found by PSO, ClonalG and CS: {words}", functools.partial(_masks, kind))
+        (f"Highlights detected by PSO, ClonalG and CS: {words}", functools.partial(_masks, kind))
         for kind, words in KINDS.items()
     ]
     for kind in _KINDS:
-        plans += _family("Highlights painted over after PSO, ClonalG and CS", kind, (_PAINTED,), 1)
+        plans += _family("Highlights inpainted after PSO, ClonalG and CS", kind, (_INPAINTED,), 1)
     for kind, count in (("specular", 4), ("synthetic", 3), ("diffuse", 2)):
         plans += _family(
             "Layers by MZK06, YCK06, YWA10 and SC09", kind, (_PUBLISHED, _IMPROVED), count

@@ -1,11 +1,10 @@
-"""Figures 3.5 to 3.8, the mutation rate and the chaotic numbers, and 4.1 to 4.9, nine images with
-their thresholds.
+"""Figures 3.5 to 3.8 and 4.1 to 4.9: mutation rate, chaotic numbers, nine thresholded images.
 
 Citation: those of `isc_core.thresholding.clonal_selection` and
 `isc_core.thresholding.logistic_map`.
 
-Limits: the images are scikit-image's, the thesis' own nine are not freely packaged; their order is
-ours.
+Limits: the images are scikit-image's, since the thesis' own nine are not freely packaged; their
+order is this project's.
 """
 
 from functools import partial
@@ -36,7 +35,7 @@ _LINES = ("-", "--", "-.", ":")
 
 
 def mutation(context: Context) -> ItemContent:
-    """Figure 3.5."""
+    """Make figure 3.5."""
     del context
     affinity = np.linspace(0, 1, 201)
     made, axes = figure(1, 1, width=4.5, height=3.0)
@@ -61,18 +60,19 @@ def mutation(context: Context) -> ItemContent:
     return ItemContent(
         (table,),
         (made,),
-        "The better an antibody, the smaller the steps of its clones. The searches here use rho = 5.",
+        "The better an antibody, the smaller the mutations of its clones. The searches "
+        "here use rho = 5.",
     )
 
 
 def branching(context: Context) -> ItemContent:
-    """Figure 3.6."""
+    """Make figure 3.6."""
     rates = np.linspace(2.8, 4, 400 if context.quick else 1400)
     ends = bifurcation(rates)
     made, axes = figure(1, 1, height=3.6)
     places = np.broadcast_to(rates, ends.shape).ravel()
     axes[0, 0].plot(places, ends.ravel(), ",", color=OKABE_ITO[0], alpha=0.25, rasterized=True)
-    axes[0, 0].set(xlabel="r", ylabel="values that the map ends in", xlim=(2.8, 4), ylim=(0, 1))
+    axes[0, 0].set(xlabel="r", ylabel="limit set of the map", xlim=(2.8, 4), ylim=(0, 1))
     known = (
         (2.9, "a fixed point"),
         (3.2, "period 2"),
@@ -91,12 +91,12 @@ def branching(context: Context) -> ItemContent:
     return ItemContent(
         (table,),
         (made,),
-        "Only at r = 4 does the orbit fill the whole interval: that is where chaotic numbers are taken from.",
+        "Only at r = 4 does the orbit fill the whole interval: chaotic numbers are drawn there.",
     )
 
 
 def distribution(context: Context) -> ItemContent:
-    """Figure 3.7."""
+    """Make figure 3.7."""
     values = orbit(_start(context), _NUMBERS)
     edges = np.linspace(0, 1, 51)
     made, axes = figure(1, 1, width=4.5, height=3.0)
@@ -121,20 +121,22 @@ def distribution(context: Context) -> ItemContent:
         ("largest error of a bin's share", float(np.abs(counted - np.diff(law)).max()), 0.0),
     )
     table = ItemTable(
-        ("of the orbit", "measured", "by the law"), rows, "The orbit at r = 4 against its law."
+        ("of the orbit", "measured", "theory"),
+        rows,
+        "The orbit at r = 4 and its theoretical distribution.",
     )
     return ItemContent(
         (table,),
         (made,),
-        "An orbit stays near the ends of the interval: used as it is, it is far from uniform.",
+        "An orbit stays near the ends of the interval: by itself, it is far from uniform.",
     )
 
 
 def generators(context: Context) -> ItemContent:
-    """Figure 3.8."""
+    """Make figure 3.8."""
     values = uniformised(orbit(_start(context), _NUMBERS))
     sources = (
-        ("one orbit, made uniform", values),
+        ("one orbit, transformed to uniform", values),
         ("many orbits, every eighth value", ChaoticNumbers(context.seed).uniform((_NUMBERS,))),
         ("pseudo-random (PCG64)", np.random.default_rng(context.seed).random(_NUMBERS)),
     )
@@ -174,8 +176,10 @@ def generators(context: Context) -> ItemContent:
         "empty cells of 10 x 10 pairs",
     )
     text = (
-        "All three are close to uniform. Below, each number against the next: in one orbit, each is a function of the one before, which "
-        "correlation does not see and pairs do. With many orbits, and every eighth value of them, nothing of it is left."
+        "All three are close to uniform. Bottom: each number and the next. In one "
+        "orbit, each is a function of the previous one, which correlation does not "
+        "detect but pairs do. With many orbits and every eighth value, this dependence "
+        "vanishes."
     )
     return ItemContent(
         (ItemTable(header, tuple(rows), f"{_NUMBERS:,} numbers of each source."),), (made,), text
@@ -183,7 +187,7 @@ def generators(context: Context) -> ItemContent:
 
 
 def thresholded(context: Context, name: str) -> ItemContent:
-    """One of figures 4.1 to 4.9."""
+    """Make one of figures 4.1 to 4.9, for the image `name`."""
     image, of = levels(name), image_objective(name)
     made, axes = figure(2, 1 + len(COUNTS), height=4.1)
     show(axes[0, 0], srgb_to_linear(image / 255), name)
@@ -228,13 +232,13 @@ def thresholded(context: Context, name: str) -> ItemContent:
     )
     header = ("K", "exact thresholds", "CS, first run", "objective")
     high = [f"{level} ({share:.1f} %)" for level, share in enumerate(shares) if share > top]
-    cut = f" Bars that the histogram cuts off: level {', '.join(high)}." if high else ""
+    cut = f" Clipped bars of the histogram: level {', '.join(high)}." if high else ""
     text = f"Each class is shown at its mean level.{cut}"
     return ItemContent((ItemTable(header, tuple(rows), f"Thresholds of {name}."),), (made,), text)
 
 
 def _classes(image: np.ndarray, thresholds: np.ndarray) -> np.ndarray:
-    """The image (H, W) with every pixel at the mean level of its class."""
+    """Set every pixel (H, W) to the mean level of its class."""
     labels = np.searchsorted(thresholds, image, side="left")
     sums, counts = (
         np.bincount(labels.ravel(), weights, len(thresholds) + 1)
@@ -248,7 +252,7 @@ def _distinct(values: np.ndarray) -> int:
 
 
 def _start(context: Context) -> float:
-    """Where the orbit begins: another place for each seed, none of the degenerate ones."""
+    """Return the first value of the orbit: varies with the seed, never degenerate."""
     return 0.1 + 0.8 * ((0.0293 + context.seed * 0.6180339887) % 1)
 
 
@@ -259,7 +263,7 @@ ITEMS: tuple[ThesisItem, ...] = (
     ThesisItem(
         "figure",
         "3.8",
-        "Histogram of chaotic numbers against a pseudo-random generator",
+        "Histogram of chaotic numbers compared with a pseudo-random generator",
         generators,
     ),
     *(

@@ -1,14 +1,13 @@
-"""Tables 4.1 to 4.4: exact multilevel thresholds of nine images, and what three optimisers make of
-them in repeated runs.
+"""Tables 4.1 to 4.4: exact thresholds of nine images, and repeated runs of three optimisers.
 
 Problem: Otsu's criterion for K = 3, 4 and 5 thresholds. The exact optimum comes from dynamic
-programming, held against all candidates one by one for K = 3. PSO, clonal selection (ClonalG) and
-its chaotic form (CS) get equal budgets of evaluations.
+programming, checked against all candidates for K = 3. PSO, clonal selection (ClonalG) and its
+chaotic form (CS) have equal budgets of evaluations.
 
-Citation: those of `isc_core.thresholding` and of `thresholding_runs`.
+Citation: those of `isc_core.thresholding` and of `threshold_runs`.
 
-Limits: another set of images than the thesis'; the operators of ClonalG and CS are ours where the
-thesis leaves them open.
+Limits: other images than in the thesis; where the thesis leaves operators of ClonalG and CS open,
+they are this project's.
 """
 
 import time
@@ -51,7 +50,20 @@ _MARKS = ("o", "s", "D", "^")
 
 
 def exhaustive_search(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
-    """The best three thresholds by looking at each of the 2.7 million sets, and the value there."""
+    """Find the best three thresholds among all 2.7 million sets.
+
+    Parameters
+    ----------
+    of : OtsuObjective
+        The objective.
+
+    Returns
+    -------
+    thresholds : (int, int, int)
+        The best set.
+    value : float
+        Its objective.
+    """
     best, where = -np.inf, (0, 0, 0)
     for first in range(_LEVELS - 2):
         # All second and third thresholds at once: rows are ends of the second class, columns of the
@@ -65,7 +77,7 @@ def exhaustive_search(of: OtsuObjective) -> tuple[tuple[int, int, int], float]:
 
 
 def ground_truth(context: Context) -> ItemContent:
-    """Table 4.1."""
+    """Make table 4.1."""
     rows, checks = [], []
     names = image_names(context)
     for number, name in enumerate(names):
@@ -92,7 +104,7 @@ def ground_truth(context: Context) -> ItemContent:
             (name, _listed(one_by_one[0]), one_by_one[1], "yes" if agrees else "NO", 1e3 * seconds)
         )
     header = ("image", "K", "thresholds", "objective", "% of the variance", "ms")
-    caption = f"Three thresholds by trying all {comb(_LEVELS, 3):,} sets: the same optimum?"
+    caption = f"Three thresholds by testing all {comb(_LEVELS, 3):,} sets"
     tables = (
         ItemTable(header, tuple(rows), "Exact optimum of Otsu's criterion by dynamic programming."),
         ItemTable(
@@ -114,14 +126,15 @@ def ground_truth(context: Context) -> ItemContent:
     axes[0, 0].set_ylabel("variance between classes, % of all")
     legend(axes[0, 0])
     text = (
-        "All sets of thresholds for K = 4 and 5 would be 175 million and 8.8 thousand million; the criterion is a sum over classes, so "
-        "that dynamic programming finds the same optimum in about a millisecond."
+        "For K = 4 and 5 there are 175 million and 8.8 thousand million sets of "
+        "thresholds. The criterion is a sum over classes, so that dynamic programming "
+        "finds the same optimum in about a millisecond."
     )
     return ItemContent(tables, (made,), text)
 
 
 def objectives(context: Context) -> ItemContent:
-    """Table 4.2."""
+    """Make table 4.2."""
     found = run_searches(context, tuple(SEARCHES))
     names = image_names(context)
     shares = tuple(_shares(found, search, names) for search in SEARCHES)
@@ -159,12 +172,13 @@ def objectives(context: Context) -> ItemContent:
         ItemTable(
             ("search", *(f"K = {k}" for k in COUNTS), "all", "95 % interval"),
             shares,
-            f"Runs of {runs} an image that found the optimum.",
+            f"Share of {runs} runs per image that reach the optimum.",
         ),
         ItemTable(
             header,
             tuple(rows),
-            f"Objective over {runs} runs; p: rank-sum test, corrected for {len(rows)} cases (Holm).",
+            f"Objective over {runs} runs; p: rank-sum test, corrected for {len(rows)} cases "
+            "(Holm).",
         ),
     )
     return ItemContent(
@@ -173,13 +187,15 @@ def objectives(context: Context) -> ItemContent:
 
 
 _OBJECTIVES_TEXT = (
-    "*CS, one orbit* takes each value of a single chaotic orbit one after the other, which is the plain reading of the method: consecutive "
-    "numbers depend on each other, some moves never happen, and runs get stuck. *CS* takes consecutive numbers from many orbits."
+    "*CS, one orbit* uses the consecutive values of a single chaotic orbit, the "
+    "literal reading of the method: consecutive numbers are dependent, some moves "
+    "never occur, and runs stagnate. *CS* takes consecutive numbers from many "
+    "orbits."
 )
 
 
 def thresholds(context: Context) -> ItemContent:
-    """Table 4.3."""
+    """Make table 4.3."""
     found = run_searches(context, COMPARED)
     names, rows = image_names(context), []
     for name in names:
@@ -193,9 +209,8 @@ def thresholds(context: Context) -> ItemContent:
                 usual, many = Counter(
                     map(tuple, found[search, name, count].thresholds.tolist())
                 ).most_common(1)[0]
-                cells.append(
-                    f"{_listed(usual)} ({100 * many / len(found[search, name, count].values):.0f} %)"
-                )
+                share = 100 * many / len(found[search, name, count].values)
+                cells.append(f"{_listed(usual)} ({share:.0f} %)")
             rows.append(tuple(cells))
     header = ("image", "K", "exact", *(f"{search} (share of runs)" for search in COMPARED))
     made, axes = figure(1, len(COUNTS), height=0.9 + 0.35 * len(names), sharey=True)
@@ -227,14 +242,16 @@ def thresholds(context: Context) -> ItemContent:
         frameon=False,
         fontsize=7,
     )
-    text = "In the picture each stroke is a threshold of one run: where a search is sure, its strokes lie on each other."
+    text = "Each stroke is a threshold of one run: where a search is stable, its strokes coincide."
     return ItemContent(
-        (ItemTable(header, tuple(rows), "The thresholds that most runs found."),), (made,), text
+        (ItemTable(header, tuple(rows), "The most frequent thresholds of each search."),),
+        (made,),
+        text,
     )
 
 
 def times(context: Context) -> ItemContent:
-    """Table 4.4."""
+    """Make table 4.4."""
     found = run_searches(replace(context, monitor=context.monitor.part(0.0, 0.5)), COMPARED)
     names = image_names(context)
     cases = [(name, count) for name in names for count in COUNTS]
@@ -259,10 +276,13 @@ def times(context: Context) -> ItemContent:
     header = (
         "image",
         "K",
-        *(f"{s}: {w}" for s in COMPARED for w in ("ms a run", "iterations to the optimum")),
+        *(f"{s}: {w}" for s in COMPARED for w in ("ms per run", "iterations to the optimum")),
         "p, CS and ClonalG",
     )
-    caption = "Median over runs; iterations of the runs that found the optimum. p: rank-sum test of the evaluations needed, corrected (Holm)."
+    caption = (
+        "Median over runs; iterations of successful runs. p: rank-sum test of the evaluations "
+        "needed, corrected (Holm)."
+    )
     made, axes = figure(1, len(COUNTS), height=2.6, sharey=True)
     for place, count in zip(axes[0], COUNTS, strict=True):
         for search, colour in zip(COMPARED, OKABE_ITO, strict=False):
@@ -293,8 +313,9 @@ def times(context: Context) -> ItemContent:
 
 
 _TIMES_TEXT = (
-    "An iteration is a generation of 255 evaluations for ClonalG and CS, and a step of 40 for PSO; times are the processor's, of the whole "
-    "budget of 20,000 evaluations. The exact search takes a millisecond (table 4.1)."
+    "An iteration is a generation of 255 evaluations for ClonalG and CS, and a "
+    "step of 40 for PSO. Times are processor times for the whole budget of 20,000 "
+    "evaluations. The exact search takes a millisecond (table 4.1)."
 )
 
 
@@ -323,11 +344,11 @@ def _objective_verdicts(
         ),
         ClaimVerdict(
             CHAOS_HELPS,
-            f"CS reaches the optimum in {share['CS']} of runs, ClonalG in {share['ClonalG']}, PSO in "
-            f"{share['PSO']}; CS on one orbit in {share['CS, one orbit']}.",
+            f"CS reaches the optimum in {share['CS']} of runs, ClonalG in {share['ClonalG']}, "
+            f"PSO in {share['PSO']}; CS on one orbit in {share['CS, one orbit']}.",
             holds,
-            "It beats the swarm, but so does plain ClonalG: the operators decide, not the source of "
-            "numbers."
+            "It beats the swarm, but so does plain ClonalG: the operators decide, not the source "
+            "of numbers."
             if over_swarm and not over_clonal
             else "",
         ),
@@ -349,9 +370,10 @@ def _speed_verdict(
     medians = [np.median(needed[np.isfinite(needed)]) for needed in (chaotic, plain, swarm)]
     return ClaimVerdict(
         CHAOS_HELPS,
-        f"CS needs {medians[0]:.0f} evaluations, ClonalG {medians[1]:.0f}, PSO {medians[2]:.0f} in "
-        "successful runs (medians). CS needs more than ClonalG in "
-        f"{100 * more:.0f} % of pairs of runs (p = {p:.2g}); {different} of {len(cases)} cases differ.",
+        f"CS needs {medians[0]:.0f} evaluations, ClonalG {medians[1]:.0f}, PSO "
+        f"{medians[2]:.0f} in successful runs (medians). CS needs more than ClonalG in "
+        f"{100 * more:.0f} % of pairs of runs (p = {p:.2g}); {different} of "
+        f"{len(cases)} cases differ.",
         Holds.YES if faster else Holds.NO,
         ""
         if faster
@@ -362,7 +384,7 @@ def _speed_verdict(
 def _shares(
     found: dict[tuple[str, str, int], ThresholdRuns], search: str, names: tuple[str, ...]
 ) -> tuple[Cell, ...]:
-    """A row: the share of runs that found the optimum by K, of all, and its interval."""
+    """Return a row: successful runs by K, in total, and the interval, per cent."""
     hits = [sum(found[search, name, count].hits for name in names) for count in COUNTS]
     total = len(names) * len(found[search, names[0], COUNTS[0]].values)
     low, high = wilson_interval(sum(hits), total * len(COUNTS))
@@ -378,7 +400,7 @@ def _shares(
 def _hit_figure(
     found: dict[tuple[str, str, int], ThresholdRuns], names: tuple[str, ...]
 ) -> "Figure":
-    """The share of runs that found the optimum, by image and K."""
+    """Draw the share of successful runs by image and K."""
     made, axes = figure(1, len(COUNTS), height=0.9 + 0.25 * len(names), sharey=True)
     for place, count in zip(axes[0], COUNTS, strict=True):
         for step, (search, colour, mark) in enumerate(
@@ -401,7 +423,7 @@ def _hit_figure(
             )
         place.set(
             title=f"K = {count}",
-            xlabel="runs at the optimum, %",
+            xlabel="runs that reach the optimum, %",
             xlim=(0, 102),
             yticks=range(len(names)),
             yticklabels=names,
@@ -424,7 +446,7 @@ def _median_iterations(search: str, runs: ThresholdRuns) -> str:
 
 
 def _milliseconds(of: OtsuObjective, count: int) -> float:
-    """Of the exact search, the fastest of a few."""
+    """Time the exact search, the fastest of a few runs."""
     taken = []
     for _ in range(_REPEATS):
         begin = time.process_time()
@@ -445,6 +467,6 @@ ITEMS: tuple[ThesisItem, ...] = (
         "Objective of PSO, ClonalG and CS: mean and deviation over repeated runs",
         objectives,
     ),
-    ThesisItem("table", "4.3", "Thresholds that PSO, ClonalG and CS find", thresholds),
+    ThesisItem("table", "4.3", "Thresholds of PSO, ClonalG and CS", thresholds),
     ThesisItem("table", "4.4", "Time and iterations of PSO, ClonalG and CS", times),
 )
