@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from isc_core.mesh import build_mesh
+from isc_core.result_files.mesh import build_mesh
 from synth.shapes.mesh_file import read_mesh_file
 
 from .case import Case, Target
@@ -86,7 +86,7 @@ _STL_WORDS = (
 
 
 def _read(path: Path) -> object:
-    return read_mesh_file(path, painted=32)  # the usual texture takes most of the time
+    return read_mesh_file(path, texture_size=32)  # the usual texture takes most of the time
 
 
 def _solid(colours: bool = False) -> trimesh.Trimesh:

@@ -1,13 +1,12 @@
-"""What objects are painted with: albedo textures of several families, all from a random generator;
-or a user's own image.
+"""Albedo textures of several families, drawn from a random generator, or a user's own image.
 
-A family is a file here. Textures are linear Rec.709, row 0 at v = 0, and go on without a seam from
-u = 1 to u = 0. Their lengths are measured in the height of the texture; going around u is `ASPECT`
+Each family is a module. Textures are linear Rec.709, row 0 at v = 0, and continue without a seam
+from u = 1 to u = 0. Their lengths are measured in heights of the texture; once around u is `ASPECT`
 of them, about what it is on most objects.
 
-Limits: painted on by u and v, so patterns narrow toward the poles of a swept shape, as a wrapped
-label would crease. No paint reflects less than `DARKEST` or more than `BRIGHTEST` of any colour:
-real ones do neither (soot .03, fresh white paint .9).
+Limits: textures follow u and v, so patterns narrow toward the poles of a swept shape, as a label
+wrapped around it. No albedo is below `DARKEST` or above `BRIGHTEST` in any channel, as real ones
+(soot .03, fresh white paint .9).
 """
 
 from collections.abc import Callable
@@ -36,11 +35,26 @@ ALBEDOS: tuple[str, ...] = tuple(_FAMILIES)
 
 
 def make_albedo(name: str, rng: np.random.Generator, size: int = 512) -> np.ndarray:
-    """A texture of the family `name`, one of `ALBEDOS`: (size, size, 3) float32, linear Rec.709
-    from `DARKEST` to `BRIGHTEST`.
+    """Draw an albedo texture.
 
-    `size`: 16 to 4096; the same seed gives another picture in another size. Raises `InputError` for
-    another size and for unknown names.
+    Parameters
+    ----------
+    name : str
+        Its family, one of `ALBEDOS`.
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int, optional
+        Side in texels, 16 to 4096; another size gives another pattern.
+
+    Returns
+    -------
+    (size, size, 3) ndarray of float32
+        Linear Rec.709 in [`DARKEST`, `BRIGHTEST`].
+
+    Raises
+    ------
+    InputError
+        For an unknown name or another size.
     """
     if name not in _FAMILIES:
         raise InputError(f"unknown albedo {name!r}: choose {', '.join(ALBEDOS)}")

@@ -1,23 +1,35 @@
-"""Colours that paints have, linear Rec.709.
+"""Colours of pigments, linear Rec.709.
 
 Equation: value * (1 - purity + purity * k(hue)), k the fully saturated colour of the hue. Pigments
-differ in how bright they can be: yellow ones reflect up to .85, green and blue ones less than half
-of it (rough figures, from what paints look like).
+differ in their largest reflectance: yellow ones reflect up to .85, green and blue ones less than
+half of it (rough figures, from the appearance of paints).
 
 Limits: no spectra, no fluorescence.
 """
 
 import numpy as np
 
-# The largest channel that a saturated pigment has, every twelfth of a turn from red over yellow,
-# green, cyan, blue and magenta to red.
+# Largest channel of a saturated pigment, every twelfth of a turn from red over yellow, green, cyan,
+# blue and magenta to red.
 _LARGEST = (0.7, 0.8, 0.85, 0.55, 0.4, 0.4, 0.45, 0.45, 0.4, 0.4, 0.5, 0.6, 0.7)
 
 
 def colour(hue: float, purity: float, value: float) -> np.ndarray:
-    """(3,):
+    """Return a colour.
 
-    `hue` in turns (0 red, 1/3 green), `purity` in [0, 1], `value` = the largest channel.
+    Parameters
+    ----------
+    hue : float
+        In turns: 0 red, 1/3 green.
+    purity : float
+        In [0, 1].
+    value : float
+        The largest channel.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709.
     """
     place = np.mod(hue + np.array([0, 2 / 3, 1 / 3]), 1) * 6
     full = np.clip(np.abs(place - 3) - 1, 0, 1)
@@ -25,28 +37,28 @@ def colour(hue: float, purity: float, value: float) -> np.ndarray:
 
 
 def pigment(rng: np.random.Generator, hue: float | None = None) -> np.ndarray:
-    """A saturated paint; a random hue unless one is given (in turns)."""
+    """Draw a saturated colour; the hue (in turns) is random unless given."""
     hue = rng.uniform() if hue is None else hue
     return colour(hue, rng.uniform(0.7, 0.97), rng.uniform(0.3, 1) * _brightest(hue))
 
 
 def pale(rng: np.random.Generator) -> np.ndarray:
-    """A pastel."""
+    """Draw a pastel colour."""
     return colour(rng.uniform(), rng.uniform(0.06, 0.4), rng.uniform(0.5, 0.85))
 
 
 def dark(rng: np.random.Generator) -> np.ndarray:
-    """A colour near black: ink, dark glaze."""
+    """Draw a colour near black: ink, dark glaze."""
     return colour(rng.uniform(), rng.uniform(0.1, 0.8), rng.uniform(0.03, 0.12))
 
 
 def paper(rng: np.random.Generator) -> np.ndarray:
-    """White to cream."""
+    """Draw a white to cream colour."""
     return rng.uniform(0.6, 0.85) * np.array([1, rng.uniform(0.93, 1), rng.uniform(0.78, 1)])
 
 
 def ink(rng: np.random.Generator) -> np.ndarray:
-    """Black, or a saturated colour dark enough to be read on paper."""
+    """Draw black, or a saturated colour dark enough to be read on paper."""
     if rng.random() < 0.4:
         return np.full(3, rng.uniform(0.02, 0.05))
     hue = rng.uniform()
@@ -54,17 +66,28 @@ def ink(rng: np.random.Generator) -> np.ndarray:
 
 
 def palette(rng: np.random.Generator, count: int) -> np.ndarray:
-    """(count, 3) paints that go well apart: hues spread around the circle, now and then a white or
-    a dark one among them.
+    """Draw colours with well-spread hues, some with a white or dark one among them.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    count : int
+        Number of colours.
+
+    Returns
+    -------
+    (count, 3) ndarray
+        Linear Rec.709.
     """
     hues = rng.uniform() + (np.arange(count) + rng.uniform(-0.25, 0.25, count)) / count
-    paints = np.stack([pigment(rng, hue) for hue in hues])
+    colours = np.stack([pigment(rng, hue) for hue in hues])
     chance = rng.random()
     if chance < 0.35:
-        paints[0] = paper(rng)
+        colours[0] = paper(rng)
     elif chance < 0.5:
-        paints[0] = dark(rng)
-    return rng.permutation(paints)
+        colours[0] = dark(rng)
+    return rng.permutation(colours)
 
 
 def _brightest(hue: float) -> float:

@@ -1,13 +1,13 @@
-"""Random fields on a texture: what patterns are made of.
+"""Random fields on a texture, the building blocks of patterns.
 
-Equation: white noise times a filter of the spatial frequency f (cycles in the height of the
-texture), scaled to mean 0 and variance 1: smooth noise exp(-(f / cycles)^2), fractal noise
-f^(-slope / 2 - 1 / 2), whose power falls as f^(-slope) along a line.
+Equation: white noise times a filter of the spatial frequency f (cycles per height of the texture),
+scaled to mean 0 and variance 1: smooth noise exp(-(f / cycles)^2), fractal noise
+f^(-slope / 2 - 1 / 2), whose power decreases as f^(-slope) along a line.
 
 Citation: R. F. Voss, "Random fractal forgeries", in Fundamental algorithms for computer graphics
 (1985), 805-835, doi:10.1007/978-3-642-84574-1_34.
 
-Limits: made by Fourier transforms, so the fields repeat along v as well, where textures stop.
+Limits: computed by Fourier transforms, so the fields are periodic along v too, where textures end.
 """
 
 from collections.abc import Callable
@@ -15,12 +15,12 @@ from collections.abc import Callable
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-# How many heights of the texture it is once around.
+# Circumference in heights of the texture.
 ASPECT = 1.6
 
 
 def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """u and v in (0, 1) of the texel centres: (size, size) each."""
+    """Return u and v in (0, 1) of the texel centres, (size, size) each."""
     steps = (np.arange(size) + 0.5) / size
     u, v = np.meshgrid(steps, steps)
     return u, v
@@ -29,9 +29,23 @@ def grid(size: int) -> tuple[np.ndarray, np.ndarray]:
 def smooth_noise(
     rng: np.random.Generator, size: int, cycles: float, stretch: float = 1.0
 ) -> np.ndarray:
-    """(size, size): blobs, about `cycles` of them in the height of the texture;
+    """Draw a field of smooth blobs.
 
-    `stretch` times as long along u.
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+    cycles : float
+        Blobs per height of the texture.
+    stretch : float, optional
+        Factor of their length along u.
+
+    Returns
+    -------
+    (size, size) ndarray
+        Mean 0, variance 1.
     """
     return _filtered(rng, size, stretch, lambda frequency: np.exp(-np.square(frequency / cycles)))
 
@@ -39,31 +53,69 @@ def smooth_noise(
 def fractal_noise(
     rng: np.random.Generator, size: int, slope: float, stretch: float = 1.0
 ) -> np.ndarray:
-    """(size, size): detail of all sizes;
+    """Draw a field with detail at all scales.
 
-    `slope` 1 is grainy, 3 is cloudy; `stretch` times as long along u.
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+    slope : float
+        Spectral slope: 1 is grainy, 3 is cloudy.
+    stretch : float, optional
+        Factor of the length along u.
+
+    Returns
+    -------
+    (size, size) ndarray
+        Mean 0, variance 1.
     """
     return _filtered(rng, size, stretch, lambda frequency: frequency ** (-slope / 2 - 0.5))
 
 
 def over(below: np.ndarray, colour: np.ndarray | float, cover: np.ndarray) -> np.ndarray:
-    """`below` (h, w, 3) painted with a colour (3,) or texture (h, w, 3) where `cover` (h, w),
-    clipped to [0, 1], is above 0.
+    """Composite a colour over a texture.
+
+    Parameters
+    ----------
+    below : (h, w, 3) ndarray
+        The texture.
+    colour : (3,) or (h, w, 3) ndarray or float
+        What covers it.
+    cover : (h, w) ndarray
+        Coverage, clipped to [0, 1].
+
+    Returns
+    -------
+    (h, w, 3) ndarray
+        The composite.
     """
     share = np.clip(cover, 0, 1)[..., None]
     return below * (1 - share) + colour * share
 
 
 def softened(values: np.ndarray, texels: float = 0.7) -> np.ndarray:
-    """(h, w[, C]) blurred by a Gaussian of this standard deviation, around the seam: so that edges
-    are as soft as a texel.
+    """Blur a texture (h, w[, C]) by a Gaussian across the seam, so that edges are a texel wide.
+
+    Parameters
+    ----------
+    values : (h, w) or (h, w, C) ndarray
+        The texture.
+    texels : float, optional
+        Standard deviation.
+
+    Returns
+    -------
+    ndarray
+        Of the same shape.
     """
     sigma, mode = (texels, texels, 0)[: values.ndim], ("nearest", "wrap", "nearest")[: values.ndim]
     return gaussian_filter(values, sigma, mode=mode)
 
 
 def step(values: np.ndarray, width: float) -> np.ndarray:
-    """0 where `values` are below -width, 1 above +width, a straight ramp between."""
+    """Return 0 where `values` are below -width, 1 above +width, and a linear ramp between."""
     return np.clip(0.5 + values / (2 * width), 0, 1)
 
 

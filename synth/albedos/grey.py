@@ -1,4 +1,4 @@
-"""Paints without any colour, R = G = B to the last bit: one grey, or the brightness of one of the
+"""Albedos without colour, R = G = B to the last bit: one grey, or the luminance of one of the
 coloured families.
 """
 
@@ -10,7 +10,7 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """(size, size, 3), its three channels alike."""
+    """Draw an achromatic texture (size, size, 3)."""
     if rng.random() < 0.25:
         return np.full((size, size, 3), np.exp(rng.uniform(np.log(0.04), np.log(0.85))))
     coloured = (patches, prints, noise)[rng.integers(3)].texture(rng, size)

@@ -1,8 +1,9 @@
 """A user's image as an albedo.
 
-Limits: an image holds light, not reflectance: what is above `BRIGHTEST` becomes `BRIGHTEST`, each
-channel on its own, before any reduction in size; nothing is scaled. Its left and right sides meet
-in a seam unless the image itself goes around.
+Limits: an image contains light, not reflectance: values above `BRIGHTEST` are clipped to it, each
+channel separately, before any reduction in size; nothing is scaled. Its left and right sides meet
+in
+a seam unless the image is periodic.
 """
 
 from pathlib import Path
@@ -16,11 +17,24 @@ BRIGHTEST, LARGEST = 0.95, 4096
 
 
 def image_albedo(path: str | Path, transfer: str = "auto") -> np.ndarray:
-    """(h, w, 3) float32, linear Rec.709 in [0, .95]; transparency is ignored. `transfer`: "srgb",
-    "linear", or "auto": floats are linear.
+    """Read an image as an albedo texture; transparency is ignored.
 
-    A side above 4096 is reduced to that, by means over areas. Raises `InputError` where the file
-    cannot be read.
+    Parameters
+    ----------
+    path : Path or str
+        The image. A side above 4096 is reduced to that, by area averaging.
+    transfer : str, optional
+        "srgb", "linear", or "auto": floating-point images are linear.
+
+    Returns
+    -------
+    (h, w, 3) ndarray of float32
+        Linear Rec.709 in [0, .95].
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
     """
     linear = np.minimum(read_linear(path, transfer), np.float32(BRIGHTEST))
     height, width = linear.shape[:2]

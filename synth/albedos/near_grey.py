@@ -1,6 +1,6 @@
-"""Paints with hardly any colour but with texture: white paper with pale print, porcelain, dark
-rubber, stone. The hard case for separations of highlights, for whose white light the paint's own
-colour is the only contrast.
+"""Nearly achromatic textures: white paper with pale print, porcelain, dark rubber, stone. This is
+the hard case for separating highlights, because the albedo hardly differs in colour from white
+light.
 
 Equation: chroma = (largest - smallest channel) / largest channel, at most `LARGEST_CHROMA`
 everywhere.
@@ -16,22 +16,20 @@ LARGEST_CHROMA = 0.12
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """(size, size, 3)."""
+    """Draw a nearly achromatic texture (size, size, 3)."""
     return (_paper, _porcelain, _rubber, _stone)[rng.integers(4)](rng, size)
 
 
 def _tint(rng: np.random.Generator, value: float) -> np.ndarray:
-    """(3,): a grey with a trace of colour."""
+    """A grey with a trace of colour, (3,)."""
     return colour(rng.uniform(), rng.uniform(0, LARGEST_CHROMA), value)
 
 
 def _mottled(
-    rng: np.random.Generator, size: int, paint: np.ndarray, amount: float, slope: float
+    rng: np.random.Generator, size: int, base: np.ndarray, amount: float, slope: float
 ) -> np.ndarray:
-    """(size, size, 3): the paint, brighter and darker by `amount` (a share, one standard
-    deviation).
-    """
-    return paint * np.clip(1 + amount * fractal_noise(rng, size, slope), 0.2, 2)[..., None]
+    """A colour (size, size, 3), varied in brightness by `amount` (relative standard deviation)."""
+    return base * np.clip(1 + amount * fractal_noise(rng, size, slope), 0.2, 2)[..., None]
 
 
 def _paper(rng: np.random.Generator, size: int) -> np.ndarray:
@@ -43,7 +41,7 @@ def _paper(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def _porcelain(rng: np.random.Generator, size: int) -> np.ndarray:
-    """White glaze over a faint relief of shades, now and then with a pale drawing."""
+    """White glaze over a faint pattern of shades, half of the time with a pale drawing."""
     base = _mottled(rng, size, _tint(rng, rng.uniform(0.55, 0.85)), 0.03, 3)
     base = over(
         base,

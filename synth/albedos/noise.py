@@ -1,8 +1,7 @@
-"""Colours that change everywhere: clouds of colour, marble, wood, speckled glaze, a glaze that runs
-from one colour to another.
+"""Colours that vary everywhere: clouds of colour, marble, wood, speckled glaze, running glazes.
 
 Equation: marble's veins are the zeros of a fractal field, wood's rings the level lines of a nearly
-flat one: the turbulence of Perlin.
+flat one: Perlin's turbulence.
 
 Citation: K. Perlin, "An image synthesizer", SIGGRAPH 1985, 287-296, doi:10.1145/325334.325247.
 """
@@ -14,18 +13,18 @@ from .fields import fractal_noise, grid, over, smooth_noise, softened, step
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """(size, size, 3)."""
+    """Draw a texture (size, size, 3)."""
     return (_clouds, _marble, _wood, _speckles, _running_glaze)[rng.integers(5)](rng, size)
 
 
 def _clouds(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Two or three paints mixed in shares that vary at all scales."""
-    paints = palette(rng, int(rng.integers(2, 4)))
+    """Two or three colours mixed in shares that vary at all scales."""
+    colours = palette(rng, int(rng.integers(2, 4)))
     slope, sharpness = rng.uniform(1.5, 3), rng.uniform(1, 2.5)
     weights = np.stack(
-        [np.exp(sharpness * fractal_noise(rng, size, slope)) for _ in paints], axis=-1
+        [np.exp(sharpness * fractal_noise(rng, size, slope)) for _ in colours], axis=-1
     )
-    return weights / weights.sum(-1, keepdims=True) @ paints
+    return weights / weights.sum(-1, keepdims=True) @ colours
 
 
 def _marble(rng: np.random.Generator, size: int) -> np.ndarray:
@@ -60,7 +59,7 @@ def _wood(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def _speckles(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Stoneware or enamel: specks of one or two colours on a ground that is a little cloudy."""
+    """Stoneware or enamel: specks of one or two colours on a slightly cloudy ground."""
     ground = pale(rng) if rng.random() < 0.6 else pigment(rng)
     result = ground * (1 + 0.05 * fractal_noise(rng, size, 2))[..., None]
     for _ in range(int(rng.integers(1, 3))):
@@ -74,16 +73,16 @@ def _speckles(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def _running_glaze(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Two or three glazes run into each other from top to bottom."""
-    paints = palette(rng, int(rng.integers(2, 4)))
+    """Two or three glazes that run into each other from top to bottom."""
+    glazes = palette(rng, int(rng.integers(2, 4)))
     _, v = grid(size)
-    result = np.broadcast_to(paints[0], (size, size, 3))
-    for number, paint in enumerate(paints[1:], 1):
+    result = np.broadcast_to(glazes[0], (size, size, 3))
+    for number, glaze in enumerate(glazes[1:], 1):
         run = (
             v
-            - number / len(paints)
+            - number / len(glazes)
             + 0.06 * smooth_noise(rng, size, 3)
             + 0.03 * fractal_noise(rng, size, 2, 0.2)
         )
-        result = over(result, paint, step(run, rng.uniform(0.02, 0.15)))
+        result = over(result, glaze, step(run, rng.uniform(0.02, 0.15)))
     return result * (1 + 0.05 * fractal_noise(rng, size, 2))[..., None]

@@ -1,5 +1,5 @@
-"""2 to 6 paints in areas of their own: stripes, cells, or the level sets of a smooth field; edges
-as soft as a texel.
+"""2 to 6 colours in separate areas: stripes, cells, or the level sets of a smooth field; edges are
+a texel wide.
 """
 
 import numpy as np
@@ -9,15 +9,16 @@ from .fields import ASPECT, grid, smooth_noise, softened
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """(size, size, 3)."""
-    paints = palette(rng, int(rng.integers(2, 7)))
+    """Draw a texture (size, size, 3)."""
+    colours = palette(rng, int(rng.integers(2, 7)))
     areas = (_stripes, _cells, _levels)[rng.integers(3)]
-    return softened(paints[areas(rng, size, len(paints))])
+    return softened(colours[areas(rng, size, len(colours))])
 
 
 def _stripes(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
-    """(size, size) indices: rings, upright stripes or screws of uneven width; an integer number of
-    them around keeps the seam closed.
+    """Indices (size, size) of rings, upright stripes or screws of uneven width; an integer number
+    around
+    keeps the seam closed.
     """
     u, v = grid(size)
     repeats = int(rng.integers(1, 4))
@@ -33,9 +34,7 @@ def _stripes(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
 
 
 def _cells(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
-    """(size, size) indices: the cell of the nearest of some random places, each with one of the
-    paints.
-    """
+    """Indices (size, size) of Voronoi cells around random places, each with one of the colours."""
     u, v = grid(size)
     bend = rng.uniform(0, 0.02)
     u, v = u + bend * smooth_noise(rng, size, 5) / ASPECT, v + bend * smooth_noise(rng, size, 5)
@@ -50,6 +49,6 @@ def _cells(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
 
 
 def _levels(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
-    """(size, size) indices: bands of equal area between the level lines of a smooth field."""
+    """Indices (size, size) of bands of equal area between the level lines of a smooth field."""
     field = smooth_noise(rng, size, rng.uniform(1.2, 3.5))
     return np.searchsorted(np.quantile(field, np.arange(1, count) / count), field)

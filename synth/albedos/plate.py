@@ -1,13 +1,13 @@
-"""A printing plate: lines, shapes and words that one ink prints, without any font file (strokes of
-A. V. Hershey's letters).
+"""A printing plate: lines, shapes and words printed with one ink, without any font file (A. V.
+Hershey's stroke letters).
 
-Lengths are heights of the texture: x from 0 to `ASPECT` once around, y from 0 at the top to 1. What
-leaves at the right enters at the left.
+Lengths are in heights of the texture: x from 0 to `ASPECT` once around, y from 0 at the top to 1.
+What leaves at the right enters at the left.
 
 Citation: A. V. Hershey, "Calligraphy for computers", U.S. Naval Weapons Laboratory report 2101
 (1967), which has no DOI.
 
-Limits: Latin letters without accents; each thing drawn is at most once around wide.
+Limits: Latin letters without accents; each drawn item is at most one turn wide.
 """
 
 import cv2
@@ -22,7 +22,7 @@ FACES: tuple[int, ...] = (
     cv2.FONT_HERSHEY_TRIPLEX,
     cv2.FONT_HERSHEY_SCRIPT_COMPLEX,
 )
-_FINER = 2  # pixels of the plate a texel, each way
+_FINER = 2  # pixels of the plate per texel, in each direction
 _SHIFT = 4  # binary places of a coordinate
 _ONSETS = [
     "b",
@@ -52,7 +52,7 @@ _CODAS = ["", "", "l", "n", "r", "s", "t", "nd", "rk"]
 
 
 class Plate:
-    """One ink's print on a texture of `size` texels a side."""
+    """The print of one ink on a texture of `size` texels a side."""
 
     def __init__(self, size: int) -> None:
         self._size, self._scale = size, size * _FINER
@@ -60,7 +60,7 @@ class Plate:
         self._canvas = np.zeros((self._scale, 2 * self._turn), np.uint8)
 
     def cover(self) -> np.ndarray:
-        """(size, size) float in [0, 1]: how much of each texel is inked."""
+        """Return the inked share of each texel, (size, size) in [0, 1]."""
         once = np.maximum(self._canvas[:, : self._turn], self._canvas[:, self._turn :])
         return (
             cv2.resize(once, (self._size, self._size), interpolation=cv2.INTER_AREA).astype(float)
@@ -68,7 +68,17 @@ class Plate:
         )
 
     def line(self, points: np.ndarray, width: float, closed: bool = False) -> None:
-        """A line through `points` (N, 2), x and y."""
+        """Draw a line through `points` (N, 2), x and y.
+
+        Parameters
+        ----------
+        points : (N, 2) ndarray
+            x and y.
+        width : float
+            Width of the line.
+        closed : bool, optional
+            Connect the last point with the first.
+        """
         cv2.polylines(
             self._canvas,
             [self._placed(points)],
@@ -80,11 +90,19 @@ class Plate:
         )
 
     def area(self, points: np.ndarray) -> None:
-        """The inside of the polygon `points` (N, 2), x and y."""
+        """Fill the polygon `points` (N, 2), x and y."""
         cv2.fillPoly(self._canvas, [self._placed(points)], 255, cv2.LINE_AA, _SHIFT)
 
     def box(self, left: float, top: float, width: float, height: float, line: float = 0.0) -> None:
-        """A rectangle: full, or its outline where `line`, the width of it, is above 0."""
+        """Draw a rectangle: filled, or its outline if the width `line` is above 0.
+
+        Parameters
+        ----------
+        left, top, width, height : float
+            The rectangle.
+        line : float, optional
+            Width of the outline, 0 for a filled rectangle.
+        """
         corners = np.array(
             [(left, top), (left + width, top), (left + width, top + height), (left, top + height)]
         )
@@ -96,15 +114,27 @@ class Plate:
     def text(
         self, words: str, left: float, base: float, height: float, face: int, weight: float = 0.1
     ) -> None:
-        """Writes `words` from `left` on the line `base`; capitals are `height` high, strokes
-        `weight` of that wide.
+        """Write words on a baseline.
+
+        Parameters
+        ----------
+        words : str
+            The words.
+        left, base : float
+            Left end of the baseline.
+        height : float
+            Height of capital letters.
+        face : int
+            One of `FACES`.
+        weight : float, optional
+            Width of the strokes relative to `height`.
         """
         scale, stroke = self._letters(height, face, weight)
         place = round(np.mod(left, ASPECT) * self._scale), round(base * self._scale)
         cv2.putText(self._canvas, words, place, face, scale, 255, stroke, cv2.LINE_AA)
 
     def text_width(self, words: str, height: float, face: int, weight: float = 0.1) -> float:
-        """How long `text` would make these words."""
+        """Return the width of `text` with the same parameters."""
         scale, stroke = self._letters(height, face, weight)
         return cv2.getTextSize(words, face, scale, stroke)[0][0] / self._scale
 
@@ -118,7 +148,23 @@ class Plate:
         room: float,
         weight: float = 0.1,
     ) -> None:
-        """Writes `words` around x = `middle`, smaller where they would be wider than `room`."""
+        """Write words centred on x = `middle`, reduced to fit into `room`.
+
+        Parameters
+        ----------
+        words : str
+            The words.
+        middle, base : float
+            Middle of the baseline.
+        height : float
+            Height of capital letters.
+        face : int
+            One of `FACES`.
+        room : float
+            Largest width.
+        weight : float, optional
+            Width of the strokes relative to the height.
+        """
         height *= min(1.0, room / self.text_width(words, height, face, weight))
         self.text(
             words,
@@ -135,13 +181,13 @@ class Plate:
         return cv2.getFontScaleFromHeight(face, max(2, round(pixels)), stroke), stroke
 
     def _placed(self, points: np.ndarray) -> np.ndarray:
-        """Points as OpenCV takes them, moved by whole turns so that they begin in the first one."""
+        """Points in OpenCV's format, shifted by whole turns so that they begin in the first one."""
         start = np.floor(points[:, 0].min() / ASPECT) * ASPECT
         return np.rint((points - (start, 0)) * self._scale * 2**_SHIFT).astype(np.int32)[:, None]
 
 
 def word(rng: np.random.Generator) -> str:
-    """A word of one to three syllables that means nothing."""
+    """Make up a word of one to three syllables."""
     count = int(rng.integers(1, 4))
     return "".join(
         str(rng.choice(part)) for _ in range(count) for part in (_ONSETS, _VOWELS, _CODAS)
@@ -158,8 +204,22 @@ def write_lines(
     height: float,
     face: int,
 ) -> None:
-    """`count` lines of words, flush left, `width` wide, letters `height` high; the last line of a
-    paragraph is short.
+    """Write lines of random words, flush left; the last line of a paragraph is short.
+
+    Parameters
+    ----------
+    plate : Plate
+        Where to write.
+    rng : numpy.random.Generator
+        Random numbers.
+    left, top, width : float
+        Place and width of the lines.
+    count : int
+        Number of lines.
+    height : float
+        Height of capital letters.
+    face : int
+        One of `FACES`.
     """
     for number in range(count):
         base = top + (1 + 1.9 * number) * height
@@ -171,7 +231,20 @@ def write_lines(
 
 
 def curve(controls: np.ndarray, count: int = 60) -> np.ndarray:
-    """(count, 2): the cubic Bezier curve of four control points (4, 2)."""
+    """Return points on a cubic Bezier curve.
+
+    Parameters
+    ----------
+    controls : (4, 2) ndarray
+        Control points.
+    count : int, optional
+        Number of points.
+
+    Returns
+    -------
+    (count, 2) ndarray
+        The points.
+    """
     t = np.linspace(0, 1, count)[:, None]
     weights = np.hstack([(1 - t) ** 3, 3 * t * (1 - t) ** 2, 3 * t**2 * (1 - t), t**3])
     return weights @ controls

@@ -1,5 +1,6 @@
 """Prints and drawings on paper, packaging and crockery: labels, pages of text, a band of large
-letters, brush strokes.
+letters,
+brush strokes.
 """
 
 from collections.abc import Callable
@@ -12,13 +13,24 @@ from .plate import FACES, Plate, curve, word, write_lines
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """(size, size, 3)."""
+    """Draw a texture (size, size, 3)."""
     return (_label, _page, _band, _drawing)[rng.integers(4)](rng, size)
 
 
 def print_covers(rng: np.random.Generator, size: int) -> list[np.ndarray]:
-    """What one or two inks cover, (size, size) in [0, 1] each, of a page of text or a drawing that
-    has no colours yet.
+    """Draw the coverage of one or two inks, for a page of text or a drawing without colours.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+
+    Returns
+    -------
+    list of (size, size) ndarray
+        Coverages in [0, 1].
     """
     makers: tuple[Callable[[np.random.Generator, int], list[np.ndarray]], ...] = (
         _page_covers,
@@ -132,7 +144,7 @@ def _band(rng: np.random.Generator, size: int) -> np.ndarray:
 
 
 def _drawing(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Crockery painted with a brush in one or two colours that vary in thickness."""
+    """Crockery with brush strokes in one or two colours of varying thickness."""
     base = np.broadcast_to(paper(rng), (size, size, 3))
     for cover in _drawing_covers(rng, size):
         wash = 0.85 + 0.15 * np.tanh(smooth_noise(rng, size, 6))
@@ -153,7 +165,7 @@ def _drawing_covers(rng: np.random.Generator, size: int) -> list[np.ndarray]:
 
 
 def _blossom(rng: np.random.Generator, x: float, y: float, radius: float) -> np.ndarray:
-    """(N, 2): the outline of a flower, a star or a disc."""
+    """The outline (N, 2) of a flower, a star or a disc."""
     angle = np.linspace(0, 2 * np.pi, 97)[:-1]
     reach = radius * (
         1

@@ -1,13 +1,13 @@
-"""Lights of a scene by the name of their kind, drawn at random: from a single lamp to a
-photographed environment.
+"""Random lights of a scene by kind: from a single directional light to a photographed environment.
 
-Directions and lengths are those of `synth.scene.lights`: the object is about 2 wide, around the origin,
-the viewer toward +z. Every draw reaches the side that the viewer sees. How bright it is on the
-whole is left to the caller (`synth.capture.truth.exposed`): the strongest lamp, or an environment on the
-average, gives a white matt surface a radiance of about 1.
+Directions and lengths are those of `synth.scene.lights`: the object is about 2 wide, around the
+origin, the viewer toward +z. Every draw reaches the visible side. The overall brightness is left to
+the caller (`synth.capture.truth.exposed`): the strongest light, or the mean of an environment,
+gives
+a white diffuse surface a radiance of about 1.
 
-Limits: colours of invented lights stay within some per cent of white; those of files are as they
-are.
+Limits: colours of generated lights are within a few per cent of white; those of files are
+unchanged.
 """
 
 from pathlib import Path
@@ -24,10 +24,10 @@ from .lamps import directional_lights, point_lights
 
 RIGS = ("point", "directional", "area", "sh", "natural", "hdr")
 FROM_FILES = {
-    "natural": "the folder that holds natural_lights.mat",
+    "natural": "the folder of natural_lights.mat",
     "hdr": "an .hdr or .exr file in latitude-longitude layout, or a folder of them",
 }
-_INVENTED = {
+_GENERATED = {
     "point": point_lights,
     "directional": directional_lights,
     "area": area_lights,
@@ -38,16 +38,32 @@ _INVENTED = {
 def make_lights(
     name: str, rng: np.random.Generator, source: Path | None = None
 ) -> tuple[Light, ...]:
-    """One draw of the kind `name`, of `RIGS`; the same state of `rng` gives the same lights.
+    """Draw the lights of a scene.
 
-    `source`: for "natural" the folder that holds natural_lights.mat; for "hdr" an .hdr or .exr
-    latitude-longitude picture, or a folder of them. Raises `InputError` for an unknown name, a
-    source that is missing, and files that cannot be used.
+    Parameters
+    ----------
+    name : str
+        Their kind, one of `RIGS`.
+    rng : numpy.random.Generator
+        Random numbers; the same state gives the same lights.
+    source : Path, optional
+        For "natural" the folder of natural_lights.mat; for "hdr" an .hdr or .exr latitude-longitude
+        image, or a folder of them.
+
+    Returns
+    -------
+    tuple of Light
+        The lights.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a missing source, or files that cannot be used.
     """
-    if name in _INVENTED:
-        return _INVENTED[name](rng)
+    if name in _GENERATED:
+        return _GENERATED[name](rng)
     if name not in RIGS:
         raise InputError(f"unknown light {name!r}: choose {', '.join(RIGS)}")
     if source is None:
-        raise InputError(f"the light {name!r} is read from files: name {FROM_FILES[name]}")
+        raise InputError(f"the light {name!r} is read from files: give {FROM_FILES[name]}")
     return natural_lights(rng, source) if name == "natural" else hdr_lights(rng, source)

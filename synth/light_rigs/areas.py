@@ -1,10 +1,10 @@
-"""Softboxes and windows: one or two rectangles that face the object, always with a little light
-from all around.
+"""Softboxes and windows: one or two rectangles that face the object, always with a little ambient
+light.
 
 Equation: a panel of area A at the distance r that faces the origin gives it about L A / r^2 of
 irradiance; L is chosen so that this is pi.
 
-Limits: panels are uniform; their frames and window bars are not there.
+Limits: panels are uniform, without frames or window bars.
 """
 
 import numpy as np
@@ -16,9 +16,9 @@ _NEAR, _FAR = 3.0, 6.0
 
 
 def area_lights(rng: np.random.Generator) -> tuple[Light, ...]:
-    """One or two panels and weak ambient light.
+    """Draw one or two panels and weak ambient light.
 
-    Their sides are seen from the object under 10 to 40 degrees, windows being upright.
+    Their sides subtend 10 to 40 degrees at the object; windows are upright.
     """
     panels = []
     for place, strength in places(rng):

@@ -1,14 +1,15 @@
-"""Smooth random environments: spherical harmonics of low degree, without what would be negative.
+"""Smooth random environments: spherical harmonics of low degree, clipped at 0.
 
-Equation: with P_l the Legendre polynomials and u_k random axes, sum_k g_k P_l(d . u_k) is a random
-spherical harmonic of degree l, in which no direction is preferred (addition theorem: P_l(d . u) is
-a sum over the Y_lm of the degree). Radiance = max(0, 1 + sum over l = 1..degree of such sums), each
-scaled to a standard deviation that falls with l, as it does in photographed environments.
+Equation: with P_l the Legendre polynomials and u_k random axes, sum_k g_k P_l(d . u_k) is an
+isotropic random spherical harmonic of degree l (addition theorem: P_l(d . u) is a sum over the Y_lm
+of the degree). Radiance = max(0, 1 + sum over l = 1..degree of such sums), each scaled to a
+standard
+deviation that decreases with l, as in photographed environments.
 
 Citation: R. O. Dror, A. S. Willsky, E. H. Adelson, "Statistical characterization of real-world
-illumination", Journal of Vision 4(9) (2004), doi:10.1167/4.9.11 (the power falls with the degree).
+illumination", Journal of Vision 4(9) (2004), doi:10.1167/4.9.11 (power decreases with the degree).
 
-Limits: nothing in it is sharp: no sun, no window; highlights are broad.
+Limits: no sharp features such as a sun or a window; highlights are broad.
 """
 
 import numpy as np
@@ -24,8 +25,8 @@ _COLOUR = 0.04  # standard deviation of the part that differs between channels
 
 
 def harmonic_lights(rng: np.random.Generator) -> tuple[Light, ...]:
-    """One environment of degree 2, 3 or 4, mirrored so that most of its light comes from the
-    viewer's side and from above.
+    """Draw one environment of degree 2, 3 or 4, mirrored so that most light comes from front and
+    above.
     """
     degree, contrast = int(rng.integers(2, 5)), rng.uniform(0.7, 1.7)
     towards, solid = directions(_ROWS), solid_angles(_ROWS)[..., None]
@@ -44,9 +45,23 @@ def harmonic_lights(rng: np.random.Generator) -> tuple[Light, ...]:
 def smooth_pattern(
     towards: np.ndarray, degree: int, contrast: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """What the radiance at the directions (..., 3) differs by from its mean, 1:
+    """Evaluate a random deviation of the radiance from its mean, 1.
 
-    (...); `degree` >= 1, `contrast` of degree 1.
+    Parameters
+    ----------
+    towards : (..., 3) ndarray
+        Unit directions.
+    degree : int
+        Largest degree, >= 1.
+    contrast : float
+        Standard deviation of degree 1.
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    (...) ndarray
+        The deviation.
     """
     return np.asarray(
         sum(contrast / l**0.75 * _harmonic(towards, l, rng) for l in range(1, degree + 1))
@@ -54,15 +69,14 @@ def smooth_pattern(
 
 
 def turned_to_front(radiance: np.ndarray) -> np.ndarray:
-    """An environment (rows, 2 rows, ...) whose front is its back: z mirrored."""
+    """Mirror an environment (rows, 2 rows, ...) in z: its front becomes its back."""
     rows = len(radiance)
     return radiance[:, (rows - 1 - np.arange(2 * rows)) % (2 * rows)]
 
 
 def _harmonic(towards: np.ndarray, degree: int, rng: np.random.Generator) -> np.ndarray:
-    """A random spherical harmonic at the directions (..., 3):
-
-    (...), of variance 1 on the average of draws and directions.
+    """A random spherical harmonic at the directions (..., 3), of variance 1 over draws and
+    directions.
     """
     axes = rng.normal(size=(2 * degree + 1, 3))
     axes /= np.linalg.norm(axes, axis=1, keepdims=True)

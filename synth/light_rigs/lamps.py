@@ -1,9 +1,9 @@
-"""Small lights: one or two lamps far away or near by, usually with a little light from all around.
+"""Small lights: one or two point or directional lights, usually with a little ambient light.
 
-Equation: see `synth.scene.lights`; an irradiance of pi gives a white matt surface that faces the lamp the
-radiance 1.
+Equation: see `synth.scene.lights`; an irradiance of pi gives a white diffuse surface that faces the
+light the radiance 1.
 
-Limits: lamps have no size, so that shadows are hard and highlights as wide as the gloss alone.
+Limits: the lights have no size: shadows are hard, and highlights as wide as the specular lobe.
 """
 
 import numpy as np
@@ -15,19 +15,20 @@ _NEAR, _FAR = 2.5, 6.0
 
 
 def directional_lights(rng: np.random.Generator) -> tuple[Light, ...]:
-    """One or two lamps infinitely far away, and ambient light in three of four draws."""
-    lamps = tuple(
+    """Draw one or two directional lights, and ambient light in three of four draws."""
+    lights = tuple(
         DirectionalLight(place, np.pi * strength * white(rng)) for place, strength in places(rng)
     )
-    return lamps + perhaps_ambient(rng)
+    return lights + perhaps_ambient(rng)
 
 
 def point_lights(rng: np.random.Generator) -> tuple[Light, ...]:
-    """One or two lamps 2.5 to 6 object units from the object's middle, and ambient light in three
-    of four draws.
+    """Draw one or two point lights, 2.5 to 6 object units from the origin.
+
+    Ambient light is added in three of four draws.
     """
-    lamps = []
+    lights = []
     for place, strength in places(rng):
         distance = rng.uniform(_NEAR, _FAR)
-        lamps.append(PointLight(distance * place, np.pi * strength * distance**2 * white(rng)))
-    return (*lamps, *perhaps_ambient(rng))
+        lights.append(PointLight(distance * place, np.pi * strength * distance**2 * white(rng)))
+    return (*lights, *perhaps_ambient(rng))

@@ -1,10 +1,11 @@
-"""What invented lights share: places around the object, near whites, and the weak light that keeps
-shadows from being black.
+"""What generated lights share: places around the object, near-white colours, and the weak ambient
+light that fills shadows.
 
 Equation: a place is given by its tilt from the viewing axis and its turn from straight up,
-clockwise as the viewer sees it: d = (sin tilt sin turn, sin tilt cos turn, cos tilt).
+clockwise
+as seen by the viewer: d = (sin tilt sin turn, sin tilt cos turn, cos tilt).
 
-Limits: only the side of the viewer, tilt below 90 degrees, reaches what the viewer sees.
+Limits: only lights on the viewer's side, with a tilt below 90 degrees, reach the visible side.
 """
 
 import numpy as np
@@ -18,22 +19,42 @@ _AMBIENT_ROWS = 16
 
 
 def toward(tilt: float, turn: float) -> np.ndarray:
-    """The unit vector (3,) at `tilt` from the viewing axis and `turn` from straight up, both in
-    degrees.
+    """Return a unit vector from two angles.
+
+    Parameters
+    ----------
+    tilt : float
+        From the viewing axis, degrees.
+    turn : float
+        From straight up, clockwise, degrees.
+
+    Returns
+    -------
+    (3,) ndarray
+        The direction, camera frame.
     """
     t, a = np.radians(tilt), np.radians(turn)
     return np.array([np.sin(t) * np.sin(a), np.sin(t) * np.cos(a), np.cos(t)])
 
 
 def white(rng: np.random.Generator) -> np.ndarray:
-    """A colour (3,) within a few per cent of white, of mean 1."""
+    """Draw a colour (3,) within a few per cent of white, of mean 1."""
     colour = 1 + rng.uniform(-_TINT, _TINT, 3)
     return colour / colour.mean()
 
 
 def places(rng: np.random.Generator) -> list[tuple[np.ndarray, float]]:
-    """Where one or two lamps stand, (3,) unit vectors, and how strong they are: a key light above
-    or at a side and, in half of the draws, a weaker one across from it.
+    """Draw directions and strengths of one or two lights.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    list of ((3,) ndarray, float)
+        A key light above or at a side and, in half of the draws, a weaker one on the other side.
     """
     turn = rng.uniform(-95, 95)
     key = (toward(rng.uniform(20, 65), turn), 1.0)
@@ -44,8 +65,19 @@ def places(rng: np.random.Generator) -> list[tuple[np.ndarray, float]]:
 
 
 def ambient(rng: np.random.Generator, weakest: float, strongest: float) -> EnvironmentLight:
-    """Light from all around, brighter from above: a white matt surface gets a radiance from
-    `weakest` to `strongest` on the average.
+    """Draw light from all directions, brighter from above.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    weakest, strongest : float
+        Range of the mean radiance of a white diffuse surface.
+
+    Returns
+    -------
+    EnvironmentLight
+        The light.
     """
     level, contrast = np.exp(rng.uniform(np.log(weakest), np.log(strongest))), rng.uniform(0.2, 0.8)
     height = directions(_AMBIENT_ROWS)[..., 1]
@@ -53,5 +85,5 @@ def ambient(rng: np.random.Generator, weakest: float, strongest: float) -> Envir
 
 
 def perhaps_ambient(rng: np.random.Generator, share: float = 0.75) -> tuple[EnvironmentLight, ...]:
-    """Weak ambient light in `share` of the draws, else none."""
+    """Draw weak ambient light in `share` of the draws, otherwise none."""
     return (ambient(rng, 0.02, 0.15),) if rng.uniform() < share else ()

@@ -1,8 +1,9 @@
-"""Light on a surface, the two lobes of its material apart: from one set of samples, by Mitsuba's
-kernels or by NumPy.
+"""Light reflected by a surface, its diffuse and specular lobes separate but from the same samples,
+by Mitsuba's kernels or by NumPy.
 
-`mitsuba_lobes` runs in Mitsuba's LLVM variants; `array_lobes` runs everywhere, on `isc_core.shading.brdf`,
-and needs Mitsuba for its rays only. Both estimate the same integral, so each is the other's test.
+`mitsuba_lobes` runs in Mitsuba's LLVM variants; `array_lobes` runs everywhere, on
+`isc_core.shading.brdf`, and needs Mitsuba only to trace rays. Both estimate the same integral, so
+each tests the other.
 """
 
 from dataclasses import dataclass
@@ -24,9 +25,23 @@ Renderer = Literal["auto", "mitsuba", "arrays"]
 
 @dataclass(frozen=True)
 class RenderOptions:
-    """`samples`: light paths a pixel, >= 2 (without two there is no variance). `seed`: of the
-    random numbers. `bounces`: of light between parts of the object, 0 to 8. `renderer`: "auto"
-    takes Mitsuba's kernels where libLLVM lets it. Raises `InputError` outside these.
+    """Options of a render.
+
+    Attributes
+    ----------
+    samples : int
+        Light paths per pixel, >= 2 (one alone has no variance).
+    seed : int
+        Seed of the random numbers, >= 0.
+    bounces : int
+        Interreflections on the object, 0 to 8.
+    renderer : str
+        "mitsuba", "arrays", or "auto": Mitsuba's kernels if libLLVM is available.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     samples: int = 64
@@ -36,7 +51,7 @@ class RenderOptions:
 
     def __post_init__(self) -> None:
         if self.samples < 2 or not 0 <= self.bounces <= 8 or self.seed < 0:
-            raise InputError("samples have to be 2 or more, bounces 0 to 8, and the seed 0 or more")
+            raise InputError("use at least 2 samples, 0 to 8 bounces, and a seed of at least 0")
         if self.renderer not in get_args(Renderer):
             raise InputError(
                 f"unknown renderer {self.renderer!r}: choose {', '.join(get_args(Renderer))}"
@@ -45,11 +60,16 @@ class RenderOptions:
 
 @dataclass(frozen=True)
 class Lit:
-    """Radiance toward the camera of N points, and how sure it is.
+    """Radiance of N points toward the camera, with the variance of its estimate.
 
-    `shading`: (N, 3) of the diffuse for albedo 1, so that diffuse = albedo * shading. `specular`: (N,
-    3) of the gloss, its strength included. `shading_variance`, `specular_variance`: (N, 3), of
-    these estimates (of the mean, not of one sample); 0 where nothing was drawn.
+    Attributes
+    ----------
+    shading : (N, 3) ndarray
+        Of the diffuse lobe for albedo 1: diffuse = albedo * shading.
+    specular : (N, 3) ndarray
+        Of the specular lobe, its strength included.
+    shading_variance, specular_variance : (N, 3) ndarray
+        Of these estimates (of the mean, not of one sample); 0 where nothing was sampled.
     """
 
     shading: np.ndarray
@@ -66,9 +86,34 @@ def light_surface(
     options: RenderOptions,
     monitor: Monitor | None = None,
 ) -> Lit:
-    """Lights the points of `surface`.
+    """Light the points of a surface.
 
-    Raises `InputError` where the renderer asked for cannot run here, `Cancelled`.
+    Parameters
+    ----------
+    surface : Surface
+        The visible points.
+    material : Material
+        Their material.
+    lights : tuple of Light
+        The lights.
+    tracer : Tracer
+        The object, for shadows and interreflections.
+    options : RenderOptions
+        Samples, seed, bounces and renderer.
+    monitor : Monitor, optional
+        Progress and cancellation.
+
+    Returns
+    -------
+    Lit
+        Shading and specular radiance.
+
+    Raises
+    ------
+    InputError
+        If the renderer cannot run on this machine.
+    Cancelled
+        If the user cancels.
     """
     monitor = monitor or Monitor()
     kernels = options.renderer == "mitsuba" or (options.renderer == "auto" and has_llvm())

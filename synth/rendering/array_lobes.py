@@ -1,9 +1,9 @@
-"""Light on a surface in plain arrays, the two lobes of its material apart; Mitsuba traces the rays
-and does nothing else.
+"""Lighting of a surface with NumPy arrays, the two lobes of its material separate; Mitsuba only
+traces the rays.
 
-The estimates are those of `direct_light` and `bounced_light`. Points are taken in chunks with
-random numbers of their own: threads draw the samples of the next chunks while one, to which
-Mitsuba's variant belongs, traces the rays of this one. Which thread does what changes nothing.
+The estimates are those of `direct_light` and `bounced_light`. Points are processed in chunks with
+their own random numbers: threads draw the samples of the next chunks while one thread, which owns
+Mitsuba's variant, traces the rays of this one. The result does not depend on the threads.
 
 Limits: see `direct_light`, `bounced_light`, `reflection`.
 """
@@ -27,8 +27,8 @@ from .direct_light import Paths, Sums, add_exactly, draw_paths, trace_paths, uns
 from .light_sampling import Sampler, sampler_of
 from .reflection import Points, Reflection
 
-_CHUNK = 1 << 15  # samples at a time: their arrays fit the cache
-_THREADS = 4  # more would wait for the rays, which one thread traces
+_CHUNK = 1 << 15  # samples at a time: their arrays fit into the cache
+_THREADS = 4  # more would wait for the rays, which a single thread traces
 
 
 def light_surface(
@@ -39,7 +39,33 @@ def light_surface(
     options: RenderOptions,
     monitor: Monitor,
 ) -> Lit:
-    """Lights the points of `surface`, see `synth.rendering.light_surface`. Raises `Cancelled`."""
+    """Light the points of a surface, see `synth.rendering.light_surface`.
+
+    Parameters
+    ----------
+    surface : Surface
+        The visible points.
+    material : Material
+        Their material.
+    lights : tuple of Light
+        The lights.
+    tracer : Tracer
+        The object.
+    options : RenderOptions
+        Samples, seed and bounces.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    Lit
+        Shading and specular radiance.
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
+    """
     points = Points(
         surface.position,
         surface.normal,
@@ -81,7 +107,7 @@ def _add_direct(
     pool: ThreadPoolExecutor,
     monitor: Monitor,
 ) -> None:
-    """Adds one light that has a size."""
+    """Add one extended light."""
     known = unshadowed(points, world.reflection, source[0])
 
     def draw(chunk: slice) -> Paths:
@@ -108,10 +134,10 @@ def _add_bounced(
     bounces: int,
     monitor: Monitor,
 ) -> None:
-    """Adds light between parts of the object."""
+    """Add interreflections."""
     chunks = _chunks(len(points), sum(samples))
     for number, chunk in enumerate(chunks):
-        monitor.report("light between parts of the object", number / len(chunks))
+        monitor.report("interreflections", number / len(chunks))
         paths = bounced_paths(
             np.random.default_rng((*seed, chunk.start)), points.at(chunk), world, samples, bounces
         )
@@ -119,7 +145,7 @@ def _add_bounced(
 
 
 def _chunks(count: int, samples: int) -> list[slice]:
-    """`count` points in pieces of about `_CHUNK` samples."""
+    """Split `count` points into pieces of about `_CHUNK` samples."""
     step = max(1, _CHUNK // samples)
     return [slice(start, min(start + step, count)) for start in range(0, count, step)]
 
@@ -127,7 +153,7 @@ def _chunks(count: int, samples: int) -> list[slice]:
 def _ahead(
     pool: ThreadPoolExecutor, work: Callable[[slice], Paths], chunks: list[slice]
 ) -> Iterator[tuple[slice, Paths]]:
-    """Results in the order of the chunks, a few of them under way at any time."""
+    """Yield results in the order of the chunks, with a few of them being computed ahead."""
     waiting: deque[tuple[slice, Future[Paths]]] = deque()
     for chunk in chunks:
         waiting.append((chunk, pool.submit(work, chunk)))

@@ -1,14 +1,15 @@
-"""Light that parts of the object send to each other before it leaves for the camera.
+"""Interreflections: light that parts of the object reflect onto each other before it reaches the
+camera.
 
-Equation: what arrives along a drawn direction that meets the object is what leaves from there: its
-direct light by one sample of each kind, and, while bounces remain, what arrives there along one
-more direction, drawn by the cosine or by the gloss with even odds. The weights are those of
-`direct_light`.
+Equation: the radiance that arrives along a sampled direction which hits the object is what leaves
+from there: its direct light by one sample of each kind, and, while bounces remain, what arrives
+there along one more direction, sampled by the cosine or by the specular lobe with equal
+probability. The weights are those of `direct_light`.
 
 Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
 
-Limits: paths of `bounces` reflections more than the last one; longer ones are left out. Light
-through the gloss onto a matt part (caustics) is met by chance only: noisy.
+Limits: paths with at most `bounces` reflections before the last one. Specular light on a diffuse
+part (caustics) is noisy, since it is hit by chance only.
 """
 
 from collections.abc import Sequence
@@ -26,9 +27,20 @@ from .reflection import Points, Reflection, cosine_density, cosine_directions
 
 @dataclass(frozen=True)
 class World:
-    """What light meets on its way.
+    """What light interacts with.
 
-    `reflection`: of the material without its albedo. `samplers`: of those lights that have a size.
+    Attributes
+    ----------
+    material : Material
+        The object's material.
+    reflection : Reflection
+        The material without its albedo.
+    lights : sequence of Light
+        All lights.
+    samplers : sequence of Sampler
+        Of the extended lights.
+    tracer : Tracer
+        The object.
     """
 
     material: Material
@@ -41,9 +53,25 @@ class World:
 def bounced_paths(
     rng: np.random.Generator, points: Points, world: World, samples: tuple[int, int], bounces: int
 ) -> Paths:
-    """Samples of what arrives from the object itself:
+    """Sample the light that arrives from the object itself.
 
-    `samples` directions by the cosine and by the gloss at each point.
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    points : Points
+        Where it arrives.
+    world : World
+        Object and lights.
+    samples : (int, int)
+        Directions per point, by the cosine and by the specular lobe.
+    bounces : int
+        Remaining reflections.
+
+    Returns
+    -------
+    Paths
+        The samples.
     """
     direction = np.concatenate(
         [
@@ -76,7 +104,7 @@ def bounced_paths(
 def _arriving(
     rng: np.random.Generator, points: Points, direction: np.ndarray, world: World, bounces: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which of M rays from the points meet the object (K,), and what arrives along those (K, 3)."""
+    """Which of M rays from the points hit the object (K,), and the radiance along those (K, 3)."""
     met = world.tracer.hits(points.lifted(), direction)
     hit = np.flatnonzero(met.valid)
     reflectance = world.material.at(met.uv[hit])
@@ -98,7 +126,7 @@ def _arriving(
 def _one_more(
     rng: np.random.Generator, places: Points, albedo: np.ndarray, world: World, bounces: int
 ) -> np.ndarray:
-    """What leaves (K, 3) of the light that arrives from the object along one direction."""
+    """Radiance (K, 3) that leaves due to the light arriving from the object along one direction."""
     by_cosine, by_gloss = (
         cosine_directions(rng, places, 1)[:, 0],
         world.reflection.draw(rng, places, 1)[:, 0],

@@ -1,17 +1,17 @@
-"""The lobes of `materials` as a plugin that Mitsuba's own integrators render: `{"type":
+"""The lobes of `scene.materials` as a plugin for Mitsuba's own integrators: `{"type":
 "isc_material", "model": "ggx", ...}`.
 
-Parameters, as in `materials`: `model` (lambert, oren_nayar, blinn_phong or ggx; roughplastic is
-Mitsuba's own); the textures or numbers `albedo` (colour), `gloss` and `strength`; the numbers `ior`
-and `sigma`. `mitsuba.traverse` finds the textures, which may carry gradients.
+Parameters, as in `scene.materials`: `model` (lambert, oren_nayar, blinn_phong or ggx; roughplastic
+is Mitsuba's own); the textures or numbers `albedo` (colour), `gloss` and `strength`; the numbers
+`ior` and `sigma`. `mitsuba.traverse` exposes the textures, which may carry gradients.
 
-Equation: f_r = albedo * diffuse + strength * gloss. Component 0 is the diffuse (DiffuseReflection),
-component 1 the gloss (GlossyReflection): a `BSDFContext` with one of these flags evaluates one lobe
-alone.
+Equation: f_r = albedo * diffuse + strength * specular. Component 0 is the diffuse lobe
+(DiffuseReflection), component 1 the specular lobe (GlossyReflection): a `BSDFContext` with one of
+these flags evaluates one lobe alone.
 
 Citation: W. Jakob et al., Mitsuba 3 renderer, 2022, https://mitsuba-renderer.org.
 
-Limits: LLVM variants; a scalar one renders it a ray at a time through Python: tiny pictures only.
+Limits: LLVM variants; a scalar one evaluates it ray by ray through Python, for tiny images only.
 One-sided.
 """
 
@@ -28,10 +28,17 @@ _PLASTIC = "roughplastic"
 
 
 def register() -> str:
-    """Makes the plugin known to Mitsuba's present variant; again and again does no harm. Returns
-    its name.
+    """Register the plugin with Mitsuba's current variant; repeated calls are harmless.
 
-    Raises `InputError` where Mitsuba is not installed.
+    Returns
+    -------
+    str
+        Its name.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
     """
     mi = load_mitsuba()
     methods = {
@@ -52,9 +59,8 @@ def _init(self: Any, properties: Any) -> None:
     mi.BSDF.__init__(self, properties)
     self.model = str(properties.get("model", "blinn_phong"))
     if self.model not in MODELS or self.model == _PLASTIC:
-        raise InputError(
-            f"the plugin {NAME} has no model {self.model!r}: choose {', '.join(name for name in MODELS if name != _PLASTIC)}"
-        )
+        known = ", ".join(name for name in MODELS if name != _PLASTIC)
+        raise InputError(f"the plugin {NAME} has no model {self.model!r}: choose {known}")
     self.albedo = properties.get_texture("albedo", 0.5)
     self.gloss = properties.get_texture("gloss", 100.0)
     self.strength = properties.get_texture("strength", 0.1)

@@ -1,20 +1,22 @@
-"""The lobes of `materials` on Mitsuba's arrays: how much they reflect, and random directions toward
-which they reflect most.
+"""The lobes of `scene.materials` on Mitsuba's arrays: their values, and importance sampling of
+directions.
 
 Directions are in the local frame of a point, z along its normal: `view` toward the camera, `light`
 toward the light, both unit vectors of Dr.Jit, or of numbers in a scalar variant. Parameters are
-numbers or arrays with an entry for each lane; all may carry gradients. They share no code with
-`isc_core.shading.brdf`, so that each is the other's test.
+numbers or arrays with one entry per lane; all may carry gradients. No code is shared with
+`isc_core.shading.brdf`, so that each tests the other.
 
-Equation: values are f_r cos_light. A gloss is sampled by half vectors: with the density p(h) per
-solid angle of h, the light's is p(h) / (4 view . h), in proportion to cos^p of the normal for
-Blinn-Phong, and to the facets that the view sees for GGX.
+Equation: values are f_r cos_light. A specular lobe is sampled by half vectors: with the density
+p(h)
+per solid angle of h, the light's is p(h) / (4 view . h); p is proportional to cos^p of the normal
+for Blinn-Phong, and to the visible facets for GGX.
 
 Citation: E. Heitz, "Sampling the GGX distribution of visible normals", Journal of Computer Graphics
-Techniques 7(4), 2018 (no DOI), as Mitsuba does it; the models' own stand in `isc_core.shading.brdf`.
+Techniques 7(4), 2018 (no DOI), as implemented in Mitsuba; for the models see
+`isc_core.shading.brdf`.
 
-Limits: reflection only. Half of the directions are drawn for the diffuse and half for the gloss,
-whatever their strengths.
+Limits: reflection only. Half of the directions are sampled from the diffuse lobe and half from the
+specular one, whatever their strengths.
 """
 
 import math
@@ -33,7 +35,13 @@ Lanes = Any
 
 
 def load_drjit() -> ModuleType:
-    """The `drjit` module. Raises `InputError` where Mitsuba is not installed."""
+    """Return the `drjit` module.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
+    """
     load_mitsuba()
     import drjit
 
@@ -41,50 +49,62 @@ def load_drjit() -> ModuleType:
 
 
 class Lobes(Protocol):
-    """What a point reflects, diffuse and gloss apart."""
+    """The reflection of a point, diffuse and specular lobes separate."""
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
-        """f_r cos_light of the diffuse for albedo 1, and of the gloss; 0 below the horizon."""
+        """Return f_r cos_light of the diffuse lobe for albedo 1, and of the specular lobe.
+
+        Both are 0 below the horizon.
+        """
         ...
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """How densely `sample` draws this direction, per steradian."""
+        """Return the density of `sample` in this direction, per steradian."""
         ...
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
-        """A direction for the uniform random numbers `choice` and `place` (two)."""
+        """Return a direction for the uniform random numbers `choice` and `place` (two)."""
         ...
 
 
 class SpecularLobe(Protocol):
-    """A glossy lobe of strength 1.
+    """A specular lobe of strength 1.
 
-    All three as in `Lobes`, but for f_r without the cosine, where view and light are above the
+    The methods are those of `Lobes`, but for f_r without the cosine, for view and light above the
     horizon.
     """
 
-    def value(self, view: Lanes, light: Lanes) -> Lanes: ...
+    def value(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return f_r."""
+        ...
 
-    def density(self, view: Lanes, light: Lanes) -> Lanes: ...
+    def density(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return the density of `sample` in this direction, per steradian."""
+        ...
 
-    def sample(self, view: Lanes, place: Lanes) -> Lanes: ...
+    def sample(self, view: Lanes, place: Lanes) -> Lanes:
+        """Return a direction for two uniform random numbers."""
+        ...
 
 
 @dataclass(frozen=True)
 class BlinnPhongLobe:
-    """`exponent`: > 0. The scale is "normalised"."""
+    """The normalised Blinn-Phong lobe of an exponent > 0."""
 
     exponent: Lanes
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return f_r."""
         return (self.exponent + 8) / (8 * math.pi) * self._lobe(view, light)
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return the density of `sample` in this direction, per steradian."""
         dr = load_drjit()
         across = dr.maximum(dr.dot(view, dr.normalize(view + light)), 1e-6)
         return (self.exponent + 1) / (2 * math.pi) * self._lobe(view, light) / (4 * across)
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
+        """Return a direction for two uniform random numbers."""
         dr, mi = load_drjit(), load_mitsuba()
         # 1 - cos^2 by way of the logarithm keeps its digits where the lobe is narrow.
         square = 1 - dr.exp(2 / (self.exponent + 1) * dr.log(dr.maximum(1 - place.x, 1e-30)))
@@ -93,8 +113,8 @@ class BlinnPhongLobe:
         return mi.reflect(view, half)
 
     def _lobe(self, view: Lanes, light: Lanes) -> Lanes:
-        """cos^p of the half vector, from its sine: for large p the cosine has lost the digits that
-        count.
+        """cos^p of the half vector, from its sine: for large p the cosine has lost the relevant
+        digits.
         """
         dr = load_drjit()
         half = dr.normalize(view + light)
@@ -103,12 +123,21 @@ class BlinnPhongLobe:
 
 @dataclass(frozen=True)
 class GgxLobe:
-    """`alpha` in (0, 1] of Mitsuba's facets; `f0` in [0, 1] of Schlick's Fresnel term."""
+    """GGX with Mitsuba's facets.
+
+    Attributes
+    ----------
+    alpha : float or Dr.Jit array
+        Roughness in (0, 1].
+    f0 : float or Dr.Jit array
+        Reflectance at normal incidence in [0, 1], for Schlick's Fresnel term.
+    """
 
     alpha: Lanes
     f0: Lanes
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return f_r."""
         dr = load_drjit()
         half = dr.normalize(view + light)
         facets = self._facets()
@@ -124,11 +153,13 @@ class GgxLobe:
         )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return the density of `sample` in this direction, per steradian."""
         dr = load_drjit()
         half = dr.normalize(view + light)
         return self._facets().pdf(view, half) / (4 * dr.maximum(dr.dot(view, half), 1e-6))
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
+        """Return a direction for two uniform random numbers."""
         half, _ = self._facets().sample(view, place)
         return load_mitsuba().reflect(view, half)
 
@@ -139,8 +170,16 @@ class GgxLobe:
 
 @dataclass(frozen=True)
 class MaterialLobes:
-    """A diffuse diffuse of slope deviation `sigma` (radians; 0 is Lambert) under `strength` times a
-    gloss, or none.
+    """A diffuse lobe with a specular lobe on top, or none.
+
+    Attributes
+    ----------
+    sigma : float or Dr.Jit array
+        Slope deviation of Oren-Nayar in radians; 0 is Lambertian.
+    strength : float or Dr.Jit array
+        Factor of the specular lobe.
+    gloss : SpecularLobe or None
+        The specular lobe.
     """
 
     sigma: Lanes = 0.0
@@ -148,6 +187,7 @@ class MaterialLobes:
     gloss: SpecularLobe | None = None
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
+        """Return f_r cos_light of both lobes."""
         dr, mi = load_drjit(), load_mitsuba()
         lit = (view.z > 1e-9) & (light.z > 1e-9)
         diffuse = dr.select(lit, oren_nayar(self.sigma, view, light) * light.z, 0)
@@ -158,6 +198,7 @@ class MaterialLobes:
         )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return the density of `sample` in this direction, per steradian."""
         dr = load_drjit()
         diffuse = dr.maximum(light.z, 0) / math.pi
         if self.gloss is None:
@@ -167,6 +208,7 @@ class MaterialLobes:
         )
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
+        """Return a direction for the uniform random numbers `choice` and `place` (two)."""
         dr, mi = load_drjit(), load_mitsuba()
         diffuse = mi.warp.square_to_cosine_hemisphere(place)
         if self.gloss is None:
@@ -176,15 +218,23 @@ class MaterialLobes:
 
 @dataclass(frozen=True)
 class PlasticLobes:
-    """Mitsuba's rough plastic, `plugin`, whose parameters are uniform. `drawn`: lobes alike, whose
-    directions are taken: the plugin would draw few for the gloss, which is faint and bright at
-    once.
+    """Mitsuba's rough plastic with uniform parameters.
+
+    Attributes
+    ----------
+    plugin : mitsuba.BSDF
+        The plugin.
+    drawn : MaterialLobes
+        Similar lobes that directions are sampled from: the plugin would sample few directions from
+        the
+        specular lobe, which is weak but narrow.
     """
 
     plugin: Lanes
     drawn: MaterialLobes
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
+        """Return f_r cos_light of both lobes."""
         mi = load_mitsuba()
         parts = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
         contexts = [mi.BSDFContext(mi.TransportMode.Radiance, int(part)) for part in parts]
@@ -194,26 +244,43 @@ class PlasticLobes:
         return diffuse, gloss
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
+        """Return the density of `sample` in this direction, per steradian."""
         return self.drawn.density(view, light)
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
+        """Return a direction for the uniform random numbers `choice` and `place` (two)."""
         return self.drawn.sample(view, choice, place)
 
 
 def rows_of(colour: Lanes) -> np.ndarray:
-    """A colour or vector with an entry for each lane as an array (N, 3).
+    """Convert a colour or vector with one entry per lane to an array (N, 3).
 
-    Part by part: Dr.Jit turns a whole one by a kernel that has the number of lanes in it, and is
-    compiled anew for every other number.
+    Component by component: Dr.Jit converts a whole one by a kernel that is compiled anew for every
+    number of lanes.
     """
     load_drjit().eval(colour)
     return np.stack([np.array(part, float) for part in colour], axis=1)
 
 
 def lobes_of(material: Material, reflectance: SurfaceReflectance) -> Lobes:
-    """The lobes of a material at points whose reflectance is known, a lane each.
+    """Return the lobes of a material at points, one lane each.
 
-    Raises `InputError` where Mitsuba is not installed.
+    Parameters
+    ----------
+    material : Material
+        The material.
+    reflectance : SurfaceReflectance
+        Its parameters at the points.
+
+    Returns
+    -------
+    Lobes
+        The lobes.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
     """
     dr, mi = load_drjit(), load_mitsuba()
     sigma, f0, strength, gloss = (
@@ -222,7 +289,7 @@ def lobes_of(material: Material, reflectance: SurfaceReflectance) -> Lobes:
         lanes(reflectance.strength),
         lanes(reflectance.gloss),
     )
-    # What is opaque is no constant of a kernel, so that the next scene finds the kernel compiled.
+    # Opaque values are not constants of a kernel: the next scene reuses the compiled kernel.
     dr.make_opaque(sigma, f0)
     if material.model == "blinn_phong":
         return MaterialLobes(0.0, strength, BlinnPhongLobe(gloss))
@@ -235,8 +302,19 @@ def lobes_of(material: Material, reflectance: SurfaceReflectance) -> Lobes:
 
 
 def rough_plastic(alpha: float, ior: float, albedo: Any = 1.0) -> Lanes:
-    """Mitsuba's plugin as `materials` means it, with a white diffuse unless told otherwise (a number,
-    or a texture as a dictionary).
+    """Load Mitsuba's plugin with the conventions of `scene.materials`.
+
+    Parameters
+    ----------
+    alpha, ior : float
+        Roughness and index of refraction.
+    albedo : float or dict, optional
+        Diffuse reflectance: a number, or a texture as a dictionary.
+
+    Returns
+    -------
+    mitsuba.BSDF
+        The plugin.
     """
     diffuse = albedo if isinstance(albedo, dict) else {"type": "rgb", "value": [float(albedo)] * 3}
     plastic = {
@@ -251,14 +329,27 @@ def rough_plastic(alpha: float, ior: float, albedo: Any = 1.0) -> Lanes:
 
 
 def oren_nayar(sigma: Lanes, view: Lanes, light: Lanes) -> Lanes:
-    """f_r of a white rough diffuse surface, `sigma` in radians; the number 0 is Lambert's."""
+    """Return f_r of a white rough diffuse surface.
+
+    Parameters
+    ----------
+    sigma : float or Dr.Jit array
+        Slope deviation in radians; the number 0 is Lambertian.
+    view, light : Dr.Jit vectors
+        Unit directions in the local frame.
+
+    Returns
+    -------
+    float or Dr.Jit array
+        f_r in 1/sr.
+    """
     if isinstance(sigma, int | float) and sigma == 0:
         return 1 / math.pi
     dr = load_drjit()
     square = sigma * sigma
     flat = 1 - 0.5 * square / (square + 0.33)
-    # sin a sin b cos d is the product of the directions' shadows on the surface, tan b / sin b
-    # divides by the larger cosine.
+    # sin a sin b cos d is the product of the projected directions; tan b / sin b divides by the
+    # larger cosine.
     together = dr.maximum(view.x * light.x + view.y * light.y, 0) / dr.maximum(
         dr.maximum(view.z, light.z), 1e-9
     )
@@ -266,10 +357,7 @@ def oren_nayar(sigma: Lanes, view: Lanes, light: Lanes) -> Lanes:
 
 
 def _log_complement(share: Lanes) -> Lanes:
-    """log(1 - share) for a share in [0, 1], with all its digits where the share is small (W.
-
-    Kahan's way).
-    """
+    """log(1 - share) for a share in [0, 1], accurate for small shares (W. Kahan's method)."""
     dr = load_drjit()
     rest = dr.maximum(1 - share, 1e-30)
     lost = dr.select(rest == 1, 1, 1 - rest)
@@ -277,7 +365,7 @@ def _log_complement(share: Lanes) -> Lanes:
 
 
 def _interaction(view: Lanes) -> Lanes:
-    """A point of a surface of which nothing counts but the direction it is seen from."""
+    """A surface point that has only a viewing direction."""
     dr, mi = load_drjit(), load_mitsuba()
     point = dr.zeros(mi.SurfaceInteraction3f, dr.width(view))
     point.wi = view

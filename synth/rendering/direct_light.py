@@ -1,26 +1,26 @@
-"""Light that comes to points of a surface straight from the lights, the two lobes of the material
-apart.
+"""Direct light on points of a surface, the two lobes of the material separate.
 
 Problem: radiance toward the camera is, for each lobe f, the integral of f V L cos over the
-directions w to a light L, with V = 0 where the object itself stands in between.
+directions w to a light L, with V = 0 where the object itself blocks the light.
 
-Equation: point and directional lights are one direction each: no noise. For panels and environments
-each sample draws one direction toward the light and one where the gloss reflects (matt: by the
-cosine); with n_k directions of density p_k each adds
+Equation: point and directional lights are one direction each, without noise. For panels and
+environments each sample takes one direction toward the light and one from the specular lobe
+(diffuse
+materials: by the cosine); with n_k directions of density p_k each adds
 
     f V L cos / sum_k n_k p_k          (the balance heuristic)
 
-Of the diffuse only its loss is estimated: a times the closed form S without shadows, for a diffuse that
-reflects a constant b, plus (V f - a b) L cos / .... b is f for light along the normal; a is the
-share of the light that is not in shadow, for each half of the samples as the other half sees it,
-which keeps the mean right. So there is no noise on a matt convex diffuse, and none in full shadow.
+Of the diffuse lobe only the shadows are estimated: a times the closed form S without shadows, for a
+surface that reflects a constant b, plus (V f - a b) L cos / .... b is f for light along the normal;
+a is the unshadowed share of the light, for each half of the samples as estimated by the other half,
+which keeps the mean unbiased. So a convex diffuse object has no noise, and neither has full shadow.
 
 Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
 rendering", SIGGRAPH 1995, doi:10.1145/218380.218498; control variates: J. M. Hammersley, D. C.
 Handscomb, "Monte Carlo methods" (1964), doi:10.1007/978-94-009-5819-7.
 
-Limits: panels do not hide each other or the environment. The variance is estimated from the samples
-themselves: where light is so rare that none of them met it, it is 0 and wrong.
+Limits: panels hide neither each other nor the environment. The variance is estimated from the
+samples themselves: if no sample hit a rare light, the variance is 0, which is wrong.
 """
 
 from dataclasses import dataclass
@@ -33,11 +33,11 @@ from .irradiance import unoccluded_panel, unoccluded_shading
 from .light_sampling import Sampler
 from .reflection import Points, Reflection
 
-_ENOUGH = 4  # samples that can be halved and still have a variance in either half
+_ENOUGH = 4  # fewest samples for a variance in either half
 
 
 class Sums:
-    """The lobes of N points as they grow, (N, 3) each, and the variances of both."""
+    """Accumulated lobes of N points, (N, 3) each, and the variances of both."""
 
     def __init__(self, count: int) -> None:
         self.diffuse, self.gloss, self.diffuse_variance, self.gloss_variance = np.zeros(
@@ -51,9 +51,18 @@ class Sums:
         clear: np.ndarray,
         unshadowed: "Unshadowed | None" = None,
     ) -> None:
-        """Adds the samples of a chunk of points.
+        """Add the samples of a chunk of points.
 
-        `clear`: (M,), which reach their light. `unshadowed`: of the chunk's points.
+        Parameters
+        ----------
+        chunk : slice
+            The points.
+        paths : Paths
+            Their samples.
+        clear : (M,) ndarray of bool
+            Which samples reach their light.
+        unshadowed : Unshadowed, optional
+            The diffuse lobe of the chunk's points without shadows.
         """
         count = chunk.stop - chunk.start
         diffuse, gloss = clear * paths.diffuse, clear * paths.gloss
@@ -86,10 +95,26 @@ class Sums:
 
 @dataclass(frozen=True)
 class Paths:
-    """M samples that bring light unless something is in the way. `point`: (M,), which point of the
-    chunk. `strategy`: (M,), 0 or 1, what drew it; `samples`: how many each draws at a point.
-    `half`: (M,), 0 or 1, each with half of the samples. `direction`: (M, 3); `reach`: (M,), how far
-    the light is; `light`: (M, 3), L cos / sum n p; `diffuse`, `gloss`: (M,), f of both lobes.
+    """M samples that carry light unless they are blocked.
+
+    Attributes
+    ----------
+    point : (M,) ndarray of int
+        Index of the point in the chunk.
+    strategy : (M,) ndarray of int
+        0 or 1: by light or by lobe.
+    half : (M,) ndarray of int
+        0 or 1: which half of the samples.
+    samples : (int, int)
+        Samples of each strategy per point.
+    direction : (M, 3) ndarray
+        Unit directions.
+    reach : (M,) ndarray
+        Distance of the light.
+    light : (M, 3) ndarray
+        L cos / sum n p.
+    diffuse, gloss : (M,) ndarray
+        f of the diffuse and the specular lobe.
     """
 
     point: np.ndarray
@@ -110,9 +135,25 @@ def draw_paths(
     sampler: Sampler,
     samples: tuple[int, int],
 ) -> Paths:
-    """Samples of one light that has a size:
+    """Sample an extended light.
 
-    `samples` of either kind at each point, toward the light and by the lobe.
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    points : Points
+        Where light arrives.
+    reflection : Reflection
+        The material without its albedo.
+    sampler : Sampler
+        Of the light.
+    samples : (int, int)
+        Directions per point, toward the light and by the lobe.
+
+    Returns
+    -------
+    Paths
+        The samples.
     """
     to_light = sampler.draw(rng, points.position, samples[0])
     by_lobe = reflection.draw(rng, points, samples[1])
@@ -138,28 +179,49 @@ def draw_paths(
 
 
 def trace_paths(points: Points, paths: Paths, tracer: Tracer) -> np.ndarray:
-    """(M,) bool: which samples reach their light."""
+    """Return which samples reach their light, (M,) bool."""
     return ~tracer.blocked(points.lifted()[paths.point], paths.direction, paths.reach)
 
 
 @dataclass(frozen=True)
 class Unshadowed:
-    """The diffuse of N points without shadows, in closed form. `reflected`: (N,), a constant f that is
-    much like the diffuse's; `diffuse`: (N, 3), the radiance under one light of a diffuse that reflects so.
+    """The diffuse lobe of N points without shadows, in closed form.
+
+    Attributes
+    ----------
+    reflected : (N,) ndarray
+        A constant f that approximates the diffuse lobe.
+    diffuse : (N, 3) ndarray
+        Radiance under one light of a surface that reflects so.
     """
 
     reflected: np.ndarray
     diffuse: np.ndarray
 
     def at(self, chosen: slice) -> "Unshadowed":
-        """That of some of the points."""
+        """Return the values of some of the points."""
         return Unshadowed(self.reflected[chosen], self.diffuse[chosen])
 
 
 def unshadowed(
     points: Points, reflection: Reflection, light: PanelLight | EnvironmentLight
 ) -> Unshadowed:
-    """The points under one light that has a size, as if the object cast no shadow."""
+    """Return the diffuse lobe under one extended light as if the object cast no shadow.
+
+    Parameters
+    ----------
+    points : Points
+        The points.
+    reflection : Reflection
+        The material without its albedo.
+    light : PanelLight or EnvironmentLight
+        The light.
+
+    Returns
+    -------
+    Unshadowed
+        The diffuse lobe.
+    """
     reflected = reflection.diffuse(points, points.normal)
     if isinstance(light, EnvironmentLight):
         shading = unoccluded_shading(light.radiance, points.normal)
@@ -169,8 +231,9 @@ def unshadowed(
 
 
 def _clear_share(paths: Paths, clear: np.ndarray, count: int) -> np.ndarray:
-    """The share of the light that reaches each point, (2, count), as either half of the samples
-    sees it; 1 where one has none.
+    """Share of the light that reaches each point, (2, count), as estimated by either half of the
+    samples;
+    1 without samples.
     """
     cell, light = paths.half * count + paths.point, paths.light.sum(1)
     reached, all_of_it = (
@@ -182,8 +245,11 @@ def _clear_share(paths: Paths, clear: np.ndarray, count: int) -> np.ndarray:
 def _sum_and_variance(
     values: np.ndarray, cell: np.ndarray, count: int, sizes: list[int]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Sums (count,) of samples over groups of equal law, and their variances. `cell`: group * count
-    + point; `sizes`: samples of each group at a point, those that bring nothing need not be listed.
+    """Sums (count,) of samples over groups of equal distribution, and their variances.
+
+    `cell`: group * count + point; `sizes`: samples of each group per point; those without light
+    need not
+    be listed.
     """
     sums, squares = (
         np.bincount(cell, values**power, len(sizes) * count).reshape(len(sizes), count)
@@ -197,7 +263,21 @@ def _sum_and_variance(
 def add_exactly(
     total: Sums, points: Points, reflection: Reflection, light: Light, tracer: Tracer
 ) -> None:
-    """Adds a light without a size: one direction from each point, one ray, no noise."""
+    """Add a light without extent: one direction and one ray per point, no noise.
+
+    Parameters
+    ----------
+    total : Sums
+        Gets the light.
+    points : Points
+        The points.
+    reflection : Reflection
+        The material without its albedo.
+    light : Light
+        Only point and directional lights are added.
+    tracer : Tracer
+        The object.
+    """
     if isinstance(light, DirectionalLight):
         toward, reach = (
             np.broadcast_to(np.asarray(light.direction, float), points.position.shape),

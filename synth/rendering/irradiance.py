@@ -1,20 +1,21 @@
-"""What wide lights give to matt surfaces that nothing stands before: the part of their shading that
-needs no random numbers.
+"""Irradiance of diffuse surfaces under extended lights without occlusion: the part of their shading
+that needs no random numbers.
 
 Problem: S(n) = 1/pi * integral of L(w) max(n . w, 0) dw for many normals, L being constant on a
-panel, or on each pixel of a picture laid out as `isc_core.shading.environment_map` says.
-`isc_core.shading.environment_map.shading_under` puts each pixel's light at its centre, which is off by 2e-4 at
-64 rows, and its matrix has an entry for every normal and pixel.
+panel, or on each pixel of an image laid out as in `isc_core.shading.environment_map`. Its function
+`shading_under` puts each pixel's light at its centre, which is off by 2e-4 at 64 rows, and its
+matrix has an entry for every normal and pixel.
 
-Equation: with the pixel's moment v = integral of w dw (closed form), a pixel wholly above the
-horizon of n gives n . v and one below gives 0. One that the horizon crosses is taken as flat: over
-it n . w is the mean m plus two independent uniform numbers in [-a, a] and [-b, b], so the mean of
-what lies above 0 is (F(m + a + b) - F(m + a - b) - F(m - a + b) + F(m - a - b)) / (4 a b), F(x) =
-max(x, 0)^3 / 6. Normals are visited in small groups: what is above for a whole group is one 3 x 3
-matrix, and only a band around its horizon is summed.
+Equation: with the pixel's moment v = integral of w dw (closed form), a pixel entirely above the
+horizon of n contributes n . v and one below contributes 0. A pixel on the horizon is treated as
+flat: over it n . w is the mean m plus two independent uniform numbers in [-a, a] and [-b, b], so
+the
+mean of the part above 0 is (F(m + a + b) - F(m + a - b) - F(m - a + b) + F(m - a - b)) / (4 a b),
+F(x) = max(x, 0)^3 / 6. Normals are processed in small groups: the pixels above the horizon of a
+whole group are one 3 x 3 matrix, and only a band around the horizon is summed.
 
-A panel: S = L / (2 pi) sum over its edges, cut off at the horizon, of the angle that the edge fills
-times the cosine between the normal and the plane of the edge (Lambert).
+A panel: S = L / (2 pi) sum over its edges, clipped at the horizon, of the angle that the edge
+subtends times the cosine between the normal and the plane of the edge (Lambert).
 
 Citation: J. H. Lambert, "Photometria", Augsburg (1760), which has no DOI; D. R. Baum, H. E.
 Rushmeier, J. M. Winget, "Improving radiosity solutions through the use of analytically determined
@@ -22,10 +23,10 @@ form-factors", SIGGRAPH 1989, doi:10.1145/74333.74367. R. Ramamoorthi, P. Hanrah
 representation for irradiance environment maps", SIGGRAPH 2001, doi:10.1145/383259.383317
 (irradiance of the normal).
 
-Limits: the panel's formula is exact. An environment's error comes from pixels taken as flat and
-falls with the square of their size: 2e-5 of the shading at 32 rows of noise, 1e-5 at 64. A single
-lit pixel, the worst light there is: 1e-4 of its largest shading, 2e-3 at the poles, where pixels
-are triangles.
+Limits: the panel's formula is exact. An environment's error comes from treating pixels as flat and
+decreases with the square of their size: 2e-5 of the shading at 32 rows of noise, 1e-5 at 64. A
+single lit pixel, the worst case: 1e-4 of its largest shading, 2e-3 at the poles, where pixels are
+triangles.
 """
 
 import numpy as np
@@ -35,16 +36,25 @@ from isc_core.shading.environment_map import solid_angles
 from ..scene.lights import PanelLight
 
 _CELLS = 10  # normals in one cube of side 1 / _CELLS make a group
-_THINNEST = (
-    1e-3  # of a pixel: a narrower spread would lose the digits that the third powers differ in
-)
+_THINNEST = 1e-3  # of a pixel: a narrower spread would cancel in the differences of third powers
 _BLOCK = 512  # normals at a time
-_FEWEST = 32  # rows: larger pixels are divided, they are not flat enough
+_FEWEST = 32  # rows: larger pixels are not flat enough and are divided
 
 
 def unoccluded_shading(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The shading, (N, 3), of matt white surfaces with unit normals (N, 3) under `radiance` (rows,
-    2 rows, 3), without shadows.
+    """Return the shading of white diffuse surfaces under an environment, without shadows.
+
+    Parameters
+    ----------
+    radiance : (rows, 2 rows, 3) ndarray
+        The environment.
+    normals : (N, 3) ndarray
+        Unit normals.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        The shading.
     """
     parts = -(-_FEWEST // len(radiance))
     pixels = _Pixels(np.asarray(radiance, float).repeat(parts, axis=0).repeat(parts, axis=1))
@@ -56,8 +66,19 @@ def unoccluded_shading(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def unoccluded_panel(panel: PanelLight, positions: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The shading, (N, 3), of matt white points (N, 3) with unit normals (N, 3) under a panel,
-    without shadows.
+    """Return the shading of white diffuse points under a panel, without shadows.
+
+    Parameters
+    ----------
+    panel : PanelLight
+        The panel.
+    positions, normals : (N, 3) ndarray
+        The points and their unit normals.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        The shading.
     """
     corners = [
         panel.centre + a * panel.right + b * panel.up - positions
@@ -82,8 +103,8 @@ def unoccluded_panel(panel: PanelLight, positions: np.ndarray, normals: np.ndarr
 
 
 def _edge(a: np.ndarray, b: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The angle between vectors (N, 3) times the cosine between the normal and their plane's; 0
-    where they have no plane.
+    """The angle between vectors (N, 3) times the cosine between the normal and that of their plane;
+    0 where they are parallel.
     """
     across = np.cross(a, b)
     length = np.linalg.norm(across, axis=1)
@@ -92,7 +113,7 @@ def _edge(a: np.ndarray, b: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def _groups(normals: np.ndarray) -> list[np.ndarray]:
-    """Indices of normals that are near each other."""
+    """Indices of normals that are close to each other."""
     cells = np.round(normals * _CELLS).astype(np.int64) @ np.array([1, 1000, 1000000])
     order = np.argsort(cells, kind="stable")
     starts = np.flatnonzero(np.diff(cells[order])) + 1
@@ -101,7 +122,7 @@ def _groups(normals: np.ndarray) -> list[np.ndarray]:
 
 
 class _Pixels:
-    """The lit pixels of an environment: where they are, how large, and what they send."""
+    """The lit pixels of an environment: their positions, sizes and light."""
 
     def __init__(self, radiance: np.ndarray) -> None:
         rows = len(radiance)
@@ -114,7 +135,7 @@ class _Pixels:
         self.flow = self.mean[:, :, None] * self.power[:, None, :]
 
     def shading(self, normals: np.ndarray) -> np.ndarray:
-        """(N, 3) of normals that are near each other."""
+        """The shading (N, 3) of normals that are close to each other."""
         centre = normals.mean(axis=0)
         centre /= np.linalg.norm(centre)
         spread = np.arccos(np.clip((normals @ centre).min(), -1, 1)) + self.radius
@@ -155,8 +176,8 @@ def _moments(rows: int) -> np.ndarray:
 
 
 def _half_sides(rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """From each pixel's centre to the middle of its lower side, and to that of its side along the
-    row: (rows, 2 rows, 3) each.
+    """From each pixel's centre to the middle of its lower side, and to that of its right side:
+    (rows, 2 rows, 3) each.
     """
     polar, turn = np.meshgrid(
         (np.arange(rows) + 0.5) * np.pi / rows,

@@ -1,16 +1,16 @@
-"""Random directions toward lights that have a size, and how densely they are drawn.
+"""Random directions toward extended lights, and their density.
 
-Problem: the light that a point receives is an integral over the directions in which it sees a
-light; samples belong there.
+Problem: the light that a point receives is an integral over the solid angle of a light; samples
+belong there.
 
-Equation: on a panel points are drawn evenly by area, so that directions have the density r^2 /
-(area cos_panel) per steradian. Pixels of an environment are drawn by the light that they hold,
-radiance x solid angle, and evenly inside: the density is the radiance's share.
+Equation: on a panel, points are sampled uniformly by area, so that directions have the density
+r^2 / (area cos_panel) per steradian. Pixels of an environment are sampled by their light, radiance
+x solid angle, and uniformly inside: the density is proportional to the radiance.
 
 Citation: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting
 calculations", ACM Transactions on Graphics 15(1), 1-36 (1996), doi:10.1145/226150.226151.
 
-Limits: neither knows the surface: half of an environment's samples may lie below a point's horizon.
+Limits: both ignore the surface: half of an environment's samples may lie below a point's horizon.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,16 @@ from ..scene.lights import EnvironmentLight, Light, PanelLight
 
 @dataclass(frozen=True)
 class Seen:
-    """What M rays meet of one light. `radiance`: (M, 3), 0 where they miss it. `distance`: (M,) of
-    it, infinite for an environment. `density`: (M,) per steradian, with which `draw` picks each
-    direction; 0 where they miss it.
+    """What M rays hit of one light.
+
+    Attributes
+    ----------
+    radiance : (M, 3) ndarray
+        0 where they miss it.
+    distance : (M,) ndarray
+        Distance of the light, infinite for an environment.
+    density : (M,) ndarray
+        Density of `draw` in each direction, per steradian; 0 where they miss it.
     """
 
     radiance: np.ndarray
@@ -36,25 +43,34 @@ class Seen:
 
 
 class Sampler(Protocol):
-    """A light that has a size, as directions are drawn toward it."""
+    """Sampling of directions toward an extended light."""
 
     def draw(self, rng: np.random.Generator, positions: np.ndarray, count: int) -> np.ndarray:
-        """`count` unit directions toward the light from each of the positions (P, 3):
+        """Draw directions toward the light.
 
-        (P, count, 3).
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers.
+        positions : (P, 3) ndarray
+            Where they start.
+        count : int
+            Directions per position.
+
+        Returns
+        -------
+        (P, count, 3) ndarray
+            Unit directions.
         """
         ...
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
-        """What rays from positions (M, 3) along unit directions (M, 3) meet."""
+        """Return what rays from positions (M, 3) along unit directions (M, 3) hit."""
         ...
 
 
 def sampler_of(light: Light) -> Sampler | None:
-    """How directions toward a light are drawn;
-
-    None for lights without a size and for those that do not shine.
-    """
+    """Return the sampler of a light; None for a black light or one without extent."""
     if isinstance(light, PanelLight) and np.any(light.radiance):
         return PanelSampler(light)
     if isinstance(light, EnvironmentLight) and np.any(light.radiance):
@@ -63,7 +79,7 @@ def sampler_of(light: Light) -> Sampler | None:
 
 
 class PanelSampler:
-    """Directions toward a panel, even by its area; from behind it nothing is seen."""
+    """Directions toward a panel, uniform by its area; its back is dark."""
 
     def __init__(self, panel: PanelLight) -> None:
         self._panel = panel
@@ -90,9 +106,7 @@ class PanelSampler:
 
 
 class EnvironmentSampler:
-    """Directions toward an environment, by the light that its pixels hold (the mean of the
-    channels).
-    """
+    """Directions toward an environment, by the light of its pixels (mean of the channels)."""
 
     def __init__(self, light: EnvironmentLight) -> None:
         self._radiance = np.asarray(light.radiance, float)
@@ -120,8 +134,7 @@ class EnvironmentSampler:
         scale = self._rows / np.pi
         row = (np.arccos(np.clip(directions[:, 1], -1, 1)) * scale).astype(int)
         column = (np.arctan2(directions[:, 0], -directions[:, 2]) * scale).astype(int)
-        # atan2 is negative for the second half of a row, where rounding toward 0 would go the wrong
-        # way.
+        # atan2 is negative in the second half of a row, where rounding toward 0 rounds up.
         column = np.where(directions[:, 0] < 0, 2 * self._rows - 1 + column, column)
         pixel = np.minimum(row, self._rows - 1) * 2 * self._rows + np.clip(
             column, 0, 2 * self._rows - 1

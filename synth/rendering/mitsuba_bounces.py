@@ -1,14 +1,17 @@
-"""Light that parts of the object send to each other, on Mitsuba's arrays.
+"""Interreflections on Mitsuba's arrays: light that parts of the object reflect onto each other.
 
-Equation: at each point a direction is drawn toward what the lobes reflect, with the density q; it
-brings f_r cos / q times what leaves the part of the object that it meets: direct light there by one
-sample of each light, albedo * diffuse + gloss, and, while bounces remain, what a direction drawn there
-brings in the same way. What meets nothing brings nothing: that light is direct.
+Equation: at each point a direction is sampled from the lobes, with the density q; it contributes
+f_r cos / q times the radiance that leaves the part of the object which it hits: direct light there
+by one sample of each light, albedo * diffuse + specular, and, while bounces remain, the
+contribution
+of a direction sampled there in the same way. Directions that miss the object contribute nothing:
+that light is direct.
 
 Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
 
-Limits: paths of `bounces` reflections more than the last one; longer ones are left out. Materials
-are read by NumPy between the waves of rays. Glints of glints are met by chance only: noisy.
+Limits: paths with at most `bounces` reflections before the last one. Materials are evaluated by
+NumPy between the waves of rays. Multiple specular reflections are noisy, since they are hit by
+chance only.
 """
 
 from dataclasses import dataclass
@@ -31,7 +34,7 @@ _AT_ONCE = 1 << 18  # light paths
 
 @dataclass(frozen=True)
 class World:
-    """What light meets. `lights`: none of them black."""
+    """What light interacts with: the material, the lights (none of them black) and the object."""
 
     material: Material
     lights: list[Beam | WideLight]
@@ -45,15 +48,36 @@ def bounced_light(
     random: np.random.Generator,
     monitor: Monitor,
 ) -> Lit:
-    """What comes to the N points of `surface` from other parts of the object.
+    """Light the points of a surface by other parts of the object.
 
-    Raises `Cancelled`.
+    Parameters
+    ----------
+    surface : Surface
+        N points.
+    world : World
+        Object and lights.
+    options : RenderOptions
+        Samples and bounces.
+    random : numpy.random.Generator
+        Source of seeds.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    Lit
+        The interreflections.
+
+    Raises
+    ------
+    Cancelled
+        If the user cancels.
     """
     count = len(surface.position)
     sums, squares = np.zeros((2, count, 3)), np.zeros((2, count, 3))
     wave = max(1, min(options.samples, _AT_ONCE // count))
     for start in range(0, options.samples, wave):
-        monitor.report("light between parts of the object", start / options.samples)
+        monitor.report("interreflections", start / options.samples)
         size = min(wave, options.samples - start)
         position, normal, view = (
             np.tile(part, (size, 1)) for part in (surface.position, surface.normal, surface.view)
@@ -83,8 +107,8 @@ def _arriving(
     bounces: int,
     random: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """One sample of what other parts of the object give to diffuse (for albedo 1) and gloss of the
-    points: (N, 3) each.
+    """One sample of the light from other parts of the object, on the diffuse lobe (for albedo 1)
+    and the specular lobe of the points: (N, 3) each.
     """
     dr, mi = load_drjit(), load_mitsuba()
     points = points_at(position, normal, view, lobes_of(world.material, reflectance))

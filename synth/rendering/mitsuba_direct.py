@@ -1,5 +1,4 @@
-"""One sample of the light that comes to points straight from a light, the lobes apart, on Mitsuba's
-arrays.
+"""One sample of direct light on points, the lobes separate, on Mitsuba's arrays.
 
 Equation: see `mitsuba_lobes`.
 
@@ -22,8 +21,18 @@ from .mitsuba_lights import Beam, WideLight
 
 @dataclass(frozen=True)
 class Points:
-    """Points that are lit, a lane each. `origin`: the position lifted off the surface, where rays
-    start. `frame`: z along the normal. `view`: in that frame.
+    """Points to be lit, one lane each.
+
+    Attributes
+    ----------
+    position, origin : Dr.Jit point
+        The position, and the same lifted off the surface, where rays start.
+    frame : Dr.Jit frame
+        z along the normal.
+    view : Dr.Jit vector
+        Direction to the camera in that frame.
+    lobes : Lobes
+        The material.
     """
 
     position: Lanes
@@ -33,12 +42,25 @@ class Points:
     lobes: Lobes
 
     def values(self, direction: Lanes) -> tuple[Lanes, Lanes]:
-        """f_r cos of diffuse and gloss for light from a direction."""
+        """Return f_r cos of the diffuse and the specular lobe for light from a direction."""
         return self.lobes.values(self.view, self.frame.to_local(direction))
 
 
 def points_at(position: np.ndarray, normal: np.ndarray, view: np.ndarray, lobes: Lobes) -> Points:
-    """Points from arrays (N, 3) in the camera's frame."""
+    """Return points from arrays (N, 3) in the camera frame.
+
+    Parameters
+    ----------
+    position, normal, view : (N, 3) ndarray
+        Positions, unit normals and unit directions to the camera.
+    lobes : Lobes
+        The material.
+
+    Returns
+    -------
+    Points
+        One lane per point.
+    """
     dr, mi = load_drjit(), load_mitsuba()
     place, across, toward = (
         mi.Vector3f(*(lanes(column) for column in part.T)) for part in (position, normal, view)
@@ -52,9 +74,7 @@ def points_at(position: np.ndarray, normal: np.ndarray, view: np.ndarray, lobes:
 def _visible(
     points: Points, direction: Lanes, distance: Lanes, needed: Lanes, tracer: Tracer
 ) -> Lanes:
-    """Whether nothing stands between the points and what is `distance` away; only where that is
-    needed.
-    """
+    """Whether nothing blocks the points within `distance`; tested only where `needed`."""
     mi = load_mitsuba()
     ray = mi.Ray3f(points.origin, direction)
     ray.maxt = mi.Float(distance)
@@ -62,7 +82,22 @@ def _visible(
 
 
 def beam_light(points: Points, light: Beam, tracer: Tracer) -> tuple[Lanes, Lanes]:
-    """The colours that a directional or point light gives to diffuse and gloss: no noise."""
+    """Return the light of a directional or point light on both lobes, without noise.
+
+    Parameters
+    ----------
+    points : Points
+        The points.
+    light : Beam
+        The light.
+    tracer : Tracer
+        The object.
+
+    Returns
+    -------
+    diffuse, specular : Dr.Jit colour
+        The radiance of both lobes.
+    """
     dr = load_drjit()
     direction, distance, irradiance = light.arriving(points.position)
     diffuse, gloss = points.values(direction)
@@ -71,7 +106,7 @@ def beam_light(points: Points, light: Beam, tracer: Tracer) -> tuple[Lanes, Lane
 
 
 def generator(lanes: int, seed: int) -> Lanes:
-    """Random numbers for each lane, all of one seed (below 2^32)."""
+    """Return random numbers for each lane, all of one seed (below 2^32)."""
     dr, mi = load_drjit(), load_mitsuba()
     random = mi.PCG32(lanes)
     first, second = mi.sample_tea_32(dr.opaque(mi.UInt32, seed), dr.arange(mi.UInt32, lanes))
@@ -83,9 +118,29 @@ def generator(lanes: int, seed: int) -> Lanes:
 def one_sample(
     points: Points, light: WideLight, tracer: Tracer, random: Lanes, flat: Lanes
 ) -> tuple[Lanes, Lanes, Lanes]:
-    """The colours that one sample of a light gives: what it gives without shadows to a diffuse that
-    reflects `flat` / pi everywhere, how much more it gives to the diffuse itself, and what it gives to
-    the gloss.
+    """Take one sample of an extended light.
+
+    Parameters
+    ----------
+    points : Points
+        The points.
+    light : WideLight
+        The light.
+    tracer : Tracer
+        The object.
+    random : Dr.Jit generator
+        Random numbers.
+    flat : Dr.Jit array
+        The albedo of a Lambertian surface as control variate.
+
+    Returns
+    -------
+    plain : Dr.Jit colour
+        Radiance of that Lambertian surface without shadows.
+    more : Dr.Jit colour
+        Difference of the diffuse lobe from it.
+    specular : Dr.Jit colour
+        Radiance of the specular lobe.
     """
     dr, mi = load_drjit(), load_mitsuba()
 

@@ -1,15 +1,16 @@
-"""Lights on Mitsuba's arrays: what arrives along a direction, and random directions from which much
-arrives.
+"""Lights on Mitsuba's arrays: the radiance along a direction, and importance sampling of
+directions.
 
-Equation: an environment is constant on each pixel; a pixel is drawn in proportion to its light,
-radiance times solid angle, and a direction evenly within it, so the density is share / solid angle.
-A place on a panel is drawn evenly: distance^2 / (area cos) per steradian. Beams (directional and
-point lights) are not drawn: they come from one direction.
+Equation: an environment is constant on each pixel; a pixel is sampled by its light, radiance times
+solid angle, and a direction uniformly within it, so the density is share / solid angle. A point on
+a
+panel is sampled uniformly: distance^2 / (area cos) per steradian. Beams (directional and point
+lights) are not sampled: they arrive from one direction.
 
 Citation: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting
 calculations", ACM Transactions on Graphics 15(1), 1-36 (1996), doi:10.1145/226150.226151.
 
-Limits: those of `lights`.
+Limits: those of `scene.lights`.
 """
 
 import math
@@ -25,26 +26,24 @@ from ..scene.variant import load_mitsuba
 from .bsdfs import Lanes, load_drjit
 from .irradiance import unoccluded_panel, unoccluded_shading
 
-FAR = 1e6  # object units: beyond everything
+FAR = 1e6  # object units: farther than anything in a scene
 
 
 class WideLight(Protocol):
     """A light that fills a solid angle."""
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """The radiance that arrives at a position from a direction, the distance it comes from, and
-        the density of `sample` there.
-        """
+        """Return radiance, distance and density of `sample` for a direction."""
         ...
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
-        """A unit direction toward the light for the uniform random numbers `place` (two) and
-        `inside` (two).
+        """Return a unit direction toward the light for the uniform random numbers `place` and
+        `inside` (two each).
         """
         ...
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """Its shading (N, 3) of matt white points without shadows, by a closed form."""
+        """Return the shading (N, 3) of white diffuse points without shadows, in closed form."""
         ...
 
 
@@ -69,6 +68,7 @@ class Environment:
         dr.make_opaque(self.rows)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
+        """Return radiance, distance and density of `sample` for a direction."""
         dr, mi = load_drjit(), load_mitsuba()
         del position
         rows = mi.Float(self.rows)
@@ -80,13 +80,16 @@ class Environment:
         return radiance, mi.Float(FAR), dr.gather(mi.Float, self.density, pixel)
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
+        """Return a unit direction for the uniform random numbers `place` and `inside` (two
+        each).
+        """
         dr, mi = load_drjit(), load_mitsuba()
         del position
         row = _first_above(self.below, mi.UInt32(0), self.rows, place.x)
         start = row * (2 * self.rows)
         column = _first_above(self.before, start, 2 * self.rows, place.y) - start
         step = math.pi / mi.Float(self.rows)
-        # Evenly in the cosine of the polar angle is evenly in solid angle.
+        # Uniform in the cosine of the polar angle is uniform in solid angle.
         upper, lower = (dr.cos((mi.Float(row) + k) * step) for k in (0, 1))
         up = dr.lerp(upper, lower, inside.x)
         sine, cosine = dr.sincos((mi.Float(column) + inside.y) * step)
@@ -94,12 +97,13 @@ class Environment:
         return mi.Vector3f(across * sine, up, -across * cosine)
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """Return the shading (N, 3) of white diffuse points without shadows."""
         del position
         return unoccluded_shading(self._radiance, normal)
 
 
 class Panel:
-    """A panel."""
+    """A panel light."""
 
     def __init__(self, light: PanelLight) -> None:
         dr, mi = load_drjit(), load_mitsuba()
@@ -115,6 +119,7 @@ class Panel:
         dr.make_opaque(self.centre, self.right, self.up, self.normal, self.radiance, self.area)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
+        """Return radiance, distance and density of `sample` for a direction."""
         dr = load_drjit()
         toward, facing = self.centre - position, -dr.dot(direction, self.normal)
         distance = -dr.dot(toward, self.normal) / dr.select(facing > 1e-9, facing, 1)
@@ -126,6 +131,7 @@ class Panel:
         return dr.select(inside, self.radiance, 0), distance, density
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
+        """Return a unit direction for the uniform random numbers `place` (two)."""
         dr = load_drjit()
         del inside
         return dr.normalize(
@@ -133,6 +139,7 @@ class Panel:
         )
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
+        """Return the shading (N, 3) of white diffuse points without shadows."""
         return unoccluded_panel(self._light, position, normal)
 
 
@@ -154,8 +161,8 @@ class Beam:
         dr.make_opaque(self.place, self.strength)
 
     def arriving(self, position: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """The direction toward the light, its distance, and the irradiance (colour) across its
-        beam.
+        """Return the direction toward the light, its distance, and the irradiance (colour) across
+        its beam.
         """
         dr, mi = load_drjit(), load_mitsuba()
         if not self.near:
@@ -167,15 +174,16 @@ class Beam:
 
 
 def kernel_light(light: Light) -> Any:
-    """The `WideLight` or `Beam` of a light; None for one that is black."""
+    """Return the `WideLight` or `Beam` of a light; None for a black environment."""
     if isinstance(light, EnvironmentLight):
         return Environment(light) if np.any(light.radiance) else None
     return Panel(light) if isinstance(light, PanelLight) else Beam(light)
 
 
 def _first_above(heap: Lanes, start: Lanes, count: Lanes, value: Lanes) -> Lanes:
-    """The first index of [start, start + count) whose entry in `heap`, rising there, is above
-    `value`; the last one if none is.
+    """The first index of [start, start + count) whose entry in `heap`, ascending there, is above
+    `value`;
+    the last one without any.
     """
     dr, mi = load_drjit(), load_mitsuba()
 

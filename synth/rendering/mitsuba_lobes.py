@@ -1,30 +1,33 @@
-"""Light on a surface by Mitsuba's kernels: diffuse and gloss from the same light paths, for all points
-at once.
+"""Lighting of a surface by Mitsuba's kernels: diffuse and specular lobes from the same light paths,
+for
+all points at once.
 
-Problem: the radiance that each visible point sends to the camera, the two lobes apart, and the
+Problem: the radiance that each visible point sends to the camera, the two lobes separate, and the
 variance of the estimate.
 
-Equation: a directional or point light is summed up as it is. For what fills a solid angle each
-sample draws two directions, one toward the light with the density p and one toward what the lobes
-reflect with q, and both count as
+Equation: directional and point lights are evaluated exactly. For extended lights each sample takes
+two directions, one toward the light with the density p and one from the lobes with q, and both
+count
+as
 
-    V f_r L cos / (p + q)                                        the balance heuristic; V: nothing
-    stands between
+    V f_r L cos / (p + q)        the balance heuristic; V: visibility
 
-The diffuse takes its shading without shadows from a closed form, S, so that only what shadows change
-is drawn: a k S + (V f_r - a k / pi) L cos / (p + q), k = pi f_r with the light along the normal, a
-the share of the light that gets there. That share is estimated by the other half of the samples, so
-the mean stays right. A convex Lambertian object has no variance, full shadow neither. Samples are
-independent: the variance of a mean is their sum of squares / (n (n - 1)), gathered by Welford's
-updates.
+The shading of the diffuse lobe without shadows is known in closed form, S, so that only the effect
+of shadows is sampled: a k S + (V f_r - a k / pi) L cos / (p + q), k = pi f_r with the light along
+the normal, a the unshadowed share of the light. That share is estimated by the other half of the
+samples, so the mean is unbiased. A convex Lambertian object has no variance, nor has full shadow.
+Samples are independent: the variance of a mean is their sum of squares / (n (n - 1)), accumulated
+by
+Welford's updates.
 
 Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
 rendering", SIGGRAPH 1995, doi:10.1145/218380.218498. B. P. Welford, "Note on a method for
 calculating corrected sums of squares and products", Technometrics 4(3), 419-420 (1962),
 doi:10.1080/00401706.1962.10490022. W. Jakob et al., Dr.Jit, 2022, doi:10.1145/3528223.3530099.
 
-Limits: LLVM variants only; float32. Where a rare shadow or glint is met by no sample, neither the
-mean nor the variance knows of it: compare renders of like numbers of samples, or take many.
+Limits: LLVM variants only; float32. If no sample hits a rare shadow or glint, both mean and
+variance
+are wrong: compare renders with similar numbers of samples, or take many.
 """
 
 import math
@@ -47,9 +50,9 @@ from .mitsuba_bounces import World, bounced_light
 from .mitsuba_direct import Points, beam_light, generator, one_sample, points_at
 from .mitsuba_lights import Beam, WideLight, kernel_light
 
-_POINTS = 1 << 17  # points at a time: memory
+_POINTS = 1 << 17  # points at a time, to limit memory
 _AT_ONCE = 1 << 22  # light paths between two reports
-_DIVISIBLE = 4  # samples: from so many on each half has a variance of its own
+_DIVISIBLE = 4  # fewest samples for a variance in either half
 
 
 def light_surface(
@@ -60,13 +63,39 @@ def light_surface(
     options: RenderOptions,
     monitor: Monitor,
 ) -> Lit:
-    """Lights the N points of `surface`; see the package.
+    """Light the points of a surface, see `synth.rendering.light_surface`.
 
-    Raises `InputError` where no LLVM variant runs, `Cancelled`.
+    Parameters
+    ----------
+    surface : Surface
+        The visible points.
+    material : Material
+        Their material.
+    lights : tuple of Light
+        The lights.
+    tracer : Tracer
+        The object.
+    options : RenderOptions
+        Samples, seed and bounces.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    Lit
+        Shading and specular radiance.
+
+    Raises
+    ------
+    InputError
+        If no LLVM variant is available.
+    Cancelled
+        If the user cancels.
     """
     if not has_llvm():
         raise InputError(
-            "Mitsuba's kernels need libLLVM 19 or later (Debian's package: libllvm19): install it, or take renderer 'arrays'"
+            "Mitsuba's kernels need libLLVM 19 or later: install it (Debian: libllvm19), or use "
+            "the renderer 'arrays'"
         )
     random = np.random.default_rng(options.seed)
     world = World(
@@ -93,7 +122,7 @@ def light_surface(
 
 
 def _piece(surface: Surface, chosen: slice) -> Surface:
-    """Some of the points of a surface, under the same mask."""
+    """Some of the points of a surface, with the same mask."""
     reflectance = SurfaceReflectance(
         surface.reflectance.albedo[chosen],
         surface.reflectance.strength[chosen],
@@ -116,7 +145,7 @@ def _light(
     random: np.random.Generator,
     monitor: Monitor,
 ) -> Lit:
-    # Two lanes a point, so that each half of the samples has moments of its own.
+    # Two lanes per point, so that each half of the samples has its own moments.
     halves = 2 if options.samples >= _DIVISIBLE else 1
     reflectance = SurfaceReflectance(
         *(
@@ -170,14 +199,14 @@ def _exact(points: Points, count: int, light: Beam, tracer: Tracer) -> Lit:
 
 
 def _flat(points: Points) -> Lanes:
-    """The albedo of a Lambertian diffuse that is much like the points' own: as theirs, lit along the
-    normal.
+    """The albedo of a Lambertian surface that approximates the diffuse lobe: equal for light along
+    the normal.
     """
     return math.pi * points.lobes.values(points.view, load_mitsuba().Vector3f(0, 0, 1))[0]
 
 
 def _known(points: Points, surface: Surface, light: WideLight) -> np.ndarray:
-    """The shading, (N, 3), of such a diffuse without shadows."""
+    """The shading, (N, 3), of such a surface without shadows."""
     count = len(surface.position)
     return (
         light.unoccluded(surface.position, surface.normal)
@@ -208,9 +237,10 @@ def _gather(
 
 @dataclass(frozen=True)
 class _Moments:
-    """Of `count` samples of (plain, more, gloss), see `one_sample`: (N, 3) each. `means`;
-    `spreads`: sums of squares about the mean; `common`: sum of products of plain and more about
-    their means.
+    """Moments of `count` samples of (plain, more, specular), see `one_sample`: (N, 3) each.
+
+    `means`; `spreads`: sums of squares about the mean; `common`: sum of products of plain and more
+    about their means.
     """
 
     count: int
@@ -219,16 +249,16 @@ class _Moments:
     common: np.ndarray
 
     def clear_share(self) -> np.ndarray:
-        """The share of the light that gets to each point, (N, 1) in [0, 1]."""
+        """The unshadowed share of the light of each point, (N, 1) in [0, 1]."""
         plain, more = (mean.sum(axis=1, keepdims=True) for mean in self.means[:2])
         return np.clip(1 + more / np.where(plain > 0, plain, 1), 0, 1)
 
     def lit(self, known: np.ndarray, share: np.ndarray) -> Lit:
-        """With `share` of the plain light replaced by what it is `known` to be, (N, 3)."""
+        """The light, with `share` of the plain light replaced by its `known` value, (N, 3)."""
         drawn, pairs = 1 - share, max(self.count * (self.count - 1), 1)
         diffuse = known + self.means[1] + drawn * (self.means[0] - known)
         spread = self.spreads[1] + 2 * drawn * self.common + drawn**2 * self.spreads[0]
-        # Where no sample met the light at all, nothing is known of its shadow.
+        # Where no sample hit the light at all, its shadow is unknown.
         unmet = np.where(self.means[0] > 0, 0, known**2)
         return Lit(
             diffuse, self.means[2], np.maximum(spread, 0) / pairs + unmet, self.spreads[2] / pairs
@@ -236,7 +266,7 @@ class _Moments:
 
 
 def _joined(parts: list[_Moments], known: np.ndarray) -> Lit:
-    """All parts, each with the share that the other one found; a single one takes all the light as
+    """All parts, each with the share that the other one estimated; a single part takes all light as
     known.
     """
     total, samples = _dark(len(known)), sum(part.count for part in parts)
@@ -258,7 +288,7 @@ def _joined(parts: list[_Moments], known: np.ndarray) -> Lit:
 
 
 class _Gathered:
-    """Means and spreads of three colours as samples come in, a lane for each point."""
+    """Running means and spreads of three colours, one lane per point."""
 
     def __init__(self, lanes: int, seed: int) -> None:
         dr, mi = load_drjit(), load_mitsuba()
@@ -270,8 +300,9 @@ class _Gathered:
         dr.make_opaque(self.means, self.spreads, self.common)
 
     def add(self, estimate: Callable[[Lanes], tuple[Lanes, ...]], samples: int) -> None:
-        """Adds samples of colours that `estimate` makes of random numbers: in one kernel, which
-        does not depend on their number.
+        """Add samples of the colours that `estimate` computes from random numbers, in one kernel,
+        which does
+        not depend on their number.
         """
         dr, mi = load_drjit(), load_mitsuba()
         end = dr.opaque(mi.UInt32, self.count + samples)
@@ -301,7 +332,7 @@ class _Gathered:
         self.count += samples
 
     def moments(self, halves: int) -> list[_Moments]:
-        """What came in so far, of each half of the lanes."""
+        """The moments so far, of each half of the lanes."""
         means, spreads = (
             [np.split(rows_of(part), halves) for part in parts]
             for parts in (self.means, self.spreads)
@@ -316,7 +347,7 @@ class _Gathered:
 
 
 def _sum(a: Lit, b: Lit) -> Lit:
-    """Lights add up; so do the variances of estimates that share no random numbers."""
+    """The sum of lights, and of the variances of independent estimates."""
     return Lit(
         a.shading + b.shading,
         a.specular + b.specular,

@@ -1,16 +1,18 @@
-"""What a material reflects at many points at once, and the directions in which it does so most.
+"""Reflection of a material at many points at once, and importance sampling of its directions.
 
-Equation: diffuse and gloss as `synth.scene.materials` says. Directions are drawn from the gloss, matt
-materials' by the cosine (density cos / pi): Blinn-Phong's half vectors have the density (p + 1) /
-(2 pi) cos^p, those of GGX facets that of the facets that the viewer sees, D G1(view) (view . h) /
-cos_view; a half vector stands for a light direction of 1 / (4 view . h) times its density.
+Equation: diffuse and specular lobes as in `synth.scene.materials`. Directions are sampled from the
+specular lobe, those of diffuse materials by the cosine (density cos / pi): Blinn-Phong's half
+vectors have the density (p + 1) / (2 pi) cos^p, those of GGX that of the visible facets, D G1(view)
+(view . h) / cos_view; a half vector maps to a light direction of 1 / (4 view . h) times its
+density.
 
 Citation: B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet models for refraction
 through rough surfaces", EGSR 2007, 195-206, doi:10.2312/EGWR/EGSR07/195-206; J. Dupuy, A. Benyoub,
 "Sampling visible GGX normals with spherical caps", Computer Graphics Forum 42(8), e14867 (2023),
 doi:10.1111/cgf.14867.
 
-Limits: those of the lobes. Drawn directions may lie below the horizon, where nothing is reflected.
+Limits: those of the lobes. Sampled directions may lie below the horizon, where nothing is
+reflected.
 """
 
 from dataclasses import dataclass
@@ -28,8 +30,14 @@ from .rough_plastic import RoughPlastic
 
 @dataclass(frozen=True)
 class Points:
-    """N points of a surface, each seen from one direction. `position`, `normal`, `view`: (N, 3), as
-    in `Surface`. `strength`, `gloss`: (N,) of the material there.
+    """N points of a surface, each seen from one direction.
+
+    Attributes
+    ----------
+    position, normal, view : (N, 3) ndarray
+        As in `Surface`.
+    strength, gloss : (N,) ndarray
+        Parameters of the specular lobe, see `scene.materials`.
     """
 
     position: np.ndarray
@@ -42,17 +50,28 @@ class Points:
         return len(self.position)
 
     def lifted(self) -> np.ndarray:
-        """Where rays from the points start, (N, 3)."""
+        """Return the origins of rays from the points, (N, 3)."""
         return self.position + LIFT * self.normal
 
     def at(self, chosen: np.ndarray | slice) -> "Points":
-        """Those that an index chooses, as often as it does."""
+        """Return the points that an index selects, repeated as often as it does."""
         parts = (self.position, self.normal, self.view, self.strength, self.gloss)
         return Points(*(part[chosen] for part in parts))
 
 
 class Reflection:
-    """A material without its albedo. Raises `InputError` for a rough plastic without Mitsuba."""
+    """A material without its albedo.
+
+    Parameters
+    ----------
+    material : Material
+        The material.
+
+    Raises
+    ------
+    InputError
+        For rough plastic, if Mitsuba is not installed.
+    """
 
     def __init__(self, material: Material) -> None:
         self._model, self._f0, self._sigma = material.model, material.f0, material.sigma
@@ -61,8 +80,19 @@ class Reflection:
             self._plastic = RoughPlastic(float(material.gloss), material.ior)
 
     def diffuse(self, points: Points, light: np.ndarray) -> np.ndarray:
-        """f_r (N,) in 1/sr of the diffuse for albedo 1, lit from the unit directions (N, 3), all above
-        the horizon.
+        """Evaluate the diffuse lobe for albedo 1.
+
+        Parameters
+        ----------
+        points : Points
+            N points.
+        light : (N, 3) ndarray
+            Unit directions to the light, above the horizon.
+
+        Returns
+        -------
+        (N,) ndarray
+            f_r in 1/sr.
         """
         if self._model == "oren_nayar":
             return OrenNayar(1.0, self._sigma).value(points.normal, points.view, light)
@@ -71,8 +101,19 @@ class Reflection:
         return np.full(len(points), 1 / np.pi)
 
     def gloss(self, points: Points, light: np.ndarray) -> np.ndarray:
-        """f_r (N,) in 1/sr of the gloss with its strength, lit from the unit directions (N, 3), all
-        above the horizon.
+        """Evaluate the specular lobe, its strength included.
+
+        Parameters
+        ----------
+        points : Points
+            N points.
+        light : (N, 3) ndarray
+            Unit directions to the light, above the horizon.
+
+        Returns
+        -------
+        (N,) ndarray
+            f_r in 1/sr.
         """
         if self.is_diffuse or not len(points):
             return np.zeros(len(points))
@@ -87,8 +128,21 @@ class Reflection:
         return self._plastic.gloss(points.normal, points.view, light)
 
     def draw(self, rng: np.random.Generator, points: Points, count: int) -> np.ndarray:
-        """`count` unit directions (N, count, 3) for each point, as the gloss reflects; by the
-        cosine for matt materials.
+        """Sample directions from the specular lobe; by the cosine for diffuse materials.
+
+        Parameters
+        ----------
+        rng : numpy.random.Generator
+            Random numbers.
+        points : Points
+            N points.
+        count : int
+            Directions per point.
+
+        Returns
+        -------
+        (N, count, 3) ndarray
+            Unit directions.
         """
         if self.is_diffuse:
             return cosine_directions(rng, points, count)
@@ -108,8 +162,19 @@ class Reflection:
         return 2 * np.einsum("...i,...i->...", view, half)[..., None] * half - view
 
     def density(self, points: Points, light: np.ndarray) -> np.ndarray:
-        """Per steradian (N,), how densely `draw` picks the unit directions (N, 3), all above the
-        horizon.
+        """Return the density of `draw`.
+
+        Parameters
+        ----------
+        points : Points
+            N points.
+        light : (N, 3) ndarray
+            Unit directions, above the horizon.
+
+        Returns
+        -------
+        (N,) ndarray
+            Per steradian.
         """
         if self.is_diffuse:
             return cosine_density(points, light)
@@ -126,18 +191,33 @@ class Reflection:
 
 
 def cosine_directions(rng: np.random.Generator, points: Points, count: int) -> np.ndarray:
-    """`count` unit directions (N, count, 3) above each point, with the density cos / pi."""
+    """Sample directions above each point with the density cos / pi.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    points : Points
+        N points.
+    count : int
+        Directions per point.
+
+    Returns
+    -------
+    (N, count, 3) ndarray
+        Unit directions.
+    """
     first, turn = rng.random((2, len(points), count))
     return _upright(np.sqrt(first), turn * (2 * np.pi)) @ _frames(points.normal)
 
 
 def cosine_density(points: Points, light: np.ndarray) -> np.ndarray:
-    """Per steradian (N,), how densely `cosine_directions` picks the unit directions (N, 3)."""
+    """Return the density (N,) of `cosine_directions` for unit directions (N, 3), per steradian."""
     return np.maximum(_dot(points.normal, light), 0) / np.pi
 
 
 def _upright(cosine: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Unit vectors (..., 3) at a cosine (...) from +z, turned about it."""
+    """Unit vectors (..., 3) at a cosine (...) from +z, rotated about it."""
     across = np.sqrt(np.maximum(1 - cosine * cosine, 0))
     return np.stack([across * np.cos(turn), across * np.sin(turn), cosine], -1)
 
@@ -145,8 +225,11 @@ def _upright(cosine: np.ndarray, turn: np.ndarray) -> np.ndarray:
 def _visible_facets(
     first: np.ndarray, turn: np.ndarray, view: np.ndarray, alpha: np.ndarray
 ) -> np.ndarray:
-    """Half vectors (N, count, 3) in the frame of each normal, for views (N, 3) there: on facets
-    stretched to a sphere the viewer sees a cap whose directions, halved with the view, are even.
+    """Half vectors (N, count, 3) in the frame of each normal, for views (N, 3) there.
+
+    On facets stretched to a sphere the visible part is a cap whose directions, halved with the
+    view,
+    are uniform.
     """
     stretch = np.stack([alpha, alpha, np.ones_like(alpha)], -1)
     seen = view * stretch
@@ -158,7 +241,7 @@ def _visible_facets(
 
 
 def _frames(normal: np.ndarray) -> np.ndarray:
-    """(N, 3, 3): two tangents and the normal, as rows."""
+    """Two tangents and the normal, as rows: (N, 3, 3)."""
     side = np.where(np.abs(normal[:, :1]) < 0.7, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     across = np.cross(side, normal)
     across /= np.linalg.norm(across, axis=1, keepdims=True)

@@ -1,22 +1,22 @@
-"""Mitsuba's rough plastic, in plain arrays: a matt diffuse under a rough dielectric interface.
+"""Mitsuba's rough plastic in plain arrays: a diffuse base under a rough dielectric interface.
 
 Equation: f_r = albedo g(cos_view) g(cos_light) / pi + F D G / (4 cos_view cos_light). D, G: GGX
-facets and Smith's separable shadowing as in `isc_core.shading.brdf.ggx`; F: the exact Fresnel term of
-unpolarised light at a dielectric, for the angle between view and half vector,
+facets and Smith's separable shadowing as in `isc_core.shading.brdf.ggx`; F: the exact Fresnel term
+of unpolarised light at a dielectric, for the angle between view and half vector,
 
-    F = (r_s^2 + r_p^2) / 2,   r_s = (c - n t) / (c + n t),   r_p = (n c - t) / (n c + t),   t =
-    sqrt(1 - (1 - c^2) / n^2)
+    F = (r_s^2 + r_p^2) / 2,   r_s = (c - n t) / (c + n t),   r_p = (n c - t) / (n c + t),
+    t = sqrt(1 - (1 - c^2) / n^2)
 
-g, what the interface lets through on the way in or out with light between diffuse and interface shared
-evenly between both, is a table over the cosine that Mitsuba integrates; it is read off its own
-plugin, at the table's knots.
+g, the transmission of the interface on the way in or out, with the light between base and interface
+attributed evenly to both, is a table over the cosine that Mitsuba integrates; it is evaluated from
+its own plugin, at the table's knots.
 
 Citation: B. Walter, S. R. Marschner, H. Li, K. E. Torrance, "Microfacet models for refraction
 through rough surfaces", EGSR 2007, 195-206, doi:10.2312/EGWR/EGSR07/195-206; W. Jakob et al.,
 "Mitsuba 3 renderer", 2022, https://mitsuba-renderer.org (the plastic).
 
-Limits: `nonlinear` off: colour does not saturate where light returns to the diffuse more than once.
-One alpha for the whole object.
+Limits: `nonlinear` off: colour does not saturate by multiple reflections at the base. One alpha for
+the whole object.
 """
 
 import numpy as np
@@ -30,9 +30,19 @@ _KNOTS = 64  # of Mitsuba's own table, evenly spaced in the cosine
 
 
 class RoughPlastic:
-    """`alpha`: width of the facets' slopes, in [.01, 1].
+    """Rough plastic without its albedo.
 
-    `ior`: index of refraction, above 1. Raises `InputError` without Mitsuba.
+    Parameters
+    ----------
+    alpha : float
+        Roughness in [.01, 1].
+    ior : float
+        Index of refraction, > 1.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
     """
 
     def __init__(self, alpha: float, ior: float) -> None:
@@ -40,8 +50,17 @@ class RoughPlastic:
         self._cosines, self._through = _transmission(alpha, ior)
 
     def diffuse(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr of the diffuse of albedo 1, for unit vectors (..., 3); 0 below the
-        horizon.
+        """Evaluate the diffuse lobe for albedo 1; 0 below the horizon.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors.
+
+        Returns
+        -------
+        (...) ndarray
+            f_r in 1/sr.
         """
         angles = cosines(normal, view, light)
         way_in, way_out = (
@@ -51,14 +70,36 @@ class RoughPlastic:
         return np.where(angles.lit, way_in * way_out / np.pi, 0)
 
     def gloss(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr of the interface, for unit vectors (..., 3); 0 below the horizon."""
+        """Evaluate the interface; 0 below the horizon.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Unit vectors.
+
+        Returns
+        -------
+        (...) ndarray
+            f_r in 1/sr.
+        """
         mirror = Ggx(self._alpha, 1.0).value(normal, view, light)
         return mirror * fresnel(cosines(normal, view, light).deviation, self._ior)
 
 
 def fresnel(cosine: np.ndarray, ior: float) -> np.ndarray:
-    """The share (...) of unpolarised light that a dielectric of index `ior` > 1 mirrors, met from
-    outside at a cosine in [0, 1].
+    """Return the reflectance of a dielectric for unpolarised light from outside.
+
+    Parameters
+    ----------
+    cosine : ndarray
+        Cosine of the angle of incidence, [0, 1].
+    ior : float
+        Index of refraction, > 1.
+
+    Returns
+    -------
+    ndarray
+        In [0, 1].
     """
     inside = np.sqrt(1 - (1 - np.square(cosine)) / ior**2)
     across = (cosine - ior * inside) / (cosine + ior * inside)
@@ -67,7 +108,7 @@ def fresnel(cosine: np.ndarray, ior: float) -> np.ndarray:
 
 
 def _transmission(alpha: float, ior: float) -> tuple[np.ndarray, np.ndarray]:
-    """The cosines of the table's knots and g there: pi f_body(c, 1) = g(c) g(1)."""
+    """The cosines of the table's knots and g there: pi f_diffuse(c, 1) = g(c) g(1)."""
     mi = load_mitsuba()
     white = {"type": "rgb", "value": 1.0}
     facets = {
@@ -81,13 +122,13 @@ def _transmission(alpha: float, ior: float) -> tuple[np.ndarray, np.ndarray]:
     context = mi.BSDFContext()
     context.type_mask = mi.BSDFFlags.DiffuseReflection
     knots = np.linspace(0, 1, _KNOTS)
-    knots[0] = 1e-6  # at 0 the plugin is black
+    knots[0] = 1e-6  # the plugin is black at 0
     products = np.array([_diffuse_toward_zenith(mi, plastic, context, cosine) for cosine in knots])
     return knots, products / np.sqrt(products[-1])
 
 
 def _diffuse_toward_zenith(mi: object, plastic: object, context: object, cosine: float) -> float:
-    """pi f_body of a white plastic seen from `cosine` and lit from the zenith."""
+    """pi f_diffuse of a white plastic seen from `cosine` and lit from the zenith."""
     point = mi.SurfaceInteraction3f()  # type: ignore[attr-defined]
     point.wi = mi.Vector3f(float(np.sqrt(1 - cosine**2)), 0.0, float(cosine))  # type: ignore[attr-defined]
     toward = mi.Vector3f(0.0, 0.0, 1.0)  # type: ignore[attr-defined]

@@ -1,8 +1,9 @@
-"""Random objects of known shape, one family a file; `make_shape` makes one by its family's name.
+"""Random objects of known shape, one family per module; `make_shape` makes one by its family's
+name.
 
-Every mesh is in object units and in the camera's frame (x right, y up, z toward the viewer), posed
-as a photographer would, centred, and as wide or high as 2, whichever is larger. Vertex normals are
-unit, outward and smooth; texture coordinates have no seam on the side that the viewer sees.
+Every mesh is in object units and in the camera frame (x right, y up, z toward the viewer), posed as
+a photographer would, centred, and 2 units wide or high, whichever is larger. Vertex normals are
+unit, outward and smooth; texture coordinates have no seam on the visible side.
 """
 
 from collections.abc import Callable
@@ -10,8 +11,8 @@ from collections.abc import Callable
 import numpy as np
 
 from isc_core.errors import InputError
-from synth.scene.meshes import Mesh
 
+from ..scene.meshes import Mesh
 from .blobby import blobby
 from .displaced import displaced
 from .extruded import extruded
@@ -31,10 +32,24 @@ SHAPES: tuple[str, ...] = tuple(_MAKERS)
 
 
 def make_shape(name: str, rng: np.random.Generator) -> Mesh:
-    """A random object of the family `name`, one of `SHAPES`; the same state of `rng` gives the same
-    mesh.
+    """Make a random object.
 
-    Raises `InputError` for an unknown name.
+    Parameters
+    ----------
+    name : str
+        Its family, one of `SHAPES`.
+    rng : numpy.random.Generator
+        Random numbers; the same state gives the same mesh.
+
+    Returns
+    -------
+    Mesh
+        The object.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
     """
     if name not in _MAKERS:
         raise InputError(f"unknown shape {name!r}: choose {', '.join(SHAPES)}")

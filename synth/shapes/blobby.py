@@ -1,16 +1,16 @@
-"""Blobby objects: a few soft ellipsoids that flow into each other, such as pebbles, knuckles, toy
-animals, jacks.
+"""Blobby objects: a few soft ellipsoids that merge, such as pebbles, knuckles, toy animals, jacks.
 
 Equation: sum_i exp(B (1 - q_i(p))) = 1 with q_i(p) = |A_i (p - c_i)|^2, the squared distance from
-the i-th centre in units of its radius. Each ellipsoid holds the origin (q_i(0) < 1). Along a ray
-from the origin every term is above 1 until the ray leaves its ellipsoid and falls from then on, so
-that the sum is 1 exactly once: the surface is star-shaped. Newton's method on the logarithm finds
-it.
+the i-th centre in units of its radius. Each ellipsoid contains the origin (q_i(0) < 1). Along a ray
+from the origin every term is above 1 until the ray leaves its ellipsoid and decreases from there,
+so
+that the sum is 1 exactly once: the surface is star-shaped. Newton's method on the logarithm solves
+for it.
 
 Citation: J. F. Blinn, "A generalization of algebraic surface drawing", ACM Transactions on Graphics
 1(3) (1982), doi:10.1145/357306.357310.
 
-Limits: no holes, no limb that hides another from the origin.
+Limits: no holes, and no limb that hides another from the origin.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from synth.scene.meshes import Mesh
-
+from ..scene.meshes import Mesh
 from .posing import posed
 from .sphere_grid import sphere_grid
 from .texture_coordinates import from_directions
@@ -29,8 +28,16 @@ _STEPS = 8
 
 @dataclass(frozen=True)
 class Blobs:
-    """`centres`: (n, 3). `shapes`: (n, 3, 3), A_i: what makes the i-th ellipsoid, moved to the
-    origin, a unit ball; |A_i c_i| < 1. `blobbiness`: B > 0, the larger the less they flow together.
+    """A sum of ellipsoidal blobs.
+
+    Attributes
+    ----------
+    centres : (n, 3) ndarray
+        Centres c_i.
+    shapes : (n, 3, 3) ndarray
+        A_i, which map the i-th ellipsoid, centred at the origin, to the unit ball; |A_i c_i| < 1.
+    blobbiness : float
+        B > 0; the larger, the less the blobs merge.
     """
 
     centres: np.ndarray
@@ -38,7 +45,7 @@ class Blobs:
     blobbiness: float
 
     def mesh(self) -> Mesh:
-        """The surface, y up."""
+        """Return the surface, y up."""
         directions, faces = sphere_grid()
         along = np.einsum("nij,vj->vni", self.shapes, directions)
         centre = np.einsum("nij,nj->ni", self.shapes, self.centres)
@@ -56,7 +63,7 @@ class Blobs:
         return Mesh(directions * radius[:, None], normals, from_directions(directions), faces)
 
     def _shares(self, level: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What each blob adds, as parts of the sum (V, n), and the sum's logarithm over B (V,)."""
+        """Share of each blob in the sum (V, n), and the logarithm of the sum divided by B (V,)."""
         top = level.max(1, keepdims=True)
         terms = np.exp(self.blobbiness * (level - top))
         total = terms.sum(1, keepdims=True)
@@ -64,7 +71,7 @@ class Blobs:
 
 
 def blobby(rng: np.random.Generator) -> Mesh:
-    """A random one, posed: two to seven blobs, round or drawn out from the middle."""
+    """Make a random blobby object: two to seven blobs, round or elongated, posed."""
     count = int(rng.integers(2, 8))
     towards = rng.normal(size=(4 * count, 3)) * (1, 1, 0.7)
     towards = _spread(towards / np.linalg.norm(towards, axis=1, keepdims=True), count)
@@ -88,7 +95,7 @@ def blobby(rng: np.random.Generator) -> Mesh:
 
 
 def _spread(candidates: np.ndarray, count: int) -> np.ndarray:
-    """`count` of the unit vectors, each as far as can be from those before it."""
+    """Choose `count` of the unit vectors, each as far as possible from the previous ones."""
     chosen = [candidates[0]]
     while len(chosen) < count:
         nearest = np.max([candidates @ one for one in chosen], axis=0)

@@ -6,13 +6,12 @@ Equation: the radius in the direction d is exp(h(d)), h a sum of smooth random f
 Citation: R. L. Cook, "Shade trees", Computer Graphics 18(3) (1984), doi:10.1145/800031.808602
 (displacement).
 
-Limits: star-shaped: nothing overhangs as seen from the middle. Normals are those of the mesh.
+Limits: star-shaped: nothing overhangs as seen from the centre. Normals are those of the mesh.
 """
 
 import numpy as np
 
-from synth.scene.meshes import Mesh, vertex_normals
-
+from ..scene.meshes import Mesh, vertex_normals
 from .fields import ridged, smooth_field
 from .posing import posed
 from .sphere_grid import sphere_grid
@@ -22,7 +21,7 @@ STYLES = ("gentle", "lumpy", "dented", "crumpled", "wrinkled", "ribbed")
 
 
 def displaced(rng: np.random.Generator) -> Mesh:
-    """A random one of a random style, posed."""
+    """Make a displaced sphere of a random style, posed."""
     directions, faces = sphere_grid()
     height = displacement(directions, rng, str(rng.choice(STYLES)))
     vertices = directions * np.exp(height)[:, None] * (1, rng.uniform(0.75, 1.1), 1)
@@ -36,7 +35,22 @@ def displaced(rng: np.random.Generator) -> Mesh:
 
 
 def displacement(directions: np.ndarray, rng: np.random.Generator, style: str) -> np.ndarray:
-    """The logarithm of the radius (N,) in the unit directions (N, 3), of one of `STYLES`."""
+    """Return the logarithm of the radius in some directions.
+
+    Parameters
+    ----------
+    directions : (N, 3) ndarray
+        Unit directions.
+    rng : numpy.random.Generator
+        Random numbers.
+    style : str
+        One of `STYLES`.
+
+    Returns
+    -------
+    (N,) ndarray
+        log(radius).
+    """
     broad = 0.1 * smooth_field(directions, rng, 0.25)
     if style == "gentle":
         return broad + rng.uniform(0.06, 0.14) * smooth_field(
@@ -68,7 +82,7 @@ def displacement(directions: np.ndarray, rng: np.random.Generator, style: str) -
 
 
 def _dents(directions: np.ndarray, rng: np.random.Generator, count: int) -> np.ndarray:
-    """Round hollows, each a bell of its own width."""
+    """Round hollows, each a Gaussian of its own width."""
     places = rng.normal(size=(count, 3))
     places /= np.linalg.norm(places, axis=1, keepdims=True)
     width = rng.uniform(0.12, 0.3, count)
@@ -77,7 +91,7 @@ def _dents(directions: np.ndarray, rng: np.random.Generator, count: int) -> np.n
 
 
 def _ribs(directions: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Ribs from pole to pole with a hollow at both ends, as a pumpkin has."""
+    """Ribs from pole to pole with a hollow at both ends, as on a pumpkin."""
     count, depth = int(rng.integers(5, 13)), rng.uniform(0.03, 0.08)
     x, y, z = directions.T
     belly = np.hypot(x, z)

@@ -2,11 +2,11 @@
 their front toward the viewer.
 
 Equation: a closed polygon is smoothed along its length by a Gaussian (corners become round), and
-swept from the middle of the front to its edge, around a quarter circle to the wall, and likewise to
-the middle of the back. The front may be domed: z = -k |(x, y)|^2.
+swept from the centre of the front to its edge, around a quarter circle to the wall, and likewise to
+the centre of the back. The front may be domed: z = -k |(x, y)|^2.
 
-Limits: outlines that the origin sees whole (star-shaped), no holes. The rounding of the edge is
-kept below what corners allow.
+Limits: star-shaped outlines about the origin, no holes. The radius of the edge is limited by the
+corners.
 """
 
 from dataclasses import dataclass
@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from synth.scene.meshes import Mesh, grid_faces
-
+from ..scene.meshes import Mesh, grid_faces
 from .posing import posed
 
 _COLUMNS, _CAP, _EDGE, _WALL = 600, 16, 12, 10
@@ -87,10 +86,20 @@ _MIDDLE = {"L": (-0.65, -0.65), "T": (0, 0.6), "Y": (0, 0.05), "arrow": (0.25, 0
 
 @dataclass(frozen=True)
 class Extrusion:
-    """`polygon`: (n, 2) corners counter-clockwise, all of it seen from the origin. `depth`: from
-    front to back. `rounding`: of its corners; `edge`: radius of the edge between front and wall, at
-    most; `dome`: how much the front's middle stands out per squared unit, less than half the depth
-    in all.
+    """A prism with rounded corners and edges.
+
+    Attributes
+    ----------
+    polygon : (n, 2) ndarray
+        Corners, counter-clockwise, star-shaped about the origin.
+    depth : float
+        Distance of front and back.
+    rounding : float
+        Of the polygon's corners.
+    edge : float
+        Maximum radius of the edge between front and wall.
+    dome : float
+        Curvature k of the front; the dome is less than half the depth high.
     """
 
     polygon: np.ndarray
@@ -100,15 +109,14 @@ class Extrusion:
     dome: float = 0.0
 
     def mesh(self) -> Mesh:
-        """The surface, its front toward +z.
+        """Return the surface, its front toward +z.
 
-        It is textured from the front, and on over the edge along the wall.
+        The texture is projected from the front, and continues over the edge along the wall.
         """
         outline, normal, tightest = smooth_outline(self.polygon, self.rounding)
         lowest = self.depth / 2 - self.dome * float((outline**2).sum(1).max())  # of the front's rim
         edge = min(self.edge, 0.8 * tightest, 0.9 * lowest)
-        # The rounding begins at the slope with which the domed front ends, so that there is no
-        # crease between them.
+        # The rounding begins at the slope with which the domed front ends, to avoid a crease.
         begin = np.arctan(2 * self.dome * np.maximum((outline * normal).sum(1), 0))[:, None]
         rim = outline - edge * (1 - np.sin(begin)) * normal
         scale = np.linspace(0, 1, _CAP)[:, None, None]
@@ -132,7 +140,7 @@ class Extrusion:
 
 
 def extruded(rng: np.random.Generator) -> Mesh:
-    """A random one, posed."""
+    """Make a random extrusion, posed."""
     kind = str(rng.choice(KINDS, p=_OFTEN))
     polygon = random_polygon(kind, rng)
     depth = rng.uniform(0.35, 0.9)
@@ -143,8 +151,19 @@ def extruded(rng: np.random.Generator) -> Mesh:
 
 
 def random_polygon(kind: str, rng: np.random.Generator) -> np.ndarray:
-    """Corners (n, 2) of one of `KINDS`, about 2 wide, counter-clockwise, star-shaped about the
-    origin.
+    """Return the corners of a random outline.
+
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    (n, 2) ndarray
+        Corners, about 2 wide, counter-clockwise, star-shaped about the origin.
     """
     if kind == "letter":
         name = str(rng.choice(list(_LETTERS)))
@@ -186,8 +205,21 @@ def random_polygon(kind: str, rng: np.random.Generator) -> np.ndarray:
 
 
 def smooth_outline(polygon: np.ndarray, rounding: float) -> tuple[np.ndarray, np.ndarray, float]:
-    """A polygon with round corners, at steps of equal length, the first repeated at the end: points
-    and outward unit normals (N, 2) each, and the smallest radius of its convex corners.
+    """Round the corners of a polygon and resample it at equal steps.
+
+    Parameters
+    ----------
+    polygon : (n, 2) ndarray
+        Corners, counter-clockwise.
+    rounding : float
+        Standard deviation of the smoothing along the outline.
+
+    Returns
+    -------
+    points, normals : (N, 2) ndarray
+        The outline with outward unit normals, the first point repeated at the end.
+    tightest : float
+        Smallest radius of a convex corner.
     """
     fine = 4 * _COLUMNS
     outline = _evenly(polygon, fine)
@@ -217,8 +249,8 @@ def _lifted(plane: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def _bend_normals(bend: np.ndarray, out: np.ndarray, lean: np.ndarray) -> np.ndarray:
-    """Normals (rows, columns, 3) of the rounding, whose rows run down at the angles `lean` and
-    whose columns face `out` (columns, 3).
+    """Normals (rows, columns, 3) of the rounded edge; rows at the angles `lean`, columns along
+    `out`.
     """
     ring = bend[:, :-1]
     along = np.roll(ring, -1, 1) - np.roll(ring, 1, 1)
@@ -229,7 +261,7 @@ def _bend_normals(bend: np.ndarray, out: np.ndarray, lean: np.ndarray) -> np.nda
 
 
 def _mesh(points: np.ndarray, normals: np.ndarray, outward: np.ndarray) -> Mesh:
-    """The mesh of a grid (rows, columns, 3); rows from the front's middle to the back's, columns
+    """The mesh of a grid (rows, columns, 3): rows from the front's centre to the back's, columns
     counter-clockwise.
     """
     rows, columns = points.shape[:2]

@@ -1,4 +1,4 @@
-"""The demo's object: a glazed ceramic gourd with ribs below, a knob on top, and a painted skin."""
+"""The demo's object: a glazed ceramic gourd with ribs below, a knob on top, and a pattern."""
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -46,7 +46,18 @@ TEAL, NAVY, CREAM, CORAL, GOLD = (
 
 
 def gourd(rows: int = 260, columns: int = 361) -> Mesh:
-    """The shape: about 1.5 wide and 2 high, centred on the origin, y up."""
+    """Make the gourd: about 1.5 wide and 2 high, centred on the origin, y up.
+
+    Parameters
+    ----------
+    rows, columns : int, optional
+        Size of its grid of vertices.
+
+    Returns
+    -------
+    Mesh
+        The object.
+    """
     height, radius = _outline(rows)
     angle = np.linspace(0, 2 * np.pi, columns)
     ribbed = np.exp(-(((height + 0.42) / 0.32) ** 2))[:, None]
@@ -60,13 +71,11 @@ def gourd(rows: int = 260, columns: int = 361) -> Mesh:
 
 
 def _outline(rows: int) -> tuple[np.ndarray, np.ndarray]:
-    """Height and radius at `rows` steps of equal length along a smooth curve through the outline's
-    points.
-    """
+    """Height and radius at `rows` equal steps along a smooth curve through the outline's points."""
     length = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(_OUTLINE, axis=0), axis=1))])
     height, radius = PchipInterpolator(length, _OUTLINE)(np.linspace(0, length[-1], rows)).T
-    # Beyond a pole the outline goes down the other side: the height repeats, the radius changes its
-    # sign. So the poles stay round.
+    # Beyond a pole the outline continues on the other side: the height is mirrored, the radius
+    # changes its sign. This keeps the poles round.
     margin, width = rows // 4, rows / 60
     height = gaussian_filter1d(np.pad(height, margin, mode="reflect"), width)[margin:-margin]
     radius = gaussian_filter1d(np.pad(radius, margin, mode="reflect", reflect_type="odd"), width)[
@@ -77,8 +86,17 @@ def _outline(rows: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def gourd_albedo(size: int = 1024) -> np.ndarray:
-    """The albedo, (size / 2, size, 3) float32, linear Rec.709 in [0, 1]; row 0 is the top of the
-    object, columns go around it.
+    """Draw the albedo of the gourd.
+
+    Parameters
+    ----------
+    size : int, optional
+        Width in texels.
+
+    Returns
+    -------
+    (size // 2, size, 3) ndarray of float32
+        Linear Rec.709 in [0, 1]; row 0 is the top of the object, columns go around it.
     """
     v, u = np.meshgrid(
         (np.arange(size // 2) + 0.5) / (size // 2), (np.arange(size) + 0.5) / size, indexing="ij"
@@ -103,7 +121,7 @@ def _over(below: np.ndarray, colour: np.ndarray, cover: np.ndarray) -> np.ndarra
 
 
 def _edge(distance: np.ndarray, soft: float) -> np.ndarray:
-    """0 where `distance` is negative, 1 where positive, a smooth step of width `soft` between."""
+    """0 where `distance` is negative, 1 where it is positive, a ramp of width `soft` between."""
     return np.clip(0.5 + distance / (2 * soft), 0, 1)
 
 
@@ -112,15 +130,14 @@ def _band(v: np.ndarray, top: float, bottom: float, soft: float) -> np.ndarray:
 
 
 def _around(u: np.ndarray, count: int) -> np.ndarray:
-    """Signed distance, in turns, to the nearest of `count` places spread evenly around the object."""
+    """Signed distance, in turns, to the nearest of `count` places evenly around the object."""
     return (np.mod(u * count + 0.5, 1) - 0.5) / count
 
 
 def _dots(
     u: np.ndarray, v: np.ndarray, count: int, row: float, radius: float, soft: float
 ) -> np.ndarray:
-    # The outline is about 3.2 long and the girth about 4: a turn is a little longer than the height
-    # of the skin.
+    # The outline is about 3.2 long and the girth about 4, hence the factor 1.2 on turns.
     return _edge(radius - np.hypot(1.2 * _around(u, count), v - row), soft)
 
 

@@ -1,17 +1,20 @@
-"""A measured or drawn height map as a mesh that the camera sees pixel by pixel as it was.
+"""A height map as a mesh that the camera sees pixel by pixel as it was measured or drawn.
 
-Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s, y = (H
-/ 2 - r - 1/2) / s and z = (height - offset) / s, with s pixels a unit: the mapping of
-`synth.scene.camera.Camera(W, H, s)`, bit by bit. A vertex stands at each centre, with the normal (-dh/dx,
--dh/dy, 1) of central differences (one-sided at the rim), and one at each corner of a pixel, at the
-mean of what the pixels around it foretell; so the mesh covers exactly the pixels that have a
-height.
+Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s,
+y = (H / 2 - r - 1/2) / s and z = (height - offset) / s, with s pixels per unit: the mapping of
+`synth.scene.camera.Camera(W, H, s)`, to the last bit. There is a vertex at each centre, with the
+normal (-dh/dx, -dh/dy, 1) of central differences (one-sided at the rim), and one at each corner of
+a
+pixel, at the mean of the linear extrapolations from the pixels around it; so the mesh covers
+exactly
+the pixels that have a height.
 
 Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
 doi:10.1109/TPAMI.2014.2377712 (the heights of the MIT-Berkeley objects, `Z.mat`).
 
-Limits: one side only, open at the rim and behind. Steps between neighbouring pixels become steep
-walls, not gaps.
+Limits: one side only, open at the rim and behind. Discontinuities between neighbouring pixels
+become
+steep walls, not gaps.
 """
 
 from dataclasses import dataclass
@@ -23,11 +26,12 @@ from isc_core.errors import InputError
 from isc_core.io.exr import read_channels
 from isc_core.io.matlab import read_matrix
 from isc_core.io.npy import ARCHIVE, read_array
-from synth.scene.camera import LARGEST, SMALLEST, Camera
-from synth.scene.meshes import Mesh
+
+from ..scene.camera import LARGEST, SMALLEST, Camera
+from ..scene.meshes import Mesh
 
 FEWEST = 64  # pixels with a height
-# of the range of heights to the larger side of the object: beyond it the unit is not the pixel
+# Range of heights relative to the larger side of the object: beyond it the unit is not the pixel.
 _DEEPEST = 20.0
 _READERS = {".mat": "a MATLAB file", ".npy": "a NumPy array", ".exr": "an OpenEXR file"}
 # Around a pixel's centre, counter-clockwise from the upper left: rows down, columns to the right.
@@ -36,9 +40,18 @@ _CORNERS = ((0, 0), (1, 0), (1, 1), (0, 1))
 
 @dataclass(frozen=True)
 class HeightField:
-    """`mesh`: in the camera's frame. `pixels_per_unit`: s; `width`, `height`: of the map in pixels;
-    `offset`: pixels, the height at z = 0, so that height = z * pixels_per_unit + offset. The
-    object's larger side is 2 units long; it lies where it lies in the map.
+    """A height map as a mesh.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        In the camera frame; the object's larger side is 2 units, its place is that in the map.
+    pixels_per_unit : float
+        The scale s.
+    width, height : int
+        Size of the map in pixels.
+    offset : float
+        Height at z = 0 in pixels: height = z * pixels_per_unit + offset.
     """
 
     mesh: Mesh
@@ -54,53 +67,99 @@ class HeightField:
 
 
 def read_height(path: str | Path) -> np.ndarray:
-    """A height map (H, W) float64, pixels toward the viewer, NaN outside the object.
+    """Read a height map from a file.
 
-    Of a .mat file the variable `depth`; of an .npy file the array; of an .exr file the channel
-    `height.Z`, `Z`, `Y` or the only one, where `mask.A`, if there is one, is at least one half.
-    Raises `InputError` for what cannot be read or cannot be a height map.
+    Parameters
+    ----------
+    path : Path or str
+        A .mat file with the variable `depth`; an .npy file; or an .exr file with the channel
+        `height.Z`, `Z`, `Y` or a single one, and optionally `mask.A`, which must be at least one
+        half.
+
+    Returns
+    -------
+    (H, W) ndarray of float64
+        Pixels toward the viewer, NaN outside the object.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or contains no height map.
     """
     path = Path(path)
     if path.suffix.lower() not in _READERS:
         raise InputError(f"{path}: heights are read from {', '.join(_READERS)} files")
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
+        raise InputError(f"{path} does not exist")
     reader = {".mat": _read_mat, ".npy": _read_npy, ".exr": _read_exr}[path.suffix.lower()]
     return check_height(reader(path), str(path))
 
 
 def check_height(height: np.ndarray, what: str = "this height map") -> np.ndarray:
-    """The map as float64, NaN where it is not finite. Raises `InputError`, which names it by
-    `what`, where it is no map, too small or large, empty, or too deep.
+    """Check a height map.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    what : str, optional
+        Name of the map in messages.
+
+    Returns
+    -------
+    (H, W) ndarray of float64
+        The map, NaN where it is not finite.
+
+    Raises
+    ------
+    InputError
+        If it is not a map, too small or large, empty, or too deep.
     """
     height = np.asarray(height)
     if height.ndim != 2 or height.dtype.kind not in "fiu":
         raise InputError(
-            f"{what}: heights are a picture of numbers (H, W), these have shape {height.shape} of {height.dtype}"
+            f"{what}: a height map is an array (H, W) of numbers, not of shape {height.shape} and "
+            f"type {height.dtype}"
         )
     if not all(SMALLEST <= side <= LARGEST for side in height.shape):
         size = f"{height.shape[1]} x {height.shape[0]}"
         raise InputError(
-            f"{what}: {size} pixels cannot be rendered, {SMALLEST} to {LARGEST} a side can: crop or resize it"
+            f"{what}: {size} pixels cannot be rendered: crop or resize it to {SMALLEST} to "
+            f"{LARGEST} a side"
         )
     height = np.where(np.isfinite(height), height, np.nan).astype(np.float64)
     known = np.isfinite(height)
     if known.sum() < FEWEST:
         raise InputError(
-            f"{what}: {known.sum()} pixels have a height, {FEWEST} at least are needed: NaN stands for outside only"
+            f"{what}: {known.sum()} pixels have a height, at least {FEWEST} are needed: use NaN "
+            "only outside the object"
         )
     deep, side = np.ptp(height[known]), max(_extents(known))
     if deep > _DEEPEST * side:
         raise InputError(
-            f"{what}: heights range over {deep:.4g} pixels, the object is {side} wide: give them in pixels, NaN outside"
+            f"{what}: heights range over {deep:.4g} pixels, the object is {side} wide: give "
+            "heights in pixels, NaN outside"
         )
     return height
 
 
 def place_height(height: np.ndarray) -> HeightField:
-    """A height map (H, W), pixels toward the viewer, NaN outside, as a mesh and its camera.
+    """Convert a height map to a mesh and its camera.
 
-    Raises `InputError` as `check_height` does.
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer, NaN outside.
+
+    Returns
+    -------
+    HeightField
+        The mesh.
+
+    Raises
+    ------
+    InputError
+        As `check_height`.
     """
     height = check_height(height)
     known = np.isfinite(height)
@@ -118,7 +177,7 @@ def place_height(height: np.ndarray) -> HeightField:
 
     def vertices(values: np.ndarray, where: np.ndarray, half: float) -> np.ndarray:
         row, column = np.nonzero(where)
-        # In the same order of operations as the camera's, so that rays and vertices meet exactly.
+        # Same order of operations as in the camera, so that rays and vertices meet exactly.
         x, y = (column + half - columns / 2) / scale, (rows / 2 - row - half) / scale
         return np.stack([x, y, (values[where] - offset) / scale], -1)
 
@@ -129,19 +188,19 @@ def place_height(height: np.ndarray) -> HeightField:
 
 
 def mesh_of_height(height: np.ndarray) -> Mesh:
-    """The mesh alone of `place_height`."""
+    """Return only the mesh of `place_height`."""
     return place_height(height).mesh
 
 
 def _extents(known: np.ndarray) -> tuple[int, int]:
-    """Rows and columns of the box around what is known."""
+    """Rows and columns of the bounding box."""
     row, column = np.nonzero(known)
     return int(np.ptp(row)) + 1, int(np.ptp(column)) + 1
 
 
 def _slopes(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Height a pixel to the right and down (H, W): the mean of the differences to the neighbours
-    that are known, 0 where there are none.
+    """Height per pixel to the right and down (H, W): the mean of the differences to known
+    neighbours, 0 without any.
     """
     slopes = []
     for axis in (1, 0):
@@ -158,8 +217,8 @@ def _slopes(height: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _corners(
     height: np.ndarray, across: np.ndarray, down: np.ndarray, normals: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Heights (H + 1, W + 1), NaN away from the object, and normals (H + 1, W + 1, 3), not yet of
-    length 1, at the pixels' corners.
+    """Heights (H + 1, W + 1), NaN away from the object, and unnormalised normals (H + 1, W + 1, 3),
+    at the pixels' corners.
     """
     rows, columns = height.shape
     known = np.isfinite(height)
@@ -174,7 +233,7 @@ def _corners(
 
 
 def _fans(known: np.ndarray, corner: np.ndarray) -> np.ndarray:
-    """Four triangles a pixel, from its centre to its sides."""
+    """Four triangles per pixel, from its centre to its sides."""
     centre = np.arange(known.sum())
     number = np.full(corner.shape, -1)
     number[corner] = np.arange(corner.sum()) + len(centre)
@@ -184,8 +243,9 @@ def _fans(known: np.ndarray, corner: np.ndarray) -> np.ndarray:
 
 
 def _coordinates(where: np.ndarray, known: np.ndarray, half: float) -> np.ndarray:
-    """Texture coordinates of centres (`half` 0.5) or corners (0): the box around the object,
-    centred, its larger side filling [0, 1].
+    """Texture coordinates of centres (`half` 0.5) or corners (0): the bounding box of the object,
+    centred,
+    its larger side filling [0, 1].
     """
     row, column = np.nonzero(known)
     middle = np.array([column.min() + column.max() + 1, row.min() + row.max() + 1]) / 2
@@ -201,7 +261,7 @@ def _read_npy(path: Path) -> np.ndarray:
     with path.open("rb") as file:
         if file.read(2) == ARCHIVE:
             raise InputError(
-                f"{path} holds several arrays: save the height map alone with numpy.save"
+                f"{path} contains several arrays: save only the height map, with numpy.save"
             )
     return read_array(path)
 
@@ -213,7 +273,8 @@ def _read_exr(path: Path) -> np.ndarray:
     ]
     if not names:
         raise InputError(
-            f"{path} has no channel height.Z, Z or Y, but {', '.join(channels)}: keep one of these names for the heights"
+            f"{path} has the channels {', '.join(channels)}: name the one with the heights "
+            "height.Z, Z or Y"
         )
     height = channels[names[0]]
     return np.where(channels["mask.A"] >= 0.5, height, np.nan) if "mask.A" in channels else height

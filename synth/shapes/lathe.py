@@ -1,9 +1,9 @@
 """Forms turned on a lathe or a potter's wheel: vases, bottles, bowls, cups, apples, pawns, eggs.
 
 Equation: the outline (r(s), y(s)), s its length, is a monotone cubic through a few points, smoothed
-by a Gaussian over s, and goes around the y axis: (r sin a, y, r cos a). Beyond a pole the outline
-goes down the other side (r changes its sign), so that poles stay round. Hollow forms have an inner
-wall, which the outline meets at the rim.
+by a Gaussian over s and revolved about the y axis: (r sin a, y, r cos a). Beyond a pole the outline
+continues on the other side (r changes its sign), which keeps the poles round. Hollow forms have an
+inner wall, which meets the outer one at the rim.
 
 Citation: F. N. Fritsch and J. Butland, "A method for constructing local monotone piecewise cubic
 interpolants", SIAM Journal on Scientific and Statistical Computing 5 (1984), doi:10.1137/0905021.
@@ -16,14 +16,12 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from synth.scene.meshes import Mesh, joined, swept
-
+from ..scene.meshes import Mesh, joined, swept
 from .posing import posed
 
 _ROWS, _COLUMNS = 360, 193
 
-# Outlines (radius, height) from the upper pole to the lower one, or from the rim to the lower pole
-# for what is hollow.
+# Outlines (radius, height) from the upper pole to the lower one; of hollow forms from the rim.
 _SOLID = {
     "apple": [
         (0, 0.60),
@@ -176,16 +174,29 @@ _ABOVE = {
     "bowl": (18, 38),
     "apple": (20, 40),
     "cup": (14, 28),
-}  # how far from above these are seen, degrees
+}  # elevation of the camera, degrees
 
 
 def lathe(rng: np.random.Generator) -> Mesh:
-    """A random form, posed."""
+    """Make a random form, posed."""
     return lathe_form(str(rng.choice(FORMS)), rng)
 
 
 def lathe_form(name: str, rng: np.random.Generator) -> Mesh:
-    """One of `FORMS` with random proportions, posed. Cups have a handle, as a rule."""
+    """Make a form with random proportions, posed. Most cups have a handle.
+
+    Parameters
+    ----------
+    name : str
+        One of `FORMS`.
+    rng : numpy.random.Generator
+        Random numbers.
+
+    Returns
+    -------
+    Mesh
+        The object.
+    """
     wide, tall = np.exp(rng.normal(size=2) * (0.14, 0.1))
     base = np.array(_SOLID.get(name) or _HOLLOW[name], float) * (wide, tall)
     base[1:-1, 0] *= np.exp(0.035 * rng.normal(size=len(base) - 2))
@@ -207,9 +218,21 @@ def lathe_form(name: str, rng: np.random.Generator) -> Mesh:
 
 
 def hollow(outer: np.ndarray, wall: float) -> np.ndarray:
-    """The outline (n, 2) of a vessel with a wall, from the inner floor over the rim to the lower
-    pole, from its outer one, rim first; a solid one's, closed at the top, where even the rim leaves
-    no room for a wall.
+    """Add an inner wall to the outline of a vessel.
+
+    Parameters
+    ----------
+    outer : (n, 2) ndarray
+        Radius and height of the outer wall, from the rim to the lower pole.
+    wall : float
+        Thickness of the wall.
+
+    Returns
+    -------
+    (m, 2) ndarray
+        The outline from the inner floor over the rim to the lower pole; solid, closed at the top,
+        if
+        even the rim is too narrow for a wall.
     """
     side = outer[:-1]
     floor = side[-1, 1] + 2 * wall
@@ -217,7 +240,7 @@ def hollow(outer: np.ndarray, wall: float) -> np.ndarray:
     upward = np.argsort(side[:, 1], kind="stable")
     heights, first = np.unique(side[upward, 1], return_index=True)
     radius = PchipInterpolator(heights, side[upward, 0][first])(fine) - wall
-    # A narrow foot or neck leaves no room for a second wall: the inside ends above it.
+    # A narrow foot or neck is too narrow for an inner wall: the inside ends above it.
     room = np.argmax(radius < wall) if (radius < wall).any() else len(fine)
     if room == 0:
         return np.concatenate([[(0, outer[0, 1])], outer])
@@ -236,10 +259,19 @@ def hollow(outer: np.ndarray, wall: float) -> np.ndarray:
 
 
 def revolved(outline: np.ndarray, smoothing: float) -> Mesh:
-    """The surface of an outline (n, 2) of (radius, height) that begins and ends on the axis; u
-    folds behind, v folds at the top.
+    """Make the surface of revolution of an outline.
 
-    `smoothing`: of the outline, in its own units.
+    Parameters
+    ----------
+    outline : (n, 2) ndarray
+        Radius and height; begins and ends on the axis.
+    smoothing : float
+        Standard deviation of the smoothing, in units of the outline.
+
+    Returns
+    -------
+    Mesh
+        The surface. Texture coordinates are mirrored behind (u) and at the top (v).
     """
     steps = np.linalg.norm(np.diff(outline, axis=0), axis=1)
     length = np.concatenate([[0], np.cumsum(steps)])
@@ -269,9 +301,9 @@ def revolved(outline: np.ndarray, smoothing: float) -> Mesh:
 
 
 def _coordinates(radius: np.ndarray, height: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """As large along u as along v where the form is wide.
+    """Coordinates with equal scale along u and v where the form is wide.
 
-    What is drawn lies on the front of the outside, once.
+    The texture appears once, on the front of the outside.
     """
     top = int(height.argmax())
     length = np.concatenate([[0], np.cumsum(np.hypot(np.diff(radius), np.diff(height)))])
@@ -285,7 +317,7 @@ def _coordinates(radius: np.ndarray, height: np.ndarray, turn: np.ndarray) -> np
 
 def _handle(ends: np.ndarray, half: float, rng: np.random.Generator) -> Mesh:
     """A bent tube, closed at both ends, that leaves a wall toward +x at the radii `ends` (2,) and
-    heights half, -half.
+    the heights half and -half.
     """
     along = np.linspace(0, 1, 90)
     out = rng.uniform(0.4, 0.6)

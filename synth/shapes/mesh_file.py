@@ -1,16 +1,16 @@
 """A user's mesh and its colours, from a file that trimesh reads.
 
-Equation: vertices in one place are one; face corners around it are smooth together where the faces
-beside each other meet at less than `CREASE`; the normal is the sum over such a group of the faces'
-normals, each times the face's angle there. Colours that are no single texture within [0, 1] are
-painted on one, as seen from the front.
+Equation: vertices at the same position are merged; face corners around it are smooth together where
+adjacent faces meet at less than `CREASE`; the normal is the sum over such a group of the face
+normals, each weighted by the face's angle there. Colours that are not a single texture within
+[0, 1] are projected onto one, as seen from the front.
 
 Citation: M. Dawson-Haggerty et al., trimesh (2019), https://trimesh.org; glTF 2.0 (ISO/IEC
-12113:2022) for what its colours mean.
+12113:2022) for the meaning of its colours.
 
-Limits: the file's own normals, transparency and other maps are not used. The frame is kept: y has
-to be up, +z toward the viewer, as in glTF. Only files in the mesh's own folder, or below it, are
-opened.
+Limits: the file's own normals, transparency and other maps are ignored. The frame is kept: y must
+be
+up, +z toward the viewer, as in glTF. Only files in the mesh's own folder, or below it, are opened.
 """
 
 import io
@@ -32,9 +32,9 @@ from isc_core.errors import InputError
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.limits import USUAL
 from isc_core.io.native_io import suppress_native_output
-from synth.scene.materials import texture_at
-from synth.scene.meshes import Mesh
 
+from ..scene.materials import texture_at
+from ..scene.meshes import Mesh
 from .texture_coordinates import from_the_front
 
 KINDS = ("glb", "gltf", "obj", "off", "ply", "stl")
@@ -43,12 +43,11 @@ MOST_FACES = 3_000_000
 _MOST_BYTES = 1 << 29
 _MOST_NUMBERS = 4 * MOST_FACES  # entries of all tables of a glTF file
 _PICTURES = ("PNG", "JPEG", "BMP", "TIFF", "WEBP", "TGA")  # of textures; others may run programs
-_DEEPEST, _FARTHEST = 10_000, 1e6  # of the width; of texture coordinates
-_UNREADABLE = "model.gltf"  # what trimesh asks for where a glTF file is not JSON
-_NO_COLOUR = (102, 102, 102)  # what trimesh gives a material that names none
-PAINTED = 768  # pixels a side of a painted texture
-# A loader trips over whatever a damaged file makes it believe, over variables that it never set,
-# too.
+_DEEPEST, _FARTHEST = 10_000, 1e6  # relative to the width; of texture coordinates
+_UNREADABLE = "model.gltf"  # what trimesh requests where a glTF file is not JSON
+_NO_COLOUR = (102, 102, 102)  # trimesh's default for a material without colour
+TEXTURE_SIZE = 768  # side of a projected texture, texels
+# A damaged file can make a loader fail in any of these ways.
 _ERRORS = (
     OSError,
     ValueError,
@@ -72,8 +71,14 @@ _ERRORS = (
 
 @dataclass(frozen=True)
 class MeshFile:
-    """`mesh`: centred, its larger x or y extent 2. `albedo`: (h, w, 3) texture for its `uv`, linear
-    in [0, 1], or None where the file has no colours.
+    """A mesh with its texture.
+
+    Attributes
+    ----------
+    mesh : Mesh
+        Centred, its larger x or y extent 2.
+    albedo : (h, w, 3) ndarray or None
+        Texture for its `uv`, linear Rec.709 in [0, 1]; None if the file has no colours.
     """
 
     mesh: Mesh
@@ -82,8 +87,9 @@ class MeshFile:
 
 @dataclass(frozen=True)
 class _Part:
-    """One piece of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as `Mesh` has them or
-    None, `texture` (h, w, 3) or None, `colours` (N, 3) or None; linear.
+    """One piece of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as in `Mesh` or None,
+    `texture`
+    (h, w, 3) or None, `colours` (N, 3) or None; linear.
     """
 
     vertices: np.ndarray
@@ -94,9 +100,9 @@ class _Part:
 
 
 class _Beside:
-    """The files that a mesh file may ask for: those in its own folder and below.
+    """Access to the files that a mesh file refers to: only those in its own folder and below.
 
-    Remembers what was asked for in vain.
+    Records the references that could not be resolved.
     """
 
     def __init__(self, path: Path) -> None:
@@ -106,7 +112,7 @@ class _Beside:
         self.given: list[str] = []
 
     def get(self, name: str) -> bytes:
-        """The bytes of a file; `FileNotFoundError` where it is absent or elsewhere."""
+        """Return the bytes of a file; `FileNotFoundError` if it is missing or elsewhere."""
         name = str(name).strip().replace("\\", "/")
         place = (self.folder / name).resolve()
         if name == _UNREADABLE:
@@ -124,17 +130,33 @@ class _Beside:
 
 
 def read_mesh(path: str | Path) -> Mesh:
-    """The mesh alone of `read_mesh_file`."""
+    """Return only the mesh of `read_mesh_file`."""
     return read_mesh_file(path).mesh
 
 
-def read_mesh_file(path: str | Path, painted: int = PAINTED) -> MeshFile:
-    """A closed mesh and its base colour; `painted`: pixels a side of a texture that has to be made
-    for it.
+def read_mesh_file(path: str | Path, texture_size: int = TEXTURE_SIZE) -> MeshFile:
+    """Read a closed mesh and its base colour.
 
-    Raises `InputError` for a file that is absent, unreadable, empty, huge, or refers to a file that
-    is missing or outside its folder, and for a mesh that is open, turned inconsistently, without
-    volume, or has places that are not finite.
+    Parameters
+    ----------
+    path : Path or str
+        A file of one of `KINDS`.
+    texture_size : int, optional
+        Side of a texture that has to be made for the mesh, in texels.
+
+    Returns
+    -------
+    MeshFile
+        The mesh.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, unreadable, empty, huge, or refers to a file that is missing or
+        outside
+        its folder; if the mesh is open, inconsistently oriented, without volume, or has vertices
+        that
+        are not finite.
     """
     path = Path(path)
     parts = _read_parts(path)
@@ -150,7 +172,7 @@ def read_mesh_file(path: str | Path, painted: int = PAINTED) -> MeshFile:
         uv, albedo = np.clip(lone.uv, 0, 1), lone.texture
     else:
         uv = from_the_front(vertices)
-        albedo = _painted(parts, vertices, uv, painted)
+        albedo = _projected(parts, vertices, uv, texture_size)
         faces = np.unique(place, return_index=True)[1][
             place[faces]
         ]  # what lies in one place has one coordinate now
@@ -169,9 +191,9 @@ def _read_parts(path: Path) -> list[_Part]:
     if kind not in KINDS:
         raise InputError(f"{path}: meshes are read from {', '.join(KINDS)} files")
     if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
+        raise InputError(f"{path} does not exist")
     if path.stat().st_size > _MOST_BYTES:
-        raise InputError(f"{path}: larger than {_MOST_BYTES >> 20} MiB: simplify the mesh first")
+        raise InputError(f"{path} is larger than {_MOST_BYTES >> 20} MiB: simplify the mesh")
     beside, data = _Beside(path), path.read_bytes()
     try:
         if kind in ("glb", "gltf"):
@@ -195,7 +217,7 @@ def _read_parts(path: Path) -> list[_Part]:
         ) from error
     _check_references(path, beside)
     if not parts:
-        raise InputError(f"{path} holds no triangles: export the object as a mesh")
+        raise InputError(f"{path} has no triangles: export the object as a mesh")
     for name in tuple(beside.given):
         if Path(name).suffix.lower() not in (".mtl", ".bin") and not _is_image(beside.get(name)):
             raise InputError(
@@ -209,8 +231,8 @@ def _read_parts(path: Path) -> list[_Part]:
 
 
 def _check_claims(path: Path, data: bytes) -> None:
-    """What a glTF file says it holds, before memory is asked for it: numbers that no buffer holds
-    count as zeros.
+    """Check the sizes that a glTF file declares before memory is allocated: accessors without a
+    buffer count as zeros.
     """
     text = (
         data[20 : 20 + int.from_bytes(data[12:16], "little")] if data.startswith(b"glTF") else data
@@ -219,7 +241,8 @@ def _check_claims(path: Path, data: bytes) -> None:
     counts = [accessor["count"] for accessor in tree.get("accessors", [])]
     if any(type(count) is not int or count < 0 for count in counts) or sum(counts) > _MOST_NUMBERS:
         raise InputError(
-            f"{path} claims more than {_MOST_NUMBERS} entries, or a strange number of them: simplify or export it again"
+            f"{path} declares more than {_MOST_NUMBERS} entries or an invalid number: simplify the "
+            "mesh or export it again"
         )
 
 
@@ -236,16 +259,18 @@ def _is_image(data: bytes) -> bool:
 def _check_references(path: Path, beside: _Beside) -> None:
     if beside.outside:
         raise InputError(
-            f"{path} refers to {beside.outside[0]}, which is not in its folder: put a copy beside the mesh and refer to that"
+            f"{path} refers to {beside.outside[0]}, which is not in its folder: put a copy beside "
+            "the mesh and refer to it"
         )
     if beside.missing:
         raise InputError(
-            f"{path} refers to {beside.missing[0]}, which is missing: put it beside the mesh, or take the reference out"
+            f"{path} refers to {beside.missing[0]}, which is missing: put it beside the mesh, or "
+            "remove the reference"
         )
 
 
 def _part(scene: Any, node: str, kind: str) -> _Part | None:
-    """One piece, moved to its place in the scene; None for what has no faces."""
+    """One piece at its place in the scene; None without faces."""
     transform, name = scene.graph[node]
     piece = scene.geometry[name]
     faces = np.asarray(getattr(piece, "faces", np.empty((0, 3))), dtype=np.int64)
@@ -270,7 +295,7 @@ def _part(scene: Any, node: str, kind: str) -> _Part | None:
 
 def _texture(material: Any) -> np.ndarray | None:
     """A material's base colour (h, w, 3), linear: its image times its factor, or the factor alone
-    as one pixel; None where it has none.
+    as one pixel; None without either.
     """
     image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
     factor = getattr(material, "baseColorFactor", None)
@@ -290,9 +315,7 @@ def _texture(material: Any) -> np.ndarray | None:
 
 
 def _vertex_colours(visual: Any, kind: str, count: int) -> np.ndarray | None:
-    """Colours of the vertices (N, 3), linear; those of glTF are stored so, those of other files as
-    a screen shows them.
-    """
+    """Colours of the vertices (N, 3), linear; glTF stores them linear, other formats as sRGB."""
     if getattr(visual, "kind", None) not in ("vertex", "face"):
         return None
     colours = np.asarray(visual.vertex_colors, float)[:, :3] / 255
@@ -304,17 +327,15 @@ def _vertex_colours(visual: Any, kind: str, count: int) -> np.ndarray | None:
 def _sound(
     path: Path, vertices: np.ndarray, faces: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertices centred and scaled, faces without empty ones and turned outward, and the number of
-    each vertex's place.
+    """Vertices centred and scaled, faces without degenerate ones and oriented outward, and the
+    index of each vertex's position.
     """
     if len(faces) > MOST_FACES:
         raise InputError(
-            f"{path} has {len(faces)} faces, at most {MOST_FACES} are used: simplify it first"
+            f"{path} has {len(faces)} faces, at most {MOST_FACES} are supported: simplify the mesh"
         )
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(
-            f"{path}: a face refers to a vertex that is not there: export the mesh again"
-        )
+        raise InputError(f"{path}: a face refers to a missing vertex: export the mesh again")
     used = vertices[faces.ravel()]
     if not np.isfinite(used).all():
         raise InputError(f"{path} has vertices that are not finite numbers: remove them")
@@ -323,13 +344,15 @@ def _sound(
         sized = (high - low)[:2].max() > 0 and np.isfinite((high - low) ** 2).all()
     if sized and (high - low)[2] > _DEEPEST * (high - low)[:2].max():
         raise InputError(
-            f"{path}: the mesh is over {_DEEPEST} times deeper than wide: scale its z as its x and y"
+            f"{path}: the mesh is over {_DEEPEST} times deeper than wide: use the same scale for "
+            "x, y and z"
         )
     if not sized:
         raise InputError(
-            f"{path}: the mesh has no size: all of its vertices lie in one place or one line toward the viewer"
+            f"{path}: the mesh has no size: all vertices lie at one point or on one line toward "
+            "the viewer"
         )
-    # Vertices that no face uses may lie anywhere: they are brought to where the others are.
+    # Vertices that no face uses may lie anywhere: they are clipped to the box of the others.
     vertices = (np.clip(np.nan_to_num(vertices), low, high) - (low + high) / 2) * (
         2 / (high - low)[:2].max()
     )
@@ -342,20 +365,20 @@ def _sound(
     a, b, c = (vertices[faces[:, i]] for i in range(3))
     volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6
     if abs(volume) < 1e-9:
-        raise InputError(f"{path}: the mesh encloses no volume: give it a thickness")
+        raise InputError(f"{path}: the mesh encloses no volume: add thickness")
     return vertices, faces if volume > 0 else faces[:, ::-1], place
 
 
 def _places(vertices: np.ndarray) -> np.ndarray:
-    """Numbers (N,), equal for vertices in the same place, to 1e-7 units."""
+    """Indices (N,), equal for vertices at the same position, to 1e-7 units."""
     _, place = np.unique(np.rint(vertices * 1e7).astype(np.int64), axis=0, return_inverse=True)
     return place.reshape(-1)
 
 
 def _check_closed(path: Path, faces: np.ndarray) -> None:
-    """Raises `InputError` unless every edge has as many faces on one side as on the other."""
+    """Check that every edge has as many faces on one side as on the other."""
     if not len(faces):
-        raise InputError(f"{path}: none of its faces has an area: export the mesh again")
+        raise InputError(f"{path}: all faces are degenerate: export the mesh again")
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
     forward = edges[:, 0] < edges[:, 1]
     key = edges.min(1) * (edges.max() + 1) + edges.max(1)
@@ -363,11 +386,13 @@ def _check_closed(path: Path, faces: np.ndarray) -> None:
     unpaired = int((count % 2).sum())
     if unpaired:
         raise InputError(
-            f"{path}: the mesh is open, {unpaired} edges have a face on one side only: fill its holes, or give it a thickness"
+            f"{path}: the mesh is open, {unpaired} edges have a face on one side only: fill its "
+            "holes, or add thickness"
         )
     if np.bincount(number.reshape(-1), np.where(forward, 1, -1)).any():
         raise InputError(
-            f"{path}: neighbouring faces are turned opposite ways: recalculate the normals so that all point outward"
+            f"{path}: neighbouring faces have opposite orientations: recalculate the normals so "
+            "that all point outward"
         )
 
 
@@ -382,8 +407,8 @@ def _smooth_corners(
     length = np.linalg.norm(across, axis=1)
     facing = across / np.where(length > 0, length, 1)[:, None]
     whole, count = place[faces], len(faces)
-    # Half edges: from corner i of a face to its next one; partners run the other way between the
-    # same places.
+    # Half edges: from corner i of a face to its next one; partners run in the opposite direction
+    # between the same positions.
     start, end = whole.ravel(), np.roll(whole, -1, 1).ravel()
     corner, after = (
         np.arange(3 * count),
@@ -393,7 +418,7 @@ def _smooth_corners(
     order = np.argsort(np.minimum(start, end) * size + np.maximum(start, end), kind="stable")
     first, second = order[0::2], order[1::2]
     smooth = (facing[first // 3] * facing[second // 3]).sum(1) > np.cos(np.radians(CREASE))
-    # An empty face has no direction of its own: it goes with its neighbours.
+    # A degenerate face has no normal: it joins its neighbours.
     smooth |= (length[first // 3] == 0) | (length[second // 3] == 0)
     smooth &= start[first] == end[second]
     first, second = first[smooth], second[smooth]
@@ -422,11 +447,12 @@ def _within(uv: np.ndarray) -> bool:
     return bool(np.isfinite(uv).all() and (uv >= -1e-3).all() and (uv <= 1.001).all())
 
 
-def _painted(
+def _projected(
     parts: list[_Part], vertices: np.ndarray, front: np.ndarray, side: int
 ) -> np.ndarray | None:
-    """The colours of all parts on one texture, at the coordinates `front` of the vertices; where
-    several lie, the one before the others.
+    """The colours of all parts on one texture, at the coordinates `front` of the vertices; the
+    frontmost
+    part is visible.
     """
     if all(part.texture is None and part.colours is None for part in parts):
         return None
@@ -436,19 +462,19 @@ def _painted(
     start = 0
     for part in parts:
         own = slice(start, start + len(part.vertices))
-        _paint(part, vertices[own, 2], front[own], texture, depth)
+        _rasterise(part, vertices[own, 2], front[own], texture, depth)
         start += len(part.vertices)
-    # What no face covers takes the colour of the nearest that one does.
+    # Texels that no face covers take the colour of the nearest covered one.
     empty = np.isinf(depth).reshape(side, side)
     row, column = distance_transform_edt(empty, return_distances=False, return_indices=True)
     return texture.reshape(side, side, 3)[row, column]
 
 
-def _paint(
+def _rasterise(
     part: _Part, z: np.ndarray, front: np.ndarray, texture: np.ndarray, depth: np.ndarray
 ) -> None:
-    """Puts one part's colours into a texture (h w, 3) where it is before what is there, by points
-    spread over its faces.
+    """Rasterise one part's colours into a texture (h w, 3) where it is in front of the present
+    ones, by points spread over its faces.
     """
     side = math.isqrt(len(depth))
     x, y = (part.vertices[part.faces, i] for i in range(2))
@@ -477,8 +503,8 @@ def _paint(
 
 
 def _colours_of(part: _Part, faces: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The colours (M, P, 3) at the points of faces (M, 3) with barycentric weights (P, 3); a mid
-    grey where a part has none.
+    """The colours (M, P, 3) at the points of faces (M, 3) with barycentric weights (P, 3); middle
+    grey for a part without colours.
     """
     if part.colours is not None:
         return weights @ part.colours[faces]

@@ -1,11 +1,11 @@
-"""How an object stands before the camera: as a photographer places it, seen a little from above and
-not quite from the front.
+"""Pose of an object before the camera: as in a product photo, seen from slightly above and not
+quite from the front.
 """
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from synth.scene.meshes import Mesh
+from ..scene.meshes import Mesh
 
 
 def posed(
@@ -15,11 +15,25 @@ def posed(
     aside: float,
     roll: float = 5.0,
 ) -> Mesh:
-    """A mesh that stood upright and looked toward +z, turned at random, centred, and scaled so that
-    its larger picture extent is 2.
+    """Rotate a mesh at random, centre it, and scale its larger extent in the picture to 2.
 
-    `above`: from how far above it is seen, least and most. `aside`: how far it turns to either side
-    at most; `roll`: how far it leans in the picture at most. All in degrees.
+    Parameters
+    ----------
+    mesh : Mesh
+        Upright, facing +z.
+    rng : numpy.random.Generator
+        Random numbers.
+    above : (float, float)
+        Least and largest elevation of the camera, degrees.
+    aside : float
+        Largest turn to either side, degrees.
+    roll : float, optional
+        Largest roll in the picture, degrees.
+
+    Returns
+    -------
+    Mesh
+        The posed mesh.
     """
     angles = (rng.uniform(-aside, aside), rng.uniform(*above), rng.uniform(-roll, roll))
     return mesh.rotated(Rotation.from_euler("yxz", angles, degrees=True).as_matrix()).fitted()

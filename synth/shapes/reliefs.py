@@ -1,7 +1,7 @@
-"""Random height fields, as closed slabs: crumpled paper, folded cloth, carved reliefs, quilts.
+"""Random height fields as closed slabs: crumpled paper, folded cloth, carved reliefs, quilts.
 
 Equation: paper, sums of |triangle waves| in random directions, bent by a smooth field; cloth, waves
-whose phase a smooth field bends; relief, smooth steps of a smooth field's level sets on a slightly
+whose phase a smooth field bends; relief, smooth steps at level sets of a smooth field on a slightly
 domed plate; quilt, cushions |sin u sin v|^(1/2), rounded at their seams.
 
 Citation: see `synth.shapes.fields`; K. Perlin, "An image synthesizer", Computer Graphics 19(3)
@@ -13,8 +13,7 @@ Limits: sheets do not overhang; the back repeats the front, `_THICKNESS` behind 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from synth.scene.meshes import Mesh, grid_faces, vertex_normals
-
+from ..scene.meshes import Mesh, grid_faces, vertex_normals
 from .fields import smooth_field
 from .posing import posed
 
@@ -24,7 +23,7 @@ STYLES = ("paper", "cloth", "relief", "quilt")
 
 
 def relief(rng: np.random.Generator) -> Mesh:
-    """A random one of a random style, posed: it stands before the viewer, leaning a little."""
+    """Make a relief of a random style, posed nearly upright before the viewer."""
     x, y = np.meshgrid(
         np.linspace(-1, 1, _CELLS + 1), np.linspace(1, -1, _CELLS + 1) * rng.uniform(0.65, 1)
     )
@@ -37,7 +36,22 @@ def relief(rng: np.random.Generator) -> Mesh:
 
 
 def relief_height(place: np.ndarray, rng: np.random.Generator, style: str) -> np.ndarray:
-    """Height toward the viewer (H, W) at places (H, W, 2) within [-1, 1]^2, of one of `STYLES`."""
+    """Return the heights of a random relief.
+
+    Parameters
+    ----------
+    place : (H, W, 2) ndarray
+        Positions in [-1, 1]^2.
+    rng : numpy.random.Generator
+        Random numbers.
+    style : str
+        One of `STYLES`.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Heights toward the viewer.
+    """
     bend = np.stack([smooth_field(place, rng, 0.35) for _ in range(2)], -1)
     low = 0.1 * smooth_field(place, rng, 0.25)
     if style == "paper":
@@ -70,7 +84,7 @@ def _creases(place: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def _folds(place: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Long waves in about one direction, with finer ones on them."""
+    """Long waves in about one direction, with finer ones on top."""
     turn = rng.uniform(0, np.pi)
     along = place[..., 0] * np.cos(turn) + place[..., 1] * np.sin(turn)
     height = np.zeros(along.shape)
@@ -83,9 +97,19 @@ def _folds(place: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def slab(place: np.ndarray, height: np.ndarray) -> Mesh:
-    """The closed mesh of heights (H, W) over places (H, W, 2), and of the same behind it.
+    """Make a closed slab from a height field.
 
-    Rows run down, columns to the right.
+    Parameters
+    ----------
+    place : (H, W, 2) ndarray
+        Positions; rows run down, columns to the right.
+    height : (H, W) ndarray
+        Heights of the front; the back is parallel to it.
+
+    Returns
+    -------
+    Mesh
+        The slab.
     """
     rows, columns = height.shape
     front = np.concatenate([place, height[..., None]], -1).reshape(-1, 3)
@@ -99,7 +123,7 @@ def slab(place: np.ndarray, height: np.ndarray) -> Mesh:
     )
     every = np.concatenate([faces, faces[:, ::-1] + back, walls])
     vertices = np.concatenate([front, front - (0, 0, _THICKNESS)])
-    # The walls have vertices of their own, or their normals would round the front's edge off.
+    # The walls have their own vertices, to keep the front's edge sharp.
     own = np.concatenate([rim, low])
     lookup = np.zeros(len(vertices), int)
     lookup[own] = np.arange(len(own)) + len(vertices)

@@ -1,8 +1,8 @@
-"""A sphere without poles: the six sides of a cube, each a square grid, blown up. All star-shaped
-surfaces are made on it.
+"""A sphere without poles: the six sides of a cube, each a square grid, projected outward. All
+star-shaped surfaces are built on it.
 
-Equation: a side's coordinate t in [-1, 1] becomes tan(pi / 4 t) before the point is scaled to
-length 1, so that cells are nearly equal.
+Equation: a side's coordinate t in [-1, 1] becomes tan(pi / 4 t) before the point is normalised, so
+that cells are nearly equal.
 
 Citation: C. Ronchi, R. Iacono, P. S. Paolucci, "The cubed sphere", Journal of Computational Physics
 124 (1996), doi:10.1006/jcph.1996.0047.
@@ -20,8 +20,19 @@ CELLS = 104
 
 @cache
 def sphere_grid(cells: int = CELLS) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors (N, 3) and triangles (M, 3), counter-clockwise from outside; closed, every
-    vertex is there once. Read-only.
+    """Return the grid. The arrays are shared and read-only.
+
+    Parameters
+    ----------
+    cells : int, optional
+        Cells along a side of the cube.
+
+    Returns
+    -------
+    vertices : (N, 3) ndarray
+        Unit vectors, each only once.
+    faces : (M, 3) ndarray
+        Triangles, counter-clockwise from outside; closed.
     """
     steps = np.arange(cells + 1)
     number = np.full((cells + 1,) * 3, -1)

@@ -1,8 +1,9 @@
-"""Superquadrics: spheres, ellipsoids, rounded boxes, cylinders, cushions, and what lies between.
+"""Superquadrics: spheres, ellipsoids, rounded boxes, cylinders, cushions, and everything in
+between.
 
-Equation: F(p) = (|x/a|^(2/e) + |z/c|^(2/e))^(e/n) + |y/b|^(2/n) = 1. F is homogeneous, of degree
-2/n, so that the surface lies at d F(d)^(-n/2) in the direction d; its normal is along the gradient
-of F.
+Equation: F(p) = (|x/a|^(2/e) + |z/c|^(2/e))^(e/n) + |y/b|^(2/n) = 1. F is homogeneous of degree
+2/n,
+so that the surface lies at d F(d)^(-n/2) in the direction d; its normal is along the gradient of F.
 
 Citation: A. H. Barr, "Superquadrics and angle-preserving transformations", IEEE Computer Graphics
 and Applications 1(1) (1981), doi:10.1109/MCG.1981.1673799.
@@ -15,8 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from synth.scene.meshes import Mesh
-
+from ..scene.meshes import Mesh
 from .posing import posed
 from .sphere_grid import sphere_grid
 from .texture_coordinates import from_directions
@@ -24,8 +24,15 @@ from .texture_coordinates import from_directions
 
 @dataclass(frozen=True)
 class Superquadric:
-    """`axes` (a, b, c): half its sizes along x, y, z, > 0. `around` (e), `upright` (n): exponents
-    in [0.12, 1.2]; 1 is round, towards 0 square, seen from above and from the side.
+    """A superquadric.
+
+    Attributes
+    ----------
+    axes : (float, float, float)
+        Half axes (a, b, c) along x, y, z, > 0.
+    around, upright : float
+        Exponents e and n in [0.12, 1.2], as seen from above and from the side; 1 is round, toward 0
+        square.
     """
 
     axes: tuple[float, float, float]
@@ -33,7 +40,7 @@ class Superquadric:
     upright: float
 
     def mesh(self) -> Mesh:
-        """The surface, y up."""
+        """Return the surface, y up."""
         directions, faces = sphere_grid()
         e, n = self.around, self.upright
         part = np.abs(directions / self.axes)
@@ -56,7 +63,7 @@ class Superquadric:
 
 
 def superquadric(rng: np.random.Generator) -> Mesh:
-    """A random one, posed: a sphere, an ellipsoid, a box, a cylinder, a cushion, or anything
+    """Make a random superquadric, posed: sphere, ellipsoid, box, cylinder, cushion or anything
     between.
     """
     kind = rng.choice(

@@ -1,5 +1,5 @@
-"""Texture coordinates without a seam: the front takes most of the texture, and behind it runs back
-mirrored.
+"""Texture coordinates without a seam: the front takes most of the texture, which is mirrored
+behind.
 
 Equation: from a direction, at the angle t from +z: (u, v) = 1/2 + a(t) (x, -y) / |(x, y)|, a = t /
 (2 T) up to T, then falling to 0 at pi: an azimuthal equidistant projection. From the front: t =
@@ -8,21 +8,29 @@ asin(|(x, y)| / r), T = pi / 2, which is the same for a sphere.
 Citation: J. P. Snyder, "Map projections: a working manual", USGS Professional Paper 1395 (1987),
 doi:10.3133/pp1395.
 
-Limits: what is drawn grows up to T / sin(T) along the rim; from the front it is drawn out by 1 /
-cos on slopes that a sphere has not.
+Limits: patterns are stretched up to T / sin(T) along the rim; from the front they are stretched by
+1 / cos on slopes steeper than a sphere's.
 """
 
 import numpy as np
 
-_FRONT = np.radians(
-    120
-)  # how far around an object its front reaches: what is seen of it when it is turned by 30 degrees
-_EDGE = 0.495  # of the texture from its middle: u wraps around, and its ends do not match
+# How far around an object its front reaches: all that is visible at a turn of 30 degrees.
+_FRONT = np.radians(120)
+_EDGE = 0.495  # largest radius in the texture: u wraps around, and its ends do not match
 
 
 def from_directions(directions: np.ndarray) -> np.ndarray:
-    """(N, 2) in [0, 1] from unit directions (N, 3) in the frame in which the object looks toward
-    +z, y up.
+    """Return texture coordinates of directions.
+
+    Parameters
+    ----------
+    directions : (N, 3) ndarray
+        Unit vectors in the frame in which the object faces +z, y up.
+
+    Returns
+    -------
+    (N, 2) ndarray
+        u and v in [0, 1].
     """
     angle = np.arccos(np.clip(directions[:, 2], -1, 1))
     return _around(
@@ -31,8 +39,17 @@ def from_directions(directions: np.ndarray) -> np.ndarray:
 
 
 def from_the_front(vertices: np.ndarray) -> np.ndarray:
-    """(N, 2) in [0, 1] from places (N, 3) in the camera's frame: equal for what lies behind each
-    other.
+    """Return texture coordinates of positions as seen from the front.
+
+    Parameters
+    ----------
+    vertices : (N, 3) ndarray
+        Positions in the camera frame.
+
+    Returns
+    -------
+    (N, 2) ndarray
+        u and v in [0, 1]; equal for positions behind each other.
     """
     low, high = vertices[:, :2].min(0), vertices[:, :2].max(0)
     away = vertices[:, :2] - (low + high) / 2
@@ -41,8 +58,8 @@ def from_the_front(vertices: np.ndarray) -> np.ndarray:
 
 
 def _around(away: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    """Coordinates at `radius`, in [0, 1], from the texture's middle on the side of `away` (N, 2), y
-    up.
+    """Coordinates at `radius`, in [0, 1], from the texture's centre in the direction of `away` (N,
+    2), y up.
     """
     length = np.linalg.norm(away, axis=1)
     return np.clip(

@@ -315,7 +315,7 @@ def test_meshes_that_trip_the_loader_are_refused(refused: Callable[..., None]) -
             read_mesh_file,
             "a.glb",
             glb(json.dumps(claims).encode(), b""),
-            "claims more than|readable",
+            "declares more than|readable",
         )
 
 
@@ -421,7 +421,7 @@ def test_texture_coordinates_without_end_are_quiet(
     )
     (tmp_path / "a.mtl").write_bytes(b"newmtl a\nmap_Kd a.png\n")
     (tmp_path / "a.png").write_bytes(coded(".png", codes()))
-    found = read_mesh_file(tmp_path / "a.obj", painted=16)
+    found = read_mesh_file(tmp_path / "a.obj", texture_size=16)
     assert found.albedo is not None and np.isfinite(found.albedo).all()
     assert capfd.readouterr() == ("", "")
 

@@ -139,7 +139,7 @@ def test_bad_files_are_refused_by_name(tmp_path: Path) -> None:
         "junk.mat": "not a readable MATLAB",
         "junk.npy": "not a readable array",
         "junk.exr": "OpenEXR",
-        "absent.mat": "no such file",
+        "absent.mat": "does not exist",
         "height.png": "are read from",
     }
     for name, words in expected.items():

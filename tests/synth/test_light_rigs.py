@@ -172,10 +172,10 @@ def test_files_that_are_no_environments_are_refused(tmp_path: Path) -> None:
     cases = {
         "hdr": [
             (tmp_path / "absent.hdr", "no such file"),
-            (tmp_path / "empty", "holds no .exr or .hdr file"),
+            (tmp_path / "empty", "has no .exr or .hdr file"),
             (write_panorama(tmp_path / "square.exr", picture[:, :32]), "twice as wide as high"),
             (write_panorama(tmp_path / "black.exr", 0 * picture), "is black"),
-            (tmp_path / "sky.png", "cut off"),
+            (tmp_path / "sky.png", "clip the radiance"),
         ],
         "natural": [(tmp_path, "natural_lights.mat")],
     }

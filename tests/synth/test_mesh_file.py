@@ -202,7 +202,7 @@ def test_open_meshes_are_refused_with_their_open_edges(tmp_path: Path) -> None:
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n", "no volume"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 2\n", "an area"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "not there|not a readable"),
-        (CUBE.replace("f 1/1 2/2 3/3", "f 1/1 3/3 2/2"), "opposite ways"),
+        (CUBE.replace("f 1/1 2/2 3/3", "f 1/1 3/3 2/2"), "opposite orientations"),
     ],
 )
 def test_bad_meshes_are_refused(text: str, words: str, tmp_path: Path) -> None:
@@ -212,7 +212,7 @@ def test_bad_meshes_are_refused(text: str, words: str, tmp_path: Path) -> None:
 def test_files_that_are_no_meshes_are_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    refused(tmp_path / "absent.obj", "no such file")
+    refused(tmp_path / "absent.obj", "does not exist")
     refused(tmp_path / "shape.blend", "meshes are read from")
     junk = np.random.default_rng(0).bytes(4000)
     for kind in ("ply", "stl", "off", "glb", "gltf", "obj"):

@@ -116,7 +116,7 @@ def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(
         (("--albedos", "tartan"), "unknown albedo 'tartan'"),
         (("--lights", "laser"), "unknown light 'laser'"),
         (("--splits", "dev"), "unknown split 'dev'"),
-        (("--lights", "natural"), "read from files: name the folder that holds natural_lights.mat"),
+        (("--lights", "natural"), "read from files: give the folder of natural_lights.mat"),
         (("--shapes", "mesh"), "give --mesh FILE"),
         (("--size", "4"), "choose 8 to 4096"),
         (("--size", "9999"), "choose 8 to 4096"),
