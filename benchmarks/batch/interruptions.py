@@ -34,7 +34,7 @@ import psutil  # type: ignore[import-untyped]
 
 from isc_core.decompose.pipeline import decompose
 from isc_core.decompose.settings import Settings
-from isc_core.photo.photo import read_photo
+from isc_core.photo import read_photo
 from isc_core.result_files.result_folder import save
 
 from ..records import append_row, read_rows

@@ -21,10 +21,10 @@ from pathlib import Path
 import psutil  # type: ignore[import-untyped]
 
 from isc_core.batch.engine import Crew
-from isc_core.batch.item import DONE, Job, Outcome
-from isc_core.batch.run import Batch, run_batch
+from isc_core.batch.item import DONE, ImageJob, ImageOutcome
+from isc_core.batch.run_batch import Batch, run_batch
 from isc_core.errors import Cancelled
-from isc_core.progress import Monitor
+from isc_core.progress import Monitor, ProgressEvent
 
 _OUTCOMES = 500
 
@@ -102,9 +102,9 @@ class Told:
         self.first = self.memory = 0.0
         self.count = 0
 
-    def progress(self, stage: str, fraction: float) -> None:
+    def progress(self, event: ProgressEvent) -> None:
         """Takes the report of a run."""
-        found = re.match(r"images, done (\d+)", stage)
+        found = re.match(r"done (\d+)", event.detail)
         self.count = int(found.group(1)) if found else 0
         if self.count and not self.first:
             self.first, self.memory = time.time(), _peak_mb()
@@ -114,10 +114,10 @@ class Told:
         return self.count >= _OUTCOMES
 
 
-def nothing(job: Job) -> Outcome:
+def nothing(job: ImageJob) -> ImageOutcome:
     """The task of these runs."""
     del job
-    return Outcome(DONE)
+    return ImageOutcome(DONE)
 
 
 def _peak_mb() -> float:

@@ -11,7 +11,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from isc_core.photo.photo import linear_to_srgb
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.shading.spherical_harmonics import real_sh
 
 _MODES = 5

@@ -28,7 +28,7 @@ from statistics import median
 
 from isc_core.decompose.pipeline import decompose
 from isc_core.decompose.settings import Settings
-from isc_core.photo.photo import read_photo
+from isc_core.photo import read_photo
 from isc_core.result_files.contact_sheet import thumbnail
 from isc_core.result_files.result_folder import save
 

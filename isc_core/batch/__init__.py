@@ -1,11 +1,12 @@
-"""Many photos, one after the other and side by side: `isc batch`.
+"""Many photos in parallel: `isc batch`.
 
-Inputs become a stream of items (`sources`, `manifest`) with names of their own (`names`). Dask's
-scheduler hands them to workers (`engine`), one image a task; a task (`work`) fetches its files
-(`fetch`), looks whether its result is there already (`fingerprint`), and writes it whole or not at
-all. What hangs or kills its worker is found out (`attempts`). The run (`run`) holds the folder's
-lock (`run_folder`), keeps a journal of what came out, and sums it up (`journal`, `summary`).
+Inputs become a stream of items (`sources`, `manifest`), each with a unique name (`names`). Dask's
+scheduler sends them to workers (`engine`), one image a task. A task (`work`) fetches its files
+(`fetch`), checks whether its result exists already (`fingerprint`), and writes it completely or not
+at all. `attempts` identifies images that hang or kill their worker. The run (`run_batch`) holds the
+lock of its folder (`run_folder`), keeps a journal of outcomes and summarises it (`journal`,
+`summary`).
 
-Limits: the output folder is one that all workers see, on a file system with renames that are atomic
-and locks that are held.
+Limits: the output folder must be visible to all workers, on a file system with atomic renames and
+locks.
 """

@@ -1,17 +1,17 @@
-"""Images that hang, or take their worker with them.
+"""Images that hang, or kill their worker.
 
-Problem: a worker may die under an image (memory, a fault in a library), and the scheduler gives the
-image to the next one, which may die as well. A step may never return, so that no flag is looked at.
-Which image it was, and why, is known to nobody who is left.
+Problem: a worker may die while it decomposes an image (out of memory, a fault in a library); the
+scheduler then gives the image to the next worker, which may die as well. A step may never return,
+so that no flag is checked. No surviving process knows which image it was, and why.
 
-Way: a task first writes a line into a file of its image, and removes the file when it ends, however
-it ends. Who finds the file knows that workers were lost on this image, and how many. With a time
-limit a watchdog waits beside the task, Python's `faulthandler`, whose thread needs no interpreter
-lock: at the limit it writes where the task stands into the same file and ends the process. The task
-that is given the image next reads that, and reports it instead of trying again.
+Method: a task first writes a line into a file of its image, and removes the file when it ends in
+any regular way. A task that finds the file knows that workers were lost on this image, and how
+many. With a time limit a watchdog runs beside the task: Python's `faulthandler`, whose thread needs
+no interpreter lock. At the limit it writes a traceback into the same file and ends the process. The
+task that gets the image next reads it, and reports it instead of trying again.
 
-Limits: one image at a time in a process. The steps look at the clock themselves first; the watchdog
-grants them a little more.
+Limits: one image at a time in a process. The steps check the clock themselves first; the watchdog
+allows a little more.
 """
 
 import faulthandler
@@ -29,10 +29,26 @@ _MARK = "Timeout ("  # how faulthandler opens its report
 
 @contextmanager
 def attempt(path: Path, run: str, timeout: float) -> Iterator[Monitor]:
-    """Gives the monitor to work with, which says stop after `timeout` seconds (0: never); `path`:
-    of the image's record.
+    """Provide a monitor that cancels the work after a time limit.
 
-    Raises `InputError` where this image has hung, or has cost `MOST_LOST` workers, in this `run`.
+    Parameters
+    ----------
+    path : Path
+        The image's record.
+    run : str
+        Identifier of the run.
+    timeout : float
+        Seconds; 0 for no limit.
+
+    Returns
+    -------
+    Monitor
+        For the duration of the block.
+
+    Raises
+    ------
+    InputError
+        If this image has hung, or has cost `MOST_LOST` workers, in this run.
     """
     _refuse_what_kills(path, run, timeout)
     try:
@@ -52,9 +68,7 @@ def attempt(path: Path, run: str, timeout: float) -> Iterator[Monitor]:
 
 
 def grace(timeout: float) -> float:
-    """Seconds beyond the limit before a worker is ended: the time from one look at the clock to the
-    next.
-    """
+    """Return the seconds that a worker gets beyond the limit: one interval of clock checks."""
     return min(max(0.1 * timeout, 1.0), 10.0)
 
 
@@ -72,15 +86,17 @@ def _refuse_what_kills(path: Path, run: str, timeout: float) -> None:
     path.unlink(missing_ok=True)
     if hung:
         raise InputError(
-            f"took longer than --timeout {timeout:g} s and did not react{_place(lines)}: its worker was ended"
+            f"took longer than --timeout {timeout:g} s and did not react{_place(lines)}: its "
+            "worker was ended"
         )
     raise InputError(
-        f"{MOST_LOST} workers were lost while they worked on it: it may need more memory than --memory gives"
+        f"{MOST_LOST} workers were lost while they run_jobs on it: it may need more memory than "
+        "--memory gives"
     )
 
 
 def _place(lines: list[str]) -> str:
-    """Where the task stood: the innermost line of the first thread that was in this package's work."""
+    """The innermost line of the first thread that was in this package's work."""
     own = [
         number for number, line in enumerate(lines) if "in process" in line and "work.py" in line
     ]

@@ -1,17 +1,16 @@
-"""Dask's scheduler and workers: started here, or found at an address; and the stream of jobs
-through them.
+"""Dask's scheduler and workers, started here or found at an address, and the stream of jobs.
 
 Citation: M. Rocklin, "Dask: Parallel Computation with Blocked algorithms and Task Scheduling"
 (2015), doi:10.25080/Majora-7b98e3ed-013.
 
 A window of jobs is at the scheduler at any time, a few for each worker, so that a stream of any
-length needs the same memory. Workers that die are replaced and their images tried again; which
-image kills them is found out by `attempts`, not by the scheduler's own count, which also blames the
-images that waited beside it.
+length needs the same memory. Workers that die are replaced and their images tried again. `attempts`
+identifies the image that kills them; the scheduler's own count also blames the images queued on the
+same worker.
 
 Limits: one image at a time in a worker process, so workers of a cluster should have one thread each
-(`dask worker --nthreads 1`). Workers of this machine listen on 127.0.0.1 only, but to whoever works
-on this machine.
+(`dask worker --nthreads 1`). Local workers listen on 127.0.0.1 only, but any user of this machine
+can connect.
 """
 
 import logging
@@ -28,11 +27,11 @@ from multiprocessing import resource_tracker
 from typing import Any
 
 from ..errors import InputError
-from .item import FAILED, Job, Outcome
+from .item import FAILED, ImageJob, ImageOutcome
 from .work import process
 
 _DEAL_SECONDS = 0.2  # between two looks at whether to stop
-_AHEAD = 3  # jobs at the scheduler for each image that is worked on
+_AHEAD = 3  # jobs at the scheduler for each image that is run_jobs on
 _SUSPICION = 100  # of the scheduler, before it gives a job up: `attempts` does before
 _LOOK_SECONDS = 2.0  # between two looks after the workers
 _LONELY_SECONDS = 900.0  # without any worker, before the run gives up
@@ -45,12 +44,20 @@ Client = Any  # Dask is optional
 
 @dataclass(frozen=True)
 class Crew:
-    """Who works. `workers`: processes, 0 for as many as cores allow; `threads`: of each image, 0
-    shares the cores among the workers.
+    """The workers of a run.
 
-    `memory`: of each worker as Dask reads it ("4GB", "auto", "0" for no limit). `scheduler`: the
-    address of a cluster; then the others do not count. `processes`: false works in threads of this
-    process, for tests and for stores that only this process sees.
+    Attributes
+    ----------
+    workers : int
+        Processes; 0 for as many as the cores allow.
+    threads : int
+        Threads of each image; 0 shares the cores among the workers.
+    memory : str
+        Of each worker, as Dask reads it: "4GB", "auto", or "0" for no limit.
+    scheduler : str
+        Address of a cluster; the other fields are then ignored.
+    processes : bool
+        False uses threads of this process, for tests and for stores that only this process sees.
     """
 
     workers: int = 0
@@ -60,7 +67,7 @@ class Crew:
     processes: bool = True
 
     def sized(self) -> "Crew":
-        """With numbers in place of zeros."""
+        """Return the crew with numbers in place of zeros."""
         cores = (
             len(os.sched_getaffinity(0))
             if hasattr(os, "sched_getaffinity")
@@ -77,7 +84,7 @@ class Crew:
 
 
 def require_dask() -> None:
-    """Raises `InputError` where Dask is not installed."""
+    """Raise `InputError` if Dask is not installed."""
     try:
         import dask.distributed  # noqa: F401
     except ImportError as error:
@@ -88,9 +95,20 @@ def require_dask() -> None:
 
 @contextmanager
 def connected(crew: Crew) -> Iterator[Client]:
-    """A client of the cluster at `crew.scheduler`, or of one that lives as long as the block.
+    """Provide a client of the cluster at `crew.scheduler`, or of a local one.
 
-    Raises `InputError`.
+    Parameters
+    ----------
+    crew : Crew
+
+    Returns
+    -------
+    dask.distributed.Client
+
+    Raises
+    ------
+    InputError
+        If there is no scheduler or no worker.
     """
     import dask
     from dask.distributed import Client as DaskClient
@@ -104,7 +122,8 @@ def connected(crew: Crew) -> Iterator[Client]:
                 client.wait_for_workers(1, timeout=_CLUSTER_PATIENCE)
             except TimeoutError as error:
                 raise InputError(
-                    f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_PATIENCE:.0f} s: start some"
+                    f"--scheduler {crew.scheduler}: no worker within {_CLUSTER_PATIENCE:.0f} s: "
+                    "start some"
                 ) from error
             except (OSError, ValueError) as error:
                 raise InputError(
@@ -190,23 +209,38 @@ def _without_interrupts() -> Iterator[None]:
 
 
 def dashboard(client: Client) -> str:
-    """Where Dask shows what it does; "" for nowhere."""
+    """Return the address of Dask's dashboard, or ""."""
     return str(client.dashboard_link or "")
 
 
-def worked(
+def run_jobs(
     client: Client,
-    jobs: Iterator[Job],
+    jobs: Iterator[ImageJob],
     tick: Callable[[], None],
-    task: Callable[[Job], Outcome] = process,
-) -> Iterator[tuple[Job, Outcome]]:
-    """Every job with its outcome, in the order in which they end. `tick` is called several times a
-    second; what it raises ends the work.
+    task: Callable[[ImageJob], ImageOutcome] = process,
+) -> Iterator[tuple[ImageJob, ImageOutcome]]:
+    """Run every job and yield it with its outcome, in order of completion.
 
-    Raises `InputError` when the scheduler, or all workers are lost.
+    Parameters
+    ----------
+    client : dask.distributed.Client
+    jobs : iterator of ImageJob
+    tick : callable
+        Called several times a second; an exception from it ends the work.
+    task : callable
+        What a worker does with a job.
+
+    Returns
+    -------
+    iterator of (ImageJob, ImageOutcome)
+
+    Raises
+    ------
+    InputError
+        If the scheduler, or all workers, are lost.
     """
     ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    waiting: dict[str, tuple[Job, Any]] = {}
+    waiting: dict[str, tuple[ImageJob, Any]] = {}
     workforce, more = _Workforce(client), True
     while more or waiting:
         tick()
@@ -260,7 +294,8 @@ class _Workforce:
             self._seen = now
         elif now - self._seen > _LONELY_SECONDS:
             raise InputError(
-                f"there was no worker for {_LONELY_SECONDS:.0f} s: start some, and give the same command again"
+                f"there was no worker for {_LONELY_SECONDS:.0f} s: start some, and give the same "
+                "command again"
             )
         self.window = _AHEAD * max(1, there, self._wanted)
 
@@ -275,21 +310,21 @@ def _some(ended: "queue.SimpleQueue[Any]") -> Iterator[Any]:
         return
 
 
-def _outcome(future: Any) -> Outcome:
+def _outcome(future: Any) -> ImageOutcome:
     from dask.distributed import KilledWorker
 
     if future.status == "finished":
-        outcome: Outcome = future.result()
+        outcome: ImageOutcome = future.result()
         return outcome
     if future.status != "error":
         raise InputError(_LOST)
     error = future.exception()
     if isinstance(error, KilledWorker):
-        return Outcome(
+        return ImageOutcome(
             FAILED,
-            "workers were lost while they worked on it: it may need more memory than they have",
+            "workers were lost while they run_jobs on it: it may need more memory than they have",
         )
     text = re.sub(r"\s+", " ", str(error))
-    return Outcome(
+    return ImageOutcome(
         FAILED, f"a fault of this program, please report it: {type(error).__name__}: {text}"
     )

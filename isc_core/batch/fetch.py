@@ -1,9 +1,8 @@
-"""Bringing an input to this machine: a path is taken as it is, a URL is copied to a temporary file
-through fsspec.
+"""Local copies of inputs: a path is used as it is, a URL is copied to a temporary file by fsspec.
 
-Limits: a file of more bytes than `Limits.max_bytes` is refused, an object of a store while it is
-copied, as soon as it is longer. What a store asks for (keys, regions) is given as its fsspec
-implementation wants it, in the environment of the workers.
+Limits: a file larger than `Limits.max_bytes` is refused; an object of a store as soon as the copy
+is longer. Credentials and options of a store are set as its fsspec implementation expects them, in
+the environment of the workers.
 """
 
 import hashlib
@@ -22,12 +21,12 @@ _BLOCK = 1 << 20
 
 
 def is_url(location: str) -> bool:
-    """Whether a place is one for fsspec, such as s3://bucket/cup.png; all else is a path."""
+    """Return whether a location is a URL for fsspec, such as s3://bucket/cup.png."""
     return "://" in location
 
 
 def fsspec_module() -> ModuleType:
-    """fsspec. Raises `InputError` where it is not installed."""
+    """Return fsspec, or raise `InputError` if it is not installed."""
     try:
         import fsspec
     except ImportError as error:
@@ -38,9 +37,21 @@ def fsspec_module() -> ModuleType:
 
 
 def file_system(url: str) -> tuple[Any, str]:
-    """fsspec's file system of a URL, and the path in it.
+    """Return the fsspec file system of a URL, and the path in it.
 
-    Raises `InputError` where there is none.
+    Parameters
+    ----------
+    url : str
+
+    Returns
+    -------
+    file_system : fsspec.AbstractFileSystem
+    path : str
+
+    Raises
+    ------
+    InputError
+        If there is none.
     """
     fsspec = fsspec_module()
     try:
@@ -51,9 +62,25 @@ def file_system(url: str) -> tuple[Any, str]:
 
 @contextmanager
 def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
-    """The file as one of this machine, while the block lasts; copies go below `folder`.
+    """Provide a local file with the content of a location.
 
-    Raises `InputError`.
+    Parameters
+    ----------
+    location : str
+        A path or URL.
+    limits : Limits
+    folder : Path
+        Copies are made below it.
+
+    Returns
+    -------
+    Path
+        For the duration of the block.
+
+    Raises
+    ------
+    InputError
+        If the location cannot be read.
     """
     if not is_url(location):
         yield _checked(Path(location), limits)
@@ -71,7 +98,8 @@ def local_copy(location: str, limits: Limits, folder: Path) -> Iterator[Path]:
                     target.write(block)
         except OSError as error:
             raise InputError(
-                f"{location}: cannot be read: {error.strerror or error or 'there is no such object'}"
+                f"{location}: cannot be read: "
+                f"{error.strerror or error or 'there is no such object'}"
             ) from error
         yield copy
 
@@ -95,7 +123,7 @@ def _check_length(location: str, length: int, limits: Limits) -> None:
 
 
 def sha256(path: Path) -> str:
-    """Of the file's content, in hexadecimal. Raises `InputError` where it cannot be read."""
+    """Return the SHA-256 of a file in hexadecimal; raise `InputError` if it cannot be read."""
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

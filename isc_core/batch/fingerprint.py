@@ -1,8 +1,8 @@
-"""Whether a result is there already: what it was made of stands in it.
+"""Fingerprints: whether a result exists already.
 
-A result's `scene.decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends
-on: the content of photo and mask, the settings, the coding, the priors, the version. How many
-threads worked on it, where its files lay and when it was made do not count.
+A result's `decomposition.json` holds, in `input.fingerprint`, a hash of everything that it depends
+on: the content of photo and mask, the settings, the transfer curve, the priors, the version. The
+number of threads, the location of the files and the date do not count.
 """
 
 import hashlib
@@ -14,11 +14,22 @@ from ..errors import InputError
 from ..io.json_files import read_json
 from ..result_files.arrays_file import ARRAYS
 from ..result_files.result_folder import DECOMPOSITION_FILES
-from .item import Job
+from .item import ImageJob
 
 
-def fingerprint(job: Job, photo_sha256: str, mask_sha256: str) -> str:
-    """The hash, in hexadecimal; `mask_sha256`: "" where no mask is given."""
+def fingerprint(job: ImageJob, photo_sha256: str, mask_sha256: str) -> str:
+    """Return the fingerprint of a job in hexadecimal.
+
+    Parameters
+    ----------
+    job : ImageJob
+    photo_sha256, mask_sha256 : str
+        "" for no mask.
+
+    Returns
+    -------
+    str
+    """
     settings = asdict(job.recipe.settings)
     del settings["threads"]
     plan = job.plan
@@ -35,7 +46,20 @@ def fingerprint(job: Job, photo_sha256: str, mask_sha256: str) -> str:
 
 
 def is_finished(folder: Path, wanted: str, arrays: bool) -> bool:
-    """Whether `folder` holds the whole result of this fingerprint."""
+    """Return whether `folder` holds the complete result of a fingerprint.
+
+    Parameters
+    ----------
+    folder : Path
+    wanted : str
+        The fingerprint.
+    arrays : bool
+        Whether `arrays.npz` is required.
+
+    Returns
+    -------
+    bool
+    """
     for name in (*DECOMPOSITION_FILES, *((ARRAYS,) if arrays else ())):
         path = folder / name
         if not path.is_file() or path.stat().st_size == 0:

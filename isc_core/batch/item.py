@@ -1,4 +1,4 @@
-"""What is asked for one image of a batch, and what became of it."""
+"""One image of a batch: its inputs, settings and outcome."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -25,40 +25,49 @@ _TYPES: dict[str, type] = {
 _WORDS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 OPTIONS = tuple(_TYPES)
+_EXPECTED = {bool: "true or false", int: "a whole number, 0 or more"}
 Options = tuple[tuple[str, str | int | bool], ...]
 
 
 @dataclass(frozen=True)
-class Recipe:
+class ImageRecipe:
     """How an image is decomposed.
 
-    `settings`: see `decompose.pipeline.Settings`; `transfer`: one of `photo.photo.TRANSFERS`.
+    Attributes
+    ----------
+    settings : Settings
+    transfer : str
+        One of `photo.TRANSFERS`.
     """
 
     settings: Settings = field(default_factory=Settings)
     transfer: str = "auto"
 
-    def changed(self, options: Options) -> "Recipe":
-        """The recipe with a line's own options.
-
-        Raises `InputError` for values that mean nothing.
-        """
+    def changed(self, options: Options) -> "ImageRecipe":
+        """Return the recipe with a manifest line's options; raise `InputError` for bad values."""
         given = dict(options)
         transfer = str(given.pop("transfer", self.transfer))
         if transfer not in TRANSFERS:
             raise InputError(f'unknown transfer "{transfer}": choose {", ".join(TRANSFERS)}')
         settings = replace(self.settings, **given)  # type: ignore[arg-type]
         settings.check()
-        return Recipe(settings, transfer)
+        return ImageRecipe(settings, transfer)
 
 
 @dataclass(frozen=True)
-class Item:
+class BatchItem:
     """One image of the inputs.
 
-    `image`, `mask`: paths or URLs; an empty mask leaves it to the photo. `name`: wanted for the
-    result, "" takes the image's. `options`: what this image is to have otherwise than the run.
-    `label`: the image as the inputs call it, the same wherever they lie.
+    Attributes
+    ----------
+    image, mask : str
+        Paths or URLs; an empty mask is found in the photo.
+    name : str
+        Requested name of the result; "" uses the image's.
+    options : Options
+        Differences from the run's settings.
+    label : str
+        The image as the inputs name it, the same on every machine.
     """
 
     image: str
@@ -69,12 +78,26 @@ class Item:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunPlan:
     """What all tasks of a run share.
 
-    `output`: the absolute folder. `run`: the run's own random name. `version`: of ISC. `timeout`:
-    seconds an image, 0 for none. `arrays`: also write `arrays.npz`. `priors`: an absolute file, ""
-    for the package's; `priors_sha256` of it.
+    Attributes
+    ----------
+    output : Path
+        The absolute output folder.
+    run : str
+        Random identifier of the run.
+    version : str
+        Of ISC.
+    limits : Limits
+    timeout : float
+        Seconds an image; 0 for no limit.
+    arrays : bool
+        Whether to write `arrays.npz`.
+    priors : str
+        Absolute path of a prior file; "" for the package's.
+    priors_sha256 : str
+        Its hash.
     """
 
     output: Path
@@ -88,33 +111,48 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Job:
+class ImageJob:
     """One task.
 
-    `number`: its place in the inputs; `name`: of its folder in the output. `image`, `mask`:
-    absolute paths or URLs.
+    Attributes
+    ----------
+    number : int
+        Position in the inputs.
+    name : str
+        Of its folder in the output.
+    image, mask : str
+        Absolute paths or URLs.
+    recipe : ImageRecipe
+    plan : RunPlan
     """
 
     number: int
     name: str
     image: str
     mask: str
-    recipe: Recipe
-    plan: Plan
+    recipe: ImageRecipe
+    plan: RunPlan
 
     @property
     def folder(self) -> Path:
-        """Where the result goes."""
+        """The result's folder."""
         return self.plan.output / self.name
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of a job.
+class ImageOutcome:
+    """The outcome of a job.
 
-    `status`: done, skipped (it was there already) or failed; `reason`: of a failure, one line.
-    `seconds` it took in the worker; `peak_mb`: the largest memory of the worker meanwhile, 0 where
-    the system does not tell.
+    Attributes
+    ----------
+    status : str
+        "done", "skipped" (the result existed already) or "failed".
+    reason : str
+        One line, for a failure.
+    seconds : float
+        In the worker.
+    peak_mb : float
+        Peak memory of the worker in MB; 0 where the system does not report it.
     """
 
     status: str
@@ -124,9 +162,23 @@ class Outcome:
 
 
 def parse_options(given: Mapping[str, object], where: str) -> Options:
-    """The options of a line, sorted and of their types; text is read as what it has to be.
+    """Parse the options of a manifest line into sorted, typed pairs.
 
-    Raises `InputError`, opened by `where`.
+    Parameters
+    ----------
+    given : mapping
+        Text is converted to the option's type.
+    where : str
+        Opens the error message.
+
+    Returns
+    -------
+    Options
+
+    Raises
+    ------
+    InputError
+        If an option or value is invalid.
     """
     found: dict[str, str | int | bool] = {}
     for key, value in sorted(given.items()):
@@ -154,6 +206,4 @@ def _read(kind: type, value: object, complaint: str) -> str | int | bool:
         and len(value) < 19
     ):
         return int(value)
-    raise InputError(
-        f"{complaint}: give {'true or false' if kind is bool else 'a whole number from 0 on' if kind is int else 'text'}"
-    )
+    raise InputError(f"{complaint}: give {_EXPECTED.get(kind, 'text')}")

@@ -1,8 +1,7 @@
-"""What came out, image by image, while a run lasts: a file that grows, and the same in the inputs'
-order once it ends.
+"""The outcomes of a run: a file that grows, and the same in input order at the end.
 
-Every line is written at once: a run that is killed leaves what it knew. Of each image 8 bytes are
-kept in memory, where its line begins.
+Every line is written at once, so that a killed run keeps what it knew. Of each image 8 bytes are
+kept in memory: the offset of its line.
 """
 
 import json
@@ -13,26 +12,33 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from types import TracebackType
 
-from .item import FAILED, Outcome
+from .item import FAILED, ImageOutcome
 from .run_folder import RunFolder
 
 
 @dataclass(frozen=True)
-class Entry:
+class JournalEntry:
     """One image's line.
 
-    `number`: its place in the inputs; `name`: of its result, "" for none; `image`, `mask`: as they
-    were given.
+    Attributes
+    ----------
+    number : int
+        Position in the inputs.
+    name : str
+        Of its result; "" for none.
+    image, mask : str
+        As given.
+    outcome : ImageOutcome
     """
 
     number: int
     name: str
     image: str
     mask: str
-    outcome: Outcome
+    outcome: ImageOutcome
 
     def row(self) -> dict[str, object]:
-        """JSON-ready."""
+        """Return the entry as a JSON-ready dictionary."""
         return {
             "number": self.number,
             "name": self.name,
@@ -42,24 +48,21 @@ class Entry:
         }
 
     @staticmethod
-    def of(row: dict[str, object]) -> "Entry":
-        """The inverse of `row`."""
-        outcome = Outcome(
+    def of(row: dict[str, object]) -> "JournalEntry":
+        """Return the entry of a row; the inverse of `row`."""
+        outcome = ImageOutcome(
             str(row["status"]),
             str(row["reason"]),
             float(str(row["seconds"])),
             float(str(row["peak_mb"])),
         )
-        return Entry(
+        return JournalEntry(
             int(str(row["number"])), str(row["name"]), str(row["image"]), str(row["mask"]), outcome
         )
 
 
 class Journal:
-    """Takes entries of `count` images as they come, and gives them back in the inputs' order.
-
-    Use as a context manager.
-    """
+    """Collects entries in any order and returns them in input order; a context manager."""
 
     def __init__(self, folder: RunFolder, count: int) -> None:
         self.counts: Counter[str] = Counter()
@@ -69,8 +72,8 @@ class Journal:
         self._all = self._files.enter_context(folder.journal.open("w+b"))
         self._failures = self._files.enter_context(folder.failures.open("wb"))
 
-    def add(self, entry: Entry) -> None:
-        """Writes an image's line; that of a failure also into `failures.jsonl`."""
+    def add(self, entry: JournalEntry) -> None:
+        """Write an image's line; a failure also goes into `failures.jsonl`."""
         self._places[entry.number] = self._all.tell()
         self._all.write(_line(entry.row()))
         self._all.flush()
@@ -85,12 +88,12 @@ class Journal:
             self._failures.write(_line(row))
             self._failures.flush()
 
-    def entries(self) -> Iterator[Entry]:
-        """All that were added, in the inputs' order."""
+    def entries(self) -> Iterator[JournalEntry]:
+        """Iterate over all entries in input order."""
         for place in self._places:
             if place >= 0:
                 self._all.seek(place)
-                yield Entry.of(json.loads(self._all.readline()))
+                yield JournalEntry.of(json.loads(self._all.readline()))
         self._all.seek(0, 2)
 
     def __enter__(self) -> "Journal":

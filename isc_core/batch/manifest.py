@@ -1,12 +1,14 @@
-"""Lists of images: CSV with a header, or JSON lines; read as a stream, a line at a time.
+"""Manifests: lists of images as CSV with a header, or as JSON lines, read as a stream.
 
-    image,mask,name,max_size                {"image": "cup.png", "mask": "cup_mask.png", "name":
-    "cup", "options": {"max_size": 256}} cup.png,cup_mask.png,cup,256            {"image":
-    "s3://photos/jug.png", "transfer": "linear"}
+    image,mask,name,max_size
+    cup.png,cup_mask.png,cup,256
 
-`image` alone is needed. Options are columns or keys of their own, or stand together under
+    {"image": "cup.png", "mask": "cup_mask.png", "name": "cup", "options": {"max_size": 256}}
+    {"image": "s3://photos/jug.png", "transfer": "linear"}
+
+Only `image` is required. Options are columns or keys of their own, or stand together under
 `options`. Relative paths are relative to the manifest's folder. A mistake in any line is found in
-the first pass, before work begins; a file that lacks is a failure of that image alone.
+the first pass, before work begins; a missing file is a failure of that image alone.
 """
 
 import csv
@@ -18,7 +20,7 @@ from typing import Any, TextIO
 
 from ..errors import InputError
 from .fetch import file_system, is_url
-from .item import OPTIONS, Item, Options, Recipe, parse_options
+from .item import OPTIONS, BatchItem, ImageRecipe, Options, parse_options
 from .names import check_given
 
 SUFFIXES = (".csv", ".jsonl", ".ndjson")
@@ -27,19 +29,19 @@ _OWN = ("image", "mask", "name", "options")
 
 
 class Manifest:
-    """The items of a manifest, any number of times.
+    """The items of a manifest; can be iterated any number of times.
 
-    `recipe`: what the lines' options change, to tell whether they can.
+    The lines' options are checked against `recipe`.
     """
 
-    def __init__(self, location: str, recipe: Recipe) -> None:
+    def __init__(self, location: str, recipe: ImageRecipe) -> None:
         self._location, self._recipe = location, recipe
         head, slash, _ = location.rpartition("/")
         self._base = head + slash
         self._known: dict[str, Options] = {}
         self._first = ""
 
-    def __iter__(self) -> Iterator[Item]:
+    def __iter__(self) -> Iterator[BatchItem]:
         with _opened(self._location) as (file, state):
             self._require_unchanged(state)
             rows = (
@@ -57,7 +59,7 @@ class Manifest:
             )
         self._first = state
 
-    def _item(self, row: dict[str, Any], line: int) -> Item:
+    def _item(self, row: dict[str, Any], line: int) -> BatchItem:
         texts = [row.get(key) for key in ("image", "mask", "name")]
         image, mask, name = ("" if text is None else text for text in texts)
         if not (isinstance(image, str) and isinstance(mask, str) and isinstance(name, str)):
@@ -71,7 +73,7 @@ class Manifest:
             if len(row) > len(texts) or not row.keys() <= {"image", "mask", "name"}
             else ()
         )
-        return Item(
+        return BatchItem(
             self._joined(image),
             self._joined(mask) if mask else "",
             name,
@@ -144,7 +146,8 @@ def _lines(file: TextIO, location: str) -> Iterator[str]:
         number += 1
         if len(line) == _LONGEST_LINE:
             raise InputError(
-                f"{location}, line {number} is longer than {_LONGEST_LINE} letters: is this a manifest?"
+                f"{location}, line {number} is longer than {_LONGEST_LINE} letters: is this a "
+                "manifest?"
             )
         yield line
 
@@ -174,7 +177,8 @@ def _csv_rows(file: TextIO, location: str) -> Iterator[tuple[int, dict[str, Any]
                 continue
             if len(cells) != len(header):
                 raise InputError(
-                    f"{location}, line {reader.line_num} has {len(cells)} cells, the header {len(header)}"
+                    f"{location}, line {reader.line_num} has {len(cells)} cells, the header "
+                    f"{len(header)}"
                 )
             yield reader.line_num, dict(zip(header, cells, strict=True))
     except csv.Error as error:
@@ -185,7 +189,8 @@ def _check_header(header: Iterable[str], location: str) -> None:
     names = list(header)
     if "image" not in names:
         raise InputError(
-            f"{location}: its first line has no column `image`: begin with image,mask,name or a part of it"
+            f"{location}: its first line has no column `image`: begin with image,mask,name or a "
+            "part of it"
         )
     if twice := [name for name in names if names.count(name) > 1]:
         raise InputError(f"{location}: the column {twice[0]!r} stands there twice")

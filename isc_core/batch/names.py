@@ -1,17 +1,16 @@
-"""Names of results, from names of files that may be anything.
+"""Names of results, from arbitrary file names.
 
 Problem: a result is a folder in the output, named after its image. Images of different folders
 share names, and a name in a manifest may hold "..", separators, control characters or a device's
-name. Names must be safe on every file system, unlike each other even where capitals do not count,
-and the same whatever the order of the inputs, so that a run that goes on finds what the run before
-has made.
+name. Names must be safe on every file system, unique even without case, and independent of the
+order of the inputs, so that a resumed run finds the results of the run before.
 
-Way: a name that several images want gets, for each of them, a hash of image, mask and options
-behind it. Two passes over the inputs tell: the first keeps 16 bytes an image, hashes of names and
-of images, sorted by NumPy, and finds those that stand there more than once.
+Method: where several images want a name, a hash of image, mask and options is appended for each of
+them. This takes two passes over the inputs: the first keeps 16 bytes an image, hashes of names and
+of images, sorts them by NumPy and finds duplicates.
 
 Limits: hashes have 64 bits; of a million images two different ones share one with a probability of
-3e-8, and the later is left out.
+3e-8, and the later one is left out.
 """
 
 import hashlib
@@ -23,7 +22,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..errors import InputError
-from .item import Item
+from .item import BatchItem
 
 _LONGEST = 120  # bytes; temporary siblings add some, and file systems allow 255
 _SAFE = re.compile(r"[0-9A-Za-z_][0-9A-Za-z_.-]{0,99}(?<!\.)")
@@ -42,8 +41,10 @@ OWN_FILES = (
 
 
 def safe_name(text: str) -> str:
-    """`text` as the name of a folder: letters, digits, ".", "-", "_" stay, runs of all else become
-    "_"; never empty, hidden or reserved.
+    """Return `text` as the name of a folder.
+
+    Letters, digits, ".", "-" and "_" stay, runs of all else become "_"; the name is never empty,
+    hidden or reserved.
     """
     name = text
     if not _SAFE.fullmatch(name):
@@ -57,9 +58,22 @@ def safe_name(text: str) -> str:
 
 
 def check_given(name: str, where: str) -> str:
-    """A name that a manifest gives, if it can be one.
+    """Return a name from a manifest if it is valid.
 
-    Raises `InputError`, opened by `where`, for paths and what means something else.
+    Parameters
+    ----------
+    name : str
+    where : str
+        Opens the error message.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    InputError
+        If the name is a path or reserved.
     """
     if (
         "/" in name
@@ -68,15 +82,16 @@ def check_given(name: str, where: str) -> str:
         or name.strip(". ") == ""
     ):
         raise InputError(
-            f"{where}: {name!r} cannot name a result: give a name without /, \\ and control characters, no path"
+            f"{where}: {name!r} cannot name a result: give a name without /, \\ and control "
+            "characters, no path"
         )
     if name.casefold() in OWN_FILES or _DEVICES.fullmatch(name):
         raise InputError(f"{where}: the name {name!r} is reserved: choose another")
     return name
 
 
-def wanted_name(item: Item) -> str:
-    """The name that an item's result has where no other wants it."""
+def wanted_name(item: BatchItem) -> str:
+    """Return the name of an item's result if no other item wants it."""
     if item.name:
         return safe_name(item.name)
     file = item.image.rstrip("/").rpartition("/")[2]
@@ -84,9 +99,9 @@ def wanted_name(item: Item) -> str:
 
 
 class Names:
-    """Gives every item of a stream that was seen before as a whole its name."""
+    """Assigns a name to every item of a stream that was read once before."""
 
-    def __init__(self, items: Iterable[Item]) -> None:
+    def __init__(self, items: Iterable[BatchItem]) -> None:
         names, identities = array("Q"), array("Q")
         for item in items:
             names.append(_hash(wanted_name(item).casefold()))
@@ -105,8 +120,8 @@ class Names:
         self._shared = _repeated(name[new])
         self._given: set[int] = set()
 
-    def name(self, item: Item) -> str | None:
-        """The item's name; None where the same item had one before in this pass."""
+    def name(self, item: BatchItem) -> str | None:
+        """Return the item's name, or None for a duplicate item in this pass."""
         identity = _identity(item)
         if (number := _hash(identity)) in self._repeated:
             if number in self._given:
@@ -118,7 +133,7 @@ class Names:
         return name
 
 
-def _identity(item: Item) -> str:
+def _identity(item: BatchItem) -> str:
     return "\0".join((item.label or item.image, item.mask, item.name, repr(item.options)))
 
 

@@ -1,13 +1,13 @@
-"""The output folder of a batch: its lock, its own files, and what killed runs left in it.
+"""The output folder of a batch: its lock, its files, and what killed runs left in it.
 
-    OUT/NAME/                a result each, whole or not there
+    OUT/NAME/                one result each, complete or absent
     OUT/thumbnails/NAME.jpg
-    OUT/failures.jsonl       grows while a run lasts
-    OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    once it ends
-    OUT/.isc-batch/          lock, the run's name, the journal, records of attempts, fetched files
+    OUT/failures.jsonl       grows during a run
+    OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    written at the end
+    OUT/.isc-batch/          lock, identifier of the run, journal, records of attempts, fetched files
 
-The lock (`filelock`) is the kernel's: it ends with its process, however that ends, so that no stale
-file locks anybody out. `owner` beside it names the process that holds it.
+The lock (`filelock`) is the kernel's: it ends with its process in any case, so that no stale file
+locks anybody out. `owner` beside it names the process that holds it.
 """
 
 import contextlib
@@ -24,7 +24,7 @@ from .names import OWN_FILES
 
 
 class RunFolder:
-    """The paths of an output folder, and what is done to it as a whole."""
+    """The paths of an output folder, and operations on it as a whole."""
 
     def __init__(self, output: Path) -> None:
         self.output = output
@@ -36,15 +36,22 @@ class RunFolder:
         self.thumbnails, self.pages = output / "thumbnails", output / "summary-pages"
 
     def thumbnail(self, name: str) -> Path:
-        """Of the result of this name."""
+        """Return the path of a result's thumbnail."""
         return self.thumbnails / f"{name}.jpg"
 
     @contextmanager
     def held(self, run: str) -> Iterator[None]:
-        """Holds the folder for this process; makes it, and removes what killed runs left, at the
-        beginning and at the end.
+        """Create and lock the folder, and clean up after killed runs.
 
-        Raises `InputError` where another process holds it, or it is not ours to write to.
+        Parameters
+        ----------
+        run : str
+            Identifier of the run.
+
+        Raises
+        ------
+        InputError
+            If another process holds the lock, or the folder cannot be written.
         """
         # Of the extra `batch`, as Dask: the other commands start without it.
         from filelock import FileLock, Timeout
@@ -69,17 +76,18 @@ class RunFolder:
                 self.owner.unlink(missing_ok=True)
 
     def runs(self, run: str) -> bool:
-        """Whether this run holds the folder now, as seen from this machine."""
+        """Return whether this run holds the folder now, as seen from this machine."""
         try:
             return self.run.read_text() == run
         except OSError:
             return False
 
     def require_run(self, run: str) -> None:
-        """Raises `InputError` where this machine does not see the folder of this run."""
+        """Raise `InputError` if this machine does not see the folder of this run."""
         if not self.runs(run):
             raise InputError(
-                f"{self.output} is not the run's folder on {socket.gethostname()}: give one that all workers share"
+                f"{self.output} is not the run's folder on {socket.gethostname()}: give one that "
+                "all workers share"
             )
 
     def _make(self) -> None:
@@ -89,7 +97,8 @@ class RunFolder:
             foreign := [name for name in OWN_FILES if (self.output / name).exists()]
         ):
             raise InputError(
-                f"{self.output} holds {foreign[0]}, which no batch has written: choose another folder"
+                f"{self.output} holds {foreign[0]}, which no batch has written: choose another "
+                "folder"
             )
         try:
             for folder in (self.attempts, self.thumbnails):

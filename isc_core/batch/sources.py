@@ -1,9 +1,8 @@
-"""What INPUTS name: photos, folders, patterns and manifests, here or in an object store; as one
-stream of items.
+"""The inputs of a batch: photos, folders, patterns and manifests, local or in an object store.
 
 A file `cup_mask.*` beside `cup.jpg` is its mask; in a folder of masks it is `cup.*` or
-`cup_mask.*`. Folders are not searched deeper: a pattern with ** is. Files come in the order of
-their names.
+`cup_mask.*`. Folders are not searched recursively, but a pattern with ** is. Files come in the
+order of their names.
 """
 
 import glob
@@ -14,7 +13,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from .fetch import file_system, is_url
-from .item import Item, Recipe
+from .item import BatchItem, ImageRecipe
 from .manifest import SUFFIXES, Manifest
 
 PHOTOS = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".ppm", ".pgm", ".exr", ".hdr", ".npy")
@@ -22,33 +21,34 @@ _MASK = "_mask"
 
 
 class Inputs:
-    """The items of all inputs, any number of times; folders and patterns are listed once, manifests
-    are streamed each time.
+    """The items of all inputs; can be iterated any number of times.
 
-    `masks`: a folder of masks, None looks beside the photos. Raises `InputError` for an input that
-    is not there or holds no photo.
+    Folders and patterns are listed once, manifests are streamed each time. `masks` is a folder of
+    masks; None looks beside the photos. Raises `InputError` for an input that does not exist or
+    holds no photo.
     """
 
-    def __init__(self, inputs: Sequence[str], masks: str | None, recipe: Recipe) -> None:
+    def __init__(self, inputs: Sequence[str], masks: str | None, recipe: ImageRecipe) -> None:
         self._stems = lru_cache(maxsize=64)(_by_stem)
         self._masks = None if masks is None else masks.rstrip("/") or masks
         if self._masks is not None and not _files(self._masks):
             raise InputError(f"--masks {masks}: there is no such folder, or it is empty")
-        self._parts: list[Iterable[Item]] = [self._part(text, recipe) for text in inputs]
+        self._parts: list[Iterable[BatchItem]] = [self._part(text, recipe) for text in inputs]
 
-    def __iter__(self) -> Iterator[Item]:
+    def __iter__(self) -> Iterator[BatchItem]:
         for part in self._parts:
             yield from part
 
-    def _part(self, text: str, recipe: Recipe) -> Iterable[Item]:
+    def _part(self, text: str, recipe: ImageRecipe) -> Iterable[BatchItem]:
         if text.lower().endswith(SUFFIXES):
             return Manifest(text, recipe)
         found = _listed(text)
         if not found:
             raise InputError(
-                f"{text}: there is no such photo, folder or manifest, or it holds no photo ({' '.join(PHOTOS)})"
+                f"{text}: there is no such photo, folder or manifest, or it holds no photo "
+                f"({' '.join(PHOTOS)})"
             )
-        return [Item(location, self._mask_of(location), label=location) for location in found]
+        return [BatchItem(location, self._mask_of(location), label=location) for location in found]
 
     def _mask_of(self, location: str) -> str:
         """The mask that belongs to a photo, "" for none.

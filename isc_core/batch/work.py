@@ -1,7 +1,7 @@
 """The task of one image: what a worker does.
 
 A worker does one image at a time, however many threads it has: the watchdog and the peak of memory
-are the process's.
+belong to the process.
 """
 
 import contextlib
@@ -25,20 +25,29 @@ from ..sirfs.priors.prior_set import PriorSet
 from .attempts import attempt
 from .fetch import is_url, local_copy, sha256
 from .fingerprint import fingerprint, is_finished
-from .item import DONE, FAILED, SKIPPED, Job, Outcome
+from .item import DONE, FAILED, SKIPPED, ImageJob, ImageOutcome
 from .run_folder import RunFolder
 
 _LOOK_SECONDS = 2.0
 _one_at_a_time = threading.Lock()
 
-Work = Callable[[Job, Monitor], str]
+Work = Callable[[ImageJob, Monitor], str]
 
 
-def process(job: Job, work: "Work | None" = None) -> Outcome:
-    """Makes the job's result unless it is there. What is wrong with the image is an outcome; a
-    fault of the program raises.
+def process(job: ImageJob, work: "Work | None" = None) -> ImageOutcome:
+    """Decompose the job's image unless its result exists.
 
-    `work`: what to do, `decompose_into` if None; returns the status.
+    A problem of the image is an outcome; a bug of the program raises.
+
+    Parameters
+    ----------
+    job : ImageJob
+    work : callable, optional
+        What to do; `decompose_into` by default. Returns the status.
+
+    Returns
+    -------
+    ImageOutcome
     """
     with _one_at_a_time:
         start = time.perf_counter()
@@ -47,15 +56,16 @@ def process(job: Job, work: "Work | None" = None) -> Outcome:
         gc.collect(
             1
         )  # meshes refer to themselves: else they stay for a hundred images, some 3 MB each
-        return Outcome(status, reason, round(time.perf_counter() - start, 4), _peak_mb())
+        return ImageOutcome(status, reason, round(time.perf_counter() - start, 4), _peak_mb())
 
 
-def _attempted(job: Job, work: Work) -> tuple[str, str]:
+def _attempted(job: ImageJob, work: Work) -> tuple[str, str]:
     plan = job.plan
     try:
         if plan.version != __version__:
             raise InputError(
-                f"this worker has ISC {__version__}, the run {plan.version}: install the same version everywhere"
+                f"this worker has ISC {__version__}, the run {plan.version}: install the same "
+                "version everywhere"
             )
         folder = RunFolder(plan.output)
         folder.require_run(plan.run)
@@ -68,14 +78,15 @@ def _attempted(job: Job, work: Work) -> tuple[str, str]:
     except MemoryError:
         return (
             FAILED,
-            "there is not enough memory for it: give a smaller image, a smaller --max-size or fewer workers",
+            "there is not enough memory for it: give a smaller image, a smaller --max-size or "
+            "fewer workers",
         )
     except OSError as error:
         return FAILED, f"{error.filename or job.image}: {error.strerror or error}"
 
 
 def _while_wanted(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
-    """Also says stop once the run is no more; on a cluster nobody else tells those who work for it."""
+    """Also cancel once the run has ended: on a cluster, nothing else stops its workers."""
     looked, wanted = time.monotonic(), True
 
     def cancelled() -> bool:
@@ -87,10 +98,18 @@ def _while_wanted(monitor: Monitor, folder: RunFolder, run: str) -> Monitor:
     return Monitor(cancelled=cancelled)
 
 
-def decompose_into(job: Job, monitor: Monitor) -> str:
-    """Decomposes the image into its folder, as `isc decompose` does.
+def decompose_into(job: ImageJob, monitor: Monitor) -> str:
+    """Decompose the image into its folder, as `isc decompose` does.
 
-    Returns whether it is done or was there already.
+    Parameters
+    ----------
+    job : ImageJob
+    monitor : Monitor
+
+    Returns
+    -------
+    str
+        "done" or "skipped".
     """
     plan, fetched = job.plan, RunFolder(job.plan.output).fetched
     with contextlib.ExitStack() as stack:
@@ -114,7 +133,12 @@ def decompose_into(job: Job, monitor: Monitor) -> str:
 
 
 def _decompose(
-    job: Job, path: Path, mask: Path | None, sums: tuple[str, str], wanted: str, monitor: Monitor
+    job: ImageJob,
+    path: Path,
+    mask: Path | None,
+    sums: tuple[str, str],
+    wanted: str,
+    monitor: Monitor,
 ) -> None:
     plan, recipe = job.plan, job.recipe
     photo = read_photo(path, mask, recipe.transfer, limits=plan.limits)
@@ -142,12 +166,13 @@ def _renamed(message: str, copies: tuple[tuple[Path | None, str], ...]) -> str:
 def _priors(path: str, expected: str) -> PriorSet:
     if sha256(Path(path)) != expected:
         raise InputError(
-            f"{path} is not the file that the run began with: all workers have to see the same priors"
+            f"{path} is not the file that the run began with: all workers have to see the same "
+            "priors"
         )
     return load_prior_set(Path(path))
 
 
-def _draw_thumbnail(job: Job, *, anew: bool) -> None:
+def _draw_thumbnail(job: ImageJob, *, anew: bool) -> None:
     """Beside the results: theirs are folders of known content."""
     target = RunFolder(job.plan.output).thumbnail(job.name)
     if anew or not target.is_file():

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 from isc_core.batch.engine import Crew
-from isc_core.batch.item import DONE, FAILED, Recipe
-from isc_core.batch.run import Batch, run_batch
+from isc_core.batch.item import DONE, FAILED, ImageRecipe
+from isc_core.batch.run_batch import Batch, run_batch
 from isc_core.decompose.settings import Settings
 from tests.core.command_line import ball_codes, write_image
 
-QUICK = Recipe(Settings(model="retinex", engine="numpy"))
+QUICK = ImageRecipe(Settings(model="retinex", engine="numpy"))
 HERE = Crew(
     workers=1, threads=1, memory="0", processes=False
 )  # threads of this process: a second less, and its memory:// is theirs

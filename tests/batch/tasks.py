@@ -8,12 +8,12 @@ import signal
 import time
 from pathlib import Path
 
-from isc_core.batch.item import DONE, Job, Outcome
+from isc_core.batch.item import DONE, ImageJob, ImageOutcome
 from isc_core.batch.work import process
 from isc_core.progress import Monitor
 
 
-def obey(job: Job, monitor: Monitor) -> str:
+def obey(job: ImageJob, monitor: Monitor) -> str:
     """Does what the image's name says: hangs without looking at anything, polls for ever, kills its
     worker, raises; else writes a file.
     """
@@ -36,13 +36,13 @@ def obey(job: Job, monitor: Monitor) -> str:
     return DONE
 
 
-def _first_time(job: Job) -> bool:
+def _first_time(job: ImageJob) -> bool:
     mark = job.plan.output / ".isc-batch" / "once"
     first = not mark.exists()
     mark.touch()
     return first
 
 
-def obedient(job: Job) -> Outcome:
+def obedient(job: ImageJob) -> ImageOutcome:
     """The task of a run whose images say what happens."""
     return process(job, obey)

@@ -5,15 +5,15 @@ from pathlib import Path
 
 import pytest
 
-from isc_core.batch.item import Item, Recipe
+from isc_core.batch.item import BatchItem, ImageRecipe
 from isc_core.batch.manifest import Manifest
 from isc_core.errors import InputError
 
 
-def items(path: Path, text: str | bytes) -> list[Item]:
+def items(path: Path, text: str | bytes) -> list[BatchItem]:
     """Of a manifest with this content."""
     path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return list(Manifest(str(path), Recipe()))
+    return list(Manifest(str(path), ImageRecipe()))
 
 
 def test_both_kinds_say_the_same(tmp_path: Path) -> None:
@@ -23,11 +23,12 @@ def test_both_kinds_say_the_same(tmp_path: Path) -> None:
     )
     lines = items(
         tmp_path / "a.jsonl",
-        '{"image": "cup.png", "mask": "m/cup.png", "name": "tasse", "options": {"max_size": 128, "full_size": true}}\n'
+        '{"image": "cup.png", "mask": "m/cup.png", "name": "tasse", "options": {"max_size": 128, '
+        '"full_size": true}}\n'
         '\n{"image": "/x/jug.png", "seed": 3}\n{"image": "s3://b/k.png", "mask": null}\n',
     )
     assert table == lines
-    assert table[0] == Item(
+    assert table[0] == BatchItem(
         f"{tmp_path}/cup.png",
         f"{tmp_path}/m/cup.png",
         "tasse",
@@ -83,13 +84,13 @@ def test_a_mistake_is_one_line_that_tells_where(
 
 def test_a_manifest_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot be read"):
-        list(Manifest(str(tmp_path / "none.csv"), Recipe()))
+        list(Manifest(str(tmp_path / "none.csv"), ImageRecipe()))
 
 
 def test_a_manifest_that_changes_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.jsonl"
     path.write_text('{"image": "x"}\n')
-    manifest = Manifest(str(path), Recipe())
+    manifest = Manifest(str(path), ImageRecipe())
     assert len(list(manifest)) == 1
     path.write_text(json.dumps({"image": "other"}) + "\n")
     with pytest.raises(InputError, match="changed"):
@@ -99,7 +100,7 @@ def test_a_manifest_that_changes_is_refused(tmp_path: Path) -> None:
 def test_a_manifest_is_not_loaded_whole(tmp_path: Path) -> None:
     path = tmp_path / "a.jsonl"
     path.write_text('{"image": "x"}\nthis line is wrong\n')
-    stream = iter(Manifest(str(path), Recipe()))
+    stream = iter(Manifest(str(path), ImageRecipe()))
     assert next(stream).image == f"{tmp_path}/x"
     with pytest.raises(InputError, match="line 2"):
         next(stream)

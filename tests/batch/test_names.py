@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from isc_core.batch.item import Item
+from isc_core.batch.item import BatchItem
 from isc_core.batch.names import OWN_FILES, Names, check_given, safe_name, wanted_name
 from isc_core.errors import InputError
 
@@ -86,10 +86,10 @@ def test_a_manifest_cannot_give_names_that_lead_elsewhere(name: str) -> None:
 
 
 def test_names_that_several_want_tell_their_images_apart_in_any_order() -> None:
-    items = [Item(f"{folder}/front.png") for folder in "abcdefgh"] + [
-        Item("a/Front.jpg"),
-        Item("a/back.png"),
-        Item("x", name="BACK"),
+    items = [BatchItem(f"{folder}/front.png") for folder in "abcdefgh"] + [
+        BatchItem("a/Front.jpg"),
+        BatchItem("a/back.png"),
+        BatchItem("x", name="BACK"),
     ]
     names = Names(items)
     given_names = {item: names.name(item) for item in items}
@@ -107,20 +107,20 @@ def test_names_that_several_want_tell_their_images_apart_in_any_order() -> None:
 
 
 def test_a_name_that_nobody_else_wants_is_the_files() -> None:
-    item = Item("photos/cup.png")
-    assert Names([item, Item("photos/jug.png")]).name(item) == "cup"
+    item = BatchItem("photos/cup.png")
+    assert Names([item, BatchItem("photos/jug.png")]).name(item) == "cup"
 
 
 def test_a_file_cannot_take_the_name_that_a_hash_gives() -> None:
-    pair = [Item("a/cup.png"), Item("b/cup.png")]
+    pair = [BatchItem("a/cup.png"), BatchItem("b/cup.png")]
     taken = str(Names(pair).name(pair[0]))
-    three = [*pair, Item(f"c/{taken}.png")]
+    three = [*pair, BatchItem(f"c/{taken}.png")]
     names = Names(three)
     assert len({names.name(item) for item in three}) == 3
 
 
 def test_the_same_item_has_one_result() -> None:
-    item, other = Item("a/cup.png"), Item("a/cup.png", options=(("max_size", 64),))
+    item, other = BatchItem("a/cup.png"), BatchItem("a/cup.png", options=(("max_size", 64),))
     names = Names([item, other, item])
     first, second = names.name(item), names.name(other)
     assert None not in (first, second) and first != second

@@ -14,7 +14,7 @@ import psutil  # type: ignore[import-untyped]
 from isc_core.batch.attempts import MOST_LOST
 from isc_core.batch.engine import Crew
 from isc_core.batch.item import DONE, FAILED
-from isc_core.batch.run import run_batch
+from isc_core.batch.run_batch import run_batch
 from tests.batch.conftest import batch, rows
 from tests.batch.tasks import obedient
 from tests.core.command_line import isc_command, run_isc
@@ -37,7 +37,7 @@ def test_images_that_hang_or_kill_their_worker_are_told_and_the_rest_is_made(
         reasons["hang"]
         == "took longer than --timeout 4 s and did not react (in obey): its worker was ended"
     )
-    assert reasons["kill"].startswith(f"{MOST_LOST} workers were lost while they worked on it")
+    assert reasons["kill"].startswith(f"{MOST_LOST} workers were lost while they run_jobs on it")
     assert (tmp_path / "out" / "kill_once" / "made").exists()
 
 

@@ -13,11 +13,11 @@ import fsspec
 import pytest
 from filelock import FileLock
 
-from isc_core.batch import run as run_module
+from isc_core.batch import run_batch as run_module
 from isc_core.batch.engine import Crew
-from isc_core.batch.item import DONE, FAILED, SKIPPED, Recipe
+from isc_core.batch.item import DONE, FAILED, SKIPPED, ImageRecipe
 from isc_core.batch.journal import Journal
-from isc_core.batch.run import run_batch
+from isc_core.batch.run_batch import run_batch
 from isc_core.batch.summary import PAGE
 from isc_core.decompose.pipeline import decompose
 from isc_core.decompose.settings import Settings
@@ -97,7 +97,7 @@ def test_a_mask_settings_and_priors_count_and_threads_do_not(made: Path, photos:
     codes = ball_codes(12.0)
     write_image(photos / "one_mask.png", (codes.max(axis=2) > 0).astype("uint8") * 255)
     assert run_batch(batch(photos, output=made)) == Counter({SKIPPED: 2, DONE: 1})
-    other = Recipe(Settings(model="retinex", engine="numpy", illumination="laboratory"))
+    other = ImageRecipe(Settings(model="retinex", engine="numpy", illumination="laboratory"))
     assert run_batch(batch(photos / "two.png", output=made, recipe=other)) == Counter({DONE: 1})
 
 

@@ -7,8 +7,8 @@ from dataclasses import fields
 from pathlib import Path
 
 from ...batch.engine import Crew
-from ...batch.item import DONE, FAILED, SKIPPED, Recipe
-from ...batch.run import Batch, run_batch
+from ...batch.item import DONE, FAILED, SKIPPED, ImageRecipe
+from ...batch.run_batch import Batch, run_batch
 from ...decompose.settings import Settings
 from ...errors import Rejected
 from ...progress import Monitor
@@ -106,7 +106,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     """Does the work. Raises `Rejected` where images failed."""
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     batch = Batch(
-        options.inputs, options.output, options.masks, Recipe(settings, options.transfer),
+        options.inputs, options.output, options.masks, ImageRecipe(settings, options.transfer),
         Crew(options.workers, options.threads, options.memory, options.scheduler),
         limits_of(options), options.timeout, options.arrays, options.priors,
     )  # fmt: skip

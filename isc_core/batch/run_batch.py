@@ -13,10 +13,10 @@ from ..errors import Cancelled, InputError
 from ..io.limits import USUAL, Limits
 from ..progress import Monitor
 from ..sirfs.priors.prior_file import load_prior_set
-from .engine import Crew, connected, dashboard, require_dask, worked
+from .engine import Crew, connected, dashboard, require_dask, run_jobs
 from .fetch import is_url, sha256
-from .item import SKIPPED, Item, Job, Outcome, Plan, Recipe
-from .journal import Entry, Journal
+from .item import SKIPPED, BatchItem, ImageJob, ImageOutcome, ImageRecipe, RunPlan
+from .journal import Journal, JournalEntry
 from .names import Names
 from .run_folder import RunFolder
 from .sources import Inputs
@@ -28,17 +28,31 @@ _RECENT = 200  # images whose rate tells how long the rest will take
 
 @dataclass(frozen=True)
 class Batch:
-    """What is asked for.
+    """A batch run.
 
-    `inputs`: photos, folders, patterns, manifests; `masks`: a folder of masks, None looks beside
-    the photos. `output`: the folder to write. `timeout`: seconds an image may take, 0 for no end.
-    `arrays`: write `arrays.npz` too. `priors`: a file of `isc fit-priors`.
+    Attributes
+    ----------
+    inputs : sequence of str
+        Photos, folders, patterns, manifests.
+    output : Path
+        The folder to write.
+    masks : str or None
+        A folder of masks; None looks beside the photos.
+    recipe : ImageRecipe
+    crew : Crew
+    limits : Limits
+    timeout : float
+        Seconds an image; 0 for no limit.
+    arrays : bool
+        Whether to write `arrays.npz`.
+    priors : Path or None
+        A file of `isc fit-priors`.
     """
 
     inputs: Sequence[str]
     output: Path
     masks: str | None = None
-    recipe: Recipe = field(default_factory=Recipe)
+    recipe: ImageRecipe = field(default_factory=ImageRecipe)
     crew: Crew = field(default_factory=Crew)
     limits: Limits = USUAL
     timeout: float = 0.0
@@ -50,14 +64,32 @@ def run_batch(
     batch: Batch,
     monitor: Monitor | None = None,
     announce: Callable[[str], None] = lambda line: None,
-    task: Callable[[Job], Outcome] = process,
+    task: Callable[[ImageJob], ImageOutcome] = process,
 ) -> Counter[str]:
-    """Makes the result of every image that is not there yet, and returns how many are done, skipped
-    and failed.
+    """Decompose every image that has no result yet.
 
-    `announce` is told, once, what a person should know at the beginning. `task`: what a worker
-    does. What is complete stays, however this ends. Raises `InputError` for what is wrong with the
-    run as a whole, before work begins; `Cancelled`.
+    Complete results stay, however the run ends.
+
+    Parameters
+    ----------
+    batch : Batch
+    monitor : Monitor, optional
+    announce : callable
+        Receives one line for the user at the start.
+    task : callable
+        What a worker does with a job.
+
+    Returns
+    -------
+    Counter
+        Number of images by status.
+
+    Raises
+    ------
+    InputError
+        If something is wrong with the run as a whole, before work begins.
+    Cancelled
+        If the user asked to stop.
     """
     monitor = monitor or Monitor()
     require_dask()
@@ -78,20 +110,22 @@ def run_batch(
                 with connected(crew) as client:
                     announce(f"{names.count} images; Dask's dashboard: {dashboard(client)}")
                     pace = _Pace(journal, monitor)
-                    for job, outcome in worked(
+                    for job, outcome in run_jobs(
                         client, _jobs(inputs, names, recipe, plan, journal), pace.tick, task
                     ):
-                        journal.add(Entry(job.number, job.name, job.image, job.mask, outcome))
+                        journal.add(
+                            JournalEntry(job.number, job.name, job.image, job.mask, outcome)
+                        )
                         pace.count(outcome)
             finally:
                 write_summary(folder, journal)
         return journal.counts
 
 
-def _plan(batch: Batch) -> Plan:
+def _plan(batch: Batch) -> RunPlan:
     if batch.priors is not None:
         load_prior_set(batch.priors)
-    return Plan(
+    return RunPlan(
         output=Path(os.path.abspath(batch.output.expanduser())),
         run=secrets.token_hex(8),
         version=__version__,
@@ -103,7 +137,7 @@ def _plan(batch: Batch) -> Plan:
     )
 
 
-def _watched(inputs: Inputs, monitor: Monitor) -> Iterator[Item]:
+def _watched(inputs: Inputs, monitor: Monitor) -> Iterator[BatchItem]:
     """The inputs, of which the first pass of a long list can be cancelled."""
     for number, item in enumerate(inputs):
         if number % 10_000 == 0 and monitor.cancelled():
@@ -112,20 +146,24 @@ def _watched(inputs: Inputs, monitor: Monitor) -> Iterator[Item]:
 
 
 def _jobs(
-    inputs: Inputs, names: Names, recipe: Recipe, plan: Plan, journal: Journal
-) -> Iterator[Job]:
+    inputs: Inputs, names: Names, recipe: ImageRecipe, plan: RunPlan, journal: Journal
+) -> Iterator[ImageJob]:
     """The tasks, as a stream; an item that stands there again needs none."""
     for number, item in enumerate(inputs):
         name = names.name(item)
         image, mask = _absolute(item.image), _absolute(item.mask)
         if name is None:
             journal.add(
-                Entry(
-                    number, "", image, mask, Outcome(SKIPPED, "stands in the inputs more than once")
+                JournalEntry(
+                    number,
+                    "",
+                    image,
+                    mask,
+                    ImageOutcome(SKIPPED, "stands in the inputs more than once"),
                 )
             )
             continue
-        yield Job(
+        yield ImageJob(
             number,
             name,
             image,
@@ -146,8 +184,8 @@ class _Pace:
         self._journal, self._monitor = journal, monitor
         self._recent: deque[float] = deque([time.monotonic()], maxlen=_RECENT)
 
-    def count(self, outcome: Outcome) -> None:
-        """An image has ended; those that were there already say nothing about how long one takes."""
+    def count(self, outcome: ImageOutcome) -> None:
+        """Count an image; skipped ones do not enter the estimate of the remaining time."""
         if outcome.status != SKIPPED:
             self._recent.append(time.monotonic())
 
