@@ -1,5 +1,5 @@
-"""Any name that the disk takes is good for photos, masks and outputs; what is written and printed
-stays readable.
+"""Photos, masks and outputs may have any name that the file system takes; whatever is written and
+printed stays readable.
 """
 
 import json
@@ -33,13 +33,13 @@ named = pytest.mark.parametrize("name", NAMES.values(), ids=NAMES)
 
 
 def place(folder: Path, name: bytes, suffix: bytes = b"") -> Path:
-    """A path of that name, or a skipped test where the disk refuses it."""
+    """A path of that name; skip the test where the file system refuses it."""
     path = Path(os.fsdecode(os.path.join(os.fsencode(folder), name + suffix)))
     try:
         path.touch()
         path.unlink()
     except OSError:
-        pytest.skip("this disk refuses the name")
+        pytest.skip("this file system refuses the name")
     return path
 
 
@@ -49,7 +49,7 @@ def moved(source: Path, target: Path) -> Path:
 
 
 def ran(capfd: pytest.CaptureFixture[str], *words: object) -> str:
-    """Runs a command that succeeds; what it printed, whose every character can be coded."""
+    """Run a command that succeeds; return what it printed, which can be encoded."""
     code = main([str(word) for word in words])
     out, err = capfd.readouterr()
     assert code == 0, (out, err)
@@ -80,24 +80,10 @@ def test_photo_mask_and_output(
     described["input"]["name"].encode()
     ran(capfd, "separate", *words, "--method", "shen_2013", "-o", output / "layers")
     assert read_channels(output / "layers" / "separation.exr")
-    ran(
-        capfd,
-        "edit",
-        output / "result",
-        "relight",
-        "--yaw",
-        "40",
-        "--photo",
-        photo,
-        "--mask",
-        mask,
-        "-o",
-        output / "turned",
-    )
-    assert (
-        "photo"
-        in json.loads((output / "turned" / "edit.json").read_text(encoding="utf-8"))["parameters"]
-    )
+    given = ("--photo", photo, "--mask", mask)
+    ran(capfd, "edit", output / "result", "relight", "--yaw", "40", *given, "-o", output / "turned")
+    edit = json.loads((output / "turned" / "edit.json").read_text(encoding="utf-8"))
+    assert "photo" in edit["parameters"]
     Image.open(output / "turned" / "before_after.png").load()
     ran(capfd, "mask", photo, "--box", "3,3,50,46", "-o", output / f"{output.name[:60]}.png")
     ran(capfd, "arrays", output / "result")
@@ -105,26 +91,16 @@ def test_photo_mask_and_output(
 
 
 @named
-def test_a_photo_of_floats_too(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes
-) -> None:
-    ran(
-        capfd,
-        "decompose",
-        ball_photo(tmp_path),
-        "--model",
-        "naive",
-        "--quiet",
-        "-o",
-        tmp_path / "first",
-    )
-    photo = moved(tmp_path / "first" / "maps" / "diffuse.exr", place(tmp_path, name, b".exr"))
+def test_photo_of_floats(tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes) -> None:
+    first = tmp_path / "first"
+    ran(capfd, "decompose", ball_photo(tmp_path), "--model", "naive", "--quiet", "-o", first)
+    photo = moved(first / "maps" / "diffuse.exr", place(tmp_path, name, b".exr"))
     ran(capfd, "separate", photo, "--method", "none", "--quiet", "-o", tmp_path / "out")
     assert read_channels(tmp_path / "out" / "separation.exr")
 
 
 @named
-def test_a_refusal_names_it_on_one_line(
+def test_refusal_takes_one_line(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], name: bytes
 ) -> None:
     photo = place(tmp_path, name, b".png")
@@ -133,31 +109,29 @@ def test_a_refusal_names_it_on_one_line(
     assert out == "" and err.count("\n") == 1 and "no such file" in err
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="names there are text")
-@pytest.mark.parametrize("coding", ["utf-8", "ascii"])
-def test_a_terminal_of_any_coding_is_told(tmp_path: Path, coding: str) -> None:
-    """In a process of its own: there standard output is strict."""
+@pytest.mark.skipif(sys.platform == "win32", reason="names are text there")
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii"])
+def test_terminal_of_any_encoding(tmp_path: Path, encoding: str) -> None:
+    """In a new process, where standard output is strict."""
     photo = moved(ball_photo(tmp_path), place(tmp_path, b"caf\xe9", b".png"))
-    before = f"import sys; sys.stdout.reconfigure(encoding={coding!r}, errors='strict')"
+    before = f"import sys; sys.stdout.reconfigure(encoding={encoding!r}, errors='strict')"
     output = tmp_path / "gr\u00fc\u00dfe"
     done = run_isc("separate", photo, "--method", "none", "-o", output, before=before)
     assert done.returncode == 0, done.stderr
     assert "preview.png" in done.stdout and (output / "preview.png").is_file()
 
 
-def test_what_can_be_read_stays() -> None:
+def test_printable_names_stay() -> None:
     assert readable("Grüße 杯 קפה émoji 👩‍🔧.png") == "Grüße 杯 קפה émoji 👩‍🔧.png"
     assert (
         readable("a\nb\t\x1b\u2028\u202e\udce9\ud800") == "a\\nb\\t\\x1b\\u2028\\u202e\\xe9\\ud800"
     )
 
 
-# --- names that are the input's own ---------------------------------------------------------------
+# --- outputs that name an input ------------------------------------------------------------------
 
 
-def test_a_mask_never_takes_the_photos_place(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_mask_never_replaces_its_photo(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     photo = ball_photo(tmp_path)
     before = photo.read_bytes()
     (tmp_path / "link.png").symlink_to(photo)
@@ -173,7 +147,7 @@ def test_a_mask_never_takes_the_photos_place(
     [("decompose", "--model", "naive"), ("separate", "--method", "none")],
     ids=lambda c: c[0],
 )
-def test_the_photos_own_folder_is_no_output(
+def test_folder_of_the_photo_is_no_output(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], command: tuple[str, ...]
 ) -> None:
     (tmp_path / "photos").mkdir()
@@ -185,26 +159,12 @@ def test_the_photos_own_folder_is_no_output(
     assert [path.name for path in (tmp_path / "photos").iterdir()] == ["ball.png"]
 
 
-def test_a_result_that_holds_the_photo_is_not_replaced(
+def test_result_that_holds_the_photo_is_not_replaced(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    """A picture of an earlier result, decomposed into that result's own folder, would be deleted by
-    it.
-    """
-    assert (
-        main(
-            [
-                "decompose",
-                str(ball_photo(tmp_path)),
-                "--model",
-                "naive",
-                "--quiet",
-                "-o",
-                str(tmp_path / "out"),
-            ]
-        )
-        == 0
-    )
+    """An image of an earlier result, decomposed into that result's own folder, would be lost."""
+    words = ("--model", "naive", "--quiet", "-o", tmp_path / "out")
+    ran(capfd, "decompose", ball_photo(tmp_path), *words)
     inside = tmp_path / "out" / "maps" / "diffuse.exr"
     before = inside.read_bytes()
     for command in (("decompose", "--model", "naive"), ("separate", "--method", "none")):
@@ -213,7 +173,7 @@ def test_a_result_that_holds_the_photo_is_not_replaced(
     assert inside.read_bytes() == before
 
 
-def test_a_link_as_output_is_followed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+def test_link_as_output_is_followed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     photo = ball_photo(tmp_path)
     (tmp_path / "real").mkdir()
     (tmp_path / "link").symlink_to("real")
