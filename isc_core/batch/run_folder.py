@@ -4,7 +4,7 @@
     OUT/thumbnails/NAME.jpg
     OUT/failures.jsonl       grows during a run
     OUT/summary.html, summary-pages/, summary.csv, summary.jsonl    written at the end
-    OUT/.isc-batch/          lock, identifier of the run, journal, records of attempts, fetched files
+    OUT/.isc-batch/          lock, owner, run identifier, journal, attempts, fetched files
 
 The lock (`filelock`) is the kernel's: it ends with its process in any case, so that no stale file
 locks anybody out. `owner` beside it names the process that holds it.

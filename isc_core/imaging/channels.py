@@ -43,6 +43,8 @@ def saturation(colours: np.ndarray) -> float:
 def fade_in(low: np.ndarray, base: float, fade: float) -> np.ndarray:
     """Return the share of a specular layer that counts, by the smallest channel.
 
+    A highlight, being white, is bright in the smallest channel.
+
     Parameters
     ----------
     low : ndarray
@@ -51,10 +53,6 @@ def fade_in(low: np.ndarray, base: float, fade: float) -> np.ndarray:
         Level up to which nothing counts.
     fade : float
         All counts from (1 + fade) base on; 0 makes a step.
-
-    Attributes
-    ----------
-    highlight, being white, is bright in the smallest channel.
 
     Returns
     -------
