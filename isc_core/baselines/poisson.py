@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage, sparse
 
-from ..numerics.linear import solved
+from ..numerics.linear import solve_linear
 
 _COARSEST = 60
 _DAMPING = 0.7
@@ -131,7 +131,7 @@ def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
     coarsest = operator.toarray()
     largest = coarsest.diagonal().max(initial=0) or 1.0
     return _Multigrid(
-        levels, solved(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest)))
+        levels, solve_linear(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest)))
     )
 
 

@@ -1,9 +1,14 @@
-"""Loops over pixels that NumPy cannot express, compiled where Numba is there and plain Python,
-slower but alike, where it is not.
+"""Loops over pixels that NumPy cannot express, compiled by Numba where it is installed.
 
-Compiled code is kept between runs: beside the source where that can be written, else in the user's
-cache folder, or where NUMBA_CACHE_DIR says; where none of them can be written, in a folder that
-lasts as long as the process.
+Without Numba the same functions run as plain Python: slower, with equal results.
+
+Compiled code is cached between runs: beside the source if that folder is writable, else in the
+user's cache folder, or in NUMBA_CACHE_DIR. If none of these can be written, a temporary folder
+serves until the process ends.
+
+Determinism: a compiled sum has the order that the compiler gave it, whatever the number of threads,
+because one call is one thread's work. `REASSOCIATED` lets the compiler choose that order once, so
+the sum may use vector instructions; it stays the same for every call of the same machine code.
 """
 
 import atexit
@@ -13,29 +18,88 @@ import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import TypeVar, cast
+from typing import TypeVar, cast, overload
 
 Loop = TypeVar("Loop", bound=Callable[..., object])
 
+EXACT: frozenset[str] = frozenset()
+"""IEEE arithmetic in the order of the source."""
+IN_ORDER = frozenset({"contract", "nsz"})
+"""Sums and differences in the order of the source; a product and a sum may round once."""
+ACCUMULATED = frozenset({"reassoc", "contract", "nsz"})
+"""Sums may be reordered, as inner products need to become vector instructions."""
+REASSOCIATED = ACCUMULATED | {"arcp", "afn"}
+"""As `ACCUMULATED`; also reciprocals for divisions, and faster approximate functions."""
 
-def compiled(loop: Loop) -> Loop:
-    """`loop`, a function on numbers and arrays that Numba can compile, made fast if possible; it
-    releases the interpreter's lock.
+
+@overload
+def jit(loop: Loop, /) -> Loop: ...
+@overload
+def jit(*, math: frozenset[str] = EXACT, inline: bool = False) -> Callable[[Loop], Loop]: ...
+def jit(
+    loop: Loop | None = None, /, *, math: frozenset[str] = EXACT, inline: bool = False
+) -> Loop | Callable[[Loop], Loop]:
+    """Compile a function of numbers and arrays, if Numba is installed.
+
+    The compiled function releases the interpreter lock, divides by zero as NumPy does, and is
+    cached on disk. Use as ``@jit`` or ``@jit(math=IN_ORDER)``.
+
+    Parameters
+    ----------
+    loop : callable, optional
+        The function, when used without arguments.
+    math : frozenset of str
+        Floating-point freedom of the compiler: `EXACT`, `IN_ORDER`, `ACCUMULATED` or
+        `REASSOCIATED`.
+    inline : bool
+        Make the function part of each kernel that calls it. A called function must be inlined if
+        bytes matter: linked separately, it would round differently in the process that compiles it
+        than in one that reads it from the cache, because the two link different copies.
+
+    Returns
+    -------
+    callable
+        The compiled function, or `loop` itself without Numba.
     """
+
+    def decorate(function: Loop) -> Loop:
+        try:
+            import numba
+        except ImportError:
+            return function
+        ensure_cache_folder()
+        dispatcher = numba.njit(
+            cache=True,
+            nogil=True,
+            error_model="numpy",
+            fastmath=set(math),
+            **({"forceinline": True} if inline else {}),
+        )(function)
+        drop_broken(Path(str(dispatcher.stats.cache_path)))
+        return cast(Loop, dispatcher)
+
+    return decorate if loop is None else decorate(loop)
+
+
+def numba_available() -> bool:
+    """Return whether Numba can be imported."""
     try:
-        import numba
+        import numba  # noqa: F401
     except ImportError:
-        return loop
-    ensure_cache_folder()
-    dispatcher = numba.njit(cache=True, nogil=True, error_model="numpy")(loop)
-    drop_broken(Path(str(dispatcher.stats.cache_path)))
-    return cast(Loop, dispatcher)
+        return False
+    return True
 
 
 @cache
 def drop_broken(folder: Path) -> None:
-    """Removes what a loss of power, or a full disk, cut short of the compiled code that is kept in
-    `folder`: Numba would fail on it, at every start.
+    """Remove truncated files of compiled code, on which Numba would fail at every start.
+
+    A power failure or a full disk leaves them behind.
+
+    Parameters
+    ----------
+    folder : Path
+        Cache folder; each is checked once a process.
     """
     for kept in folder.glob("*.nb[ic]"):
         with contextlib.suppress(OSError):  # another process replaced it, or it cannot be removed
@@ -44,9 +108,7 @@ def drop_broken(folder: Path) -> None:
 
 
 def ensure_cache_folder() -> None:
-    """Gives Numba a folder that lasts as long as this process, where it finds none to write to: it
-    would refuse to work.
-    """
+    """Give Numba a temporary cache folder if it can write to no other; it would refuse to work."""
     try:
         import numba
     except ImportError:
@@ -56,10 +118,8 @@ def ensure_cache_folder() -> None:
     except RuntimeError:
         folder = tempfile.mkdtemp(prefix="isc-kernels-")
         atexit.register(shutil.rmtree, folder, ignore_errors=True)
-        setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010 (the module's own declaration of it is dynamic)
+        setattr(numba.config, "CACHE_DIR", folder)  # noqa: B010 (declared dynamically there)
 
 
 def _probe() -> None:
-    """Lies among the package's modules, so that Numba looks for a cache where it will look for
-    theirs.
-    """
+    """Lie among the package's modules, so that Numba looks for a cache where theirs would be."""

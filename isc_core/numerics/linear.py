@@ -11,7 +11,7 @@ of NumPy's; meant for tens of unknowns.
 import numpy as np
 
 
-def solved(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
+def solve_linear(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
     """X (n, m) of `matrix` (n, n) X = `right` (n, m), float64.
 
     Raises `ValueError` where `matrix` has no inverse.

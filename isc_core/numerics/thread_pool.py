@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from types import TracebackType
 
 
-class Workers:
+class ThreadPool:
     """Runs lists of tasks on `threads` threads, the calling one included.
 
     Use as a context manager, or call `close`.
@@ -38,7 +38,7 @@ class Workers:
         if self._pool is not None:
             self._pool.shutdown()
 
-    def __enter__(self) -> "Workers":
+    def __enter__(self) -> "ThreadPool":
         return self
 
     def __exit__(

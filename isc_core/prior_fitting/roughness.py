@@ -14,10 +14,7 @@ import itertools
 
 import numpy as np
 
-try:
-    import numba
-except ImportError:  # there is no build for every machine; NumPy alone is about ten times slower
-    numba = None  # type: ignore[assignment]
+from ..numerics.jit import jit, numba_available
 
 Taps = list[tuple[float, float, float]]
 _SMOOTH = (0.25, 0.5, 0.25)
@@ -30,7 +27,7 @@ def roughness(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.ndarray
 
     `f` has at least 3 nodes on each of its axes.
     """
-    if numba is not None and f.ndim == 3 and f.dtype == np.float32:
+    if numba_available() and f.ndim == 3 and f.dtype == np.float32:
         gradient = np.zeros_like(f)
         return float(_rows(f, np.float32(softening), gradient)), gradient
     return roughness_numpy(f, softening)
@@ -68,7 +65,8 @@ def _spread(g: np.ndarray, taps: Taps) -> np.ndarray:
     return g
 
 
-def _rows_python(f, softening, gradient):  # type: ignore[no-untyped-def]
+@jit
+def _rows(f, softening, gradient):  # type: ignore[no-untyped-def]
     """One row along the last axis at a time: the six products of filters on the first two axes,
     then the filters on the last.
     """
@@ -129,7 +127,8 @@ def _rows_python(f, softening, gradient):  # type: ignore[no-untyped-def]
     return total
 
 
-def _add_transposed_python(t, b, gradient, i, j):  # type: ignore[no-untyped-def]
+@jit(inline=True)
+def _add_transposed(t, b, gradient, i, j):  # type: ignore[no-untyped-def]
     """Adds the transpose of a row's filters; `t` (6, n) is 0 at both ends, `b` is scratch."""
     n2 = t.shape[1]
     q, h, two = np.float32(0.25), np.float32(0.5), np.float32(2)
@@ -154,8 +153,3 @@ def _add_transposed_python(t, b, gradient, i, j):  # type: ignore[no-untyped-def
         gradient[i + 1, j - 1, k] += s + dx - dy + xx + yy - xy
         gradient[i + 1, j, k] += two * (s + dx + xx - yy)
         gradient[i + 1, j + 1, k] += s + dx + dy + xx + yy + xy
-
-
-if numba is not None:
-    _add_transposed = numba.njit(cache=True, nogil=True, inline="always")(_add_transposed_python)
-    _rows = numba.njit(cache=True, nogil=True)(_rows_python)

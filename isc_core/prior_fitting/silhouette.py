@@ -13,13 +13,13 @@ import numpy as np
 
 from ..shading.surface_stencils import normals
 from ..sirfs.priors.priors import SilhouetteProfile
-from ..sirfs.silhouette import outline_coordinates
+from ..sirfs.silhouette import silhouette_coordinates
 
 BINS = 16
 
 
 @dataclass(frozen=True)
-class OutlineMoments:
+class SilhouetteMoments:
     """One object's shares: of its pixels in each bin, and of the sums of x, x^2 and y^2 there;
 
     (4, BINS).
@@ -28,9 +28,9 @@ class OutlineMoments:
     sums: np.ndarray
 
     @classmethod
-    def of(cls, height: np.ndarray, mask: np.ndarray) -> "OutlineMoments":
+    def of(cls, height: np.ndarray, mask: np.ndarray) -> "SilhouetteMoments":
         """Of a height map (H, W), NaN where unknown, in `mask` (H, W) bool."""
-        u, down, right = outline_coordinates(mask)
+        u, down, right = silhouette_coordinates(mask)
         normal = normals(height)
         known = mask & np.isfinite(normal).all(axis=-1)
         along = (normal[..., 0] * down + normal[..., 1] * right)[known]
@@ -42,7 +42,7 @@ class OutlineMoments:
         return cls(np.stack(sums) / max(len(which), 1))
 
 
-def fit_silhouette(objects: Sequence[OutlineMoments]) -> SilhouetteProfile:
+def fit_silhouette(objects: Sequence[SilhouetteMoments]) -> SilhouetteProfile:
     """The profile of all `objects`; a bin that no object reaches takes its neighbours' values."""
     count, along, along2, across2 = np.sum([o.sums for o in objects], axis=0)
     seen = count > 0

@@ -13,7 +13,7 @@ from ..sirfs.priors.color_mixture import ColorCells
 from ..sirfs.priors.scale_mixture import Magnitudes
 from ..sirfs.surface import geometry
 from .pairs import pair_differences
-from .silhouette import OutlineMoments
+from .silhouette import SilhouetteMoments
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class ObjectStatistics:
     color_smoothness: ColorCells
     log_reflectance: np.ndarray
     grey_log_reflectance: np.ndarray
-    outline: OutlineMoments
+    outline: SilhouetteMoments
     natural_light: np.ndarray
     laboratory_light: np.ndarray
 
@@ -79,7 +79,7 @@ def object_statistics(training: TrainingObject) -> ObjectStatistics:
         color_smoothness=ColorCells.of(steps),
         log_reflectance=log_reflectance[valid].astype(np.float32),
         grey_log_reflectance=log_grey[valid].astype(np.float32)[:, None],
-        outline=OutlineMoments.of(np.asarray(training.height, float), training.mask),
+        outline=SilhouetteMoments.of(np.asarray(training.height, float), training.mask),
         natural_light=training.natural_light,
         laboratory_light=training.laboratory_light,
     )

@@ -3,9 +3,8 @@
 import sys
 from pathlib import Path
 
-from ..numerics.jit import drop_broken, ensure_cache_folder
+from ..numerics.jit import drop_broken, ensure_cache_folder, numba_available
 from ..progress import Monitor
-from .solver import compiled_engine_available
 
 
 def announce_compilation(engine: str, monitor: Monitor) -> None:
@@ -13,12 +12,12 @@ def announce_compilation(engine: str, monitor: Monitor) -> None:
     compile first: 20 s in silence look like a fault. Call before the first solve: where no cache
     folder can be written, it also sees to it that kernels work without.
     """
-    if engine == "numpy" or not compiled_engine_available():
+    if engine == "numpy" or not numba_available():
         return
     ensure_cache_folder()
     drop_broken(_folder())
     if not kernels_compiled():
-        monitor.report("preparing the compiled kernels (only once, some 20 s)", 0.0)
+        monitor.report("preparing the compiled kernels", 0.0, "only once, about 20 s")
 
 
 def kernels_compiled() -> bool:
@@ -28,9 +27,10 @@ def kernels_compiled() -> bool:
     kernel = kernels.forward_rows
     code = kernel.py_func.__code__
     source = Path(code.co_filename)
-    pattern = f"{source.stem}.{code.co_name}-{code.co_firstlineno}.py{sys.version_info[0]}{sys.version_info[1]}*.nbi"
-    found = _folder().glob(pattern)
-    return any(index.stat().st_mtime >= source.stat().st_mtime for index in found)
+    python = f"py{sys.version_info[0]}{sys.version_info[1]}"
+    pattern = f"{source.stem}.{code.co_name}-{code.co_firstlineno}.{python}*.nbi"
+    indices = _folder().glob(pattern)
+    return any(index.stat().st_mtime >= source.stat().st_mtime for index in indices)
 
 
 def _folder() -> Path:

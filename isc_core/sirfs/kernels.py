@@ -1,59 +1,201 @@
-"""The SIRFS objective as compiled row kernels: the same formulas as `surface`, `reflectance` and
+"""The SIRFS objective as compiled row kernels, with the formulas of `surface`, `reflectance` and
 `illumination`.
 
-Every loop runs over one-dimensional rows with few pointers, so that the compiler turns it into
-vector instructions; each kernel works for float32 and float64 alike. Kernels release the
-interpreter lock and write to rows of their own, hence the spill buffers: pairs reach two rows below
-a block, and these contributions are added later, in a fixed order.
+Every loop runs over one-dimensional rows with few pointers, so that the compiler can emit vector
+instructions; each kernel accepts float32 and float64. Arrays that belong together are passed as one
+named tuple, which Numba unpacks at the call. Kernels release the interpreter lock and write only to
+their own rows, hence the spill buffers: pairs reach two rows below a block, and those contributions
+are added later, in a fixed order.
 """
 
 # mypy: disable-error-code="no-untyped-def"
 # (the compiler infers the types of every call)
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import njit
 
-_FAST = {"reassoc", "contract", "arcp", "nsz", "afn"}
-compiled = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy")
-# Part of each kernel that calls it: called as a function of its own it would round otherwise in the
-# process that compiles it than in one that reads it from the cache, for the two link it with
-# another copy.
-inlined = njit(cache=True, nogil=True, fastmath=_FAST, error_model="numpy", forceinline=True)
-# Differences of neighbouring heights are exact; reordering them would lose in float32 what the
-# curvature needs.
-in_order = njit(cache=True, nogil=True, fastmath={"contract", "nsz"}, error_model="numpy")
+from ..numerics.jit import IN_ORDER, REASSOCIATED, jit
 
 
-@in_order
-def forward_rows(
-    first,
-    last,
-    zp,
-    spans,
-    log_image,
-    light,
-    whiten_smooth,
-    whiten_palette,
-    geometry,
-    whitened,
-    palette,
-    d3,
-    slant,
-):
-    """Local geometry, whitened log reflectance and the slant term of rows [first, last).
+class Photo(NamedTuple):
+    """The image and where it is valid.
 
-    zp (H+2, W+2) float64, the height with replicated borders; log_image (H, C, W); light (9, C)
-    already times the basis constants. Fills geometry (H, 9, W): zi zj n1 n2 n3 everywhere, zii zjj
-    zij curvature within spans (H, 2); whitened, palette (H, C, W) within spans; d3 (H, W) the slant
-    term's gradient, unscaled; slant (H,) its sums.
+    Attributes
+    ----------
+    log_image : (H, C, W) ndarray
+        Natural logarithm of the linear image.
+    weight : (H, W) ndarray
+        Per-pixel weight in [0, 1] of the reflectance terms, 0 where not valid.
+    valid : (H, W) ndarray
+        1 where the image is valid, else 0.
+    spans : (H, 2) int64 ndarray
+        First valid column of each row, and one past the last.
     """
+
+    log_image: np.ndarray
+    weight: np.ndarray
+    valid: np.ndarray
+    spans: np.ndarray
+
+
+class Surface(NamedTuple):
+    """The local geometry of the height map, and the slant term.
+
+    Attributes
+    ----------
+    geometry : (H, 9, W) ndarray
+        Rows zi zj zii zjj zij n1 n2 n3 and the mean curvature.
+    slant_gradient : (H, W) ndarray
+        Gradient of the slant term with respect to n3, unscaled.
+    slant : (H,) ndarray
+        Slant term of each row, unscaled.
+    """
+
+    geometry: np.ndarray
+    slant_gradient: np.ndarray
+    slant: np.ndarray
+
+
+class Reflectance(NamedTuple):
+    """Arrays of the reflectance in the space of the smoothness term and of the palette terms.
+
+    Whitening matrices are (C, C); whitened log reflectances and their gradients are (H, C, W).
+    """
+
+    smoothness: np.ndarray
+    palette: np.ndarray
+
+
+class Pairs(NamedTuple):
+    """The pairs of a smoothness term and its tabulated potential.
+
+    Attributes
+    ----------
+    offsets : (K, 2) int64 ndarray
+        Offset (down, right) of the second pixel of each pair, down >= 0.
+    costs, rises : (M,) and (M - 1,) ndarray
+        Cost at each node, and the difference to the next node.
+    low, inverse_step : float
+        Argument at the first node, and 1 / spacing of the nodes.
+    """
+
+    offsets: np.ndarray
+    costs: np.ndarray
+    rises: np.ndarray
+    low: float
+    inverse_step: float
+
+
+class PairSums(NamedTuple):
+    """What the blocks of a smoothness term write.
+
+    Attributes
+    ----------
+    gradient : (H, ..., W) ndarray
+        Gradient with respect to the differenced quantity, unscaled.
+    spill : (B, 2, ..., W) ndarray
+        What each block adds to the two rows below it.
+    cost : (B,) ndarray
+        Sum of each block, unscaled.
+    """
+
+    gradient: np.ndarray
+    spill: np.ndarray
+    cost: np.ndarray
+
+
+class Grid(NamedTuple):
+    """One axis of the table of absolute colour; all three are alike."""
+
+    low: float
+    high: float
+    step: float
+    inverse_step: float
+    nodes: int
+
+
+class Cells(NamedTuple):
+    """Where every pixel falls on the occupied part of the colour grid.
+
+    Attributes
+    ----------
+    index : (H, W) int32 ndarray
+        Flat index of the cell's first node.
+    side : (H, 3, W) ndarray
+        Position in the cell, in [0, 1].
+    """
+
+    index: np.ndarray
+    side: np.ndarray
+
+
+class Pulls(NamedTuple):
+    """Gradients that `backward_rows` carries on to the height and the light; unscaled.
+
+    Attributes
+    ----------
+    smoothness, palette : (H, C, W) ndarray
+        With respect to the whitened log reflectances.
+    curvature : (H, W) ndarray
+        With respect to the mean curvature.
+    """
+
+    smoothness: np.ndarray
+    palette: np.ndarray
+    curvature: np.ndarray
+
+
+class Backward(NamedTuple):
+    """What `backward_rows` writes.
+
+    Attributes
+    ----------
+    light : (H, 9, C) ndarray
+        Gradient with respect to the light of each row, as sums over monomials of the normal.
+    derivatives : (5, H + 4, W + 4) ndarray
+        Gradient with respect to zi, zj, zii, zjj and zij, with a zero border of two pixels; the
+        last three are zero outside the spans.
+    """
+
+    light: np.ndarray
+    derivatives: np.ndarray
+
+
+@jit(math=IN_ORDER)
+def forward_rows(first, last, padded, photo, light, whiten, surface, reflectance):
+    """Compute the geometry, the whitened log reflectance and the slant term of rows [first, last).
+
+    Differences of neighbouring heights are exact; reordering them would lose in float32 what the
+    curvature needs, hence the mode `IN_ORDER`.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows of this call.
+    padded : (H + 2, W + 2) float64 ndarray
+        Height with replicated borders, pixels.
+    photo : Photo
+    light : (9, C) ndarray
+        Coefficients, already multiplied by the constants of the basis.
+    whiten : Reflectance
+        Whitening matrices.
+    surface : Surface
+        Output; curvature and second derivatives are written within the spans only.
+    reflectance : Reflectance
+        Output; whitened log reflectances, written within the spans only.
+    """
+    log_image, spans = photo.log_image, photo.spans
+    geometry = surface.geometry
+    whitened, palette = reflectance.smoothness, reflectance.palette
+    whiten_smooth, whiten_palette = whiten.smoothness, whiten.palette
     t = geometry.dtype.type
     one, two, half = t(1), t(2), t(0.5)
     channels, width = log_image.shape[1], log_image.shape[2]
     soft = t(1e-4)
     a = np.empty((channels, width), geometry.dtype)
     for i in range(first, last):
-        up, mid, low = zp[i], zp[i + 1], zp[i + 2]
+        up, mid, low = padded[i], padded[i + 1], padded[i + 2]
         row = geometry[i]
         zi, zj, n1, n2, n3 = row[0], row[1], row[5], row[6], row[7]
         for j in range(width):
@@ -71,21 +213,21 @@ def forward_rows(
         for j in range(width):
             n2[j] = -zj[j] * n3[j]
         total = t(0)
-        dslant = d3[i]
+        dslant = surface.slant_gradient[i]
         for j in range(width):
             x = -np.log(n3[j])
             root = np.sqrt(x * x + soft)
             total += root
             dslant[j] = -x / (root * n3[j])
-        slant[i] = total
+        surface.slant[i] = total
         start, stop = spans[i, 0], spans[i, 1]
         count = stop - start
         if count <= 0:
             continue
         up, mid, low = (
-            zp[i, start : stop + 2],
-            zp[i + 1, start : stop + 2],
-            zp[i + 2, start : stop + 2],
+            padded[i, start : stop + 2],
+            padded[i + 1, start : stop + 2],
+            padded[i + 2, start : stop + 2],
         )
         zi, zj, zii, zjj, zij = (
             row[0, start:stop],
@@ -143,7 +285,7 @@ def forward_rows(
         _mix(a[:, :count], whiten_palette, palette[i, :, start:stop])
 
 
-@inlined
+@jit(math=REASSOCIATED, inline=True)
 def _mix(source, matrix, target):
     """target[c] = sum_d matrix[c, d] source[d], row by row."""
     width = source.shape[1]
@@ -159,32 +301,27 @@ def _mix(source, matrix, target):
             out[j] = m0 * s0[j] + m1 * s1[j] + m2 * s2[j]
 
 
-@compiled
-def smoothness_block(
-    first,
-    last,
-    whitened,
-    trust,
-    spans,
-    offsets,
-    table,
-    rises,
-    low,
-    inverse_step,
-    gradient,
-    spill,
-    total,
-    block,
-):
-    """The smoothness term of the pairs whose upper pixel lies in rows [first, last); gradients
-    unscaled. trust (H, W) in [0, 1].
+@jit(math=REASSOCIATED)
+def smoothness_block(first, last, block, whitened, photo, pairs, out):
+    """Compute the smoothness term of the pairs whose upper pixel lies in rows [first, last).
 
-    gradient (H, C, W) is overwritten in these rows; what goes to the two rows below goes to spill
-    (2, C, W).
+    Parameters
+    ----------
+    first, last, block : int
+        Rows of this block, and its index.
+    whitened : (H, C, W) ndarray
+        Whitened log reflectance.
+    photo : Photo
+    pairs : Pairs
+    out : PairSums
+        Output; `gradient` is overwritten in these rows, `spill` and `cost` at `block`.
     """
+    weight, spans = photo.weight, photo.spans
+    offsets, table, rises = pairs.offsets, pairs.costs, pairs.rises
+    gradient, spill = out.gradient, out.spill[block]
     t = whitened.dtype.type
     half, soft, zero = t(0.5), t(1e-8), t(0)
-    inv, low_t = t(inverse_step), t(low)
+    inv, low_t = t(pairs.inverse_step), t(pairs.low)
     height, channels, width = whitened.shape
     last_cell = t(len(table) - 2)
     d = np.empty((channels, width), whitened.dtype)
@@ -204,7 +341,7 @@ def smoothness_block(
             n = b - a
             if n <= 0:
                 continue
-            va, vb = trust[i, a:b], trust[q, a + right : b + right]
+            va, vb = weight[i, a:b], weight[q, a + right : b + right]
             for k in range(n):
                 w[k] = va[k] * vb[k]
             for c in range(channels):
@@ -234,9 +371,7 @@ def smoothness_block(
                     cells[k] = np.int32(min(f[k], last_cell))
                 for k in range(n):
                     f[k] -= t(cells[k])
-                for k in range(
-                    n
-                ):  # the only loop that the table's look-up keeps from becoming vector instructions
+                for k in range(n):  # the table look-up keeps this loop from being vectorised
                     cell = cells[k]
                     rise = rises[cell]
                     part += w[k] * (table[cell] + f[k] * rise)
@@ -258,31 +393,29 @@ def smoothness_block(
                     g = spill[q - last, c, a + right : b + right]
                 for k in range(n):
                     g[k] -= dc[k]
-    total[block] = cost
+    out.cost[block] = cost
 
 
-@compiled
-def curvature_block(
-    first,
-    last,
-    geometry,
-    valid,
-    spans,
-    offsets,
-    table,
-    rises,
-    low,
-    inverse_step,
-    gradient,
-    spill,
-    total,
-    block,
-):
-    """The curvature term of the pairs whose upper pixel lies in rows [first, last); as
-    `smoothness_block`, (H, W) and (2, W).
+@jit(math=REASSOCIATED)
+def curvature_block(first, last, block, geometry, photo, pairs, out):
+    """Compute the curvature term of the pairs whose upper pixel lies in rows [first, last).
+
+    Parameters
+    ----------
+    first, last, block : int
+        Rows of this block, and its index.
+    geometry : (H, 9, W) ndarray
+        See `Surface`.
+    photo : Photo
+    pairs : Pairs
+    out : PairSums
+        Output, as in `smoothness_block`, without an axis of channels.
     """
+    valid, spans = photo.valid, photo.spans
+    offsets, table, rises = pairs.offsets, pairs.costs, pairs.rises
+    gradient, spill = out.gradient, out.spill[block]
     t = geometry.dtype.type
-    soft, zero, inv, low_t = t(1e-8), t(0), t(inverse_step), t(low)
+    soft, zero, inv, low_t = t(1e-8), t(0), t(pairs.inverse_step), t(pairs.low)
     height, width = valid.shape
     last_cell = t(len(table) - 2)
     d = np.empty(width, geometry.dtype)
@@ -333,12 +466,24 @@ def curvature_block(
                 g = spill[q - last, a + right : b + right]
             for k in range(n):
                 g[k] -= d[k]
-    total[block] = cost
+    out.cost[block] = cost
 
 
-@compiled
-def palette_range(palette, trust, spans, low, step, nodes, bounds):
-    """The first and last occupied node on each axis: fills bounds (C, 2)."""
+@jit(math=REASSOCIATED)
+def palette_range(palette, photo, grid, bounds):
+    """Find the occupied part of the colour grid.
+
+    Parameters
+    ----------
+    palette : (H, 3, W) ndarray
+        Log reflectance, whitened for the palette terms.
+    photo : Photo
+    grid : Grid
+    bounds : (3, 2) int64 ndarray
+        Output: the first occupied node of each axis, and one past the last.
+    """
+    weight, spans = photo.weight, photo.spans
+    low, step, nodes = grid.low, grid.step, grid.nodes
     height, channels, _ = palette.shape
     t = palette.dtype.type
     for c in range(channels):
@@ -346,7 +491,7 @@ def palette_range(palette, trust, spans, low, step, nodes, bounds):
         for i in range(height):
             row = palette[i, c]
             for j in range(spans[i, 0], spans[i, 1]):
-                if trust[i, j] > t(0):
+                if weight[i, j] > t(0):
                     least, most = min(least, row[j]), max(most, row[j])
         first = min(max((least - low) / step, 0.0), nodes - 1.0)
         final = min(max((most - low) / step, 0.0), nodes - 1.0)
@@ -354,11 +499,24 @@ def palette_range(palette, trust, spans, low, step, nodes, bounds):
         bounds[c, 1] = min(int(final), nodes - 2) + 2
 
 
-@compiled
-def locate_color(palette, spans, low, inverse_step, nodes, bounds, cell, side):
-    """Where every pixel falls on the occupied part of the grid: cell (H, W) its flat node, side (H,
-    3, W) its place in the cell.
+@jit(math=REASSOCIATED)
+def locate_color(palette, spans, grid, bounds, cells):
+    """Find where every pixel falls on the occupied part of the colour grid.
+
+    Parameters
+    ----------
+    palette : (H, 3, W) ndarray
+        Log reflectance, whitened for the palette terms.
+    spans : (H, 2) int64 ndarray
+        See `Photo`.
+    grid : Grid
+    bounds : (3, 2) int64 ndarray
+        See `palette_range`.
+    cells : Cells
+        Output.
     """
+    low, inverse_step, nodes = grid.low, grid.inverse_step, grid.nodes
+    cell, side = cells.index, cells.side
     sizes = bounds[:, 1] - bounds[:, 0]
     strides = (sizes[1] * sizes[2], sizes[2], 1)
     t = side.dtype.type
@@ -377,20 +535,28 @@ def locate_color(palette, spans, low, inverse_step, nodes, bounds, cell, side):
                 flat[j] += (whole - first) * stride
 
 
-@compiled
-def splat_color(trust, spans, cell, side, counts):
-    """Adds every pixel's trust (H, W) to the eight nodes around its whitened log colour; counts (A,
-    B, N).
+@jit(math=REASSOCIATED)
+def splat_color(photo, cells, counts):
+    """Add every pixel's weight to the eight nodes around its whitened log colour.
+
+    Parameters
+    ----------
+    photo : Photo
+    cells : Cells
+    counts : (A, B, N) float64 ndarray
+        Changed in place.
     """
+    weight, spans = photo.weight, photo.spans
+    cell, side = cells.index, cells.side
     right, down = counts.shape[2], counts.shape[1] * counts.shape[2]
     flat = counts.reshape(counts.size)
-    for i in range(trust.shape[0]):
+    for i in range(weight.shape[0]):
         for j in range(spans[i, 0], spans[i, 1]):
-            if trust[i, j] == 0:
+            if weight[i, j] == 0:
                 continue
             k = cell[i, j]
             x, y, z = float(side[i, 0, j]), float(side[i, 1, j]), float(side[i, 2, j])
-            share = float(trust[i, j])
+            share = float(weight[i, j])
             x0, y0, x = share * (1 - x), 1 - y, share * x
             p00, p01, p10, p11 = x0 * y0, x0 * y, x * y0, x * y
             flat[k] += p00 * (1 - z)
@@ -403,23 +569,34 @@ def splat_color(trust, spans, cell, side, counts):
             flat[k + down + right + 1] += p11 * z
 
 
-@compiled
-def gather_color(
-    palette, trust, spans, low, high, inverse_step, cell, side, node_gradient, gradient
-):
-    """Gradient (H, 3, W) of the whitened log colours from that of the node counts (A, B, N), times
-    trust; 0 off the grid.
+@jit(math=REASSOCIATED)
+def gather_color(palette, photo, grid, cells, node_gradient, gradient):
+    """Compute the gradient of the whitened log colours from that of the node counts.
+
+    Parameters
+    ----------
+    palette : (H, 3, W) ndarray
+        Log reflectance, whitened for the palette terms.
+    photo : Photo
+    grid : Grid
+    cells : Cells
+    node_gradient : (A, B, N) ndarray
+    gradient : (H, 3, W) ndarray
+        Output, written within the spans; 0 where a colour lies off the grid.
     """
+    weight, spans = photo.weight, photo.spans
+    low, high = grid.low, grid.high
+    cell, side = cells.index, cells.side
     t = gradient.dtype.type
-    inv = t(inverse_step)
+    inv = t(grid.inverse_step)
     right, down = node_gradient.shape[2], node_gradient.shape[1] * node_gradient.shape[2]
     flat = node_gradient.reshape(node_gradient.size)
     for i in range(palette.shape[0]):
         gx_row, gy_row, gz_row = gradient[i, 0], gradient[i, 1], gradient[i, 2]
         for j in range(spans[i, 0], spans[i, 1]):
-            if trust[i, j] == 0:
+            if weight[i, j] == 0:
                 continue
-            k, share = cell[i, j], inv * trust[i, j]
+            k, share = cell[i, j], inv * weight[i, j]
             x, y, z = side[i, 0, j], side[i, 1, j], side[i, 2, j]
             g000, g001, g010, g011 = flat[k], flat[k + 1], flat[k + right], flat[k + right + 1]
             k += down
@@ -438,7 +615,7 @@ def gather_color(
                     out[j] = t(0)
 
 
-@compiled
+@jit(math=REASSOCIATED)
 def blur_color(counts, taps, blurred):
     """Separable blur of counts (A, B, N), zero padded, only where it can matter:
 
@@ -486,10 +663,24 @@ def blur_color(counts, taps, blurred):
                     target[c] += source[c] * tap
 
 
-@compiled
+@jit(math=REASSOCIATED)
 def silhouette_rows(first, last, geometry, expected, strength, gradient, sums):
-    """The silhouette term of rows [first, last): overwrites gradient (2, H, W) with those of n1 and
-    n2, sums (H,) with its costs.
+    """Compute the silhouette term of rows [first, last).
+
+    Parameters
+    ----------
+    first, last : int
+        Rows of this call.
+    geometry : (H, 9, W) ndarray
+        See `Surface`.
+    expected : (2, H, W) ndarray
+        Expected n1 and n2.
+    strength : (H, W) ndarray
+        Precision times the term's scale.
+    gradient : (2, H, W) ndarray
+        Output: gradients with respect to n1 and n2.
+    sums : (H,) ndarray
+        Output: the term of each row.
     """
     t = geometry.dtype.type
     half = t(0.5)
@@ -512,29 +703,38 @@ def silhouette_rows(first, last, geometry, expected, strength, gradient, sums):
         sums[i] = half * total
 
 
-@compiled
-def backward_rows(
-    first, last, geometry, spans, light, whiten_smooth, whiten_palette, g_smooth, g_palette, g_curvature, scales, d3, contour, light_sums,
-    out,
-):  # fmt: skip
-    """Gradients of the first and second derivatives of the height, and of the light, for rows
-    [first, last).
+@jit(math=REASSOCIATED)
+def backward_rows(first, last, surface, spans, light, whiten, pulls, scales, in_plane, out):
+    """Compute the gradients with respect to the height's derivatives and the light.
 
-    g_smooth, g_palette (H, C, W) and g_curvature (H, W) matter within spans (H, 2); scales:
-    (smoothness, palette, curvature, slant); contour (2, H, W); light_sums (H, 9, C), of monomials
-    of the normal; out (5, H + 4, W + 4) with zero borders of two, and zero outside spans in its
-    last three.
+    Parameters
+    ----------
+    first, last : int
+        Rows of this call.
+    surface : Surface
+    spans : (H, 2) int64 ndarray
+        See `Photo`.
+    light : (9, C) ndarray
+        As in `forward_rows`.
+    whiten : Reflectance
+        Whitening matrices.
+    pulls : Pulls
+        Gradients with respect to the whitened log reflectances and the curvature.
+    scales : tuple of float
+        Factors of the smoothness, palette, curvature and slant gradients.
+    in_plane : (2, H, W) ndarray
+        Gradients of the contour and silhouette terms with respect to n1 and n2.
+    out : Backward
+        Output.
     """
+    geometry, light_sums = surface.geometry, out.light
+    g_smooth, g_palette, g_curvature = pulls.smoothness, pulls.palette, pulls.curvature
     t = geometry.dtype.type
     two, three = t(2), t(3)
     channels, width = g_smooth.shape[1], g_smooth.shape[2]
-    k_smooth, k_palette, k_curvature, k_slant = (
-        t(scales[0]),
-        t(scales[1]),
-        t(scales[2]),
-        t(scales[3]),
-    )
-    m_smooth, m_palette = whiten_smooth.T * k_smooth, whiten_palette.T * k_palette
+    k_smooth, k_palette = t(scales[0]), t(scales[1])
+    k_curvature, k_slant = t(scales[2]), t(scales[3])
+    m_smooth, m_palette = whiten.smoothness.T * k_smooth, whiten.palette.T * k_palette
     shape = (channels, width)
     e_all, f_all = np.empty(shape, geometry.dtype), np.empty(shape, geometry.dtype)
     d1_all, d2_all, dn3_all = (
@@ -547,7 +747,7 @@ def backward_rows(
         row = geometry[i]
         start, stop = spans[i, 0], spans[i, 1]
         count = stop - start
-        c1, c2, slant = contour[0, i], contour[1, i], d3[i]
+        c1, c2, slant = in_plane[0, i], in_plane[1, i], surface.slant_gradient[i]
         for j in range(width):
             d1_all[j] = c1[j]
         for j in range(width):
@@ -590,18 +790,21 @@ def backward_rows(
             for j in range(count):
                 dk[j] = dk[j] * n3[j] * n3[j] * n3[j]
         n3 = row[7]
-        down, right = out[0, i + 2, 2 : width + 2], out[1, i + 2, 2 : width + 2]
+        down = out.derivatives[0, i + 2, 2 : width + 2]
+        right = out.derivatives[1, i + 2, 2 : width + 2]
         for j in range(width):
             down[j] = zi[j] * along_all[j] - n3[j] * d1_all[j]
         for j in range(width):
             right[j] = zj[j] * along_all[j] - n3[j] * d2_all[j]
         if count > 0:
             _curvature_derivatives(
-                row[:, start:stop], dk_all[:count], out[:, i + 2, start + 2 : stop + 2]
+                row[:, start:stop],
+                dk_all[:count],
+                out.derivatives[:, i + 2, start + 2 : stop + 2],
             )
 
 
-@inlined
+@jit(math=REASSOCIATED, inline=True)
 def _curvature_derivatives(row, dk, out):
     """Adds what the curvature's gradient dk (W,), times n3^3, asks of the five derivatives in `out`
     (5, W); the last three are set.
@@ -632,7 +835,7 @@ def _curvature_derivatives(row, dk, out):
         o[j] = -dk[j] * zi[j] * zj[j]
 
 
-@inlined
+@jit(math=REASSOCIATED, inline=True)
 def _light_sums(d, n1, n2, n3, sums):
     """Sums of d times 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
     t = d.dtype.type
@@ -661,7 +864,7 @@ def _light_sums(d, n1, n2, n3, sums):
     )
 
 
-@compiled
+@jit(math=REASSOCIATED)
 def adjoint_rows(first, last, d, wide):
     """Rows [first, last) of the gradient of the padded height, (H+2, W+2), from those of its
     derivatives, (5, H+4, W+4).

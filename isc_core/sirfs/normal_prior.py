@@ -18,47 +18,40 @@ from scipy import ndimage
 from ..imaging.upsampling import enlarged
 from ..scene.normal_estimate import NormalEstimate
 from .priors.priors import SilhouetteProfile
-from .silhouette import SilhouetteField, silhouette_field
+from .silhouette import ExpectedNormals, normals_from_silhouette
 
 _STEP = 4  # pixels of the coarse grid
-_STEEPEST = 0.97  # of an in-plane part, where slopes are added up
-_COVERED = 0.1  # of a cell that belongs to the object
-_PRECISION = 1e-6  # of the slopes' sums: the start is not needed better
+_STEEPEST = 0.97  # largest in-plane part of a normal that is integrated
+_COVERED = 0.1  # least share of a cell that belongs to the object
+_PRECISION = 1e-6  # relative residual: the start need not be more exact
 
 
-def expected_field(
-    mask: np.ndarray, profile: SilhouetteProfile | None, seen: NormalEstimate | None
-) -> SilhouetteField | None:
-    """What is expected of the normals inside `mask` (H, W) bool: what was `seen`, else what the
-    outline suggests by `profile`.
-    """
-    if seen is not None:
-        return seen_field(seen, mask)
-    return None if profile is None else silhouette_field(mask, profile)
+def expected_normals(
+    mask: np.ndarray, profile: SilhouetteProfile | None, predicted: NormalEstimate | None
+) -> ExpectedNormals | None:
+    if predicted is not None:
+        return normals_from_prediction(predicted, mask)
+    return None if profile is None else normals_from_silhouette(mask, profile)
 
 
-def seen_field(seen: NormalEstimate, mask: np.ndarray) -> SilhouetteField:
-    """What `seen` says of the normals inside `mask` (H, W) bool; where that reaches further, the
-    nearest that was seen goes on.
-    """
+def normals_from_prediction(predicted: NormalEstimate, mask: np.ndarray) -> ExpectedNormals:
     nearest = tuple(
         ndimage.distance_transform_edt(
-            seen.deviation <= 0, return_distances=False, return_indices=True
+            predicted.deviation <= 0, return_distances=False, return_indices=True
         )
     )
-    normal, deviation = seen.normal[nearest].astype(float), seen.deviation[nearest].astype(float)
+    normal = predicted.normal[nearest].astype(float)
+    deviation = predicted.deviation[nearest].astype(float)
     maps = (-normal[..., 1], normal[..., 0], 1 / deviation**2, height_of_normals(normal, mask))
-    return SilhouetteField(*(np.where(mask, values, 0) for values in maps))
+    return ExpectedNormals(*(np.where(mask, values, 0) for values in maps))
 
 
 def height_of_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
     """The height (H, W) in pixels, 0 at its lowest and outside `mask` (H, W) bool, whose slopes are
     nearest to those of the mean normals (H, W, 3); nothing finer than 4 pixels.
     """
-    cover, sums = (
-        _cells(mask.astype(float)),
-        [_cells(np.where(mask, normal[..., k], 0)) for k in (0, 1)],
-    )
+    cover = _cells(mask.astype(float))
+    sums = [_cells(np.where(mask, normal[..., k], 0)) for k in (0, 1)]
     across, up = (total / np.where(cover > 0, cover, 1) for total in sums)
     flat = np.minimum(1, _STEEPEST / np.maximum(np.hypot(across, up), _STEEPEST))
     across, up = across * flat, up * flat
@@ -66,7 +59,7 @@ def height_of_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
     known = cover > _COVERED
     if not known.any():
         return np.zeros(mask.shape)
-    height = _added_up(-_STEP * across / steep, _STEP * up / steep, known)
+    height = _integrated(-_STEP * across / steep, _STEP * up / steep, known)
     nearest = tuple(
         ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
     )
@@ -85,14 +78,16 @@ def _cells(values: np.ndarray) -> np.ndarray:
     return np.asarray(padded.reshape(rows, _STEP, columns, _STEP).mean(axis=(1, 3)))
 
 
-def _added_up(right: np.ndarray, down: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """The height (h, w), least 0, 0 where not `known`, that rises nearest to `right` and `down`
-    from a cell to the next, in least squares: by conjugate gradients (M. R. Hestenes and E. Stiefel
-    1952, doi:10.6028/jres.049.044), whose sums no thread reorders.
+def _integrated(right: np.ndarray, down: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Height (h, w), least 0, 0 where not `known`, whose rises to the next cell are nearest to
+    `right` and `down` in least squares.
+
+    By conjugate gradients (M. R. Hestenes and E. Stiefel 1952, doi:10.6028/jres.049.044), whose
+    sums no thread reorders.
     """
     beside, below = known[:, :-1] & known[:, 1:], known[:-1] & known[1:]
 
-    def transposed(along: np.ndarray, across: np.ndarray) -> np.ndarray:
+    def adjoint(along: np.ndarray, across: np.ndarray) -> np.ndarray:
         out = np.zeros(known.shape)
         out[:, 1:] += along
         out[:, :-1] -= along
@@ -107,15 +102,15 @@ def _added_up(right: np.ndarray, down: np.ndarray, known: np.ndarray) -> np.ndar
         np.where(beside, (right[:, :-1] + right[:, 1:]) / 2, 0),
         np.where(below, (down[:-1] + down[1:]) / 2, 0),
     )
-    height, left = np.zeros(known.shape), transposed(*wanted)
-    way, square = left, float(np.square(left).sum())
+    height, residual = np.zeros(known.shape), adjoint(*wanted)
+    direction, square = residual, float(np.square(residual).sum())
     enough = _PRECISION**2 * square
     for _ in range(known.size):
         if square <= enough:
             break
-        turned = transposed(*rises(way))
-        step = square / float((way * turned).sum())
-        height, left = height + step * way, left - step * turned
-        before, square = square, float(np.square(left).sum())
-        way = left + square / before * way
+        image = adjoint(*rises(direction))
+        step = square / float((direction * image).sum())
+        height, residual = height + step * direction, residual - step * image
+        before, square = square, float(np.square(residual).sum())
+        direction = residual + square / before * direction
     return np.where(known, height - height[known].min(), 0)

@@ -17,7 +17,7 @@ class NumpyEngine:
     def __init__(self, problem: Problem, dtype: type[np.floating] = np.float64) -> None:
         self.problem = problem
         self.dtype = np.dtype(dtype)
-        self._trust = problem.reflectance_weight
+        self._pixel_weight = problem.reflectance_weight
         self._log_image = np.ascontiguousarray(problem.log_image, self.dtype)
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
@@ -45,14 +45,14 @@ class NumpyEngine:
         p, w = self.problem, self.problem.weights
         if p.shading_only:
             cost, gradient = reflectance.one_color_cost(
-                log_reflectance, self._trust, w.shading_only
+                log_reflectance, self._pixel_weight, w.shading_only
             )
             return {"shading_only": cost}, gradient
         smooth, d_smooth = reflectance.smoothness_cost(
-            log_reflectance, self._trust, p.priors, w.smoothness
+            log_reflectance, self._pixel_weight, p.priors, w.smoothness
         )
         parsimony, absolute, d_palette = reflectance.palette_cost(
-            log_reflectance, self._trust, p.priors, w
+            log_reflectance, self._pixel_weight, p.priors, w
         )
         return {
             "smoothness": smooth,
@@ -87,6 +87,6 @@ class NumpyEngine:
             d1, d2 = d1 + e1, d2 + e2
         gradient = surface.height_gradient(g, d1, d2, d3 + d_slant, dk)
         if p.observation is not None:
-            terms["observation"], seen = surface.observation_cost(height, p.observation)
-            gradient = gradient + seen
+            terms["observation"], pull = surface.observation_cost(height, p.observation)
+            gradient = gradient + pull
         return terms, gradient

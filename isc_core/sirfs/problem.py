@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..scene.known_inputs import DepthObservation
 from ..shading.occluding_contour import Contour
 from .priors.priors import Priors
 from .settings import Weights
-from .silhouette import SilhouetteField
+from .silhouette import ExpectedNormals
 
-# Half of the 5 x 5 window's offsets (down, right): every unordered pair once.
+# Half of the offsets (down, right) in a 5 x 5 window: every unordered pair once.
 PAIR_OFFSETS = (
     (0, 1),
     (0, 2),
@@ -29,20 +30,6 @@ PAIR_OFFSETS = (
 
 
 @dataclass(frozen=True)
-class DepthObservation:
-    """Heights seen by something else (a depth sensor, another program): a map with holes.
-
-    `height`: (H, W) in pixels toward the viewer, any constant added, NaN where nothing was seen.
-    `sigma`: its standard error in pixels; larger differences cost linearly, so that outliers do not
-    rule. `weight`: of the whole term.
-    """
-
-    height: np.ndarray
-    sigma: float = 2.0
-    weight: float = 10.0
-
-
-@dataclass(frozen=True)
 class Problem:
     """`log_image`: (H, W, C) natural logarithm of linear intensities, 0 where not `valid`; `valid`:
     (H, W) bool.
@@ -50,7 +37,7 @@ class Problem:
     `mask`: (H, W) bool, the object; `contour`: its occluding contour.
 
     `silhouette`: what the outline says of the normals. `shading_only`: shape-from-shading mode,
-    reflectance is taken as one unknown colour. `trust`: (H, W) in [0, 1], how much a valid pixel
+    reflectance is taken as one unknown colour. `pixel_weight`: (H, W) in [0, 1], how much a valid pixel
     counts in the terms of reflectance, of a pair the product; not 0 everywhere. None: 1.
     """
 
@@ -62,13 +49,13 @@ class Problem:
     weights: Weights
     observation: DepthObservation | None = None
     shading_only: bool = False
-    silhouette: SilhouetteField | None = None
-    trust: np.ndarray | None = None
+    silhouette: ExpectedNormals | None = None
+    pixel_weight: np.ndarray | None = None
 
     @property
     def reflectance_weight(self) -> np.ndarray:
-        """`trust` (H, W) float64, 0 where not valid."""
-        return np.where(self.valid, 1.0 if self.trust is None else self.trust, 0.0)
+        """`pixel_weight` (H, W) float64, 0 where not valid."""
+        return np.where(self.valid, 1.0 if self.pixel_weight is None else self.pixel_weight, 0.0)
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,14 @@
-"""Shape and illumination of one masked diffuse image: the SIRFS problem set up, solved, and brought
-back to the image's scale.
+"""Shape and illumination of one masked diffuse image: sets up the SIRFS problem, solves it, and
+brings the result back to the image's scale.
 
-The priors speak of pixels, so the object is brought to one size first
-(`RecoverOptions.solve_size`), and a window of its box with a fixed margin is solved: neither the
-photo's scale nor empty space around the object changes the answer.
+Problem: the priors are statistics per pixel, so the answer would depend on the photo's scale and on
+the empty space around the object. The object is therefore resampled to one size
+(`RecoverOptions.solve_size`), and a window around its bounding box with a fixed margin is solved.
+
+Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
+2015, doi:10.1109/TPAMI.2014.2377712.
+
+Limits: one object; detail finer than `solve_size` allows is not in the height.
 """
 
 from dataclasses import dataclass, field, replace
@@ -13,13 +18,14 @@ import numpy as np
 from ..imaging.framing import continued
 from ..imaging.resampling import height_scale, resample_height, resample_inside
 from ..progress import Monitor
+from ..scene.known_inputs import DepthObservation, SceneConstraints
 from ..scene.normal_estimate import NormalEstimate
 from ..shading.occluding_contour import Contour, occluding_contour
-from .normal_prior import expected_field
+from .normal_prior import expected_normals
 from .priors.priors import Priors
-from .problem import DepthObservation, Problem, Terms
+from .problem import Problem, Terms
 from .settings import Weights
-from .solver import SolverOptions, solve
+from .solver import SirfsResult, SolverOptions, solve
 
 MARGIN = 20
 SOLVE_SIZE = 256
@@ -55,24 +61,26 @@ class RecoverOptions:
 
 
 @dataclass(frozen=True)
-class Known:
-    """What is known beforehand, each at the image's scale: `height` (H, W) in pixels, `light` (9,
-    C) reference convention, `depth` an observation with holes; outside the mask it is not looked
-    at.
-    """
-
-    height: np.ndarray | None = None
-    light: np.ndarray | None = None
-    depth: DepthObservation | None = None
-
-
-@dataclass(frozen=True)
 class Recovered:
-    """`height`: (H, W) float64 at the image's scale, pixels, 0 mean over the mask unless given;
-    valid in the mask and its surroundings.
+    """Shape and light of an image, at the image's scale.
 
-    `light`: (9, C) reference convention. `solved_shape`: of the window that was solved. `reason`:
-    why the solver stopped.
+    Attributes
+    ----------
+    height : (H, W) float64 ndarray
+        Pixels toward the viewer, mean 0 over the mask unless it was given; valid in the mask and
+        its surroundings.
+    light : (9, C) ndarray
+        Log-shading SH coefficients, reference convention.
+    terms : Terms
+        Terms of the objective at the solution.
+    iterations, evaluations : int
+        Steps of the optimiser, and evaluations of the objective.
+    reason : str
+        Why the optimiser stopped, see `LbfgsResult`.
+    converged : bool
+        Whether it stopped because there was no more to gain.
+    solved_shape : tuple of int
+        Shape of the window that was solved.
     """
 
     height: np.ndarray
@@ -86,8 +94,16 @@ class Recovered:
 
 
 @dataclass(frozen=True)
-class _Window:
-    """A rectangle around the object that may reach beyond the image."""
+class Window:
+    """A rectangle around the object, which may reach beyond the image.
+
+    Attributes
+    ----------
+    top, left : int
+        First row and column; may be negative.
+    height, width : int
+        Size in pixels.
+    """
 
     top: int
     left: int
@@ -95,6 +111,7 @@ class _Window:
     width: int
 
     def cut(self, array: np.ndarray, fill: float | bool) -> np.ndarray:
+        """Return the window of `array` (H, W, ...), with `fill` beyond the image."""
         rows, columns = array.shape[:2]
         out = np.full((self.height, self.width, *array.shape[2:]), fill, array.dtype)
         a, b = max(self.top, 0), min(self.top + self.height, rows)
@@ -102,8 +119,8 @@ class _Window:
         out[a - self.top : b - self.top, c - self.left : d - self.left] = array[a:b, c:d]
         return out
 
-    def cut_on(self, array: np.ndarray) -> np.ndarray:
-        """The same with the border's values going on beyond the image."""
+    def cut_replicated(self, array: np.ndarray) -> np.ndarray:
+        """Return the window of `array` (H, W), with its border values beyond the image."""
         rows, columns = (
             np.clip(np.arange(start, start + size), 0, n - 1)
             for start, size, n in zip(
@@ -112,12 +129,92 @@ class _Window:
         )
         return array[np.ix_(rows, columns)]
 
+    def cut_silhouette(self, silhouette: np.ndarray) -> np.ndarray:
+        """Return the window of `silhouette` (H, W) bool, continued where the frame cuts it."""
+        below = self.top + self.height - silhouette.shape[0]
+        beyond = self.left + self.width - silhouette.shape[1]
+        grown = continued(
+            silhouette, max(-self.top, 0), max(below, 0), max(-self.left, 0), max(beyond, 0)
+        )
+        top, left = max(self.top, 0), max(self.left, 0)
+        return grown[top : top + self.height, left : left + self.width]
+
     def put(self, window: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
+        """Return an image of `shape` that holds `window`, 0 elsewhere."""
         out = np.zeros(shape, window.dtype)
         a, b = max(self.top, 0), min(self.top + self.height, shape[0])
         c, d = max(self.left, 0), min(self.left + self.width, shape[1])
         out[a:b, c:d] = window[a - self.top : b - self.top, c - self.left : d - self.left]
         return out
+
+
+@dataclass(frozen=True)
+class SolveInputs:
+    """The maps a problem is made of, all at one scale.
+
+    Attributes
+    ----------
+    image : (h, w, C) ndarray
+        Linear diffuse image.
+    valid : (h, w) bool ndarray
+        Pixels whose values count.
+    silhouette : (h, w) bool ndarray
+        The object, continued beyond the photo.
+    photo : (h, w) bool ndarray
+        The part of the window inside the photo.
+    pixel_weight : (h, w) ndarray or None
+        See `Problem`.
+    normals : NormalEstimate or None
+        Predicted normals.
+    depth : DepthObservation or None
+        Observed depth.
+    """
+
+    image: np.ndarray
+    valid: np.ndarray
+    silhouette: np.ndarray
+    photo: np.ndarray
+    pixel_weight: np.ndarray | None = None
+    normals: NormalEstimate | None = None
+    depth: DepthObservation | None = None
+
+    def cut(self, window: Window) -> "SolveInputs":
+        """Return the maps in `window`."""
+        weight, normals, depth = self.pixel_weight, self.normals, self.depth
+        return SolveInputs(
+            window.cut(self.image, 0),
+            window.cut(self.valid, False),
+            window.cut_silhouette(self.silhouette),
+            window.cut(self.photo, False),
+            None if weight is None else window.cut(weight, 0),
+            normals
+            and NormalEstimate(window.cut(normals.normal, 0), window.cut(normals.deviation, 0)),
+            depth and replace(depth, height=window.cut(depth.height, np.nan)),
+        )
+
+    def scaled(self, factor: float) -> "SolveInputs":
+        """Return the maps at `factor` times the scale."""
+        if factor == 1:
+            return self
+        weight, normals, depth = self.pixel_weight, self.normals, self.depth
+
+        def inside(values: np.ndarray) -> np.ndarray:
+            return resample_inside(values, self.valid, factor)[0]
+
+        image, share = resample_inside(self.image, self.valid, factor)
+        silhouette, photo = (
+            resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5
+            for m in (self.silhouette, self.photo)
+        )
+        return SolveInputs(
+            image,
+            share >= 0.5 * share.max(),  # an object thinner than a pixel fills none by half
+            silhouette,
+            photo,
+            None if weight is None else inside(weight),
+            normals and NormalEstimate(inside(normals.normal), inside(normals.deviation)),
+            depth and _scaled_depth(depth, factor),
+        )
 
 
 def recover(
@@ -128,174 +225,135 @@ def recover(
     weights: Weights,
     options: RecoverOptions | None = None,
     *,
-    trust: np.ndarray | None = None,
-    seen: NormalEstimate | None = None,
-    outline: np.ndarray | None = None,
-    known: Known | None = None,
+    pixel_weight: np.ndarray | None = None,
+    predicted_normals: NormalEstimate | None = None,
+    silhouette: np.ndarray | None = None,
+    known: SceneConstraints | None = None,
     monitor: Monitor | None = None,
 ) -> Recovered:
-    """Recovers height and light.
+    """Recover height and light.
 
-    `image`: (H, W, C) linear diffuse light, C = `priors.channels`; `mask`: (H, W) bool; `floor`:
-    zero channels are raised to it, in the logarithm only. `trust`: (H, W) in [0, 1], see `Problem`.
-    `seen`: what was seen of the shape, instead of what the outline suggests. `outline` (H, W) bool:
-    the object's silhouette where it differs from `mask`, the pixels whose values count. Raises
-    `Cancelled`.
+    Parameters
+    ----------
+    image : (H, W, C) ndarray
+        Linear diffuse image, C = `priors.channels`.
+    mask : (H, W) bool ndarray
+        Pixels whose values count.
+    floor : float
+        Smallest intensity; lower ones are raised to it, in the logarithm only.
+    priors : Priors
+        Priors for C channels.
+    weights : Weights
+        Weights of the objective's terms.
+    options : RecoverOptions, optional
+        Window, scale and solver.
+    pixel_weight : (H, W) ndarray, optional
+        In [0, 1], see `Problem`.
+    predicted_normals : NormalEstimate, optional
+        Expected normals; by default, those that the silhouette suggests.
+    silhouette : (H, W) bool ndarray, optional
+        The object's silhouette, if it differs from `mask`.
+    known : SceneConstraints, optional
+        Fixed shape or light, and observed depth.
+    monitor : Monitor, optional
+        Receives the progress.
+
+    Returns
+    -------
+    Recovered
+
+    Raises
+    ------
+    Cancelled
+        If the user asked to stop.
     """
-    options, known, monitor = options or RecoverOptions(), known or Known(), monitor or Monitor()
-    known, base = _levelled(known, mask)
+    options, monitor = options or RecoverOptions(), monitor or Monitor()
+    known, base = _levelled(known or SceneConstraints(), mask)
     window, factor = _window(mask, options)
-    inside, photo = window.cut(mask, False), window.cut(np.ones_like(mask), False)
-    scene = _Scene(
-        window.cut(image, 0),
-        inside,
-        _outline(mask if outline is None else outline, window),
-        photo,
-        floor,
-        priors,
-        weights,
-        options,
-        known,
-        window,
-        None if trust is None else window.cut(trust, 0),
-        None
-        if seen is None
-        else NormalEstimate(window.cut(seen.normal, 0), window.cut(seen.deviation, 0)),
-    )
-    problem = scene.problem(factor)
-    given = (
-        None
-        if known.height is None
-        else _to_solve(window.cut_on(known.height), scene.inside, factor)
-    )
+    inputs = SolveInputs(
+        image,
+        mask,
+        mask if silhouette is None else silhouette,
+        np.ones_like(mask),
+        pixel_weight,
+        predicted_normals,
+        known.depth,
+    ).cut(window)
+    problem = _problem(inputs.scaled(factor), floor, priors, weights, options)
+    fixed = None
+    if known.height is not None:
+        fixed = _scaled_height(window.cut_replicated(known.height), factor)
     result = solve(
-        problem, options.solver, known_height=given, known_light=known.light, monitor=monitor
+        problem, options.solver, known_height=fixed, known_light=known.light, monitor=monitor
     )
-    cut = (
-        resample_height(result.height, scene.inside.shape) + base
-        if known.height is None
-        else window.cut_on(known.height)
-    )
-    if known.height is None and known.depth is None and not options.whole_frame:
-        cut = cut - cut[scene.inside].mean()
+    if known.height is not None:
+        height = window.cut_replicated(known.height)
+    else:
+        height = resample_height(result.height, inputs.valid.shape) + base
+        if known.depth is None and not options.whole_frame:
+            height = height - height[inputs.valid].mean()
+    return _recovered(result, window.put(height, mask.shape), problem.valid.shape)
+
+
+def _recovered(result: SirfsResult, height: np.ndarray, solved_shape: tuple[int, ...]) -> Recovered:
     return Recovered(
-        window.put(cut, mask.shape),
+        height,
         result.light,
         result.terms,
         result.iterations,
         result.evaluations,
         result.reason,
         result.converged,
-        problem.valid.shape,
+        solved_shape,
     )
 
 
-def _levelled(known: Known, mask: np.ndarray) -> tuple[Known, float]:
-    """What is known with the depth inside the mask alone and its median taken off: a sensor's
-    distances are large, float32 is short.
+def _levelled(known: SceneConstraints, mask: np.ndarray) -> tuple[SceneConstraints, float]:
+    """The constraints with the depth inside the mask alone and less its median, and the median.
+
+    A sensor's distances are large, and float32 is short.
     """
     if known.depth is None:
         return known, 0.0
-    seen = np.where(mask, known.depth.height, np.nan)
-    base = float(np.nanmedian(seen)) if np.isfinite(seen).any() else 0.0
-    return replace(known, depth=replace(known.depth, height=seen - base)), base
+    depth = np.where(mask, known.depth.height, np.nan)
+    base = float(np.nanmedian(depth)) if np.isfinite(depth).any() else 0.0
+    return replace(known, depth=replace(known.depth, height=depth - base)), base
 
 
-def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[_Window, float]:
+def _window(mask: np.ndarray, options: RecoverOptions) -> tuple[Window, float]:
+    """The window that is solved, and the factor from the image's scale to the solver's."""
     if options.whole_frame:
         factor = options.solve_size / max(mask.shape) if options.solve_size else 1.0
-        return _Window(0, 0, *mask.shape), factor
+        return Window(0, 0, *mask.shape), factor
     rows, columns = np.nonzero(mask.any(axis=1))[0], np.nonzero(mask.any(axis=0))[0]
     height, width = int(rows[-1] - rows[0] + 1), int(columns[-1] - columns[0] + 1)
     factor = options.solve_size / max(height, width) if options.solve_size else 1.0
     margin = round(options.margin / factor)
-    return _Window(
+    return Window(
         int(rows[0]) - margin, int(columns[0]) - margin, height + 2 * margin, width + 2 * margin
     ), factor
 
 
-def _outline(mask: np.ndarray, window: _Window) -> np.ndarray:
-    """The object in the window, going on beyond the photo where the photo's frame cuts it."""
-    below, beyond = (
-        window.top + window.height - mask.shape[0],
-        window.left + window.width - mask.shape[1],
+def _problem(
+    inputs: SolveInputs, floor: float, priors: Priors, weights: Weights, options: RecoverOptions
+) -> Problem:
+    contour = occluding_contour(inputs.silhouette, drop_near_edge=options.drop_near_edge)
+    return Problem(
+        np.where(inputs.valid[..., None], np.log(np.maximum(inputs.image, floor)), 0.0),
+        inputs.valid,
+        inputs.silhouette,
+        _inside_photo(contour, inputs.photo),
+        priors,
+        weights,
+        inputs.depth,
+        options.shading_only,
+        expected_normals(inputs.silhouette, priors.silhouette, inputs.normals),
+        inputs.pixel_weight,
     )
-    grown = continued(
-        mask, max(-window.top, 0), max(below, 0), max(-window.left, 0), max(beyond, 0)
-    )
-    top, left = max(window.top, 0), max(window.left, 0)
-    return grown[top : top + window.height, left : left + window.width]
 
 
-@dataclass(frozen=True)
-class _Scene:
-    """What a problem is made of, in the window and at the image's scale."""
-
-    image: np.ndarray
-    inside: np.ndarray
-    outline: np.ndarray
-    photo: np.ndarray
-    floor: float
-    priors: Priors
-    weights: Weights
-    options: RecoverOptions
-    known: Known
-    window: _Window
-    trust: np.ndarray | None
-    seen: NormalEstimate | None
-
-    def problem(self, factor: float) -> Problem:
-        """The problem at `factor` times the image's scale."""
-        image, valid, outline, photo, depth = (
-            self.image,
-            self.inside,
-            self.outline,
-            self.photo,
-            self.known.depth,
-        )
-        trust, seen = self.trust, self.seen
-        if depth is not None:
-            depth = DepthObservation(
-                self.window.cut(depth.height, np.nan), depth.sigma, depth.weight
-            )
-        if factor != 1:
-            image, share = resample_inside(image, self.inside, factor)
-            valid = share >= 0.5 * share.max()  # an object thinner than a pixel fills none by half
-            outline, photo = (
-                resample_inside(m.astype(float), np.ones_like(m), factor)[0] >= 0.5
-                for m in (outline, photo)
-            )
-            depth = None if depth is None else _scaled_depth(depth, factor)
-            trust = None if trust is None else resample_inside(trust, self.inside, factor)[0]
-            seen = (
-                None
-                if seen is None
-                else NormalEstimate(
-                    *(
-                        resample_inside(m, self.inside, factor)[0]
-                        for m in (seen.normal, seen.deviation)
-                    )
-                )
-            )
-        log_image = np.where(valid[..., None], np.log(np.maximum(image, self.floor)), 0.0)
-        return Problem(
-            log_image,
-            valid,
-            outline,
-            _seen(occluding_contour(outline, drop_near_edge=self.options.drop_near_edge), photo),
-            self.priors,
-            self.weights,
-            depth,
-            self.options.shading_only,
-            expected_field(outline, self.priors.silhouette, seen),
-            trust,
-        )
-
-
-def _seen(contour: Contour, photo: np.ndarray) -> Contour:
-    """The contour points that lie in the photo: where an object was continued beyond it, its sides
-    are made up.
-    """
+def _inside_photo(contour: Contour, photo: np.ndarray) -> Contour:
+    """The contour points in the photo: those of an object continued beyond it are invented."""
     keep = photo[contour.rows, contour.columns]
     return Contour(
         contour.rows[keep], contour.columns[keep], contour.down[keep], contour.right[keep]
@@ -303,15 +361,16 @@ def _seen(contour: Contour, photo: np.ndarray) -> Contour:
 
 
 def _scaled_depth(depth: DepthObservation, factor: float) -> DepthObservation:
-    seen, share = resample_inside(np.nan_to_num(depth.height), np.isfinite(depth.height), factor)
-    scale = height_scale(depth.height.shape, seen.shape)
+    height, share = resample_inside(np.nan_to_num(depth.height), np.isfinite(depth.height), factor)
+    scale = height_scale(depth.height.shape, height.shape)
     return DepthObservation(
-        np.where(share >= 0.5, seen * scale, np.nan), depth.sigma * scale, depth.weight
+        np.where(share >= 0.5, height * scale, np.nan), depth.sigma * scale, depth.weight
     )
 
 
-def _to_solve(height: np.ndarray, inside: np.ndarray, factor: float) -> np.ndarray:
+def _scaled_height(height: np.ndarray, factor: float) -> np.ndarray:
+    """A fixed height (h, w) at `factor` times the scale."""
     if factor == 1:
         return np.array(height, float)
-    coarse = resample_inside(height, np.ones_like(inside), factor)[0]
-    return coarse * height_scale(inside.shape, coarse.shape)
+    coarse = resample_inside(height, np.ones(height.shape, bool), factor)[0]
+    return coarse * height_scale(height.shape, coarse.shape)

@@ -1,6 +1,6 @@
 """What SIRFS believes of reflectance: locally smooth, few colours, likely colours.
 
-With log reflectance A = log I - log shading (n pixels in the crop) and a pixel's trust t in [0, 1],
+With log reflectance A = log I - log shading (n pixels in the crop) and a pixel's pixel_weight t in [0, 1],
 0 where not valid, n_t = sum t:
   smoothness  w (3/25)/(C n) * sum over pairs of t_p t_q cost(sqrt(m^2 + 1e-8)), m = 0.5 |B (A_p -
   A_q)|^2   (colour)
@@ -30,21 +30,24 @@ ABSOLUTE_DIVISOR = 8.0
 
 
 def smoothness_cost(
-    log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weight: float
+    log_reflectance: np.ndarray, pixel_weight: np.ndarray, priors: Priors, weight: float
 ) -> tuple[float, np.ndarray]:
     """The smoothness term and its gradient with respect to `log_reflectance` (H, W, C);
 
-    `trust` (H, W).
+    `pixel_weight` (H, W).
     """
     t = log_reflectance.dtype.type
-    valid, trust = trust > 0, trust.astype(t)
+    valid, pixel_weight = pixel_weight > 0, pixel_weight.astype(t)
     whitened = log_reflectance @ priors.smoothness_whiten.astype(log_reflectance.dtype)
     gradient = np.zeros_like(whitened)
     total = 0.0
     for offset in PAIR_OFFSETS:
         p, q = pair_slices(*offset)
         both = valid[p] & valid[q]
-        difference, counts = whitened[p][both] - whitened[q][both], trust[p][both] * trust[q][both]
+        difference, counts = (
+            whitened[p][both] - whitened[q][both],
+            pixel_weight[p][both] * pixel_weight[q][both],
+        )
         if priors.channels == 1:
             cost, slope = priors.smoothness.evaluate(difference[:, 0])
             pull = (counts * slope)[:, None]
@@ -56,7 +59,7 @@ def smoothness_cost(
         total += float((counts * cost).sum(dtype=float))
         gradient[p][both] += pull
         gradient[q][both] -= pull
-    n = trust.size
+    n = pixel_weight.size
     scale = weight * 3 / (25 * n * priors.channels)
     return scale * total, (gradient @ priors.smoothness_whiten.T.astype(gradient.dtype)) * t(scale)
 
@@ -137,15 +140,15 @@ def blur(counts: np.ndarray, taps: np.ndarray) -> np.ndarray:
 
 
 def palette_cost(
-    log_reflectance: np.ndarray, trust: np.ndarray, priors: Priors, weights: Weights
+    log_reflectance: np.ndarray, pixel_weight: np.ndarray, priors: Priors, weights: Weights
 ) -> tuple[float, float, np.ndarray]:
     """The parsimony and absolute terms, and the gradient of their sum with respect to
-    `log_reflectance` (H, W, C); `trust` (H, W).
+    `log_reflectance` (H, W, C); `pixel_weight` (H, W).
     """
-    whiten, valid = priors.parsimony_whiten, trust > 0
+    whiten, valid = priors.parsimony_whiten, pixel_weight > 0
     samples = log_reflectance[valid].astype(float) @ whiten.T
     where = splat(samples, priors.absolute)
-    share = trust[valid].astype(float)
+    share = pixel_weight[valid].astype(float)
     count = float(share.sum())
     size = int(np.prod(where.shape))
     counts = np.bincount(where.index.ravel(), (where.weight * share).ravel(), size).reshape(
@@ -168,13 +171,13 @@ def palette_cost(
 
 
 def one_color_cost(
-    log_reflectance: np.ndarray, trust: np.ndarray, weight: float
+    log_reflectance: np.ndarray, pixel_weight: np.ndarray, weight: float
 ) -> tuple[float, np.ndarray]:
     """Shape-from-shading mode: weight/(2 n_t) * sum of t (A - mean A)^2, the mean with t, and its
-    gradient (H, W, C); `trust` (H, W).
+    gradient (H, W, C); `pixel_weight` (H, W).
     """
-    valid = trust > 0
-    away, share = log_reflectance[valid].astype(float), trust[valid].astype(float)[:, None]
+    valid = pixel_weight > 0
+    away, share = log_reflectance[valid].astype(float), pixel_weight[valid].astype(float)[:, None]
     away = away - (share * away).sum(axis=0) / share.sum()
     gradient = np.zeros_like(log_reflectance)
     gradient[valid] = share * away * (weight / share.sum())

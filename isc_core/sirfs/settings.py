@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 class Start:
     """Where the solver begins (ours; published: a flat shape and no light).
 
-    `dome`: how much of the dome that the outline suggests (`silhouette.SilhouetteField`), where the
+    `dome`: how much of the dome that the outline suggests (`silhouette.ExpectedNormals`), where the
     problem has one and no depth was seen. `light`: how much of the log light that the priors
     expect.
     """
@@ -56,8 +56,8 @@ COLOR_LABORATORY = Weights(13.4543, 3.3636, 1.6818, 4.7568, 6.7272, 2.3784, 4, 4
 GREY_LABORATORY = Weights(6.7272, 1.4142, 1.6818, 4, 6.7272, 2.3784, 3.3636, 4.7568)
 
 
-# Chosen with the priors that ship, leave-one-object-out on ten objects; docs/results.md says how,
-# and how sure that is. The grey laboratory set follows the coloured one halfway; the natural one
+# Chosen with the shipped priors, leave-one-object-out on ten objects; docs/results.md has the method
+# and its uncertainty. The grey laboratory set follows the coloured one halfway; the grey natural one
 # differs from it mostly as the published colour sets do.
 ISC_NATURAL = replace(
     COLOR_NATURAL,
@@ -94,21 +94,20 @@ ISC_GREY_NATURAL = replace(
     starts=ISC_NATURAL.starts,
 )
 
-# the silhouette's weight where its field is what was seen of the shape (`seen_shape`);
-# docs/methods/first_shape.md
-SEEN_SHAPE = 0.4
+# The silhouette term's weight where the expected normals are predicted ones (`normal_prior`).
+PREDICTED_NORMALS_WEIGHT = 0.4
 
 
-def isc_weights(illumination: str, channels: int, *, shape_seen: bool = False) -> Weights:
+def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = False) -> Weights:
     """Our own set for "natural" or "laboratory" illumination and 3 or 1 channels;
 
-    `shape_seen`: with what was seen of the shape.
+    `normals_predicted`: with what was seen of the shape.
     """
     if channels == 1:
-        found = ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
+        chosen = ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
     else:
-        found = ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
-    return replace(found, silhouette=SEEN_SHAPE) if shape_seen else found
+        chosen = ISC_NATURAL if illumination == "natural" else ISC_LABORATORY
+    return replace(chosen, silhouette=PREDICTED_NORMALS_WEIGHT) if normals_predicted else chosen
 
 
 def published_weights(illumination: str, channels: int) -> Weights:

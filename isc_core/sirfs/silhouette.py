@@ -20,14 +20,13 @@ from scipy import ndimage
 from .priors.priors import SilhouetteProfile
 
 _STEPS = 257
-_STEEPEST = 0.99  # of an in-plane part of a normal
-_SMOOTHING = (
-    0.05  # of the largest distance: the outward direction ignores finer detail of the outline
-)
+_STEEPEST = 0.99  # largest in-plane part of a normal
+# Share of the largest distance: the outward direction ignores finer detail of the silhouette.
+_SMOOTHING = 0.05
 
 
 @dataclass(frozen=True)
-class SilhouetteField:
+class ExpectedNormals:
     """Expected in-plane part of the normal, `down` and `right`, and its `precision` 1/s^2, each (H,
     W); 0 outside the mask.
 
@@ -41,7 +40,7 @@ class SilhouetteField:
     dome: np.ndarray
 
 
-def outline_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def silhouette_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Relative depth u in (0, 1] and the outward direction (down, right) of every pixel of `mask`
     (H, W) bool.
 
@@ -52,12 +51,12 @@ def outline_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nd
     return distance / deepest, *_outward(distance, deepest)
 
 
-def outline_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
+def silhouette_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
     """Unit normals (H, W, 3), camera frame, that lean outward as `profile` says on average;
 
     (0, 0, 1) outside `mask` (H, W) bool.
     """
-    u, down, right = outline_coordinates(mask)
+    u, down, right = silhouette_coordinates(mask)
     lean = np.where(mask, np.clip(profile.at(u)[0], -_STEEPEST, _STEEPEST), 0)
     normal = np.dstack([lean * right, -lean * down, np.sqrt(1 - lean**2)])
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
@@ -82,13 +81,13 @@ def _outward(distance: np.ndarray, deepest: float) -> tuple[np.ndarray, np.ndarr
     return -down / length, -right / length
 
 
-def silhouette_field(mask: np.ndarray, profile: SilhouetteProfile) -> SilhouetteField:
+def normals_from_silhouette(mask: np.ndarray, profile: SilhouetteProfile) -> ExpectedNormals:
     """What `profile` expects inside `mask` (H, W) bool."""
     distance, deepest = _depth(mask)
     u, (down, right) = distance / deepest, _outward(distance, deepest)
     mean, spread = profile.at(u)
     maps = (mean * down, mean * right, 1 / spread**2, deepest * _dome_at(u, profile))
-    return SilhouetteField(*(np.where(mask, values, 0) for values in maps))
+    return ExpectedNormals(*(np.where(mask, values, 0) for values in maps))
 
 
 def _dome_at(u: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
@@ -102,7 +101,7 @@ def _dome_at(u: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
 
 
 def silhouette_cost(
-    n1: np.ndarray, n2: np.ndarray, valid: np.ndarray, field: SilhouetteField, weight: float
+    n1: np.ndarray, n2: np.ndarray, valid: np.ndarray, field: ExpectedNormals, weight: float
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """The term and its gradients with respect to n1 and n2, all (H, W)."""
     scale = weight / max(int(valid.sum()), 1)

@@ -18,8 +18,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..numerics.lbfgs import Algebra, LbfgsOptions, LbfgsResult, Minimisation, NumpyAlgebra
-from ..numerics.linear import solved
-from ..numerics.thread_pool import Workers
+from ..numerics.jit import numba_available
+from ..numerics.linear import solve_linear
+from ..numerics.thread_pool import ThreadPool
 from ..progress import Monitor
 from .illumination import stack, unstack
 from .numpy_engine import NumpyEngine
@@ -27,12 +28,15 @@ from .problem import Evaluation, Problem, Terms
 from .pyramid import analyse, down, level_shapes, synthesise
 from .settings import Start
 
+STAGE = "shape and light"
 MOST_THREADS = 64  # more only wait for each other
-_START_LEVEL = 2  # of the pyramid: finer detail of the start is the outline's, not the shape's
-# evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum
-# have parted
+# Level of the pyramid: finer detail of the start belongs to the silhouette, not to the shape.
+_START_LEVEL = 2
+# Evaluations, of the hundreds that a solve takes: by then the losses of a good and a bad minimum
+# differ.
 _TRIAL = 80
-_COARSER = 16  # what `down` multiplies heights by, and that heights of a step up are doubled
+# `down` multiplies heights by 8, and a step up doubles them.
+_COARSER = 16
 
 
 @dataclass(frozen=True)
@@ -77,15 +81,6 @@ class Engine(Protocol):
         ...
 
 
-def compiled_engine_available() -> bool:
-    """Whether Numba can be imported here."""
-    try:
-        import numba  # noqa: F401
-    except ImportError:
-        return False
-    return True
-
-
 def thread_count(options: SolverOptions) -> int:
     """How many threads `options` ask for on this machine, at most `MOST_THREADS`; 0 means the cores
     that this process may use.
@@ -99,10 +94,10 @@ def thread_count(options: SolverOptions) -> int:
 class Backend:
     """The engine and its algebra, chosen once for a solve."""
 
-    def __init__(self, options: SolverOptions, workers: Workers) -> None:
+    def __init__(self, options: SolverOptions, workers: ThreadPool) -> None:
         if options.engine not in ("auto", "numba", "numpy"):
             raise InputError(f'unknown engine "{options.engine}": choose auto, numba or numpy')
-        self.compiled = options.engine != "numpy" and compiled_engine_available()
+        self.compiled = options.engine != "numpy" and numba_available()
         if options.engine == "numba" and not self.compiled:
             raise InputError(
                 "the engine numba needs the package numba: install it, or choose --engine numpy"
@@ -158,12 +153,12 @@ class ParameterVector:
     def __init__(
         self,
         problem: Problem,
-        tools: Backend,
+        backend: Backend,
         levels: int | None,
         known_height: np.ndarray | None,
         known_light: np.ndarray | None,
     ) -> None:
-        self._problem, self._tools, self._engine = problem, tools, tools.engine(problem)
+        self._problem, self._backend, self._engine = problem, backend, backend.engine(problem)
         self._known_height, self._known_light = known_height, known_light
         self.shapes = [] if known_height is not None else level_shapes(problem.valid.shape, levels)
         sizes = [int(np.prod(s)) for s in self.shapes]
@@ -171,7 +166,7 @@ class ParameterVector:
         self._light_size = 0 if known_light is not None else problem.priors.light.mean.size
         self.evaluations = 0
         self.channels = problem.priors.channels
-        self.x = np.zeros(int(self._edges[-1]) + self._light_size, tools.dtype)
+        self.x = np.zeros(int(self._edges[-1]) + self._light_size, backend.dtype)
         self.terms = Terms()
 
     def levels(self, vector: np.ndarray) -> list[np.ndarray]:
@@ -183,7 +178,7 @@ class ParameterVector:
 
     def height(self) -> np.ndarray:
         return (
-            self._tools.synthesise(self.levels(self.x))
+            self._backend.synthesise(self.levels(self.x))
             if self._known_height is None
             else self._known_height
         )
@@ -205,7 +200,7 @@ class ParameterVector:
         p, x = self._problem, np.zeros_like(self.x)
         prior = p.priors.light
         if self._known_light is None:  # whitened, the expected light is at 0
-            x[self._edges[-1] :] = solved(
+            x[self._edges[-1] :] = solve_linear(
                 prior.unwhiten, (start.light - 1) * prior.offset[:, None]
             )[:, 0]
         if start.dome and p.silhouette is not None and p.observation is None and self.shapes:
@@ -221,7 +216,7 @@ class ParameterVector:
         self.evaluations += 1
         result = self._engine.evaluate(self.height(), self.light())
         if self._known_height is None:
-            self._tools.analyse(result.height_gradient, self.levels(gradient))
+            self._backend.analyse(result.height_gradient, self.levels(gradient))
         if self._known_light is None:
             gradient[self._edges[-1] :] = np.einsum(
                 "ji,j->i", self._problem.priors.light.unwhiten, stack(result.light_gradient)
@@ -247,69 +242,69 @@ def solve(
     for given in (known_height, known_light):
         if given is not None and not np.isfinite(given).all():
             raise InputError(
-                "a given shape or light has holes or infinite values: fill them, or give the shape as depth"
+                "a given shape or light has holes or infinite values: fill them,"
+                " or give the shape as depth"
             )
-    with Workers(thread_count(options)) as workers:
-        tools = Backend(options, workers)
-        unknowns = ParameterVector(problem, tools, options.levels, known_height, known_light)
-        monitor.report("shape and light", 0.0)
+    with ThreadPool(thread_count(options)) as workers:
+        backend = Backend(options, workers)
+        unknowns = ParameterVector(problem, backend, options.levels, known_height, known_light)
+        monitor.report(STAGE, 0.0)
         if unknowns.x.size:
-            begun = _begun(
-                unknowns, problem.weights.starts, options.lbfgs, tools.algebra(), monitor
+            run = multi_start(
+                unknowns, problem.weights.starts, options.lbfgs, backend.algebra(), monitor
             )
-            outcome = begun.run(_reporter(monitor, options.lbfgs.iterations))
-            if unknowns.x is not begun.x:  # it had come to its end before another start was tried
-                unknowns(begun.x, np.empty_like(begun.x))
-        else:
-            outcome = LbfgsResult(
-                unknowns(unknowns.x, unknowns.x), 0, 1, "gradient"
-            )  # all is known: only the loss is asked for
+            outcome = run.run(_reporter(monitor, options.lbfgs.iterations))
+            if unknowns.x is not run.x:  # it had converged before another start was tried
+                unknowns(run.x, np.empty_like(run.x))
+        else:  # all is known: only the loss is needed
+            outcome = LbfgsResult(unknowns(unknowns.x, unknowns.x), 0, 1, "gradient")
         return SirfsResult(
-            np.array(unknowns.height(), float), np.array(unknowns.light(), float), unknowns.terms,
-            outcome.iterations, unknowns.evaluations, outcome.reason, outcome.converged,
-        )  # fmt: skip
+            np.array(unknowns.height(), float),
+            np.array(unknowns.light(), float),
+            unknowns.terms,
+            outcome.iterations,
+            unknowns.evaluations,
+            outcome.reason,
+            outcome.converged,
+        )
 
 
-def _begun(
+def multi_start(
     unknowns: ParameterVector,
     starts: Sequence[Start],
     options: LbfgsOptions,
     algebra: Algebra,
     monitor: Monitor,
 ) -> Minimisation:
-    """The minimisation from the only start there is, or, taken that far, the one whose loss is
-    lowest after `_TRIAL` evaluations.
-    """
-    ways: list[np.ndarray] = []
+    points: list[np.ndarray] = []
     for start in starts:
-        way = unknowns.at(start)
-        if not any(np.array_equal(way, other) for other in ways):
-            ways.append(way)
-    if len(ways) == 1:
-        return Minimisation(unknowns, ways[0], options, algebra)
-    begun = [Minimisation(unknowns, way, options, algebra) for way in ways]
-    waiting = _waiting(monitor)
-    for one in begun:
-        one.run(waiting, _TRIAL)
-    return min(begun, key=lambda one: one.loss)
+        point = unknowns.at(start)
+        if not any(np.array_equal(point, other) for other in points):
+            points.append(point)
+    if len(points) == 1:
+        return Minimisation(unknowns, points[0], options, algebra)
+    runs = [Minimisation(unknowns, point, options, algebra) for point in points]
+    report = _lowest_reporter(monitor)
+    for run in runs:
+        run.run(report, _TRIAL)
+    return min(runs, key=lambda run: run.loss)
 
 
-def _waiting(monitor: Monitor) -> Callable[[int, float], None]:
-    """Tells the lowest loss of all starts so far: that of the one that will go on."""
+def _lowest_reporter(monitor: Monitor) -> Callable[[int, float], None]:
+    """Report the lowest loss of all starts so far, which is that of the run that will go on."""
     lowest = np.inf
 
     def each(_: int, loss: float) -> None:
         nonlocal lowest
         lowest = min(lowest, loss)
-        monitor.report(f"shape and light, loss {lowest:.3f}", 0.0)
+        monitor.report(STAGE, 0.0, f"loss {lowest:.3f}")
 
     return each
 
 
 def _reporter(monitor: Monitor, most: int) -> Callable[[int, float], None]:
     def each(iteration: int, loss: float) -> None:
-        monitor.report(
-            f"shape and light, loss {loss:.3f}", 1 - 0.99**iteration if iteration < most else 1.0
-        )
+        fraction = 1 - 0.99**iteration if iteration < most else 1.0
+        monitor.report(STAGE, fraction, f"loss {loss:.3f}")
 
     return each

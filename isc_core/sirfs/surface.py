@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from ..scene.known_inputs import DepthObservation
 from ..shading.occluding_contour import Contour
 from ..shading.surface_stencils import DERIVATIVES, derivative, derivative_adjoint
 from .priors.tabulated_potential import TabulatedPotential
-from .problem import PAIR_OFFSETS, DepthObservation
+from .problem import PAIR_OFFSETS
 
 SOFT_DIFFERENCE = 1e-8
 SLANT_SOFTNESS = 0.01
@@ -131,13 +132,16 @@ def contour_cost(
     return scale * float(np.sum(gap**power)), pull * contour.down, pull * contour.right
 
 
-def observation_cost(height: np.ndarray, seen: DepthObservation) -> tuple[float, np.ndarray]:
+def observation_cost(height: np.ndarray, observed: DepthObservation) -> tuple[float, np.ndarray]:
     """The observation's term, weight/n_seen * sum of (sqrt(1 + (difference/sigma)^2) - 1), and its
     gradient (H, W).
     """
-    known = np.isfinite(seen.height)
+    known = np.isfinite(observed.height)
     count = max(int(known.sum()), 1)
-    r = np.where(known, height.astype(float) - np.where(known, seen.height, 0), 0) / seen.sigma
+    r = (
+        np.where(known, height.astype(float) - np.where(known, observed.height, 0), 0)
+        / observed.sigma
+    )
     root = np.sqrt(1 + r * r)
-    scale = seen.weight / count
-    return scale * float((root - 1).sum()), (scale / seen.sigma) * r / root
+    scale = observed.weight / count
+    return scale * float((root - 1).sum()), (scale / observed.sigma) * r / root

@@ -8,19 +8,16 @@ and `NumpyAlgebra`.
 from functools import partial
 
 import numpy as np
-from numba import njit
 
-from ..numerics.thread_pool import Workers
+from ..numerics.jit import ACCUMULATED, jit
+from ..numerics.thread_pool import ThreadPool
 from .pyramid import TAPS
 
-_compiled = njit(
-    cache=True, nogil=True, fastmath={"reassoc", "contract", "nsz"}, error_model="numpy"
-)
 _CHUNK = 1024
 _PARTS = 8
 
 
-@_compiled
+@jit(math=ACCUMULATED)
 def _products(first, last, vectors, others, sums):
     count = others.shape[0]
     zero = vectors.dtype.type(0)
@@ -36,7 +33,7 @@ def _products(first, last, vectors, others, sums):
                 sums[k, m] += part
 
 
-@_compiled
+@jit(math=ACCUMULATED)
 def _combine(first, last, coefficients, vectors, out):
     for start in range(first, last, _CHUNK):
         stop = min(start + _CHUNK, last)
@@ -56,7 +53,7 @@ class CompiledAlgebra:
     the threads.
     """
 
-    def __init__(self, workers: Workers) -> None:
+    def __init__(self, workers: ThreadPool) -> None:
         self._workers = workers
 
     def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
@@ -82,7 +79,7 @@ def _parts(length: int) -> list[tuple[int, int]]:
     return list(zip(edges[:-1], edges[1:], strict=True))
 
 
-@_compiled
+@jit(math=ACCUMULATED)
 def down(fine, out):
     """One pyramid step down, (H, W) into (ceil(H/2), ceil(W/2)); see `pyramid.down`."""
     t = fine.dtype.type
@@ -104,7 +101,7 @@ def down(fine, out):
             o[j] = a * (line[2 * j] + line[2 * j + 3]) + b * (line[2 * j + 1] + line[2 * j + 2])
 
 
-@_compiled
+@jit(math=ACCUMULATED)
 def up_add(coarse, fine, out):
     """out = fine + the adjoint of `down` applied to `coarse`; see `pyramid.up`."""
     t = coarse.dtype.type

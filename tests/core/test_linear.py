@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from isc_core.numerics.linear import solved
+from isc_core.numerics.linear import solve_linear
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
 SYSTEMS = [np.random.default_rng(n).normal(size=(n, n)) for n in (1, 2, 9, 27)]
@@ -13,17 +13,17 @@ SYSTEMS = [np.random.default_rng(n).normal(size=(n, n)) for n in (1, 2, 9, 27)]
 @pytest.mark.parametrize("matrix", SYSTEMS)
 def test_the_answer_solves_the_equations(matrix: np.ndarray) -> None:
     right = np.arange(3.0 * len(matrix)).reshape(-1, 3)
-    np.testing.assert_allclose(matrix @ solved(matrix, right), right, atol=1e-9)
+    np.testing.assert_allclose(matrix @ solve_linear(matrix, right), right, atol=1e-9)
     np.testing.assert_allclose(
-        solved(matrix, np.eye(len(matrix))), np.linalg.inv(matrix), rtol=1e-6
+        solve_linear(matrix, np.eye(len(matrix))), np.linalg.inv(matrix), rtol=1e-6
     )
 
 
 def test_a_zero_in_the_way_is_walked_around_and_a_singular_matrix_refused() -> None:
     swap = np.array([[0.0, 2.0], [4.0, 0.0]])
-    np.testing.assert_array_equal(solved(swap, np.eye(2)), [[0, 0.25], [0.5, 0]])
+    np.testing.assert_array_equal(solve_linear(swap, np.eye(2)), [[0, 0.25], [0.5, 0]])
     with pytest.raises(ValueError, match="no inverse"):
-        solved(np.ones((3, 3)), np.eye(3))
+        solve_linear(np.ones((3, 3)), np.eye(3))
 
 
 @pytest.mark.parametrize("kind", ["natural", "laboratory"])

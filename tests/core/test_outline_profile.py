@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from isc_core.prior_fitting.silhouette import BINS, OutlineMoments, fit_silhouette
-from isc_core.sirfs.silhouette import silhouette_cost, silhouette_field
+from isc_core.prior_fitting.silhouette import BINS, SilhouetteMoments, fit_silhouette
+from isc_core.sirfs.silhouette import silhouette_cost, normals_from_silhouette
 
 
 def ball(radius: float, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -13,14 +13,14 @@ def ball(radius: float, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_a_balls_profile_is_one_minus_its_depth() -> None:
-    profile = fit_silhouette([OutlineMoments.of(*ball(60, 140))])
+    profile = fit_silhouette([SilhouetteMoments.of(*ball(60, 140))])
     u = (np.arange(BINS) + 0.5) / BINS
     assert np.abs(profile.mean - (1 - u))[1:-1].max() < 0.05
     assert profile.spread.max() < 0.2
 
 
 def test_objects_count_alike_whatever_their_size() -> None:
-    small, large = OutlineMoments.of(*ball(20, 60)), OutlineMoments.of(*ball(60, 140))
+    small, large = SilhouetteMoments.of(*ball(20, 60)), SilhouetteMoments.of(*ball(60, 140))
     assert abs(small.sums[0].sum() - 1) < 1e-12
     both, swapped = fit_silhouette([small, large]), fit_silhouette([large, small])
     assert np.allclose(both.mean, swapped.mean)
@@ -28,8 +28,8 @@ def test_objects_count_alike_whatever_their_size() -> None:
 
 def test_the_true_ball_costs_less_than_a_flat_one_and_than_its_inverse() -> None:
     height, mask = ball(40, 100)
-    profile = fit_silhouette([OutlineMoments.of(height, mask)])
-    field = silhouette_field(mask, profile)
+    profile = fit_silhouette([SilhouetteMoments.of(height, mask)])
+    field = normals_from_silhouette(mask, profile)
     i, j = (np.mgrid[:100, :100] - 49.5) / 40
     down, right = np.where(mask, i, 0), np.where(mask, j, 0)
     costs = [silhouette_cost(s * down, s * right, mask, field, 1.0)[0] for s in (1.0, 0.0, -1.0)]

@@ -18,7 +18,7 @@ Limits: neither how bright the light is nor its colour is looked at; both stay t
 
 import numpy as np
 
-from ...numerics.linear import solved
+from ...numerics.linear import solve_linear
 from ...shading.spherical_harmonics import light_from_reference, real_sh
 from .priors import Light
 
@@ -37,24 +37,24 @@ def _front() -> np.ndarray:
 
 def _look() -> np.ndarray:
     """A (8, 9) for one channel, of the coefficients of `frames.real_sh`."""
-    values = real_sh(FRONT)
+    values = real_sh(FRONT_NORMALS)
     triangle = np.linalg.qr((values - values.mean(axis=0))[:, 1:] / np.sqrt(len(values)))[1]
     return np.hstack([np.zeros((8, 1)), triangle * np.sign(np.diag(triangle))[:, None]])
 
 
-FRONT = _front()
-LOOK = _look()
+FRONT_NORMALS = _front()
+LIGHT_TERMS = _look()
 
 
-def seen_light(prior: Light, seen: np.ndarray, deviations: np.ndarray) -> Light:
+def predicted_light_prior(prior: Light, seen: np.ndarray, deviations: np.ndarray) -> Light:
     """`prior` for C channels, told that the light looks like `seen` (8,), give or take `deviations`
     (8,), > 0.
     """
     channels = len(prior.mean) // 9
-    look = np.hstack([LOOK @ light_from_reference(np.eye(9)) / channels] * channels)
+    look = np.hstack([LIGHT_TERMS @ light_from_reference(np.eye(9)) / channels] * channels)
     across = np.einsum("ij,kj->ik", prior.covariance, look)
     spread = np.einsum("ij,jk->ik", look, across) + np.diag(np.square(deviations))
-    gain = solved(spread, across.T).T
+    gain = solve_linear(spread, across.T).T
     mean = prior.mean + np.einsum("ij,j->i", gain, seen - np.einsum("ij,j->i", look, prior.mean))
     covariance = prior.covariance - np.einsum("ij,kj->ik", gain, across)
     return Light(mean, (covariance + covariance.T) / 2, prior.unwhiten, mean)

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...numerics.linear import solved
+from ...numerics.linear import solve_linear
 from .tabulated_potential import TabulatedPotential
 
 
@@ -44,7 +44,7 @@ class Light:
         """The inverse covariance, computed once: a library's solver would wake its threads at every
         evaluation.
         """
-        inverse = solved(self.covariance, np.eye(len(self.covariance)))
+        inverse = solve_linear(self.covariance, np.eye(len(self.covariance)))
         return (inverse + inverse.T) / 2
 
 

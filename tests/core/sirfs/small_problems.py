@@ -15,7 +15,7 @@ from isc_core.sirfs.priors.priors import AbsoluteTable, Light, Priors, Silhouett
 from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
-from isc_core.sirfs.silhouette import silhouette_field
+from isc_core.sirfs.silhouette import normals_from_silhouette
 
 NODES = 30
 BRIGHTNESS = (-0.8, -0.9, -1.1)
@@ -172,7 +172,7 @@ def make_problem(
         valid &= np.random.default_rng(3).random(valid.shape) > 0.05
     log_image = np.where(valid[..., None], np.log(np.where(valid[..., None], scene.image, 1)), 0.0)
     priors = priors or made_priors(scene.image.shape[2])
-    field = silhouette_field(scene.mask, PROFILE) if outline else None
+    field = normals_from_silhouette(scene.mask, PROFILE) if outline else None
     contour = occluding_contour(scene.mask)
     return Problem(
         log_image,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from isc_core.numerics.lbfgs import LbfgsOptions
-from isc_core.numerics.thread_pool import Workers
+from isc_core.numerics.thread_pool import ThreadPool
 from isc_core.scene.known_inputs import DepthObservation
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.problem import Problem
@@ -42,7 +42,9 @@ def problem_of(kind: str) -> Problem:
         holes=True,
         outline=True,
     )
-    return replace(problem, pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in kind else None)
+    return replace(
+        problem, pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in kind else None
+    )
 
 
 def states(problem: Problem, dtype: type[np.floating]) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -97,7 +99,7 @@ def test_result_of_an_evaluation_is_the_same_bytes_on_any_threads() -> None:
     height, light = states(problem, np.float32)[5]
     results = []
     for threads in (1, 2, 3, 5):
-        with Workers(threads) as workers:
+        with ThreadPool(threads) as workers:
             result = numba_engine.NumbaEngine(problem, np.float32, workers).evaluate(height, light)
             results.append(
                 (
@@ -148,7 +150,7 @@ def test_tiny_problems(shape: tuple[int, int]) -> None:
     )
     problem = make_problem(scene)
     height, light = random_state(shape, 3, 4, 0.5)
-    with Workers(4) as workers:
+    with ThreadPool(4) as workers:
         have = numba_engine.NumbaEngine(problem, np.float64, workers).evaluate(height, light)
     want = NumpyEngine(problem).evaluate(height, light)
     assert have.terms.total == pytest.approx(want.terms.total, rel=1e-10)

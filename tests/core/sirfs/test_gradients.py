@@ -74,7 +74,9 @@ def problem_of(term: str, channels: int) -> Problem:
         priors, curvature=coarser(priors.curvature), smoothness=coarser(priors.smoothness)
     )
     return replace(
-        problem, priors=priors, pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in term else None
+        problem,
+        priors=priors,
+        pixel_weight=some_pixel_weight(scene.mask.shape) if "weighted" in term else None,
     )
 
 

@@ -14,7 +14,7 @@ from isc_core.numerics.lbfgs import (
     _Memory,
     minimise,
 )
-from isc_core.numerics.thread_pool import Workers
+from isc_core.numerics.thread_pool import ThreadPool
 
 EXACT = LbfgsOptions(
     loss_tolerance=0.0, gradient_tolerance=1e-9, step_tolerance=0.0, evaluations=5000
@@ -178,7 +178,7 @@ def test_compiled_algebra_equals_numpy(dtype: type[np.floating], tolerance: floa
     vectors = rng.normal(size=(7, 20011)).astype(dtype)
     coefficients = np.array([1.0, -2, 0, 3, 0.5, -0.25, 1e-3])
     results = []
-    for algebra in (NumpyAlgebra(), CompiledAlgebra(Workers(1)), CompiledAlgebra(Workers(2))):
+    for algebra in (NumpyAlgebra(), CompiledAlgebra(ThreadPool(1)), CompiledAlgebra(ThreadPool(2))):
         out = np.full(20011, np.nan, dtype)
         algebra.combine(coefficients, vectors, out)
         results.append((algebra.products(vectors, vectors[[1, 6]]), out))
@@ -193,7 +193,7 @@ def test_compiled_algebra_follows_the_same_path() -> None:
     pytest.importorskip("numba")
     from isc_core.sirfs.vector_kernels import CompiledAlgebra
 
-    algebras: list[Algebra] = [NumpyAlgebra(), CompiledAlgebra(Workers(2))]
+    algebras: list[Algebra] = [NumpyAlgebra(), CompiledAlgebra(ThreadPool(2))]
     paths: list[list[float]] = [[], []]
     for algebra, path in zip(algebras, paths, strict=True):
         minimise(

@@ -8,7 +8,7 @@ import pytest
 from isc_core.scene.normal_estimate import NormalEstimate
 from isc_core.shading.spherical_harmonics import normal_from_reference
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.normal_prior import height_of_normals, seen_field
+from isc_core.sirfs.normal_prior import height_of_normals, normals_from_prediction
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.settings import isc_weights
@@ -51,7 +51,7 @@ def test_the_field_is_in_the_reference_s_frame_and_goes_on_beyond_what_was_seen(
     inner = mask.copy()
     inner[:, :40] = False
     seen = NormalEstimate(np.where(inner[..., None], normal, 0), np.where(inner, 0.2, 0))
-    field = seen_field(seen, mask)
+    field = normals_from_prediction(seen, mask)
     np.testing.assert_allclose(np.dstack([field.right, -field.down])[inner], normal[inner][:, :2])
     np.testing.assert_allclose(field.precision[mask], 25)
     assert not field.precision[~mask].any() and not field.dome[~mask].any()
@@ -65,7 +65,7 @@ def test_sirfs_takes_the_shape_that_was_seen() -> None:
 
     def error(seen: NormalEstimate | None) -> float:
         options = RecoverOptions(solve_size=96, solver=SolverOptions(threads=1))
-        found = recover(image, mask, 1e-3, priors, weights, options, seen=seen)
+        found = recover(image, mask, 1e-3, priors, weights, options, predicted_normals=seen)
         return float(
             np.degrees(
                 np.arccos(

@@ -9,14 +9,14 @@ from scipy import ndimage
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.numerics.lbfgs import LbfgsOptions
-from isc_core.progress import Monitor
+from isc_core.progress import Monitor, ProgressEvent
 from isc_core.scene.known_inputs import DepthObservation
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.illumination import unstack
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.settings import Start
-from isc_core.sirfs.silhouette import silhouette_field
+from isc_core.sirfs.silhouette import normals_from_silhouette
 from isc_core.sirfs.solver import MOST_THREADS, SirfsResult, SolverOptions, solve, thread_count
 
 from .small_problems import Scene, blob, make_problem, weights
@@ -189,19 +189,19 @@ def test_cancel_before_the_start_evaluates_nothing(monkeypatch: pytest.MonkeyPat
 
 @pytest.mark.parametrize("size", [(60, 60), (90, 84), (170, 165)])
 def test_progress_rises_from_0_to_1(size: tuple[int, int]) -> None:
-    seen: list[tuple[str, float]] = []
+    seen: list[ProgressEvent] = []
     few = LbfgsOptions(iterations=6)
     options = SolverOptions(threads=1, lbfgs=few)
     solve(
         make_problem(blob(size)),
         options,
-        monitor=Monitor(lambda event: seen.append((event.stage, event.fraction))),
+        monitor=Monitor(seen.append),
     )
-    fractions = [f for _, f in seen]
+    fractions = [event.fraction for event in seen]
     assert len(fractions) >= 7
     assert fractions == sorted(fractions)
     assert fractions[0] >= 0 and fractions[-1] <= 1
-    assert "loss" in seen[-1][0]
+    assert "loss" in seen[-1].detail
 
 
 @pytest.mark.parametrize("levels", [1, 2, 3])
@@ -236,7 +236,7 @@ def test_it_begins_with_the_dome_and_light_that_the_settings_ask_for() -> None:
     scene = hemisphere()
     profile = SilhouetteProfile(np.array([0.7, 0.5, 0.3, 0.1]), np.full(4, 0.3))
     plain = make_problem(scene)
-    field = silhouette_field(scene.mask, profile)
+    field = normals_from_silhouette(scene.mask, profile)
     plain = replace(plain, silhouette=field)
     unmoved = SolverOptions(threads=1, single=False, lbfgs=LbfgsOptions(iterations=0))
     flat = solve(plain, unmoved)
@@ -296,17 +296,15 @@ def test_the_start_that_goes_on_ends_where_it_would_have_ended_alone() -> None:
 def test_trying_starts_can_be_cancelled_and_does_not_pretend_to_advance() -> None:
     problem = make_problem(hemisphere())
     problem = replace(problem, weights=replace(problem.weights, starts=(Start(), Start(light=1))))
-    seen: list[tuple[str, float]] = []
+    seen: list[ProgressEvent] = []
     solve(
         problem,
         SolverOptions(threads=1),
-        monitor=Monitor(lambda event: seen.append((event.stage, event.fraction))),
+        monitor=Monitor(seen.append),
     )
-    shares, losses = (
-        [share for _, share in seen],
-        [float(stage.split()[-1]) for stage, _ in seen if "loss" in stage],
-    )
+    shares = [event.fraction for event in seen]
+    losses = [float(event.detail.split()[-1]) for event in seen if "loss" in event.detail]
     assert shares == sorted(shares)
-    assert losses == sorted(losses, reverse=True), "the loss that is told is the lowest so far"
+    assert losses == sorted(losses, reverse=True), "the reported loss is the lowest so far"
     with pytest.raises(Cancelled):
         solve(problem, SolverOptions(threads=1), monitor=Monitor(cancelled=lambda: True))
