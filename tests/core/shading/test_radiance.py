@@ -10,7 +10,7 @@ from isc_core.shading.brdf.lambert import Lambert
 from isc_core.shading.radiance import Lights, directional, environment, radiance, sh_shading
 from isc_core.shading.spherical_harmonics import real_sh
 
-from .directions_at import GLOSSY_PAINT, UP, polar_units, random_units
+from .brdf.directions_at import GLOSSY_PAINT, UP, polar_units, random_units
 
 
 def sky(rows: int = 40) -> tuple[np.ndarray, np.ndarray]:
