@@ -1,25 +1,25 @@
-"""The Blinn-Phong extension: the object's gloss made sharper, rougher or metallic.
+"""The Blinn-Phong extension: sharper, rougher or metallic gloss.
 
 Equations. Remapping needs no shape: under one light the specular layer is s = w c^p, so that an
-exponent q makes of it, pixel by pixel,
+exponent q turns it, pixel by pixel, into
 
-    s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),     m the pixel's largest channel, w the layer's
-    brightest but for a few,
+    s' = g (q + 8) / (p + 8) s (m / w)^(q / p - 1),
 
-with the usual factor, which keeps the energy, and a gain g; for a wider lobe, q < p, m / w counts
-as a quarter at least, or the edge at which the separated layer ends would be lifted with it.
-Rendering draws the lobe anew on the recovered shape under the light that best explains the layer.
-Metal has no body colour of its own: of the share M of metal the diffuse light goes, the highlight
-takes the colour of the reflectance, and the surroundings are mirrored in that colour:
+with m the pixel's largest channel, w the layer's white, the usual energy-preserving factor and a
+gain g. For a wider lobe, q < p, m / w counts as at least a quarter, or the edge at which the
+separated layer ends would be lifted with it. Rendering draws the lobe anew on the recovered shape
+under the light that best explains the layer. Metal has no diffuse colour of its own: of the share M
+of metal the diffuse light vanishes, the highlight takes the colour of the reflectance, and the
+environment is mirrored in that colour:
 
-    diffuse' = (1 - M) diffuse,   specular' = s' (1 - M + M r / max r) + M r sum_w f(n, w) L(w)
-    max(0, n . w).
+    diffuse' = (1 - M) diffuse,
+    specular' = s' (1 - M + M r / max r) + M r sum_w f(n, w) L(w) max(0, n . w).
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (Blinn-Phong extension); for
 metals, R. L. Cook, K. E. Torrance 1982, doi:10.1145/357290.357293.
 
-Limits: remapping cannot spread a highlight beyond where some of it is, so a rougher look soon needs
-rendering. The mirrored surroundings are those that the smooth shading tells.
+Limits: remapping cannot spread a highlight beyond the pixels that show some of it, so a much
+rougher look needs rendering. The mirrored environment is the one recovered from the smooth shading.
 """
 
 from dataclasses import dataclass, replace
@@ -46,10 +46,22 @@ _CENTRE = 99.9  # percentile: the lobe's own centre, but for a few wrong pixels
 
 @dataclass(frozen=True)
 class Gloss:
-    """`exponent`: the new lobe's, in [1, 1e5]; None for `sharper` > 0 times the present one's.
-    `present`: the present lobe's, None for the fitted one. `gain` in [0, 1e6]: of the specular
-    layer. `metal` in [0, 1]: the share of metal. `method`: "remap" or "render". Raises
-    `InputError`.
+    """A change of gloss. Raises `InputError` outside these ranges.
+
+    Attributes
+    ----------
+    exponent : float or None
+        Of the new lobe, in [1, 1e5]; None for `sharper` times the present one.
+    sharper : float
+        Factor of the present exponent, greater than 0.
+    present : float or None
+        Exponent of the present lobe; None for the fitted one.
+    gain : float
+        Of the specular layer, in [0, 1e6].
+    metal : float
+        Share of metal, in [0, 1].
+    method : str
+        "remap" or "render".
     """
 
     exponent: float | None = None
@@ -73,9 +85,18 @@ class Gloss:
 
 
 def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None = None) -> Edited:
-    """The scene with another gloss.
+    """Return the scene with another gloss.
 
-    `light`: to render under; None for the one that best explains the specular layer.
+    Parameters
+    ----------
+    d : Decomposition
+    gloss : Gloss
+    light : DirectionalLight, optional
+        To render under; by default the one that best explains the specular layer.
+
+    Returns
+    -------
+    Edited
     """
     notes: list[str] = []
     same = gloss.exponent is None and gloss.sharper == 1 and gloss.method == "remap"
@@ -96,8 +117,18 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
 
 
 def remapped(specular: np.ndarray, mask: np.ndarray, present: float, exponent: float) -> np.ndarray:
-    """The specular layer (H, W, 3) of a lobe of exponent `present`, as one of `exponent` would have
-    it; unchanged where they are equal.
+    """Remap a specular layer to another Blinn-Phong exponent.
+
+    Parameters
+    ----------
+    specular : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    present, exponent : float
+        Old and new exponent; if equal, the layer is unchanged.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
     """
     if exponent == present:
         return specular

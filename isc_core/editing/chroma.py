@@ -1,10 +1,10 @@
-"""Colours as lightness, chroma and hue, for changes that an eye finds even: Oklab.
+"""Lightness, chroma and hue in the perceptually uniform space Oklab.
 
 Equation: with the cube roots (l, m, s)' of three mixtures of linear Rec.709, (L, a, b) = M (l, m,
 s)'; hue is the angle of (a, b), chroma its length. Both matrices are the published constants.
 
-Citation: B. Ottosson, "A perceptual color space for image processing" (2020), public domain, which
-has no DOI.
+Citation: B. Ottosson, "A perceptual color space for image processing" (2020), public domain, no
+DOI.
 """
 
 import numpy as np
@@ -26,12 +26,13 @@ _LAB = np.array(
 
 
 def to_oklab(linear: np.ndarray) -> np.ndarray:
-    """(..., 3) lightness, a, b of linear Rec.709 (..., 3)."""
+    """Convert linear Rec.709 (..., 3) to Oklab (L, a, b) (..., 3)."""
     return np.cbrt(np.asarray(linear, float) @ _MIX.T) @ _LAB.T
 
 
 def from_oklab(lab: np.ndarray) -> np.ndarray:
-    """Linear Rec.709 (..., 3) of lightness, a, b (..., 3); outside the gamut some channels are
-    negative.
+    """Convert Oklab (L, a, b) (..., 3) to linear Rec.709 (..., 3).
+
+    Outside the gamut some channels are negative.
     """
     return (np.asarray(lab, float) @ np.linalg.inv(_LAB).T) ** 3 @ np.linalg.inv(_MIX).T

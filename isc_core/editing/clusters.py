@@ -1,11 +1,11 @@
-"""Which parts of an object have the same paint: clusters of its reflectance by colour.
+"""Clusters of an object's reflectance by colour.
 
 Equation: k-means over (a / L, b / L, L / 5) in Oklab of the reflectance in the light's mean colour,
-brightness scaled so that its 99.5th percentile is white. The ratios do not change when shading was
-taken for paint, which scales L, a and b alike. Starts: each next centre is the one of a few random
-pixels that lowers the total distance most (k-means++, greedy), with a seed of its own; then
-alternating means; then centres that an eye would hardly tell apart become one. Clusters are
-numbered by size, the largest first.
+with brightness scaled so that its 99.5th percentile is white. The ratios are invariant where
+shading was taken for reflectance, which scales L, a and b alike. Initial centres: each next centre
+is the one of a few random pixels that lowers the total distance most (greedy k-means++), with a
+seed of its own; then alternating means; then centres that are nearly indistinguishable to the eye
+are merged. Clusters are numbered by size, the largest first.
 
 Citation: S. Lloyd 1982, doi:10.1109/TIT.1982.1056489; D. Arthur, S. Vassilvitskii, "k-means++",
 SODA 2007, doi:10.5555/1283383.1283494.
@@ -32,9 +32,18 @@ _SURE = 0.7  # shares within 15 % of none and all are none and all
 
 @dataclass(frozen=True)
 class Clusters:
-    """`labels`: (H, W) int, 0 for the largest cluster, -1 outside the mask. `colors`: (K, 3)
-    linear, each cluster's mean in the light's mean colour. `shares`: (K,) of the object's pixels,
-    falling. `paint`: (H, W, 3), what they are clusters of.
+    """Clusters of reflectance.
+
+    Attributes
+    ----------
+    labels : (H, W) int ndarray
+        0 for the largest cluster, -1 outside the mask.
+    colors : (K, 3) ndarray
+        Linear; each cluster's mean in the light's mean colour.
+    shares : (K,) ndarray
+        Of the object's pixels, descending.
+    paint : (H, W, 3) ndarray
+        The clustered reflectance.
     """
 
     labels: np.ndarray
@@ -43,15 +52,29 @@ class Clusters:
     paint: np.ndarray
 
     def weight(self, number: int) -> np.ndarray:
-        """(H, W) in [0, 1]: how much each pixel belongs to the cluster `number`, 1 being the
-        largest. Along its outline pixels are mixtures of two paints: how much of each follows from
-        their colour.
+        """Return how much each pixel belongs to a cluster.
 
-        Raises `InputError` for a number that is not there.
+        Along its outline pixels are mixtures of two reflectances; their colour gives the share.
+
+        Parameters
+        ----------
+        number : int
+            1 is the largest.
+
+        Returns
+        -------
+        (H, W) ndarray
+            In [0, 1].
+
+        Raises
+        ------
+        InputError
+            If there is no such cluster.
         """
         if not 1 <= number <= len(self.shares):
             raise InputError(
-                f"there is no cluster {number}: choose one of 1 to {len(self.shares)}, see clusters.png"
+                f"there is no cluster {number}: choose one of 1 to {len(self.shares)}, see "
+                "clusters.png"
             )
         mask = self.labels >= 0
         member = (self.labels == number - 1).astype(float)[..., None]
@@ -63,10 +86,24 @@ class Clusters:
 
 
 def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
-    """Splits the object into at most `count` paints, 1 to 12; fewer where there are not so many
-    colours. The same seed, the same clusters.
+    """Split the object's reflectance into clusters; deterministic for a seed.
 
-    Raises `InputError` for another count, or a seed below 0.
+    Parameters
+    ----------
+    d : Decomposition
+    count : int
+        Largest number of clusters, 1 to 12.
+    seed : int
+        Not negative.
+
+    Returns
+    -------
+    Clusters
+
+    Raises
+    ------
+    InputError
+        If `count` or `seed` is out of range.
     """
     if count not in range(1, LARGEST_COUNT + 1):
         raise InputError(f"{count} clusters are not possible: give 1 to {LARGEST_COUNT}")

@@ -1,20 +1,22 @@
-"""Bringing an edit back into the photo, at its full size.
+"""Transferring an edit to the photo at its full size.
 
 Problem: the maps may be smaller than the photo, whose detail the edited picture should keep; pixels
-outside the object must not change. Equation: what is brought back is the CHANGE, e = image' -
-image. Around each pixel k of the maps it is taken to be an affine function of the photo's colour I,
-e ~ A_k^T I + b_k (see `guided`). Where the window's colours tell nothing A falls back to the change
-as a factor of each channel, mean_k e / mean_k I, at most 1: so texture finer than the maps gets the
-contrast of its new light. A and b, smooth, are enlarged and applied to the full photo, and what
-they leave of e is enlarged as it is. A highlight that is taken away or a paint that is changed so
-ends at the photo's own edges. At the photo's own size e is added as it is.
+outside the object must not change.
+
+Equation: the transferred quantity is the CHANGE, e = image' - image. Around each pixel k of the
+maps it is modelled as an affine function of the photo's colour I, e ~ A_k^T I + b_k (see
+`imaging.guided_filter`). Where the window's colours are uninformative A falls back to the change as
+a factor of each channel, mean_k e / mean_k I, at most 1: so texture finer than the maps gets the
+contrast of its new light. A and b, which are smooth, are upsampled and applied to the full photo;
+the remainder of e is upsampled as it is. So a removed highlight or a changed reflectance ends at
+the photo's own edges. At the photo's own size e is added as it is.
 
 Citation: K. He, J. Sun, X. Tang, "Guided image filtering", TPAMI 35(6), 2013,
-doi:10.1109/TPAMI.2012.213; enlarging the coefficients: K. He, J. Sun, "Fast guided filter" (2015),
+doi:10.1109/TPAMI.2012.213; upsampling the coefficients: K. He, J. Sun, "Fast guided filter" (2015),
 arXiv:1505.00996.
 
-Limits: detail that the maps do not hold changes only as its colour says. Where the photo is
-clipped, so is the edit.
+Limits: detail that the maps do not hold changes only with its colour. Where the photo is clipped,
+so is the edit.
 """
 
 import numpy as np
@@ -34,11 +36,26 @@ _OFF = 3.0  # pixels of the maps that the object's box may differ
 
 
 def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray, np.ndarray]:
-    """The edited photo (H, W, 3) float32, linear, >= 0, at the size of `photo`, and where it
-    differs from it, (H, W) bool.
+    """Apply an edit to the photo at full size.
 
-    `photo`: the one that the result was made of, at full size, with the same mask. Nothing outside
-    the mask changes. Raises `InputError` where photo, mask and result do not fit.
+    Parameters
+    ----------
+    d : Decomposition
+    edit : Edited
+    photo : Photo
+        The photo that the result was made of, at full size, with the same mask.
+
+    Returns
+    -------
+    image : (H, W, 3) float32 ndarray
+        Linear, not negative.
+    changed : (H, W) bool ndarray
+        Where it differs from the photo; never outside the mask.
+
+    Raises
+    ------
+    InputError
+        If photo, mask and result do not fit.
     """
     scale = scale_of(d, photo)
     change = np.where(d.mask[..., None], edit.image - d.image, 0).astype(np.float32)
@@ -54,34 +71,60 @@ def composite(d: Decomposition, edit: Edited, photo: Photo) -> tuple[np.ndarray,
 
 
 def scale_of(d: Decomposition, photo: Photo) -> float:
-    """Map pixels to one photo pixel.
+    """Return the size of the maps over that of the photo.
 
-    Raises `InputError` where the photo or its mask is not that of the result.
+    Parameters
+    ----------
+    d : Decomposition
+    photo : Photo
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        If the photo or its mask is not that of the result.
     """
     stated = d.provenance.input.get("scale")
     size = d.provenance.input.get("size")
     if not isinstance(stated, int | float) or not 0 < stated <= 1 or not isinstance(size, list):
         raise InputError(
-            "the result does not say at which scale of its photo the maps are: decompose the photo again"
+            "the result does not say at which scale of its photo the maps are: decompose the photo "
+            "again"
         )
     height, width = photo.mask.shape
     expected = tuple(max(1, int(np.ceil(n * stated - 1e-6))) for n in (height, width))
     if size != [width, height] or expected != d.mask.shape:
         raise InputError(
-            f"the result was made of a photo of {' x '.join(map(str, size))} pixels, this one has {width} x {height}: give the same photo"
+            f"the result was made of a photo of {' x '.join(map(str, size))} pixels, this one has "
+            f"{width} x {height}: give the same photo"
         )
     boxes = np.array(mask_box(photo.mask)) * stated, np.array(mask_box(d.mask))
     if np.abs(boxes[0] - boxes[1]).max() > _OFF:
         raise InputError(
-            "the photo's mask is not the one that the result was made with: give the same mask with --mask"
+            "the photo's mask is not the one that the result was made with: give the same mask "
+            "with --mask"
         )
     return float(stated)
 
 
 def enlarged_change(d: Decomposition, change: np.ndarray, photo: Photo, scale: float) -> np.ndarray:
-    """The change (h, w, 3) of the maps' image, led by the colours of the full photo:
+    """Upsample the change of the maps' image, guided by the colours of the full photo.
 
-    (H, W, 3) float32, 0 outside its mask.
+    Parameters
+    ----------
+    d : Decomposition
+    change : (h, w, 3) ndarray
+    photo : Photo
+    scale : float
+        Size of the maps over that of the photo.
+
+    Returns
+    -------
+    (H, W, 3) float32 ndarray
+        0 outside the photo's mask.
     """
     result = np.zeros(photo.image.shape, np.float32)
     if not change.any():

@@ -1,16 +1,15 @@
-"""Dichromatic editing: the diffuse and the specular layer each on its own (thesis, figure 4.50).
+"""Dichromatic editing: the diffuse and the specular layer, edited separately (thesis, figure 4.50).
 
 Equation, for a layer l with white w (its 99.5th percentile), m its largest channel, G a Gaussian
 average inside the mask: sharpened u = max(0, l + amount (l - G l)); then l' = gain u (m(u) /
-w)^(gamma - 1). All channels of a pixel share the factor, so that gamma keeps its hue. Gain 0
+w)^(gamma - 1). All channels of a pixel share the factor, so that gamma keeps the hue. Gain 0
 removes the layer.
 
 Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and
 Application 10(4), 210-218 (1985), doi:10.1002/col.5080100409; H. Akbar, "3D Intrinsic Scene
 Characteristics Extraction Framework for a Single Image" (2016).
 
-Limits: a gamma below 1 lifts what the separation left by mistake; sharpening does so with its
-noise.
+Limits: a gamma below 1 amplifies errors of the separation; sharpening amplifies its noise.
 """
 
 from dataclasses import dataclass, field
@@ -26,9 +25,18 @@ from .edited import MOST_GAIN, Edited, edited
 
 @dataclass(frozen=True)
 class LayerEdit:
-    """`gain` in [0, 1e6], 0 removes the layer. `gamma` in [.05, 20], above 1 is more contrast.
-    `sharpen` in [-1, 20]: the share of detail that is added; -1 takes all of it away. `radius` in
-    [.3, 100]: sigma of what counts as detail, in pixels. Raises `InputError`.
+    """A change of one layer. Raises `InputError` outside these ranges.
+
+    Attributes
+    ----------
+    gain : float
+        In [0, 1e6]; 0 removes the layer.
+    gamma : float
+        In [0.05, 20]; above 1 is more contrast.
+    sharpen : float
+        Share of detail that is added, in [-1, 20]; -1 removes all detail.
+    radius : float
+        Standard deviation that separates detail, in pixels, in [0.3, 100].
     """
 
     gain: float = 1.0
@@ -48,14 +56,29 @@ class LayerEdit:
 
 @dataclass(frozen=True)
 class DichromaticEdit:
-    """What is done with the `diffuse` and with the `specular` layer."""
+    """Changes of both layers.
+
+    Attributes
+    ----------
+    diffuse, specular : LayerEdit
+    """
 
     diffuse: LayerEdit = field(default_factory=LayerEdit)
     specular: LayerEdit = field(default_factory=LayerEdit)
 
 
 def edit_layers(d: Decomposition, change: DichromaticEdit) -> Edited:
-    """The scene with both layers changed and added up again."""
+    """Return the scene with both layers changed and added again.
+
+    Parameters
+    ----------
+    d : Decomposition
+    change : DichromaticEdit
+
+    Returns
+    -------
+    Edited
+    """
     return edited(
         d,
         edited_layer(d.diffuse, d.mask, change.diffuse),
@@ -64,8 +87,18 @@ def edit_layers(d: Decomposition, change: DichromaticEdit) -> Edited:
 
 
 def edited_layer(layer: np.ndarray, mask: np.ndarray, change: LayerEdit) -> np.ndarray:
-    """One layer (H, W, 3) >= 0, changed inside `mask` (H, W); the same array's values where nothing
-    is asked for.
+    """Change one layer; a default edit returns the same values.
+
+    Parameters
+    ----------
+    layer : (H, W, 3) ndarray
+        Not negative.
+    mask : (H, W) bool ndarray
+    change : LayerEdit
+
+    Returns
+    -------
+    (H, W, 3) ndarray
     """
     if change.gain == 0:
         return np.zeros_like(layer)
@@ -82,8 +115,18 @@ def edited_layer(layer: np.ndarray, mask: np.ndarray, change: LayerEdit) -> np.n
 
 
 def masked_blur(values: np.ndarray, mask: np.ndarray, sigma: float) -> np.ndarray:
-    """Gaussian average of `values` (H, W) or (H, W, C) over the pixels of `mask` alone; 0 outside
-    it.
+    """Smooth values by a Gaussian over the pixels of a mask; 0 outside it.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+    mask : (H, W) bool ndarray
+    sigma : float
+        In pixels.
+
+    Returns
+    -------
+    ndarray
     """
     if values.ndim == 3:
         return np.stack(

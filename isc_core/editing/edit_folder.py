@@ -1,9 +1,9 @@
-"""The files of an edit: the picture, in the photo's own coding, and what a person looks at first.
+"""The files of an edit: the picture, in the photo's own encoding, and a contact sheet.
 
-`edit.json` says what was asked for and what was found; `edited.png` has the photo's depth, coding
-and alpha (none for a photo of floats); `edited.exr` is the same picture in linear light, colours
-multiplied by alpha as is usual there; `before_after.png` is the sheet; `clusters.png`, of
-recolouring, shows the parts to choose from. A folder appears whole or not at all.
+`edit.json` records the parameters and measurements; `edited.png` has the photo's bit depth,
+encoding and alpha (none for a photo of floats); `edited.exr` is the same picture in linear light,
+premultiplied by alpha; `before_after.png` is the contact sheet; `clusters.png`, of recolouring,
+shows the clusters to choose from. A folder appears completely or not at all.
 
 Limits: of a float photo with partly transparent pixels those outside the mask are kept bit by bit
 only where its file is an EXR with plain R, G, B; else to the rounding of the product with alpha.
@@ -34,8 +34,16 @@ _FADED = 0.06
 
 @dataclass(frozen=True)
 class Original:
-    """The photo to bring the edit back into: its light and mask at full size, its file's values,
-    and the file.
+    """The photo to apply the edit to.
+
+    Attributes
+    ----------
+    photo : Photo
+        Its light and mask at full size.
+    raster : Raster
+        The values of its file.
+    path : Path or None
+        The file.
     """
 
     photo: Photo
@@ -45,8 +53,15 @@ class Original:
 
 @dataclass(frozen=True)
 class Sheet:
-    """What stands on the sheet: its title, a faint second line, panels that follow the pictures,
-    and whether the layers are shown.
+    """Content of the contact sheet.
+
+    Attributes
+    ----------
+    title, subtitle : str
+    others : sequence of Panel
+        Panels that follow the pictures.
+    layers : bool
+        Whether the layers are shown.
     """
 
     title: str
@@ -57,7 +72,13 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Record:
-    """What `edit.json` tells, JSON-ready: the `action`, its `parameters`, what was `measured`."""
+    """Content of `edit.json`, ready for JSON.
+
+    Attributes
+    ----------
+    action : str
+    parameters, measured : mapping
+    """
 
     action: str
     parameters: Mapping[str, Any] = field(default_factory=dict)
@@ -65,8 +86,17 @@ class Record:
 
 
 def require_writable_edit(folder: Path | str, inputs: Iterable[Path | None] = ()) -> None:
-    """Tells before the work whether an edit could be written to `folder` without loss of its
-    `inputs`. Raises `InputError`.
+    """Check, before the work, that an edit can be written without loss of its inputs.
+
+    Parameters
+    ----------
+    folder : Path or str
+    inputs : iterable of Path
+
+    Raises
+    ------
+    InputError
+        If it cannot.
     """
     require_writable(folder, FILES, inputs)
 
@@ -75,10 +105,24 @@ def save_edit(
     d: Decomposition, edit: Edited, folder: Path | str, record: Record, sheet: Sheet, *,
     original: Original | None = None, clusters: Clusters | None = None,
 ) -> None:  # fmt: skip
-    """Writes the folder of an edit; the picture is the photo's where there is one, else the maps'.
+    """Write the folder of an edit.
 
-    Raises `InputError` if the folder is not ours or cannot be written, or the photo is not the
-    result's.
+    Parameters
+    ----------
+    d : Decomposition
+    edit : Edited
+    folder : Path or str
+    record : Record
+    sheet : Sheet
+    original : Original, optional
+        The edit is applied to this photo; by default the picture has the size of the maps.
+    clusters : Clusters, optional
+        Shown in `clusters.png`.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be replaced or written, or the photo is not the result's.
     """
     image, mask, before, raster = _picture(d, edit, original)
     pair = [
@@ -139,8 +183,16 @@ def _linear_planes(
 
 
 def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
-    """A picture of the clusters, (a Pillow image): the reflectance with all but one faded, for each
-    of them, under its number.
+    """Draw the clusters: for each, the reflectance with all others faded, under its number.
+
+    Parameters
+    ----------
+    d : Decomposition
+    clusters : Clusters
+
+    Returns
+    -------
+    PIL.Image.Image
     """
     paint = d.reflectance * light_color(d)
     shown = [Shown(paint, d.mask, "Reflectance")]

@@ -1,10 +1,10 @@
-"""The result of an edit: the layers of the picture as it would have been.
+"""The result of an edit: the edited layers, and the picture that they make.
 
 Equation, per channel, with L = diffuse + specular the light and L' the edited one: image' = L' +
-residual' where the residual is not below 0; it belongs to a highlight and goes with that, residual'
-= residual min(1, specular' / specular). Below 0 it is what the sensor cut off of L: there the
-picture stays cut off at the photo's value while the light is enough for it, and a stronger light
-lifts it as much (Y: luminance),
+residual' where the residual is not negative; it belongs to a highlight and follows it, residual' =
+residual min(1, specular' / specular). A negative residual is what the sensor clipped of L: there
+the picture stays clipped at the photo's value while the light is sufficient, and a stronger light
+raises it equally (Y: luminance),
 
     image' = min(L', image max(1, Y(L') / Y(L))).
 
@@ -25,10 +25,14 @@ _MOST_LIGHT = 1e30  # far from what single precision cannot hold
 
 @dataclass(frozen=True)
 class Edited:
-    """`image`, `diffuse`, `specular`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and
-    specular >= 0.
+    """The layers of an edited scene.
 
-    `notes`: what a person should know of the edit, a sentence each.
+    Attributes
+    ----------
+    image, diffuse, specular : (H, W, 3) float32 ndarray
+        Linear, 0 outside the mask; diffuse and specular are not negative.
+    notes : tuple of str
+        Notes for the user, one sentence each.
     """
 
     image: np.ndarray
@@ -43,9 +47,18 @@ def edited(
     specular: np.ndarray | None = None,
     notes: tuple[str, ...] = (),
 ) -> Edited:
-    """The scene with another diffuse or specular layer (H, W, 3);
+    """Return the scene with another diffuse or specular layer.
 
-    None keeps the present one. Negative light becomes 0.
+    Parameters
+    ----------
+    d : Decomposition
+    diffuse, specular : (H, W, 3) ndarray, optional
+        None keeps the present layer. Negative light becomes 0.
+    notes : tuple of str
+
+    Returns
+    -------
+    Edited
     """
     new_diffuse = d.diffuse if diffuse is None else _layer(diffuse, d.mask)
     new_specular = d.specular if specular is None else _layer(specular, d.mask)
@@ -63,9 +76,19 @@ def edited(
 
 
 def light_color(d: Decomposition) -> np.ndarray:
-    """(3,) the mean colour of the light on the object, of luminance 1. One photo leaves open how
-    much of a tint is light and how much is paint; `reflectance * light_color` is the paint as the
-    photo shows it, and is what colours are chosen for.
+    """Return the mean colour of the light on the object, of luminance 1.
+
+    One photo leaves open how much of a tint is light and how much is reflectance. `reflectance *
+    light_color` is the colour that the photo shows, and the one that users choose.
+
+    Parameters
+    ----------
+    d : Decomposition
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709.
     """
     mean = d.shading[d.mask].mean(0, dtype=float)
     return np.maximum(mean, 1e-3 * mean.max()) / float(

@@ -1,12 +1,12 @@
-"""New highlights: a lobe on the recovered shape, under a light of one's choice.
+"""New highlights: a lobe on the recovered shape, under a chosen light.
 
-Equation: specular' = (specular or 0) + k E/|E| f(n; l) max(0, n . l), the lobe f of `lobes.Lobe`, k
-by `lobes.strength_of`.
+Equation: specular' = (specular or 0) + k E/|E| f(n; l) max(0, n . l), with the lobe f of
+`shading.lobe_rendering.Lobe` and k by `lobes.strength_of`.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; H. Akbar 2016 (rendering highlights).
 
-Limits: the shape is what shading tells, smooth where the paint is busy; so is the highlight. It is
-clipped where the picture is.
+Limits: the recovered shape is smooth where the texture is busy; so is the highlight. It is clipped
+where the picture is.
 """
 
 from dataclasses import replace
@@ -30,11 +30,28 @@ def add_highlight(
     level: float | None = None,
     replacing: bool = False,
 ) -> Edited:
-    """The scene with a highlight of `lobe` under `light`, of which direction and colour count, on
-    top of the present specular layer or instead of it. `lobe`: None for the fitted one, or the
-    usual one. `level`: see `lobes.strength_of`; 0 adds none.
+    """Return the scene with a highlight, added to the specular layer or in its place.
 
-    Raises `InputError` for a light without light.
+    Parameters
+    ----------
+    d : Decomposition
+    light : DirectionalLight
+        Its direction and colour count.
+    lobe : Lobe, optional
+        By default the fitted one, or a standard one.
+    level : float, optional
+        See `lobes.strength_of`; 0 adds none.
+    replacing : bool
+        Remove the present specular layer.
+
+    Returns
+    -------
+    Edited
+
+    Raises
+    ------
+    InputError
+        If the light is black.
     """
     lobe = lobe or known_lobe(d) or Lobe()
     power = float(luminance(light.irradiance))

@@ -1,17 +1,11 @@
-"""The lobe that an edit renders, and what it sends to the viewer under any of the edits' lights.
+"""The lobe of an edit, and its strength relative to the photo.
 
-Equation: radiance(n) = sum over lights of f_r(n, v, l) max(0, n . l) E, with the viewer along z. It
-depends on the normal alone, so under an environment of many samples it is rendered for a table of
-normals, in the stereographic plane (x, y) / (1 + z), and looked up there.
-
-Strength: a lobe has none that a photo's unit could tell. It is given relative to the photo
-(`level`: how bright the lobe's centre would be at exponent 60, in units of the photo's white; other
-exponents keep the energy), or such that the present specular layer's energy stays.
+Strength: the photo's unit is unknown, so the strength is given relative to the photo (`level`: the
+brightness of the lobe's centre at exponent 60, in units of the photo's white; other exponents keep
+the energy), or such that the energy of the present specular layer is kept.
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; B. Walter et al. 2007,
-doi:10.2312/EGWR/EGSR07/195-206 (see `brdf`).
-
-Limits: no shadows, no light between parts of the surface.
+doi:10.2312/EGWR/EGSR07/195-206 (see `shading.brdf`).
 """
 
 import numpy as np
@@ -29,8 +23,16 @@ _TOO_BRIGHT = 2.0  # of the photo's white: kept energy never asks for more at a 
 
 
 def known_lobe(d: Decomposition) -> Lobe | None:
-    """The lobe that was fitted to the photo, the widest that it can be where only that is known;
-    None where there is no fit or it says nothing of the roughness.
+    """Return the lobe fitted to the photo, or the widest possible one where only a bound is known.
+
+    Parameters
+    ----------
+    d : Decomposition
+
+    Returns
+    -------
+    Lobe or None
+        None without a fit, or where the fit does not determine the roughness.
     """
     fit = d.brdf
     if fit is None or fit.alpha is None:
@@ -44,12 +46,27 @@ def known_lobe(d: Decomposition) -> Lobe | None:
 
 
 def strength_of(d: Decomposition, lobe: Lobe, unscaled: np.ndarray, level: float | None) -> float:
-    """The factor for `unscaled` (H, W, 3), the lobe of strength 1 as rendered under a light of
-    irradiance 1 across its beam.
+    """Return the factor of a rendered lobe.
 
-    `level` in [0, 1e6]: brightness relative to the photo's white, see the module; None keeps the
-    energy of the present specular layer, as far as that does not make the lobe's centre brighter
-    than twice the white, and is level 1 where there is none. Raises `InputError`.
+    Parameters
+    ----------
+    d : Decomposition
+    lobe : Lobe
+    unscaled : (H, W, 3) ndarray
+        The lobe of strength 1, rendered under a light of irradiance 1 across its beam.
+    level : float or None
+        Brightness relative to the photo's white, in [0, 1e6]; None keeps the energy of the present
+        specular layer, as long as the lobe's centre is not brighter than twice the white, and is 1
+        where there is none.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        If `level` is out of range.
     """
     if level is not None:
         check_range("strength", level, 0, MOST_GAIN)

@@ -1,17 +1,16 @@
-"""Recolouring: another paint under the same light and the same gloss (thesis, figure 4.51).
+"""Recolouring: another reflectance under the same light and the same gloss (thesis, figure 4.51).
 
-Equation, for a paint r, the reflectance times the light's mean colour, with luminance Y(r), in
-Oklab (L, a, b) with hue h and chroma C: h' = h + shift, C' = saturation C, or, for a target colour,
-the target's hue and the chroma C_target L / L_target, which is the target's own paint in more or
-less light; back in linear light it is scaled to Y(r') = value Y(r), so that texture and shading
-stay as they were. A colour that cannot be that bright moves toward grey at that luminance just
-until it can. diffuse' = ((1 - w) r + w r') shading, w being the region's weight; the specular layer
-is not touched.
+Equation, for a colour r, the reflectance times the light's mean colour, with luminance Y(r), in
+Oklab (L, a, b) with hue h and chroma C: h' = h + shift, C' = saturation C; or, for a target colour,
+the target's hue and the chroma C_target L / L_target, which is the target in more or less light.
+Back in linear light it is scaled to Y(r') = value Y(r), so that texture and shading stay. A colour
+that cannot be that bright moves toward grey at that luminance just until it can. diffuse' = ((1 -
+w) r + w r') shading, with w the region's weight; the specular layer does not change.
 
 Citation: B. Ottosson 2020 (Oklab, see `chroma`); H. Akbar 2016 (recolouring).
 
-Limits: what the separation left of the highlights in the diffuse layer is painted too. Black and
-pure white paint take hardly any colour.
+Limits: highlights that the separation left in the diffuse layer are recoloured too. Black and pure
+white take hardly any colour.
 """
 
 from dataclasses import dataclass
@@ -28,9 +27,18 @@ from .edited import Edited, edited, light_color
 
 @dataclass(frozen=True)
 class Paint:
-    """`hue`: degrees that the hue turns. `saturation`, `value` >= 0: factors of chroma and of
-    luminance. `target`: (3,) linear colour in [0, 1] that the paint becomes first, or None.
-    `target_luminance`: on average it becomes as bright as the target, too. Raises `InputError`.
+    """A change of colour. Raises `InputError` outside these ranges.
+
+    Attributes
+    ----------
+    hue : float
+        Rotation of the hue in degrees.
+    saturation, value : float
+        Factors of chroma and luminance, not negative.
+    target : (3,) ndarray or None
+        Linear colour in [0, 1] that the reflectance takes first.
+    target_luminance : bool
+        Match the mean luminance of the target, too.
     """
 
     hue: float = 0.0
@@ -49,12 +57,13 @@ class Paint:
                 raise InputError("a target colour has three numbers")
         if self.target_luminance and (self.target is None or not np.any(self.target)):
             raise InputError(
-                "the brightness of a target colour is to be taken, but there is none, or it is black"
+                "the brightness of a target colour is to be taken, but there is none, or it is "
+                "black"
             )
 
     @property
     def changes(self) -> bool:
-        """Whether anything is asked for."""
+        """Whether anything changes."""
         return (
             self.target is not None
             or self.hue % 360 != 0
@@ -64,10 +73,23 @@ class Paint:
 
 
 def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -> Edited:
-    """The scene with other paint. `region`: (H, W) in [0, 1], where and how much; None for the
-    whole object.
+    """Return the scene with another reflectance.
 
-    Raises `InputError` for a region of another size, or of nothing of the object.
+    Parameters
+    ----------
+    d : Decomposition
+    paint : Paint
+    region : (H, W) ndarray, optional
+        Weight in [0, 1]; by default the whole object.
+
+    Returns
+    -------
+    Edited
+
+    Raises
+    ------
+    InputError
+        If the region has another size or covers nothing of the object.
     """
     if region is not None and region.shape != d.mask.shape:
         raise InputError(
@@ -92,9 +114,21 @@ def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -
 
 
 def repainted(old_paint: np.ndarray, paint: Paint, white: float, weight: np.ndarray) -> np.ndarray:
-    """Paints (N, 3) >= 0, linear, changed.
+    """Change colours.
 
-    `white`: the brightest that paint gets. `weight` (N, 1): of each in the average.
+    Parameters
+    ----------
+    old_paint : (N, 3) ndarray
+        Linear, not negative.
+    paint : Paint
+    white : float
+        Brightest value a colour may take.
+    weight : (N, 1) ndarray
+        Of each colour in the mean.
+
+    Returns
+    -------
+    (N, 3) ndarray
     """
     old = luminance(old_paint)
     lab = to_oklab(old_paint)

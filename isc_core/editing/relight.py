@@ -1,23 +1,26 @@
-"""Relighting: the object under the recovered light turned, or under another light.
+"""Relighting: the object under the recovered light rotated, or under another light.
 
-Equation: diffuse' = reflectance S'(n), S' by the new light: exp(sum_k L'_k Y_k(n)), one distant
-light with an ambient rest, or an environment's K L of `environment`. What becomes of the highlights
-is a choice: keep     they stay as they are; scale    each pixel's follow its own shading, specular'
-= specular S' / S, at most fourfold: dimmed where the light has gone, not moved; remove   they go;
-render   a lobe is rendered under the new light, with the strength under which it has the present
-layer's energy in the present light.
+Equation: diffuse' = reflectance S'(n), with S' by the new light: exp(sum_k L'_k Y_k(n)), one
+distant light with an ambient term, or the irradiance of an environment map (see
+`shading.environment_map`). Highlights follow one of these modes:
+
+    keep     they stay as they are;
+    scale    they follow their pixel's shading, specular' = specular S' / S, at most fourfold;
+    remove   they vanish;
+    render   a lobe is rendered under the new light, with the strength under which it has the
+             present layer's energy in the present light.
 
 The present light that a lobe is rendered in is the distant light that best explains the specular
-layer, or else that of the fit, since the recovered one is too smooth for highlights; where neither
-tells, the recovered one. A light that is turned takes it along. Left to itself ("auto") a turn
-fades from the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the angle that
-this light moves: the smallest turn changes least, and a highlight that has gone elsewhere is all
+layer, or else that of the fit, since the recovered one is too smooth for highlights; without
+either, the recovered one. A rotated light takes it along. By default ("auto") a rotation fades from
+the present layer to the rendered one, by exp(-(angle / 10 degrees)^2) of the angle by which this
+light moves: the smallest rotation changes least, and a highlight far from its place is all
 rendered.
 
 Citation: R. Ramamoorthi, P. Hanrahan 2001, doi:10.1145/383259.383317; H. Akbar 2016 (relighting).
 
-Limits: no cast shadows, old or new: those of the photo stay in the reflectance. Light from behind
-the object was seen by no normal.
+Limits: no cast shadows, old or new: those of the photo stay in the reflectance. No normal saw light
+from behind the object.
 """
 
 from dataclasses import dataclass, replace
@@ -45,10 +48,17 @@ _FADE = 10.0  # degrees that a light moves until its highlights are new ones
 
 @dataclass(frozen=True)
 class NewLight:
-    """A light of one of three kinds, the others None. `coefficients` (9, 3): of log shading. `sun`:
-    one distant light. `sky`: environment (rows, 2 rows, 3) of linear radiance >= 0, see
-    `environment`. `turned` (3, 3): the rotation that makes `coefficients` of the recovered light,
-    None for another light. Raises `InputError` unless there is exactly one, and sound.
+    """A light of exactly one of three kinds; raises `InputError` otherwise.
+
+    Attributes
+    ----------
+    coefficients : (9, 3) ndarray or None
+        SH coefficients of log shading, Rec.709.
+    sun : DirectionalLight or None
+    sky : (rows, 2 rows, 3) ndarray or None
+        Environment map of linear radiance, not negative.
+    turned : (3, 3) ndarray or None
+        Rotation from the recovered light to `coefficients`; None for another light.
     """
 
     coefficients: np.ndarray | None = None
@@ -65,12 +75,13 @@ class NewLight:
             rows = len(self.sky)
             if np.shape(self.sky) != (rows, 2 * rows, 3) or rows < 2:
                 raise InputError(
-                    f"an environment is twice as wide as high, this one is {np.shape(self.sky)[1]} x {rows}: use a full panorama"
+                    f"an environment is twice as wide as high, this one is {np.shape(self.sky)[1]} "
+                    f"x {rows}: use a full panorama"
                 )
             check_range("the environment's radiance", self.sky, 0, np.inf)
 
     def shading(self, normals: np.ndarray) -> np.ndarray:
-        """(N, 3) of white matt surfaces with the unit normals (N, 3)."""
+        """Return the shading (N, 3) of white diffuse surfaces with unit normals (N, 3)."""
         if self.coefficients is not None:
             return sh_shading(normals, self.coefficients)
         if self.sun is not None:
@@ -78,7 +89,7 @@ class NewLight:
         return shading_under(np.asarray(self._sky(_ROWS), float), np.asarray(normals, float))
 
     def lobe(self, lobe: Lobe, normals: np.ndarray) -> np.ndarray:
-        """(N, 3): what a lobe of strength 1 shows of this light on unit normals (N, 3)."""
+        """Return the radiance (N, 3) of a lobe of strength 1 on unit normals (N, 3)."""
         if self.sun is not None:
             ambient = np.broadcast_to(self.sun.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
             return lobe_under(lobe, normals, self.sun) + lobe_in(lobe, normals, ambient)
@@ -93,11 +104,19 @@ class NewLight:
 
 @dataclass(frozen=True)
 class Relighting:
-    """`highlights`: one of `HIGHLIGHTS`; "auto" renders where a lobe is known and scales otherwise.
-    `lobe`: to render, None for the fitted one. `exposure` > 0: factor of the new light. `balanced`:
-    the new light's white is taken to be the present light's mean colour, and it is made as bright,
-    on average over the object, as the present one; for lights that are not told in the photo's
-    units. Raises `InputError`.
+    """Options of relighting. Raises `InputError` outside these ranges.
+
+    Attributes
+    ----------
+    highlights : str
+        One of `HIGHLIGHTS`; "auto" renders where a lobe is known and scales otherwise.
+    lobe : Lobe or None
+        To render; None for the fitted one.
+    exposure : float
+        Factor of the new light, greater than 0.
+    balanced : bool
+        Give the new light's white the present light's mean colour, and its mean brightness over the
+        object: for lights whose unit is not the photo's.
     """
 
     highlights: str = "auto"
@@ -114,10 +133,25 @@ class Relighting:
 
 
 def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None) -> Edited:
-    """The scene under `light`. The recovered light itself, at exposure 1, returns the image as it
-    is, but for highlights that are to be removed or rendered.
+    """Return the scene under another light.
 
-    Raises `InputError` for a light that leaves the object black.
+    The recovered light itself, at exposure 1, returns the image bit by bit, except for highlights
+    that are removed or rendered.
+
+    Parameters
+    ----------
+    d : Decomposition
+    light : NewLight
+    choice : Relighting, optional
+
+    Returns
+    -------
+    Edited
+
+    Raises
+    ------
+    InputError
+        If the light leaves the object black.
     """
     choice = choice or Relighting()
     same = light.coefficients is not None and np.array_equal(light.coefficients, d.illumination)
@@ -129,7 +163,8 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
     new = light.shading(normals)
     if not luminance(new).any():
         raise InputError(
-            "no part of the object sees the new light: bring it to the front, or give it an ambient rest"
+            "no part of the object sees the new light: bring it to the front, or give it an "
+            "ambient rest"
         )
     old = d.shading[d.mask].astype(float)
     factor = np.full(3, choice.exposure)

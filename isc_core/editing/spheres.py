@@ -1,7 +1,7 @@
-"""Balls under lights: what a light looks like to a person (thesis, figure 4.49).
+"""Spheres under a light: a picture of the light (thesis, figure 4.49).
 
-Equation: a white matt ball of radius 1 has the normal (x, y, sqrt(1 - x^2 - y^2)); its radiance is
-the light's shading of that normal, and a lobe's on top where one is given.
+Equation: a white diffuse sphere of radius 1 has the normal (x, y, sqrt(1 - x^2 - y^2)); its
+radiance is the light's shading of that normal, plus that of a lobe if one is given.
 """
 
 import numpy as np
@@ -11,8 +11,17 @@ from ..shading.lights import DirectionalLight
 
 
 def sphere_normals(size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Normals (size, size, 3) of a ball that fills 90 % of a square picture, and how much of each
-    pixel it covers, (size, size).
+    """Return the normals of a sphere that fills 90 % of a square picture, and its coverage.
+
+    Parameters
+    ----------
+    size : int
+
+    Returns
+    -------
+    normal : (size, size, 3) ndarray
+    coverage : (size, size) ndarray
+        In [0, 1].
     """
     radius = 0.45 * size
     axis = (np.arange(size) + 0.5 - size / 2) / radius
@@ -32,8 +41,24 @@ def render_sphere(
     strength: float = 0.1,
     albedo: float = 1.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A ball of reflectance `albedo` under `light`, (size, size, 3) linear, and its coverage;
-    glossy if `exponent` is given.
+    """Render a sphere under a light.
+
+    Parameters
+    ----------
+    light : DirectionalLight
+    size : int
+        In pixels.
+    exponent : float, optional
+        Blinn-Phong exponent of a lobe.
+    strength : float
+        Of the lobe.
+    albedo : float
+
+    Returns
+    -------
+    image : (size, size, 3) ndarray
+        Linear.
+    coverage : (size, size) ndarray
     """
     normal, coverage = sphere_normals(size)
     color = albedo * light.shading(normal)
