@@ -1,66 +1,383 @@
-"""How the networks that learn from relit objects are fitted, `lamp_network_training` and
-`shape_network_training`.
+"""The training loop of all networks.
 
-Adam with decoupled weight decay (I. Loshchilov and F. Hutter 2019, arXiv:1711.05101), a cosine of
-steps after a rise, weights averaged.
+Equation: the learning rate at step k of K is rate * min(1, (k + 1) / warm_up) * (1 + cos(pi k / K))
+/ 2. The exported weights are a running average w' <- w' + (1 - d) (w - w') with
+d = min(d_max, (k + 1) / (k + delay)).
+
+Citation: optimiser: I. Loshchilov and F. Hutter, "Decoupled Weight Decay Regularization", 2019,
+arXiv:1711.05101.
+
+Limits: CPU only. The gradient is clipped to norm 1. A resumed run draws other samples than the
+uninterrupted one would have drawn.
 """
 
 import argparse
 import copy
 import math
 import time
-from collections.abc import Callable, Iterator
-from typing import Any, TypeVar
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 import torch
 from torch import nn
 
-from training.networks.scene_classifier import follow
+from isc_core.io.atomic import new_file
 
-RATE, HEAD_RATE = 4e-4, 1e-3  # of an encoder that knows something, and of what is new
-_DECAY, _WARM_UP, _SHOWN, _KEPT = 1e-2, 100, 100, 1000
+_REPORT_EVERY, _CHECKPOINT_EVERY = 100, 1000  # steps
+_VALIDATION_BATCHES = 8
+_CHECKPOINT_KEYS = {"step", "network", "average", "optimizer"}
 
-Net = TypeVar("Net", bound=nn.Module)
+Batch = tuple[torch.Tensor, ...]
+DrawBatch = Callable[[np.random.Generator], Batch]
+Member = TypeVar("Member")
 
 
-def optimised(
-    network: Net,
-    encoder: nn.Module,
-    batches: Iterator[Any],
-    loss_of: Callable[[Net, Any], tuple[torch.Tensor, list[float]]],
-    given: argparse.Namespace,
-) -> Net:
-    """The network after `given.steps` batches, its weights averaged over the last ones; every
-    thousand steps those are kept as the output's name with .pt. `loss_of` gives the loss and the
-    parts of it that are shown; all but the `encoder` learns at `HEAD_RATE`.
+class Trainable(Protocol):
+    """What the loop needs of a network besides `torch.nn.Module`."""
+
+    def encoder_parameters(self) -> Sequence[nn.Parameter]:
+        """Return the parameters that start from a fitted encoder."""
+
+    def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+        """Return the loss of a batch and its named terms."""
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return the weights in the layout that the core reads."""
+
+
+Net = TypeVar("Net", bound=Any)  # an nn.Module that is Trainable
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Constants of the optimiser.
+
+    Attributes
+    ----------
+    rate : float
+        Peak learning rate of the encoder.
+    head_rate : float
+        Peak learning rate of all other parameters.
+    weight_decay : float
+        Decoupled weight decay.
+    warm_up : int
+        Steps over which the rate rises linearly.
+    floor : float
+        Added to every rate.
+    average_limit : float
+        Largest share of the old weights in the running average.
+    average_delay : int
+        Steps that delay the running average, > 1.
     """
-    known = {id(weights) for weights in encoder.parameters()}
-    heads = [weights for weights in network.parameters() if id(weights) not in known]
-    rates = (RATE, HEAD_RATE)
-    groups = [
-        {"params": group, "lr": rate}
-        for group, rate in zip((encoder.parameters(), heads), rates, strict=True)
-    ]
-    optimizer = torch.optim.AdamW(groups, weight_decay=_DECAY)
-    average, shown, began = copy.deepcopy(network).eval(), np.zeros(1), time.time()
-    for step in range(given.steps):
-        share = min(1.0, (step + 1) / _WARM_UP) * 0.5 * (1 + math.cos(math.pi * step / given.steps))
-        for group, full in zip(optimizer.param_groups, rates, strict=True):
-            group["lr"] = share * full
-        loss, parts = loss_of(network, next(batches))
+
+    rate: float
+    head_rate: float
+    weight_decay: float = 1e-2
+    warm_up: int = 100
+    floor: float = 0.0
+    average_limit: float = 0.995
+    average_delay: int = 20
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of one run, from the command line.
+
+    Attributes
+    ----------
+    output : Path
+        The weights (.npz). Checkpoints are written beside it (.pt).
+    steps : int
+        Number of optimiser steps.
+    batch : int
+        Samples per batch.
+    seed : int
+        Seed of the initial weights and of the samples.
+    threads : int
+        Threads of PyTorch; 0 keeps its default.
+    workers : int
+        Processes that draw samples; 0 draws them in the main process.
+    validation : float
+        Share of the subjects held out, in [0, 1).
+    resume : Path or None
+        Checkpoint of an interrupted run to continue.
+    start : Path or None
+        Checkpoint whose averaged weights a new run starts from.
+    """
+
+    output: Path
+    steps: int
+    batch: int
+    seed: int = 0
+    threads: int = 1
+    workers: int = 1
+    validation: float = 0.0
+    resume: Path | None = None
+    start: Path | None = None
+
+
+def add_run_arguments(parser: argparse.ArgumentParser, steps: int, batch: int) -> None:
+    """Add the options of `RunOptions` to a command line.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        Changed in place.
+    steps, batch : int
+        Defaults.
+    """
+    add = parser.add_argument
+    add("-o", "--output", type=Path, required=True, metavar="NPZ", help="where to write weights")
+    add("--steps", type=int, default=steps, help="optimiser steps (default: %(default)s)")
+    add("--batch", type=int, default=batch, help="samples per batch (default: %(default)s)")
+    add("--seed", type=int, default=0, help="seed of weights and samples (default: %(default)s)")
+    add("--threads", type=int, default=1, help="PyTorch threads (default: %(default)s; 0: all)")
+    add("--workers", type=int, default=1, help="sampling processes (default: %(default)s)")
+    add(
+        "--validation",
+        type=float,
+        default=0.0,
+        metavar="SHARE",
+        help="share of subjects to hold out for validation (default: none, as for the shipped "
+        "networks)",
+    )
+    begin = parser.add_mutually_exclusive_group()
+    begin.add_argument(
+        "--resume", type=Path, metavar="PT", help="continue the run that wrote this checkpoint"
+    )
+    begin.add_argument(
+        "--start", type=Path, metavar="PT", help="start a new run from a checkpoint's weights"
+    )
+
+
+def run_options(arguments: argparse.Namespace) -> RunOptions:
+    """Collect the options added by `add_run_arguments`."""
+    return RunOptions(
+        arguments.output,
+        arguments.steps,
+        arguments.batch,
+        arguments.seed,
+        arguments.threads,
+        arguments.workers,
+        arguments.validation,
+        arguments.resume,
+        arguments.start,
+    )
+
+
+def split(
+    members: Sequence[Member], name: Callable[[Member], str], options: RunOptions
+) -> tuple[list[Member], list[Member]]:
+    """Split subjects into a training set and a validation set.
+
+    Subjects of the same name stay together: views of one object never lie in both sets.
+
+    Parameters
+    ----------
+    members : sequence
+        The subjects.
+    name : callable
+        Returns the name of a subject's object or shape family.
+    options : RunOptions
+        `validation` and `seed` are used.
+
+    Returns
+    -------
+    training, validation : list
+        `validation` is empty if the share is 0.
+    """
+    names = sorted({name(member) for member in members})
+    count = math.ceil(options.validation * len(names)) if options.validation else 0
+    order = np.random.default_rng([options.seed, 1]).permutation(len(names))
+    held_out = {names[k] for k in order[: min(count, len(names) - 1)]}
+    return (
+        [member for member in members if name(member) not in held_out],
+        [member for member in members if name(member) in held_out],
+    )
+
+
+class _Batches(torch.utils.data.IterableDataset[Batch]):  # type: ignore[misc]
+    """Batches without end; each worker process has a random stream of its own."""
+
+    def __init__(self, draw: DrawBatch, seed: int, first_step: int) -> None:
+        self._draw, self._seed = draw, [seed, first_step]
+
+    def __iter__(self) -> Iterator[Batch]:
+        worker = torch.utils.data.get_worker_info()
+        number = 0 if worker is None else int(worker.id)
+        if worker is not None:
+            seeds = np.random.default_rng([*self._seed, number, 3])
+            torch.manual_seed(int(seeds.integers(2**31)))
+            torch.set_num_threads(1)
+        rng = np.random.default_rng([*self._seed, number])
+        while True:
+            yield self._draw(rng)
+
+
+def fit(
+    network: Net,
+    draw: DrawBatch,
+    schedule: Schedule,
+    options: RunOptions,
+    draw_validation: DrawBatch | None = None,
+) -> Net:
+    """Fit a network and write its weights.
+
+    Parameters
+    ----------
+    network : nn.Module
+        A `Trainable`, changed in place.
+    draw : callable
+        Draws a training batch.
+    schedule : Schedule
+        Constants of the optimiser.
+    options : RunOptions
+        Length, files and seeds of the run.
+    draw_validation : callable, optional
+        Draws a batch of held-out subjects. The same batches are used at every evaluation.
+
+    Returns
+    -------
+    nn.Module
+        The network with averaged weights, as written to `options.output`.
+
+    Raises
+    ------
+    ValueError
+        If a checkpoint does not fit the network.
+    """
+    if options.threads:
+        torch.set_num_threads(options.threads)
+    optimizer, rates = _optimizer(network, schedule)
+    if options.start is not None:
+        network.load_state_dict(_checkpoint(options.start)["average"])
+    average, first = copy.deepcopy(network).eval(), 0
+    if options.resume is not None:
+        first = _restore(_checkpoint(options.resume), network, average, optimizer)
+    batches = _loader(draw, options, first)
+    held_out = _validation_batches(draw_validation, options)
+    report = _Report(options.steps)
+    for step in range(first, options.steps):
+        share = _rate_share(step, options.steps, schedule.warm_up)
+        for group, rate in zip(optimizer.param_groups, rates, strict=True):
+            group["lr"] = share * rate + schedule.floor
+        loss, terms = network.loss(next(batches))
         optimizer.zero_grad()
         loss.backward()
         nn.utils.clip_grad_norm_(network.parameters(), 1.0)
         optimizer.step()
-        follow(average, network, step)
-        shown = 0.99 * shown + 0.01 * np.array(parts)
-        if (step + 1) % _SHOWN == 0:
-            told = ", ".join(f"{part:.4f}" for part in shown / (1 - 0.99 ** (step + 1)))
-            print(
-                f"step {step + 1} of {given.steps}, losses {told}, {time.time() - began:.0f} s",
-                flush=True,
-            )
-        if (step + 1) % _KEPT == 0:
-            torch.save(average.state_dict(), given.output.with_suffix(".pt"))
+        _follow(average, network, step, schedule)
+        report.add(step, loss, terms)
+        done = step + 1
+        if done % _CHECKPOINT_EVERY == 0 or done == options.steps:
+            _write(average, network, optimizer, done, options.output)
+            if held_out:
+                print(f"  validation loss {_mean_loss(average, held_out):.4f}", flush=True)
     return average
+
+
+def _optimizer(network: Net, schedule: Schedule) -> tuple[Any, tuple[float, float]]:
+    encoder = list(network.encoder_parameters())
+    known = {id(weights) for weights in encoder}
+    heads = [weights for weights in network.parameters() if id(weights) not in known]
+    rates = (schedule.rate, schedule.head_rate)
+    groups = [
+        {"params": group, "lr": rate} for group, rate in zip((encoder, heads), rates, strict=True)
+    ]
+    return torch.optim.AdamW(groups, weight_decay=schedule.weight_decay), rates
+
+
+def _rate_share(step: int, steps: int, warm_up: int) -> float:
+    return min(1.0, (step + 1) / warm_up) * 0.5 * (1 + math.cos(math.pi * step / steps))
+
+
+def _loader(draw: DrawBatch, options: RunOptions, first: int) -> Iterator[Batch]:
+    batches = _Batches(draw, options.seed, first)
+    if not options.workers:
+        return iter(batches)
+    loader = torch.utils.data.DataLoader(
+        batches, batch_size=None, num_workers=options.workers, prefetch_factor=8
+    )
+    return iter(loader)
+
+
+def _validation_batches(draw: DrawBatch | None, options: RunOptions) -> list[Batch]:
+    if draw is None:
+        return []
+    rng = np.random.default_rng([options.seed, 2])
+    return [draw(rng) for _ in range(_VALIDATION_BATCHES)]
+
+
+def _mean_loss(network: Net, batches: Sequence[Batch]) -> float:
+    with torch.no_grad():
+        return float(np.mean([float(network.loss(batch)[0]) for batch in batches]))
+
+
+def _follow(average: nn.Module, network: nn.Module, step: int, schedule: Schedule) -> None:
+    """Move the running average toward the current weights."""
+    kept_share = min(schedule.average_limit, (step + 1) / (step + schedule.average_delay))
+    with torch.no_grad():
+        pairs = zip(average.state_dict().values(), network.state_dict().values(), strict=True)
+        for kept, new in pairs:
+            if kept.is_floating_point():
+                kept.lerp_(new, 1 - kept_share)
+            else:
+                kept.copy_(new)
+
+
+class _Report:
+    """Prints smoothed losses every hundred steps."""
+
+    def __init__(self, steps: int) -> None:
+        self._steps, self._began = steps, time.monotonic()
+        self._smoothed: dict[str, float] = {}
+        self._count = 0
+
+    def add(self, step: int, loss: torch.Tensor, terms: dict[str, torch.Tensor]) -> None:
+        self._count += 1
+        for name, value in chain([("loss", loss)], terms.items()):
+            smoothed = self._smoothed.get(name, 0.0)
+            self._smoothed[name] = 0.99 * smoothed + 0.01 * float(value.detach())
+        if (step + 1) % _REPORT_EVERY and step + 1 < self._steps:
+            return
+        weight = 1 - 0.99**self._count
+        shown = ", ".join(f"{name} {part / weight:.4f}" for name, part in self._smoothed.items())
+        seconds = time.monotonic() - self._began
+        print(f"step {step + 1}/{self._steps}: {shown} ({seconds:.0f} s)", flush=True)
+
+
+def _checkpoint(path: Path) -> dict[str, Any]:
+    found = torch.load(path, weights_only=True)
+    if not isinstance(found, dict) or not found.keys() >= _CHECKPOINT_KEYS:
+        raise ValueError(f"{path} is not a training checkpoint")
+    return found
+
+
+def _restore(kept: dict[str, Any], network: Net, average: Net, optimizer: Any) -> int:
+    """Restore a run; return the number of steps already done."""
+    try:
+        network.load_state_dict(kept["network"])
+        average.load_state_dict(kept["average"])
+        optimizer.load_state_dict(kept["optimizer"])
+    except RuntimeError as error:
+        raise ValueError(f"the checkpoint is of another network: {error}") from error
+    return int(kept["step"])
+
+
+def _write(average: Net, network: Net, optimizer: Any, step: int, output: Path) -> None:
+    """Write the averaged weights (.npz), and beside them the state to resume from (.pt)."""
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with new_file(output) as temporary, temporary.open("wb") as file:
+        np.savez_compressed(file, **average.arrays())
+    state = {
+        "step": step,
+        "network": network.state_dict(),
+        "average": average.state_dict(),
+        "optimizer": optimizer.state_dict(),
+    }
+    with new_file(output.with_suffix(".pt")) as temporary, temporary.open("wb") as file:
+        torch.save(state, file)

@@ -20,7 +20,7 @@ from isc_core.networks.scene_classifier import (
     read_appearance,
 )
 from tests.core.lit_balls import mirror_ball, under_lamps
-from training.data.environments import PLACES, make_surroundings
+from training.data.environments import ENVIRONMENTS, make_environment
 
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
 
@@ -84,10 +84,10 @@ def test_photos_without_anything_in_them_are_judged_too(level: float) -> None:
     assert np.isfinite(found).all() and found.sum() == pytest.approx(1)
 
 
-@pytest.mark.parametrize("place", PLACES)
+@pytest.mark.parametrize("place", ENVIRONMENTS)
 def test_mirrors_look_like_mirrors(place: str) -> None:
     found = [
-        classify_scene(*mirror_ball(make_surroundings(place, np.random.default_rng([9, k]))))
+        classify_scene(*mirror_ball(make_environment(place, np.random.default_rng([9, k]))))
         for k in range(10)
     ]
     assert sum(kinds[MIRROR] + kinds[GLASS] > 0.5 for kinds in found) >= (

@@ -1,17 +1,16 @@
-"""Invented surroundings, sharp enough to be seen in a mirror: rooms, places outdoors, studios,
-clutter; as environments (rows, 2 rows, 3).
+"""Procedural environment maps, detailed enough for mirror reflections.
 
-Equation: a room is a box around the object: each direction meets a wall at a point, whose paint and
-pictures are rectangles; radiance 1 is about that of a white wall. Outdoors a sky brightens toward
-the horizon, below it lie houses or trees and a ground. A studio is a dark backdrop with softboxes.
-Clutter is made of dead leaves: discs and rectangles of all sizes, their number falling as size^-2,
-each before the last, which gives the statistics of natural pictures. The layout is that of
-`isc_core.shading.environment_map`.
+Equation: radiance (rows, 2 rows, 3) in the layout of `isc_core.shading.environment_map`; 1 is about
+the radiance of a white wall. A room is a box around the object: every direction meets a wall, whose
+reflectance and pictures are rectangles. Outdoors, the sky brightens toward the horizon; below it
+lie houses or trees and the ground. A studio is a dark backdrop with softboxes. Clutter follows the
+dead-leaves model: discs and rectangles of all sizes, their number falling as size^-2, each in front
+of the last, which gives the statistics of natural images.
 
 Citation: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41 (2001),
 doi:10.1023/A:1011109015675.
 
-Limits: flat: what stands in a room is painted on its walls. Nothing moves as one walks around.
+Limits: no parallax: the content of a room is painted on its walls.
 """
 
 import numpy as np
@@ -20,13 +19,26 @@ from scipy.ndimage import gaussian_filter, gaussian_filter1d
 from isc_core.shading.environment_map import directions
 from synth.albedos.fields import fractal_noise, smooth_noise
 
-PLACES = ("room", "outdoors", "studio", "clutter")
+ENVIRONMENTS = ("room", "outdoors", "studio", "clutter")
 ROWS = 128
 _TEXELS = 256
 
 
-def make_surroundings(name: str, rng: np.random.Generator) -> np.ndarray:
-    """One draw of `PLACES`, (ROWS, 2 ROWS, 3) float32 radiance >= 0."""
+def make_environment(name: str, rng: np.random.Generator) -> np.ndarray:
+    """Draw an environment map.
+
+    Parameters
+    ----------
+    name : str
+        One of `ENVIRONMENTS`.
+    rng : np.random.Generator
+        Draws the layout and colours.
+
+    Returns
+    -------
+    (ROWS, 2 ROWS, 3) ndarray
+        Radiance, float32, > 0.
+    """
     radiance = {"room": _room, "outdoors": _outdoors, "studio": _studio, "clutter": _clutter}[name](
         rng, directions(ROWS)
     )
@@ -34,9 +46,7 @@ def make_surroundings(name: str, rng: np.random.Generator) -> np.ndarray:
 
 
 def _texture(rng: np.random.Generator, u: np.ndarray, v: np.ndarray, contrast: float) -> np.ndarray:
-    """A factor around 1 at places u, v (any shape, in units of the texture), cloudy, grainy, tiled
-    or boarded.
-    """
+    """A factor around 1 at u, v (texture units, any shape): clouds, grain, tiles or boards."""
     kind = rng.integers(4)
     if kind < 2:
         field = fractal_noise(rng, _TEXELS, 3.0) if kind else smooth_noise(rng, _TEXELS, 8)
@@ -58,7 +68,7 @@ def _texture(rng: np.random.Generator, u: np.ndarray, v: np.ndarray, contrast: f
 
 
 def _colour(rng: np.random.Generator, strength: float) -> np.ndarray:
-    """(3,), of mean 1: `strength` 0 is grey, 1 any colour."""
+    """A colour (3,) of mean 1; `strength` 0 is grey, 1 any colour."""
     values = np.exp(strength * rng.normal(0, 1, 3))
     return values / values.mean()
 
@@ -66,9 +76,7 @@ def _colour(rng: np.random.Generator, strength: float) -> np.ndarray:
 def _rectangles(
     rng: np.random.Generator, u: np.ndarray, v: np.ndarray, count: int, low: float, high: float
 ) -> list[np.ndarray]:
-    """Where (bool, as u and v) `count` upright rectangles lie whose sides are from `low` to `high`,
-    u and v from -1 to 1.
-    """
+    """Masks of `count` rectangles in [-1, 1]^2, with sides from `low` to `high`."""
     found = []
     for _ in range(count):
         middle, half = rng.uniform(-0.8, 0.8, 2), rng.uniform(low, high, 2) / 2
@@ -86,7 +94,7 @@ def _room(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
     window_walls = rng.permutation([(0, -1), (0, 1), (2, -1), (2, 1)])[
         : rng.integers(1, 3)
     ].tolist()
-    wall_paint = rng.uniform(0.2, 0.9) * _colour(rng, 0.15)
+    wall_colour = rng.uniform(0.2, 0.9) * _colour(rng, 0.15)
     for k in range(3):
         for side in (-1, 1):
             on = (axis == k) & (place[..., k] * side > 0)
@@ -96,15 +104,15 @@ def _room(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
             if k == 1:
                 out[on] = _ceiling(rng, u, v) if side > 0 else _floor(rng, u, v)
             else:
-                out[on] = _wall(rng, u, v, wall_paint, [k, side] in window_walls)
+                out[on] = _wall(rng, u, v, wall_colour, [k, side] in window_walls)
     return out
 
 
 def _ceiling(rng: np.random.Generator, u: np.ndarray, v: np.ndarray) -> np.ndarray:
     out = np.broadcast_to(rng.uniform(0.4, 1.2) * _colour(rng, 0.05), (*u.shape, 3)).copy()
-    lamps = rng.integers(0, 4)
-    for lamp in _rectangles(rng, u, v, lamps, 0.1, 0.5):
-        out[lamp] = np.exp(rng.uniform(np.log(8), np.log(60))) * _colour(rng, 0.15)
+    count = rng.integers(0, 4)
+    for panel in _rectangles(rng, u, v, count, 0.1, 0.5):
+        out[panel] = np.exp(rng.uniform(np.log(8), np.log(60))) * _colour(rng, 0.15)
     return out
 
 
@@ -116,11 +124,11 @@ def _floor(rng: np.random.Generator, u: np.ndarray, v: np.ndarray) -> np.ndarray
 
 
 def _wall(
-    rng: np.random.Generator, u: np.ndarray, v: np.ndarray, paint: np.ndarray, windows: bool
+    rng: np.random.Generator, u: np.ndarray, v: np.ndarray, colour: np.ndarray, windows: bool
 ) -> np.ndarray:
     out = (
         rng.uniform(0.6, 1.2)
-        * paint
+        * colour
         * _texture(rng, u, v, rng.uniform(0, 0.1))
         * (1 + 0.2 * v[:, None])
     )
@@ -142,7 +150,7 @@ def _wall(
                 * np.where(v > rng.uniform(-0.4, 0.2), 1.0, rng.uniform(0.1, 0.6))[:, None]
             )
             frame = (np.mod(u / bars, 1) < 0.08) | (np.mod(v / bars, 1) < 0.08)
-            out[pane] = np.where(frame[:, None], 0.4 * paint, sky)[pane]
+            out[pane] = np.where(frame[:, None], 0.4 * colour, sky)[pane]
     return out
 
 
@@ -233,8 +241,9 @@ def _studio(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
 def _on_plane(
     toward: np.ndarray, forward: np.ndarray, across: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where directions (..., 3) meet the plane at the distance 1 along the unit vector `forward`:
-    whether they do, and the place there, x along `across`, which is at right angles to it.
+    """Where directions (..., 3) meet the plane at distance 1 along the unit vector `forward`.
+
+    Returns whether they do, and the coordinates there, x along `across`.
     """
     across = across / np.linalg.norm(across)
     depth = toward @ forward
@@ -247,7 +256,7 @@ def _on_plane(
 
 
 def _clutter(rng: np.random.Generator, toward: np.ndarray) -> np.ndarray:
-    """Brighter above than below, or the other way round; some of the leaves shine."""
+    """Dead leaves, brighter above or below; some of them emit."""
     palette = rng.uniform(0.03, 1, (6, 3)) ** rng.uniform(0.8, 2)
     saturated = rng.uniform(0.05, 0.5)
     palette = (saturated * palette + (1 - saturated) * palette.mean(1, keepdims=True)) * np.exp(

@@ -1,8 +1,8 @@
-"""What random scenes and pictures are drawn with."""
+"""Random draws shared by the sample generators."""
 
 import numpy as np
 
 
 def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
-    """From `low` to `high` > 0, its logarithm evenly."""
+    """Draw a number from [low, high] whose logarithm is uniform; `low` > 0."""
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))

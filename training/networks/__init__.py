@@ -1,0 +1,1 @@
+"""One program per network of `isc_core.networks`, under the same name."""

@@ -1,23 +1,26 @@
-"""Fits the network of `isc_core.networks.light_network`.
+"""Fit the network of `isc_core.networks.light_network`.
 
-  python -m training.networks.light_network OBJECTS [--leave NAME...] [--steps N] -o LAMPS.npz
+  python -m training.networks.light_network OBJECTS... [--exclude NAME...] [--steps N] -o LIGHT.npz
 
-OBJECTS: of `training.data.traced_objects`; every picture lights one of them anew
-(`training.data.relighting`): by smooth light alone, by one lamp, or by two to four. `--leave`:
-families of shapes that the network must not see, because it will be measured on them. It begins
-with the encoder of the layer network that ships. Needs PyTorch (`pip install 'isc3d[training]'`),
-which nothing else of ISC does.
+OBJECTS are folders of `training.data.traced_objects`. Every sample relights one of the objects
+(`training.data.relighting`): ambient light alone, one directional light, or two to four.
+`--exclude` names shape families to leave out because the network will be measured on them. The
+encoder starts from the shipped layer network.
 
-Loss: the cross entropy of how many lamps there are; that of where they stand, their shares of the
-light blurred over some degrees; so that light and shape are told apart, the squared error of the
-mean normals of patches of 16 x 16 pixels; and minus the log likelihood of how the light looks
-(`sirfs.seen_light`). Adam with decoupled weight decay (I. Loshchilov and F. Hutter 2019,
-arXiv:1711.05101), a cosine of steps, averaged weights.
+Equation: the loss is the sum of four terms: the cross entropy of the number of lights; that of
+their directions, with the lights' shares blurred over some degrees; the squared error of the mean
+normals of cells of 16 x 16 pixels, so that light and shape are separated; and the negative log
+likelihood of the light's parameters (`isc_core.sirfs.priors.predicted_light`).
+
+Citation: see `training.loop`; the network: `isc_core.networks.light_network`.
+
+Limits: distant lights only.
 """
 
 import argparse
 import math
-from collections.abc import Iterator
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -29,187 +32,126 @@ from isc_core.networks.layer_network import shipped_network
 from isc_core.networks.light_network import CELL, LONG_SIDE, SURE, UNSURE
 from isc_core.scene.light_estimate import PLACES
 from isc_core.shading.spherical_harmonics import real_sh
-from isc_core.sirfs.priors.predicted_light import FRONT, LOOK
-from training.data.random_draws import log_uniform
-from training.data.relighting import NONE, ONE, SEVERAL, Relit, draw_photo
-from training.data.traced_objects import SIZE, objects_in
-from training.loop import optimised
-from training.networks.scene_classifier import sensed
-from training.networks.layer_network import arrays_of, encoder_of, inputs
+from isc_core.sirfs.priors.predicted_light import FRONT_NORMALS, LIGHT_TERMS
 
-_SIDE = 128  # of the pictures that it learns from
-_OBJECT = 0.9 * SIZE  # of an unlit object, its longer side
-_CHANCES = (0.25, 0.4, 0.35)  # of NONE, ONE, SEVERAL
-_SPREAD = math.radians(8)  # of a lamp's place
-_NORMALS = 1.0  # weight of the normals in the loss
-_BATCH = 32
-_LOCAL, _WHOLE = 192, 256
-_EVERY = 8  # pixels: one of them tells of the light
-_DARKEST = 0.05  # of the mean shading: what is darker is in shadow
-_RIDGE = 0.05  # how much an even light over all directions counts
+from ..data.random_draws import log_uniform
+from ..data.relighting import LightCount, RelightableObject, draw_photo, relightable_objects
+from ..data.relit_samples import OBJECT_SIDE, Transform, sample_of, transformed_vectors
+from ..data.traced_objects import SIZE
+from ..loop import Batch, Schedule, add_run_arguments, fit, run_options, split
+from .torch_layers import convolution_arrays, encoder_from, network_input
 
-
-class Draws(torch.utils.data.IterableDataset[tuple[torch.Tensor, ...]]):  # type: ignore[misc]
-    """Batches without end: input (B, 4, side, side), lamps (B,), places (B, P), normals (B, 3, side
-    / CELL, side / CELL), light (B, 8).
-    """
-
-    def __init__(self, objects: list[Relit], seed: int) -> None:
-        self._objects, self._seed = objects, seed
-
-    def __iter__(self) -> Iterator[tuple[torch.Tensor, ...]]:
-        worker = torch.utils.data.get_worker_info()
-        rng = np.random.default_rng([self._seed, worker.id if worker else 0])
-        torch.manual_seed(self._seed + (worker.id if worker else 0))
-        torch.set_num_threads(1)
-        while True:
-            drawn = [
-                draw(self._objects[int(rng.integers(len(self._objects)))], rng)
-                for _ in range(_BATCH)
-            ]
-            yield tuple(torch.stack(parts) for parts in zip(*drawn, strict=True))
-
-
-def draw(relit: Relit, rng: np.random.Generator) -> tuple[torch.Tensor, ...]:
-    """One picture as some camera takes it, and what is true of it, see `Draws`."""
-    lit = draw_photo(relit, rng, int(rng.choice([NONE, ONE, SEVERAL], p=_CHANCES)))
-    normals = np.zeros((*relit.mask.shape, 3), np.float32)
-    normals[relit.mask] = relit.normals
-    layers = torch.from_numpy(
-        np.concatenate([lit.photo, normals, relit.mask[..., None]], 2)
-        .astype(np.float32)
-        .transpose(2, 0, 1)
-    )
-    factor = LONG_SIDE / _OBJECT * (1.0 if rng.random() < 0.5 else log_uniform(rng, 0.6, 1.02))
-    layers = functional.interpolate(
-        layers[None], scale_factor=factor, mode="bilinear", antialias=True, align_corners=False
-    )[0]
-    turn, mirror = int(rng.integers(1, 4)) if rng.random() < 0.15 else 0, bool(rng.random() < 0.5)
-    layers, toward = layers.rot90(turn, (1, 2)), torch.from_numpy(lit.toward.astype(np.float32))
-    sample = torch.from_numpy(relit.normals[::_EVERY].astype(np.float32))
-    vectors = torch.cat([layers[3:6].reshape(3, -1).T, toward, sample])
-    for _ in range(turn):
-        vectors = torch.stack([-vectors[:, 1], vectors[:, 0], vectors[:, 2]], 1)
-    if mirror:
-        layers, vectors = layers.flip(2), vectors * torch.tensor([-1.0, 1, 1])
-    count, side = layers[0].numel(), layers.shape[1]
-    turned = vectors[:count].T.reshape(3, side, side)
-    layers = torch.cat([layers[:3], turned.flip(2) if mirror else turned, layers[6:]])
-    room = _SIDE - side
-    top, left = (int(rng.integers(room + 1)) for _ in range(2))
-    layers = functional.pad(layers, (left, room - left, top, room - top))
-    mask = (layers[6] > 0.98).float()
-    cells = functional.avg_pool2d(layers[3:6] * mask, CELL) / functional.avg_pool2d(
-        mask[None], CELL
-    ).clamp(min=1e-3)
-    seen = inputs(sensed(layers[:3], mask, rng)[None], mask[None, None])[0]
-    known = count + len(lit.toward)
-    light = _log_light(vectors[known:].numpy(), lit.shading[::_EVERY])
-    return (
-        seen,
-        torch.tensor(lit.lamps),
-        _blurred(vectors[count:known], lit.shares),
-        cells,
-        torch.from_numpy(light),
-    )
-
-
-def _log_light(normals: np.ndarray, shading: np.ndarray) -> np.ndarray:
-    """The look (8,) float32, see `sirfs.seen_light`, of the light that gives the log shading (N,)
-    of unit normals (N, 3) best.
-    """
-    level = float(shading.mean())
-    values = np.log(np.maximum(shading / max(level, 1e-9), _DARKEST))
-    basis, evenly = real_sh(normals.astype(float)), real_sh(FRONT)
-    matrix = basis.T @ basis / len(basis) + _RIDGE * evenly.T @ evenly / len(evenly)
-    start = _RIDGE * evenly.T @ np.full(len(evenly), values.mean()) / len(evenly)
-    return np.asarray(
-        LOOK @ np.linalg.solve(matrix, basis.T @ values / len(basis) + start), np.float32
-    )
-
-
-def _blurred(toward: torch.Tensor, shares: np.ndarray) -> torch.Tensor:
-    """The probabilities (P,) of PLACES; even where there is no lamp."""
-    places = torch.from_numpy(PLACES.astype(np.float32))
-    if not len(toward):
-        return torch.full((len(places),), 1 / len(places))
-    near = torch.softmax(places @ toward.T / _SPREAD**2, 0)
-    return near @ torch.from_numpy(shares.astype(np.float32))
+SCHEDULE = Schedule(rate=4e-4, head_rate=1e-3)
+_COUNT_SHARES = (0.25, 0.4, 0.35)  # of NONE, ONE, SEVERAL
+_BLUR = math.radians(8)  # of a light's direction
+_NORMALS_WEIGHT = 1.0  # in the loss
+_LOCAL, _GLOBAL = 192, 256  # features
+_EVERY = 8  # pixels per sample of the shading
+_DARKEST = 0.05  # of the mean shading: darker pixels are in shadow
+_RIDGE = 0.05  # weight of uniform light in the fit of the light's parameters
 
 
 class Network(nn.Module):  # type: ignore[misc]
-    """The network of `isc_core.networks.light_network`, to be fitted; it begins with the encoder of the layer
-    network that ships.
-    """
+    """The trainable light network."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.convolutions = encoder_of(*shipped_network().encoder)
+        self.convolutions = encoder_from(*shipped_network().encoder)
         count = sum(one.out_channels for one in list(self.convolutions)[1::2])
         self.scaled = nn.BatchNorm1d(count, momentum=0.02)
         self.local = nn.Linear(count + 5, _LOCAL)
         self.normal = nn.Linear(_LOCAL, 3)
-        self.whole = nn.Linear(3 * _LOCAL, _WHOLE)
+        self.whole = nn.Linear(3 * _LOCAL, _GLOBAL)
         self.dropped = nn.Dropout(0.1)
-        self.lamps, self.places, self.light = (
-            nn.Linear(_WHOLE, 3),
-            nn.Linear(_WHOLE, len(PLACES)),
-            nn.Linear(_WHOLE, 16),
-        )
+        self.lamps = nn.Linear(_GLOBAL, 3)
+        self.places = nn.Linear(_GLOBAL, len(PLACES))
+        self.light = nn.Linear(_GLOBAL, 2 * len(LIGHT_TERMS))
 
     def forward(self, layer: torch.Tensor) -> tuple[torch.Tensor, ...]:
-        """Log odds of lamps (B, 3) and of places (B, P), the light and the logarithm of its
-        deviations (B, 16), and normals (B, 3, side / CELL, side / CELL), of (B, 4, side, side).
+        """Predict the light and coarse normals.
+
+        Parameters
+        ----------
+        layer : (B, 4, side, side) tensor
+            Inputs.
+
+        Returns
+        -------
+        count : (B, 3) tensor
+            Log odds of the number of lights.
+        places : (B, P) tensor
+            Log odds of their directions.
+        light : (B, 16) tensor
+            Parameters of the light, and the log of their deviations.
+        normals : (B, 3, side / CELL, side / CELL) tensor
+            Mean normals of the cells.
         """
-        mask = layer[:, 3:]
-        cover, layer, found = (
-            functional.avg_pool2d(mask, CELL),
-            functional.pixel_unshuffle(layer, 2),
-            [],
-        )
+        cover = functional.avg_pool2d(layer[:, 3:], CELL)
+        cells = self._cells(functional.pixel_unshuffle(layer, 2))
+        batch, channels, rows, columns = cells.shape
+        flat = cells.permute(0, 2, 3, 1).reshape(-1, channels)
+        total = cover.sum((1, 2, 3)).reshape(-1, 1, 1).clamp(min=1e-6)
+        weight = cover.reshape(batch, -1, 1) / total
+        where = _cell_positions(rows, columns, weight)
+        inside = torch.cat([self.scaled(flat).reshape(batch, -1, channels), where], 2)
+        inside = functional.relu(self.local(inside))
+        normals = self.normal(inside).permute(0, 2, 1).reshape(batch, 3, rows, columns)
+        mean = (weight * inside).sum(1)
+        spread = ((weight * inside**2).sum(1) - mean**2).clamp(min=1e-6).sqrt()
+        largest = (inside * (weight > 0.2 * weight.amax(1, keepdim=True))).amax(1)
+        features = self.dropped(torch.cat([mean, spread, largest], 1))
+        whole = functional.relu(self.whole(features))
+        return self.lamps(whole), self.places(whole), self.light(whole), normals
+
+    def _cells(self, layer: torch.Tensor) -> torch.Tensor:
+        """The encoder's features of all levels, averaged over cells."""
+        features = []
         for level in range(len(self.convolutions) // 2):
             if level:
                 layer = functional.avg_pool2d(layer, 2)
             with torch.autocast("cpu", torch.bfloat16, enabled=self.training):
                 for one in self.convolutions[2 * level : 2 * level + 2]:
                     layer = functional.relu(one(layer))
-            step = 2 ** (level + 1)
-            seen = layer.float()
-            finer = functional.avg_pool2d(seen, CELL // step) if step < CELL else seen
-            found.append(functional.interpolate(finer, scale_factor=max(1, step // CELL)))
-        cells = torch.sqrt(torch.cat(found, 1).clamp(0, 1e4) + 1e-6)
-        batch, channels, rows, columns = cells.shape
-        flat = cells.permute(0, 2, 3, 1).reshape(-1, channels)
-        weight = cover.reshape(batch, -1, 1) / cover.sum((1, 2, 3)).reshape(-1, 1, 1).clamp(
-            min=1e-6
-        )
-        where = _where(rows, columns, weight)
-        inside = torch.cat([self.scaled(flat).reshape(batch, -1, channels), where], 2)
-        inside = functional.relu(self.local(inside))
-        normals = self.normal(inside).permute(0, 2, 1).reshape(batch, 3, rows, columns)
-        mean = (weight * inside).sum(1)
-        spread = ((weight * inside**2).sum(1) - mean**2).clamp(min=1e-6).sqrt()
-        most = (inside * (weight > 0.2 * weight.amax(1, keepdim=True))).amax(1)
-        whole = functional.relu(self.whole(self.dropped(torch.cat([mean, spread, most], 1))))
-        return self.lamps(whole), self.places(whole), self.light(whole), normals
+            step, values = 2 ** (level + 1), layer.float()
+            pooled = functional.avg_pool2d(values, CELL // step) if step < CELL else values
+            features.append(functional.interpolate(pooled, scale_factor=max(1, step // CELL)))
+        return torch.sqrt(torch.cat(features, 1).clamp(0, 1e4) + 1e-6)
+
+    def encoder_parameters(self) -> list[nn.Parameter]:
+        """Return the parameters that start from a fitted encoder."""
+        return list(self.convolutions.parameters())
+
+    def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
+        """Return the loss of a batch of `Batches`, and its terms."""
+        inputs, count, places, normals, light = batch
+        count_odds, place_odds, predicted, shape = self(inputs)
+        counts = functional.cross_entropy(count_odds, count)
+        lit = count != LightCount.NONE
+        directions = -(places * functional.log_softmax(place_odds, 1)).sum(1)[lit].mean()
+        cover = functional.avg_pool2d(inputs[:, 3:], CELL)
+        shapes = (((shape - normals) ** 2).sum(1, keepdim=True) * cover).sum() / cover.sum()
+        parameters = light.shape[1]
+        log_deviation = predicted[:, parameters:].clamp(SURE, UNSURE)
+        error = (light - predicted[:, :parameters]) * torch.exp(-log_deviation)
+        lights = (0.5 * error**2 + log_deviation).mean()
+        terms = {"count": counts, "direction": directions, "normals": shapes, "light": lights}
+        return counts + directions + _NORMALS_WEIGHT * shapes + lights, terms
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """As `isc_core.networks.light_network.read_lamp_network` reads them."""
+        """Return the weights in the layout that the core reads."""
         norm, found = self.scaled, {}
         scale = norm.weight / torch.sqrt(norm.running_var + norm.eps)
         found["middle"], found["scale"] = (norm.running_mean - norm.bias / scale), scale
         for name in ("local", "whole", "lamps", "places", "light"):
             one = getattr(self, name)
             found[f"{name}_weight"], found[f"{name}_bias"] = one.weight.T, one.bias
-        return arrays_of(self.convolutions) | {
+        return convolution_arrays(self.convolutions) | {
             name: values.detach().numpy().astype(np.float16) for name, values in found.items()
         }
 
 
-def _where(rows: int, columns: int, weight: torch.Tensor) -> torch.Tensor:
-    """Where each cell lies in the object: x, y, their squares and product over its extent (B, rows
-    * columns, 5); `weight` (B, ., 1).
-    """
+def _cell_positions(rows: int, columns: int, weight: torch.Tensor) -> torch.Tensor:
+    """x, y, their squares and product (B, cells, 5), centred, over the object's extent."""
     row, column = torch.meshgrid(torch.arange(rows), torch.arange(columns), indexing="ij")
     place = torch.stack([column.reshape(-1), -row.reshape(-1)], 1).float()[None]
     off = place - (weight * place).sum(1, keepdim=True)
@@ -217,68 +159,106 @@ def _where(rows: int, columns: int, weight: torch.Tensor) -> torch.Tensor:
     return torch.stack([x, y, x * x, y * y, x * y], 2)
 
 
-def loss_of(network: Network, batch: list[torch.Tensor]) -> tuple[torch.Tensor, list[float]]:
-    """The loss of the module's docstring, and its parts."""
-    picture, lamps, places, normals, light = batch
-    odds, where, told, shape = network(picture)
-    count = functional.cross_entropy(odds, lamps)
-    lit = lamps != NONE
-    place = -(places * functional.log_softmax(where, 1)).sum(1)[lit].mean()
-    cover = functional.avg_pool2d(picture[:, 3:], CELL)
-    shaped = (((shape - normals) ** 2).sum(1, keepdim=True) * cover).sum() / cover.sum()
-    unsure = told[:, 8:].clamp(SURE, UNSURE)
-    lit_by = (0.5 * ((light - told[:, :8]) * torch.exp(-unsure)) ** 2 + unsure).mean()
-    return count + place + _NORMALS * shaped + lit_by, [
-        float(part.detach()) for part in (count, place, shaped, lit_by)
-    ]
+@dataclass(frozen=True)
+class Batches:
+    """Draws batches.
+
+    Attributes
+    ----------
+    objects : sequence of RelightableObject
+        Not empty.
+    size : int
+        Photos per batch.
+    """
+
+    objects: Sequence[RelightableObject]
+    size: int
+
+    def __call__(self, rng: np.random.Generator) -> Batch:
+        """Draw a batch.
+
+        Parameters
+        ----------
+        rng : np.random.Generator
+            Draws objects, light and camera.
+
+        Returns
+        -------
+        inputs : (B, 4, side, side) tensor
+            Inputs of the network.
+        count : (B,) tensor
+            `LightCount`.
+        places : (B, P) tensor
+            Probabilities of the lights' directions.
+        normals : (B, 3, side / CELL, side / CELL) tensor
+            Mean normals of cells.
+        light : (B, 8) tensor
+            Parameters of the light.
+        """
+        count = len(self.objects)
+        drawn = [_sample(self.objects[int(rng.integers(count))], rng) for _ in range(self.size)]
+        return tuple(torch.stack(parts) for parts in zip(*drawn, strict=True))
 
 
-def fit(objects: list[Relit], given: argparse.Namespace) -> Network:
-    """The fitted network, its weights averaged over the last steps; see `network_fitting`."""
-    torch.manual_seed(given.seed)
-    torch.set_num_threads(given.threads)
-    network = Network()
-    if given.start is not None:
-        known = torch.load(given.start, weights_only=True)
-        network.load_state_dict(
-            {name: part for name, part in known.items() if not name.startswith("light")},
-            strict=False,
-        )
-    batches = iter(
-        torch.utils.data.DataLoader(
-            Draws(objects, given.seed), batch_size=None, num_workers=1, prefetch_factor=8
-        )
+def _sample(relit: RelightableObject, rng: np.random.Generator) -> Batch:
+    """One photo and its ground truth, as in a batch."""
+    count = LightCount(int(rng.choice(len(LightCount), p=_COUNT_SHARES)))
+    lit = draw_photo(relit, rng, count)
+    factor = LONG_SIDE / OBJECT_SIDE * (1.0 if rng.random() < 0.5 else log_uniform(rng, 0.6, 1.02))
+    turns = int(rng.integers(1, 4)) if rng.random() < 0.15 else 0
+    side = round(SIZE * factor)
+    transform = Transform((side, side), turns, bool(rng.random() < 0.5))
+    sample = sample_of(lit, relit, transform, CELL, rng)
+    toward = torch.from_numpy(lit.toward.astype(np.float32))
+    normals = torch.from_numpy(relit.normals[::_EVERY].astype(np.float32))
+    turned = transformed_vectors(normals, transform).numpy()
+    return (
+        network_input(sample.image[None], sample.mask[None, None])[0],
+        torch.tensor(int(lit.count)),
+        _direction_probabilities(transformed_vectors(toward, transform), lit.shares),
+        sample.normals,
+        torch.from_numpy(_light_parameters(turned, lit.shading[::_EVERY])),
     )
-    return optimised(network, network.convolutions, batches, loss_of, given)
+
+
+def _light_parameters(normals: np.ndarray, shading: np.ndarray) -> np.ndarray:
+    """Parameters (8,) float32 of the light that fits the log shading (N,) at normals (N, 3)."""
+    level = float(shading.mean())
+    values = np.log(np.maximum(shading / max(level, 1e-9), _DARKEST))
+    basis, evenly = real_sh(normals.astype(float)), real_sh(FRONT_NORMALS)
+    matrix = basis.T @ basis / len(basis) + _RIDGE * evenly.T @ evenly / len(evenly)
+    start = _RIDGE * evenly.T @ np.full(len(evenly), values.mean()) / len(evenly)
+    light = np.linalg.solve(matrix, basis.T @ values / len(basis) + start)
+    return np.asarray(LIGHT_TERMS @ light, np.float32)
+
+
+def _direction_probabilities(toward: torch.Tensor, shares: np.ndarray) -> torch.Tensor:
+    """Probabilities (P,) of PLACES for lights toward (K, 3); uniform without lights."""
+    places = torch.from_numpy(PLACES.astype(np.float32))
+    if not len(toward):
+        return torch.full((len(places),), 1 / len(places))
+    near = torch.softmax(places @ toward.T / _BLUR**2, 0)
+    return near @ torch.from_numpy(shares.astype(np.float32))
 
 
 def main() -> None:
-    """Fits and writes."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("objects", type=Path)
-    parser.add_argument("--leave", nargs="+", default=[])
-    parser.add_argument("--steps", type=int, default=20000)
-    parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument(
-        "--start",
-        type=Path,
-        metavar="FILE.pt",
-        help="weights to go on from, as are written beside the output",
-    )
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    given = parser.parse_args()
-    objects = [
-        Relit.of(unlit) for unlit in objects_in(given.objects) if unlit.shape not in given.leave
-    ]
+    add = parser.add_argument
+    add("objects", type=Path, nargs="+", help="folders of training.data.traced_objects")
+    add("--exclude", nargs="+", default=[], metavar="NAME", help="shapes to leave out")
+    add_run_arguments(parser, steps=20000, batch=32)
+    arguments = parser.parse_args()
+    objects = list(relightable_objects(arguments.objects, arguments.exclude))
     if not objects:
-        parser.error(
-            "there is nothing to learn from: make objects with training.data.traced_objects"
-        )
-    given.output.parent.mkdir(parents=True, exist_ok=True)
-    np.savez_compressed(given.output, **fit(objects, given).arrays())  # type: ignore[arg-type]
+        parser.error("no samples; make some with training.data.traced_objects")
+    options = run_options(arguments)
+    torch.manual_seed(options.seed)
+    training, held_out = split(objects, lambda one: one.shape, options)
+    validation = Batches(held_out, options.batch) if held_out else None
+    fit(Network(), Batches(training, options.batch), SCHEDULE, options, validation)
 
 
 if __name__ == "__main__":
