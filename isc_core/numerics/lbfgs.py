@@ -1,12 +1,15 @@
 """Limited-memory BFGS with a strong Wolfe line search, in place and in the storage type of the
 unknowns.
 
-The direction comes from the two-loop recursion (Nocedal 1980,
-doi:10.1090/S0025-5718-1980-0572855-7) carried out on the inner products of the stored vectors alone
-(after Chen, Wang & Zhou 2014, "Large-scale L-BFGS using MapReduce", NIPS): each iteration reads the
-memory twice, once for products and once for the direction. Products are float64 sums in a fixed
-order. The line search is that of Nocedal & Wright 2006, section 3.5, doi:10.1007/978-0-387-40065-5.
-Limits: smooth unconstrained functions; small kinks are survived, not resolved.
+Equation: the direction comes from the two-loop recursion on the inner products of the stored
+vectors alone, so each iteration reads the memory twice: once for the products, once for the
+direction. Products are float64 sums in a fixed order (see `numerics`).
+
+Citation: J. Nocedal 1980, doi:10.1090/S0025-5718-1980-0572855-7 (two-loop recursion); W. Chen, Z.
+Wang, J. Zhou, "Large-scale L-BFGS using MapReduce", NIPS 2014 (on inner products); J. Nocedal, S. J.
+Wright, "Numerical Optimization" (2006), section 3.5, doi:10.1007/978-0-387-40065-5 (line search).
+
+Limits: smooth unconstrained functions; small kinks are tolerated, not resolved.
 """
 
 from collections.abc import Callable
@@ -18,12 +21,26 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LbfgsOptions:
-    """`memory`: pairs kept. `iterations`, `evaluations`: at most so many.
+    """Memory, limits and tolerances of a minimisation.
 
-    `loss_tolerance`, `loss_window`: stop once so many previous losses all lie within this relative
-    distance of the current one. `gradient_tolerance`: stop at a largest gradient component this
-    small. `step_tolerance`: or at a smaller step. `armijo`, `wolfe`: the strong Wolfe conditions'
-    constants; `trials`: evaluations of one line search.
+    Attributes
+    ----------
+    memory : int
+        Pairs of step and gradient change kept.
+    iterations, evaluations : int
+        Largest number of each.
+    loss_tolerance : float
+        Stop once `loss_window` previous losses lie within this relative distance of the current one.
+    loss_window : int
+        Number of previous losses compared.
+    gradient_tolerance : float
+        Stop at a largest gradient component this small.
+    step_tolerance : float
+        Stop at a largest step component, or a change of the loss, this small.
+    armijo, wolfe : float
+        Constants of the strong Wolfe conditions.
+    trials : int
+        Evaluations of one line search.
     """
 
     memory: int = 10
@@ -40,9 +57,16 @@ class LbfgsOptions:
 
 @dataclass(frozen=True)
 class LbfgsResult:
-    """`loss`: final value.
+    """The end of a minimisation.
 
-    `reason`: why it stopped, one of "loss", "gradient", "step", "iterations", "evaluations".
+    Attributes
+    ----------
+    loss : float
+        Final value.
+    iterations, evaluations : int
+        Steps taken, and evaluations of the function.
+    reason : str
+        Why it stopped: "loss", "gradient", "step", "iterations" or "evaluations".
     """
 
     loss: float
@@ -60,11 +84,28 @@ class Algebra(Protocol):
     """The two passes over the stored vectors."""
 
     def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """Inner products (K, M) float64 of `vectors` (K, N) with `others` (M, N)."""
+        """Return all inner products.
+
+        Parameters
+        ----------
+        vectors : (K, N) ndarray
+        others : (M, N) ndarray
+
+        Returns
+        -------
+        (K, M) float64 ndarray
+        """
         ...
 
     def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
-        """out = sum_k coefficients[k] vectors[k]."""
+        """Write sum_k coefficients[k] vectors[k] into `out`.
+
+        Parameters
+        ----------
+        coefficients : (K,) ndarray
+        vectors : (K, N) ndarray
+        out : (N,) ndarray
+        """
         ...
 
 
@@ -72,18 +113,18 @@ class NumpyAlgebra:
     """`Algebra` in plain NumPy."""
 
     def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """See `Algebra`."""
+        """Return all inner products, see `Algebra`."""
         return np.stack([np.einsum("kn,n->k", vectors, v, dtype=float) for v in others], axis=1)
 
     def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
-        """See `Algebra`."""
+        """Write a linear combination into `out`, see `Algebra`."""
         np.einsum("k,kn->n", coefficients.astype(out.dtype), vectors, out=out)
 
 
 Function = Callable[[np.ndarray, np.ndarray], float]
 
 
-# between a step and the change of the gradient: below, the pair says nothing of the curvature
+# Cosine between a step and the change of the gradient; below it the pair carries no curvature.
 _LEAST_COSINE = 1e-10
 
 
@@ -105,7 +146,7 @@ class _Memory:
         return self.vectors[-1]
 
     def next_slot(self) -> int:
-        """A row that holds no pair, else that of the oldest.
+        """A row without a pair, else that of the oldest pair.
 
         (A skipped pair can leave a gap anywhere.)
         """
@@ -115,7 +156,7 @@ class _Memory:
         )
 
     def refresh(self, slot: int | None) -> None:
-        """Takes the rows of `slot` as the newest pair (None: only the gradient has changed)."""
+        """Take the rows of `slot` as the newest pair (None: only the gradient has changed)."""
         rows = [2 * self.size] if slot is None else [slot, self.size + slot, 2 * self.size]
         products = self._algebra.products(self.vectors, self.vectors[rows])
         self._gram[:, rows] = products
@@ -130,7 +171,7 @@ class _Memory:
             self._order.append(slot)
 
     def direction(self, out: np.ndarray) -> float:
-        """Writes the descent direction into `out`; returns its product with the gradient."""
+        """Write the descent direction into `out`; return its product with the gradient."""
         m, g = self.size, self._gram
         c = np.zeros(2 * m + 1)
         c[-1] = -1
@@ -157,17 +198,44 @@ def minimise(
     algebra: Algebra,
     each: Callable[[int, float], None] = lambda iteration, loss: None,
 ) -> LbfgsResult:
-    """Minimises `function(x, gradient_out) -> loss`, changing `x` (N,) in place.
+    """Minimise a function in place.
 
-    `each(iteration, loss)` is called after every step; what it raises ends the run.
+    Parameters
+    ----------
+    function : callable
+        ``function(x, gradient_out) -> loss``.
+    x : (N,) ndarray
+        Start; the minimum on return.
+    options : LbfgsOptions
+    algebra : Algebra
+    each : callable, optional
+        ``each(iteration, loss)``, called after every step; an exception it raises ends the run.
+
+    Returns
+    -------
+    LbfgsResult
     """
     return Minimisation(function, x, options, algebra).run(each)
 
 
 class Minimisation:
-    """One that can be put down and taken up again, as if it had never stopped.
+    """A minimisation that can be suspended and resumed without changing its course.
 
-    `x` (N,) is where it is, changed in place; `loss` there.
+    Attributes
+    ----------
+    x : (N,) ndarray
+        Current point, changed in place.
+    loss : float
+        Loss there.
+
+    Parameters
+    ----------
+    function : callable
+        ``function(x, gradient_out) -> loss``.
+    x : (N,) ndarray
+        Start.
+    options : LbfgsOptions
+    algebra : Algebra
     """
 
     def __init__(
@@ -182,7 +250,7 @@ class Minimisation:
         )
         self.loss = function(x, self._memory.gradient)
         self._losses, self._evaluations = [self.loss], 1
-        self._settled = ""  # why the last step was the last
+        self._settled = ""  # reason to stop, once there is one
         self._memory.refresh(None)
 
     def run(
@@ -190,8 +258,18 @@ class Minimisation:
         each: Callable[[int, float], None] = lambda iteration, loss: None,
         evaluations: int | None = None,
     ) -> LbfgsResult:
-        """Goes on until there is no more to gain, or until it has taken `evaluations` in all (None:
-        as many as the options allow).
+        """Continue until there is no more to gain, or until a number of evaluations.
+
+        Parameters
+        ----------
+        each : callable, optional
+            As for `minimise`.
+        evaluations : int, optional
+            Total number of evaluations; by default, that of the options.
+
+        Returns
+        -------
+        LbfgsResult
         """
         most = (
             self._options.evaluations
@@ -208,7 +286,7 @@ class Minimisation:
         return len(self._losses) - 1
 
     def _stop(self, evaluations: int) -> str:
-        """Why not to take another step, "" for no reason."""
+        """Return why not to take another step, "" for no reason."""
         if self._settled:
             return self._settled
         if float(np.abs(self._memory.gradient).max()) <= self._options.gradient_tolerance:
@@ -259,7 +337,7 @@ class _Trial:
 
 
 class _Search:
-    """One line search along `direction` from `start`;
+    """One line search along `direction` from `start`.
 
     `x` and `gradient` end at the accepted point.
     """
@@ -284,7 +362,7 @@ class _Search:
         self.evaluations = 0
 
     def run(self, loss: float, slope: float, first: float) -> tuple[float, float]:
-        """The accepted step and its loss."""
+        """Return the accepted step and its loss."""
         o = self._options
         origin = previous = _Trial(0.0, loss, slope)
         step = first
@@ -344,13 +422,13 @@ class _Search:
         )
 
     def _settle(self, best: _Trial) -> tuple[float, float]:
-        """Goes back to the best point seen, which need not be the last one evaluated."""
+        """Return to the best point so far, which need not be the last one evaluated."""
         trial = self._try(best.step)
         return trial.step, trial.loss
 
 
 def _cubic_minimum(a: _Trial, b: _Trial) -> float:
-    """Where the cubic through two losses and slopes is least; the middle where it has no minimum."""
+    """Return the minimum of the cubic through two losses and slopes; without one, the middle."""
     if a.step == b.step:
         return a.step
     d1 = a.slope + b.slope - 3 * (a.loss - b.loss) / (a.step - b.step)

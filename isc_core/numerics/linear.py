@@ -1,20 +1,34 @@
-"""Small systems of equations, solved with the same bytes on any number of threads.
+"""Small systems of linear equations, solved with the same bytes on any number of threads.
 
-Problem: a library's solver shares its sums among its threads, and rounds otherwise on one than on
-two; a solve with many minima makes another shape of the last digit. Equation: A X = B by Gauss and
-Jordan's elimination with the largest pivot of each column, row by row.
+Problem: a library's solver splits its sums among its threads, so it rounds differently on one than
+on two; a solve with many minima turns that into another shape.
 
-Citation: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), section 3.4. Limits: n^3 steps
-of NumPy's; meant for tens of unknowns.
+Equation: A X = B by Gauss-Jordan elimination with partial pivoting, row by row.
+
+Citation: G. H. Golub, C. F. Van Loan, "Matrix Computations" (2013), section 3.4.
+
+Limits: n^3 operations in NumPy; meant for tens of unknowns.
 """
 
 import numpy as np
 
 
 def solve_linear(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """X (n, m) of `matrix` (n, n) X = `right` (n, m), float64.
+    """Solve `matrix` X = `right`.
 
-    Raises `ValueError` where `matrix` has no inverse.
+    Parameters
+    ----------
+    matrix : (n, n) ndarray
+    right : (n, m) ndarray
+
+    Returns
+    -------
+    (n, m) float64 ndarray
+
+    Raises
+    ------
+    ValueError
+        If `matrix` is singular.
     """
     size = len(matrix)
     work = np.concatenate([matrix, right], axis=1, dtype=float)

@@ -1,7 +1,7 @@
 """A few threads for kernels that release the interpreter lock.
 
-Which thread runs which task never changes a result: tasks write to places of their own, and sums
-over tasks are taken in the tasks' order.
+Determinism: which thread runs which task never changes a result. Tasks write to their own places,
+and sums over tasks are taken in the order of the tasks.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -10,9 +10,14 @@ from types import TracebackType
 
 
 class ThreadPool:
-    """Runs lists of tasks on `threads` threads, the calling one included.
+    """Run lists of tasks on several threads, the calling one included.
 
-    Use as a context manager, or call `close`.
+    Use it as a context manager, or call `close`.
+
+    Parameters
+    ----------
+    threads : int
+        Number of threads, at least 1.
     """
 
     def __init__(self, threads: int) -> None:
@@ -20,7 +25,18 @@ class ThreadPool:
         self._pool = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
     def run(self, tasks: Sequence[Callable[[], None]]) -> None:
-        """Runs every task and returns when all are done; the first exception is raised."""
+        """Run every task, and return when all are done.
+
+        Parameters
+        ----------
+        tasks : sequence of callable
+            Called without arguments, in this order if there is one thread.
+
+        Raises
+        ------
+        Exception
+            The first exception of a task.
+        """
         if self._pool is None or len(tasks) < 2:
             for task in tasks:
                 task()
@@ -34,7 +50,7 @@ class ThreadPool:
             other.result()
 
     def close(self) -> None:
-        """Ends the threads."""
+        """End the threads."""
         if self._pool is not None:
             self._pool.shutdown()
 
