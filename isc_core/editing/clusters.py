@@ -24,9 +24,9 @@ from .edited import light_color
 
 LARGEST_COUNT = 12
 _LIGHTNESS, _DARK = 0.2, 0.15  # the weight of L; below the second the ratios are mostly noise
-_ALIKE = 0.045  # centres nearer than this are one paint
+_ALIKE = 0.045  # centres nearer than this are one reflectance
 _ROUNDS, _TRIES, _SAMPLES = 60, 12, 20000
-_SOFT = 1e-3  # of the white's square: contrasts of the paint that do not matter
+_SOFT = 1e-3  # of the white's square: contrasts of the reflectance that do not matter
 _SURE = 0.7  # shares within 15 % of none and all are none and all
 
 
@@ -42,14 +42,14 @@ class Clusters:
         Linear; each cluster's mean in the light's mean colour.
     shares : (K,) ndarray
         Of the object's pixels, descending.
-    paint : (H, W, 3) ndarray
+    reflectance : (H, W, 3) ndarray
         The clustered reflectance.
     """
 
     labels: np.ndarray
     colors: np.ndarray
     shares: np.ndarray
-    paint: np.ndarray
+    reflectance: np.ndarray
 
     def weight(self, number: int) -> np.ndarray:
         """Return how much each pixel belongs to a cluster.
@@ -79,9 +79,9 @@ class Clusters:
         mask = self.labels >= 0
         member = (self.labels == number - 1).astype(float)[..., None]
         slope, offset = affine_fit(
-            self.paint, member, mask, _SOFT * white_of(self.paint, mask) ** 2
+            self.reflectance, member, mask, _SOFT * white_of(self.reflectance, mask) ** 2
         )
-        share = np.einsum("hwgc,hwg->hwc", slope, self.paint)[..., 0] + offset[..., 0]
+        share = np.einsum("hwgc,hwg->hwc", slope, self.reflectance)[..., 0] + offset[..., 0]
         return np.where(mask, np.clip((share - 0.5) / _SURE + 0.5, 0, 1), 0)
 
 
@@ -110,8 +110,8 @@ def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
     if seed < 0:
         raise InputError(f"{seed} is no seed of random numbers: give 0 or more")
     seen = np.maximum(d.reflectance * light_color(d), 0)
-    paint = seen[d.mask]
-    lab = to_oklab(paint / white_of(seen, d.mask))
+    reflectance = seen[d.mask]
+    lab = to_oklab(reflectance / white_of(seen, d.mask))
     points = np.stack([_LIGHTNESS * lab[:, 0], *(lab[:, 1:] / np.maximum(lab[:, :1], _DARK)).T], -1)
     centers = _means(points[:: max(1, len(points) // _SAMPLES)], count, np.random.default_rng(seed))
     labels = _joined(centers)[_nearest(points, centers)]
@@ -121,7 +121,7 @@ def find_clusters(d: Decomposition, count: int = 4, seed: int = 0) -> Clusters:
     rank[order] = np.arange(len(order))
     picture = np.full(d.mask.shape, -1)
     picture[d.mask] = rank[labels]
-    colors = np.stack([paint[rank[labels] == k].mean(0) for k in range(len(order))])
+    colors = np.stack([reflectance[rank[labels] == k].mean(0) for k in range(len(order))])
     return Clusters(picture, colors, sizes[order] / len(points), seen)
 
 

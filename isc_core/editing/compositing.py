@@ -23,10 +23,10 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
+from ..imaging.bounding_box import mask_box
 from ..imaging.guided_filter import affine_fit, window_means
 from ..imaging.luminance import white_of
 from ..photo import Photo
-from ..imaging.bounding_box import mask_box
 from ..scene.decomposition import Decomposition
 from .edited import Edited
 

@@ -19,9 +19,9 @@ import numpy as np
 
 from ..imaging.luminance import white_of
 from ..io.atomic import new_folder, require_writable
+from ..io.decoders import write_png
 from ..io.exr import read_channels, write_channels
 from ..photo import Photo, Raster, encode_like
-from ..io.decoders import write_png
 from ..result_files.contact_sheet import Panel, Shown, edit_sheet
 from ..scene.decomposition import Decomposition
 from .clusters import Clusters
@@ -194,12 +194,12 @@ def cluster_sheet(d: Decomposition, clusters: Clusters) -> Any:
     -------
     PIL.Image.Image
     """
-    paint = d.reflectance * light_color(d)
-    shown = [Shown(paint, d.mask, "Reflectance")]
+    reflectance = d.reflectance * light_color(d)
+    shown = [Shown(reflectance, d.mask, "Reflectance")]
     for number, share in enumerate(clusters.shares, 1):
         weight = clusters.weight(number)[..., None]
-        grey = np.full(3, _FADED * white_of(paint, d.mask))
-        values = weight * paint + (1 - weight) * grey
+        grey = np.full(3, _FADED * white_of(reflectance, d.mask))
+        values = weight * reflectance + (1 - weight) * grey
         shown.append(
             Shown(values, d.mask, f"Cluster {number}", f"{100 * share:.0f} % of the object")
         )

@@ -26,7 +26,7 @@ from .edited import Edited, edited, light_color
 
 
 @dataclass(frozen=True)
-class Paint:
+class ColourEdit:
     """A change of colour. Raises `InputError` outside these ranges.
 
     Attributes
@@ -72,13 +72,13 @@ class Paint:
         )
 
 
-def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -> Edited:
+def recolour(d: Decomposition, change: ColourEdit, region: np.ndarray | None = None) -> Edited:
     """Return the scene with another reflectance.
 
     Parameters
     ----------
     d : Decomposition
-    paint : Paint
+    change : ColourEdit
     region : (H, W) ndarray, optional
         Weight in [0, 1]; by default the whole object.
 
@@ -101,26 +101,28 @@ def recolour(d: Decomposition, paint: Paint, region: np.ndarray | None = None) -
         raise InputError(
             "the region holds nothing of the object: mark the part to be recoloured in white"
         )
-    if not paint.changes:
+    if not change.changes:
         return edited(d)
     inside = weight > 0
     share = weight[inside][:, None]
     tint = light_color(d)
     old = np.maximum(d.reflectance[inside] * tint, 0)
-    new = repainted(old, paint, _room(d, tint), share)
+    new = repainted(old, change, _room(d, tint), share)
     diffuse = d.diffuse.copy()
     diffuse[inside] = (1 - share) * d.diffuse[inside] + share * new * (d.shading[inside] / tint)
     return edited(d, diffuse)
 
 
-def repainted(old_paint: np.ndarray, paint: Paint, white: float, weight: np.ndarray) -> np.ndarray:
+def repainted(
+    colors: np.ndarray, change: ColourEdit, white: float, weight: np.ndarray
+) -> np.ndarray:
     """Change colours.
 
     Parameters
     ----------
-    old_paint : (N, 3) ndarray
+    colors : (N, 3) ndarray
         Linear, not negative.
-    paint : Paint
+    change : ColourEdit
     white : float
         Brightest value a colour may take.
     weight : (N, 1) ndarray
@@ -130,30 +132,30 @@ def repainted(old_paint: np.ndarray, paint: Paint, white: float, weight: np.ndar
     -------
     (N, 3) ndarray
     """
-    old = luminance(old_paint)
-    lab = to_oklab(old_paint)
+    old = luminance(colors)
+    lab = to_oklab(colors)
     lightness, chroma, hue = (
         lab[:, 0],
         np.hypot(lab[:, 1], lab[:, 2]),
         np.arctan2(lab[:, 2], lab[:, 1]),
     )
-    wanted = paint.value * old
-    if paint.target is not None:
-        goal = to_oklab(np.maximum(paint.target, 1e-6))
+    wanted = change.value * old
+    if change.target is not None:
+        goal = to_oklab(np.maximum(change.target, 1e-6))
         chroma = float(np.hypot(goal[1], goal[2])) * lightness / float(goal[0])
         hue = np.full_like(hue, np.arctan2(goal[2], goal[1]))
-        if paint.target_luminance:
+        if change.target_luminance:
             mean = float((weight[:, 0] * old).sum() / weight.sum())
-            wanted = wanted * float(luminance(paint.target)) / max(mean, 1e-9)
-    hue, chroma = hue + np.deg2rad(paint.hue), chroma * paint.saturation
+            wanted = wanted * float(luminance(change.target)) / max(mean, 1e-9)
+    hue, chroma = hue + np.deg2rad(change.hue), chroma * change.saturation
     color = from_oklab(np.stack([lightness, chroma * np.cos(hue), chroma * np.sin(hue)], -1))
     return _at_luminance(
-        np.maximum(color, 0), wanted, np.maximum(white * max(paint.value, 1.0), old_paint.max(-1))
+        np.maximum(color, 0), wanted, np.maximum(white * max(change.value, 1.0), colors.max(-1))
     )
 
 
 def _room(d: Decomposition, tint: np.ndarray) -> float:
-    """How bright paint may get: as the object's brightest, or as what the photo shows white in the
+    """How bright a colour may become: as the object's brightest, or as what the photo shows white in the
     object's brightest light.
     """
     float_photo = d.provenance.input.get("bit_depth", 8) == 32

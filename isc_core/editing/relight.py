@@ -54,52 +54,59 @@ class NewLight:
     ----------
     coefficients : (9, 3) ndarray or None
         SH coefficients of log shading, Rec.709.
-    sun : DirectionalLight or None
-    sky : (rows, 2 rows, 3) ndarray or None
+    directional : DirectionalLight or None
+    environment : (rows, 2 rows, 3) ndarray or None
         Environment map of linear radiance, not negative.
     turned : (3, 3) ndarray or None
         Rotation from the recovered light to `coefficients`; None for another light.
     """
 
     coefficients: np.ndarray | None = None
-    sun: DirectionalLight | None = None
-    sky: np.ndarray | None = None
+    directional: DirectionalLight | None = None
+    environment: np.ndarray | None = None
     turned: np.ndarray | None = None
 
     def __post_init__(self) -> None:
-        if sum(part is not None for part in (self.coefficients, self.sun, self.sky)) != 1:
+        if (
+            sum(
+                part is not None for part in (self.coefficients, self.directional, self.environment)
+            )
+            != 1
+        ):
             raise InputError(
                 "a new light is one of: coefficients, one distant light, an environment"
             )
-        if self.sky is not None:
-            rows = len(self.sky)
-            if np.shape(self.sky) != (rows, 2 * rows, 3) or rows < 2:
+        if self.environment is not None:
+            rows = len(self.environment)
+            if np.shape(self.environment) != (rows, 2 * rows, 3) or rows < 2:
                 raise InputError(
-                    f"an environment is twice as wide as high, this one is {np.shape(self.sky)[1]} "
+                    f"an environment is twice as wide as high, this one is {np.shape(self.environment)[1]} "
                     f"x {rows}: use a full panorama"
                 )
-            check_range("the environment's radiance", self.sky, 0, np.inf)
+            check_range("the environment's radiance", self.environment, 0, np.inf)
 
     def shading(self, normals: np.ndarray) -> np.ndarray:
         """Return the shading (N, 3) of white diffuse surfaces with unit normals (N, 3)."""
         if self.coefficients is not None:
             return sh_shading(normals, self.coefficients)
-        if self.sun is not None:
-            return self.sun.shading(normals)
+        if self.directional is not None:
+            return self.directional.shading(normals)
         return shading_under(np.asarray(self._sky(_ROWS), float), np.asarray(normals, float))
 
     def lobe(self, lobe: Lobe, normals: np.ndarray) -> np.ndarray:
         """Return the radiance (N, 3) of a lobe of strength 1 on unit normals (N, 3)."""
-        if self.sun is not None:
-            ambient = np.broadcast_to(self.sun.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
-            return lobe_under(lobe, normals, self.sun) + lobe_in(lobe, normals, ambient)
+        if self.directional is not None:
+            ambient = np.broadcast_to(self.directional.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
+            return lobe_under(lobe, normals, self.directional) + lobe_in(lobe, normals, ambient)
         return lobe_in(lobe, normals, self._sky(_LOBE_ROWS))
 
     def _sky(self, rows: int) -> np.ndarray:
         if self.coefficients is not None:
             return environment_from_shading(self.coefficients, rows)
-        assert self.sky is not None
-        return resampled(self.sky, rows) if len(self.sky) > rows else self.sky
+        assert self.environment is not None
+        return (
+            resampled(self.environment, rows) if len(self.environment) > rows else self.environment
+        )
 
 
 @dataclass(frozen=True)
@@ -187,9 +194,14 @@ def relight(d: Decomposition, light: NewLight, choice: Relighting | None = None)
 
 
 def _highlights(
-    d: Decomposition, light: NewLight, choice: Relighting, normals: np.ndarray, ratio: np.ndarray, factor: np.ndarray,
+    d: Decomposition,
+    light: NewLight,
+    choice: Relighting,
+    normals: np.ndarray,
+    ratio: np.ndarray,
+    factor: np.ndarray,
     turned: np.ndarray | None,
-) -> tuple[np.ndarray, str]:  # fmt: skip
+) -> tuple[np.ndarray, str]:
     """The new specular layer, and what to say of it.
 
     `turned` (3, 3): how the present light became this one, None for another one.

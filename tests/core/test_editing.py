@@ -13,7 +13,7 @@ from isc_core.editing.clusters import find_clusters
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers, masked_blur
 from isc_core.editing.edited import light_color
 from isc_core.editing.highlights import add_highlight
-from isc_core.editing.recolour import Paint, recolour
+from isc_core.editing.recolour import ColourEdit, recolour
 from isc_core.editing.relight import NewLight, Relighting, relight
 from isc_core.errors import InputError
 from isc_core.imaging.luminance import LUMINANCE, luminance, white_of
@@ -38,8 +38,8 @@ def scene() -> Decomposition:
 def test_edits_that_ask_for_nothing_return_the_image_bit_by_bit(scene: Decomposition) -> None:
     for edit in (
         edit_layers(scene, DichromaticEdit()),
-        recolour(scene, Paint()),
-        recolour(scene, Paint(hue=360.0)),
+        recolour(scene, ColourEdit()),
+        recolour(scene, ColourEdit(hue=360.0)),
         relight(scene, NewLight(coefficients=scene.illumination)),
         relight(
             scene,
@@ -58,8 +58,8 @@ def test_no_edit_touches_what_is_outside_the_mask_or_the_scene(scene: Decomposit
     sun = DirectionalLight(toward(-1, 1, 1), ambient=np.full(3, 0.2))
     for edit in (
         edit_layers(scene, DichromaticEdit(LayerEdit(2, 1.3, 0.5), LayerEdit(0.5, 0.6, 2))),
-        recolour(scene, Paint(hue=100, saturation=1.4, value=0.8)),
-        relight(scene, NewLight(sun=sun), Relighting("render", Lobe(30))),
+        recolour(scene, ColourEdit(hue=100, saturation=1.4, value=0.8)),
+        relight(scene, NewLight(directional=sun), Relighting("render", Lobe(30))),
         change_gloss(scene, Gloss(exponent=200, present=60, metal=0.5)),
         add_highlight(scene, sun),
     ):
@@ -130,7 +130,7 @@ def test_oklab_is_there_and_back_and_grey_has_no_chroma() -> None:
 
 
 def test_recolouring_leaves_gloss_shading_and_texture(scene: Decomposition) -> None:
-    edit = recolour(scene, Paint(hue=70, saturation=0.8))
+    edit = recolour(scene, ColourEdit(hue=70, saturation=0.8))
     assert np.array_equal(edit.specular, scene.specular)
     new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
     old = scene.reflectance[scene.mask] * light_color(scene)
@@ -140,12 +140,12 @@ def test_recolouring_leaves_gloss_shading_and_texture(scene: Decomposition) -> N
 
 def test_a_target_colour_is_reached_at_the_texture_s_luminance(scene: Decomposition) -> None:
     target = np.array([0.05, 0.2, 0.1])
-    edit = recolour(scene, Paint(target=target))
+    edit = recolour(scene, ColourEdit(target=target))
     new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
     chroma = new / new.sum(-1, keepdims=True)
     assert chroma == pytest.approx(np.broadcast_to(target / target.sum(), chroma.shape), abs=0.02)
     bright = (
-        recolour(scene, Paint(target=target, target_luminance=True)).diffuse[scene.mask]
+        recolour(scene, ColourEdit(target=target, target_luminance=True)).diffuse[scene.mask]
         / scene.shading[scene.mask]
     )
     assert luminance(bright * light_color(scene)).mean() == pytest.approx(
@@ -159,7 +159,7 @@ def test_no_colour_is_brighter_than_the_paint_was_or_what_the_photo_shows_white(
     seen = scene.reflectance * light_color(scene)
     for bits in (8, 32):
         given = replace(scene, provenance=replace(scene.provenance, input={"bit_depth": bits}))
-        edit = recolour(given, Paint(target=np.array([0.0, 0.0, 1.0])))
+        edit = recolour(given, ColourEdit(target=np.array([0.0, 0.0, 1.0])))
         new = edit.diffuse[scene.mask] / scene.shading[scene.mask] * light_color(scene)
         white = 1.0 if bits == 8 else white_of(scene.image, scene.mask)
         assert (
@@ -180,14 +180,14 @@ def test_evenly_grey_paint_takes_colour(scene: Decomposition) -> None:
         image=diffuse + scene.specular,
         residual=0 * diffuse,
     )
-    red = recolour(even, Paint(target=np.array([1.0, 0.0, 0.0]))).diffuse[scene.mask].mean(0)
+    red = recolour(even, ColourEdit(target=np.array([1.0, 0.0, 0.0]))).diffuse[scene.mask].mean(0)
     assert red[0] > 2 * red[1:].max()
 
 
 def test_a_region_is_where_paint_changes(scene: Decomposition) -> None:
     region = np.zeros(scene.mask.shape)
     region[:, :60] = 1
-    edit = recolour(scene, Paint(hue=90), region)
+    edit = recolour(scene, ColourEdit(hue=90), region)
     assert np.array_equal(edit.image[:, 60:], scene.image[:, 60:])
     assert not np.array_equal(edit.image[:, :60], scene.image[:, :60])
 
@@ -247,7 +247,7 @@ def test_yaw_pitch_and_roll_turn_as_they_say(angles: tuple, start: tuple, end: t
 
 def test_relighting_is_reflectance_times_shading(scene: Decomposition) -> None:
     sun = DirectionalLight(toward(0.3, 0.2, 0.9), np.array([3.0, 2.0, 1.0]), np.full(3, 0.1))
-    edit = relight(scene, NewLight(sun=sun), Relighting("remove"))
+    edit = relight(scene, NewLight(directional=sun), Relighting("remove"))
     expected = scene.reflectance[scene.mask] * sun.shading(scene.normal[scene.mask])
     assert edit.diffuse[scene.mask] == pytest.approx(expected, abs=1e-5)
     assert not edit.specular.any()
@@ -257,9 +257,9 @@ def test_a_uniform_sky_shades_evenly_and_a_balanced_light_is_as_bright(
     scene: Decomposition,
 ) -> None:
     sky = np.broadcast_to([0.5, 0.5, 0.5], (16, 32, 3))
-    even = relight(scene, NewLight(sky=sky), Relighting("remove"))
+    even = relight(scene, NewLight(environment=sky), Relighting("remove"))
     assert even.diffuse[scene.mask] == pytest.approx(0.5 * scene.reflectance[scene.mask], rel=0.01)
-    balanced = relight(scene, NewLight(sky=sky), Relighting("remove", balanced=True))
+    balanced = relight(scene, NewLight(environment=sky), Relighting("remove", balanced=True))
     assert luminance(balanced.diffuse[scene.mask]).sum() == pytest.approx(
         luminance(scene.diffuse[scene.mask]).sum(), rel=1e-3
     )
@@ -375,7 +375,7 @@ def test_a_clipped_highlight_stays_white_on_other_paint(scene: Decomposition) ->
     clipped = (d.residual < 0).all(-1) & (d.specular > full).all(-1)
     assert clipped.sum() > 5
     for edit in (
-        recolour(d, Paint(hue=180)),
+        recolour(d, ColourEdit(hue=180)),
         edit_layers(d, DichromaticEdit(diffuse=LayerEdit(gain=0.05))),
     ):
         assert (edit.image[clipped] >= full - 1e-6).all()
@@ -492,24 +492,24 @@ def test_a_matt_object_says_that_it_has_no_gloss_to_change(scene: Decomposition)
         lambda: Gloss(exponent=0.5),
         lambda: Gloss(metal=1.5),
         lambda: Gloss(method="magic"),
-        lambda: Paint(saturation=-1),
-        lambda: Paint(target=np.array([2.0, 0, 0])),
-        lambda: Paint(target_luminance=True),
+        lambda: ColourEdit(saturation=-1),
+        lambda: ColourEdit(target=np.array([2.0, 0, 0])),
+        lambda: ColourEdit(target_luminance=True),
         lambda: Lobe(alpha=2.0),
         lambda: toward(0, 0, 0),
         lambda: DirectionalLight(np.array([1.0, 1, 1])),
         lambda: DirectionalLight(toward(0, 0, 1), irradiance=-np.ones(3)),
         lambda: NewLight(),
-        lambda: NewLight(sky=np.ones((4, 9, 3))),
+        lambda: NewLight(environment=np.ones((4, 9, 3))),
         lambda: Relighting("somehow"),
         lambda: Relighting(exposure=0),
         lambda: turned_light(LIGHT, 2 * np.eye(3)),
         lambda: turn(yaw=float("inf")),
         lambda: find_clusters(ball(), 0),
         lambda: find_clusters(ball(), 2).weight(3),
-        lambda: recolour(ball(), Paint(hue=3), np.ones((3, 3))),
-        lambda: recolour(ball(), Paint(hue=3), np.zeros((96, 120))),
-        lambda: relight(ball(), NewLight(sun=DirectionalLight(toward(0, 0, -1)))),
+        lambda: recolour(ball(), ColourEdit(hue=3), np.ones((3, 3))),
+        lambda: recolour(ball(), ColourEdit(hue=3), np.zeros((96, 120))),
+        lambda: relight(ball(), NewLight(directional=DirectionalLight(toward(0, 0, -1)))),
     ],
 )
 def test_impossible_parameters_are_one_clear_error(make: object) -> None:

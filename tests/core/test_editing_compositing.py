@@ -13,7 +13,7 @@ from isc_core.editing.compositing import composite
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from isc_core.editing.edit_folder import Original, Record, Sheet, save_edit
 from isc_core.editing.edited import Edited
-from isc_core.editing.recolour import Paint, recolour
+from isc_core.editing.recolour import ColourEdit, recolour
 from isc_core.errors import InputError
 from isc_core.io.exr import read_channels, write_channels
 from isc_core.photo import Photo, PhotoSource, read_linear, read_photo, read_raster
@@ -50,7 +50,7 @@ def full() -> Decomposition:
 
 def test_at_the_photo_s_own_size_the_edit_is_the_edit() -> None:
     scene = ball()
-    edit = recolour(scene, Paint(hue=90))
+    edit = recolour(scene, ColourEdit(hue=90))
     image, changed = composite(scene, edit, photo_of(scene))
     assert image[scene.mask] == pytest.approx(edit.image[scene.mask], abs=1e-6)
     assert np.array_equal(image[~scene.mask], photo_of(scene).image[~scene.mask])
@@ -139,7 +139,7 @@ def test_png_keeps_depth_coding_alpha_and_all_other_pixels(
     original = Original(photo, read_raster(tmp_path / "photo.png"))
     save_edit(
         half,
-        recolour(half, Paint(hue=120)),
+        recolour(half, ColourEdit(hue=120)),
         tmp_path / "out",
         Record("recolour"),
         Sheet("t"),
@@ -151,7 +151,7 @@ def test_png_keeps_depth_coding_alpha_and_all_other_pixels(
     assert np.array_equal(written[~full.mask][:, :3], values[~full.mask][:, ::-1])
     assert not np.array_equal(written[full.mask][:, :3], values[full.mask][:, ::-1])
     again = read_linear(tmp_path / "out" / "edited.png", transfer)
-    exact, _ = composite(half, recolour(half, Paint(hue=120)), photo)
+    exact, _ = composite(half, recolour(half, ColourEdit(hue=120)), photo)
     step = 1 / np.iinfo(kind).max
     assert np.abs(linear_to_srgb(again) - linear_to_srgb(np.clip(exact, 0, 1)))[full.mask].max() < (
         step if transfer == "srgb" else 13 * step
@@ -169,7 +169,7 @@ def test_a_grey_photo_gets_colour_only_where_it_is_painted(
     original = Original(photo, read_raster(tmp_path / "photo.png"))
     save_edit(
         half,
-        recolour(half, Paint(hue=120)),
+        recolour(half, ColourEdit(hue=120)),
         tmp_path / "out",
         Record("recolour"),
         Sheet("t"),

@@ -12,7 +12,7 @@ from isc_core.editing.clusters import find_clusters
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from isc_core.editing.edited import Edited, edited
 from isc_core.editing.highlights import add_highlight
-from isc_core.editing.recolour import Paint, recolour
+from isc_core.editing.recolour import ColourEdit, recolour
 from isc_core.editing.relight import NewLight, Relighting, relight
 from isc_core.evaluation.image_metrics import rank_correlation, sparsification, ssim, ssim_volume
 from isc_core.evaluation.metrics import lmse, mse, psnr, scaled_mse
@@ -101,7 +101,7 @@ def layers_edit(n: OptionsCase) -> DichromaticEdit:
 
 def recoloured(d: Decomposition, n: OptionsCase) -> Edited:
     weight = find_clusters(d, 1 + int(5 * n.a), 3).weight(1)
-    return recolour(d, Paint(360 * n.a, 2 * n.b, 2 * n.c), weight)
+    return recolour(d, ColourEdit(360 * n.a, 2 * n.b, 2 * n.c), weight)
 
 
 def turned(d: Decomposition, n: OptionsCase) -> Edited:
@@ -117,7 +117,7 @@ EDITS: dict[str, Callable[[Decomposition, OptionsCase], Edited]] = {
     "layers": lambda d, n: edit_layers(d, layers_edit(n)),
     "recolour": recoloured,
     "relight": turned,
-    "sun": lambda d, n: relight(d, NewLight(sun=sun_of(n))),
+    "sun": lambda d, n: relight(d, NewLight(directional=sun_of(n))),
     "highlight": lambda d, n: add_highlight(d, sun_of(n), level=n.a, replacing=n.b > 0.5),
 }
 

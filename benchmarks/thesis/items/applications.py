@@ -23,7 +23,7 @@ import numpy as np
 from isc_core.editing.clusters import Clusters, find_clusters
 from isc_core.editing.dichromatic import DichromaticEdit, LayerEdit, edit_layers
 from isc_core.editing.edited import Edited
-from isc_core.editing.recolour import Paint, recolour
+from isc_core.editing.recolour import ColourEdit, recolour
 from isc_core.editing.spheres import render_sphere, sphere_normals
 from isc_core.imaging.luminance import luminance
 from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, lobe_light
@@ -330,13 +330,13 @@ def _recolouring(context: Context) -> ItemContent:
     clusters = find_clusters(d, 4, context.seed)
     numbers = range(1, min(len(clusters.shares), 3) + 1)
     target = np.array([0.05, 0.18, 0.55])
-    edits: list[tuple[str, Paint, np.ndarray | None]] = [
-        ("hue turned by 120°, everywhere", Paint(hue=120), None),
-        ("less saturation, everywhere", Paint(saturation=0.3), None),
-        ("blue inside a mask", Paint(target=target), soft_disc_mask(d)),
+    edits: list[tuple[str, ColourEdit, np.ndarray | None]] = [
+        ("hue turned by 120°, everywhere", ColourEdit(hue=120), None),
+        ("less saturation, everywhere", ColourEdit(saturation=0.3), None),
+        ("blue inside a mask", ColourEdit(target=target), soft_disc_mask(d)),
     ]
     edits += [
-        (f"blue in cluster {number}", Paint(target=target), clusters.weight(number))
+        (f"blue in cluster {number}", ColourEdit(target=target), clusters.weight(number))
         for number in numbers
     ]
     shown = [

@@ -30,7 +30,7 @@ _OTHER_LIGHTS = (
 def find_direction(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     del options
     shading, specular = explain_shading(d), explain_specular(d)
-    edit = relight(d, NewLight(sun=shading.light), Relighting(highlights="keep"))
+    edit = relight(d, NewLight(directional=shading.light), Relighting(highlights="keep"))
     panels = [recovered_light_panel(d)]
     for label, found in (("Best for the shading", shading), ("Best for the highlights", specular)):
         remark = _remark(found)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from ....editing.clusters import find_clusters
-from ....editing.recolour import Paint, recolour
+from ....editing.recolour import ColourEdit, recolour
 from ....errors import InputError
 from ....io.limits import Limits
 from ....photo import read_raster
@@ -20,7 +20,7 @@ from .options import color, number, plain
 
 
 def recolour_object(d: Decomposition, options: argparse.Namespace) -> ActionResult:
-    paint = Paint(
+    change = ColourEdit(
         options.hue, options.saturation, options.value, options.color, options.match_brightness
     )
     if options.cluster is not None and options.region is not None:
@@ -37,7 +37,7 @@ def recolour_object(d: Decomposition, options: argparse.Namespace) -> ActionResu
             for c, s in zip(clusters.colors, clusters.shares, strict=True)
         ]
     }
-    return ActionResult(recolour(d, paint, region), measured, (), clusters)
+    return ActionResult(recolour(d, change, region), measured, (), clusters)
 
 
 def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
@@ -66,7 +66,7 @@ def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    usual = Paint()
+    usual = ColourEdit()
     parser.add_argument(
         "--hue", type=number, default=usual.hue, metavar="DEGREES", help="turns the hue"
     )
@@ -88,7 +88,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--color",
         type=color,
         metavar="RRGGBB",
-        help="the paint, as in web pages; its brightness stays the object's",
+        help="the change, as in web pages; its brightness stays the object's",
     )
     parser.add_argument(
         "--match-brightness", action="store_true", help="takes the brightness of --color too"

@@ -56,7 +56,7 @@ def _new_light(
         color = np.ones(3) if options.color is None else options.color
         ambient = 0.15 if options.ambient is None else options.ambient
         return NewLight(
-            sun=DirectionalLight(
+            directional=DirectionalLight(
                 rotation @ toward(*options.direction), np.pi * color, ambient * color
             )
         ), False
@@ -71,7 +71,7 @@ def _new_light(
                 "direction"
             )
         return NewLight(
-            sky=read_linear(options.light, limits=limits_of(options), finite=True)
+            environment=read_linear(options.light, limits=limits_of(options), finite=True)
         ), False
     if options.light is None:
         return NewLight(coefficients=turned_light(d.illumination, rotation), turned=rotation), True
