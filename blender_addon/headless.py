@@ -1,14 +1,13 @@
-"""Photos become .blend files and renders without a window.
+"""Photos to .blend files and renders without a window.
 
-    blender -b -P blender_addon/headless.py -- photo.png --mask mask.png -o out.blend --render
-    out.png python -m blender_addon.headless photo.png --mask mask.png -o out.blend --render out.png
+    blender -b -P blender_addon/headless.py -- photo.png --mask mask.png -o out.blend
+    python -m blender_addon.headless photo.png --mask mask.png -o out.blend --render out.png
 
-The first form works with this file in the source tree and in an installed extension; the second
-wants the `bpy` module. What stands behind `--` is read by `command_line`; exit codes are those of
-`isc`: 0, 2 for bad input, 130 when cancelled.
+The first form works with this file in the source tree and in an installed extension. The second
+requires the `bpy` module. Everything after `--` is parsed by `headless_command`. Exit codes are
+those of `isc`: 0, 2 for invalid input, 130 when cancelled.
 
-Limits: in the source tree, the Python that runs this has to have the packages that `isc_core`
-needs.
+Limits: in the source tree, the Python that runs this must have the packages that `isc_core` needs.
 """
 
 import importlib
@@ -18,20 +17,28 @@ import traceback
 from pathlib import Path
 from typing import NoReturn
 
-FAULT = 1  # of this program, not of what it was given
+INTERNAL_ERROR = 1
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Runs the command, with the arguments of the process if None, and returns its exit code."""
-    command_line = importlib.import_module(f"{_package()}.headless_command")
-    return int(command_line.main(_own_arguments() if arguments is None else arguments))
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Arguments; those of the process if None.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
+    command = importlib.import_module(f"{_package()}.headless_command")
+    return int(command.main(_own_arguments() if arguments is None else arguments))
 
 
 def _own_arguments() -> list[str]:
-    """What Blender leaves to scripts: everything behind `--`.
-
-    Without Blender around it, everything.
-    """
+    """The arguments that Blender leaves to scripts, after `--`; without Blender, all of them."""
     given = sys.argv[1:]
     if "--" in given:
         return given[given.index("--") + 1 :]
@@ -39,22 +46,19 @@ def _own_arguments() -> list[str]:
 
 
 def _package() -> str:
-    """The name of the package that this file is a module of.
-
-    Blender runs the file by itself: then the package may have to be loaded.
-    """
+    """The name of this file's package; loaded first where Blender runs the file as a script."""
     if __package__:
         return __package__
     folder = Path(__file__).resolve().parent
     if (folder / "isc_core").is_dir():
-        return _enabled(f"bl_ext.{folder.parent.name}.{folder.name}")
+        return _enable(f"bl_ext.{folder.parent.name}.{folder.name}")
     if importlib.util.find_spec("isc_core") is None:
         _load(folder.parent / "isc_core")
     return _load(folder)
 
 
-def _enabled(extension: str) -> str:
-    """The installed extension, enabled for this run: Blender then knows where its wheels are."""
+def _enable(extension: str) -> str:
+    """Enable the installed extension for this process, which makes its wheels importable."""
     if extension not in sys.modules:
         import addon_utils  # type: ignore[import-not-found]
 
@@ -63,33 +67,28 @@ def _enabled(extension: str) -> str:
 
 
 def _load(folder: Path) -> str:
-    """Imports the package in `folder` under the folder's name, wherever it lies: the search path
-    stays as it is.
-    """
-    place = importlib.util.spec_from_file_location(
+    """Import the package in `folder` under the folder's name, without changing the search path."""
+    spec = importlib.util.spec_from_file_location(
         folder.name, folder / "__init__.py", submodule_search_locations=[str(folder)]
     )
-    if place is None or place.loader is None:
+    if spec is None or spec.loader is None:
         raise ImportError(f"{folder} is not a package")
-    module = importlib.util.module_from_spec(place)
+    module = importlib.util.module_from_spec(spec)
     sys.modules[folder.name] = module
-    place.loader.exec_module(module)
+    spec.loader.exec_module(module)
     return folder.name
 
 
-def _run() -> NoReturn:
-    """Ends the process with the command's exit code;
-
-    Blender by itself ends with 0 after a script that raised.
-    """
-    code = FAULT
+def _run_and_exit() -> NoReturn:
+    """Exit with the command's code; Blender itself exits with 0 after a script that raised."""
+    code = INTERNAL_ERROR
     try:
         code = main()
     finally:
-        if code == FAULT:
+        if code == INTERNAL_ERROR:
             traceback.print_exc()
         sys.exit(code)
 
 
 if __name__ == "__main__":
-    _run()
+    _run_and_exit()

@@ -1,9 +1,9 @@
-"""The command behind `headless`: each photo is taken apart by a worker, the objects are built,
-saved and rendered.
+"""The command line of `headless`: decompose each photo by a worker, build, save and render the
+objects.
 
-What there is to say of a photo's result, such as why it is doubtful, is printed once all is done. A
-photo that fails is named on stderr and the others go on; the exit code is then 2. Files appear
-whole or not at all. Ctrl-C ends the worker; during a render it is answered once the render is done.
+Notes on a result, such as assumptions that do not hold, are printed at the end. A photo that fails
+is reported on stderr and the others continue; the exit code is then 2. Files are written completely
+or not at all. Ctrl-C ends the worker; a render is finished first.
 """
 
 import argparse
@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from isc_core.cli.interface.terminal import Interrupts, ProgressBar, printable
 from isc_core.errors import Cancelled, InputError
-from isc_core.terminal import Interrupts, ProgressBar, printable
 
-DONE, REFUSED, CANCELLED = 0, 2, 130
+DONE, INVALID_INPUT, CANCELLED = 0, 2, 130
 
 
 class _Parser(argparse.ArgumentParser):
@@ -26,26 +26,37 @@ class _Parser(argparse.ArgumentParser):
 
 
 def main(arguments: Sequence[str]) -> int:
-    """Runs the command and returns its exit code; never raises for a user's mistake."""
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Arguments without the program's name.
+
+    Returns
+    -------
+    int
+        Exit code.
+    """
     try:
         options = _parser().parse_args(arguments)
         _require_blender()
-        from .headless_batch import run
+        from .headless_batch import run_batch
 
         with Interrupts() as interrupts, ProgressBar(sys.stderr, quiet=options.quiet) as bar:
-            said = run(options, interrupts.monitor(bar))
+            report = run_batch(options, interrupts.monitor(bar))
     except SystemExit as done:  # --help
         return int(done.code or 0)
     except InputError as error:
-        return _refuse(error)
+        return _print_error(error)
     except (Cancelled, KeyboardInterrupt):
         print("blender: cancelled", file=sys.stderr)
         return CANCELLED
-    for note in said.notes:
+    for note in report.notes:
         print(printable(note, sys.stdout))
-    for failure in said.failures:
-        _refuse(failure)
-    return REFUSED if said.failures else DONE
+    for failure in report.failures:
+        _print_error(failure)
+    return INVALID_INPUT if report.failures else DONE
 
 
 def _require_blender() -> None:
@@ -53,126 +64,145 @@ def _require_blender() -> None:
         import bpy  # noqa: F401
     except ImportError as error:
         raise InputError(
-            f"this needs Blender, or its Python module ({error}): pip install 'isc3d[blender]'"
+            f"Blender or its Python module is missing ({error}): pip install 'isc3d[blender]'"
         ) from error
 
 
-def _refuse(error: InputError | str) -> int:
+def _print_error(error: InputError | str) -> int:
     print(f"blender: error: {error}", file=sys.stderr)
-    return REFUSED
+    return INVALID_INPUT
 
 
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="blender -b -P headless.py --",
         allow_abbrev=False,
-        description="Photos of glossy objects become textured objects in .blend files, under the light that was recovered, and renders.",
+        description=(
+            "Turn photos of glossy objects into textured objects in .blend files, under the "
+            "recovered light, and render them."
+        ),
     )
-    add = parser.add_argument
-    add(
+    parser.add_argument(
         "inputs",
         nargs="+",
         type=Path,
         metavar="PHOTO",
-        help="a photo, a folder of photos, or a folder that isc decompose wrote",
+        help="photo, folder of photos, or result folder of isc decompose",
     )
+    parser.add_argument("--quiet", action="store_true", help="hide progress")
+    _add_files(parser.add_argument_group("files"))
+    _add_method(parser.add_argument_group("decomposition"))
+    _add_build(parser.add_argument_group("scene"))
+    return parser
+
+
+def _add_files(group: argparse._ArgumentGroup) -> None:
+    add = group.add_argument
     add(
         "--mask",
         type=Path,
-        help="the object in white on black, of the photo's size; or a folder where the mask of cup.jpg is cup.*",
+        help=(
+            "mask of the photo's size with the object white on black, or a folder with the mask "
+            "of cup.jpg in cup.*"
+        ),
     )
     add(
         "-o",
         "--output",
         type=Path,
         metavar="OUT",
-        help="a .blend file (several objects: a scene each), or a folder for one file each",
+        help=".blend file (a scene for each of several objects), or folder for one file each",
     )
     add(
         "--render",
         type=Path,
         metavar="OUT",
-        help="a .png or .exr file to render to with Cycles, or a folder for one file each",
+        help=".png or .exr file to render to with Cycles, or folder for one file each",
     )
-    add("--samples", type=int, default=64, metavar="N", help="rays a pixel (default %(default)s)")
+    add(
+        "--samples",
+        type=int,
+        default=64,
+        metavar="N",
+        help="samples per pixel (default: %(default)s)",
+    )
     add(
         "--results",
         type=Path,
         metavar="DIR",
-        help="keep the results of the photos here, a folder each",
+        help="folder to keep the result folders in",
     )
-    add("--quiet", action="store_true", help="show no progress")
-    _add_recovery(parser.add_argument_group("how a photo is taken apart"))
-    _add_scene(parser.add_argument_group("what is built"))
-    return parser
 
 
-def _add_recovery(group: argparse._ArgumentGroup) -> None:
+def _add_method(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
     add(
         "--model",
         default="joint",
         metavar="NAME",
-        help="as isc decompose knows them (default %(default)s)",
+        help="model, as of isc decompose (default: %(default)s)",
     )
     add(
         "--separator",
         default="isc",
         metavar="NAME",
-        help="what removes highlights (default %(default)s)",
+        help="method that removes highlights, as of isc decompose (default: %(default)s)",
     )
     add(
         "--illumination",
         default="natural",
         choices=("natural", "laboratory"),
-        help="which lights to expect (default %(default)s)",
+        help="prior of the light (default: %(default)s)",
     )
     add(
         "--transfer",
         default="auto",
         choices=("auto", "srgb", "linear"),
-        help="how the photos are coded (default %(default)s)",
+        help="coding of the photos (default: %(default)s)",
     )
     add(
         "--max-size",
         type=int,
         default=512,
         metavar="N",
-        help="long side of the object in the maps, pixels; 0: as is (default %(default)s)",
+        help=(
+            "longer side of the object in pixels, 0 keeps the photo's resolution "
+            "(default: %(default)s)"
+        ),
     )
     add(
         "--threads",
         type=int,
         default=0,
         metavar="N",
-        help="0: one for each core (default %(default)s)",
+        help="number of threads, 0 uses one per core (default: %(default)s)",
     )
 
 
-def _add_scene(group: argparse._ArgumentGroup) -> None:
+def _add_build(group: argparse._ArgumentGroup) -> None:
     add = group.add_argument
     add(
         "--size",
         type=float,
         default=0.1,
         metavar="M",
-        help="long side of the object in metres (default %(default)s)",
+        help="longer side of the object in metres (default: %(default)s)",
     )
     add(
         "--specular",
         default="image",
         choices=("lobe", "image", "none"),
-        help="where highlights come from (default %(default)s)",
+        help="source of the highlights (default: %(default)s)",
     )
     add(
         "--own-shadows",
         action="store_true",
-        help="let the object cast shadows on itself, beside those that the recovered light holds",
+        help="cast shadows on the object itself, in addition to those of the recovered light",
     )
-    add("--sun", action="store_true", help="add a sun from the strongest direction of the light")
+    add("--sun", action="store_true", help="use a sun along the dominant direction of the light")
     add(
         "--displacement",
         action="store_true",
         help="displace a flat grid instead of building the mesh",
     )
-    add("--closed-back", action="store_true", help="close the mesh behind")
+    add("--closed-back", action="store_true", help="close the mesh with a flat back")

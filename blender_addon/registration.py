@@ -1,4 +1,4 @@
-"""What Blender is told about, and what it tells: another file is loaded, Blender is closed."""
+"""Registration with Blender, and what to do when Blender loads another file or exits."""
 
 import atexit
 from typing import Any
@@ -7,8 +7,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from . import operators, panels
-from .operators.modal import show
-from .operators.worker_run import active, end_active
+from .operators.modal import update_display
+from .operators.worker_run import active_run, cancel_active_run
 from .settings import preferences, properties
 
 _CLASSES = (
@@ -20,31 +20,29 @@ _CLASSES = (
 
 
 def register() -> None:
-    """Registers all classes, the properties of scenes, and what has to be known of loading and
-    closing.
-    """
+    """Register all classes, the properties of scenes, and the handlers."""
     for kind in _CLASSES:
         bpy.utils.register_class(kind)
-    properties.attach()
-    bpy.app.handlers.load_pre.append(_end_before_loading)
-    # Blender closes without a word to add-ons; the worker would notice, but not its files.
-    atexit.register(end_active)
+    properties.add_properties()
+    bpy.app.handlers.load_pre.append(_cancel_before_loading)
+    # Blender exits without notifying add-ons. The worker would stop by itself, but leave its files.
+    atexit.register(cancel_active_run)
 
 
 def unregister() -> None:
-    """The same backwards; the run that goes on ends."""
-    end_active()
-    atexit.unregister(end_active)
-    bpy.app.handlers.load_pre.remove(_end_before_loading)
-    properties.detach()
+    """Cancel the active run and undo the registration in reverse order."""
+    cancel_active_run()
+    atexit.unregister(cancel_active_run)
+    bpy.app.handlers.load_pre.remove(_cancel_before_loading)
+    properties.remove_properties()
     for kind in reversed(_CLASSES):
         bpy.utils.unregister_class(kind)
 
 
 @persistent
-def _end_before_loading(*_: Any) -> None:
-    """The run belongs to the file that it was begun in."""
-    run = active()
+def _cancel_before_loading(*_: Any) -> None:
+    """A run belongs to the file that it was started in."""
+    run = active_run()
     if run is not None:
         run.cancel()
-        show(bpy.context, run)
+        update_display(bpy.context, run)

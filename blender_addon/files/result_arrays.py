@@ -1,10 +1,10 @@
-"""A result as arrays: what `isc decompose --arrays` wrote, read with nothing but Python and NumPy.
+"""The arrays that `isc decompose --arrays` writes, read with Python and NumPy alone.
 
-`Result` has the names, shapes and units of `arrays.npz`: maps cover the photo's whole frame with
-row 0 at the top and are 0 outside the mask, colours are linear Rec.709, vectors stand in the
-camera's frame (x right, y up, z toward the viewer).
+`ResultArrays` has the names, shapes and units of `arrays.npz`. Maps cover the full frame of the
+photo, row 0 at the top, and are 0 outside the mask. Colours are linear Rec.709. Vectors are in the
+camera frame (x right, y up, z toward the viewer).
 
-Limits: a file of another version, or a damaged one, is refused; nothing is repaired.
+Limits: a damaged file, or one of an unsupported version, is refused; nothing is repaired.
 """
 
 from dataclasses import dataclass, field
@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from isc_core.errors import InputError
-from isc_core.json_files import read_json
-from isc_core.numpy_files import read_arrays
+from isc_core.io.json_files import read_json
+from isc_core.io.npy import read_arrays
 
 ARRAYS, DESCRIPTION = "arrays.npz", "decomposition.json"
 
 
-# The shape of each array: letters are sizes that arrays share.
+# Shape of each array; a letter is a size that several arrays share.
 _COLORS = (
     "image",
     "diffuse",
@@ -52,37 +52,84 @@ _SHAPES: dict[str, tuple[str | int, ...]] = {
     **dict.fromkeys(("illumination", "mesh_illumination"), (9, 3)),
     **dict.fromkeys(("origin", "sun_direction", "sun_strength", "sun_ambient"), (3,)),
     "faces": ("F", 3),
-    "sky": ("h", "w", 3),
+    "environment_map": ("h", "w", 3),
     "photo_size": (2,),
 }
-_KINDS = {
+_DTYPES = {
     "mask": np.dtype(bool),
     **dict.fromkeys(("faces", "vertex_pixel", "photo_size"), np.dtype(np.int32)),
 }
-_OPTIONAL, _MAY_BE_UNKNOWN = {"specular_variation"}, {"roughness", "specular_level"}
+_OPTIONAL, _MAY_BE_NAN = {"specular_variation"}, {"roughness", "specular_level"}
+# Names that earlier versions wrote.
+_FORMER_NAMES = {"environment_map": "sky"}
 
 
 @dataclass(frozen=True)
-class Result:
-    """One decomposition; arrays are float32 unless said otherwise.
+class ResultArrays:
+    """One decomposition. Arrays are float32 unless stated otherwise.
 
-    `image, diffuse, specular, residual, reflectance, shading`: (H, W, 3). `normal`: (H, W, 3) unit.
-    `height`: (H, W), pixels toward the viewer. `mask`: (H, W) bool. `confidence`: (H, W) in [0, 1].
-    `lobe`: (H, W, 3), the specular image that the fitted lobe predicts. `vertices`: (V, 3) metres,
-    x right, y up, z toward the viewer. `faces`: (F, 3) int32, counter-clockwise for the viewer.
-    `vertex_normals`: (V, 3) unit. `uv`: (V, 2), v from the bottom. `vertex_pixel`: (V, 2) int32,
-    row and column. `base_color`: (H, W, 3), k * reflectance, continued beyond the mask.
-    `normal_map`: (H, W, 3), tangent space, [0, 1] for [-1, 1]. `reflectance_scale`: k.
-    `metres_per_pixel`: of `vertices`. `origin`: (3,), column, row and height in pixels of their
-    origin. `illumination`, `mesh_illumination`: (9, 3), log shading for `reflectance` and for
-    `base_color`. `sky`: (h, 2 h, 3), the radiance that gives `base_color` its shading, laid out as
-    `isc_core.environment` says. `sun_direction`: (3,) unit, toward the light. `sun_strength`: (3,),
-    its irradiance for `base_color`; `sun_ambient`: (3,), the shading it leaves to the rest;
-    `sun_explained` in [0, 1]; `sun_cone` in degrees. `roughness`: Blender's; `specular_level`: for
-    `base_color`, 1 is plastic; NaN where unknown. `specular_variation`: (H, W), a factor of the
-    level, or None. `photo_size`: (2,) int32, width and height of the photo. `crop_scale`: map
-    pixels to one of its pixels. `description`: what decomposition.json says. `folder`: where it was
-    read from.
+    Attributes
+    ----------
+    image, diffuse, specular, residual, reflectance, shading : (H, W, 3) ndarray
+        Photo and its layers.
+    normal : (H, W, 3) ndarray
+        Unit normals.
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    mask : (H, W) ndarray of bool
+        Pixels of the object.
+    confidence : (H, W) ndarray
+        Confidence of the shape in [0, 1].
+    lobe : (H, W, 3) ndarray
+        Specular image predicted by the fitted lobe.
+    vertices : (V, 3) ndarray
+        Metres in the camera frame.
+    faces : (F, 3) ndarray of int32
+        Vertices of each triangle, counter-clockwise for the viewer.
+    vertex_normals : (V, 3) ndarray
+        Unit normals.
+    uv : (V, 2) ndarray
+        Texture coordinates, v from the bottom.
+    vertex_pixel : (V, 2) ndarray of int32
+        Row and column of each vertex.
+    base_color : (H, W, 3) ndarray
+        `reflectance_scale` * `reflectance`, extrapolated beyond the mask.
+    normal_map : (H, W, 3) ndarray
+        Tangent-space normals, [0, 1] for [-1, 1].
+    reflectance_scale : float
+        Factor from `reflectance` to `base_color`.
+    metres_per_pixel : float
+        Scale of `vertices`.
+    origin : (3,) ndarray
+        Column, row and height in pixels of the origin of `vertices`.
+    illumination, mesh_illumination : (9, 3) ndarray
+        Log-shading SH coefficients for `reflectance` and for `base_color`.
+    environment_map : (h, 2 h, 3) ndarray
+        Radiance that gives `base_color` its shading, in the layout of the core's environment maps.
+    sun_direction : (3,) ndarray
+        Unit vector toward the light.
+    sun_strength : (3,) ndarray
+        Irradiance of the sun for `base_color`.
+    sun_ambient : (3,) ndarray
+        Uniform shading in addition to the sun.
+    sun_explained : float
+        Share of the shading that the sun explains, in [0, 1].
+    sun_cone : float
+        Angular spread of the light, degrees.
+    roughness : float
+        Roughness as Blender defines it; NaN if unknown.
+    specular_level : float
+        Level of the specular lobe for `base_color`, 1 is plastic; NaN if unknown.
+    photo_size : (2,) ndarray of int32
+        Width and height of the photo in pixels.
+    crop_scale : float
+        Map pixels per photo pixel.
+    specular_variation : (H, W) ndarray or None
+        Spatial factor of the specular level.
+    description : dict
+        Content of decomposition.json.
+    folder : Path
+        Folder the result was read from.
     """
 
     image: np.ndarray
@@ -108,7 +155,7 @@ class Result:
     origin: np.ndarray
     illumination: np.ndarray
     mesh_illumination: np.ndarray
-    sky: np.ndarray
+    environment_map: np.ndarray
     sun_direction: np.ndarray
     sun_strength: np.ndarray
     sun_ambient: np.ndarray
@@ -129,20 +176,33 @@ class Result:
 
     @property
     def name(self) -> str:
-        """What to call the object: the photo's name without its suffix, else the folder's."""
+        """Name of the object: the photo's name without its suffix, else the folder's name."""
         given = self.description.get("input", {}).get("name", "")
         return Path(str(given)).stem or self.folder.resolve().name or "object"
 
     @property
     def longest_side(self) -> int:
-        """Pixels of the mask's bounding box, its longer side: what a size in metres is measured by."""
+        """Longer side of the mask's bounding box in pixels; it has the size given in metres."""
         return int((np.ptp(np.argwhere(self.mask), axis=0) + 1).max())
 
 
-def read_result(folder: Path | str) -> Result:
-    """Reads the result folder of `isc decompose --arrays`.
+def read_result(folder: Path | str) -> ResultArrays:
+    """Read a result folder of `isc decompose --arrays`.
 
-    Raises `InputError` if it is none, is damaged, or has no arrays.
+    Parameters
+    ----------
+    folder : Path or str
+        Result folder.
+
+    Returns
+    -------
+    ResultArrays
+        The decomposition.
+
+    Raises
+    ------
+    InputError
+        If the folder is no result, is damaged, or has no arrays.
     """
     folder = Path(folder)
     description = read_description(folder / DESCRIPTION)
@@ -150,14 +210,27 @@ def read_result(folder: Path | str) -> Result:
         raise InputError(
             f"{folder} has no {ARRAYS}: run `isc arrays` on it, or decompose with --arrays"
         )
-    values = _checked(read_arrays(folder / ARRAYS), folder / ARRAYS)
-    return Result(**values, description=description, folder=folder)
+    values = _check_arrays(read_arrays(folder / ARRAYS), folder / ARRAYS)
+    return ResultArrays(**values, description=description, folder=folder)
 
 
 def read_description(path: Path) -> dict[str, Any]:
-    """What decomposition.json says; its input, settings and status are objects.
+    """Read the description of a result.
 
-    Raises `InputError` if it cannot be read or is none.
+    Parameters
+    ----------
+    path : Path
+        A decomposition.json.
+
+    Returns
+    -------
+    dict
+        Its content. The entries `input`, `settings` and `status` are dicts where present.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is no description.
     """
     description = read_json(path, "decompose the photo again")
     parts = (
@@ -170,44 +243,44 @@ def read_description(path: Path) -> dict[str, Any]:
     return dict(description)
 
 
-def _checked(held: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
-    """The arrays of `Result` by name, once shapes, kinds and values are what it promises."""
+def _check_arrays(arrays: dict[str, np.ndarray], path: Path) -> dict[str, Any]:
+    """The arrays of `ResultArrays` by name, once shapes, types and values are checked."""
     sizes: dict[str, int] = {}
     values: dict[str, Any] = {}
     for name, shape in _SHAPES.items():
-        if name not in held and name in _OPTIONAL:
+        array = arrays.get(name, arrays.get(_FORMER_NAMES.get(name, name)))
+        if array is None and name in _OPTIONAL:
             continue
-        problem = "is missing" if name not in held else _problem(name, held[name], sizes)
-        if problem:
+        problem = "is missing" if array is None else _find_problem(name, array, sizes)
+        if array is None or problem:
             raise InputError(
-                f"{path} is damaged or of another version ({name} {problem}): decompose the photo again"
+                f"{path} is damaged or of an unsupported version ({name} {problem}): "
+                "decompose the photo again"
             )
-        values[name] = held[name] if shape else float(held[name])
+        values[name] = array if shape else float(array)
     if not values["mask"].any() or not values["metres_per_pixel"] > 0 or not len(values["faces"]):
-        raise InputError(f"{path} holds no object: decompose the photo again")
+        raise InputError(f"{path} contains no object: decompose the photo again")
     faces, (rows, columns) = values["faces"], values["vertex_pixel"].T
     outside = faces.min() < 0 or faces.max() >= sizes["V"] or min(rows.min(), columns.min()) < 0
     if outside or rows.max() >= sizes["H"] or columns.max() >= sizes["W"]:
         raise InputError(
-            f"{path} is damaged (the mesh points at what is not there): decompose the photo again"
+            f"{path} is damaged (the mesh refers to missing vertices or pixels): "
+            "decompose the photo again"
         )
     return values
 
 
-def _problem(name: str, array: np.ndarray, sizes: dict[str, int]) -> str:
-    """What is wrong with an array, in words; nothing if it is as promised.
-
-    `sizes` are the letters met so far.
-    """
-    shape, kind = _SHAPES[name], _KINDS.get(name, np.dtype(np.float32))
+def _find_problem(name: str, array: np.ndarray, sizes: dict[str, int]) -> str:
+    """What is wrong with an array, "" if nothing; `sizes` collects the lettered sizes."""
+    shape, dtype = _SHAPES[name], _DTYPES.get(name, np.dtype(np.float32))
     fits = len(shape) == array.ndim and all(
         n == (sizes.setdefault(wanted, n) if isinstance(wanted, str) else wanted)
         for n, wanted in zip(array.shape, shape, strict=True)
     )
     if not fits:
         return f"has the shape {array.shape}"
-    if array.dtype != kind:
+    if array.dtype != dtype:
         return f"is {array.dtype}"
-    if kind.kind == "f" and name not in _MAY_BE_UNKNOWN and not np.isfinite(array).all():
-        return "holds NaN or infinite values"
+    if dtype.kind == "f" and name not in _MAY_BE_NAN and not np.isfinite(array).all():
+        return "contains NaN or infinite values"
     return ""

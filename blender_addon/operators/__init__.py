@@ -1,4 +1,4 @@
-"""What the panels' buttons do; `CLASSES` is what Blender has to know of."""
+"""Operators of the panels; `CLASSES` lists them for registration."""
 
 from .decompose import ISC_OT_decompose, ISC_OT_redo
 from .edit import ISC_OT_dichromatic, ISC_OT_own_material, ISC_OT_recolour, ISC_OT_relight

@@ -1,8 +1,6 @@
-"""The main button: the photo of the panel becomes an object; and the same once more for an object
-that is there, at another size.
-"""
+"""Decompose the photo of the panel, or the photo of an object again at another size."""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
-# ruff: noqa: RUF012 (Blender wants its options as sets)
+# ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from pathlib import Path
 from typing import Any
@@ -13,66 +11,92 @@ from bpy.props import IntProperty
 from isc_core.errors import InputError
 
 from ..files.result_arrays import ARRAYS
-from ..scene.build import find
-from ..scene.copies import is_copy, original_of
-from ..settings.preferences import choices, new_folder, worker_environment
+from ..scene.build import find_built
+from ..scene.copies import find_original, is_copy
+from ..settings.preferences import create_run_folder, read_preferences, worker_environment
+from .messages import busy_message
 from .modal import WorkerOperator
-from .request import Request, pictures_of, remembered, request_from_settings
-from .result import build_in_one_step
-from .run_steps import decompose
-from .worker_run import Run, active, require_idle
+from .request import DecomposeRequest, inspect_images, request_from_settings, stored_request
+from .result import build_as_undo_step
+from .run_steps import decompose_steps
+from .worker_run import WorkerRun, active_run, require_no_active_run
 
 
-def run_of(context: Any, request: Request) -> Run:
-    """The run that decomposes the request's photo and builds the result.
+def create_decompose_run(context: Any, request: DecomposeRequest) -> WorkerRun:
+    """Create the run that decomposes a photo and builds the result.
 
-    Raises `InputError` before anything is begun.
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+    request : DecomposeRequest
+        What to decompose and to build.
+
+    Returns
+    -------
+    WorkerRun
+        The run, not started.
+
+    Raises
+    ------
+    InputError
+        If the request cannot be fulfilled.
     """
-    require_idle()
-    photo, mask, mask_size = pictures_of(request)
-    chosen = choices(context)
-    environment = worker_environment(chosen)
-    folder = new_folder(chosen.results, request.build.name)
-    script = decompose(photo, mask, mask_size, request.method, folder, chosen.threads, environment)
+    require_no_active_run()
+    photo, mask, mask_size = inspect_images(request)
+    preferences = read_preferences(context)
+    environment = worker_environment(preferences)
+    folder = create_run_folder(preferences.results, request.build.name)
+    steps = decompose_steps(
+        photo, mask, mask_size, request.method, folder, preferences.threads, environment
+    )
 
-    def finish(now: Any, result: Path) -> str:
-        said = build_in_one_step(now, result, request)
-        (result / ARRAYS).unlink(
-            missing_ok=True
-        )  # by far the largest file; what it holds is in the scene now
-        return said
+    def finish(context: Any, result: Path) -> str:
+        message = build_as_undo_step(context, result, request)
+        # By far the largest file; the scene holds its content now.
+        (result / ARRAYS).unlink(missing_ok=True)
+        return message
 
-    return Run(f"Decompose {request.build.name}", script, finish, folder)
+    return WorkerRun(f"Decompose {request.build.name}", steps, finish, folder)
 
 
 class ISC_OT_decompose(WorkerOperator, bpy.types.Operator):
-    """Decomposes the photo of the panel."""
+    """Decompose the photo of the panel."""
 
     bl_idname = "isc.decompose"
     bl_label = "Decompose"
-    bl_description = "Recover shape, light and material of the object in the photo, and build it; the window stays free meanwhile"
+    bl_description = (
+        "Recover shape, light and material of the object in the photo and build it, "
+        "in the background"
+    )
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """Always but while a run goes on."""
-        return _is_free(cls)
+        """Whether no run is active."""
+        del context
+        return _is_idle(cls)
 
-    def prepare(self, context: Any) -> Run:
-        """The run of the scene's panel. Raises `InputError`."""
-        return run_of(context, request_from_settings(context.scene))
+    def prepare(self, context: Any) -> WorkerRun:
+        """Create the run of the scene's panel; see `WorkerOperator`."""
+        return create_decompose_run(context, request_from_settings(context.scene))
 
 
 class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
-    """Decomposes an object's photo again at another size, and updates the object."""
+    """Decompose an object's photo again at another size, and update the object."""
 
     bl_idname = "isc.redo"
     bl_label = "Decompose Again"
-    bl_description = "Decompose the photo of the active object again, at another size, and update the object; colours that were set stay"
+    bl_description = (
+        "Decompose the photo of the active object at another size and update the object, "
+        "color edits are kept"
+    )
     bl_options = {"REGISTER"}
 
     max_size: IntProperty(
         name="Size",
-        description="The object's long side in pixels, in the maps and the mesh; 0 keeps the photo's",
+        description=(
+            "Longer side of the object in pixels, in maps and mesh, 0 keeps the photo's resolution"
+        ),
         default=512,
         min=0,
         max=8192,
@@ -80,28 +104,30 @@ class ISC_OT_redo(WorkerOperator, bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """With an object of ISC active, while no run goes on."""
-        if find(context.object) is None:
-            cls.poll_message_set("Choose an object that ISC made")
+        """Whether an ISC object is active and no run is."""
+        if find_built(context.object) is None:
+            cls.poll_message_set("Select an object made by ISC")
             return False
-        return _is_free(cls)
+        return _is_idle(cls)
 
-    def prepare(self, context: Any) -> Run:
-        """The run. Raises `InputError`."""
-        built = find(context.object)
+    def prepare(self, context: Any) -> WorkerRun:
+        """Create the run; see `WorkerOperator`."""
+        built = find_built(context.object)
         if built is None:
-            raise InputError("choose an object that ISC made")
+            raise InputError("no object made by ISC is active: select one")
         if is_copy(built.object):
-            original = original_of(built.object)
-            instead = "press Decompose" if original is None else f"choose {original.name}"
+            original = find_original(built.object)
+            instead = "press Decompose" if original is None else f"select {original.name}"
             raise InputError(
                 f"{built.object.name} is a copy, and only the original is updated: {instead}"
             )
-        return run_of(context, remembered(built.object, built.scene, self.max_size))
+        return create_decompose_run(
+            context, stored_request(built.object, built.scene, self.max_size)
+        )
 
 
-def _is_free(operator: Any) -> bool:
-    present = active()
+def _is_idle(operator: Any) -> bool:
+    present = active_run()
     if present is not None:
-        operator.poll_message_set(f"{present.title} is going on: wait for it, or cancel it first")
+        operator.poll_message_set(busy_message(present.title))
     return present is None

@@ -1,9 +1,9 @@
-"""Editing an object that was built: its paint, the gains of paint and gloss, its light.
+"""Edit a built object: its reflectance, the gains of diffuse and specular light, its illumination.
 
-All of it stays editable in the nodes.
+All of it remains editable in the nodes.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
-# ruff: noqa: RUF012 (Blender wants its options as sets)
+# ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from dataclasses import replace
 from typing import Any
@@ -14,227 +14,271 @@ from bpy.props import EnumProperty, FloatProperty, FloatVectorProperty
 
 from isc_core.errors import InputError
 
-from ..scene.build import Built, find
-from ..scene.copies import material_of, own_material
+from ..scene.build import BuiltObject, find_built
+from ..scene.copies import find_material, make_material_single_user
 from ..scene.material import dichromatic_node, set_specular_gain
 from ..scene.provenance import KEY
 from ..scene.sun import ensure_sun, relight
-from ..scene.world import mix_sun
+from ..scene.world import set_sun_mix
 
 _LIGHTS = (
     (
         "OPTIMAL",
-        "Best Direction",
-        "One sun along the direction that best explains the photo's shading, even light beside it",
+        "Dominant Direction",
+        "One sun along the direction that best explains the photo's shading, and uniform light",
     ),
-    ("CHOSEN", "Chosen Direction", "The same sun from another direction"),
-    ("RECOVERED", "Recovered Light", "The environment as it was recovered, no sun"),
+    ("CHOSEN", "Custom Direction", "The same sun from another direction"),
+    ("RECOVERED", "Recovered Light", "The recovered environment map without a sun"),
 )
 
 
 class EditOperator:
-    """A mixin for operators that change what ISC built:
+    """Mixin for operators that change what ISC has built, as one undo step.
 
-    `edit` does, within one undo step, or raises `InputError` before it changes.
+    `edit` changes it, or raises `InputError` before any change.
     """
 
-    report: Any  # Blender's own
+    report: Any  # from bpy.types.Operator
     bl_options = {"REGISTER", "UNDO"}
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """With an object, camera or sun of ISC active."""
-        if find(context.object) is None:
-            cls.poll_message_set("Choose an object that ISC made")  # type: ignore[attr-defined]
+        """Whether an object, camera or sun of ISC is active."""
+        if find_built(context.object) is None:
+            cls.poll_message_set("Select an object made by ISC")  # type: ignore[attr-defined]
             return False
         return True
 
     def execute(self, context: Any) -> set[str]:
-        """Edits."""
-        built = find(context.object)
+        """Apply the edit."""
+        built = find_built(context.object)
         try:
             if built is None:
-                raise InputError("choose an object that ISC made")
+                raise InputError("no object made by ISC is active: select one")
             self.edit(built)
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         return {"FINISHED"}
 
-    def edit(self, built: Built) -> None:
-        """Changes what was built. Raises `InputError`."""
+    def edit(self, built: BuiltObject) -> None:
+        """Change an object.
+
+        Parameters
+        ----------
+        built : BuiltObject
+            The active object and what belongs to it.
+
+        Raises
+        ------
+        InputError
+            If the object cannot be changed.
+        """
         raise NotImplementedError
 
 
 class ISC_OT_recolour(EditOperator, bpy.types.Operator):
-    """Other paint under the same light and gloss."""
+    """Change the reflectance under the same light and highlights."""
 
     bl_idname = "isc.recolour"
-    bl_label = "Recolour"
-    bl_description = "Give the object other paint; its texture, light and gloss stay"
+    bl_label = "Recolor"
+    bl_description = "Change hue, saturation and value of the object's reflectance"
 
     hue: FloatProperty(
         name="Hue",
-        description="Turns the hue: 0.5 as in the photo, 0 and 1 the opposite",
+        description="Rotation of the hue, 0.5 as in the photo, 0 and 1 the opposite",
         default=0.5,
         min=0,
         max=1,
     )
     saturation: FloatProperty(
-        name="Saturation", description="0 is grey, 1 as in the photo", default=1, min=0, max=2
+        name="Saturation",
+        description="Factor of the saturation, 0 is gray, 1 as in the photo",
+        default=1,
+        min=0,
+        max=2,
     )
     value: FloatProperty(
         name="Value",
-        description="Factor of the paint's brightness: 1 as in the photo",
+        description="Factor of the brightness, 1 as in the photo",
         default=1,
         min=0,
         max=2,
     )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Begins with what is set now."""
+        """Start with the object's current values."""
         del event
-        inputs = inputs_of(find(context.object))
+        inputs = dichromatic_inputs(find_built(context.object))
         self.hue, self.saturation, self.value = (
             inputs[name].default_value for name in ("Hue", "Saturation", "Value")
         )
         return self.execute(context)
 
-    def edit(self, built: Built) -> None:
-        """Sets the node's inputs."""
-        inputs = own_inputs_of(built)
-        for name, value in (
-            ("Hue", self.hue),
-            ("Saturation", self.saturation),
-            ("Value", self.value),
-        ):
-            inputs[name].default_value = value
+    def edit(self, built: BuiltObject) -> None:
+        """Set the node's inputs; see `EditOperator`."""
+        inputs = single_user_inputs(built)
+        inputs["Hue"].default_value = self.hue
+        inputs["Saturation"].default_value = self.saturation
+        inputs["Value"].default_value = self.value
 
 
 class ISC_OT_dichromatic(EditOperator, bpy.types.Operator):
-    """Paint and gloss in other proportions."""
+    """Change the proportion of diffuse and specular light."""
 
     bl_idname = "isc.dichromatic"
-    bl_label = "Paint and Gloss"
-    bl_description = "Make the light of the paint, and that of the gloss, stronger or weaker"
+    bl_label = "Diffuse and Specular Gain"
+    bl_description = "Scale the object's diffuse and specular light"
 
     diffuse_gain: FloatProperty(
-        name="Paint",
-        description="Factor of the light that the paint scatters",
+        name="Diffuse",
+        description="Factor of the diffuse light",
         default=1,
         min=0,
         max=10,
     )
     specular_gain: FloatProperty(
-        name="Gloss", description="Factor of the highlights: 0 is matt", default=1, min=0, max=10
+        name="Specular",
+        description="Factor of the highlights, 0 is diffuse",
+        default=1,
+        min=0,
+        max=10,
     )
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Begins with what is set now."""
+        """Start with the object's current values."""
         del event
-        inputs = inputs_of(find(context.object))
-        self.diffuse_gain, self.specular_gain = (
-            inputs["Diffuse Gain"].default_value,
-            inputs["Specular Gain"].default_value,
-        )
+        inputs = dichromatic_inputs(find_built(context.object))
+        self.diffuse_gain = inputs["Diffuse Gain"].default_value
+        self.specular_gain = inputs["Specular Gain"].default_value
         return self.execute(context)
 
-    def edit(self, built: Built) -> None:
-        """Sets the nodes' inputs: highlights may come from the lobe or from the photo."""
-        own_inputs_of(built)["Diffuse Gain"].default_value = self.diffuse_gain
-        set_specular_gain(material_of(built.object), self.specular_gain)
+    def edit(self, built: BuiltObject) -> None:
+        """Set the nodes' inputs, of the lobe and of the photo's highlights; see `EditOperator`."""
+        single_user_inputs(built)["Diffuse Gain"].default_value = self.diffuse_gain
+        set_specular_gain(find_material(built.object), self.specular_gain)
 
 
 class ISC_OT_own_material(EditOperator, bpy.types.Operator):
-    """Paint and gloss that no copy shares."""
+    """Give the object a material that no copy shares."""
 
     bl_idname = "isc.own_material"
-    bl_label = "Own Paint and Gloss"
-    bl_description = "Give the object a material of its own: now its copies, or what it was copied from, change with it"
+    bl_label = "Make Material Single User"
+    bl_description = "Give the object its own material, so that edits do not change its copies"
 
-    def edit(self, built: Built) -> None:
-        """Copies the material."""
-        own_inputs_of(built)
+    def edit(self, built: BuiltObject) -> None:
+        """Copy the material; see `EditOperator`."""
+        single_user_inputs(built)
 
 
 class ISC_OT_relight(EditOperator, bpy.types.Operator):
-    """One sun instead of the environment, or the environment again."""
+    """Replace the environment map by a sun, or restore it."""
 
     bl_idname = "isc.relight"
     bl_label = "Relight"
-    bl_description = (
-        "Light the object by one sun and even light beside it, or again as in the photo"
-    )
+    bl_description = "Light the object by one sun and uniform light, or as in the photo"
 
     light: EnumProperty(
-        name="Light", description="What lights the object", items=_LIGHTS, default="OPTIMAL"
+        name="Light", description="Light of the object", items=_LIGHTS, default="OPTIMAL"
     )
     direction: FloatVectorProperty(
         name="Direction",
-        description="From the object toward the chosen sun: right, away from the viewer, up; of any length",
+        description=(
+            "Direction from the object toward the sun (right, away from the viewer, up), "
+            "of any length"
+        ),
         subtype="XYZ",
         size=3,
         default=(-0.5, -0.7, 0.5),
     )
     strength: FloatProperty(
-        name="Strength", description="Factor of the sun's light", default=1, min=0, soft_max=10
+        name="Strength",
+        description="Factor of the sun's strength",
+        default=1,
+        min=0,
+        soft_max=10,
     )
     ambient: FloatProperty(
-        name="Even Light",
-        description="Factor of the light from all around",
+        name="Uniform Light",
+        description="Factor of the light from all directions",
         default=1,
         min=0,
         soft_max=10,
     )
 
-    def edit(self, built: Built) -> None:
-        """Sets the sun and the world."""
-        thing = built.object
+    def edit(self, built: BuiltObject) -> None:
+        """Set the sun and the world; see `EditOperator`."""
+        obj = built.object
         if self.light == "RECOVERED":
-            relight(thing, False)
+            relight(obj, sun=False)
             return
-        direction, irradiance, even = (
-            _stored(thing, f"isc_sun_{name}") for name in ("direction", "strength", "ambient")
+        direction, irradiance, ambient = (
+            _stored_vector(obj, f"isc_sun_{name}") for name in ("direction", "strength", "ambient")
         )
         if self.light == "CHOSEN":
             right, away, up = self.direction
-            direction = np.array([right, up, -away])  # in the camera's frame
+            direction = np.array([right, up, -away])  # in the camera frame
         length = float(np.linalg.norm(direction))
         if length < 1e-9:
-            raise InputError("the direction has no length: say where the sun stands")
-        ensure_sun(thing[KEY], built.collection, direction / length, self.strength * irradiance)
-        mix_sun(built.world, self.ambient * even, True)
+            raise InputError("the direction has no length: enter another")
+        ensure_sun(obj[KEY], built.collection, direction / length, self.strength * irradiance)
+        set_sun_mix(built.world, self.ambient * ambient, True)
 
 
-def inputs_of(built: Built | None) -> Any:
-    """The inputs of the material's node "ISC Dichromatic".
+def dichromatic_inputs(built: BuiltObject | None) -> Any:
+    """Return the inputs of the material's node "ISC Dichromatic".
 
-    Raises `InputError` if it has gone or belongs to another file.
+    Parameters
+    ----------
+    built : BuiltObject or None
+        The object.
+
+    Returns
+    -------
+    bpy.types.NodeInputs
+        The inputs.
+
+    Raises
+    ------
+    InputError
+        If the node is missing, or the material is linked from another file.
     """
     if built is None or (node := dichromatic_node(built.material)) is None:
         raise InputError(
-            "the material has no node group ISC Dichromatic any more: decompose the photo again"
+            "the material has no node group ISC Dichromatic: decompose the photo again"
         )
     if built.material.library is not None:
         raise InputError(
-            f"{built.material.name} is linked from another file: make it local first (Object, Relations, Make Local)"
+            f"{built.material.name} is linked from another file: "
+            "make it local first (Object > Relations > Make Local)"
         )
     return node.inputs
 
 
-def own_inputs_of(built: Built) -> Any:
-    """As `inputs_of`, on a material that no copy of the object shares: made where it has none.
+def single_user_inputs(built: BuiltObject) -> Any:
+    """Return the inputs of the node "ISC Dichromatic" in a material that no copy shares.
 
-    Raises `InputError` as that does.
+    Parameters
+    ----------
+    built : BuiltObject
+        The object; gets its own material if it shares one.
+
+    Returns
+    -------
+    bpy.types.NodeInputs
+        The inputs.
+
+    Raises
+    ------
+    InputError
+        As `dichromatic_inputs`.
     """
-    inputs_of(built)
-    own = own_material(built.object, built.material)
-    return inputs_of(replace(built, material=own))
+    dichromatic_inputs(built)
+    own = make_material_single_user(built.object, built.material)
+    return dichromatic_inputs(replace(built, material=own))
 
 
-def _stored(thing: Any, name: str) -> np.ndarray:
-    if name not in thing:
-        raise InputError(
-            f"it is not known where the light of {thing.name} comes from: import its result again"
-        )
-    return np.array(thing[name], np.float64)
+def _stored_vector(obj: Any, name: str) -> np.ndarray:
+    if name not in obj:
+        raise InputError(f"{obj.name} does not store its light: import its result again")
+    return np.array(obj[name], np.float64)

@@ -1,8 +1,8 @@
-"""Masks: cut out of a box that is drawn in the image editor or typed, or painted on a black image
-of the photo's size.
+"""Masks: segmented inside a box that is drawn in the image editor or typed, or painted on a black
+image of the photo's size.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
-# ruff: noqa: RUF012 (Blender wants its options as sets)
+# ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from math import ceil, floor
 from pathlib import Path
@@ -15,78 +15,70 @@ from gpu_extras.batch import batch_for_shader  # type: ignore[import-not-found]
 
 from isc_core.errors import InputError
 
-from ..files.image_export import examine
-from ..settings.preferences import choices, new_folder, worker_environment
+from ..files.image_source import inspect_image
+from ..settings.preferences import create_run_folder, read_preferences, worker_environment
+from ..worker.commands import Box
+from .messages import busy_message
 from .modal import WorkerOperator
-from .request import named
-from .run_steps import cut_out
-from .worker_run import Run, active, remove, require_idle
+from .request import find_by_full_name
+from .run_steps import mask_steps
+from .worker_run import WorkerRun, active_run, remove_folder, require_no_active_run
 
 _MASK_OF = "isc_mask_of"
-_LEAST = 8
-Box = tuple[int, int, int, int]
+_MIN_SIDE = 8
 
 
 class ISC_OT_cut_mask(WorkerOperator, bpy.types.Operator):
-    """Cuts the object inside the box out of the photo."""
+    """Segment the object inside the box and make it the mask."""
 
     bl_idname = "isc.cut_mask"
     bl_label = "Cut Out"
-    bl_description = "Find the object inside the box by its colours, and make that the mask; look at it before you use it"
+    bl_description = "Create the mask by segmenting the object inside the box by its colors"
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """With a photo, while no run goes on."""
+        """Whether there is a photo and no run is active."""
         return _can_cut(cls, context)
 
-    def prepare(self, context: Any) -> Run:
-        """The run. Raises `InputError`."""
-        require_idle()
+    def prepare(self, context: Any) -> WorkerRun:
+        """Create the run; see `WorkerOperator`."""
+        require_no_active_run()
         settings = context.scene.isc
         if settings.image is None:
-            raise InputError(
-                "there is no photo: open a file, or choose an image that is in Blender already"
-            )
-        box = tuple(int(number) for number in settings.box)
-        if min(box[2:]) < _LEAST:
-            raise InputError(
-                f"the box is less than {_LEAST} pixels wide or high: draw it around the object in the image editor"
-            )
-        photo, scene = examine(settings.image), context.scene.name_full
-        folder = new_folder(None, "mask")
+            raise InputError("no photo is selected: open a file, or choose an image of this file")
+        left, top, width, height = (int(number) for number in settings.box)
+        if min(width, height) < _MIN_SIDE:
+            raise InputError(_small_box_message())
+        photo, scene = inspect_image(settings.image), context.scene.name_full
+        folder = create_run_folder(None, "mask")
 
-        def finish(now: Any, path: Path) -> str:
-            del now
-            _take_mask(path, photo.name, scene)
-            remove(folder)
-            return "the mask is cut out: look at it before you use it"
+        def finish(context: Any, path: Path) -> str:
+            del context
+            _load_mask(path, photo.name, scene)
+            remove_folder(folder)
+            return "the mask is ready: check its outline before you decompose the photo"
 
-        script = cut_out(
-            photo, (box[0], box[1], box[2], box[3]), folder, worker_environment(choices(context))
-        )
-        return Run("Cut Out", script, finish, folder)
+        environment = worker_environment(read_preferences(context))
+        steps = mask_steps(photo, (left, top, width, height), folder, environment)
+        return WorkerRun("Cut Out", steps, finish, folder)
 
 
 class ISC_OT_take_mask(bpy.types.Operator):
-    """Makes a picture file the mask of a photo."""
+    """Make an image file the mask of a photo."""
 
     bl_idname = "isc.take_mask"
-    bl_label = "Take Mask"
+    bl_label = "Load Mask"
     bl_description = "Load a mask from a file, pack it, and make it the mask of a photo"
     bl_options = {"UNDO", "INTERNAL"}
 
-    filepath: StringProperty(name="File", description="The mask's file", subtype="FILE_PATH")
-    image: StringProperty(name="Photo", description="The photo's full name")
-    scene: StringProperty(
-        name="Scene", description="The full name of the scene whose mask it becomes"
-    )
+    filepath: StringProperty(name="File", description="File of the mask", subtype="FILE_PATH")
+    image: StringProperty(name="Photo", description="Full name of the photo")
+    scene: StringProperty(name="Scene", description="Full name of the scene that uses the mask")
 
     def execute(self, context: Any) -> set[str]:
-        """Loads it; a mask that was cut out before is replaced."""
-        scene, photo = (
-            named(bpy.data.scenes, self.scene) or context.scene,
-            named(bpy.data.images, self.image),
-        )
+        """Load the mask; it replaces one that was cut out earlier."""
+        scene = find_by_full_name(bpy.data.scenes, self.scene) or context.scene
+        photo = find_by_full_name(bpy.data.images, self.image)
         try:
             mask = bpy.data.images.load(self.filepath)
         except RuntimeError:
@@ -102,21 +94,19 @@ class ISC_OT_take_mask(bpy.types.Operator):
 
 
 class ISC_OT_new_mask(bpy.types.Operator):
-    """A black image of the photo's size, to paint the object on in white."""
+    """Create a black image of the photo's size to paint the mask on."""
 
     bl_idname = "isc.new_mask"
     bl_label = "New Mask to Paint"
-    bl_description = (
-        "A black image of the photo's size: paint the object on it in white (image editor, Paint)"
-    )
+    bl_description = "Create a black image of the photo's size, to paint the object on in white"
     bl_options = {"REGISTER", "UNDO"}
 
     def execute(self, context: Any) -> set[str]:
-        """Makes it, and shows it for painting where this is called from an image editor."""
+        """Create the image; an image editor shows it in Paint mode."""
         settings = context.scene.isc
         image = settings.image
         if image is None or 0 in tuple(image.size):
-            self.report({"ERROR"}, "choose a photo first: the mask takes its size")
+            self.report({"ERROR"}, "no photo is selected: choose one, the mask takes its size")
             return {"CANCELLED"}
         mask = bpy.data.images.new(f"{image.name} mask", *image.size, alpha=False)
         mask.colorspace_settings.name = "Non-Color"
@@ -127,13 +117,11 @@ class ISC_OT_new_mask(bpy.types.Operator):
 
 
 class ISC_OT_draw_box(bpy.types.Operator):
-    """A box drawn around the object with the mouse."""
+    """Draw a box around the object with the mouse, and cut the object out."""
 
     bl_idname = "isc.draw_box"
     bl_label = "Draw Box"
-    bl_description = (
-        "Draw a box around the object, with some background in it, and cut the object out of it"
-    )
+    bl_description = "Cut the object out of a box drawn around it with some background"
 
     _start: tuple[int, int] | None = None
     _end: tuple[int, int] = (0, 0)
@@ -141,7 +129,7 @@ class ISC_OT_draw_box(bpy.types.Operator):
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """In an image editor that shows the photo, while no run goes on."""
+        """Whether an image editor shows the photo and no run is active."""
         if (
             context.area is None
             or context.area.type != "IMAGE_EDITOR"
@@ -149,15 +137,15 @@ class ISC_OT_draw_box(bpy.types.Operator):
         ):
             cls.poll_message_set("Show the photo in an image editor")
             return False
-        return active() is None
+        return active_run() is None
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Waits for the mouse."""
+        """Wait for the mouse."""
         del event
         context.scene.isc.image = context.space_data.image
         context.window.cursor_modal_set("CROSSHAIR")
         context.workspace.status_text_set(
-            "Draw a box around the object; Esc or right button: leave it"
+            "Draw a box around the object, Esc or right mouse button to cancel"
         )
         self._handler = bpy.types.SpaceImageEditor.draw_handler_add(
             self._draw, (), "WINDOW", "POST_PIXEL"
@@ -166,38 +154,36 @@ class ISC_OT_draw_box(bpy.types.Operator):
         return {"RUNNING_MODAL"}
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Press, drag, release."""
+        """Follow press, drag and release of the left mouse button."""
         region = _canvas(context)
-        place = (event.mouse_x - region.x, event.mouse_y - region.y)
+        position = (event.mouse_x - region.x, event.mouse_y - region.y)
         if event.type in {"ESC", "RIGHTMOUSE"}:
             return self._leave(context, {"CANCELLED"})
         if event.type == "LEFTMOUSE" and event.value == "PRESS":
-            self._start = self._end = place
+            self._start = self._end = position
         elif event.type == "MOUSEMOVE" and self._start is not None:
-            self._end = place
+            self._end = position
             region.tag_redraw()
         elif event.type == "LEFTMOUSE" and event.value == "RELEASE" and self._start is not None:
-            self._end = place
+            self._end = position
             return self._finish(context, region)
         elif self._start is None:
-            return {"PASS_THROUGH"}  # so that the view can be moved before
+            return {"PASS_THROUGH"}  # so that the view can still be moved
         return {"RUNNING_MODAL"}
 
     def cancel(self, context: Any) -> None:
-        """Blender ends the operator itself."""
+        """Stop drawing: Blender ends the operator."""
         self._leave(context, set())
 
     def _finish(self, context: Any, region: Any) -> set[str]:
         corners = [
-            region.view2d.region_to_view(*place) for place in (self._start or self._end, self._end)
+            region.view2d.region_to_view(*corner)
+            for corner in (self._start or self._end, self._end)
         ]
-        box = box_of(corners[0], corners[1], tuple(context.space_data.image.size))
+        box = box_from_corners(corners[0], corners[1], tuple(context.space_data.image.size))
         self._leave(context, set())
         if box is None:
-            self.report(
-                {"WARNING"},
-                f"the box is less than {_LEAST} pixels wide or high: draw it around the object",
-            )
+            self.report({"WARNING"}, _small_box_message())
             return {"CANCELLED"}
         context.scene.isc.box = box
         bpy.ops.isc.cut_mask("INVOKE_DEFAULT")
@@ -224,22 +210,39 @@ class ISC_OT_draw_box(bpy.types.Operator):
         )
 
 
-def box_of(
+def box_from_corners(
     first: tuple[float, float], second: tuple[float, float], size: tuple[int, ...]
 ) -> Box | None:
-    """(left, top, width, height) in pixels, from the top, of two corners in the image editor's
-    view: (0, 0) is the image's lower left corner, (1, 1) its upper right one. Cut to the image of
-    `size` (width, height); None if less than 8 pixels are left.
+    """Convert two corners in the image editor's view to a box in pixels.
+
+    Parameters
+    ----------
+    first, second : tuple of float
+        Opposite corners; (0, 0) is the image's lower left corner, (1, 1) its upper right one.
+    size : tuple of int
+        Width and height of the image in pixels.
+
+    Returns
+    -------
+    tuple of int or None
+        Left, top, width and height, clipped to the image; None below 8 pixels.
     """
     width, height = size
     across = sorted(min(max(u * width, 0), width) for u in (first[0], second[0]))
     down = sorted(min(max((1 - v) * height, 0), height) for v in (first[1], second[1]))
     left, top = floor(across[0]), floor(down[0])
     box = (left, top, ceil(across[1]) - left, ceil(down[1]) - top)
-    return box if min(box[2:]) >= _LEAST else None
+    return box if min(box[2:]) >= _MIN_SIDE else None
 
 
-def _take_mask(path: Path, image: str, scene: str) -> None:
+def _small_box_message() -> str:
+    return (
+        f"the box is less than {_MIN_SIDE} pixels wide or high: "
+        "draw it around the object in the image editor"
+    )
+
+
+def _load_mask(path: Path, image: str, scene: str) -> None:
     try:
         bpy.ops.isc.take_mask("EXEC_DEFAULT", True, filepath=str(path), image=image, scene=scene)
     except RuntimeError as error:
@@ -247,9 +250,7 @@ def _take_mask(path: Path, image: str, scene: str) -> None:
 
 
 def _replace_mask(mask: Any, name: str) -> None:
-    """Gives the mask its name; one that was cut out before under that name hands its users over and
-    goes.
-    """
+    """Name the mask; it replaces one that was cut out earlier under that name."""
     old = next(
         (
             image
@@ -266,14 +267,14 @@ def _replace_mask(mask: Any, name: str) -> None:
 
 def _can_cut(operator: Any, context: Any) -> bool:
     if context.scene.isc.image is None:
-        operator.poll_message_set("Choose a photo first")
+        operator.poll_message_set("Select a photo first")
         return False
-    present = active()
+    present = active_run()
     if present is not None:
-        operator.poll_message_set(f"{present.title} is going on: wait for it, or cancel it first")
+        operator.poll_message_set(busy_message(present.title))
     return present is None
 
 
 def _canvas(context: Any) -> Any:
-    """The region that shows the image: the button may have been pressed in the sidebar."""
+    """The region that shows the image; the button may be in the sidebar."""
     return next(region for region in context.area.regions if region.type == "WINDOW")

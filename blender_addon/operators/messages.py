@@ -1,55 +1,88 @@
-"""What the worker says, in the words of the window: its messages name files and options, people see
-images and fields.
+"""The sentences that the window shows.
+
+The worker's messages name files and command-line options; the window names images and fields of the
+panels.
 """
 
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import bpy
 
 REPORT = "ISC Report"
-_INSTEAD = (
-    (
-        "make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` and give it with --mask",
-        "choose a mask image, or cut one out of a box",
-    ),
-    ("give a mask of the photo's size", "give a mask of the photo's size, or tick Scale Mask"),
-    ("--max-size ", "Size "),
-    ("--illumination ", "Light "),
-    ("--transfer ", "colour space "),
-    ("--threads ", "Threads "),
-    ("--separator ", "Separator "),
-    ("--model ", "Model "),
-    ("--box ", "Box "),
-    ("--box:", "Box:"),
-)
-_FOR_TERMINALS = ("look at ",)
+_FIELDS = {
+    "--max-size": "Size",
+    "--illumination": "Light",
+    "--transfer": "Color Space",
+    "--threads": "Threads",
+    "--separator": "Separator",
+    "--model": "Model",
+    "--box": "Box",
+}
+# Advice that names these is about masks, and the panel offers other ways.
+_MASK_OPTION, _MASK_COMMAND = re.compile(r"--mask(?![\w-])"), "isc mask"
+_MASK_ADVICE = "choose a mask image, or cut one out with Draw Box"
 
 
-def in_words(message: str, names: Mapping[str, str]) -> str:
-    """A message with the files in it called by `names` (path: name of the image) and options called
-    as the panel calls them.
+def translate_message(message: str, names: Mapping[str, str]) -> str:
+    """Rewrite a message of the command line for the window.
+
+    Parameters
+    ----------
+    message : str
+        "What is wrong: what to do".
+    names : mapping of str to str
+        Name of the image of each file path.
+
+    Returns
+    -------
+    str
+        The message with image names and field labels.
     """
     for path, name in sorted(names.items(), key=lambda item: -len(item[0])):
         message = message.replace(path, name)
-    for option, field in _INSTEAD:
-        message = message.replace(option, field)
+    problem, colon, advice = message.rpartition(": ")
+    if colon and (_MASK_OPTION.search(advice) or _MASK_COMMAND in advice):
+        message = f"{problem}: {_MASK_ADVICE}"
+    for option, field in _FIELDS.items():
+        message = re.sub(rf"{option}(?![\w-])=?", field, message)
     return message
 
 
-def notes_of(message: str) -> str:
-    """What a worker's last words say of the result, in one line: what only helps at a terminal is
-    left out.
-    """
-    lines = (line.strip() for line in message.splitlines())
-    return "; ".join(line for line in lines if line and not line.startswith(_FOR_TERMINALS))
+def join_notes(lines: Iterable[str]) -> str:
+    """Join notes on a result into one line."""
+    return "; ".join(filter(None, (line.strip() for line in lines)))
 
 
-def keep_report(title: str, message: str, report: str) -> Any:
-    """Writes what went wrong into the text "ISC Report", for the text editor; returns the
-    datablock.
+def busy_message(title: str) -> str:
+    """Return why nothing can start while the run of that title is active."""
+    return f"{title} is running: wait for it, or cancel it first"
+
+
+def progress_message(title: str, stage: str, fraction: float) -> str:
+    """Return the text of the status bar during a run."""
+    return f"{title}: {stage} ({100 * fraction:.0f} %), Esc to cancel"
+
+
+def write_report(title: str, message: str, log: str) -> Any:
+    """Write an error into the text datablock "ISC Report", for the text editor.
+
+    Parameters
+    ----------
+    title : str
+        Name of the run.
+    message : str
+        The error.
+    log : str
+        Last part of the worker's log.
+
+    Returns
+    -------
+    bpy.types.Text
+        The datablock.
     """
     text = bpy.data.texts.get(REPORT) or bpy.data.texts.new(REPORT)
     text.clear()
-    text.write(f"{title}\n{message}\n\n{report.strip()}\n")
+    text.write(f"{title}\n{message}\n\n{log.strip()}\n")
     return text

@@ -1,12 +1,11 @@
-"""How a run lives in a window: a timer that only polls, progress in the panels and the status bar,
-Esc.
+"""Runs in a window: a timer that polls, progress in the panels and the status bar, Esc to cancel.
 
-The operators here have no UNDO of their own: Blender would push an undo step for them while they go
-on. What is built is built by an operator of its own that has it, called when the work is done: one
-step, whatever the user did meanwhile.
+The operators here have no UNDO of their own: Blender would push an undo step for them while they
+run. The result is built by a separate operator that has it, called when the work is done: one undo
+step, whatever the user has done in the meantime.
 """
 # mypy: allow-subclassing-any
-# ruff: noqa: RUF012 (Blender wants its options as sets)
+# ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 import time
 from typing import Any
@@ -15,30 +14,46 @@ import bpy
 
 from isc_core.errors import InputError
 
-from .messages import keep_report
-from .worker_run import Run, active, begin, end_active
+from .messages import progress_message, write_report
+from .worker_run import RunState, WorkerRun, active_run, begin_run, cancel_active_run
 
-SECONDS = 0.1
-_PANELS = {"VIEW_3D", "IMAGE_EDITOR"}
+POLL_SECONDS = 0.1
+_PANEL_EDITORS = {"VIEW_3D", "IMAGE_EDITOR"}
 
 
 class WorkerOperator:
-    """A mixin for operators whose work is a run: `prepare` makes it.
+    """Mixin for operators that start a run, which `prepare` creates.
 
-    From a panel it goes on while the user works; without a window, or from a script that does not
-    ask for more, it is waited for.
+    From a panel the run continues in the background. Without a window, or when called from a
+    script, the operator waits for its end.
     """
 
-    report: Any  # Blender's own
+    report: Any  # from bpy.types.Operator
     _timer: Any = None
-    _run: Run | None = None
+    _run: WorkerRun | None = None
 
-    def prepare(self, context: Any) -> Run:
-        """The run. Raises `InputError`, with nothing left behind, where it cannot be."""
+    def prepare(self, context: Any) -> WorkerRun:
+        """Create the run.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Blender's context.
+
+        Returns
+        -------
+        WorkerRun
+            The run, not started.
+
+        Raises
+        ------
+        InputError
+            If the run is impossible; nothing is left behind.
+        """
         raise NotImplementedError
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Begins the run and returns at once."""
+        """Start the run and return at once."""
         del event
         run = self._begin(context)
         if run is None:
@@ -47,18 +62,18 @@ class WorkerOperator:
             return self._wait(context, run)
         manager = context.window_manager
         self._run = run
-        self._timer = manager.event_timer_add(SECONDS, window=context.window)
+        self._timer = manager.event_timer_add(POLL_SECONDS, window=context.window)
         manager.modal_handler_add(self)
-        show(context, run)
+        update_display(context, run)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: Any) -> set[str]:
-        """Begins the run and waits for its end."""
+        """Start the run and wait for its end."""
         run = self._begin(context)
         return {"CANCELLED"} if run is None else self._wait(context, run)
 
     def modal(self, context: Any, event: Any) -> set[str]:
-        """Looks how far the work is, ten times a second; all that the user does passes through."""
+        """Poll the run ten times a second; all events of the user pass through."""
         run = self._run
         if run is None:
             return {"CANCELLED"}
@@ -66,37 +81,37 @@ class WorkerOperator:
             run.cancel()
         elif event.type != "TIMER":
             return {"PASS_THROUGH"}
-        if not advance(context, run):
+        if not advance_run(context, run):
             return {"PASS_THROUGH"}
         self._stop_timer(context)
-        return self._told(run)
+        return self._report_outcome(run)
 
     def cancel(self, context: Any) -> None:
-        """Blender ends the operator itself: its window is closed, or another file is loaded."""
+        """Cancel the run: Blender closes the window or loads another file."""
         self._stop_timer(context)
-        end_active()
+        cancel_active_run()
 
-    def _begin(self, context: Any) -> Run | None:
+    def _begin(self, context: Any) -> WorkerRun | None:
         began = time.perf_counter()
         try:
-            run = begin(self.prepare(context))
+            run = begin_run(self.prepare(context))
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return None
-        run.count(time.perf_counter() - began)
+        run.record_call(time.perf_counter() - began)
         return run
 
-    def _wait(self, context: Any, run: Run) -> set[str]:
-        while not advance(context, run):
-            time.sleep(SECONDS / 2)
-        return self._told(run)
+    def _wait(self, context: Any, run: WorkerRun) -> set[str]:
+        while not advance_run(context, run):
+            time.sleep(POLL_SECONDS / 2)
+        return self._report_outcome(run)
 
-    def _told(self, run: Run) -> set[str]:
-        state, message, report = run.status.state, run.status.message, run.status.report
-        if state == "failed" and report:
-            message += f" (see the text {keep_report(run.title, message, report).name})"
-        self.report({"ERROR" if state == "failed" else "INFO"}, message)
-        return {"FINISHED"} if state == "done" else {"CANCELLED"}
+    def _report_outcome(self, run: WorkerRun) -> set[str]:
+        state, message, log = run.status.state, run.status.message, run.status.log
+        if state == RunState.FAILED and log:
+            message += f" (see the text {write_report(run.title, message, log).name})"
+        self.report({"ERROR" if state == RunState.FAILED else "INFO"}, message)
+        return {"FINISHED"} if state == RunState.DONE else {"CANCELLED"}
 
     def _stop_timer(self, context: Any) -> None:
         if self._timer is not None:
@@ -104,80 +119,97 @@ class WorkerOperator:
             self._timer = None
 
 
-def advance(context: Any, run: Run) -> bool:
-    """One tick of a run; whether it has ended.
+def advance_run(context: Any, run: WorkerRun) -> bool:
+    """Advance a run by one tick.
 
-    Its result is taken in as soon as the user is not in the middle of editing something.
+    The result is imported as soon as the user is in no edit mode.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+    run : WorkerRun
+        The run.
+
+    Returns
+    -------
+    bool
+        Whether the run has ended.
     """
     began = time.perf_counter()
-    state = run.step().state
-    # Undo within a mode of editing knows that mode alone: what is built then could not be undone by
-    # one step.
+    ready = run.step().state == RunState.READY
+    # Undo in an edit mode covers that mode alone: one step could not undo what is built then.
     editing = context.mode.startswith("EDIT")
-    show(context, run, "leave Edit Mode to see the result" if state == "ready" and editing else "")
-    run.count(time.perf_counter() - began)
-    if state == "ready" and not editing:
-        run.take_in(context)
-        show(context, run)
+    remark = "leave Edit Mode to import the result" if ready and editing else ""
+    update_display(context, run, remark)
+    run.record_call(time.perf_counter() - began)
+    if ready and not editing:
+        run.import_result(context)
+        update_display(context, run)
     return run.ended
 
 
-def show(context: Any, run: Run, remark: str = "") -> None:
-    """Brings what the window shows up to date with the run."""
+def update_display(context: Any, run: WorkerRun, remark: str = "") -> None:
+    """Update what the window shows of a run.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+    run : WorkerRun
+        The run.
+    remark : str, optional
+        Text to show instead of the stage.
+    """
     shown, status = context.window_manager.isc, run.status
     stage = remark or status.stage
     shown.longest_call_ms, shown.import_ms = run.longest_call_ms, run.import_ms
-    # The view redraws when something that can be seen has changed, not ten times a second.
-    now = (run.title, status.state, stage, round(status.fraction, 2), status.message)
+    # Redraw only when something visible has changed, not ten times a second.
+    now = (run.title, str(status.state), stage, round(status.fraction, 2), status.message)
     if now == (shown.title, shown.state, shown.stage, round(shown.fraction, 2), shown.message):
         return
     shown.title, shown.state, shown.stage, shown.fraction, shown.message = now
-    _say(
-        context,
-        None if run.ended else f"{run.title}: {stage} ({100 * status.fraction:.0f} %), Esc cancels",
-    )
-    redraw(context)
+    text = None if run.ended else progress_message(run.title, stage, status.fraction)
+    _set_status_text(context, text)
+    redraw_panels(context)
 
 
-def _say(context: Any, text: str | None) -> None:
-    """Shows the text in the status bar;
-
-    None takes it away from wherever it was shown, as the user may have changed the workspace.
-    """
+def _set_status_text(context: Any, text: str | None) -> None:
+    """None clears the text in all workspaces, as the user may have changed the workspace."""
     for workspace in [context.workspace] if text else bpy.data.workspaces:
         if workspace is not None:
             workspace.status_text_set(text)
 
 
-def redraw(context: Any) -> None:
-    """Draws the panels again, in all windows."""
+def redraw_panels(context: Any) -> None:
+    """Redraw the panels in all windows."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
-            if area.type in _PANELS:
+            if area.type in _PANEL_EDITORS:
                 for region in area.regions:
                     if region.type == "UI":
                         region.tag_redraw()
 
 
 class ISC_OT_cancel(bpy.types.Operator):
-    """Ends the run that goes on."""
+    """Cancel the active run."""
 
     bl_idname = "isc.cancel"
     bl_label = "Cancel"
-    bl_description = "End the work at once; nothing of it is kept (Esc does the same)"
+    bl_description = "Cancel the run and discard its work"
     bl_options = {"INTERNAL"}
 
     @classmethod
     def poll(cls, context: Any) -> bool:
-        """While a run goes on."""
+        """Whether a run is active."""
         del context
-        return active() is not None
+        return active_run() is not None
 
     def execute(self, context: Any) -> set[str]:
-        """Ends it; its operator notices at its next tick."""
-        run = active()
+        """Cancel the run; its operator ends at its next tick."""
+        run = active_run()
         if run is None:
             return {"CANCELLED"}
         run.cancel()
-        show(context, run)
+        update_display(context, run)
         return {"FINISHED"}

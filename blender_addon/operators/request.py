@@ -1,5 +1,5 @@
-"""What a decomposition is asked for: taken from the panel, or from an object that was made before;
-kept with what is made of it.
+"""The request of a decomposition: taken from the panel or from an existing object, and stored with
+the object.
 """
 
 import json
@@ -11,8 +11,8 @@ import bpy
 
 from isc_core.errors import InputError
 
-from ..files.image_export import Picture, examine
-from ..scene.build import SHADOWS, BuildOptions
+from ..files.image_source import ImageSource, inspect_image
+from ..scene.build import OWN_SHADOWS, BuildOptions
 from ..scene.provenance import KEY, SOURCE_IMAGE
 
 _SUFFIXES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".bmp", ".exr", ".hdr", ".tga", ".webp")
@@ -20,10 +20,21 @@ _IMAGE, _MASK, _REQUEST = SOURCE_IMAGE, "isc_source_mask", "isc_request"
 
 
 @dataclass(frozen=True)
-class Method:
-    """How the photo is taken apart; the names are those of `isc decompose`.
+class MethodSettings:
+    """How a photo is decomposed; the values are those of `isc decompose`.
 
-    `samples`: rays a pixel in the scene that is built.
+    Attributes
+    ----------
+    model : str
+        Value of `--model`.
+    separator : str
+        Value of `--separator`.
+    illumination : str
+        Value of `--illumination`.
+    max_size : int
+        Longer side of the object in pixels; 0 keeps the photo's resolution.
+    samples : int
+        Samples per pixel of Cycles in the scene that is built.
     """
 
     model: str = "joint"
@@ -34,77 +45,128 @@ class Method:
 
 
 @dataclass(frozen=True)
-class Request:
-    """One decomposition to be made and built; images and scenes by their full names, since undoing
-    replaces the things themselves.
+class DecomposeRequest:
+    """One decomposition and what to build of its result.
 
-    `image`: the photo. `mask`: its mask, or nothing for the photo's transparency or black border;
-    `scale_mask`: to the photo's size. `scene`: that asks. `build`: what is made of the result, its
-    `name` the object's.
+    Images and scenes are given by their full names: undo replaces the datablocks themselves. The
+    field names are part of the JSON text that files store.
+
+    Attributes
+    ----------
+    image : str
+        The photo.
+    mask : str
+        Its mask; "" uses the photo's transparency or black background.
+    scale_mask : bool
+        Whether to scale the mask to the photo's size.
+    method : MethodSettings
+        How to decompose.
+    build : BuildOptions
+        What to build; its `name` is the object's.
+    scene : str
+        Scene that the request comes from.
     """
 
     image: str = ""
     mask: str = ""
     scale_mask: bool = False
-    method: Method = field(default_factory=Method)
+    method: MethodSettings = field(default_factory=MethodSettings)
     build: BuildOptions = field(default_factory=BuildOptions)
     scene: str = ""
 
     def to_json(self) -> str:
-        """The request as text; `request_from_json` reads it."""
+        """Return the request as text for `request_from_json`."""
         return json.dumps(asdict(self), ensure_ascii=False)
 
 
-def request_from_json(text: str) -> Request:
-    """What `Request.to_json` wrote, in this version or another.
+def request_from_json(text: str) -> DecomposeRequest:
+    """Read what `DecomposeRequest.to_json` wrote, in this version or another.
 
-    Raises `InputError` for anything else.
+    Parameters
+    ----------
+    text : str
+        JSON text; unknown entries are ignored.
+
+    Returns
+    -------
+    DecomposeRequest
+        The request.
+
+    Raises
+    ------
+    InputError
+        If the text is no request.
     """
     try:
         stored = json.loads(text)
         parts = {
-            "method": _known(Method, stored["method"]),
-            "build": _known(BuildOptions, stored["build"]),
+            "method": _from_known_fields(MethodSettings, stored["method"]),
+            "build": _from_known_fields(BuildOptions, stored["build"]),
         }
-        return _known(Request, {**stored, **parts})
+        return _from_known_fields(DecomposeRequest, {**stored, **parts})
     except (ValueError, KeyError, TypeError, RecursionError) as error:
         raise InputError(
-            "it is not known how this object was made: decompose its photo again"
+            "the object does not store how it was made: decompose its photo again"
         ) from error
 
 
-def request_from_settings(scene: Any) -> Request:
-    """The request of a scene's panel.
+def request_from_settings(scene: Any) -> DecomposeRequest:
+    """Return the request of a scene's panel.
 
-    Raises `InputError` if there is no photo, or no mask where one is wanted.
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        The scene.
+
+    Returns
+    -------
+    DecomposeRequest
+        The request.
+
+    Raises
+    ------
+    InputError
+        If the photo is missing, or a mask image is chosen but missing.
     """
     settings = scene.isc
     if settings.image is None:
-        raise InputError(
-            "there is no photo: open a file, or choose an image that is in Blender already"
-        )
+        raise InputError("no photo is selected: open a file, or choose an image of this file")
     masked = settings.mask_source == "IMAGE"
     if masked and settings.mask is None:
         raise InputError(
-            "there is no mask image: choose one, cut one out of a box, or set Mask to Alpha or Black"
+            "no mask image is selected: choose one, cut one out with Draw Box, "
+            "or set Mask to Alpha or Black"
         )
     if masked and settings.mask == settings.image:
         raise InputError(
             "the mask is the photo itself: choose another image, or set Mask to Alpha or Black"
         )
-    return Request(
-        settings.image.name_full,
-        settings.mask.name_full if masked else "",
-        settings.scale_mask,
-        Method(**{part.name: getattr(settings, part.name) for part in fields(Method)}),
-        build_options(settings, key_of(settings.image)),
-        scene.name_full,
+    return DecomposeRequest(
+        image=settings.image.name_full,
+        mask=settings.mask.name_full if masked else "",
+        scale_mask=settings.scale_mask,
+        method=MethodSettings(
+            **{part.name: getattr(settings, part.name) for part in fields(MethodSettings)}
+        ),
+        build=build_options(settings, object_key(settings.image)),
+        scene=scene.name_full,
     )
 
 
 def build_options(settings: Any, name: str) -> BuildOptions:
-    """What the panel says is to be built, under that name; the rest, which Blender's own panels
-    show, stays as it is.
+    """Return what the panel's settings build.
+
+    Parameters
+    ----------
+    settings : ISC_PG_settings
+        The settings; options that the panel does not offer keep their defaults.
+    name : str
+        Name of the object, "" for the result's own.
+
+    Returns
+    -------
+    BuildOptions
+        The options.
     """
     offered = settings.bl_rna.properties.keys()
     chosen = {
@@ -112,92 +174,154 @@ def build_options(settings: Any, name: str) -> BuildOptions:
         for part in fields(BuildOptions)
         if part.name in offered
     }
-    return BuildOptions(**{**chosen, "own_shadows": SHADOWS[settings.shadows], "name": name})
+    own_shadows = OWN_SHADOWS[settings.shadows]
+    return BuildOptions(**{**chosen, "own_shadows": own_shadows, "name": name})
 
 
-def pictures_of(request: Request) -> tuple[Picture, Picture | None, tuple[int, int] | None]:
-    """How photo and mask leave Blender, and the size (width, height) that the mask is to be scaled
-    to, if it is.
+def inspect_images(
+    request: DecomposeRequest,
+) -> tuple[ImageSource, ImageSource | None, tuple[int, int] | None]:
+    """Determine how photo and mask are handed to the worker.
 
-    Raises `InputError`, with what to do, for images that cannot be used.
+    Parameters
+    ----------
+    request : DecomposeRequest
+        The request.
+
+    Returns
+    -------
+    photo : ImageSource
+        The photo.
+    mask : ImageSource or None
+        The mask.
+    size : tuple of int or None
+        Width and height to scale the mask to.
+
+    Raises
+    ------
+    InputError
+        If an image is missing or cannot be used.
     """
-    image, mask = (
-        named(bpy.data.images, request.image),
-        named(bpy.data.images, request.mask) if request.mask else None,
-    )
+    image = find_by_full_name(bpy.data.images, request.image)
+    mask = find_by_full_name(bpy.data.images, request.mask) if request.mask else None
     if image is None or (request.mask and mask is None):
-        raise InputError(
-            f"the image {request.mask if image else request.image} is not in this file any more: choose another"
-        )
-    photo = examine(image)
+        missing = request.mask if image else request.image
+        raise InputError(f"the image {missing} is no longer in this file: choose another")
+    photo = inspect_image(image)
     if mask is None:
         return photo, None, None
     if request.scale_mask:
-        return photo, examine(mask, as_pixels=True), (int(image.size[0]), int(image.size[1]))
+        return photo, inspect_image(mask, as_pixels=True), (int(image.size[0]), int(image.size[1]))
     if image.has_data and mask.has_data and tuple(image.size) != tuple(mask.size):
-        (width, height), (wide, high) = mask.size, image.size
         raise InputError(
-            f"the mask is {width} x {height} pixels, the photo {wide} x {high}: choose another mask, or tick Scale Mask"
+            f"the mask is {mask.size[0]} x {mask.size[1]} pixels, the photo {image.size[0]} x "
+            f"{image.size[1]}: choose another mask, or enable Scale Mask"
         )
-    return photo, examine(mask), None
+    return photo, inspect_image(mask), None
 
 
-def named(blocks: Any, name: str) -> Any:
-    """The datablock of that full name, which tells linked ones apart; None if there is none."""
+def find_by_full_name(blocks: Any, name: str) -> Any:
+    """Find a datablock by its full name, which distinguishes linked ones.
+
+    Parameters
+    ----------
+    blocks : bpy_prop_collection
+        For example `bpy.data.images`.
+    name : str
+        Full name.
+
+    Returns
+    -------
+    bpy.types.ID or None
+        The datablock.
+    """
     return next((block for block in blocks if block.name_full == name), None)
 
 
-def key_of(image: Any) -> str:
-    """What to call what is made of an image: its name without a suffix, unless another image's
-    object is called so already.
+def object_key(image: Any) -> str:
+    """Return the name of the object built from an image.
+
+    Parameters
+    ----------
+    image : bpy.types.Image
+        The photo.
+
+    Returns
+    -------
+    str
+        The image's name without its suffix; with it, if another image's object has that name.
     """
     name = PurePath(image.name.replace("/", "_").replace("\\", "_"))
     plain = name.stem if name.suffix.lower() in _SUFFIXES else str(name)
     taken = any(
-        thing.get("isc_key") == plain and thing.get(_IMAGE) not in (None, image)
-        for thing in bpy.data.objects
+        obj.get(KEY) == plain and obj.get(_IMAGE) not in (None, image) for obj in bpy.data.objects
     )
     return image.name if taken else plain
 
 
-def remember(thing: Any, request: Request) -> None:
-    """Writes into an object how it was made, under the name it was given; its images are pointed
-    at, so that they stay with it whatever they are called.
+def store_request(obj: Any, request: DecomposeRequest) -> None:
+    """Store in an object how it was made, under the name it was given.
+
+    The object also points to the images, so that they stay with it when they are renamed.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object.
+    request : DecomposeRequest
+        How it was made.
     """
-    thing[_REQUEST] = replace(request, build=replace(request.build, name=str(thing[KEY]))).to_json()
+    named = replace(request, build=replace(request.build, name=str(obj[KEY])))
+    obj[_REQUEST] = named.to_json()
     for role, name in ((_IMAGE, request.image), (_MASK, request.mask)):
-        image = named(bpy.data.images, name) if name else None
+        image = find_by_full_name(bpy.data.images, name) if name else None
         if image is not None:
-            thing[role] = image
-        elif role in thing:
-            del thing[role]
+            obj[role] = image
+        elif role in obj:
+            del obj[role]
 
 
-def remembered(thing: Any, scene: Any, max_size: int) -> Request:
-    """The request that an object was made by, at another size; images as they are called now.
+def stored_request(obj: Any, scene: Any, max_size: int) -> DecomposeRequest:
+    """Return the request that made an object, at another size.
 
-    Raises `InputError` if they have gone.
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object.
+    scene : bpy.types.Scene
+        Scene of the new request.
+    max_size : int
+        New longer side of the object in pixels.
+
+    Returns
+    -------
+    DecomposeRequest
+        The request, with the current names of its images.
+
+    Raises
+    ------
+    InputError
+        If the object stores no request, or its images are missing.
     """
-    request = request_from_json(thing.get(_REQUEST, ""))
+    request = request_from_json(obj.get(_REQUEST, ""))
     for role, name in ((_IMAGE, request.image), (_MASK, request.mask)):
-        if (name or role == _IMAGE) and thing.get(role) is None:
+        if (name or role == _IMAGE) and obj.get(role) is None:
             what = "photo" if role == _IMAGE else "mask"
             raise InputError(
-                f"the {what} that {thing.name} was made of is not in this file: open it, and press Decompose"
+                f"the {what} of {obj.name} is not in this file: open it, and press Decompose"
             )
-    mask = thing[_MASK].name_full if request.mask else ""
-    method = replace(request.method, max_size=max_size)
     return replace(
-        request, image=thing[_IMAGE].name_full, mask=mask, method=method, scene=scene.name_full
+        request,
+        image=obj[_IMAGE].name_full,
+        mask=obj[_MASK].name_full if request.mask else "",
+        method=replace(request.method, max_size=max_size),
+        scene=scene.name_full,
     )
 
 
-def _known(kind: type, stored: dict[str, Any]) -> Any:
-    """A dataclass of those values that it has fields for.
-
-    Raises `TypeError` if they have no names.
-    """
+def _from_known_fields(kind: type, stored: dict[str, Any]) -> Any:
+    """A dataclass from those values that it has fields for."""
     if not isinstance(stored, dict):
-        raise TypeError(f"{stored!r} has no names")
+        raise TypeError(f"{stored!r} is not a mapping")
     names = {part.name for part in fields(kind)}
     return kind(**{name: value for name, value in stored.items() if name in names})

@@ -1,112 +1,131 @@
-"""A result's folder becomes an object in the scene: as one undo step, whoever asks for it."""
+"""Build a result folder as an object in the scene, as one undo step."""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
-# ruff: noqa: RUF012 (Blender wants its options as sets)
+# ruff: noqa: RUF012 (Blender requires sets for operator options)
 
 from pathlib import Path
 from typing import Any
 
 import bpy
-from bpy.props import StringProperty
+from bpy.props import BoolProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import ARRAYS, read_result
-from ..scene.build import Built, build, find
-from ..settings.preferences import choices, new_folder, worker_environment
+from ..files.result_arrays import ARRAYS, DESCRIPTION, read_result
+from ..scene.build import BuiltObject, build_object, find_built
+from ..settings.preferences import create_run_folder, read_preferences, worker_environment
 from .modal import WorkerOperator
-from .request import Request, build_options, named, remember, request_from_json
-from .run_steps import complete
-from .worker_run import Run, require_idle
+from .request import (
+    DecomposeRequest,
+    build_options,
+    find_by_full_name,
+    request_from_json,
+    store_request,
+)
+from .run_steps import arrays_steps
+from .worker_run import WorkerRun, require_no_active_run
 
 
-def build_in_one_step(context: Any, folder: Path, request: Request | None = None) -> str:
-    """Builds the result in `folder` and makes one undo step of it; a line that says where it
-    stands. Raises `InputError`.
+def build_as_undo_step(context: Any, folder: Path, request: DecomposeRequest | None = None) -> str:
+    """Build the result of a folder as one undo step.
 
-    `request`: what was asked for; None takes the panel's choices.
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Ignored: building changes the scene and the object that are active.
+    folder : Path
+        Result folder with arrays.
+    request : DecomposeRequest, optional
+        What to build; None uses the panel's settings.
+
+    Returns
+    -------
+    str
+        Where the object is, one line.
+
+    Raises
+    ------
+    InputError
+        If the result cannot be built.
     """
     del context
     text = "" if request is None else request.to_json()
     try:
-        # Called from Python, an operator makes an undo step only if it is told to.
+        # From Python, an operator pushes an undo step only if told to.
         bpy.ops.isc.build_result("EXEC_DEFAULT", True, directory=str(folder), request=text)
     except RuntimeError as error:
         raise InputError(str(error).strip().splitlines()[0].removeprefix("Error: ")) from error
-    built = find(bpy.context.object)
-    return (
-        "the result is in the scene"
-        if built is None
-        else f"{built.object.name}: built in the scene {built.scene.name}"
-    )
+    built = find_built(bpy.context.object)
+    if built is None:
+        return "the result is in the scene"
+    return f"{built.object.name}: built in the scene {built.scene.name}"
 
 
 class ISC_OT_build_result(bpy.types.Operator):
-    """Builds what a result's folder holds."""
+    """Build the object of a result folder."""
 
     bl_idname = "isc.build_result"
     bl_label = "Build Result"
-    bl_description = "Build the object of a result's folder, or update the one that was built from the same photo"
+    bl_description = (
+        "Build the object of a result folder, or update the object built from the same photo"
+    )
     bl_options = {"UNDO", "INTERNAL"}
 
     directory: StringProperty(
-        name="Folder", description="The result's folder, arrays.npz in it", subtype="DIR_PATH"
+        name="Folder", description="Result folder with arrays.npz", subtype="DIR_PATH"
     )
     request: StringProperty(
-        name="Request", description="What was asked for, as JSON; empty: what the panel says"
+        name="Request", description="Request as JSON, empty uses the panel's settings"
     )
 
     def execute(self, context: Any) -> set[str]:
-        """Builds it; the scene is as before if it cannot be."""
+        """Build the object; on an error the scene is unchanged."""
         try:
             request = (
-                request_from_json(self.request) if self.request else _asked_by_panel(context.scene)
+                request_from_json(self.request) if self.request else _panel_request(context.scene)
             )
             result = read_result(Path(self.directory))
-            scene = named(bpy.data.scenes, request.scene) or context.scene
-            built = build(
-                result, request.build, scene=scene, photo=named(bpy.data.images, request.image)
-            )
+            scene = find_by_full_name(bpy.data.scenes, request.scene) or context.scene
+            photo = find_by_full_name(bpy.data.images, request.image)
+            built = build_object(result, request.build, scene=scene, photo=photo)
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
         _complete(built, request, scene)
-        _show(context, built)
+        _activate(context, built)
         return {"FINISHED"}
 
 
 class ISC_OT_import_result(bpy.types.Operator):
-    """Imports a folder that `isc decompose` wrote."""
+    """Import a result folder of `isc decompose`."""
 
     bl_idname = "isc.import_result"
     bl_label = "Import Result"
-    bl_description = "Build the object of a folder that isc decompose wrote"
+    bl_description = "Build the object of a result folder of isc decompose"
     bl_options = {"REGISTER"}
 
     directory: StringProperty(
-        name="Folder", description="The folder that isc decompose wrote", subtype="DIR_PATH"
+        name="Folder", description="Result folder of isc decompose", subtype="DIR_PATH"
     )
-    filter_folder: bpy.props.BoolProperty(
-        default=True, options={"HIDDEN"}, description="Show folders"
-    )
+    filter_folder: BoolProperty(default=True, options={"HIDDEN"}, description="Show folders")
 
     def invoke(self, context: Any, event: Any) -> set[str]:
-        """Asks for the folder."""
+        """Open the file browser."""
         del event
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, context: Any) -> set[str]:
-        """Builds it; a folder without arrays is given them first, by a worker."""
+        """Build the object; a worker first adds missing arrays."""
         folder = Path(bpy.path.abspath(self.directory))
-        if not self.directory or not (folder / "decomposition.json").is_file():
+        if not self.directory or not (folder / DESCRIPTION).is_file():
             self.report(
-                {"ERROR"}, f"{folder} is no result: give the folder that isc decompose wrote"
+                {"ERROR"}, f"{folder} is no result: select a folder that isc decompose has written"
             )
             return {"CANCELLED"}
         if not (folder / ARRAYS).is_file():
             return set(bpy.ops.isc.complete_result("INVOKE_DEFAULT", directory=str(folder)))
         try:
-            self.report({"INFO"}, build_in_one_step(context, folder))
+            self.report({"INFO"}, build_as_undo_step(context, folder))
         except InputError as error:
             self.report({"ERROR"}, str(error))
             return {"CANCELLED"}
@@ -114,35 +133,35 @@ class ISC_OT_import_result(bpy.types.Operator):
 
 
 class ISC_OT_complete_result(WorkerOperator, bpy.types.Operator):
-    """Gives a result the arrays that Blender reads, then builds it."""
+    """Add the arrays that Blender reads to a result folder, then build its object."""
 
     bl_idname = "isc.complete_result"
     bl_label = "Complete Result"
-    bl_description = "Write arrays.npz into a result's folder that has none, and build its object"
+    bl_description = "Add arrays.npz to a result folder without it, and build its object"
     bl_options = {"INTERNAL"}
 
-    directory: StringProperty(name="Folder", description="The result's folder", subtype="DIR_PATH")
+    directory: StringProperty(name="Folder", description="Result folder", subtype="DIR_PATH")
 
-    def prepare(self, context: Any) -> Run:
-        """The run. Raises `InputError`."""
-        require_idle()
+    def prepare(self, context: Any) -> WorkerRun:
+        """Create the run; see `WorkerOperator`."""
+        require_no_active_run()
         folder = Path(self.directory)
-        environment = worker_environment(choices(context))
-        return Run(
+        environment = worker_environment(read_preferences(context))
+        return WorkerRun(
             f"Import {folder.name}",
-            complete(folder, environment),
-            build_in_one_step,
-            new_folder(None, "import"),
+            arrays_steps(folder, environment),
+            build_as_undo_step,
+            create_run_folder(None, "import"),
         )
 
 
-def _asked_by_panel(scene: Any) -> Request:
-    return Request(build=build_options(scene.isc, ""), scene=scene.name_full)
+def _panel_request(scene: Any) -> DecomposeRequest:
+    return DecomposeRequest(build=build_options(scene.isc, ""), scene=scene.name_full)
 
 
-def _complete(built: Built, request: Request, scene: Any) -> None:
-    """What the panels need later: how the object was made, and the choices in its own scene too."""
-    remember(built.object, request)
+def _complete(built: BuiltObject, request: DecomposeRequest, scene: Any) -> None:
+    """Store what the panels need later; the object's own scene also gets the settings."""
+    store_request(built.object, request)
     if request.build.own_scene:
         if built.scene.render.engine == "CYCLES":
             built.scene.cycles.samples = request.method.samples
@@ -151,22 +170,20 @@ def _complete(built: Built, request: Request, scene: Any) -> None:
 
 
 def _copy_settings(source: Any, target: Any) -> None:
-    for name, about in source.bl_rna.properties.items():
-        if name not in {"rna_type", "name", "preset"} and not about.is_readonly:
+    for name, prop in source.bl_rna.properties.items():
+        if name not in {"rna_type", "name", "preset"} and not prop.is_readonly:
             setattr(target, name, getattr(source, name))
 
 
-def _show(context: Any, built: Built) -> None:
-    """Makes the object the active one, where the user looks; its own scene is looked at through the
-    photo's camera.
-    """
+def _activate(context: Any, built: BuiltObject) -> None:
+    """Make the object active; its own scene is shown through the photo's camera."""
     if context.window is not None and context.window.scene != built.scene:
         context.window.scene = built.scene
         for area in context.window.screen.areas:
             if area.type == "VIEW_3D":
                 area.spaces.active.region_3d.view_perspective = "CAMERA"
     layer = built.scene.view_layers[0] if context.window is None else context.window.view_layer
-    layer.update()  # it does not know yet what was linked just now
+    layer.update()  # so that it includes what was linked a moment ago
     if built.object.name not in layer.objects:
         return
     for other in list(layer.objects.selected):

@@ -1,41 +1,71 @@
-"""What workers are asked to do, as scripts for `run.Run`: decompose a photo, cut a mask out of a
-box, complete a result's arrays.
+"""The work of each kind of run, as steps for `WorkerRun`: decompose a photo, segment a mask, add
+the arrays of a result.
 """
 
 from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from ..files.image_export import Picture, hand_over, hand_over_mask
-from ..files.result_arrays import ARRAYS
-from ..worker.process import Job, Update, Worker, WorkerEnvironment, box_mask, start, start_arrays
-from .messages import in_words, notes_of
-from .request import Method
-from .worker_run import Made, Script, WorkFailed, during, follow
+from isc_core.result_files.diagnostics_text import status_lines
 
-_HANDING_OVER = "handing the photo over"
+from ..files.image_export import export_image, export_mask
+from ..files.image_source import ImageSource
+from ..files.result_arrays import ARRAYS, DESCRIPTION, read_description
+from ..worker.commands import (
+    Box,
+    DecomposeJob,
+    WorkerEnvironment,
+    start_arrays,
+    start_box_mask,
+    start_decompose,
+)
+from ..worker.process import WorkerProcess, WorkerUpdate
+from .messages import join_notes, translate_message
+from .request import MethodSettings
+from .worker_run import RunOutput, RunSteps, WorkerFailed, follow_worker, with_stage
+
+_EXPORTING, _STARTING = "exporting the photo", "starting the worker"
 RESULT = "result"
 
 
-def decompose(
-    photo: Picture,
-    mask: Picture | None,
+def decompose_steps(
+    photo: ImageSource,
+    mask: ImageSource | None,
     mask_size: tuple[int, int] | None,
-    method: Method,
+    method: MethodSettings,
     folder: Path,
     threads: int,
     environment: WorkerEnvironment,
-) -> Script:
-    """Decomposes a photo into the folder `RESULT` within the run's own `folder`; returns that one,
-    its arrays included.
+) -> RunSteps:
+    """Decompose a photo.
+
+    Parameters
+    ----------
+    photo : ImageSource
+        The photo.
+    mask : ImageSource or None
+        The mask; None uses the photo's transparency or black background.
+    mask_size : tuple of int or None
+        Width and height to scale the mask to.
+    method : MethodSettings
+        How to decompose.
+    folder : Path
+        The run's folder; the result is written to `RESULT` in it.
+    threads : int
+        Number of threads; 0 uses one per core.
+    environment : WorkerEnvironment
+        What the worker runs with.
+
+    Returns
+    -------
+    RunOutput
+        The result folder, with arrays.
     """
-    photo_path = yield from during(_HANDING_OVER, hand_over(photo, folder / "photo"))
+    photo_path = yield from with_stage(_EXPORTING, export_image(photo, folder / "photo"))
     mask_path = None
     if mask is not None:
-        mask_path = yield from during(
-            _HANDING_OVER, hand_over_mask(mask, folder / "mask", mask_size)
-        )
-    job = Job(
+        mask_path = yield from with_stage(_EXPORTING, export_mask(mask, folder / "mask", mask_size))
+    job = DecomposeJob(
         photo=photo_path,
         output=folder / RESULT,
         mask=mask_path,
@@ -47,68 +77,115 @@ def decompose(
         transfer=photo.transfer,
     )
     names = {str(photo_path): photo.name} | ({} if mask is None else {str(mask_path): mask.name})
-    done = yield from _worked(lambda: start(job, environment), names)
-    for handed in (photo_path, mask_path):
-        # What was handed over has served; a file of the user's own is not in the run's folder.
-        if handed is not None and handed.parent == folder:
-            handed.unlink(missing_ok=True)
-    return Made(folder / RESULT, notes_of(done.message))
+    yield from _run_worker(lambda: start_decompose(job, environment), names)
+    for exported in (photo_path, mask_path):
+        # Exported copies are no longer needed; the user's own files are not in the run's folder.
+        if exported is not None and exported.parent == folder:
+            exported.unlink(missing_ok=True)
+    return RunOutput(folder / RESULT, result_notes(folder / RESULT))
 
 
-def cut_out(
-    photo: Picture, box: tuple[int, int, int, int], folder: Path, environment: WorkerEnvironment
-) -> Script:
-    """Cuts the object inside `box` (left, top, width, height in pixels) out of a photo; returns the
-    mask's PNG.
+def mask_steps(
+    photo: ImageSource, box: Box, folder: Path, environment: WorkerEnvironment
+) -> RunSteps:
+    """Segment the object inside a box.
+
+    Parameters
+    ----------
+    photo : ImageSource
+        The photo.
+    box : tuple of int
+        Left, top, width and height in pixels.
+    folder : Path
+        The run's folder.
+    environment : WorkerEnvironment
+        What the worker runs with.
+
+    Returns
+    -------
+    RunOutput
+        The PNG file of the mask.
     """
-    path = yield from during(_HANDING_OVER, hand_over(photo, folder / "photo"))
+    path = yield from with_stage(_EXPORTING, export_image(photo, folder / "photo"))
     mask = folder / "mask.png"
-    yield from _worked(
-        lambda: box_mask(path, box, mask, environment, photo.transfer), {str(path): photo.name}
+    yield from _run_worker(
+        lambda: start_box_mask(path, box, mask, environment, photo.transfer),
+        {str(path): photo.name},
     )
-    return Made(mask)
+    return RunOutput(mask)
 
 
-def complete(result: Path, environment: WorkerEnvironment) -> Script:
-    """Adds the arrays that Blender reads to a result folder that was made without them; returns it."""
+def arrays_steps(result: Path, environment: WorkerEnvironment) -> RunSteps:
+    """Add the arrays that Blender reads to a result folder without them.
+
+    Parameters
+    ----------
+    result : Path
+        Result folder.
+    environment : WorkerEnvironment
+        What the worker runs with.
+
+    Returns
+    -------
+    RunOutput
+        The result folder.
+    """
     if not (result / ARRAYS).is_file():
-        yield from _worked(lambda: start_arrays(result, environment), {})
-    return Made(result)
+        yield from _run_worker(lambda: start_arrays(result, environment), {})
+    return RunOutput(result)
 
 
-def _worked(
-    begin: Callable[[], Worker], names: Mapping[str, str]
-) -> Generator[Update, None, Update]:
-    """Starts a worker and follows it to its end; what it says is said in the window's words.
+def result_notes(result: Path) -> str:
+    """Return the notes on a result in one line, "" if there are none.
 
-    `names`: of images, by path.
+    Parameters
+    ----------
+    result : Path
+        Result folder.
+
+    Returns
+    -------
+    str
+        For example why the solver stopped early, or which assumptions do not hold.
+
+    Raises
+    ------
+    InputError
+        If the folder is no result.
     """
-    worker = yield from _begun(begin)
+    return join_notes(status_lines(read_description(result / DESCRIPTION).get("status", {})))
+
+
+def _run_worker(
+    start: Callable[[], WorkerProcess], names: Mapping[str, str]
+) -> Generator[WorkerUpdate, None, WorkerUpdate]:
+    """Start a worker and follow it; `names` are those of images by path, for its messages."""
+    worker = yield from _start_in_thread(start)
     try:
-        return (yield from follow(worker))
-    except WorkFailed as failure:
-        raise WorkFailed(in_words(str(failure), names), failure.report) from failure
+        return (yield from follow_worker(worker))
+    except WorkerFailed as failure:
+        raise WorkerFailed(translate_message(str(failure), names), failure.log) from failure
 
 
-def _begun(begin: Callable[[], Worker]) -> Generator[Update, None, Worker]:
-    """Starts a worker in a thread: on a busy machine a new process of a large program takes longer
-    than a window may wait.
-    """
+def _start_in_thread(
+    start: Callable[[], WorkerProcess],
+) -> Generator[WorkerUpdate, None, WorkerProcess]:
+    """On a busy machine, starting a process of a large program may block the window too long."""
     pool = ThreadPoolExecutor(1)
-    starting = pool.submit(begin)
+    starting = pool.submit(start)
     pool.shutdown(wait=False)
-    followed = False
+    returned = False
     try:
-        yield Update("starting the worker")
+        yield WorkerUpdate(_STARTING)
         while not starting.done():
-            yield Update("starting the worker")
-        followed = True
+            yield WorkerUpdate(_STARTING)
+        returned = True
         return starting.result()
     finally:
-        if not followed:  # cancelled meanwhile
-            starting.add_done_callback(_end_unfollowed)
+        if not returned:  # cancelled in the meantime
+            starting.add_done_callback(_kill_started)
 
 
-def _end_unfollowed(started: Future[Worker]) -> None:
+def _kill_started(started: Future[WorkerProcess]) -> None:
     if started.exception() is None:
         started.result().kill()

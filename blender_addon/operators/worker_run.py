@@ -1,10 +1,10 @@
-"""One run: hand the images over, let a worker process do the work, take its result in; in steps
-that never keep the window waiting.
+"""One run: export the images, let a worker process them, import its result, in short steps.
 
-A run is a generator ("script") whose every `next()` is one short call; `Run.step()` makes one such
-call, measures it, and turns whatever happens into a `Status`. Nothing here knows windows or
-operators, so it runs without either. The script owns the worker and closes it when it is closed
-itself, which is all that cancelling takes; the run's own folder then goes, the result with it.
+A run is driven by a generator of steps, each `next()` of which is one short call.
+`WorkerRun.step()` makes one such call, measures it, and turns the outcome into a `RunStatus`.
+Nothing here depends on windows or operators. The generator owns the worker and ends it when it is
+closed, so closing it is all that cancelling takes. The run's folder is then deleted, with the
+result in it.
 """
 
 import contextlib
@@ -14,187 +14,290 @@ import threading
 import time
 from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from isc_core.errors import InputError
 
-from ..worker.process import Update, Worker
+from ..worker.process import WorkerProcess, WorkerState, WorkerUpdate
+from .messages import busy_message
 
 
 @dataclass(frozen=True)
-class Made:
-    """What a script has made: a folder or a file, and what the worker had to say of it, one line or
-    nothing.
+class RunOutput:
+    """What a run has produced.
+
+    Attributes
+    ----------
+    path : Path
+        File or folder.
+    notes : str
+        Notes on the result, one line or empty.
     """
 
     path: Path
     notes: str = ""
 
 
-Script = Generator[Update, None, Made]
-"""Yields how far the work is, and returns what it made; raises `InputError` or `WorkFailed`."""
+RunSteps = Generator[WorkerUpdate, None, RunOutput]
+"""Yields progress and returns the output; raises `InputError` or `WorkerFailed`."""
 
-State = Literal["running", "ready", "done", "failed", "cancelled"]
 _REMOVE_SECONDS = 5.0
 
 
+class RunState(StrEnum):
+    """State of a run; READY means that the result can be imported."""
+
+    RUNNING = "running"
+    READY = "ready"
+    DONE = "done"
+    FAILED = "failed"
+    CANCELLED = "cancelled"
+
+
 @dataclass(frozen=True)
-class Status:
-    """How a run stands. `state`: "ready" means that the result can be taken in. `stage`: for
-    people. `fraction`: of the work, in [0, 1]. `message`: how it ended, one line. `report`: the
-    tail of the worker's log, if it failed.
+class RunStatus:
+    """Progress and outcome of a run.
+
+    Attributes
+    ----------
+    state : RunState
+        State of the run.
+    stage : str
+        Name of the current stage, for display.
+    fraction : float
+        Share of the work that is done, in [0, 1].
+    message : str
+        The outcome, one line.
+    log : str
+        Last part of the worker's log, if it failed.
     """
 
-    state: State = "running"
+    state: RunState = RunState.RUNNING
     stage: str = "starting"
     fraction: float = 0.0
     message: str = ""
-    report: str = ""
+    log: str = ""
 
 
-class WorkFailed(Exception):
-    """The worker gave up.
+class WorkerFailed(Exception):
+    """The worker has failed.
 
-    `args[0]`: one line for people. `report`: the tail of its log, or nothing.
+    Parameters
+    ----------
+    message : str
+        The reason, one line.
+    log : str, optional
+        Last part of the worker's log.
     """
 
-    def __init__(self, message: str, report: str = "") -> None:
+    def __init__(self, message: str, log: str = "") -> None:
         super().__init__(message)
-        self.report = report
+        self.log = log
 
 
-class Run:
-    """One piece of work and the folder it may write to.
+class WorkerRun:
+    """One run and the folder it may write to.
 
-    `title`: what is being done. `folder`: the run's own, removed if the run does not end well; what
-    is to be kept of it is the business of `finish`, which puts the result into the scene and
-    returns a line for people. `status`: as it stands. `longest_call_ms`: of all calls but the one
-    of `finish`; `import_ms`: of that one.
+    Parameters
+    ----------
+    title : str
+        Name of the run, for display.
+    steps : RunSteps
+        The work.
+    finish : callable
+        Called with Blender's context and the output path; imports the result and returns one line
+        on it. It decides what is kept of the folder.
+    folder : Path
+        The run's own folder, deleted unless the run succeeds.
+
+    Attributes
+    ----------
+    title : str
+        Name of the run.
+    folder : Path
+        The run's own folder.
+    status : RunStatus
+        Current status.
+    longest_call_ms : float
+        Longest call except that of `finish`, in milliseconds.
+    import_ms : float
+        Duration of `finish`, in milliseconds.
     """
 
     def __init__(
-        self, title: str, script: Script, finish: Callable[[Any, Path], str], folder: Path
+        self, title: str, steps: RunSteps, finish: Callable[[Any, Path], str], folder: Path
     ) -> None:
         self.title = title
         self.folder = folder
-        self.status = Status()
+        self.status = RunStatus()
         self.longest_call_ms = 0.0
         self.import_ms = 0.0
-        self._script = script
+        self._steps = steps
         self._finish = finish
-        self._made: Made | None = None
+        self._output: RunOutput | None = None
 
     @property
     def ended(self) -> bool:
-        """Whether nothing more will happen."""
-        return self.status.state in ("done", "failed", "cancelled")
+        """Whether the run is over."""
+        return self.status.state in (RunState.DONE, RunState.FAILED, RunState.CANCELLED)
 
-    def step(self) -> Status:
-        """Does what can be done at once and tells how far the run is.
+    def step(self) -> RunStatus:
+        """Make one short step of a running run.
 
-        Never waits, never raises for what the work met.
+        Never blocks, and never raises for a failure of the work.
+
+        Returns
+        -------
+        RunStatus
+            The new status.
         """
-        if self.status.state == "running":
+        if self.status.state == RunState.RUNNING:
             began = time.perf_counter()
             self._advance()
-            self.count(time.perf_counter() - began)
+            self.record_call(time.perf_counter() - began)
         return self.status
 
-    def count(self, seconds: float) -> None:
-        """Takes note of how long a call for this run has kept the window waiting."""
+    def record_call(self, seconds: float) -> None:
+        """Record how long a call for this run has blocked the window."""
         self.longest_call_ms = max(self.longest_call_ms, 1e3 * seconds)
 
-    def take_in(self, context: Any) -> Status:
-        """Puts the result of a run that is ready into the scene: the one call that may take longer."""
-        if self.status.state != "ready" or self._made is None:
+    def import_result(self, context: Any) -> RunStatus:
+        """Import the result of a run that is ready: the one call that may take longer.
+
+        Parameters
+        ----------
+        context : bpy.types.Context
+            Passed on to `finish`.
+
+        Returns
+        -------
+        RunStatus
+            The new status.
+        """
+        if self.status.state != RunState.READY or self._output is None:
             return self.status
         began = time.perf_counter()
         with self._ended_by_errors():
-            said = self._finish(context, self._made.path)
-            self._end("done", f"{said}; {self._made.notes}" if self._made.notes else said)
+            outcome, notes = self._finish(context, self._output.path), self._output.notes
+            self._end(RunState.DONE, f"{outcome}; {notes}" if notes else outcome)
         self.import_ms = 1e3 * (time.perf_counter() - began)
         return self.status
 
-    def cancel(self) -> Status:
-        """Ends the run at once: the worker dies, its files go.
+    def cancel(self) -> RunStatus:
+        """End the run now, its worker and its files included.
 
-        Without effect on a run that has ended.
+        Does nothing once the run has ended.
+
+        Returns
+        -------
+        RunStatus
+            The new status.
         """
         if not self.ended:
-            self._end("cancelled", f"{self.title}: cancelled")
+            self._end(RunState.CANCELLED, f"{self.title}: cancelled")
         return self.status
 
     def _advance(self) -> None:
         with self._ended_by_errors():
             try:
-                said = next(self._script)
-                self.status = Status("running", said.stage, said.fraction)
+                update = next(self._steps)
+                self.status = RunStatus(RunState.RUNNING, update.stage, update.fraction)
             except StopIteration as stop:
-                self._made = stop.value
-                self.status = Status("ready", "building the scene", 1.0)
+                self._output = stop.value
+                self.status = RunStatus(RunState.READY, "building the scene", 1.0)
 
     @contextlib.contextmanager
     def _ended_by_errors(self) -> Iterator[None]:
-        """Ends the run with what went wrong; errors that nobody foresaw go on to Blender's console,
-        but the run must not stay.
-        """
-        foreseen = False
+        """End the run on an error; unexpected errors also go on to Blender's console."""
+        expected = False
         try:
             yield
-            foreseen = True
+            expected = True
         except InputError as error:
-            foreseen = True
-            self._end("failed", str(error))
-        except WorkFailed as failure:
-            foreseen = True
-            self._end("failed", str(failure), failure.report)
+            expected = True
+            self._end(RunState.FAILED, str(error))
+        except WorkerFailed as failure:
+            expected = True
+            self._end(RunState.FAILED, str(failure), failure.log)
         finally:
-            if not foreseen:
+            if not expected:
                 self._end(
-                    "failed", f"an error of the extension, see the console: {sys.exception()}"
+                    RunState.FAILED,
+                    f"internal error of the extension, see the console: {sys.exception()}",
                 )
 
-    def _end(self, state: State, message: str, report: str = "") -> None:
-        self._script.close()
-        self.status = replace(self.status, state=state, stage="", message=message, report=report)
-        if state != "done":
-            remove(self.folder)
+    def _end(self, state: RunState, message: str, log: str = "") -> None:
+        self._steps.close()
+        self.status = replace(self.status, state=state, stage="", message=message, log=log)
+        if state != RunState.DONE:
+            remove_folder(self.folder)
 
 
-def follow(worker: Worker) -> Generator[Update, None, Update]:
-    """Passes on what a worker says until it is done; returns its last update.
+def follow_worker(worker: WorkerProcess) -> Generator[WorkerUpdate, None, WorkerUpdate]:
+    """Yield a worker's updates until it is done; end the worker when closed.
 
-    Ends the worker when closed. Raises `WorkFailed`.
+    Parameters
+    ----------
+    worker : WorkerProcess
+        The worker.
+
+    Returns
+    -------
+    WorkerUpdate
+        The last update.
+
+    Raises
+    ------
+    WorkerFailed
+        If the worker fails or is cancelled.
     """
     try:
-        while (update := worker.poll()).state == "running":
+        while (update := worker.poll()).state == WorkerState.RUNNING:
             yield update
     finally:
-        # Also after the worker has ended by itself: then there is nothing left to end.
-        worker.kill()
-    if update.state != "done":
-        raise WorkFailed(update.message, update.report)
+        worker.kill()  # does nothing if the worker has ended
+    if update.state != WorkerState.DONE:
+        raise WorkerFailed(update.message, update.log)
     return update
 
 
-def during(stage: str, steps: Generator[None, None, Any]) -> Generator[Update, None, Any]:
-    """Steps that say nothing, under the name of a stage; returns what they return."""
+def with_stage(stage: str, steps: Generator[None, None, Any]) -> Generator[WorkerUpdate, None, Any]:
+    """Yield an update of the given stage for each step.
+
+    Parameters
+    ----------
+    stage : str
+        Name of the stage.
+    steps : generator
+        Steps that yield nothing; closed at the end.
+
+    Returns
+    -------
+    Any
+        The return value of `steps`.
+    """
     try:
         while True:
             next(steps)
-            yield Update(stage)
+            yield WorkerUpdate(stage)
     except StopIteration as stop:
         return stop.value
     finally:
         steps.close()
 
 
-def remove(folder: Path) -> None:
-    """Removes a run's folder.
+def remove_folder(folder: Path) -> None:
+    """Delete a run's folder.
 
-    A worker that was killed just now may still write to it, so a thread tries again for some
+    A worker that was killed a moment ago may still write to it, so a thread retries for some
     seconds.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
     """
     shutil.rmtree(folder, ignore_errors=True)
     if folder.exists():
@@ -208,40 +311,58 @@ def _keep_removing(folder: Path) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-# --- the run that goes on -------------------------------------------------------------------------
+# --- the active run -------------------------------------------------------------------------------
 
-# There is one worker at most, as there is one machine: the process holds it, whichever window or
-# file began it.
-_going_on: list[Run] = []
-
-
-def active() -> Run | None:
-    """The run that goes on, or None."""
-    return next((run for run in _going_on if not run.ended), None)
+# At most one worker runs per process, whichever window or file has started it.
+_active: list[WorkerRun] = []
 
 
-def begin(run: Run) -> Run:
-    """Makes this the run that goes on.
+def active_run() -> WorkerRun | None:
+    """Return the active run, or None."""
+    return next((run for run in _active if not run.ended), None)
 
-    Raises `InputError`, and removes its folder, if there is one already.
+
+def begin_run(run: WorkerRun) -> WorkerRun:
+    """Make a run the active one.
+
+    Parameters
+    ----------
+    run : WorkerRun
+        The new run; cancelled if there is an active one.
+
+    Returns
+    -------
+    WorkerRun
+        The same run.
+
+    Raises
+    ------
+    InputError
+        If another run is active.
     """
-    present = active()
+    present = active_run()
     if present is not None:
         run.cancel()
-        raise InputError(f"{present.title} is going on: wait for it, or cancel it first")
-    _going_on[:] = [run]
+        raise InputError(busy_message(present.title))
+    _active[:] = [run]
     return run
 
 
-def require_idle() -> None:
-    """Raises `InputError` while a run goes on."""
-    present = active()
+def require_no_active_run() -> None:
+    """Check that no run is active.
+
+    Raises
+    ------
+    InputError
+        If a run is active.
+    """
+    present = active_run()
     if present is not None:
-        raise InputError(f"{present.title} is going on: wait for it, or cancel it first")
+        raise InputError(busy_message(present.title))
 
 
-def end_active() -> None:
-    """Ends the run that goes on, if there is one: Blender is closed, or another file is loaded."""
-    present = active()
+def cancel_active_run() -> None:
+    """Cancel the active run, if any: Blender exits, or another file is loaded."""
+    present = active_run()
     if present is not None:
         present.cancel()

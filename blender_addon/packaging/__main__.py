@@ -1,5 +1,5 @@
-"""`python -m blender_addon.packaging`: builds the extension's zips, checks them with Blender's
-validator and lists what is in them.
+"""`python -m blender_addon.packaging`: build the extension's zips, validate them with Blender, and
+list their contents.
 """
 
 import argparse
@@ -15,16 +15,28 @@ from .wheels import wheels_for
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command. Returns 0, or 2 after one line about what was wrong."""
+    """Run the command.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Arguments; those of the process if None.
+
+    Returns
+    -------
+    int
+        Exit code: 0, or 2 after one line with the error.
+    """
     parser = argparse.ArgumentParser(
-        prog="python -m blender_addon.packaging", description="Build the Blender extension's zips."
+        prog="python -m blender_addon.packaging",
+        description="Build the zips of the Blender extension.",
     )
     names = ", ".join(target.name for target in TARGETS)
     parser.add_argument(
         "target",
         nargs="?",
         default="all",
-        help=f"all, here (this machine and Python) or one of {names} (default: all)",
+        help=f"all, here (this machine and Python), or one of {names} (default: %(default)s)",
     )
     parser.add_argument(
         "-o",
@@ -39,15 +51,13 @@ def main(arguments: list[str] | None = None) -> int:
         type=Path,
         default=Path("build/wheels"),
         metavar="DIR",
-        help="where wheels are kept (%(default)s)",
+        help="folder for downloaded wheels (default: %(default)s)",
     )
-    parser.add_argument(
-        "--offline", action="store_true", help="take the wheels that are there, fetch none"
-    )
+    parser.add_argument("--offline", action="store_true", help="use downloaded wheels only")
     parser.add_argument(
         "--without-wheels",
         action="store_true",
-        help="for a Blender whose Python has the packages already",
+        help="leave out wheels, for a Blender whose Python has the packages",
     )
     options = parser.parse_args(arguments)
     try:
@@ -65,11 +75,28 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def build(target: Target, output: Path, cache: Path | None, *, offline: bool = False) -> Path:
-    """Builds one zip in the folder `output`, checks and lists it. `cache`: the folder of wheels;
-    None leaves them out.
+    """Build, validate and list one zip.
 
-    Raises `InputError` if a wheel cannot be had, a module cannot be shipped, or Blender refuses the
-    zip.
+    Parameters
+    ----------
+    target : Target
+        Platform and Python version.
+    output : Path
+        Folder of the zip.
+    cache : Path or None
+        Folder of downloaded wheels; None leaves wheels out.
+    offline : bool, optional
+        Whether to use downloaded wheels only.
+
+    Returns
+    -------
+    Path
+        The zip.
+
+    Raises
+    ------
+    InputError
+        If a wheel is missing, a module cannot be shipped, or Blender rejects the zip.
     """
     wheels = [] if cache is None else wheels_for(target, cache, offline=offline)
     path = output / archive_name(target)
@@ -79,9 +106,9 @@ def build(target: Target, output: Path, cache: Path | None, *, offline: bool = F
         "\n".join(
             [
                 *listing(path),
-                "  passed Blender's validator"
+                "  validated by Blender"
                 if checked
-                else "  not validated: the bpy module is not here",
+                else "  not validated: the bpy module is not installed",
             ]
         ),
         flush=True,

@@ -1,7 +1,7 @@
-"""One zip: the files that go in, and bytes that depend on nothing but them.
+"""The contents of a zip. Its bytes depend on nothing but its files.
 
-Entries are sorted, dated 1980 and stored as they are: wheels are compressed already, and the rest
-is small beside them.
+Entries are sorted, dated 1980 and stored uncompressed: wheels are compressed already, and the rest
+is comparatively small.
 """
 
 import json
@@ -11,7 +11,7 @@ from pathlib import Path
 from string import Template
 
 from isc_core import __version__
-from isc_core.atomic import new_file
+from isc_core.io.atomic import new_file
 
 from .rewrite import installed_source
 from .targets import Target
@@ -24,14 +24,29 @@ _DATE = (1980, 1, 1, 0, 0, 0)
 
 
 def archive_name(target: Target) -> str:
-    """The zip's file name."""
+    """Return the file name of a target's zip."""
     return f"isc_intrinsic-{__version__}-{target.name}.zip"
 
 
 def contents(target: Target, wheels: Sequence[Path]) -> dict[str, bytes | Path]:
-    """What the zip holds, by the path inside it: bytes, or the file to copy.
+    """Return the contents of a zip.
 
-    Raises `InputError` as `installed_source` does.
+    Parameters
+    ----------
+    target : Target
+        Platform and Python version.
+    wheels : sequence of Path
+        Wheels to include.
+
+    Returns
+    -------
+    dict of str to bytes or Path
+        Content, or file to copy, by path inside the zip.
+
+    Raises
+    ------
+    InputError
+        If an import of a module would fail in an installed extension.
     """
     entries: dict[str, bytes | Path] = {
         "LICENSE": ROOT / "LICENSE",
@@ -47,12 +62,25 @@ def contents(target: Target, wheels: Sequence[Path]) -> dict[str, bytes | Path]:
 
 
 def manifest(target: Target, wheels: Sequence[Path]) -> str:
-    """The text of blender_manifest.toml."""
+    """Return the text of blender_manifest.toml.
+
+    Parameters
+    ----------
+    target : Target
+        Platform and Python version.
+    wheels : sequence of Path
+        Wheels of the zip.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     template = Template((_ADDON / _MANIFEST).read_text(encoding="utf-8").partition("\n")[2])
     return template.substitute(
         version=__version__,
         blender_min=target.blender_min,
-        # Left out where there is no end: Blender 5.2 stumbles over an empty one.
+        # Omitted where there is no maximum: Blender 5.2 rejects an empty one.
         blender_max=f'blender_version_max = "{target.blender_max}"' if target.blender_max else "",
         platforms=json.dumps([target.platform]),
         wheels=json.dumps([f"./wheels/{path.name}" for path in wheels], indent=2),
@@ -60,16 +88,40 @@ def manifest(target: Target, wheels: Sequence[Path]) -> str:
 
 
 def write_archive(path: Path, entries: Mapping[str, bytes | Path]) -> None:
-    """Writes the zip, whole or not at all. Raises `InputError` where it cannot be written."""
+    """Write a zip, completely or not at all.
+
+    Parameters
+    ----------
+    path : Path
+        The zip.
+    entries : mapping of str to bytes or Path
+        Content, or file to copy, by path inside the zip.
+
+    Raises
+    ------
+    InputError
+        If it cannot be written.
+    """
     with new_file(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_STORED) as archive:
         for name, content in sorted(entries.items()):
-            about = zipfile.ZipInfo(name, _DATE)
-            about.create_system, about.external_attr = 3, 0o100644 << 16
-            archive.writestr(about, content if isinstance(content, bytes) else content.read_bytes())
+            entry = zipfile.ZipInfo(name, _DATE)
+            entry.create_system, entry.external_attr = 3, 0o100644 << 16
+            archive.writestr(entry, content if isinstance(content, bytes) else content.read_bytes())
 
 
 def listing(path: Path) -> list[str]:
-    """Lines for a person: the zip's size and what makes it up, the largest first."""
+    """Summarise a zip.
+
+    Parameters
+    ----------
+    path : Path
+        The zip.
+
+    Returns
+    -------
+    list of str
+        Lines with its size and that of its parts, the largest first.
+    """
     sizes: dict[str, int] = {}
     with zipfile.ZipFile(path) as archive:
         for entry in archive.infolist():

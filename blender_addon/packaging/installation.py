@@ -1,16 +1,14 @@
-"""What an installed zip must do, tried in a `bpy` module: `python -P installation.py ZIP FOLDER
-[RESULT]`.
+"""Test of an installed zip in a `bpy` module: `python -P installation.py ZIP FOLDER [RESULT]`.
 
-Stands alone and is run by its path, so that nothing of the source tree can be imported: only what
-the zip carries. Installs the zip as Blender's preferences do, decomposes a painted photo by driving
-the poller, twice, cancels a third run in the middle, kills the worker of a fourth, saves, opens,
-appends, and uninstalls. The last line is JSON with what was measured; a check that fails raises.
-With RESULT, a folder with arrays, that is imported instead of the two whole runs: seconds instead
-of a minute. `try_out` makes the environment and starts it; BLENDER_USER_RESOURCES has to be set
-before.
+Runs by its path and imports nothing of the source tree, only what the zip contains. It installs the
+zip as Blender's preferences do, decomposes a generated photo twice by driving the poller, cancels a
+third run midway, kills the worker of a fourth, saves, opens, appends, and uninstalls. The last line
+of its output is JSON with measurements; a failed check raises. With RESULT, a result folder with
+arrays, that is imported instead of the two complete runs: seconds instead of a minute. `try_out`
+creates the environment and starts this file; BLENDER_USER_RESOURCES must be set.
 
-Limits: a zip without wheels is tried in an environment that has the packages, and then the source
-tree may be in reach.
+Limits: a zip without wheels is tested in an environment that has the packages; the source tree may
+then be importable.
 """
 
 import importlib
@@ -32,7 +30,17 @@ SIDE = 96
 
 
 def main(archive: Path, folder: Path, result: Path | None = None) -> None:
-    """Does it all; `folder`: an empty one to work in. `result`: of a photo called "photo"."""
+    """Run the whole test.
+
+    Parameters
+    ----------
+    archive : Path
+        The zip.
+    folder : Path
+        Empty folder to work in.
+    result : Path, optional
+        Result folder of a photo named "photo".
+    """
     report: dict[str, Any] = {
         "blender": bpy.app.version_string,
         "python": sys.version.split()[0],
@@ -40,33 +48,46 @@ def main(archive: Path, folder: Path, result: Path | None = None) -> None:
     }
     install(archive, report)
     before = files_of(extension_folder())
-    photo = paint_photo()
-    use(photo)
+    photo = create_photo()
+    select_photo(photo)
     for name in ("run", "second run"):
-        report[name] = run_to_the_end() if result is None else import_result(result)
+        report[name] = complete_run() if result is None else import_result(result)
         check_object()
-    report["cancelled"] = cancel_in_the_middle()
-    report["killed"] = kill_the_worker()
+    report["cancelled"] = cancel_run()
+    report["killed"] = kill_worker()
     check_object()
     blend = folder / "saved.blend"
-    save_and_open(blend)
+    save_and_load(blend)
     append(blend)
     check(
         files_of(extension_folder()) == before,
-        "nothing was written beside the extension's own files",
+        "no file was written into the extension's folder",
     )
     uninstall()
     print("REPORT", json.dumps(report), flush=True)
 
 
-def check(fact: bool, what: str) -> None:
-    """Raises `AssertionError` unless `fact`."""
-    if not fact:
-        raise AssertionError(what)
+def check(condition: bool, expectation: str) -> None:
+    """Check a condition.
+
+    Parameters
+    ----------
+    condition : bool
+        The condition.
+    expectation : str
+        What is expected.
+
+    Raises
+    ------
+    AssertionError
+        If the condition is false.
+    """
+    if not condition:
+        raise AssertionError(expectation)
 
 
 def install(archive: Path, report: dict[str, Any]) -> None:
-    """Installs and enables the zip."""
+    """Install and enable the zip; adds the duration to `report`."""
     began = time.perf_counter()
     done = bpy.ops.extensions.package_install_files(
         filepath=str(archive), repo="user_default", enable_on_install=True
@@ -77,11 +98,13 @@ def install(archive: Path, report: dict[str, Any]) -> None:
         "the extension is installed and enabled",
     )
     with zipfile.ZipFile(archive) as opened:
-        alone = any(name.startswith("wheels/") for name in opened.namelist())
-    reach = [
-        name for name in ("isc_core", "blender_addon") if alone and importlib.util.find_spec(name)
+        has_wheels = any(name.startswith("wheels/") for name in opened.namelist())
+    importable = [
+        name
+        for name in ("isc_core", "blender_addon")
+        if has_wheels and importlib.util.find_spec(name)
     ]
-    check(not reach, f"nothing of the source tree is in reach: {reach}")
+    check(not importable, f"the source tree is not importable: {importable}")
     loaded = {name.partition(".")[0] for name in sys.modules} & {
         "scipy",
         "numba",
@@ -94,14 +117,12 @@ def install(archive: Path, report: dict[str, Any]) -> None:
 
 
 def extension_folder() -> Path:
-    """Where the extension lies."""
+    """Return the folder of the installed extension."""
     return Path(str(sys.modules[MODULE].__file__)).parent
 
 
 def files_of(folder: Path) -> dict[str, int]:
-    """Sizes of all files under a folder; the byte code of Blender's own process is Python's
-    business.
-    """
+    """Return the sizes of all files in a folder by relative path, except Python's byte code."""
     return {
         str(path.relative_to(folder)): path.stat().st_size
         for path in folder.rglob("*")
@@ -109,8 +130,8 @@ def files_of(folder: Path) -> dict[str, int]:
     }
 
 
-def paint_photo() -> Any:
-    """A glossy ball on nothing, as an image that was never a file."""
+def create_photo() -> Any:
+    """Create a generated image of a glossy ball on a transparent background."""
     row, column = (np.indices((SIDE, SIDE)) - (SIDE - 1) / 2) / (0.42 * SIDE)
     square = row**2 + column**2
     z = np.sqrt(np.clip(1 - square, 0, 1))
@@ -127,33 +148,46 @@ def paint_photo() -> Any:
     return image
 
 
-def use(photo: Any) -> None:
-    """Chooses the photo in the panel."""
+def select_photo(photo: Any) -> None:
+    """Select the photo in the panel."""
     settings = bpy.context.scene.isc
     settings.image, settings.max_size = photo, 64
 
 
-def part(name: str) -> Any:
-    """A module of the installed extension."""
+def extension_module(name: str) -> Any:
+    """Import a module of the installed extension."""
     return importlib.import_module(f"{MODULE}.{name}")
 
 
 def begin_run() -> Any:
-    """What the button does, without its window."""
+    """Start a run as the button does, without a window."""
     request = part("operators.request").request_from_settings(bpy.data.scenes[0])
     return part("operators.worker_run").begin(
         part("operators.decompose").run_of(bpy.context, request)
     )
 
 
-def tick(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:
-    """Polls as the timer does, until the run has ended or `until` of it is done; the stages that
-    were shown.
+def poll_run(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:
+    """Poll a run as the timer does.
+
+    Parameters
+    ----------
+    run : WorkerRun
+        The run.
+    seconds : float, optional
+        Maximum duration.
+    until : float, optional
+        Fraction of the work at which to stop; above 1 for its end.
+
+    Returns
+    -------
+    list of str
+        The stages shown.
     """
     stages, end = [], time.monotonic() + seconds
     while (
         time.monotonic() < end
-        and not part("operators.modal").advance(bpy.context, run)
+        and not extension_module("operators.modal").advance_run(bpy.context, run)
         and run.status.fraction < until
     ):
         if run.status.stage not in stages:
@@ -162,12 +196,12 @@ def tick(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:
     return stages
 
 
-def run_to_the_end() -> dict[str, Any]:
-    """One whole run; how long it took and how long its longest call."""
+def complete_run() -> dict[str, Any]:
+    """Make one complete run and return its durations."""
     began = time.perf_counter()
     run = begin_run()
-    stages = tick(run)
-    check(run.status.state == "done", f"the run ends well: {run.status}")
+    stages = poll_run(run)
+    check(run.status.state == "done", f"the run succeeds: {run.status}")
     seconds = round(time.perf_counter() - began, 1)
     return {
         "seconds": seconds,
@@ -178,7 +212,7 @@ def run_to_the_end() -> dict[str, Any]:
 
 
 def import_result(folder: Path) -> dict[str, Any]:
-    """A result folder, by the operator; how long it took."""
+    """Import a result folder by the operator and return its duration."""
     began = time.perf_counter()
     check(
         bpy.ops.isc.import_result(directory=str(folder)) == {"FINISHED"}, "the result is imported"
@@ -187,60 +221,58 @@ def import_result(folder: Path) -> dict[str, Any]:
 
 
 def check_object() -> None:
-    """The object is there, once, with all that belongs to it."""
+    """Check that the object exists once, with all that belongs to it."""
     found = [
-        thing
-        for thing in bpy.data.objects
-        if thing.type == "MESH" and thing.get("isc_key") == "photo"
+        obj for obj in bpy.data.objects if obj.type == "MESH" and obj.get("isc_key") == "photo"
     ]
-    check(len(found) == 1, f"one object of the photo, not {[thing.name for thing in found]}")
-    built = part("scene.build").find(found[0])
-    check(built is not None and len(built.object.data.vertices) > 500, "the object is whole")
+    check(len(found) == 1, f"one object of the photo, not {[obj.name for obj in found]}")
+    built = extension_module("scene.build").find_built(found[0])
+    check(built is not None and len(built.object.data.vertices) > 500, "the object is complete")
     check(
         built.scene.camera == built.camera and built.scene.world == built.world,
-        "its scene shows it",
+        "its scene uses its camera and world",
     )
 
 
-def cancel_in_the_middle() -> dict[str, Any]:
-    """A run that is cancelled: the worker dies, its files go."""
+def cancel_run() -> dict[str, Any]:
+    """Cancel a run and check that its worker and its files are gone."""
     bpy.data.scenes[0].isc.max_size = 0
     before = len(bpy.data.objects)
     run = begin_run()
-    tick(run, until=0.02)
-    check(run.status.state == "running", f"the run is at work: {run.status}")
-    at = run.status.stage
+    poll_run(run, until=0.02)
+    check(run.status.state == "running", f"the run is active: {run.status}")
+    stage = run.status.stage
     began = time.perf_counter()
     run.cancel()
-    took = time.perf_counter() - began
+    seconds = time.perf_counter() - began
     check(
         run.status.state == "cancelled" and len(bpy.data.objects) == before,
-        "cancelled, and the scene as before",
+        "cancelled, and the scene unchanged",
     )
-    gone = _within(5, lambda: not run.folder.exists() and not children())
-    check(gone, f"a cancelled run leaves nothing: {children()} {run.folder}")
-    return {"at": at, "call ms": round(1e3 * took, 1)}
+    gone = _wait_for(5, lambda: not run.folder.exists() and not child_processes())
+    check(gone, f"a cancelled run leaves nothing: {child_processes()} {run.folder}")
+    return {"stage": stage, "call ms": round(1e3 * seconds, 1)}
 
 
-def kill_the_worker() -> str:
-    """A worker that is killed from outside gives a message; Blender lives on."""
+def kill_worker() -> str:
+    """Kill a worker and return the message of its run."""
     if not Path("/proc").is_dir():
-        return "not tried: the system does not tell which process the worker is"
+        return "not tested: the system has no /proc to find the worker"
     run = begin_run()
-    tick(run, until=0.02)
-    for child in children():
+    poll_run(run, until=0.02)
+    for child in child_processes():
         os.kill(child, signal.SIGKILL)
-    tick(run, seconds=30)
+    poll_run(run, seconds=30)
     check(
         run.status.state == "failed" and run.status.message != "",
-        f"a killed worker is reported: {run.status}",
+        f"the run reports the killed worker: {run.status}",
     )
     bpy.data.scenes[0].isc.max_size = 64
     return str(run.status.message)
 
 
-def children() -> list[int]:
-    """Processes that this one has started and that go on; empty where the system does not tell."""
+def child_processes() -> list[int]:
+    """Return the running child processes; empty on a system without /proc."""
     found = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
@@ -252,59 +284,62 @@ def children() -> list[int]:
     return found
 
 
-def _within(seconds: float, fact: Any) -> bool:
+def _wait_for(seconds: float, condition: Any) -> bool:
     end = time.monotonic() + seconds
-    while not fact() and time.monotonic() < end:
+    while not condition() and time.monotonic() < end:
         time.sleep(0.05)
-    return bool(fact())
+    return bool(condition())
 
 
-def save_and_open(blend: Path) -> None:
-    """All of it is in the file."""
+def save_and_load(blend: Path) -> None:
+    """Save and load a file, and check that it contains everything."""
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     check(blend.stat().st_size > 50_000, "the file is written")
     bpy.ops.wm.open_mainfile(filepath=str(blend))
     check_object()
-    loose = [
+    unpacked = [
         f"{image.name} ({image.type})"
         for image in bpy.data.images
         if image.type in {"IMAGE", "UV_TEST"} and image.size[0] and not image.packed_file
     ]
-    check(not loose, f"all images are in the file, but for {loose}")
-    check(bpy.data.scenes[0].isc.max_size == 64, "the panel's choices are in the file")
+    check(not unpacked, f"all images are packed, except {unpacked}")
+    check(bpy.data.scenes[0].isc.max_size == 64, "the panel's settings are in the file")
 
 
 def append(blend: Path) -> None:
-    """The object and its material go into another file."""
+    """Append the object to another file, and check its material."""
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     with bpy.data.libraries.load(str(blend)) as (source, target):
         target.collections = [name for name in source.collections if name.startswith("photo")]
-    check(len(target.collections) == 1, "the object's collection is found by the photo's name")
+    check(len(target.collections) == 1, "the collection has the photo's name")
     bpy.context.scene.collection.children.link(target.collections[0])
-    (thing,) = [thing for thing in target.collections[0].objects if thing.type == "MESH"]
+    (obj,) = [obj for obj in target.collections[0].objects if obj.type == "MESH"]
     images = [
-        node.image for node in thing.data.materials[0].node_tree.nodes if node.type == "TEX_IMAGE"
+        node.image for node in obj.data.materials[0].node_tree.nodes if node.type == "TEX_IMAGE"
     ]
     check(
         bool(images) and all(image.packed_file and image.size[0] for image in images),
-        "the material came with its images",
+        "the material is appended with its images",
     )
-    check("isc_request" in thing and "isc_decomposition" in thing, "how it was made came along")
+    check(
+        "isc_request" in obj and "isc_decomposition" in obj,
+        "the request is appended with the object",
+    )
 
 
 def uninstall() -> None:
-    """Nothing is left: no classes, no properties, no files of the extension or its wheels."""
+    """Uninstall, and check that no properties and no files of the extension and its wheels remain."""
     folder = extension_folder()
     wheels = folder.parent.parent / ".local"
     bpy.ops.extensions.package_uninstall(repo_index=_repository(), pkg_id="isc_intrinsic")
     check(MODULE not in bpy.context.preferences.addons, "the extension is disabled")
     check(
         not hasattr(bpy.types.Scene, "isc") and not hasattr(bpy.types.WindowManager, "isc"),
-        "its properties are gone",
+        "its properties are removed",
     )
-    check(not folder.exists(), "its files are gone")
-    left = [path.name for path in wheels.rglob("*") if path.suffix in {".so", ".pyd", ".py"}]
-    check(not left, f"its wheels are gone: {left[:5]}")
+    check(not folder.exists(), "its files are removed")
+    remaining = [path.name for path in wheels.rglob("*") if path.suffix in {".so", ".pyd", ".py"}]
+    check(not remaining, f"its wheels are removed: {remaining[:5]}")
 
 
 def _repository() -> int:

@@ -1,10 +1,10 @@
-"""In the source tree the add-on imports `isc_core` by its name; installed, `isc_core` is a part of
-it and has to be imported from there.
+"""Rewrite imports of `isc_core` for the installed extension.
 
-The text of `from isc_core.errors import InputError` in a module `n` folders deep becomes `from
-...isc_core.errors import InputError`, with 1 + n dots. Python's own parser says where such a line
-stands, and afterwards that no import is left which an installed extension could not satisfy: other
-than of Python itself, Blender, NumPy and the extension.
+In the source tree the add-on imports `isc_core` by its name. In the extension, `isc_core` is a
+sub-package: in a module `n` folders deep, `from isc_core.errors import InputError` becomes `from
+...isc_core.errors import InputError` with 1 + n dots. Python's own parser locates these lines. It
+then checks that all other imports are available to an installed extension: from Python itself,
+Blender, NumPy and the extension.
 """
 
 import ast
@@ -13,20 +13,22 @@ import sys
 from isc_core.errors import InputError
 
 CORE = "isc_core"
-# Of the core, only what needs nothing but Python and NumPy may be loaded into Blender's own
-# process.
-_LIGHT_NAMES = (
-    "atomic",
-    "environment",
-    "errors",
-    "json_files",
-    "numpy_files",
-    "progress",
-    "srgb",
-    "status_lines",
-    "terminal",
+# The modules of the core that need only Python and NumPy, and may therefore be imported into
+# Blender's own process.
+LIGHT_MODULES = frozenset(
+    {
+        "isc_core.cli.interface.terminal",
+        "isc_core.errors",
+        "isc_core.imaging.srgb",
+        "isc_core.io.atomic",
+        "isc_core.io.json_files",
+        "isc_core.io.npy",
+        "isc_core.progress",
+        "isc_core.result_files.diagnostics_json",
+        "isc_core.result_files.diagnostics_text",
+        "isc_core.scene.diagnostics",
+    }
 )
-LIGHT = {f"{CORE}.{name}" for name in _LIGHT_NAMES}
 _BLENDER = {
     "addon_utils",
     "bl_ui",
@@ -44,27 +46,42 @@ _ALLOWED = _BLENDER | set(sys.stdlib_module_names)
 
 
 def installed_source(source: str, name: str) -> str:
-    """The text of a module as it is shipped. `name`: its path within the add-on, with forward
-    slashes.
+    """Return the text of a module as it is shipped.
 
-    Raises `InputError` for an import that would not work in an installed extension.
+    Parameters
+    ----------
+    source : str
+        Text in the source tree.
+    name : str
+        Path within the add-on, with forward slashes.
+
+    Returns
+    -------
+    str
+        The text with relative imports of `isc_core`.
+
+    Raises
+    ------
+    InputError
+        If an import would fail in an installed extension.
     """
     dots = "." * (1 + name.count("/"))
     lines = source.splitlines(keepends=True)
     for node in ast.walk(ast.parse(source, name)):
-        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module in LIGHT:
-            line, before, found = lines[node.lineno - 1], node.col_offset, f"from {CORE}."
-            if not line[before:].startswith(found):
+        if isinstance(node, ast.ImportFrom) and node.level == 0 and node.module in LIGHT_MODULES:
+            line, start, statement = lines[node.lineno - 1], node.col_offset, f"from {CORE}."
+            if not line[start:].startswith(statement):
                 raise InputError(
-                    f"{name}:{node.lineno}: write `{found}MODULE import NAME` on one line, so that it can be changed"
+                    f"{name}:{node.lineno}: cannot rewrite the import: "
+                    f"write `{statement}MODULE import NAME` on one line"
                 )
-            lines[node.lineno - 1] = f"{line[:before]}from {dots}{line[before + len('from ') :]}"
-    changed = "".join(lines)
-    _check(changed, name)
-    return changed
+            lines[node.lineno - 1] = f"{line[:start]}from {dots}{line[start + len('from ') :]}"
+    rewritten = "".join(lines)
+    _check_imports(rewritten, name)
+    return rewritten
 
 
-def _check(source: str, name: str) -> None:
+def _check_imports(source: str, name: str) -> None:
     for node in ast.walk(ast.parse(source, name)):
         if isinstance(node, ast.Import):
             modules = [alias.name for alias in node.names]

@@ -1,4 +1,4 @@
-"""Which Blenders a zip is for: one platform and one version of Python each."""
+"""The targets of zips: one platform and one Python version each."""
 
 import platform
 import sys
@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 from isc_core.errors import InputError
 
-# Wheels for macOS are made for 13 and later, as OpenCV's are; those for Linux need glibc 2.28, as
-# Blender does.
+# On macOS, OpenCV's wheels require version 13. On Linux, wheels require glibc 2.28, as Blender.
 _PIP_PLATFORMS = {
     "linux-x64": (
         "manylinux_2_28_x86_64",
@@ -27,9 +26,18 @@ _HERE = {
 
 @dataclass(frozen=True)
 class Target:
-    """`platform`: as Blender names it.
+    """Platform, Python and Blender versions of one zip.
 
-    `python`: (major, minor). `blender_min` <= Blender < `blender_max` (empty: no end).
+    Attributes
+    ----------
+    platform : str
+        Name of the platform in Blender's manifests.
+    python : tuple of int
+        Major and minor version.
+    blender_min : str
+        First supported version of Blender.
+    blender_max : str
+        First unsupported version of Blender, "" for none.
     """
 
     platform: str
@@ -39,21 +47,21 @@ class Target:
 
     @property
     def name(self) -> str:
-        """What the zip's name ends in, such as linux-x64-cp311."""
+        """Name of the target, for example linux-x64-cp311."""
         return f"{self.platform}-{self.abi}"
 
     @property
     def abi(self) -> str:
-        """The interpreter as wheels name it, such as cp311."""
+        """Tag of the interpreter in wheel names, for example cp311."""
         return f"cp{self.python[0]}{self.python[1]}"
 
     @property
     def pip_platforms(self) -> tuple[str, ...]:
-        """The platforms whose wheels run here, the most modern first."""
+        """Tags of compatible platforms in wheel names, the newest first."""
         return _PIP_PLATFORMS[self.platform]
 
     def runs(self, wheel: str) -> bool:
-        """Whether the wheel of this file name is for this target."""
+        """Return whether the wheel of a file name is compatible."""
         python, abi, platforms = wheel.removesuffix(".whl").split("-")[-3:]
         fits_python = (
             python == "py3"
@@ -66,15 +74,15 @@ class Target:
 
 
 def _version(tag: str) -> tuple[int, int]:
-    """(3, 7) of cp37."""
+    """For example (3, 7) for cp37."""
     digits = tag.removeprefix("cp")
     return int(digits[0]), int(digits[1:])
 
 
 _PLATFORMS = ("linux-x64", "windows-x64", "macos-arm64")
 
-# Blender 4.5 and 5.0 run Python 3.11, blender.org's later ones 3.13; a distribution's Blender runs
-# that distribution's Python.
+# Blender 4.5 and 5.0 include Python 3.11, later builds of blender.org 3.13. The Blender of a Linux
+# distribution uses the distribution's Python.
 TARGETS = (
     *(Target(name, (3, 11), "4.5.0", "5.1.0") for name in _PLATFORMS),
     *(Target(name, (3, 13), "5.1.0") for name in _PLATFORMS),
@@ -83,8 +91,22 @@ TARGETS = (
 
 
 def chosen(name: str) -> tuple[Target, ...]:
-    """The targets called `name`: one's name, "all", or "here" for the machine and Python that this
-    runs on. Raises `InputError`.
+    """Return the targets of a name.
+
+    Parameters
+    ----------
+    name : str
+        Name of a target, "all", or "here" for this machine and Python.
+
+    Returns
+    -------
+    tuple of Target
+        At least one target.
+
+    Raises
+    ------
+    InputError
+        If there is none.
     """
     if name == "all":
         return TARGETS
@@ -92,7 +114,8 @@ def chosen(name: str) -> tuple[Target, ...]:
     found = tuple(target for target in TARGETS if target.name == wanted)
     if not found:
         raise InputError(
-            f"no extension is built for {wanted}: choose all, here, {', '.join(target.name for target in TARGETS)}"
+            f"no extension is built for {wanted}: "
+            f"choose all, here, {', '.join(target.name for target in TARGETS)}"
         )
     return found
 

@@ -1,9 +1,8 @@
-"""`python -m blender_addon.packaging.try_out ZIP --bpy 4.5.15`: installs a zip in a fresh
-environment that holds only that `bpy`.
+"""`python -m blender_addon.packaging.try_out ZIP --bpy 4.5.15`: install and test a zip in a clean
+environment with only that `bpy`.
 
-The environment is made once, in build/, with the Python that runs this; Blender's user folder is a
-new one each time. What is tried there stands in `installation`. The bpy wheel is fetched by pip;
-nothing else is.
+The environment is created once, in build/, with the Python that runs this. Blender's user folder is
+new each time. `installation` contains the test itself. Only the bpy wheel is downloaded, by pip.
 """
 
 import argparse
@@ -20,22 +19,30 @@ _SECONDS = 1800
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command.
+    """Run the command.
 
-    Returns 0, 1 if something does not work, or 2 after one line about what was wrong.
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Arguments; those of the process if None.
+
+    Returns
+    -------
+    int
+        Exit code: 0, 1 if the test fails, 2 after one line with the error.
     """
     parser = argparse.ArgumentParser(
         prog="python -m blender_addon.packaging.try_out",
-        description="Try a zip out in a clean environment.",
+        description="Test a zip of the extension in a clean environment.",
     )
-    parser.add_argument("archive", type=Path, metavar="ZIP", help="the extension's zip")
+    parser.add_argument("archive", type=Path, metavar="ZIP", help="zip of the extension")
     which = parser.add_mutually_exclusive_group(required=True)
     which.add_argument(
         "--bpy",
         metavar="VERSION",
-        help="the Blender to try, such as 4.5.15: an environment is made for it in build/",
+        help="version of Blender, for example 4.5.15; its environment is created in build/",
     )
-    which.add_argument("--python", type=Path, metavar="PATH", help="a Python that has bpy")
+    which.add_argument("--python", type=Path, metavar="PATH", help="Python with the bpy module")
     options = parser.parse_args(arguments)
     try:
         python = options.python or environment(options.bpy)
@@ -48,19 +55,28 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def environment(version: str, folder: Path = Path("build/environments")) -> Path:
-    """The Python of a virtual environment with that bpy and what it needs itself.
+    """Create a virtual environment with a bpy module, unless it exists.
 
-    Raises `InputError` if pip has none.
+    Parameters
+    ----------
+    version : str
+        Version of bpy.
+    folder : Path, optional
+        Parent folder of environments.
+
+    Returns
+    -------
+    Path
+        The environment's Python.
+
+    Raises
+    ------
+    InputError
+        If pip cannot install that version.
     """
     place = folder.resolve() / f"bpy-{version}"
     python = place / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
-    if (
-        subprocess.run(
-            [str(python), "-c", "import bpy"], capture_output=True, check=False
-        ).returncode
-        if python.exists()
-        else True
-    ):
+    if not python.exists() or _fails(python, "import bpy"):
         subprocess.run([sys.executable, "-m", "venv", "--clear", str(place)], check=True)
         call = [
             str(python),
@@ -74,20 +90,43 @@ def environment(version: str, folder: Path = Path("build/environments")) -> Path
         done = subprocess.run(call, capture_output=True, text=True, check=False)
         if done.returncode:
             raise InputError(
-                f"bpy {version} cannot be installed for {sys.version.split()[0]}: {done.stderr.strip().splitlines()[-1]}"
+                f"cannot install bpy {version} for Python {sys.version.split()[0]}: "
+                f"{done.stderr.strip().splitlines()[-1]}"
             )
     return python
+
+
+def _fails(python: Path, code: str) -> bool:
+    done = subprocess.run([str(python), "-c", code], capture_output=True, check=False)
+    return done.returncode != 0
 
 
 def try_out(
     archive: Path, python: Path, result: Path | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Runs `installation` with a new user folder; what it printed.
+    """Run `installation` with a new user folder.
 
-    `result`: see there. Raises `InputError` if there is no such zip.
+    Parameters
+    ----------
+    archive : Path
+        The zip.
+    python : Path
+        Python with the bpy module.
+    result : Path, optional
+        Result folder to import instead of decomposing photos.
+
+    Returns
+    -------
+    subprocess.CompletedProcess
+        Exit code and output.
+
+    Raises
+    ------
+    InputError
+        If the zip does not exist.
     """
     if not archive.is_file():
-        raise InputError(f"{archive}: there is no such zip; build it with `make extension`")
+        raise InputError(f"{archive}: no such zip: build it with `make extension`")
     with tempfile.TemporaryDirectory(prefix="isc-extension-") as folder:
         user, work = Path(folder) / "user", Path(folder) / "work"
         user.mkdir()

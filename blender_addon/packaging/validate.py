@@ -1,5 +1,5 @@
-"""Blender's own strict check of a zip, as its `blender --command extension validate` does it; run
-in the bpy module, in a process apart.
+"""Blender's own strict validation of a zip, as `blender --command extension validate` runs it, in a
+separate process with the bpy module.
 """
 
 import importlib.util
@@ -18,9 +18,22 @@ sys.exit(cli_extension_handler(["validate", sys.argv[1]]))
 
 
 def validate(archive: Path) -> bool:
-    """Whether the check was made: it needs the bpy module.
+    """Validate a zip.
 
-    Raises `InputError` with Blender's words if the zip does not pass.
+    Parameters
+    ----------
+    archive : Path
+        The zip.
+
+    Returns
+    -------
+    bool
+        False if the bpy module is not installed, so that nothing was checked.
+
+    Raises
+    ------
+    InputError
+        If the zip is invalid, with Blender's message.
     """
     if importlib.util.find_spec("bpy") is None:
         return False
@@ -28,5 +41,5 @@ def validate(archive: Path) -> bool:
     done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
     if done.returncode:
         lines = [line for line in (done.stdout + done.stderr).splitlines() if line.strip()]
-        raise InputError(f"Blender refuses {archive.name}: {' '.join(lines[-6:])}")
+        raise InputError(f"Blender rejects {archive.name}: {' '.join(lines[-6:])}")
     return True

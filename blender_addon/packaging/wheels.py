@@ -1,8 +1,8 @@
-"""The wheels that a zip carries: which, where they are kept, and that they are what they should be.
+"""The wheels of a zip: selected, downloaded and verified.
 
-`wheels.sha256` names every wheel of every target with the hash of its bytes, in the form that
-`sha256sum --check` reads. pip fetches what the cache folder lacks; with all of them there, nothing
-is fetched and no network is needed.
+`wheels.sha256` lists every wheel of every target with its hash, in the format of `sha256sum
+--check`. pip downloads those missing from the cache folder; with a complete cache no network is
+needed.
 """
 
 import hashlib
@@ -19,43 +19,72 @@ LOCK = Path(__file__).with_name("wheels.sha256")
 
 
 def locked(lock: Path = LOCK) -> dict[str, str]:
-    """The hash of each wheel by its file name.
+    """Read the list of wheels.
 
-    Raises `InputError` for a line that is not of the form `HASH  NAME.whl`.
+    Parameters
+    ----------
+    lock : Path, optional
+        The list.
+
+    Returns
+    -------
+    dict of str to str
+        SHA-256 by file name.
+
+    Raises
+    ------
+    InputError
+        If a line does not have the form `HASH  NAME.whl`.
     """
     found = {}
     for line in lock.read_text(encoding="utf-8").splitlines():
         digest, _, name = line.partition("  ")
         if len(digest) != 64 or not name.endswith(".whl"):
             raise InputError(
-                f"{lock.name}: a line is not a hash, two blanks and a wheel: {line[:80]}"
+                f"{lock.name} has an invalid line (expected HASH, two spaces, NAME.whl): {line[:80]}"
             )
         found[name] = digest
     return found
 
 
 def wheels_for(target: Target, cache: Path, *, offline: bool = False) -> list[Path]:
-    """The wheels of a target, in the cache folder and checked; pip fetches what is missing unless
-    `offline`.
+    """Return the verified wheels of a target, downloading those that are missing.
 
-    Raises `InputError` for one that cannot be had or is not the one that was locked.
+    Parameters
+    ----------
+    target : Target
+        Platform and Python version.
+    cache : Path
+        Folder of downloaded wheels.
+    offline : bool, optional
+        Whether to use downloaded wheels only.
+
+    Returns
+    -------
+    list of Path
+        The wheels.
+
+    Raises
+    ------
+    InputError
+        If a wheel is missing or has another hash.
     """
     folder = cache / target.name
     names = {name: digest for name, digest in sorted(locked().items()) if target.runs(name)}
     missing = [name for name in names if not (folder / name).is_file()]
     if missing and offline:
-        raise InputError(f"{folder} lacks {', '.join(missing)}: build once with the network")
+        raise InputError(f"{folder} lacks {', '.join(missing)}: build once without --offline")
     if missing:
-        _fetch(target, {name: names[name] for name in missing}, folder)
+        _download(target, {name: names[name] for name in missing}, folder)
     for name, digest in names.items():
         if not (folder / name).is_file() or _sha256(folder / name) != digest:
             raise InputError(
-                f"{folder / name} is not the wheel that {LOCK.name} names: delete it and build again"
+                f"{folder / name} does not have the hash in {LOCK.name}: delete it and build again"
             )
     return [folder / name for name in names]
 
 
-def _fetch(target: Target, names: dict[str, str], folder: Path) -> None:
+def _download(target: Target, names: dict[str, str], folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     requirements = folder / "requirements.txt"
     requirements.write_text(
@@ -89,7 +118,7 @@ def _fetch(target: Target, names: dict[str, str], folder: Path) -> None:
             or done.stderr.splitlines()[-1:]
             or ["pip failed"]
         )
-        raise InputError(f"the wheels for {target.name} cannot be fetched: {reasons[0]}")
+        raise InputError(f"the wheels for {target.name} cannot be downloaded: {reasons[0]}")
 
 
 def _tags(target: Target) -> Iterator[str]:
@@ -106,7 +135,7 @@ def _tags(target: Target) -> Iterator[str]:
 
 
 def _requirement(wheel: str) -> str:
-    """numba==0.68.1 of numba-0.68.1-cp311-cp311-win_amd64.whl."""
+    """For example numba==0.68.1 for numba-0.68.1-cp311-cp311-win_amd64.whl."""
     name, version = wheel.split("-")[:2]
     return f"{name}=={version}"
 

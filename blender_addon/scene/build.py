@@ -1,66 +1,77 @@
-"""One result becomes an object in a scene: mesh, material, light, camera, photo; built again, the
-same things are updated.
+"""Build a result as an object in a scene: mesh, material, light, camera and photo. Building again
+updates the same datablocks.
 """
 
 import json
 from dataclasses import asdict, dataclass, replace
-from typing import Literal
 
 import bpy
 import numpy as np
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import Result
-from .camera import ensure_camera, frame_as_photo
-from .camera_background import show_photo
+from ..files.result_arrays import ResultArrays
+from .camera import ensure_camera, set_render_size
+from .camera_background import set_background_photo
 from .closed_back import close_back
-from .collection import ensure_collection, ensure_scene, put, show_as_photographed
-from .copies import COPY, OBJECT, material_of
-from .displacement import displace, flattened, undo_displacement
-from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps, require_spaces
-from .material import Gloss, Maps, ensure_material
-from .mesh import fill_mesh, sheet
+from .collection import ensure_collection, ensure_scene, link_object, use_standard_view
+from .copies import COPY, OBJECT, find_material
+from .displacement import add_displacement, flatten, remove_displacement
+from .images import COLOR, DATA, attach_maps, ensure_image, ensure_maps, require_color_spaces
+from .material import MaterialMaps, SpecularSettings, SpecularSource, ensure_material
+from .mesh import fill_mesh, front_geometry
 from .provenance import (
+    KEY,
     PHOTO_HASH,
     ROLE,
     SOURCE_IMAGE,
-    is_isc,
-    label,
-    mark,
+    datablock_name,
+    find_tagged,
+    is_isc_datablock,
     photo_hash,
-    record,
     require_local,
+    tag,
+    write_provenance,
 )
-from .provenance import find as find_block
 from .sun import relight
 from .world import ensure_world
 
-__all__ = ["SHADOWS", "BuildOptions", "Built", "build", "find", "is_isc"]
-
-SHADOWS: dict[str, bool | None] = {
-    "usual": None,
-    "on": True,
-    "off": False,
-}  # what the user's choice means for `own_shadows`
-_USUAL_ROUGHNESS = 0.5
-_BACK = 0.02  # of the size: how far the back lies behind the furthest point of the front
+# `BuildOptions.own_shadows` of each item of the panel.
+OWN_SHADOWS: dict[str, bool | None] = {"auto": None, "on": True, "off": False}
+_DEFAULT_ROUGHNESS = 0.5
+# Distance of the back from the furthest point of the front, relative to the size.
+_BACK_DISTANCE = 0.02
 
 
 @dataclass(frozen=True)
 class BuildOptions:
-    """What is built, and what of the user's may be changed.
+    """What is built, and which of the user's settings may change.
 
-    `size_metres`: longer side of the object. `own_scene`: in a scene of its own; else in the
-    current one, where the world, the active camera, the resolution and the view transform change
-    only with `set_world, set_camera, set_resolution, set_view_transform`. `sun`: a sun lamp and
-    even light instead of the environment. `displacement`: a flat grid that a modifier displaces,
-    instead of the height mesh. `closed_back`: a wall and a flat back, so that the mesh is closed.
-    `specular_from`: the gloss is the fitted "lobe", the photo's specular "image", or "none".
-    `own_shadows`: whether the object casts shadows and lights itself (Cycles). The recovered
-    shading holds those of the photo already, so that without them it looks as photographed. None: a
-    new object does, unless it has a scene of its own; an old one as it is. `name`: the result's own
-    if empty.
+    The field names are part of the JSON text that files store.
+
+    Attributes
+    ----------
+    size_metres : float
+        Longer side of the object.
+    own_scene : bool
+        Whether to build in a new scene. In a shared scene, world, active camera, resolution and
+        view transform change only with the next four options.
+    set_world, set_camera, set_resolution, set_view_transform : bool
+        What of a shared scene may change.
+    sun : bool
+        Whether to use a sun and uniform light instead of the environment map.
+    displacement : bool
+        Whether to displace a flat grid by a modifier instead of building the height mesh.
+    closed_back : bool
+        Whether to close the mesh with a wall and a flat back.
+    specular_from : str
+        Source of the highlights: the fitted "lobe", the photo's specular "image", or "none".
+    own_shadows : bool or None
+        Whether the object casts shadows and diffuse light on itself (Cycles). The recovered shading
+        already contains those of the photo, so the object looks as in the photo without them. None
+        enables them for a new object in a shared scene, and keeps those of an existing object.
+    name : str
+        Name of the object; "" for the result's own.
     """
 
     size_metres: float = 0.1
@@ -72,14 +83,30 @@ class BuildOptions:
     sun: bool = False
     displacement: bool = False
     closed_back: bool = False
-    specular_from: Literal["lobe", "image", "none"] = "lobe"
+    specular_from: SpecularSource = "lobe"
     own_shadows: bool | None = None
     name: str = ""
 
 
 @dataclass(frozen=True)
-class Built:
-    """What stands in the file now. `world` is the scene's only where that was wanted."""
+class BuiltObject:
+    """An object and what belongs to it.
+
+    Attributes
+    ----------
+    collection : bpy.types.Collection
+        Collection of everything built of the photo.
+    object : bpy.types.Object
+        The object.
+    camera : bpy.types.Object
+        The photo's camera.
+    world : bpy.types.World
+        The recovered light; a shared scene uses it only if requested.
+    scene : bpy.types.Scene
+        Scene of the object.
+    material : bpy.types.Material
+        Material of the object.
+    """
 
     collection: bpy.types.Collection
     object: bpy.types.Object
@@ -89,185 +116,202 @@ class Built:
     material: bpy.types.Material
 
 
-def build(
-    result: Result,
+def build_object(
+    result: ResultArrays,
     options: BuildOptions | None = None,
     *,
     scene: bpy.types.Scene | None = None,
     photo: bpy.types.Image | None = None,
-) -> Built:
-    """Builds the result, or updates what was built of the same photo under its name before; another
-    photo's object is left alone, the new one is then called "name-2" and so on.
+) -> BuiltObject:
+    """Build a result, or update what was built of the same photo under its name.
 
-    `scene`: where to, without a scene of its own; the current one if None. `photo`: shown behind
-    the object; the masked one if None. Raises `InputError`, before anything is changed, for a size
-    that is none, things linked from another file, a mesh being edited, a colour configuration
-    without the spaces that maps need.
+    An object of another photo is kept; the new one is then named "name-2" and so on.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    options : BuildOptions, optional
+        What to build.
+    scene : bpy.types.Scene, optional
+        Shared scene to build in; the current one if None.
+    photo : bpy.types.Image, optional
+        Image behind the object; the masked photo of the result if None.
+
+    Returns
+    -------
+    BuiltObject
+        The object.
+
+    Raises
+    ------
+    InputError
+        Before any change: for a size that is not positive, datablocks linked from another file, a
+        mesh in an edit mode, or a colour configuration without the required colour spaces.
     """
     options = options or BuildOptions()
-    key = _key(options.name or result.name, result, photo)
+    key = _choose_key(options.name or result.name, result, photo)
     _require_ready(key, options, scene or bpy.context.scene)
     scene = ensure_scene(key) if options.own_scene else scene or bpy.context.scene
     collection = ensure_collection(key, scene)
     maps = ensure_maps(key, result)
-    material = ensure_material(key, _material_maps(key, result, maps), _gloss(result, options))
-    thing = _object(key, collection, result, options, material)
-    attach_maps(thing, maps)
-    camera = ensure_camera(key, collection, result, options.size_metres, thing.matrix_basis)
-    show_photo(
-        camera,
-        photo or ensure_image(key, "photo", result.image, COLOR, result.mask.astype(np.float32)),
-    )
-    world = ensure_world(
-        key, ensure_image(key, "sky", result.sky, COLOR), result.sun_ambient, options.sun
-    )
-    thing["isc_world"] = (
-        # so that the light is saved and appended with what it lights, whether or not a scene uses
-        # it
-        world
-    )
-    for block in (thing, collection):
-        record(block, result, json.dumps(asdict(options)))
-    relight(thing, options.sun)
-    built = Built(collection, thing, camera, world, scene, material)
+    specular = _specular_settings(result, options)
+    material = ensure_material(key, _material_maps(key, result, maps), specular)
+    obj = _ensure_object(key, collection, result, options, material)
+    attach_maps(obj, maps)
+    camera = ensure_camera(key, collection, result, options.size_metres, obj.matrix_basis)
+    if photo is None:
+        alpha = result.mask.astype(np.float32)
+        photo = ensure_image(key, "photo", result.image, COLOR, alpha)
+    set_background_photo(camera, photo)
+    environment_map = ensure_image(key, "environment_map", result.environment_map, COLOR)
+    world = ensure_world(key, environment_map, result.sun_ambient, options.sun)
+    # Saves and appends the light with the object, whether or not a scene uses it.
+    obj["isc_world"] = world
+    for block in (obj, collection):
+        write_provenance(block, result, json.dumps(asdict(options)))
+    relight(obj, options.sun)
+    built = BuiltObject(collection, obj, camera, world, scene, material)
     _set_scene(built, options, result)
     return built
 
 
-def find(thing: bpy.types.Object | None) -> Built | None:
-    """What belongs to an object, camera or sun that ISC made; None for others, and where object or
-    material are gone.
+def find_built(obj: bpy.types.Object | None) -> BuiltObject | None:
+    """Find what belongs to an object, camera or sun that ISC made.
 
-    A copy of an object is itself what is found, with the material that it wears, beside what it
-    shares with the original. Camera, world, scene and collection are None where they were deleted,
-    or not appended with the object.
+    A copy of an object is found itself, with its own material, and with what it shares with the
+    original. Camera, world, scene and collection are None where they were deleted, or not appended
+    with the object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object or None
+        Any object.
+
+    Returns
+    -------
+    BuiltObject or None
+        None for other objects, and where the object or its material was deleted.
     """
-    if thing is None or not is_isc(thing):
+    if obj is None or not is_isc_datablock(obj):
         return None
-    key = thing["isc_key"]
-    own = thing.get(ROLE) in (OBJECT, COPY) and thing.library is None
-    made = thing if own else find_block(bpy.data.objects, key, OBJECT)
-    material = None if made is None else material_of(made)
-    if made is None or material is None:
+    key = obj[KEY]
+    is_local_object = obj.get(ROLE) in (OBJECT, COPY) and obj.library is None
+    built = obj if is_local_object else find_tagged(bpy.data.objects, key, OBJECT)
+    material = None if built is None else find_material(built)
+    if built is None or material is None:
         return None
-    collection = find_block(bpy.data.collections, key, "collection") or next(
-        iter(made.users_collection), None
+    return BuiltObject(
+        collection=find_tagged(bpy.data.collections, key, "collection")
+        or next(iter(built.users_collection), None),
+        object=built,
+        camera=find_tagged(bpy.data.objects, key, "camera"),
+        world=find_tagged(bpy.data.worlds, key, "world"),
+        scene=find_tagged(bpy.data.scenes, key, "scene") or next(iter(built.users_scene), None),
+        material=material,
     )
-    scene = find_block(bpy.data.scenes, key, "scene") or next(iter(made.users_scene), None)
-    camera, world = (
-        find_block(bpy.data.objects, key, "camera"),
-        find_block(bpy.data.worlds, key, "world"),
-    )
-    return Built(collection, made, camera, world, scene, material)
 
 
-def _key(name: str, result: Result, photo: bpy.types.Image | None) -> str:
-    """The name, with a number behind it where it is that of another photo's object: photos of
-    different folders may be called alike.
-    """
+def _choose_key(name: str, result: ResultArrays, photo: bpy.types.Image | None) -> str:
+    """The name, numbered if another photo's object has it: folders may share file names."""
     key, number = name, 1
-    while (thing := find_block(bpy.data.objects, key, "object")) is not None and not _of_same_photo(
-        thing, result, photo
+    while (obj := find_tagged(bpy.data.objects, key, OBJECT)) is not None and not _is_of_same_photo(
+        obj, result, photo
     ):
         number += 1
         key = f"{name}-{number}"
     return key
 
 
-def _of_same_photo(thing: bpy.types.Object, result: Result, photo: bpy.types.Image | None) -> bool:
-    """An image of this file is the same photo however it was changed since; else the photos' bytes
-    tell, where they are known.
-    """
-    if photo is not None and thing.get(SOURCE_IMAGE) is not None:
-        return bool(thing[SOURCE_IMAGE] == photo)
-    made_of, given = thing.get(PHOTO_HASH, ""), photo_hash(result)
-    return not made_of or not given or made_of == given
+def _is_of_same_photo(
+    obj: bpy.types.Object, result: ResultArrays, photo: bpy.types.Image | None
+) -> bool:
+    """An image of this file is the same photo even if edited; otherwise the hashes decide."""
+    if photo is not None and obj.get(SOURCE_IMAGE) is not None:
+        return bool(obj[SOURCE_IMAGE] == photo)
+    stored, given = obj.get(PHOTO_HASH, ""), photo_hash(result)
+    return not stored or not given or stored == given
 
 
 def _require_ready(key: str, options: BuildOptions, scene: bpy.types.Scene) -> None:
     if not 0 < options.size_metres < 1e6:
         raise InputError(
-            f"a size of {options.size_metres} metres cannot be built: give one above 0"
+            f"a size of {options.size_metres} metres cannot be built: choose one above 0"
         )
     if not options.own_scene and scene.library is not None:
         raise InputError(
-            f"the scene {scene.name} is linked from another file and cannot be changed: build in a scene of its own"
+            f"the scene {scene.name} is linked from another file and cannot be changed: "
+            "enable Own Scene"
         )
     if options.displacement and options.closed_back:
-        raise InputError("a displaced grid has no back: choose displacement or a closed back")
-    require_spaces(COLOR, DATA)
+        raise InputError("a displaced grid has no back: choose Displacement or Closed Back")
+    require_color_spaces(COLOR, DATA)
     require_local(key)
-    thing = find_block(bpy.data.objects, key, "object")
-    if thing is not None and thing.mode != "OBJECT":
-        raise InputError(f"{thing.name} is being edited: go back to Object Mode first")
+    obj = find_tagged(bpy.data.objects, key, OBJECT)
+    if obj is not None and obj.mode != "OBJECT":
+        raise InputError(f"{obj.name} is being edited: return to Object Mode first")
 
 
-def _object(
+def _ensure_object(
     key: str,
     collection: bpy.types.Collection,
-    result: Result,
+    result: ResultArrays,
     options: BuildOptions,
     material: bpy.types.Material,
 ) -> bpy.types.Object:
-    thing, shadows = find_block(bpy.data.objects, key, "object"), options.own_shadows
-    if thing is None:
-        thing = mark(
-            bpy.data.objects.new(label(key), mark(bpy.data.meshes.new(label(key)), key, "mesh")),
-            key,
-            "object",
-        )
+    obj, shadows = find_tagged(bpy.data.objects, key, OBJECT), options.own_shadows
+    if obj is None:
+        mesh = tag(bpy.data.meshes.new(datablock_name(key)), key, "mesh")
+        obj = tag(bpy.data.objects.new(datablock_name(key), mesh), key, OBJECT)
         shadows = not options.own_scene if shadows is None else shadows
     if shadows is not None:
-        thing.visible_shadow = thing.visible_diffuse = shadows
-    put(thing, collection)
-    thing.shape_key_clear()
-    geometry = sheet(result, options.size_metres)
+        obj.visible_shadow = obj.visible_diffuse = shadows
+    link_object(obj, collection)
+    obj.shape_key_clear()
+    geometry = front_geometry(result, options.size_metres)
     if options.displacement:
-        fill_mesh(thing.data, flattened(geometry))
-        displace(key, thing, result, options.size_metres)
+        fill_mesh(obj.data, flatten(geometry))
+        add_displacement(key, obj, result, options.size_metres)
     else:
-        fill_mesh(
-            thing.data,
-            close_back(geometry, _BACK * options.size_metres) if options.closed_back else geometry,
-        )
-        undo_displacement(key, thing)
-    if not thing.data.materials:
-        thing.data.materials.append(material)
-    return thing
+        if options.closed_back:
+            geometry = close_back(geometry, _BACK_DISTANCE * options.size_metres)
+        fill_mesh(obj.data, geometry)
+        remove_displacement(key, obj)
+    if not obj.data.materials:
+        obj.data.materials.append(material)
+    return obj
 
 
-def _material_maps(key: str, result: Result, maps: dict[str, bpy.types.Image]) -> Maps:
-    base = ensure_image(key, "base_color", result.base_color, COLOR)
-    varies = result.specular_variation
-    variation = None if varies is None else ensure_image(key, "specular_variation", varies, DATA)
-    flat = (
-        np.abs(result.normal_map - (0.5, 0.5, 1)).max() < 1e-3
-    )  # a mesh of every pixel has all detail in its own normals
-    return Maps(
-        base,
-        maps["specular"],
-        variation,
-        None if flat else ensure_image(key, "normal_map", result.normal_map, DATA),
-    )
+def _material_maps(
+    key: str, result: ResultArrays, maps: dict[str, bpy.types.Image]
+) -> MaterialMaps:
+    variation, normal = None, None
+    if result.specular_variation is not None:
+        variation = ensure_image(key, "specular_variation", result.specular_variation, DATA)
+    # A mesh with a vertex per pixel has all detail in its own normals.
+    if np.abs(result.normal_map - (0.5, 0.5, 1)).max() >= 1e-3:
+        normal = ensure_image(key, "normal_map", result.normal_map, DATA)
+    base_color = ensure_image(key, "base_color", result.base_color, COLOR)
+    return MaterialMaps(base_color, maps["specular"], variation, normal)
 
 
-def _gloss(result: Result, options: BuildOptions) -> Gloss:
-    """What the fit says; without a fitted level there is no gloss, which the photo would not show."""
+def _specular_settings(result: ResultArrays, options: BuildOptions) -> SpecularSettings:
+    """Values of the fit; without a fitted level the lobe is off, as the photo would not show it."""
     level = result.specular_level if np.isfinite(result.specular_level) else 0.0
-    roughness = result.roughness if np.isfinite(result.roughness) else _USUAL_ROUGHNESS
-    return Gloss(level, roughness, options.specular_from)
+    roughness = result.roughness if np.isfinite(result.roughness) else _DEFAULT_ROUGHNESS
+    return SpecularSettings(level, roughness, options.specular_from)
 
 
-def _set_scene(built: Built, options: BuildOptions, result: Result) -> None:
-    everything = replace(
-        options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True
-    )
-    wanted = everything if options.own_scene else options
-    if wanted.set_world:
+def _set_scene(built: BuiltObject, options: BuildOptions, result: ResultArrays) -> None:
+    if options.own_scene:
+        options = replace(
+            options, set_world=True, set_camera=True, set_resolution=True, set_view_transform=True
+        )
+    if options.set_world:
         built.scene.world = built.world
-    if wanted.set_camera:
+    if options.set_camera:
         built.scene.camera = built.camera
-    if wanted.set_resolution:
-        frame_as_photo(built.scene, result.size)
-    if wanted.set_view_transform:
-        show_as_photographed(built.scene)
+    if options.set_resolution:
+        set_render_size(built.scene, result.size)
+    if options.set_view_transform:
+        use_standard_view(built.scene)

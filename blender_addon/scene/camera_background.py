@@ -1,29 +1,26 @@
-"""The photo behind the object, in the camera's view."""
+"""The photo as background image of the camera."""
 
 import bpy
 
-_SHOWN = "isc_background"
+_PHOTO = "isc_background"
 
 
-def show_photo(camera: bpy.types.Object, photo: bpy.types.Image) -> None:
-    """Shows the image as the camera's background, filling its frame.
+def set_background_photo(camera: bpy.types.Object, photo: bpy.types.Image) -> None:
+    """Show a photo behind the object in the camera view; the user's other images stay.
 
-    Only the one that ISC put there before is replaced.
+    Parameters
+    ----------
+    camera : bpy.types.Object
+        The camera.
+    photo : bpy.types.Image
+        The photo; it replaces the one that ISC has set before.
     """
-    pictures = camera.data.background_images
-    before = camera.data.get(_SHOWN)
-    ours = (
-        next(
-            (one for one in pictures if one.image in (photo, before) and one.image is not None),
-            None,
-        )
-        or pictures.new()
+    images = camera.data.background_images
+    before = camera.data.get(_PHOTO)
+    background = (
+        next((entry for entry in images if entry.image in (photo, before) and entry.image), None)
+        or images.new()
     )
-    ours.source, ours.image, ours.display_depth, ours.frame_method, ours.alpha = (
-        "IMAGE",
-        photo,
-        "BACK",
-        "STRETCH",
-        1.0,
-    )
-    camera.data.show_background_images, camera.data[_SHOWN] = True, photo
+    background.source, background.image, background.alpha = "IMAGE", photo, 1.0
+    background.display_depth, background.frame_method = "BACK", "STRETCH"
+    camera.data.show_background_images, camera.data[_PHOTO] = True, photo

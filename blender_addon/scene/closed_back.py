@@ -1,24 +1,34 @@
-"""A closed body from the open sheet that a photo shows: a flat back, and a wall around the outline
-and around holes.
+"""A closed mesh from the open front that a photo shows: a flat back, and a wall along the outline and
+around holes.
 
-Every edge then has two faces that pass it in opposite directions, as printing and boolean
-operations want it. Where the sheet hangs together by a corner only, two of its cells meeting in one
-vertex, that vertex is split, since four faces of the wall would share an edge.
+Every edge then has two faces that traverse it in opposite directions, as 3D printing and boolean
+operations require. Where two parts of the front meet in a single vertex, that vertex is split,
+since four faces of the wall would share an edge.
 
-Limits: the back is invented: its confidence is 0, its texture that of the front.
+Limits: the back is invented. Its confidence is 0, its texture that of the front.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from .mesh import Geometry
+from .mesh import MeshGeometry
 
 
-def close_back(sheet: Geometry, thickness: float) -> Geometry:
-    """The sheet of triangles with wall and back;
+def close_back(sheet: MeshGeometry, thickness: float) -> MeshGeometry:
+    """Add a wall and a flat back to an open mesh.
 
-    `thickness`: metres from the sheet's furthest vertex to the back, above 0.
+    Parameters
+    ----------
+    sheet : MeshGeometry
+        Triangles with a normal per vertex, or none.
+    thickness : float
+        Metres from the furthest vertex of the sheet to the back, above 0.
+
+    Returns
+    -------
+    MeshGeometry
+        A closed mesh.
     """
     front = _split_pinches(sheet)
     faces, n = front.corners.reshape(-1, 3), len(front.vertices)
@@ -33,15 +43,16 @@ def close_back(sheet: Geometry, thickness: float) -> Geometry:
     starts = np.concatenate(
         [np.arange(0, 2 * faces.size, 3), 2 * faces.size + np.arange(0, wall.size, 4)]
     ).astype(np.int32)
-    trust = np.concatenate([front.confidence, np.zeros_like(front.confidence)])
+    confidence = np.concatenate([front.confidence, np.zeros_like(front.confidence)])
     normals = (
         None if front.normals is None else _corner_normals(front.normals, faces, vertices, wall)
     )
-    return Geometry(vertices, corners, starts, np.concatenate([front.uv, front.uv]), trust, normals)
+    uv = np.concatenate([front.uv, front.uv])
+    return MeshGeometry(vertices, corners, starts, uv, confidence, normals)
 
 
 def _outline(faces: np.ndarray) -> np.ndarray:
-    """The edges (E, 2) that one face alone passes, in its direction."""
+    """The edges (E, 2) of a single face, in its direction."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     n = int(faces.max()) + 1
     code, back = edges[:, 0] * n + edges[:, 1], edges[:, 1] * n + edges[:, 0]
@@ -51,7 +62,7 @@ def _outline(faces: np.ndarray) -> np.ndarray:
 def _corner_normals(
     front: np.ndarray, faces: np.ndarray, vertices: np.ndarray, wall: np.ndarray
 ) -> np.ndarray:
-    """(L, 3): the sheet's own normals, the back's, and the wall's, which are smooth along it."""
+    """(L, 3): normals of the sheet, of the back, and of the wall, smooth along the outline."""
     across = np.cross(
         vertices[wall[:, 1]] - vertices[wall[:, 0]], vertices[wall[:, 3]] - vertices[wall[:, 0]]
     )
@@ -69,8 +80,8 @@ def _unit(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-30)
 
 
-def _split_pinches(sheet: Geometry) -> Geometry:
-    """The sheet with a vertex for each fan of faces, where several fans met in one."""
+def _split_pinches(sheet: MeshGeometry) -> MeshGeometry:
+    """The sheet with a separate vertex for each fan of faces that met in one."""
     faces = sheet.corners.reshape(-1, 3).copy()
     leaving = np.bincount(_outline(faces)[:, 0], minlength=len(sheet.vertices))
     copies: list[int] = []
@@ -95,7 +106,7 @@ def _split_pinches(sheet: Geometry) -> Geometry:
 
 
 def _fans(faces: np.ndarray, vertex: int) -> list[list[int]]:
-    """Which of the faces (N, 3) around the vertex hang together by edges."""
+    """Groups of the faces (N, 3) around the vertex that are connected by edges."""
     fans: list[tuple[set[int], list[int]]] = []
     for index, face in enumerate(faces):
         others = set(map(int, face)) - {vertex}

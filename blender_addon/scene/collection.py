@@ -1,16 +1,29 @@
-"""The collection that holds all that ISC makes of one image, and the scene that it stands in."""
+"""The collection with everything that ISC builds of one photo, and the scene that shows it."""
 
 from contextlib import suppress
 
 import bpy
 
-from .provenance import find, label, mark
+from .provenance import datablock_name, find_tagged, tag
 
 
 def ensure_collection(key: str, scene: bpy.types.Scene) -> bpy.types.Collection:
-    """The collection of that image, in the scene."""
-    collection = find(bpy.data.collections, key, "collection") or mark(
-        bpy.data.collections.new(label(key)), key, "collection"
+    """Find or create the collection of a photo, and link it to a scene.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    scene : bpy.types.Scene
+        The scene.
+
+    Returns
+    -------
+    bpy.types.Collection
+        The collection.
+    """
+    collection = find_tagged(bpy.data.collections, key, "collection") or tag(
+        bpy.data.collections.new(datablock_name(key)), key, "collection"
     )
     if collection not in set(scene.collection.children_recursive):
         scene.collection.children.link(collection)
@@ -18,30 +31,55 @@ def ensure_collection(key: str, scene: bpy.types.Scene) -> bpy.types.Collection:
 
 
 def ensure_scene(key: str) -> bpy.types.Scene:
-    """The image's own scene: a new one renders with Cycles, the object alone before nothing."""
-    scene = find(bpy.data.scenes, key, "scene")
+    """Find or create a photo's own scene.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+
+    Returns
+    -------
+    bpy.types.Scene
+        The scene; a new one renders with Cycles and a transparent background.
+    """
+    scene = find_tagged(bpy.data.scenes, key, "scene")
     if scene is None:
-        scene = mark(bpy.data.scenes.new(label(key)), key, "scene")
-        if hasattr(scene, "cycles"):  # an add-on, which people may have switched off
+        scene = tag(bpy.data.scenes.new(datablock_name(key)), key, "scene")
+        if hasattr(scene, "cycles"):  # an add-on, which may be disabled
             scene.render.engine, scene.cycles.samples = "CYCLES", 64
-            # the photo's camera has smoothed the texture: Blender's usual filter would once more
+            # The photo's camera has already smoothed the texture: Blender's default pixel filter
+            # would smooth it once more.
             scene.cycles.filter_width = 0.5
         scene.render.film_transparent = True
     return scene
 
 
-def put(thing: bpy.types.Object, collection: bpy.types.Collection) -> None:
-    """Puts an object into the collection, if it is not there."""
-    if thing.name not in collection.objects or collection.objects[thing.name] != thing:
-        collection.objects.link(thing)
+def link_object(obj: bpy.types.Object, collection: bpy.types.Collection) -> None:
+    """Link an object to a collection, unless it is linked.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object.
+    collection : bpy.types.Collection
+        The collection.
+    """
+    if obj.name not in collection.objects or collection.objects[obj.name] != obj:
+        collection.objects.link(obj)
 
 
-def show_as_photographed(scene: bpy.types.Scene) -> None:
-    """Colours on the screen and in files as they are: no film look, no exposure.
+def use_standard_view(scene: bpy.types.Scene) -> None:
+    """Set a scene to show colours unchanged: no look, no exposure.
 
-    Views that are not Blender's own stay.
+    A view transform of a custom colour configuration is kept.
+
+    Parameters
+    ----------
+    scene : bpy.types.Scene
+        The scene.
     """
     view = scene.view_settings
     view.exposure, view.gamma, view.use_curve_mapping = 0.0, 1.0, False
-    with suppress(TypeError):  # in somebody's colour configuration they may not exist
+    with suppress(TypeError):  # a custom colour configuration may lack them
         view.view_transform, view.look = "Standard", "None"

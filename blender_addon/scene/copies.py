@@ -1,87 +1,129 @@
-"""Copies that people make of an object (Shift D, Alt D): what is edited is the object that is
-active, and no other.
+"""Copies of an object (Shift D, Alt D): an edit changes the active object and no other.
 
-A copy has the key, the role and at first the material of what it was copied from. The first object
-of a key is the original, which is updated when its photo is decomposed again; the others are
-copies. Once a copy has a material of its own, both have the role "copy", so that they are never
-taken for the original. World, sun and camera belong to the original and its copies alike.
+A copy has the key, the role and at first the material of its original. The first object of a key is
+the original, which is updated when its photo is decomposed again; the others are copies. Once a
+copy has its own material, both have the role "copy", so that they are never taken for the original.
+World, sun and camera belong to the original and its copies alike.
 
-Limits: while they share everything, which of them is the original is told by the order of their
-names.
+Limits: while they share everything, the order of their names decides which one is the original.
 """
 
 import bpy
 
-from .provenance import KEY, ROLE, find, mark
+from .provenance import KEY, ROLE, find_tagged, tag
 
 OBJECT, MATERIAL, COPY = "object", "material", "copy"
 
 
-def original_of(thing: bpy.types.Object) -> bpy.types.Object | None:
-    """The object that ISC made of the same photo, which may be `thing` itself;
+def find_original(obj: bpy.types.Object) -> bpy.types.Object | None:
+    """Find the object that ISC built from the same photo.
 
-    None where it was deleted.
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC; may be the original itself.
+
+    Returns
+    -------
+    bpy.types.Object or None
+        None if the original was deleted.
     """
-    return find(bpy.data.objects, thing[KEY], OBJECT)
+    return find_tagged(bpy.data.objects, obj[KEY], OBJECT)
 
 
-def is_copy(thing: bpy.types.Object) -> bool:
-    """Whether an object was copied from the one that ISC made."""
-    return thing.get(ROLE) in (OBJECT, COPY) and original_of(thing) != thing
+def is_copy(obj: bpy.types.Object) -> bool:
+    """Return whether an object is a copy of one that ISC built."""
+    return obj.get(ROLE) in (OBJECT, COPY) and find_original(obj) != obj
 
 
-def material_of(thing: bpy.types.Object) -> bpy.types.Material | None:
-    """The material of ISC that an object wears; for an original that wears none the one that was
-    made for it.
+def find_material(obj: bpy.types.Object) -> bpy.types.Material | None:
+    """Find the material of ISC that is assigned to an object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC.
+
+    Returns
+    -------
+    bpy.types.Material or None
+        For an original without one, the material that was built for it.
     """
-    worn = (slot.material for slot in thing.material_slots)
+    assigned = (slot.material for slot in obj.material_slots)
     found = next(
-        (material for material in worn if material is not None and material.get(KEY) == thing[KEY]),
+        (
+            material
+            for material in assigned
+            if material is not None and material.get(KEY) == obj[KEY]
+        ),
         None,
     )
-    return (
-        found
-        if found is not None or is_copy(thing)
-        else find(bpy.data.materials, thing[KEY], MATERIAL)
-    )
+    if found is not None or is_copy(obj):
+        return found
+    return find_tagged(bpy.data.materials, obj[KEY], MATERIAL)
 
 
-def sharers(thing: bpy.types.Object, material: bpy.types.Material) -> list[bpy.types.Object]:
-    """Other objects of the same photo that wear the material of `thing`: what is changed on it
-    shows on them, too.
+def objects_sharing_material(
+    obj: bpy.types.Object, material: bpy.types.Material
+) -> list[bpy.types.Object]:
+    """Find other objects of the same photo that use a material.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC.
+    material : bpy.types.Material
+        Its material.
+
+    Returns
+    -------
+    list of bpy.types.Object
+        Objects that change with the material.
     """
     family = (
         other
         for other in bpy.data.objects
-        if other != thing and other.get(KEY) == thing[KEY] and other.library is None
+        if other != obj and other.get(KEY) == obj[KEY] and other.library is None
     )
     return [
         other for other in family if any(slot.material == material for slot in other.material_slots)
     ]
 
 
-def own_material(thing: bpy.types.Object, material: bpy.types.Material) -> bpy.types.Material:
-    """A material that no other object of the same photo wears: the copies are given their own, the
-    original keeps the first one.
+def make_material_single_user(
+    obj: bpy.types.Object, material: bpy.types.Material
+) -> bpy.types.Material:
+    """Give an object a material that no other object of the same photo uses.
+
+    The original keeps the first material; copies get their own.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object of ISC.
+    material : bpy.types.Material
+        Its material.
+
+    Returns
+    -------
+    bpy.types.Material
+        The object's material.
     """
-    others = sharers(thing, material)
-    if is_copy(thing):
-        mark(thing, thing[KEY], COPY)
-        return _given_own(thing, material) if others else mark(material, thing[KEY], COPY)
+    others = objects_sharing_material(obj, material)
+    if is_copy(obj):
+        tag(obj, obj[KEY], COPY)
+        return _copy_material(obj, material) if others else tag(material, obj[KEY], COPY)
     for other in others:
-        _given_own(mark(other, thing[KEY], COPY), material)
+        _copy_material(tag(other, obj[KEY], COPY), material)
     return material
 
 
-def _given_own(thing: bpy.types.Object, material: bpy.types.Material) -> bpy.types.Material:
-    """Copies the material for the object.
-
-    On a mesh that is shared, its slot becomes the object's own.
-    """
-    own = mark(material.copy(), thing[KEY], COPY)
-    for slot in thing.material_slots:
+def _copy_material(obj: bpy.types.Object, material: bpy.types.Material) -> bpy.types.Material:
+    """Copy the material for an object; on a shared mesh its slot becomes the object's own."""
+    own = tag(material.copy(), obj[KEY], COPY)
+    for slot in obj.material_slots:
         if slot.material == material:
-            if thing.data.users > 1:
+            if obj.data.users > 1:
                 slot.link = "OBJECT"
             slot.material = own
     return own

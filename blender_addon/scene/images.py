@@ -1,8 +1,8 @@
 """Maps as Blender images: float32, packed into the file, in the right colour space.
 
-Blender counts rows from below; our maps from above. Colours are "Linear Rec.709", everything else
-"Non-Color": their values are used as they are. A packed image is an OpenEXR of 32 bit, so that
-nothing is lost by saving.
+Blender counts rows from below, the maps from above. Colours are "Linear Rec.709", everything else
+"Non-Color": the values are used unchanged. A packed image is a 32-bit OpenEXR, so saving the file
+loses nothing.
 """
 
 import bpy
@@ -10,8 +10,8 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import Result
-from .provenance import find, label, mark
+from ..files.result_arrays import ResultArrays
+from .provenance import datablock_name, find_tagged, tag
 
 COLOR, DATA = "Linear Rec.709", "Non-Color"
 MAPS = {
@@ -20,30 +20,56 @@ MAPS = {
 }
 
 
-def require_spaces(*names: str) -> None:
-    """Raises `InputError` where Blender runs with somebody's colour configuration that lacks one of
-    the colour spaces.
+def require_color_spaces(*names: str) -> None:
+    """Check that Blender knows some colour spaces.
+
+    Parameters
+    ----------
+    *names : str
+        Names of colour spaces.
+
+    Raises
+    ------
+    InputError
+        If a custom colour configuration lacks one.
     """
     known = bpy.types.ColorManagedInputColorspaceSettings.bl_rna.properties[
         "name"
     ].enum_items.keys()
     if missing := [name for name in names if name not in known]:
         raise InputError(
-            f"the colour configuration has no space {missing[0]!r}: start Blender with its own (without the variable OCIO)"
+            f"the colour configuration has no space {missing[0]!r}: "
+            "start Blender with its own configuration (without the variable OCIO)"
         )
 
 
 def ensure_image(
     key: str, role: str, values: np.ndarray, space: str, alpha: np.ndarray | None = None
 ) -> bpy.types.Image:
-    """The image of that role with these values:
+    """Create an image, or replace the one of that role everywhere it is used.
 
-    (H, W) or (H, W, 3); `alpha`: (H, W) in [0, 1], 1 if None.
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    role : str
+        Purpose of the image.
+    values : (H, W) or (H, W, 3) ndarray
+        Pixels, row 0 at the top.
+    space : str
+        Name of the colour space.
+    alpha : (H, W) ndarray, optional
+        Alpha in [0, 1]; opaque if None.
+
+    Returns
+    -------
+    bpy.types.Image
+        The packed image.
     """
     rows, columns = values.shape[:2]
-    old = find(bpy.data.images, key, role)
+    old = find_tagged(bpy.data.images, key, role)
     image = bpy.data.images.new(
-        label(key, role.replace("_", " ")),
+        datablock_name(key, role.replace("_", " ")),
         columns,
         rows,
         alpha=alpha is not None,
@@ -58,28 +84,45 @@ def ensure_image(
     image.pack()
     if old is not None:
         _replace(old, image)
-    return mark(image, key, role)
+    return tag(image, key, role)
 
 
-def ensure_maps(key: str, result: Result) -> dict[str, bpy.types.Image]:
-    """All maps of the result as images, by name."""
+def ensure_maps(key: str, result: ResultArrays) -> dict[str, bpy.types.Image]:
+    """Create or replace the images of all maps.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    result : ResultArrays
+        The result.
+
+    Returns
+    -------
+    dict of str to bpy.types.Image
+        The images by map name.
+    """
     return {
         name: ensure_image(key, name, getattr(result, name), space) for name, space in MAPS.items()
     }
 
 
-def attach_maps(thing: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None:
-    """Lets the object's properties `isc_map_...` point at the images, so that they are saved and
-    appended with it.
+def attach_maps(obj: bpy.types.Object, maps: dict[str, bpy.types.Image]) -> None:
+    """Store the images as custom properties, so that they are saved and appended with the object.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        The object; gets the properties `isc_map_...`.
+    maps : dict of str to bpy.types.Image
+        The images by map name.
     """
     for name, image in maps.items():
-        thing[f"isc_map_{name}"] = image
+        obj[f"isc_map_{name}"] = image
 
 
 def _replace(old: bpy.types.Image, new: bpy.types.Image) -> None:
-    """Puts `new` wherever `old` is used, under its name; a generated image cannot change its size
-    in place without losing its pixels.
-    """
+    """A generated image loses its pixels when resized in place, so it is replaced instead."""
     name = old.name
     old.user_remap(new)
     bpy.data.images.remove(old)

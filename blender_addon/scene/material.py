@@ -1,7 +1,7 @@
-"""The object's material: the group "ISC Dichromatic" fed by the recovered maps, ready to be edited.
+"""The object's material: the group "ISC Dichromatic" with the recovered maps, ready to be edited.
 
-The group's node is called like the group. What people set on it stays when the object is built
-again: gains and recolouring are theirs; maps, roughness and level follow the result.
+The group's node has the group's name. When the object is built again, gains and colour edits on the
+node are kept; maps, roughness and level follow the result.
 """
 
 from dataclasses import dataclass
@@ -12,16 +12,25 @@ import bpy
 from .dichromatic import DICHROMATIC, HIGHLIGHTS, dichromatic_group, highlights_group
 from .mesh import UV
 from .nodes import add_node, node_tree
-from .provenance import find, label, mark
+from .provenance import datablock_name, find_tagged, tag
 
-SpecularFrom = Literal["lobe", "image", "none"]
+SpecularSource = Literal["lobe", "image", "none"]
 
 
 @dataclass(frozen=True)
-class Maps:
-    """The images of a material;
+class MaterialMaps:
+    """The images of a material.
 
-    None where there is none. `base_color`, `specular`: colours. `variation`: of the specular level.
+    Attributes
+    ----------
+    base_color : bpy.types.Image
+        Reflectance.
+    specular : bpy.types.Image or None
+        The photo's highlights.
+    variation : bpy.types.Image or None
+        Spatial factor of the specular level.
+    normal : bpy.types.Image or None
+        Tangent-space normal map.
     """
 
     base_color: bpy.types.Image
@@ -31,20 +40,45 @@ class Maps:
 
 
 @dataclass(frozen=True)
-class Gloss:
-    """`level` >= 0, 1 is plastic; `roughness` in [0, 1]; where the gloss comes from."""
+class SpecularSettings:
+    """The specular part of a material.
+
+    Attributes
+    ----------
+    level : float
+        Level of the lobe, 0 or more; 1 is plastic.
+    roughness : float
+        Roughness of the lobe, in [0, 1].
+    source : str
+        "lobe", "image" or "none".
+    """
 
     level: float
     roughness: float
-    source: SpecularFrom
+    source: SpecularSource
 
 
-def ensure_material(key: str, maps: Maps, gloss: Gloss) -> bpy.types.Material:
-    """The image's material with these maps."""
-    material = find(bpy.data.materials, key, "material") or mark(
-        bpy.data.materials.new(label(key)), key, "material"
+def ensure_material(key: str, maps: MaterialMaps, specular: SpecularSettings) -> bpy.types.Material:
+    """Create or update the material of a photo.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    maps : MaterialMaps
+        Its images.
+    specular : SpecularSettings
+        Its specular part.
+
+    Returns
+    -------
+    bpy.types.Material
+        The material.
+    """
+    material = find_tagged(bpy.data.materials, key, "material") or tag(
+        bpy.data.materials.new(datablock_name(key)), key, "material"
     )
-    kept = _settings(material)
+    kept = _edited_values(material)
     tree = node_tree(material)
     tree.nodes.clear()
     group = add_node(
@@ -52,37 +86,48 @@ def ensure_material(key: str, maps: Maps, gloss: Gloss) -> bpy.types.Material:
     )
     output = add_node(tree, "OutputMaterial", (600, 200))
     if hasattr(material, "cycles"):
-        material.cycles.emission_sampling = (
-            "NONE"  # the photo's highlights light nothing: rays toward them would only add noise
-        )
-    _texture(tree, maps.base_color, group.inputs["Reflectance"], (-500, 400))
+        # The photo's highlights emit no light: rays toward them would only add noise.
+        material.cycles.emission_sampling = "NONE"
+    _add_texture(tree, maps.base_color, group.inputs["Reflectance"], (-500, 400))
     surface = group.outputs["Surface"]
-    if gloss.source == "image" and maps.specular is not None:
+    if specular.source == "image" and maps.specular is not None:
         surface = _add_highlights(tree, surface, maps.specular)
-    if gloss.source == "lobe" and maps.variation is not None:
-        _texture(tree, maps.variation, group.inputs["Specular Image"], (-500, 100))
+    if specular.source == "lobe" and maps.variation is not None:
+        _add_texture(tree, maps.variation, group.inputs["Specular Image"], (-500, 100))
     if maps.normal is not None:
-        bump = add_node(tree, "NormalMap", (-200, -200), uv_map=UV)
-        _texture(tree, maps.normal, bump.inputs["Color"], (-500, -200))
-        tree.links.new(bump.outputs["Normal"], group.inputs["Normal"])
+        normal_map = add_node(tree, "NormalMap", (-200, -200), uv_map=UV)
+        _add_texture(tree, maps.normal, normal_map.inputs["Color"], (-500, -200))
+        tree.links.new(normal_map.outputs["Normal"], group.inputs["Normal"])
     tree.links.new(surface, output.inputs["Surface"])
     for name, value in kept.items():
         group.inputs[name].default_value = value
-    group.inputs["Specular Level"].default_value = gloss.level if gloss.source == "lobe" else 0.0
-    group.inputs["Roughness"].default_value = gloss.roughness
+    level = specular.level if specular.source == "lobe" else 0.0
+    group.inputs["Specular Level"].default_value = level
+    group.inputs["Roughness"].default_value = specular.roughness
     set_specular_gain(material, group.inputs["Specular Gain"].default_value)
     return material
 
 
 def dichromatic_node(material: bpy.types.Material) -> bpy.types.Node | None:
-    """The node of the group "ISC Dichromatic" in a material, or None."""
+    """Find the node of the group "ISC Dichromatic" in a material.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        The material.
+
+    Returns
+    -------
+    bpy.types.Node or None
+        The node.
+    """
     nodes = material.node_tree.nodes if material.node_tree else ()
     groups = (node for node in nodes if node.type == "GROUP" and node.node_tree)
     return next((node for node in groups if node.node_tree.get("isc_group") == DICHROMATIC), None)
 
 
 def shows_highlights(material: bpy.types.Material) -> bool:
-    """Whether the photo's own highlights stand in for the gloss."""
+    """Return whether a material shows the photo's own highlights instead of the lobe."""
     nodes = material.node_tree.nodes if material.node_tree else ()
     return any(
         node.type == "GROUP" and node.node_tree and node.node_tree.get("isc_group") == HIGHLIGHTS
@@ -91,41 +136,47 @@ def shows_highlights(material: bpy.types.Material) -> bool:
 
 
 def set_specular_gain(material: bpy.types.Material, gain: float) -> None:
-    """Sets the gain of the gloss wherever it comes from: the lobe or the photo's highlights."""
+    """Set the gain of the lobe and of the photo's highlights.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        The material.
+    gain : float
+        Factor, 0 or more.
+    """
     for node in material.node_tree.nodes:
         if node.type == "GROUP" and node.node_tree and "Specular Gain" in node.inputs:
             node.inputs["Specular Gain"].default_value = gain
 
 
-def _settings(material: bpy.types.Material) -> dict[str, float]:
-    """What people may have set on the group's node."""
+def _edited_values(material: bpy.types.Material) -> dict[str, float]:
+    """The values on the group's node that belong to the user."""
     node = dichromatic_node(material)
-    theirs = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value")
-    return (
-        {}
-        if node is None
-        else {name: node.inputs[name].default_value for name in theirs if name in node.inputs}
-    )
+    if node is None:
+        return {}
+    names = ("Diffuse Gain", "Specular Gain", "Hue", "Saturation", "Value")
+    return {name: node.inputs[name].default_value for name in names if name in node.inputs}
 
 
-def _texture(
+def _add_texture(
     tree: bpy.types.NodeTree,
     image: bpy.types.Image,
     target: bpy.types.NodeSocket,
-    place: tuple[float, float],
+    location: tuple[float, float],
 ) -> None:
-    node = add_node(tree, "TexImage", place, image=image, extension="EXTEND")
+    node = add_node(tree, "TexImage", location, image=image, extension="EXTEND")
     tree.links.new(node.outputs["Color"], target)
 
 
 def _add_highlights(
     tree: bpy.types.NodeTree, surface: bpy.types.NodeSocket, image: bpy.types.Image
 ) -> bpy.types.NodeSocket:
-    shine = add_node(
+    highlights = add_node(
         tree, "Group", (0, -50), name=HIGHLIGHTS, width=220, node_tree=highlights_group()
     )
-    both = add_node(tree, "AddShader", (350, 200))
-    _texture(tree, image, shine.inputs["Specular Image"], (-500, 100))
-    tree.links.new(surface, both.inputs[0])
-    tree.links.new(shine.outputs["Surface"], both.inputs[1])
-    return both.outputs["Shader"]
+    total = add_node(tree, "AddShader", (350, 200))
+    _add_texture(tree, image, highlights.inputs["Specular Image"], (-500, 100))
+    tree.links.new(surface, total.inputs[0])
+    tree.links.new(highlights.outputs["Surface"], total.inputs[1])
+    return total.outputs["Shader"]

@@ -1,10 +1,9 @@
-"""The height mesh: vertices, faces, UV, the recovered normals, and how far each vertex can be
-trusted.
+"""The height mesh: vertices, faces, UV, the recovered normals, and a confidence per vertex.
 
-Axes: the camera's frame (x right, y up, z toward the viewer) becomes Blender's (x, -z, y); metres.
-The recovered normals are "free" custom normals, a vector a vertex: exact, and not turned when the
-mesh is deformed (Mesh > Normals > Clear Custom Split Normals then gives those of the geometry).
-Attributes a vertex: `confidence` in [0, 1].
+Axes: the camera frame (x right, y up, z toward the viewer) becomes Blender's (x, -z, y), in metres.
+The recovered normals are stored as "free" custom normals, one vector per vertex: exact, and not
+rotated when the mesh is deformed (Mesh > Normals > Clear Custom Split Normals then restores those
+of the geometry). The attribute `confidence` of each vertex is in [0, 1].
 """
 
 from dataclasses import dataclass
@@ -14,16 +13,29 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import Result
+from ..files.result_arrays import ResultArrays
 
 UV, NORMAL, CONFIDENCE = "UVMap", "custom_normal", "confidence"
 
 
 @dataclass(frozen=True)
-class Geometry:
-    """A mesh in Blender's axes: `vertices` (V, 3) metres; `corners` (L,) int32, the vertex of each
-    corner, and `starts` (F,) int32, the first corner of each face; `uv` (V, 2) and `confidence`
-    (V,) a vertex; `normals` (V, 3) a vertex or (L, 3) a corner, None for smooth.
+class MeshGeometry:
+    """A mesh in Blender's axes.
+
+    Attributes
+    ----------
+    vertices : (V, 3) ndarray
+        Metres.
+    corners : (L,) ndarray of int32
+        Vertex of each corner.
+    starts : (F,) ndarray of int32
+        First corner of each face.
+    uv : (V, 2) ndarray
+        Texture coordinates.
+    confidence : (V,) ndarray
+        Confidence in [0, 1].
+    normals : (V, 3) or (L, 3) ndarray or None
+        Unit normals per vertex or per corner; None for smooth shading.
     """
 
     vertices: np.ndarray
@@ -35,36 +47,73 @@ class Geometry:
 
 
 def to_blender(vectors: np.ndarray) -> np.ndarray:
-    """Vectors (..., 3) of the camera's frame in Blender's axes."""
+    """Convert vectors (..., 3) of the camera frame to Blender's axes."""
     return np.stack([vectors[..., 0], -vectors[..., 2], vectors[..., 1]], -1)
 
 
-def sheet(result: Result, size_metres: float) -> Geometry:
-    """The visible side of the object; `size_metres`: its longer side."""
+def front_geometry(result: ResultArrays, size_metres: float) -> MeshGeometry:
+    """Return the visible side of the object, an open mesh.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    size_metres : float
+        Longer side of the object.
+
+    Returns
+    -------
+    MeshGeometry
+        Triangles with a normal per vertex.
+    """
     scale = metres_per_pixel(result, size_metres) / result.metres_per_pixel
     corners = np.ascontiguousarray(result.faces.ravel())
     rows, columns = result.vertex_pixel.T
-    vertices = to_blender(result.vertices.astype(np.float64) * scale)
-    starts = np.arange(0, len(corners), 3, dtype=np.int32)
-    return Geometry(
-        vertices,
-        corners,
-        starts,
-        result.uv,
-        result.confidence[rows, columns],
-        to_blender(result.vertex_normals),
+    return MeshGeometry(
+        vertices=to_blender(result.vertices.astype(np.float64) * scale),
+        corners=corners,
+        starts=np.arange(0, len(corners), 3, dtype=np.int32),
+        uv=result.uv,
+        confidence=result.confidence[rows, columns],
+        normals=to_blender(result.vertex_normals),
     )
 
 
-def metres_per_pixel(result: Result, size_metres: float) -> float:
-    """Metres of one pixel of the maps. Raises `InputError` if the size is not positive."""
+def metres_per_pixel(result: ResultArrays, size_metres: float) -> float:
+    """Return the size of a map pixel in the scene.
+
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    size_metres : float
+        Longer side of the object.
+
+    Returns
+    -------
+    float
+        Metres per pixel.
+
+    Raises
+    ------
+    InputError
+        If the size is not positive.
+    """
     if not 0 < size_metres < 1e6:
-        raise InputError(f"a size of {size_metres} metres cannot be built: give one above 0")
+        raise InputError(f"a size of {size_metres} metres cannot be built: choose one above 0")
     return size_metres / result.longest_side
 
 
-def fill_mesh(mesh: bpy.types.Mesh, geometry: Geometry) -> None:
-    """Replaces the mesh's geometry, its UV, normals and attributes; its materials stay."""
+def fill_mesh(mesh: bpy.types.Mesh, geometry: MeshGeometry) -> None:
+    """Replace the geometry, UV, normals and attributes of a mesh; its materials stay.
+
+    Parameters
+    ----------
+    mesh : bpy.types.Mesh
+        The mesh.
+    geometry : MeshGeometry
+        The new geometry.
+    """
     mesh.clear_geometry()
     mesh.vertices.add(len(geometry.vertices))
     mesh.loops.add(len(geometry.corners))
@@ -76,8 +125,8 @@ def fill_mesh(mesh: bpy.types.Mesh, geometry: Geometry) -> None:
     mesh.uv_layers.new(name=UV, do_init=False).uv.foreach_set(
         "vector", _flat(geometry.uv[geometry.corners])
     )
-    trust = mesh.attributes.new(CONFIDENCE, "FLOAT", "POINT")
-    trust.data.foreach_set("value", _flat(geometry.confidence))
+    confidence = mesh.attributes.new(CONFIDENCE, "FLOAT", "POINT")
+    confidence.data.foreach_set("value", _flat(geometry.confidence))
     if geometry.normals is not None:
         domain = "POINT" if len(geometry.normals) == len(geometry.vertices) else "CORNER"
         mesh.attributes.new(NORMAL, "FLOAT_VECTOR", domain).data.foreach_set(

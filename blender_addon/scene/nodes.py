@@ -1,4 +1,4 @@
-"""Small helpers for node trees."""
+"""Helpers for node trees."""
 
 from typing import Any
 
@@ -6,26 +6,51 @@ import bpy
 
 
 def node_tree(block: Any) -> bpy.types.NodeTree:
-    """The tree of a material or world; before Blender 5 it has to be asked for."""
+    """Return the node tree of a material or world, created where needed (before Blender 5)."""
     if block.node_tree is None:
         block.use_nodes = True
     return block.node_tree
 
 
 def add_node(
-    tree: bpy.types.NodeTree, kind: str, place: tuple[float, float], **settings: Any
+    tree: bpy.types.NodeTree, kind: str, location: tuple[float, float], **settings: Any
 ) -> bpy.types.Node:
-    """A node of `ShaderNode<kind>` (or the full name) at `place`, with its properties set."""
+    """Add a node.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+        The tree.
+    kind : str
+        Type without the prefix "ShaderNode", or the full type.
+    location : tuple of float
+        Position in the node editor.
+    **settings
+        Properties of the node.
+
+    Returns
+    -------
+    bpy.types.Node
+        The node.
+    """
     node = tree.nodes.new(kind if kind.startswith("Node") else f"ShaderNode{kind}")
-    node.location = place
+    node.location = location
     for name, value in settings.items():
         setattr(node, name, value)
     return node
 
 
 def connect(
-    tree: bpy.types.NodeTree, *wires: tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]
+    tree: bpy.types.NodeTree, *links: tuple[bpy.types.NodeSocket, bpy.types.NodeSocket]
 ) -> None:
-    """Links each output to each input."""
-    for source, target in wires:
+    """Link pairs of an output and an input.
+
+    Parameters
+    ----------
+    tree : bpy.types.NodeTree
+        The tree.
+    *links : tuple of bpy.types.NodeSocket
+        Output and input.
+    """
+    for source, target in links:
         tree.links.new(source, target)

@@ -1,12 +1,12 @@
-"""How what ISC made is recognised, and where it comes from: custom properties that are saved and
-appended with each datablock.
+"""How ISC's datablocks are identified, and what they were made from: custom properties that are
+saved and appended with each datablock.
 
-`isc_key` is the name of the image it was made of (with a number where photos are called alike),
-`isc_role` what it is there for ("object", "base_color", "camera", ...). Datablocks are found by
-these two, since people rename things and Blender cuts long names.
+`isc_key` is the name of the photo (numbered where photos share a name), `isc_role` the datablock's
+purpose ("object", "base_color", "camera", ...). Datablocks are identified by these two, since users
+rename them and Blender shortens long names.
 
-Limits: a datablock linked from another file belongs to that file: it is never found here, and
-cannot be changed.
+Limits: a datablock linked from another file belongs to that file: it is never found here and cannot
+be changed.
 """
 
 import json
@@ -18,7 +18,7 @@ import bpy
 
 from isc_core.errors import InputError
 
-from ..files.result_arrays import Result
+from ..files.result_arrays import ResultArrays
 
 KEY, ROLE = "isc_key", "isc_role"
 PHOTO_HASH, SOURCE_IMAGE, SPECULAR_LEVEL = (
@@ -26,62 +26,114 @@ PHOTO_HASH, SOURCE_IMAGE, SPECULAR_LEVEL = (
     "isc_source_image",
     "isc_specular_level",
 )
-_NAME_BYTES = 63  # of a datablock's name in Blender 4.5; later ones take more
+# Roles that earlier versions wrote.
+_FORMER_ROLES = {"environment_map": "sky"}
+_NAME_BYTES = 63  # limit of a datablock's name in Blender 4.5; later versions allow more
 
 
-def find(blocks: Iterable[Any], key: str, role: str) -> Any:
-    """The local datablock of that key and role, or None."""
+def find_tagged(blocks: Iterable[Any], key: str, role: str) -> Any:
+    """Find the local datablock of a key and a role.
+
+    Parameters
+    ----------
+    blocks : iterable of bpy.types.ID
+        For example `bpy.data.objects`.
+    key : str
+        Name of the photo.
+    role : str
+        Purpose of the datablock.
+
+    Returns
+    -------
+    bpy.types.ID or None
+        The datablock.
+    """
+    roles = (role, _FORMER_ROLES.get(role, role))
     return next(
         (
             block
             for block in blocks
-            if block.get(KEY) == key and block.get(ROLE) == role and block.library is None
+            if block.get(KEY) == key and block.get(ROLE) in roles and block.library is None
         ),
         None,
     )
 
 
-def mark(block: Any, key: str, role: str) -> Any:
-    """Makes a datablock one of ISC's; returns it."""
+def tag(block: Any, key: str, role: str) -> Any:
+    """Mark a datablock as one of ISC's.
+
+    Parameters
+    ----------
+    block : bpy.types.ID
+        The datablock.
+    key : str
+        Name of the photo.
+    role : str
+        Purpose of the datablock.
+
+    Returns
+    -------
+    bpy.types.ID
+        The same datablock.
+    """
     block[KEY], block[ROLE] = key, role
     return block
 
 
-def is_isc(block: Any) -> bool:
-    """Whether ISC made this datablock."""
+def is_isc_datablock(block: Any) -> bool:
+    """Return whether ISC made a datablock; False for None."""
     return block is not None and KEY in block
 
 
-def label(key: str, what: str = "") -> str:
-    """A datablock's name: the key and what it is, the key cut so that `what` stays to be read."""
-    end = f" {what}" if what else ""
+def datablock_name(key: str, suffix: str = "") -> str:
+    """Return the key and a suffix; a long key is shortened so that the suffix remains."""
+    end = f" {suffix}" if suffix else ""
     room = _NAME_BYTES - len(end.encode())
     return key.encode("utf-8", "replace")[:room].decode("utf-8", "ignore") + end
 
 
 def require_local(key: str) -> None:
-    """Raises `InputError` if what ISC made of that name is linked from another file."""
+    """Check that no datablock of a key is linked from another file.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+
+    Raises
+    ------
+    InputError
+        If one is.
+    """
     kinds = (bpy.data.collections, bpy.data.objects, bpy.data.meshes, bpy.data.materials)
     for block in (block for blocks in kinds for block in blocks if block.get(KEY) == key):
         if block.library is not None:
             raise InputError(
-                f"{block.name} is linked from {block.library.filepath}, which this file cannot change: make it local "
-                "(Object > Relations > Make Local > All) or give another name"
+                f"{block.name} is linked from {block.library.filepath} and cannot be changed: "
+                "make it local (Object > Relations > Make Local > All) or choose another name"
             )
 
 
-def photo_hash(result: Result) -> str:
-    """The SHA-256 of the result's photo, "" where it is not known."""
+def photo_hash(result: ResultArrays) -> str:
+    """Return the SHA-256 of the result's photo, "" if unknown."""
     return str(result.description.get("input", {}).get("sha256", ""))
 
 
-def record(block: Any, result: Result, options: str) -> None:
-    """Writes what the datablock was made from: photo, settings, versions, status, light, and the
-    level of the gloss, 0 where it is not known. `options`: of the build, as JSON.
+def write_provenance(block: Any, result: ResultArrays, options: str) -> None:
+    """Store what a datablock was made from: photo, settings, versions, status and light.
+
+    Parameters
+    ----------
+    block : bpy.types.ID
+        The datablock.
+    result : ResultArrays
+        The result; an unknown specular level is stored as 0.
+    options : str
+        Build options as JSON.
     """
-    described = result.description
-    source, settings = described.get("input", {}), described.get("settings", {})
-    block["isc_version"] = str(described.get("versions", {}).get("isc", ""))
+    description = result.description
+    source, settings = description.get("input", {}), description.get("settings", {})
+    block["isc_version"] = str(description.get("versions", {}).get("isc", ""))
     block["isc_photo"] = str(source.get("name", ""))
     block[PHOTO_HASH] = photo_hash(result)
     block["isc_model"] = str(settings.get("model", ""))
@@ -92,4 +144,4 @@ def record(block: Any, result: Result, options: str) -> None:
     block["isc_sun_explained"], block["isc_sun_cone"] = result.sun_explained, result.sun_cone
     block[SPECULAR_LEVEL] = result.specular_level if math.isfinite(result.specular_level) else 0.0
     block["isc_options"] = options
-    block["isc_decomposition"] = json.dumps(described, ensure_ascii=False)
+    block["isc_decomposition"] = json.dumps(description, ensure_ascii=False)

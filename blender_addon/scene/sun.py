@@ -1,7 +1,7 @@
-"""The optimal light direction as a sun lamp: the one far light that best explains the shading.
+"""The dominant light direction as a sun: the one distant light that best explains the shading.
 
-Equation: shading = E / pi * max(0, n . l) + A, with the irradiance E of the lamp across its beam,
-which is Blender's strength of a sun, and the even rest A, which is the world's.
+Equation: shading = E / pi * max(0, n . l) + A, with the irradiance E of the sun perpendicular to
+its direction l, which is Blender's strength of a sun, and the uniform light A of the world.
 """
 
 import bpy
@@ -10,24 +10,39 @@ from mathutils import Vector
 
 from isc_core.errors import InputError
 
-from .collection import put
+from .collection import link_object
 from .mesh import to_blender
-from .provenance import KEY, find, label, mark
-from .world import mix_sun
+from .provenance import KEY, datablock_name, find_tagged, tag
+from .world import set_sun_mix
 
 
 def ensure_sun(
     key: str, collection: bpy.types.Collection, direction: np.ndarray, strength: np.ndarray
 ) -> bpy.types.Object:
-    """The lamp:
+    """Create or update the sun.
 
-    `direction` (3,) toward it in the camera's frame, `strength` (3,) its irradiance.
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    collection : bpy.types.Collection
+        Collection of the sun.
+    direction : (3,) ndarray
+        Vector toward the sun in the camera frame.
+    strength : (3,) ndarray
+        Irradiance, linear Rec.709.
+
+    Returns
+    -------
+    bpy.types.Object
+        The sun.
     """
-    sun = find(bpy.data.objects, key, "sun")
+    sun = find_tagged(bpy.data.objects, key, "sun")
     if sun is None:
-        data = mark(bpy.data.lights.new(label(key, "sun"), "SUN"), key, "sun")
-        sun = mark(bpy.data.objects.new(label(key, "sun"), data), key, "sun")
-    put(sun, collection)
+        name = datablock_name(key, "sun")
+        data = tag(bpy.data.lights.new(name, "SUN"), key, "sun")
+        sun = tag(bpy.data.objects.new(name, data), key, "sun")
+    link_object(sun, collection)
     brightest = float(max(strength.max(), 1e-9))
     sun.data.energy, sun.data.color = brightest, tuple(float(part) / brightest for part in strength)
     sun.rotation_mode = "QUATERNION"
@@ -35,35 +50,54 @@ def ensure_sun(
     return sun
 
 
-def relight(thing: bpy.types.Object, on: bool = True) -> bpy.types.Object | None:
-    """Lights an object that ISC made by its sun and even light, or by its recovered environment
-    again; returns the sun.
+def relight(obj: bpy.types.Object, sun: bool = True) -> bpy.types.Object | None:
+    """Light an object by a sun and uniform light, or by its recovered environment map.
 
-    The directions are the object's properties, so that this works in any file. Raises `InputError`
-    if it has none.
+    The light is stored in the object's properties, so this works in any file.
+
+    Parameters
+    ----------
+    obj : bpy.types.Object
+        An object made by ISC.
+    sun : bool, optional
+        Whether to use the sun.
+
+    Returns
+    -------
+    bpy.types.Object or None
+        The sun, if used.
+
+    Raises
+    ------
+    InputError
+        If the object stores no light.
     """
-    key, values = (
-        thing.get(KEY),
-        [thing.get(f"isc_sun_{name}") for name in ("direction", "strength", "ambient")],
-    )
+    key = obj.get(KEY)
+    values = [obj.get(f"isc_sun_{name}") for name in ("direction", "strength", "ambient")]
     if not isinstance(key, str) or any(value is None for value in values):
         raise InputError(
-            f"{thing.name} is not an object of ISC, or its light was deleted: import the result again"
+            f"{obj.name} is not an object of ISC, or its light was deleted: import the result again"
         )
     direction, strength, ambient = (np.array(value, float) for value in values)
-    mix_sun(find(bpy.data.worlds, key, "world"), ambient, on)
-    if not on:
+    set_sun_mix(find_tagged(bpy.data.worlds, key, "world"), ambient, sun)
+    if not sun:
         remove_sun(key)
         return None
-    collection = find(bpy.data.collections, key, "collection") or next(
-        iter(thing.users_collection), bpy.context.scene.collection
+    collection = find_tagged(bpy.data.collections, key, "collection") or next(
+        iter(obj.users_collection), bpy.context.scene.collection
     )
     return ensure_sun(key, collection, direction, strength)
 
 
 def remove_sun(key: str) -> None:
-    """Takes the lamp away, if there is one."""
-    sun = find(bpy.data.objects, key, "sun")
+    """Remove the sun of a photo, if there is one.
+
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    """
+    sun = find_tagged(bpy.data.objects, key, "sun")
     if sun is not None:
         data = sun.data
         bpy.data.objects.remove(sun)

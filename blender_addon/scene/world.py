@@ -1,13 +1,12 @@
-"""The recovered light as a world: an environment image that gives a white surface the recovered
+"""The recovered light as a world: an environment map that gives a white surface the recovered
 shading.
 
-The image is laid out as `isc_core.environment` says, its middle column is what the viewer's side
-shines; Blender takes the middle column for +X of the mapped direction. The Mapping node turns
-between the two, and turns the light where people want it turned: `isc_rotation` says by how many
-degrees about Z the node turns as recovered.
+The map is laid out as in `isc_core.shading.environment_map`: its middle column is light from the
+viewer's side. Blender takes the middle column for +X of the mapped direction. The Mapping node
+rotates between the two, and can rotate the light further: `isc_rotation` stores the node's rotation
+of the recovered light, in degrees about Z.
 
-"Sun" in the mix node: 0 is the environment, 1 the even light that remains when a sun lamp stands
-for the rest.
+"Sun" in the Mix node: 0 is the environment map, 1 the uniform light that complements a sun.
 """
 
 from math import radians
@@ -16,54 +15,80 @@ import bpy
 import numpy as np
 
 from .nodes import add_node, connect, node_tree
-from .provenance import find, label, mark
+from .provenance import datablock_name, find_tagged, tag
 
 ROTATION = 90.0  # degrees about Z
 MAPPING, SUN, BACKGROUND = "ISC Rotation", "ISC Sun", "ISC Light"
 
 
-def ensure_world(key: str, sky: bpy.types.Image, ambient: np.ndarray, sun: bool) -> bpy.types.World:
-    """The image's world.
+def ensure_world(
+    key: str, environment_map: bpy.types.Image, ambient: np.ndarray, sun: bool
+) -> bpy.types.World:
+    """Create or update the world of a photo.
 
-    `ambient`: (3,), the shading that a sun leaves to the rest, which is shown instead of the sky if
-    `sun`.
+    Parameters
+    ----------
+    key : str
+        Name of the photo.
+    environment_map : bpy.types.Image
+        Equirectangular radiance.
+    ambient : (3,) ndarray
+        Uniform shading in addition to a sun.
+    sun : bool
+        Whether to show the uniform light instead of the environment map.
+
+    Returns
+    -------
+    bpy.types.World
+        The world.
     """
-    world = find(bpy.data.worlds, key, "world") or mark(
-        bpy.data.worlds.new(label(key)), key, "world"
+    world = find_tagged(bpy.data.worlds, key, "world") or tag(
+        bpy.data.worlds.new(datablock_name(key)), key, "world"
     )
     tree = node_tree(world)
     tree.nodes.clear()
-    place = add_node(tree, "TexCoord", (-900, 0))
-    turn = add_node(tree, "Mapping", (-700, 0), name=MAPPING, label="Rotation of the light")
-    picture = add_node(tree, "TexEnvironment", (-450, 0), image=sky)
-    mix = add_node(tree, "Mix", (-150, 0), name=SUN, label="Sun: even light", data_type="RGBA")
+    coordinates = add_node(tree, "TexCoord", (-900, 0))
+    rotation = add_node(tree, "Mapping", (-700, 0), name=MAPPING, label="Light Rotation")
+    texture = add_node(tree, "TexEnvironment", (-450, 0), image=environment_map)
+    mix = add_node(tree, "Mix", (-150, 0), name=SUN, label="Sun: Uniform Light", data_type="RGBA")
     light = add_node(tree, "Background", (50, 0), name=BACKGROUND)
-    out = add_node(tree, "OutputWorld", (250, 0))
-    turn.inputs["Rotation"].default_value = (0, 0, radians(ROTATION))
+    output = add_node(tree, "OutputWorld", (250, 0))
+    rotation.inputs["Rotation"].default_value = (0, 0, radians(ROTATION))
     first = next(socket for socket in mix.inputs if socket.type == "RGBA")
     connect(
         tree,
-        (place.outputs["Generated"], turn.inputs["Vector"]),
-        (turn.outputs["Vector"], picture.inputs["Vector"]),
-        (picture.outputs["Color"], first),
+        (coordinates.outputs["Generated"], rotation.inputs["Vector"]),
+        (rotation.outputs["Vector"], texture.inputs["Vector"]),
+        (texture.outputs["Color"], first),
         (next(socket for socket in mix.outputs if socket.type == "RGBA"), light.inputs["Color"]),
-        (light.outputs["Background"], out.inputs["Surface"]),
+        (light.outputs["Background"], output.inputs["Surface"]),
     )
-    mix_sun(world, ambient, sun)
-    if hasattr(
-        world, "cycles"
-    ):  # its own choice is 1024 columns, which take longer to tabulate than a small render
-        world.cycles.sampling_method, world.cycles.sample_map_resolution = "MANUAL", 4 * sky.size[0]
+    set_sun_mix(world, ambient, sun)
+    if hasattr(world, "cycles"):
+        # The default of 1024 columns takes longer to tabulate than a small render.
+        world.cycles.sampling_method = "MANUAL"
+        world.cycles.sample_map_resolution = 4 * environment_map.size[0]
     world["isc_rotation"] = ROTATION
     world["isc_rotation_about"] = (
-        "degrees about Z, by which the Mapping node brings the image's middle column toward the viewer (-Y)"
+        "degrees about Z by which the Mapping node rotates the map's middle column "
+        "toward the viewer (-Y)"
     )
     return world
 
 
-def mix_sun(world: bpy.types.World | None, ambient: np.ndarray, sun: bool) -> None:
-    """Shows the even light `ambient` (3,) that a sun leaves to the rest, or the environment;
-    nothing where world or node are gone.
+def set_sun_mix(world: bpy.types.World | None, ambient: np.ndarray, sun: bool) -> None:
+    """Show the environment map, or the uniform light that complements a sun.
+
+    Does nothing where the world or its Mix node is missing.
+
+    Parameters
+    ----------
+    world : bpy.types.World or None
+        The world.
+    ambient : (3,) ndarray
+        Uniform shading in addition to the sun.
+    sun : bool
+        Whether to show the uniform light.
     """
     mix = world.node_tree.nodes.get(SUN) if world else None
     if mix is not None and mix.type == "MIX":

@@ -1,4 +1,4 @@
-"""What holds for all files: how many threads, where compiled kernels and results are kept."""
+"""The add-on's preferences: number of threads, folders of compiled kernels and of results."""
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 
 import importlib.util
@@ -13,16 +13,25 @@ from bpy.props import BoolProperty, IntProperty, StringProperty
 
 from isc_core.errors import InputError
 
-from ..worker.process import WorkerEnvironment
+from ..worker.commands import WorkerEnvironment
 
-# The add-on's package is the parent of this one.
+_ROOT = Path(__file__).resolve().parents[1]
+# The package that Blender registers is the parent of this one.
 ADDON = (__package__ or "").rpartition(".")[0]
 
 
 @dataclass(frozen=True)
-class Choices:
-    """The preferences as they hold now. `threads`: 0 for one each core. `cache`: folder of compiled
-    kernels. `results`: folder of results that are kept, or None.
+class PreferenceValues:
+    """The current preferences.
+
+    Attributes
+    ----------
+    threads : int
+        Number of threads; 0 uses one per core.
+    cache : Path
+        Folder of compiled kernels.
+    results : Path or None
+        Folder of results to keep; None keeps none.
     """
 
     threads: int
@@ -31,57 +40,71 @@ class Choices:
 
 
 class ISC_AP_preferences(bpy.types.AddonPreferences):
-    """The add-on's preferences."""
+    """The add-on's page in Blender's preferences."""
 
     bl_idname = ADDON
 
     threads: IntProperty(
         name="Threads",
-        description="How many threads the work may use; 0 takes one for each core",
+        description="Number of threads for the worker, 0 uses one per core",
         default=0,
         min=0,
         max=256,
     )
     cache_folder: StringProperty(
         name="Cache Folder",
-        description="Where compiled kernels, and results that are kept, are stored; empty: the extension's own folder",
+        description=(
+            "Folder for compiled kernels and kept results, empty uses the extension's own folder"
+        ),
         subtype="DIR_PATH",
         default="",
     )
     keep_results: BoolProperty(
         name="Keep Result Folders",
-        description="Keep every result's folder (maps, mesh, preview) in the cache folder; otherwise they go when Blender is closed",
+        description=(
+            "Keep the folder of every result (maps, mesh, preview) in the cache folder, "
+            "otherwise it is deleted when Blender exits"
+        ),
         default=False,
     )
 
     def draw(self, context: Any) -> None:
-        """Draws them."""
+        """Draw the page."""
+        del context
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "threads")
         layout.prop(self, "cache_folder")
         layout.prop(self, "keep_results")
         if self.keep_results:
-            layout.label(
-                text=f"Results: {_base(self.cache_folder) / 'results'}", icon="FILE_FOLDER"
-            )
+            folder = _base_folder(self.cache_folder) / "results"
+            layout.label(text=f"Results: {folder}", icon="FILE_FOLDER")
 
 
-def choices(context: Any) -> Choices:
-    """The preferences in use, the usual ones where the add-on was registered without being
-    installed.
+def read_preferences(context: Any) -> PreferenceValues:
+    """Return the current preferences.
+
+    Parameters
+    ----------
+    context : bpy.types.Context
+        Blender's context.
+
+    Returns
+    -------
+    PreferenceValues
+        The defaults where the add-on was registered without being installed.
     """
     addon = context.preferences.addons.get(ADDON)
     stored = None if addon is None else addon.preferences
     if stored is None:
-        return Choices(0, _base("") / "kernels", None)
-    base = _base(stored.cache_folder)
-    return Choices(
+        return PreferenceValues(0, _base_folder("") / "kernels", None)
+    base = _base_folder(stored.cache_folder)
+    return PreferenceValues(
         stored.threads, base / "kernels", base / "results" if stored.keep_results else None
     )
 
 
-def _base(chosen: str) -> Path:
+def _base_folder(chosen: str) -> Path:
     if chosen:
         return Path(bpy.path.abspath(chosen))
     try:
@@ -90,46 +113,71 @@ def _base(chosen: str) -> Path:
         return Path(tempfile.gettempdir()) / "isc_intrinsic"
 
 
-def worker_environment(chosen: Choices) -> WorkerEnvironment:
-    """Blender's own Python, where the worker finds `isc_core` and the packages it needs, and where
-    it keeps compiled kernels.
+def worker_environment(preferences: PreferenceValues) -> WorkerEnvironment:
+    """Return what a worker runs with: Blender's Python, `isc_core` and the extension's packages.
 
-    Raises `InputError` if `isc_core` is not there.
+    Parameters
+    ----------
+    preferences : PreferenceValues
+        The current preferences.
+
+    Returns
+    -------
+    WorkerEnvironment
+        Interpreter, search path and cache.
+
+    Raises
+    ------
+    InputError
+        If `isc_core` is missing.
     """
-    inside = Path(__file__).resolve().parents[1]
-    place = importlib.util.find_spec("isc_core") if not (inside / "isc_core").is_dir() else None
-    if place is not None and place.submodule_search_locations:
-        inside = Path(place.submodule_search_locations[0]).resolve().parent
+    inside = _ROOT
+    spec = importlib.util.find_spec("isc_core") if not (inside / "isc_core").is_dir() else None
+    if spec is not None and spec.submodule_search_locations:
+        inside = Path(spec.submodule_search_locations[0]).resolve().parent
     if not (inside / "isc_core" / "__main__.py").is_file():
         raise InputError(
-            "the worker is missing (isc_core is not in the extension): install the extension again"
+            "the worker is missing (the extension has no isc_core): install the extension again"
         )
     extensions = Path(bpy.utils.user_resource("EXTENSIONS")).resolve()
     wheels = (
         Path(path) for path in sys.path if path and Path(path).resolve().is_relative_to(extensions)
     )
     return WorkerEnvironment(
-        python=Path(sys.executable), search=(inside, *wheels), cache=chosen.cache
+        python=Path(sys.executable), search=(inside, *wheels), cache=preferences.cache
     )
 
 
-def new_folder(choice: Path | None, name: str) -> Path:
-    """A new, empty folder of one run: in `choice`, or in Blender's temporary folder, which is
-    removed when Blender ends.
+def create_run_folder(parent: Path | None, name: str) -> Path:
+    """Create a new, empty folder for one run.
 
-    `name`: anything; what file systems refuse is left out. Raises `InputError` where it cannot be
-    made.
+    Parameters
+    ----------
+    parent : Path or None
+        Folder to create it in; None uses Blender's temporary folder, which Blender deletes on exit.
+    name : str
+        Part of the folder's name; unsupported characters are replaced.
+
+    Returns
+    -------
+    Path
+        The folder.
+
+    Raises
+    ------
+    InputError
+        If it cannot be created.
     """
     plain = (
         "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name)[:60]
         or "photo"
     )
     try:
-        if choice is not None:
-            choice.mkdir(parents=True, exist_ok=True)
-        return Path(tempfile.mkdtemp(prefix=f"isc_{plain}_", dir=choice or bpy.app.tempdir))
+        if parent is not None:
+            parent.mkdir(parents=True, exist_ok=True)
+        return Path(tempfile.mkdtemp(prefix=f"isc_{plain}_", dir=parent or bpy.app.tempdir))
     except OSError as error:
-        place = choice or bpy.app.tempdir
         raise InputError(
-            f"cannot write to {place} ({error.strerror}): choose another folder in the add-on's preferences"
+            f"cannot write to {parent or bpy.app.tempdir} ({error.strerror}): "
+            "choose another folder in the add-on's preferences"
         ) from error

@@ -1,35 +1,58 @@
-"""Three usual choices between waiting and quality, so that nobody has to know a model's name to
-begin.
-"""
+"""Presets of resolution, model and samples, from fast to detailed."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class Preset:
-    """`label`, `text`: for people. `max_size`: pixels of the object's long side. `model`: of `isc
-    decompose`. `samples`: rays a pixel that Cycles spends in the scene that is built.
+    """Values of one preset.
+
+    Attributes
+    ----------
+    label : str
+        Name in the panel.
+    description : str
+        Tooltip.
+    max_size : int
+        Longer side of the object in pixels.
+    model : str
+        Value of `isc decompose --model`.
+    samples : int
+        Samples per pixel of Cycles in the scene that is built.
     """
 
     label: str
-    text: str
+    description: str
     max_size: int
     model: str
     samples: int
 
 
 PRESETS = {
-    "DRAFT": Preset(
-        "Draft", "A first look within seconds: a small, coarse shape", 128, "joint", 16
-    ),
-    "STANDARD": Preset("Standard", "A good balance for most objects", 256, "joint", 64),
-    "FULL": Preset("Full", "The finest textures: a minute or more", 512, "joint", 256),
+    "DRAFT": Preset("Draft", "Coarse shape within seconds", 128, "joint", 16),
+    "STANDARD": Preset("Standard", "Good balance for most objects", 256, "joint", 64),
+    "FULL": Preset("Full", "Most detailed textures, in a minute or more", 512, "joint", 256),
 }
 CUSTOM = "CUSTOM"
 
 
-def preset_of(max_size: int, model: str, samples: int) -> str:
-    """The name of the preset that has these values, or `CUSTOM`."""
+def matching_preset(max_size: int, model: str, samples: int) -> str:
+    """Return the name of the preset with these values, or `CUSTOM`.
+
+    Parameters
+    ----------
+    max_size : int
+        Longer side of the object in pixels.
+    model : str
+        Value of `isc decompose --model`.
+    samples : int
+        Samples per pixel.
+
+    Returns
+    -------
+    str
+        A key of `PRESETS`, or `CUSTOM`.
+    """
     wanted = (max_size, model, samples)
     return next(
         (

@@ -1,8 +1,11 @@
-"""What the user chooses for a scene, and what the window shows of a run.
+"""The properties of a scene, and the state of the current run that the panels show.
 
-The choices (`scene.isc`) are saved with the file and undone with it. The state of a run
-(`window_manager.isc`) is neither: undoing a brush stroke while the work goes on must not turn the
-progress back.
+The settings (`scene.isc`) are saved with the file and take part in undo. The state of a run
+(`window_manager.isc`) does neither: undoing a brush stroke during a run must not reset its
+progress.
+
+Blender saves the choice of an enumeration as a number. Every item therefore has an explicit number,
+which must not change: files of earlier versions keep their choices when identifiers are renamed.
 """
 # mypy: allow-subclassing-any, disable-error-code="valid-type"
 
@@ -19,157 +22,167 @@ from bpy.props import (
     StringProperty,
 )
 
-from .presets import CUSTOM, PRESETS, preset_of
+from .presets import CUSTOM, PRESETS, matching_preset
 
-MODELS = (
+EnumItem = tuple[str, str, str, int]
+
+
+def _numbered(*items: tuple[str, str, str]) -> tuple[EnumItem, ...]:
+    """Items of (identifier, label, tooltip) with the numbers that files store."""
+    return tuple((*item, number) for number, item in enumerate(items))
+
+
+MODELS = _numbered(
     (
         "joint",
         "Joint",
-        "Highlights go by colour and form; shape, light and paint are recovered, and the paint beneath continued",
+        "Separate highlights by color and shape, recover shape, light and reflectance, "
+        "and extrapolate the reflectance below the highlights",
     ),
     (
         "mdr",
         "MDR",
-        "Highlights are removed by colour, then shape, light and paint are recovered from the diffuse image",
+        "Remove highlights by color, then recover shape, light and reflectance from the "
+        "diffuse image",
     ),
     (
         "mbp",
         "MBP",
-        "Shape, light and paint are recovered from the photo, then highlights are removed from the paint",
+        "Recover shape, light and reflectance from the photo, then remove highlights from the "
+        "reflectance",
     ),
-    ("sirfs", "SIRFS", "The photo is taken as free of highlights"),
-    ("naive", "Naive", "Baseline: a flat shape under even light"),
-    ("retinex", "Retinex", "Baseline: smooth changes are shading, sharp ones are paint"),
+    ("sirfs", "SIRFS", "Assume that the photo has no highlights"),
+    ("naive", "Naive", "Baseline: flat shape under uniform light"),
+    ("retinex", "Retinex", "Baseline: smooth changes are shading, sharp changes are reflectance"),
     ("sfs-tsai-shah", "Tsai-Shah", "Baseline: linear shape from shading"),
-    ("sfs-ikeuchi-horn", "Ikeuchi-Horn", "Baseline: smoothed shape from shading"),
+    ("sfs-ikeuchi-horn", "Ikeuchi-Horn", "Baseline: regularized shape from shading"),
 )
-SEPARATORS = (
-    ("isc", "ISC", "This project's own: the best on most photos"),
+SEPARATORS = _numbered(
+    ("isc", "ISC", "This project's method, the most accurate on most photos"),
     (
         "network",
         "Network",
-        "Learned from rendered glossy objects: also tells highlights from white paint, where colours alone cannot",
+        "Network trained on rendered glossy objects, also separates highlights from white "
+        "reflectance, where color alone cannot",
     ),
     (
         "sparse_coding",
         "Sparse Coding",
-        "Highlights as what a dictionary of diffuse patches cannot say",
+        "Highlights are the part that a dictionary of diffuse patches cannot represent",
     ),
     (
         "chaotic_segmentation",
         "Chaotic Segmentation",
-        "Highlights by thresholds that chaotic search finds, filled in from around",
+        "Highlights exceed thresholds found by chaotic search, and are inpainted",
     ),
     ("shen_2013", "Shen 2013", "Real-time: chromaticity ranges by pixel clustering"),
-    ("shen_2009", "Shen 2009", "Simple: a modified specular-free image"),
-    ("akashi_2016", "Akashi 2016", "Sparse non-negative matrix factors"),
-    ("kim_2013", "Kim 2013", "Dark channel prior and optimisation"),
-    ("yang_2010", "Yang 2010", "Bilateral filter of the largest chromaticity"),
-    ("tan_2005", "Tan 2005", "Iterated comparison of neighbours' chromaticity"),
+    ("shen_2009", "Shen 2009", "Modified specular-free image"),
+    ("akashi_2016", "Akashi 2016", "Sparse non-negative matrix factorization"),
+    ("kim_2013", "Kim 2013", "Dark channel prior and optimization"),
+    ("yang_2010", "Yang 2010", "Bilateral filter of the maximum chromaticity"),
+    ("tan_2005", "Tan 2005", "Iterative comparison of neighboring chromaticities"),
     (
         "mallick_2006",
         "Mallick 2006",
-        "A differential equation in a colour space turned to the light",
+        "Partial differential equation in a color space aligned with the light",
     ),
-    ("yoon_2006", "Yoon 2006", "Ratios of neighbours in specular-free images"),
-    ("none", "None", "Nothing is removed"),
+    ("yoon_2006", "Yoon 2006", "Ratios of neighboring pixels in specular-free images"),
+    ("none", "None", "Keep the highlights"),
 )
-ILLUMINATIONS = (
-    ("natural", "Natural", "Light from all around: outdoors, a room, a light tent"),
-    ("laboratory", "Laboratory", "One strong lamp in a dark room"),
+ILLUMINATIONS = _numbered(
+    ("natural", "Natural", "Light from all directions: outdoors, a room, a light tent"),
+    ("laboratory", "Laboratory", "One strong light source in a dark room"),
 )
-MASK_SOURCES = (
+MASK_SOURCES = _numbered(
     (
         "ALPHA",
         "Alpha or Black",
-        "The photo's transparency; without it, what is not black behind the object",
+        "Use the photo's transparency, or its black background where it has none",
     ),
     (
         "IMAGE",
         "Image",
-        "Another image, the object white on black (or opaque on transparent); also one painted in Blender",
+        "Use another image, with the object white on black or opaque on transparent",
     ),
 )
-SPECULAR_SOURCES = (
+SPECULAR_SOURCES = _numbered(
     (
         "lobe",
-        "Fitted Gloss",
-        "Highlights come from the material's fitted roughness and level: they move with light and view",
+        "Fitted Lobe",
+        "Use the fitted roughness and specular level, highlights move with light and view",
     ),
-    ("image", "Image", "The separated highlights, fixed to the surface as in the photo"),
-    ("none", "None", "A matte object"),
+    ("image", "Image", "Use the separated highlights, fixed to the surface as in the photo"),
+    ("none", "None", "Build a diffuse object"),
 )
-SHADOWS = (
+OWN_SHADOWS_ITEMS = _numbered(
     (
-        "usual",
-        "Usual",
-        "On in a scene with others, off in a scene of its own; an object that is updated keeps what it has",
+        "auto",
+        "Automatic",
+        "On in a shared scene, off in the object's own scene, unchanged for an object that is "
+        "updated",
     ),
     (
         "on",
         "On",
-        "The object casts shadows, on itself too, and its parts light each other; the recovered light holds the photo's already",
+        "Cast shadows, also on the object itself, in addition to those that the recovered light "
+        "contains",
     ),
-    ("off", "Off", "The object casts no shadows, and looks as photographed"),
+    ("off", "Off", "Cast no shadows, the object looks as in the photo"),
 )
 _PRESET_NAMES = (*PRESETS, CUSTOM)
-
-
-def _preset_items() -> list[tuple[str, str, str, int]]:
-    known = [
-        (name, preset.label, preset.text, index)
-        for index, (name, preset) in enumerate(PRESETS.items())
-    ]
-    return [*known, (CUSTOM, "Custom", "What is set below", len(known))]
+_PRESET_ITEMS = _numbered(
+    *((name, preset.label, preset.description) for name, preset in PRESETS.items()),
+    (CUSTOM, "Custom", "Values set in the Method panel"),
+)
 
 
 def _get_preset(settings: Any) -> int:
-    return _PRESET_NAMES.index(preset_of(settings.max_size, settings.model, settings.samples))
+    return _PRESET_NAMES.index(matching_preset(settings.max_size, settings.model, settings.samples))
 
 
 def _set_preset(settings: Any, value: int) -> None:
     preset = PRESETS.get(_PRESET_NAMES[value])
     if preset is not None:
-        settings.max_size, settings.model, settings.samples = (
-            preset.max_size,
-            preset.model,
-            preset.samples,
-        )
+        settings.max_size, settings.model = preset.max_size, preset.model
+        settings.samples = preset.samples
 
 
-def _is_picture(_settings: Any, image: Any) -> bool:
+def _is_still_image(_settings: Any, image: Any) -> bool:
     return image.source in {"FILE", "GENERATED"} or image.type == "COMPOSITING"
 
 
 class ISC_PG_settings(bpy.types.PropertyGroup):
-    """The choices of one scene."""
+    """The settings of one scene."""
 
     image: PointerProperty(
         name="Photo",
-        description="The photo of one object: open a file, or choose an image that is in Blender already, also a painted one",
+        description="Photo of one object: an image file, or any image in this file",
         type=bpy.types.Image,
-        poll=_is_picture,
+        poll=_is_still_image,
     )
     mask_source: EnumProperty(
         name="Mask",
-        description="What says where the object is",
+        description="How the object is separated from the background",
         items=MASK_SOURCES,
         default="ALPHA",
     )
     mask: PointerProperty(
         name="Mask Image",
-        description="The object white on black, of the photo's size",
+        description="Image of the photo's size with the object white on black",
         type=bpy.types.Image,
-        poll=_is_picture,
+        poll=_is_still_image,
     )
     scale_mask: BoolProperty(
         name="Scale Mask",
-        description="Bring a mask of another size to the photo's size; otherwise it is refused",
+        description="Scale a mask of another size to the photo's size",
         default=False,
     )
     box: IntVectorProperty(
         name="Box",
-        description="Left, top, width and height in pixels, from the photo's upper left corner; some background around the object included",
+        description=(
+            "Left, top, width and height in pixels, from the photo's upper left corner, "
+            "with some background around the object"
+        ),
         size=4,
         min=0,
         default=(0, 0, 0, 0),
@@ -177,27 +190,36 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
 
     preset: EnumProperty(
         name="Preset",
-        description="Usual choices of size, model and samples",
-        items=_preset_items(),
+        description="Preset of size, model and samples",
+        items=_PRESET_ITEMS,
         get=_get_preset,
         set=_set_preset,
         options={"SKIP_SAVE"},
     )
     model: EnumProperty(
         name="Model",
-        description="How highlights, shape, light and paint are told apart",
+        description="How highlights, shape, light and reflectance are recovered",
         items=MODELS,
         default="joint",
     )
     separator: EnumProperty(
-        name="Separator", description="What removes the highlights", items=SEPARATORS, default="isc"
+        name="Separator",
+        description="Method that removes the highlights",
+        items=SEPARATORS,
+        default="isc",
     )
     illumination: EnumProperty(
-        name="Light", description="Which lights to expect", items=ILLUMINATIONS, default="natural"
+        name="Light",
+        description="Prior of the light",
+        items=ILLUMINATIONS,
+        default="natural",
     )
     max_size: IntProperty(
         name="Size",
-        description="The object's long side in pixels, in the maps and the mesh; 0 keeps the photo's; time grows with its square",
+        description=(
+            "Longer side of the object in pixels, in maps and mesh, 0 keeps the photo's "
+            "resolution; time grows with the square"
+        ),
         default=256,
         min=0,
         max=8192,
@@ -206,7 +228,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     samples: IntProperty(
         name="Samples",
-        description="Rays a pixel that Cycles spends in the object's own scene",
+        description="Samples per pixel of Cycles in the object's own scene",
         default=64,
         min=1,
         soft_max=4096,
@@ -214,7 +236,7 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
 
     size_metres: FloatProperty(
         name="Object Size",
-        description="The object's long side in the scene",
+        description="Longer side of the object in the scene",
         subtype="DISTANCE",
         default=0.1,
         min=1e-4,
@@ -222,74 +244,81 @@ class ISC_PG_settings(bpy.types.PropertyGroup):
     )
     own_scene: BoolProperty(
         name="Own Scene",
-        description="Build in a scene of its own, and leave this one as it is; otherwise in this scene",
+        description="Build the object in a new scene instead of this one",
         default=True,
     )
     set_world: BoolProperty(
         name="World", description="Replace this scene's world by the recovered light", default=False
     )
     set_camera: BoolProperty(
-        name="Camera", description="Make the photo's camera this scene's camera", default=False
+        name="Camera", description="Make the photo's camera the active camera", default=False
     )
     set_resolution: BoolProperty(
-        name="Resolution", description="Give this scene's renders the photo's size", default=False
+        name="Resolution", description="Set the render resolution to the photo's", default=False
     )
     set_view_transform: BoolProperty(
         name="View Transform",
-        description="Show this scene as photos are (Standard): AgX and Filmic would change its colours",
+        description=(
+            "Set this scene's view transform to Standard, AgX and Filmic change the photo's colors"
+        ),
         default=False,
     )
     sun: BoolProperty(
-        name="Sun", description="Add a sun along the light's best single direction", default=False
+        name="Sun",
+        description=(
+            "Light the object by a sun along the dominant direction of the light and a uniform "
+            "world"
+        ),
+        default=False,
     )
     displacement: BoolProperty(
         name="Displacement",
-        description="A flat grid, raised by a Displace modifier from the height map, instead of a mesh",
+        description="Build a flat grid with a Displace modifier instead of a mesh",
         default=False,
     )
     closed_back: BoolProperty(
-        name="Closed Back", description="Close the object with a flat back", default=False
+        name="Closed Back", description="Close the mesh with a flat back", default=False
     )
     shadows: EnumProperty(
         name="Own Shadows",
-        description="Whether the object casts shadows and lights itself in Cycles",
-        items=SHADOWS,
-        default="usual",
+        description="Whether the object casts shadows and diffuse light on itself in Cycles",
+        items=OWN_SHADOWS_ITEMS,
+        default="auto",
     )
     specular_from: EnumProperty(
         name="Highlights",
-        description="Where the material's highlights come from",
+        description="Source of the material's highlights",
         items=SPECULAR_SOURCES,
         default="image",
     )
 
 
 class ISC_PG_run(bpy.types.PropertyGroup):
-    """What the window shows of the run that goes on, or of the last one."""
+    """What the panels show of the current run, or of the last one."""
 
-    title: StringProperty(name="Run", description="What is being done", options={"SKIP_SAVE"})
+    title: StringProperty(name="Run", description="Name of the run", options={"SKIP_SAVE"})
     state: StringProperty(
-        name="State",
-        description="running, done, failed, cancelled, or empty",
-        options={"SKIP_SAVE"},
+        name="State", description="State of the run, empty before the first", options={"SKIP_SAVE"}
     )
-    stage: StringProperty(name="Stage", description="What the worker is at", options={"SKIP_SAVE"})
+    stage: StringProperty(
+        name="Stage", description="Current stage of the worker", options={"SKIP_SAVE"}
+    )
     fraction: FloatProperty(
         name="Progress",
-        description="How much of the work is done",
+        description="Share of the work that is done",
         min=0,
         max=1,
         options={"SKIP_SAVE"},
     )
-    message: StringProperty(name="Message", description="How the run ended", options={"SKIP_SAVE"})
+    message: StringProperty(name="Message", description="Outcome of the run", options={"SKIP_SAVE"})
     longest_call_ms: FloatProperty(
         name="Longest Call",
-        description="The longest time in milliseconds that the run has kept the window waiting",
+        description="Longest time in milliseconds for which the run has blocked the window",
         options={"SKIP_SAVE"},
     )
     import_ms: FloatProperty(
         name="Import",
-        description="How long in milliseconds it took to build the result in the scene",
+        description="Time in milliseconds to build the result in the scene",
         options={"SKIP_SAVE"},
     )
 
@@ -297,17 +326,17 @@ class ISC_PG_run(bpy.types.PropertyGroup):
 CLASSES = (ISC_PG_settings, ISC_PG_run)
 
 
-def attach() -> None:
-    """Makes `scene.isc` and `window_manager.isc`; the classes must be registered."""
+def add_properties() -> None:
+    """Add `scene.isc` and `window_manager.isc`; the classes must be registered."""
     bpy.types.Scene.isc = PointerProperty(
-        name="ISC", description="Choices of ISC", type=ISC_PG_settings
+        name="ISC", description="Settings of ISC", type=ISC_PG_settings
     )
     bpy.types.WindowManager.isc = PointerProperty(
-        name="ISC", description="The run of ISC", type=ISC_PG_run, options={"SKIP_SAVE"}
+        name="ISC", description="Current run of ISC", type=ISC_PG_run, options={"SKIP_SAVE"}
     )
 
 
-def detach() -> None:
-    """Takes them away."""
+def remove_properties() -> None:
+    """Remove `scene.isc` and `window_manager.isc`."""
     del bpy.types.Scene.isc
     del bpy.types.WindowManager.isc

@@ -23,11 +23,11 @@ def blender() -> Any:
 def addon(blender: Any) -> Iterator[Any]:
     """Blender with the add-on registered; no run is left behind."""
     import blender_addon
-    from blender_addon.operators.worker_run import end_active
+    from blender_addon.operators.worker_run import cancel_active_run
 
     blender_addon.register()
     yield blender
-    end_active()
+    cancel_active_run()
     blender_addon.unregister()
 
 

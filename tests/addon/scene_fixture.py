@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.arrays_file import write_arrays
-from isc_core.decomposition import Decomposition, Provenance
-from isc_core.mesh import MeshOptions, build_mesh
-from isc_core.sirfs.frames import real_sh
+from isc_core.result_files.arrays_file import write_arrays
+from isc_core.result_files.mesh import MeshOptions, build_mesh
+from isc_core.scene.decomposition import Decomposition, Provenance
+from isc_core.scene.diagnostics import Diagnostics
+from isc_core.shading.spherical_harmonics import real_sh
 
 
 def bump(
@@ -47,7 +48,12 @@ def bump(
         "crop_box": [0, 0, columns, rows],
     }
     provenance = Provenance(
-        {"model": "mdr", "separator": "isc"}, 0, {"isc": "0.1.0"}, {}, about, {"converged": True}
+        {"model": "mdr", "separator": "isc"},
+        0,
+        {"isc": "0.1.0"},
+        {},
+        about,
+        Diagnostics(converged=True),
     )
     residual = np.zeros_like(diffuse)
     trust = (mask * np.clip(normal[..., 2], 0, 1)).astype(np.float32)
@@ -77,11 +83,11 @@ def write_result(
     )
     p = d.provenance
     text = {
-        "schema_version": 1,
+        "schema_version": 2,
         "settings": p.settings,
         "versions": p.versions,
         "input": p.input,
-        "status": p.status,
+        "status": p.diagnostics.to_json(),
     }
     (folder / "decomposition.json").write_text(json.dumps(text), encoding="utf-8")
     return folder

@@ -10,19 +10,19 @@ import pytest
 
 from benchmarks.blender import closed_loop
 from benchmarks.blender.closed_loop_cases import Relit
-from blender_addon.files.result_arrays import Result, read_result
-from isc_core.environment import directions, shading_under
-from isc_core.metrics import psnr
+from blender_addon.files.result_arrays import ResultArrays, read_result
+from isc_core.evaluation.metrics import psnr
+from isc_core.shading.environment_map import directions, shading_under
 
 SAMPLES = 16
 
 
 @pytest.fixture
-def result(bump_folder: Path, blender: Any) -> Result:
+def result(bump_folder: Path, blender: Any) -> ResultArrays:
     return read_result(bump_folder)
 
 
-def test_what_stands_in_blender_is_what_was_recovered(result: Result, tmp_path: Path) -> None:
+def test_what_stands_in_blender_is_what_was_recovered(result: ResultArrays, tmp_path: Path) -> None:
     renders = closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES)
     row = closed_loop.loop_row("bump", renders)
     assert row.shading < 0.08
@@ -42,7 +42,7 @@ def test_what_stands_in_blender_is_what_was_recovered(result: Result, tmp_path: 
 
 @pytest.mark.parametrize("light", ["sun", "sky"])
 def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(
-    result: Result, light: str
+    result: ResultArrays, light: str
 ) -> None:
     """A shallow dome has no shadows under light from the front: matt radiance is albedo *
     irradiance / pi.
@@ -81,20 +81,20 @@ def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(
     )
 
 
-def test_materials_that_shine_by_themselves_are_found(result: Result) -> None:
+def test_materials_that_shine_by_themselves_are_found(result: ResultArrays) -> None:
     from benchmarks.blender.renders import shining
-    from blender_addon.scene import BuildOptions, build
+    from blender_addon.scene import BuildOptions, build_object
 
-    assert shining(build(result, BuildOptions(specular_from="image")).material)
+    assert shining(build_object(result, BuildOptions(specular_from="image")).material)
     for gloss in ("lobe", "none"):
-        assert not shining(build(result, BuildOptions(specular_from=gloss)).material)  # type: ignore[arg-type]
+        assert not shining(build_object(result, BuildOptions(specular_from=gloss)).material)  # type: ignore[arg-type]
 
 
-def test_an_object_shadows_itself_only_where_others_stand_around_it(result: Result) -> None:
-    from blender_addon.scene import BuildOptions, build
+def test_an_object_shadows_itself_only_where_others_stand_around_it(result: ResultArrays) -> None:
+    from blender_addon.scene import BuildOptions, build_object
 
     def shadows(**options: Any) -> tuple[bool, bool]:
-        thing = build(result, BuildOptions(**options)).object
+        thing = build_object(result, BuildOptions(**options)).object
         return thing.visible_shadow, thing.visible_diffuse
 
     assert shadows(name="alone") == (False, False)

@@ -134,7 +134,7 @@ def test_the_zip_holds_the_addon_the_core_and_no_tools() -> None:
         "__init__.py",
         "headless.py",
         "isc_core/__main__.py",
-        "isc_core/data/priors.npz",
+        "isc_core/sirfs/priors/data/priors.npz",
     } <= names
     assert not [
         name
@@ -196,13 +196,13 @@ def test_the_same_files_make_the_same_bytes(tmp_path: Path) -> None:
 def test_a_wheel_that_is_not_the_locked_one_stops_the_build(tmp_path: Path) -> None:
     folder = tmp_path / LINUX.name
     folder.mkdir()
-    with pytest.raises(InputError, match="lacks .*scipy.*: build once with the network"):
+    with pytest.raises(InputError, match="lacks .*scipy.*: build once without --offline"):
         wheels_for(LINUX, tmp_path, offline=True)
     for name in locked():
         if LINUX.runs(name):
             (folder / name).write_bytes(b"something else")
     with pytest.raises(
-        InputError, match="is not the wheel that wheels.sha256 names: delete it and build again"
+        InputError, match="does not have the hash in wheels.sha256: delete it and build again"
     ):
         wheels_for(LINUX, tmp_path, offline=True)
 
@@ -217,7 +217,7 @@ def test_blender_accepts_the_zip_and_its_refusal_is_reported(tmp_path: Path) -> 
         tmp_path / "bad.zip",
         entries | {"blender_manifest.toml": text.replace('"Material"', '"Magic"').encode()},
     )
-    with pytest.raises(InputError, match="Blender refuses bad.zip: .*Magic"):
+    with pytest.raises(InputError, match="Blender rejects bad.zip: .*Magic"):
         validate(tmp_path / "bad.zip")
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from blender_addon.headless import main
-from isc_core.terminal import Interrupts
+from isc_core.cli.interface.terminal import Interrupts
 from tests.addon.scene_fixture import bump, write_result
 from tests.core.lit_balls import under_lamps
 
@@ -205,8 +205,8 @@ def test_a_results_folder_says_why_it_is_doubtful_too(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["none.png", "-o", "x.blend"], "none.png: there is no such photo or folder"),
-        (["RESULT"], "say what to write"),
+        (["none.png", "-o", "x.blend"], "none.png: no such photo or folder"),
+        (["RESULT"], "no output: give"),
         (["RESULT", "-o", "x.blend", "--samples", "0"], "--samples must be 1 or more"),
         (["RESULT", "-o", "x.blend", "--size", "nan"], "--size must be above 0"),
         (["RESULT", "-o", "RESULT/arrays.npz/x.blend"], "a part of the path is a file"),

@@ -15,17 +15,17 @@ bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon import operators  # noqa: E402
 from blender_addon.operators import request as requests  # noqa: E402
-from blender_addon.operators.decompose import run_of  # noqa: E402
-from blender_addon.operators.mask import box_of  # noqa: E402
-from blender_addon.operators.messages import in_words, notes_of  # noqa: E402
+from blender_addon.operators.decompose import create_decompose_run  # noqa: E402
+from blender_addon.operators.mask import box_from_corners  # noqa: E402
+from blender_addon.operators.messages import join_notes, translate_message  # noqa: E402
 from blender_addon.operators.request import request_from_settings  # noqa: E402
-from blender_addon.operators.worker_run import Run, begin  # noqa: E402
-from blender_addon.panels import wrapped
-from blender_addon.scene.build import BuildOptions, find  # noqa: E402
+from blender_addon.operators.worker_run import WorkerRun, begin_run  # noqa: E402
+from blender_addon.panels import wrap_text  # noqa: E402
+from blender_addon.scene.build import BuildOptions, find_built  # noqa: E402
 from blender_addon.settings import preferences, presets, properties  # noqa: E402
-from blender_addon.worker.process import Update  # noqa: E402
+from blender_addon.worker.process import WorkerUpdate  # noqa: E402
+from isc_core.decompose.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
-from isc_core.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.separation import METHODS  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
 
@@ -90,7 +90,7 @@ def test_a_photo_becomes_an_object_and_is_made_again_larger(addon: Any) -> None:
     assert shown.state == "done" and shown.message.startswith(
         "Täss_chen 杯: built in the scene Täss_chen 杯; gloss: "
     )
-    built = find(addon.context.object)
+    built = find_built(addon.context.object)
     assert built is not None and built.scene == addon.context.scene and built.object.select_get()
     assert built.scene.cycles.samples == 3 and built.scene.isc.image == settings.image
     mine = addon.data.scenes["Mine"]
@@ -104,7 +104,7 @@ def test_a_photo_becomes_an_object_and_is_made_again_larger(addon: Any) -> None:
     vertices = len(built.object.data.vertices)
     addon.ops.isc.recolour(hue=0.1)
     assert addon.ops.isc.redo(max_size=48) == {"FINISHED"}
-    again = find(addon.context.object)
+    again = find_built(addon.context.object)
     assert (
         again is not None
         and again.object == built.object
@@ -137,7 +137,7 @@ def test_a_box_is_cut_out_as_the_mask(addon: Any) -> None:
     settings.mask.pixels.foreach_get(found)
     inside = found.reshape(64, 88, 4)[::-1, :, 0] > 0.5
     assert (inside & d.mask).sum() / (inside | d.mask).sum() > 0.9
-    run = run_of(addon.context, request_from_settings(addon.context.scene))
+    run = create_decompose_run(addon.context, request_from_settings(addon.context.scene))
     run.cancel()
 
 
@@ -145,12 +145,16 @@ def test_two_runs_at_once_are_refused(addon: Any, tmp_path: Path) -> None:
     addon.context.scene.isc.image = photo()
     before = census(addon)
     (tmp_path / "run").mkdir()
-    begin(Run("Decompose jug", (Update() for _ in "many"), lambda *_: "", tmp_path / "run"))  # type: ignore[arg-type]
+    begin_run(
+        WorkerRun(
+            "Decompose jug", (WorkerUpdate() for _ in "many"), lambda *_: "", tmp_path / "run"
+        )
+    )  # type: ignore[arg-type]
     assert not addon.ops.isc.decompose.poll()
     with pytest.raises(
-        InputError, match="Decompose jug is going on: wait for it, or cancel it first"
+        InputError, match="Decompose jug is running: wait for it, or cancel it first"
     ):
-        run_of(addon.context, request_from_settings(addon.context.scene))
+        create_decompose_run(addon.context, request_from_settings(addon.context.scene))
     assert census(addon) == before
 
 
@@ -205,32 +209,32 @@ def test_choices_survive_the_file(addon: Any, tmp_path: Path) -> None:
 
 
 def test_a_request_is_kept_as_text() -> None:
-    asked = requests.Request(
-        "a", "b", True, requests.Method(max_size=7), BuildOptions(name="杯"), "Scene"
+    asked = requests.DecomposeRequest(
+        "a", "b", True, requests.MethodSettings(max_size=7), BuildOptions(name="杯"), "Scene"
     )
     assert requests.request_from_json(asked.to_json()) == asked
     later = json.loads(asked.to_json()) | {"of_a_later_version": 1}
     assert requests.request_from_json(json.dumps(later)) == asked
     for broken in ("", "null", "[]", "{}", '{"method": 3, "build": {}}'):
-        with pytest.raises(InputError, match="not known how this object was made"):
+        with pytest.raises(InputError, match="does not store how it was made"):
             requests.request_from_json(broken)
 
 
 def test_objects_of_two_photos_are_told_apart(addon: Any, tmp_path: Path) -> None:
     first, second = photo("cup.png"), photo("cup.jpg")
-    assert requests.key_of(first) == requests.key_of(second) == "cup"
+    assert requests.object_key(first) == requests.object_key(second) == "cup"
     thing = addon.data.objects.new("cup", None)
     thing["isc_key"] = "cup"
-    requests.remember(thing, requests.Request(image="cup.png"))
-    assert (requests.key_of(first), requests.key_of(second)) == ("cup", "cup.jpg")
+    requests.store_request(thing, requests.DecomposeRequest(image="cup.png"))
+    assert (requests.object_key(first), requests.object_key(second)) == ("cup", "cup.jpg")
 
 
 def test_kept_results_go_to_the_cache_folder(addon: Any, tmp_path: Path) -> None:
-    folder = preferences.new_folder(tmp_path / "results", "a/b: 杯 ..")
+    folder = preferences.create_run_folder(tmp_path / "results", "a/b: 杯 ..")
     assert folder.parent == tmp_path / "results" and folder.name.startswith("isc_a_b__杯____")
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="choose another folder in the add-on's preferences"):
-        preferences.new_folder(tmp_path / "file" / "x", "cup")
+        preferences.create_run_folder(tmp_path / "file" / "x", "cup")
 
 
 # --- what is wrong --------------------------------------------------------------------------------
@@ -252,22 +256,22 @@ def set_image(settings: Any, values: np.ndarray) -> None:
 @pytest.mark.parametrize(
     ("prepare", "complaint"),
     [
-        (lambda s: None, "there is no photo: open a file"),
+        (lambda s: None, "no photo is selected: open a file"),
         (lambda s: set_image(s, np.ones((1, 1, 3))), "is 1 x 1 pixels: choose a larger one"),
-        (without_mask, "there is no mask image: choose one"),
+        (without_mask, "no mask image is selected: choose one"),
         (
             lambda s: masked(s, bpy.data.images.new("m", 88, 64)),
             "the mask m is empty: paint the object white on black",
         ),
         (
             lambda s: masked(s, mask_image(size=(20, 30))),
-            "the mask is 30 x 20 pixels, the photo 88 x 64: choose another mask, or tick Scale Mask",
+            "the mask is 30 x 20 pixels, the photo 88 x 64: choose another mask, or enable Scale Mask",
         ),
         (lambda s: masked(s, None), "is the photo itself"),
         (lambda s: set_image(s, np.zeros((32, 32, 3))), "wall: every pixel is black"),
         (
             lambda s: set_image(s, 0.3 + np.indices((32, 32, 3)).sum(0) / 200),
-            "choose a mask image, or cut one out of a box",
+            "choose a mask image, or cut one out with Draw Box",
         ),
     ],
 )
@@ -290,7 +294,7 @@ def test_a_mask_of_another_size_is_taken_where_that_is_wanted(addon: Any) -> Non
         mask_image(size=(32, 44)),
     )
     settings.scale_mask = True
-    run = run_of(addon.context, request_from_settings(addon.context.scene))
+    run = create_decompose_run(addon.context, request_from_settings(addon.context.scene))
     folder = run.folder
     while not (folder / "mask.npy").exists():
         assert run.step().state == "running", run.status.message
@@ -317,7 +321,7 @@ def test_a_box_that_is_none_is_refused(addon: Any) -> None:
 
 def test_a_new_mask_has_the_photos_size(addon: Any) -> None:
     settings = addon.context.scene.isc
-    assert "choose a photo first" in say(addon.ops.isc.new_mask)
+    assert "no photo is selected" in say(addon.ops.isc.new_mask)
     settings.image = photo()
     assert addon.ops.isc.new_mask() == {"FINISHED"}
     assert tuple(settings.mask.size) == (88, 64) and settings.mask_source == "IMAGE"
@@ -331,7 +335,7 @@ def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path
     scene.isc.own_scene = False
     world, camera = scene.world, scene.camera
     assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
-    built = find(addon.context.object)
+    built = find_built(addon.context.object)
     assert (
         built is not None
         and built.scene == scene
@@ -343,7 +347,7 @@ def test_a_folder_is_imported_into_the_users_scene(addon: Any, bump_folder: Path
 
 @pytest.mark.parametrize(
     ("chosen", "own", "cast"),
-    [("usual", True, False), ("usual", False, True), ("on", True, True), ("off", False, False)],
+    [("auto", True, False), ("auto", False, True), ("on", True, True), ("off", False, False)],
 )
 def test_shadows_are_as_chosen(
     addon: Any, bump_folder: Path, chosen: str, own: bool, cast: bool
@@ -351,21 +355,23 @@ def test_shadows_are_as_chosen(
     settings = addon.context.scene.isc
     settings.shadows, settings.own_scene = chosen, own
     assert addon.ops.isc.import_result(directory=str(bump_folder)) == {"FINISHED"}
-    made = next(thing for thing in addon.data.objects if thing.type == "MESH" and find(thing))
+    made = next(thing for thing in addon.data.objects if thing.type == "MESH" and find_built(thing))
     assert (made.visible_shadow, made.visible_diffuse) == (cast, cast)
 
 
 def test_a_folder_without_arrays_is_given_them(addon: Any, tmp_path: Path) -> None:
-    from isc_core.result_folder import save
+    from isc_core.result_files.result_folder import save
 
     save(bump(), tmp_path / "cup")
     assert addon.ops.isc.import_result(directory=str(tmp_path / "cup")) == {"FINISHED"}
-    assert find(addon.context.object) is not None and (tmp_path / "cup" / "arrays.npz").is_file()
+    assert (
+        find_built(addon.context.object) is not None and (tmp_path / "cup" / "arrays.npz").is_file()
+    )
 
 
 def test_what_is_no_result_is_refused(addon: Any, tmp_path: Path, bump_folder: Path) -> None:
     before = census(addon)
-    assert "is no result: give the folder that isc decompose wrote" in say(
+    assert "is no result: select a folder that isc decompose has written" in say(
         addon.ops.isc.import_result, directory=str(tmp_path)
     )
     shutil.copytree(bump_folder, tmp_path / "broken")
@@ -412,36 +418,44 @@ def test_what_is_built_comes_with_the_object_into_another_file(addon: Any, tmp_p
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon.ops.wm.append(directory=str(tmp_path / "a.blend" / "Object"), filename="cup")
     thing = addon.data.objects["cup"]
-    again = requests.remembered(thing, addon.context.scene, 99)
+    again = requests.stored_request(thing, addon.context.scene, 99)
     assert again.image == "cup.png" and again.method.max_size == 99
     addon.data.images.remove(addon.data.images["cup.png"])
-    with pytest.raises(InputError, match="the photo that cup was made of is not in this file"):
-        requests.remembered(thing, addon.context.scene, 99)
+    with pytest.raises(InputError, match="the photo of cup is not in this file"):
+        requests.stored_request(thing, addon.context.scene, 99)
 
 
 # --- words ----------------------------------------------------------------------------------------
 
 
-def test_messages_speak_of_images_and_fields() -> None:
-    assert in_words(
+def test_messages_name_images_and_panel_fields() -> None:
+    assert translate_message(
         "/t/a.npy: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size",
         {"/t/a.npy": "cup"},
-    ) == (
-        "cup: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size, or tick Scale Mask"
-    )
-    assert in_words("--max-size 9 leaves the object thin", {}) == "Size 9 leaves the object thin"
-
-
-def test_notes_leave_out_what_helps_at_a_terminal() -> None:
+    ) == ("cup: the mask is 1 x 1 pixels, the photo 2 x 2: give a mask of the photo's size")
     assert (
-        notes_of("note: not converged\ngloss: none\nlook at x/preview.png")
+        translate_message("--max-size 9 leaves the object thin", {})
+        == "Size 9 leaves the object thin"
+    )
+    for advice in (
+        "make a mask with `isc mask PHOTO --box x,y,w,h -o MASK`",
+        "give another --mask",
+    ):
+        assert translate_message(f"/t/a.npy: no object: {advice}", {"/t/a.npy": "cup"}) == (
+            "cup: no object: choose a mask image, or cut one out with Draw Box"
+        )
+
+
+def test_notes_are_joined_into_one_line() -> None:
+    assert (
+        join_notes(["note: not converged", "gloss: none ", ""])
         == "note: not converged; gloss: none"
     )
 
 
 def test_lines_fit() -> None:
-    assert wrapped("one two three", 7) == ["one two", "three"]
-    assert wrapped("unbreakable", 3) == ["unbreakable"] and wrapped("", 5) == [""]
+    assert wrap_text("one two three", 7) == ["one two", "three"]
+    assert wrap_text("unbreakable", 3) == ["unbreakable"] and wrap_text("", 5) == [""]
 
 
 @pytest.mark.parametrize(
@@ -457,4 +471,4 @@ def test_lines_fit() -> None:
 def test_a_drawn_box_counts_from_above(
     first: tuple[float, float], second: tuple[float, float], box: Any
 ) -> None:
-    assert box_of(first, second, (100, 200)) == box
+    assert box_from_corners(first, second, (100, 200)) == box

@@ -17,26 +17,26 @@ from mathutils import Vector  # noqa: E402 (after the skip)
 
 from blender_addon.files.result_arrays import read_result  # noqa: E402
 from blender_addon.operators.edit import ISC_OT_dichromatic, ISC_OT_recolour  # noqa: E402
-from blender_addon.operators.export import write  # noqa: E402
-from blender_addon.scene.build import BuildOptions, Built, build, find  # noqa: E402
-from blender_addon.scene.copies import sharers  # noqa: E402
-from blender_addon.scene.export_material import recoloured  # noqa: E402
+from blender_addon.operators.export import export_object  # noqa: E402
+from blender_addon.scene.build import BuildOptions, BuiltObject, build_object, find_built  # noqa: E402
+from blender_addon.scene.copies import objects_sharing_material  # noqa: E402
+from blender_addon.scene.export_material import recolour_reflectance  # noqa: E402
 from blender_addon.scene.material import dichromatic_node, set_specular_gain  # noqa: E402
-from isc_core.srgb import linear_to_srgb  # noqa: E402
+from isc_core.imaging.srgb import linear_to_srgb  # noqa: E402
 from tests.addon.scene_render import render  # noqa: E402
 
 
 @pytest.fixture
-def built(addon: Any, bump_folder: Path) -> Built:
+def built(addon: Any, bump_folder: Path) -> BuiltObject:
     """The bump in its own scene, active; its gloss follows the light."""
     addon.context.scene.isc.specular_from = "lobe"
     addon.ops.isc.import_result(directory=str(bump_folder))
-    found = find(addon.context.object)
+    found = find_built(addon.context.object)
     assert found is not None
     return found
 
 
-def sockets(built: Built) -> dict[str, float]:
+def sockets(built: BuiltObject) -> dict[str, float]:
     node = dichromatic_node(built.material)
     assert node is not None
     names = ("Hue", "Saturation", "Value", "Diffuse Gain", "Specular Gain", "Roughness")
@@ -50,12 +50,12 @@ def say(operator: Any, **options: Any) -> str:
     return str(caught.value).strip().removeprefix("Error: ")
 
 
-def sun_of(built: Built) -> Any:
+def sun_of(built: BuiltObject) -> Any:
     return next((thing for thing in built.collection.objects if thing.type == "LIGHT"), None)
 
 
 def test_recolouring_sets_the_paint_and_nothing_else(
-    addon: Any, built: Built, bump_folder: Path, tmp_path: Path
+    addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path
 ) -> None:
     before = sockets(built)
     assert addon.ops.isc.recolour(hue=0.5, saturation=0.0, value=0.5) == {"FINISHED"}
@@ -73,7 +73,7 @@ def test_recolouring_sets_the_paint_and_nothing_else(
 def test_gains_reach_paint_and_gloss_wherever_it_comes_from(addon: Any, bump_folder: Path) -> None:
     addon.context.scene.isc.specular_from = "image"
     addon.ops.isc.import_result(directory=str(bump_folder))
-    material = find(addon.context.object).material  # type: ignore[union-attr]
+    material = find_built(addon.context.object).material  # type: ignore[union-attr]
     assert addon.ops.isc.dichromatic(diffuse_gain=0.25, specular_gain=0.5) == {"FINISHED"}
     groups = [node for node in material.node_tree.nodes if node.type == "GROUP"]
     gains = [
@@ -89,7 +89,7 @@ def test_gains_reach_paint_and_gloss_wherever_it_comes_from(addon: Any, bump_fol
     )
 
 
-def test_an_edit_begins_with_what_is_set(addon: Any, built: Built) -> None:
+def test_an_edit_begins_with_what_is_set(addon: Any, built: BuiltObject) -> None:
     """From a panel: the redo panel shows the object's values, not the usual ones.
 
     Without a window, Blender never asks for that.
@@ -105,7 +105,9 @@ def test_an_edit_begins_with_what_is_set(addon: Any, built: Built) -> None:
         assert {name: getattr(operator, name) for name in wanted} == pytest.approx(wanted)
 
 
-def test_the_sun_stands_where_the_light_was(addon: Any, built: Built, bump_folder: Path) -> None:
+def test_the_sun_stands_where_the_light_was(
+    addon: Any, built: BuiltObject, bump_folder: Path
+) -> None:
     result = read_result(bump_folder)
     assert sun_of(built) is None
     assert addon.ops.isc.relight(light="OPTIMAL") == {"FINISHED"}
@@ -118,7 +120,7 @@ def test_the_sun_stands_where_the_light_was(addon: Any, built: Built, bump_folde
     )
 
 
-def test_the_sun_goes_where_it_is_told(addon: Any, built: Built) -> None:
+def test_the_sun_goes_where_it_is_told(addon: Any, built: BuiltObject) -> None:
     """Right, away from the viewer, up: Blender's own axes, as the camera looks along +Y."""
     addon.ops.isc.relight(light="OPTIMAL")
     energy = sun_of(built).data.energy
@@ -130,7 +132,7 @@ def test_the_sun_goes_where_it_is_told(addon: Any, built: Built) -> None:
     assert "no length" in say(addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0))
 
 
-def test_the_recovered_light_comes_back(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_the_recovered_light_comes_back(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     before = render(built.scene, tmp_path, samples=4)["Combined"]
     addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0), ambient=0)
     lit = render(built.scene, tmp_path, samples=4)["Combined"][..., :3]
@@ -143,14 +145,14 @@ def test_the_recovered_light_comes_back(addon: Any, built: Built, tmp_path: Path
     assert sun_of(built) is None
 
 
-def test_even_light_is_a_factor(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_even_light_is_a_factor(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     addon.ops.isc.relight(light="OPTIMAL", strength=0, ambient=0)
     assert render(built.scene, tmp_path, samples=4)["Combined"][..., :3].max() < 1e-6
     addon.ops.isc.relight(light="OPTIMAL", strength=0, ambient=1)
     assert render(built.scene, tmp_path, samples=4)["Combined"][..., :3].max() > 0.01
 
 
-def test_other_objects_are_not_edited(addon: Any, built: Built) -> None:
+def test_other_objects_are_not_edited(addon: Any, built: BuiltObject) -> None:
     other = addon.data.objects.new("cube", addon.data.meshes.new("cube"))
     addon.context.scene.collection.objects.link(other)
     addon.context.view_layer.objects.active = other
@@ -158,32 +160,32 @@ def test_other_objects_are_not_edited(addon: Any, built: Built) -> None:
         assert not getattr(addon.ops.isc, name).poll(), name
 
 
-def test_nodes_that_were_taken_away_are_missed(addon: Any, built: Built) -> None:
+def test_nodes_that_were_taken_away_are_missed(addon: Any, built: BuiltObject) -> None:
     built.material.node_tree.nodes.clear()
-    assert "has no node group ISC Dichromatic any more" in say(addon.ops.isc.recolour, hue=0.1)
+    assert "has no node group ISC Dichromatic" in say(addon.ops.isc.recolour, hue=0.1)
 
 
-def test_an_object_of_unknown_origin_is_not_made_again(addon: Any, built: Built) -> None:
+def test_an_object_of_unknown_origin_is_not_made_again(addon: Any, built: BuiltObject) -> None:
     assert "is not in this file: open it, and press Decompose" in say(
         addon.ops.isc.redo, max_size=64
     )
     del built.object["isc_request"]
-    assert "not known how this object was made" in say(addon.ops.isc.redo, max_size=64)
+    assert "does not store how it was made" in say(addon.ops.isc.redo, max_size=64)
 
 
 # --- copies ---------------------------------------------------------------------------------------
 
 
-def copied(bpy: Any, built: Built, linked: bool = False) -> Built:
+def copied(bpy: Any, built: BuiltObject, linked: bool = False) -> BuiltObject:
     """What Shift D makes, or Alt D where `linked`; it is active then."""
     bpy.ops.object.duplicate(linked=linked)
-    copy = find(bpy.context.object)
+    copy = find_built(bpy.context.object)
     assert copy is not None and copy.object != built.object, "edits would go to the original"
     return copy
 
 
 def hue(thing: Any) -> float:
-    found = find(thing)
+    found = find_built(thing)
     assert found is not None
     return sockets(found)["Hue"]
 
@@ -191,7 +193,7 @@ def hue(thing: Any) -> float:
 @pytest.mark.parametrize("linked", [False, True])
 @pytest.mark.parametrize("active", ["copy", "original"])
 def test_an_edit_changes_the_active_object_alone(
-    addon: Any, built: Built, tmp_path: Path, linked: bool, active: str
+    addon: Any, built: BuiltObject, tmp_path: Path, linked: bool, active: str
 ) -> None:
     copy = copied(addon, built, linked)
     other = addon.context.object.copy()
@@ -201,7 +203,8 @@ def test_an_edit_changes_the_active_object_alone(
     assert addon.ops.isc.recolour(hue=0.2, saturation=0.5, value=1.0) == {"FINISHED"}
     assert addon.ops.isc.dichromatic(diffuse_gain=0.5, specular_gain=2.0) == {"FINISHED"}
     values = {
-        thing: sockets(find(thing))["Diffuse Gain"] for thing in (built.object, copy.object, other)
+        thing: sockets(find_built(thing))["Diffuse Gain"]
+        for thing in (built.object, copy.object, other)
     }  # type: ignore[arg-type]
     assert values == {thing: 0.5 if thing == edited else 1.0 for thing in values}
     assert hue(edited) == pytest.approx(0.2) and sum(hue(thing) == 0.5 for thing in values) == 2
@@ -209,7 +212,7 @@ def test_an_edit_changes_the_active_object_alone(
     assert np.isfinite(shown).all()
 
 
-def test_a_material_that_people_made_single_is_the_copys(addon: Any, built: Built) -> None:
+def test_a_material_that_people_made_single_is_the_copys(addon: Any, built: BuiltObject) -> None:
     copy = copied(addon, built)
     copy.object.material_slots[0].material = built.material.copy()
     addon.ops.isc.recolour(hue=0.3)
@@ -218,7 +221,7 @@ def test_a_material_that_people_made_single_is_the_copys(addon: Any, built: Buil
 
 
 def test_a_copy_is_never_taken_for_the_original_once_it_was_edited(
-    addon: Any, built: Built, bump_folder: Path
+    addon: Any, built: BuiltObject, bump_folder: Path
 ) -> None:
     copy = copied(addon, built)
     addon.ops.isc.recolour(hue=0.3)
@@ -230,12 +233,12 @@ def test_a_copy_is_never_taken_for_the_original_once_it_was_edited(
         and hue(copy.object) == pytest.approx(0.3)
         and hue(built.object) == 0.5
     )
-    assert find(built.object).material == built.material  # type: ignore[union-attr]
+    assert find_built(built.object).material == built.material  # type: ignore[union-attr]
 
 
-def test_a_copy_is_not_decomposed_again(addon: Any, built: Built) -> None:
+def test_a_copy_is_not_decomposed_again(addon: Any, built: BuiltObject) -> None:
     copied(addon, built)
-    assert "is a copy, and only the original is updated: choose bump" in say(
+    assert "is a copy, and only the original is updated: select bump" in say(
         addon.ops.isc.redo, max_size=64
     )
     addon.ops.isc.recolour(hue=0.3)
@@ -245,7 +248,7 @@ def test_a_copy_is_not_decomposed_again(addon: Any, built: Built) -> None:
     )
 
 
-def test_a_copy_is_exported_as_it_is(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_a_copy_is_exported_as_it_is(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     copy = copied(addon, built)
     addon.ops.isc.dichromatic(diffuse_gain=0.25, specular_gain=1.0)
     copy.object.location.x = 1.0
@@ -258,20 +261,22 @@ def test_a_copy_is_exported_as_it_is(addon: Any, built: Built, tmp_path: Path) -
     assert (mine < 0.8 * original).all()
 
 
-def test_what_else_a_copy_wears_is_not_edited(addon: Any, built: Built) -> None:
+def test_what_else_a_copy_wears_is_not_edited(addon: Any, built: BuiltObject) -> None:
     copy = copied(addon, built)
     copy.object.material_slots[0].material = addon.data.materials.new("mine")
-    assert find(copy.object) is None and not addon.ops.isc.recolour.poll()
+    assert find_built(copy.object) is None and not addon.ops.isc.recolour.poll()
 
 
-def test_own_paint_and_gloss_are_given_on_demand(addon: Any, built: Built) -> None:
+def test_own_paint_and_gloss_are_given_on_demand(addon: Any, built: BuiltObject) -> None:
     """What the panel offers instead of sliders that would change both."""
     copy = copied(addon, built)
-    assert sharers(copy.object, copy.material) == [built.object]
+    assert objects_sharing_material(copy.object, copy.material) == [built.object]
     assert addon.ops.isc.own_material() == {"FINISHED"}
-    own = find(copy.object)
+    own = find_built(copy.object)
     assert (
-        own is not None and own.material != built.material and not sharers(own.object, own.material)
+        own is not None
+        and own.material != built.material
+        and not objects_sharing_material(own.object, own.material)
     )
 
 
@@ -279,9 +284,9 @@ def test_own_paint_and_gloss_are_given_on_demand(addon: Any, built: Built) -> No
 
 
 def test_the_results_own_files_are_copied(addon: Any, tmp_path: Path) -> None:
-    from isc_core.arrays_file import write_arrays
-    from isc_core.mesh import build_mesh
-    from isc_core.result_folder import load, save
+    from isc_core.result_files.arrays_file import write_arrays
+    from isc_core.result_files.mesh import build_mesh
+    from isc_core.result_files.result_folder import load, save
     from tests.addon.scene_fixture import bump
 
     d = bump()
@@ -305,11 +310,11 @@ def test_the_results_own_files_are_copied(addon: Any, tmp_path: Path) -> None:
 
 
 def test_without_them_the_scene_is_written(
-    addon: Any, built: Built, bump_folder: Path, tmp_path: Path
+    addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path
 ) -> None:
     import trimesh
 
-    from isc_core.exr import read_channels
+    from isc_core.io.exr import read_channels
 
     addon.ops.isc.relight(light="OPTIMAL")
     material = built.object.data.materials[0]
@@ -364,7 +369,7 @@ def specular_factor(path: Path) -> float:
     ids=str,
 )
 def test_the_paint_is_written_as_it_is_shown(
-    addon: Any, built: Built, bump_folder: Path, tmp_path: Path, edit: dict[str, float]
+    addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path, edit: dict[str, float]
 ) -> None:
     """Coded as sRGB, after the edits: what Cycles shows of the paint is what another program will
     read.
@@ -395,9 +400,9 @@ def test_recolouring_is_that_of_hsv() -> None:
             colorsys.hsv_to_rgb((h + hue + 0.5) % 1, min(s * saturation, 1), v) for h, s, v in hsv
         ]
         np.testing.assert_allclose(
-            recoloured(paint, hue, saturation, 0.7), 0.7 * np.array(wanted), atol=1e-12
+            recolour_reflectance(paint, hue, saturation, 0.7), 0.7 * np.array(wanted), atol=1e-12
         )
-    np.testing.assert_array_equal(recoloured(paint, 0.5, 1.0, 2.0), 2 * paint)
+    np.testing.assert_array_equal(recolour_reflectance(paint, 0.5, 1.0, 2.0), 2 * paint)
 
 
 @pytest.mark.parametrize(("source", "level"), [("lobe", 0.3), ("image", 0.3), ("none", 0.0)])
@@ -406,9 +411,9 @@ def test_the_gloss_that_is_written_is_the_fitted_one_unless_it_is_not_wanted(
 ) -> None:
     """The photo's highlights, that Blender may show instead, do not fit into the file."""
     fitted = replace(read_result(bump_folder), specular_level=0.6, roughness=0.35)
-    thing = build(fitted, BuildOptions(specular_from=source, own_scene=False))
+    thing = build_object(fitted, BuildOptions(specular_from=source, own_scene=False))
     set_specular_gain(thing.material, 0.5)
-    write(thing, tmp_path, from_scene=True)
+    export_object(thing, tmp_path, from_scene=True)
     path = tmp_path / "bump" / "mesh.glb"
     assert specular_factor(path) == pytest.approx(level)
     assert surface(path)["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.35)
@@ -417,8 +422,10 @@ def test_the_gloss_that_is_written_is_the_fitted_one_unless_it_is_not_wanted(
 def test_gloss_that_is_not_known_is_not_written(
     addon: Any, bump_folder: Path, tmp_path: Path
 ) -> None:
-    write(
-        build(read_result(bump_folder), BuildOptions(specular_from="image", own_scene=False)),
+    export_object(
+        build_object(
+            read_result(bump_folder), BuildOptions(specular_from="image", own_scene=False)
+        ),
         tmp_path,
         from_scene=True,
     )
@@ -426,7 +433,7 @@ def test_gloss_that_is_not_known_is_not_written(
 
 
 def test_paint_that_is_one_colour_or_comes_from_other_nodes(
-    addon: Any, built: Built, tmp_path: Path
+    addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     tree, node = built.material.node_tree, dichromatic_node(built.material)
     assert node is not None
@@ -444,7 +451,7 @@ def test_paint_that_is_one_colour_or_comes_from_other_nodes(
 
 
 def test_an_object_without_material_slots_is_written(
-    addon: Any, built: Built, tmp_path: Path
+    addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     built.object.data.materials.clear()
     assert addon.ops.isc.export(directory=str(tmp_path)) == {"FINISHED"}
@@ -453,7 +460,7 @@ def test_an_object_without_material_slots_is_written(
 
 
 def test_every_slot_that_has_the_material_is_written_with_its_paint(
-    addon: Any, built: Built, tmp_path: Path
+    addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     mine = addon.data.materials.new("mine")
     built.object.data.materials.clear()
@@ -466,20 +473,22 @@ def test_every_slot_that_has_the_material_is_written_with_its_paint(
     assert list(built.object.data.materials) == [mine, built.material]
 
 
-def places(built: Built) -> np.ndarray:
+def places(built: BuiltObject) -> np.ndarray:
     """(V, 3) of the object's mesh."""
     values = np.empty(3 * len(built.object.data.vertices), np.float32)
     built.object.data.vertices.foreach_get("co", values)
     return values.reshape(-1, 3)
 
 
-def test_a_place_that_cannot_be_written_is_said(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_said(
+    addon: Any, built: BuiltObject, tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("")
     assert "choose another folder" in say(addon.ops.isc.export, directory=str(tmp_path / "file"))
-    assert "and a folder to write to" in say(addon.ops.isc.export, directory="")
+    assert "and a folder to export_object to" in say(addon.ops.isc.export, directory="")
 
 
-def test_linked_objects_are_left_alone(addon: Any, built: Built, tmp_path: Path) -> None:
+def test_linked_objects_are_left_alone(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon.ops.wm.link(

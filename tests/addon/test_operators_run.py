@@ -15,22 +15,23 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 import blender_addon  # noqa: E402 (after the skip)
-from blender_addon.files.image_export import Picture  # noqa: E402
-from blender_addon.operators import run_steps as tasks  # noqa: E402
-from blender_addon.operators.modal import WorkerOperator, advance  # noqa: E402
-from blender_addon.operators.request import Method  # noqa: E402
-from blender_addon.operators.run_steps import cut_out, decompose  # noqa: E402
-from blender_addon.operators.worker_run import (
-    Made,
-    Run,
-    WorkFailed,
-    active,
-    begin,
-    end_active,
-    follow,
-    remove,
+from blender_addon.files.image_source import ImageSource  # noqa: E402
+from blender_addon.operators import run_steps  # noqa: E402
+from blender_addon.operators.modal import WorkerOperator, advance_run  # noqa: E402
+from blender_addon.operators.request import MethodSettings  # noqa: E402
+from blender_addon.operators.run_steps import decompose_steps, mask_steps  # noqa: E402
+from blender_addon.operators.worker_run import (  # noqa: E402
+    RunOutput,
+    WorkerFailed,
+    WorkerRun,
+    active_run,
+    begin_run,
+    cancel_active_run,
+    follow_worker,
+    remove_folder,
 )
-from blender_addon.worker.process import Update, Worker, WorkerEnvironment, start  # noqa: E402
+from blender_addon.worker.commands import WorkerEnvironment, start_decompose  # noqa: E402
+from blender_addon.worker.process import WorkerProcess, WorkerUpdate  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
 
 # A package in place of `isc_core` that takes its time, or dies.
@@ -50,8 +51,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path / "run"
 
 
-def stand_in(tmp_path: Path, code: str) -> WorkerEnvironment:
-    package = tmp_path / "stand_in" / "isc_core"
+def fake_core(tmp_path: Path, code: str) -> WorkerEnvironment:
+    package = tmp_path / "fake_core" / "isc_core"
     package.mkdir(parents=True)
     (package / "__init__.py").write_text("")
     (package / "__main__.py").write_text(code)
@@ -60,18 +61,18 @@ def stand_in(tmp_path: Path, code: str) -> WorkerEnvironment:
 
 def script(
     steps: int, result: Path, closed: list[str] | None = None
-) -> Generator[Update, None, Made]:
+) -> Generator[WorkerUpdate, None, RunOutput]:
     try:
         for number in range(steps):
-            yield Update("at work", number / steps)
+            yield WorkerUpdate("at work", number / steps)
     finally:
         if closed is not None:
             closed.append("closed")
-    return Made(result)
+    return RunOutput(result)
 
 
-def failing(error: Exception) -> Generator[Update, None, Made]:
-    yield Update("at work")
+def failing(error: Exception) -> Generator[WorkerUpdate, None, RunOutput]:
+    yield WorkerUpdate("at work")
     raise error
 
 
@@ -87,15 +88,19 @@ def until(true: Callable[[], object], seconds: float = 20.0) -> None:
 
 
 def test_a_run_ends_with_its_result_taken_in(folder: Path) -> None:
-    run = Run("Decompose cup", script(2, folder), take, folder)
+    run = WorkerRun("Decompose cup", script(2, folder), take, folder)
     assert [run.step().state for _ in range(4)] == ["running", "running", "ready", "ready"]
     assert not run.ended
-    assert (run.take_in(None).state, run.status.message, run.ended) == ("done", "took run", True)
+    assert (run.import_result(None).state, run.status.message, run.ended) == (
+        "done",
+        "took run",
+        True,
+    )
     assert folder.is_dir(), "what is kept is for others to decide"
 
 
 def test_stage_and_fraction_are_passed_on(folder: Path) -> None:
-    run = Run("Decompose cup", script(4, folder), take, folder)
+    run = WorkerRun("Decompose cup", script(4, folder), take, folder)
     run.step()
     run.step()
     assert (run.status.stage, run.status.fraction) == ("at work", 0.25)
@@ -103,13 +108,13 @@ def test_stage_and_fraction_are_passed_on(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("error", "report"),
-    [(InputError("no room"), ""), (WorkFailed("no room", "the log"), "the log")],
+    [(InputError("no room"), ""), (WorkerFailed("no room", "the log"), "the log")],
 )
 def test_a_failure_is_told_and_leaves_nothing(folder: Path, error: Exception, report: str) -> None:
-    run = Run("Decompose cup", failing(error), take, folder)
+    run = WorkerRun("Decompose cup", failing(error), take, folder)
     run.step()
     assert run.step().state == "failed"
-    assert (run.status.message, run.status.report) == ("no room", report)
+    assert (run.status.message, run.status.log) == ("no room", report)
     assert not folder.exists()
 
 
@@ -117,9 +122,9 @@ def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
     def refuse(_context: Any, _result: Path) -> str:
         raise InputError("linked")
 
-    run = Run("Decompose cup", script(0, folder), refuse, folder)
+    run = WorkerRun("Decompose cup", script(0, folder), refuse, folder)
     run.step()
-    assert (run.take_in(None).state, run.status.message, folder.exists()) == (
+    assert (run.import_result(None).state, run.status.message, folder.exists()) == (
         "failed",
         "linked",
         False,
@@ -127,14 +132,14 @@ def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
 
 
 def test_what_the_worker_says_of_the_result_is_passed_on(folder: Path) -> None:
-    def talkative() -> Generator[Update, None, Made]:
-        yield Update("at work")
-        return Made(folder, "note: it did not converge")
+    def talkative() -> Generator[WorkerUpdate, None, RunOutput]:
+        yield WorkerUpdate("at work")
+        return RunOutput(folder, "note: it did not converge")
 
-    run = Run("Decompose cup", talkative(), take, folder)
+    run = WorkerRun("Decompose cup", talkative(), take, folder)
     run.step()
     run.step()
-    assert run.take_in(None).message == "took run; note: it did not converge"
+    assert run.import_result(None).message == "took run; note: it did not converge"
 
 
 @pytest.mark.parametrize("where", ["script", "finish"])
@@ -145,12 +150,12 @@ def test_an_unforeseen_error_does_not_block_the_next_run(folder: Path, where: st
     steps = (
         failing(ZeroDivisionError("an error of ours")) if where == "script" else script(1, folder)
     )
-    run = begin(Run("Decompose cup", steps, broken, folder))
+    run = begin_run(WorkerRun("Decompose cup", steps, broken, folder))
     run.step()
     with pytest.raises(ZeroDivisionError):
-        run.step() and run.take_in(None)
+        run.step() and run.import_result(None)
     assert (
-        active() is None
+        active_run() is None
         and run.status.state == "failed"
         and "an error of ours" in run.status.message
     )
@@ -159,7 +164,7 @@ def test_an_unforeseen_error_does_not_block_the_next_run(folder: Path, where: st
 
 def test_cancelling_closes_the_script_and_removes_the_folder(folder: Path) -> None:
     closed: list[str] = []
-    run = Run("Decompose cup", script(5, folder, closed), take, folder)
+    run = WorkerRun("Decompose cup", script(5, folder, closed), take, folder)
     run.step()
     run.cancel()
     assert (run.status.state, run.status.message, closed) == (
@@ -167,49 +172,49 @@ def test_cancelling_closes_the_script_and_removes_the_folder(folder: Path) -> No
         "Decompose cup: cancelled",
         ["closed"],
     )
-    assert run.step().state == "cancelled" and run.take_in(None).state == "cancelled"
+    assert run.step().state == "cancelled" and run.import_result(None).state == "cancelled"
     assert not folder.exists()
 
 
 def test_cancelling_after_the_end_changes_nothing(folder: Path) -> None:
-    run = Run("Decompose cup", script(0, folder), take, folder)
+    run = WorkerRun("Decompose cup", script(0, folder), take, folder)
     run.step()
-    run.take_in(None)
+    run.import_result(None)
     assert run.cancel().state == "done" and folder.is_dir()
 
 
 def test_calls_are_measured_and_the_import_apart(folder: Path) -> None:
-    def slow_script() -> Generator[Update, None, Made]:
-        yield Update("quick")
+    def slow_script() -> Generator[WorkerUpdate, None, RunOutput]:
+        yield WorkerUpdate("quick")
         time.sleep(0.03)
-        yield Update("slow")
-        return Made(folder)
+        yield WorkerUpdate("slow")
+        return RunOutput(folder)
 
     def slow_import(_context: Any, _result: Path) -> str:
         time.sleep(0.2)
         return ""
 
-    run = Run("Decompose cup", slow_script(), slow_import, folder)
+    run = WorkerRun("Decompose cup", slow_script(), slow_import, folder)
     run.step()
     assert run.longest_call_ms < 30
     while run.step().state == "running":
         pass
-    run.take_in(None)
+    run.import_result(None)
     assert 30 <= run.longest_call_ms < 200 <= run.import_ms
 
 
 def test_two_runs_at_once_are_refused(tmp_path: Path, folder: Path) -> None:
-    first = begin(Run("Decompose cup", script(5, folder), take, folder))
+    first = begin_run(WorkerRun("Decompose cup", script(5, folder), take, folder))
     (tmp_path / "second").mkdir()
     try:
         with pytest.raises(
-            InputError, match="Decompose cup is going on: wait for it, or cancel it first"
+            InputError, match="Decompose cup is running: wait for it, or cancel it first"
         ):
-            begin(Run("Decompose jug", script(5, folder), take, tmp_path / "second"))
-        assert active() is first and not (tmp_path / "second").exists()
+            begin_run(WorkerRun("Decompose jug", script(5, folder), take, tmp_path / "second"))
+        assert active_run() is first and not (tmp_path / "second").exists()
     finally:
-        end_active()
-    assert active() is None and first.status.state == "cancelled"
+        cancel_active_run()
+    assert active_run() is None and first.status.state == "cancelled"
 
 
 def test_a_folder_that_is_still_written_to_goes_in_the_end(
@@ -224,7 +229,7 @@ def test_a_folder_that_is_still_written_to_goes_in_the_end(
             whole(path, ignore_errors=ignore_errors)
 
     monkeypatch.setattr(shutil, "rmtree", busy)
-    remove(tmp_path / "run")
+    remove_folder(tmp_path / "run")
     assert (tmp_path / "run").exists(), "the first try was too early"
     until(lambda: not (tmp_path / "run").exists())
 
@@ -232,24 +237,24 @@ def test_a_folder_that_is_still_written_to_goes_in_the_end(
 # --- workers --------------------------------------------------------------------------------------
 
 
-def photo_file(tmp_path: Path) -> Picture:
+def photo_file(tmp_path: Path) -> ImageSource:
     (tmp_path / "cup.png").write_text("never read")
-    return Picture("cup", path=tmp_path / "cup.png")
+    return ImageSource("cup", path=tmp_path / "cup.png")
 
 
 def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    environment, workers = stand_in(tmp_path, SLOW), []
+    environment, workers = fake_core(tmp_path, SLOW), []
 
-    def started(*given: Any) -> Worker:
-        workers.append(start(*given))
+    def started(*given: Any) -> WorkerProcess:
+        workers.append(start_decompose(*given))
         return workers[0]
 
-    monkeypatch.setattr(tasks, "start", started)
-    run = Run(
+    monkeypatch.setattr(run_steps, "start_decompose", started)
+    run = WorkerRun(
         "Decompose cup",
-        decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment),
+        decompose_steps(photo_file(tmp_path), None, None, MethodSettings(), folder, 0, environment),
         take,
         folder,
     )
@@ -257,7 +262,7 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
     assert workers[0].poll().state == "running"
     run.cancel()
     until(lambda: workers[0].poll().state == "cancelled")
-    assert workers[0]._process.poll() is not None
+    assert workers[0].exit_code is not None
     until(lambda: not folder.exists())
     assert (tmp_path / "cup.png").is_file(), "the user's own file stays"
 
@@ -265,17 +270,17 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
 def test_a_worker_that_is_just_being_started_is_ended_too(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    environment, workers = stand_in(tmp_path, SLOW), []
+    environment, workers = fake_core(tmp_path, SLOW), []
 
-    def slow_start(*given: Any) -> Worker:
+    def slow_start(*given: Any) -> WorkerProcess:
         time.sleep(0.3)
-        workers.append(start(*given))
+        workers.append(start_decompose(*given))
         return workers[0]
 
-    monkeypatch.setattr(tasks, "start", slow_start)
-    run = Run(
+    monkeypatch.setattr(run_steps, "start_decompose", slow_start)
+    run = WorkerRun(
         "Decompose cup",
-        decompose(photo_file(tmp_path), None, None, Method(), folder, 0, environment),
+        decompose_steps(photo_file(tmp_path), None, None, MethodSettings(), folder, 0, environment),
         take,
         folder,
     )
@@ -283,25 +288,25 @@ def test_a_worker_that_is_just_being_started_is_ended_too(
     run.cancel()
     assert not workers
     until(lambda: workers and workers[0].poll().state == "cancelled")
-    assert workers[0]._process.poll() is not None
+    assert workers[0].exit_code is not None
 
 
 def test_a_crash_is_reported_with_the_logs_tail(tmp_path: Path, folder: Path) -> None:
-    script = cut_out(photo_file(tmp_path), (0, 0, 9, 9), folder, stand_in(tmp_path, CRASH))
-    run = Run("Cut Out", script, take, folder)
+    script = mask_steps(photo_file(tmp_path), (0, 0, 9, 9), folder, fake_core(tmp_path, CRASH))
+    run = WorkerRun("Cut Out", script, take, folder)
     until(lambda: run.step().state != "running")
     assert run.status.state == "failed" and "killed (SIGABRT)" in run.status.message
-    assert "half way through" in run.status.report
+    assert "half way through" in run.status.log
     assert not folder.exists()
 
 
 def test_a_worker_that_cannot_be_started_is_said(tmp_path: Path, folder: Path) -> None:
     environment = WorkerEnvironment(tmp_path / "no_python", (), tmp_path / "cache")
-    run = Run(
-        "Cut Out", cut_out(photo_file(tmp_path), (0, 0, 9, 9), folder, environment), take, folder
+    run = WorkerRun(
+        "Cut Out", mask_steps(photo_file(tmp_path), (0, 0, 9, 9), folder, environment), take, folder
     )
     until(lambda: run.step().state != "running")
-    assert run.status.state == "failed" and "cannot be started" in run.status.message
+    assert run.status.state == "failed" and "cannot start the worker" in run.status.message
 
 
 def test_messages_name_images_not_files(tmp_path: Path, folder: Path) -> None:
@@ -311,26 +316,26 @@ print(json.dumps({"event": "failed", "message": f"{sys.argv[2]}: make a mask wit
                   "and give it with --mask", "code": 2}), flush=True)
 sys.exit(2)
 """
-    script = decompose(
-        photo_file(tmp_path), None, None, Method(), folder, 0, stand_in(tmp_path, code)
+    script = decompose_steps(
+        photo_file(tmp_path), None, None, MethodSettings(), folder, 0, fake_core(tmp_path, code)
     )
-    run = Run("Decompose cup", script, take, folder)
+    run = WorkerRun("Decompose cup", script, take, folder)
     until(lambda: run.step().state != "running")
-    assert run.status.message == "cup: choose a mask image, or cut one out of a box"
+    assert run.status.message == "cup: choose a mask image, or cut one out with Draw Box"
 
 
 def test_following_ends_the_worker_when_it_is_closed() -> None:
     class Fake:
         killed = 0
 
-        def poll(self) -> Update:
-            return Update("at work", 0.5)
+        def poll(self) -> WorkerUpdate:
+            return WorkerUpdate("at work", 0.5)
 
         def kill(self) -> None:
             self.killed += 1
 
     worker = Fake()
-    following = follow(worker)
+    following = follow_worker(worker)
     next(following)
     following.close()
     assert worker.killed == 1
@@ -344,7 +349,7 @@ class Plain(WorkerOperator):
     call.
     """
 
-    def __init__(self, run: Run) -> None:
+    def __init__(self, run: WorkerRun) -> None:
         self._run = run
         self.said: list[tuple[set[str], str]] = []
 
@@ -357,7 +362,7 @@ def event(kind: str, value: str = "NOTHING") -> Any:
 
 
 def test_the_timer_polls_and_all_else_passes_through(addon: Any, folder: Path) -> None:
-    run = begin(Run("Decompose cup", script(2, folder), take, folder))
+    run = begin_run(WorkerRun("Decompose cup", script(2, folder), take, folder))
     plain, shown = Plain(run), addon.context.window_manager.isc
     assert (
         plain.modal(addon.context, event("MOUSEMOVE")) == {"PASS_THROUGH"}
@@ -376,7 +381,7 @@ def test_the_timer_polls_and_all_else_passes_through(addon: Any, folder: Path) -
 
 
 def test_escape_cancels_at_once(addon: Any, folder: Path) -> None:
-    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    run = begin_run(WorkerRun("Decompose cup", script(9, folder), take, folder))
     plain = Plain(run)
     plain.modal(addon.context, event("TIMER"))
     assert plain.modal(addon.context, event("ESC", "RELEASE")) == {"PASS_THROUGH"} and not run.ended
@@ -386,7 +391,7 @@ def test_escape_cancels_at_once(addon: Any, folder: Path) -> None:
 
 def test_the_button_cancels(addon: Any, folder: Path) -> None:
     assert not addon.ops.isc.cancel.poll()
-    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    run = begin_run(WorkerRun("Decompose cup", script(9, folder), take, folder))
     run.step()
     assert addon.ops.isc.cancel() == {"FINISHED"} and run.status.state == "cancelled"
     assert Plain(run).modal(addon.context, event("TIMER")) == {"CANCELLED"}
@@ -394,7 +399,9 @@ def test_the_button_cancels(addon: Any, folder: Path) -> None:
 
 def test_a_report_is_kept_as_text(addon: Any, folder: Path) -> None:
     for log in ("an older log", "the log's tail"):
-        run = begin(Run("Decompose cup", failing(WorkFailed("it died", log)), take, folder))
+        run = begin_run(
+            WorkerRun("Decompose cup", failing(WorkerFailed("it died", log)), take, folder)
+        )
         plain = Plain(run)
         plain.modal(addon.context, event("TIMER"))
         assert plain.modal(addon.context, event("TIMER")) == {"CANCELLED"}
@@ -414,15 +421,15 @@ def test_nothing_is_built_while_something_is_edited(addon: Any, folder: Path) ->
     addon.context.scene.collection.objects.link(mesh)
     addon.context.view_layer.objects.active = mesh
     addon.ops.object.mode_set(mode="EDIT")
-    run = begin(Run("Decompose cup", script(0, folder), take, folder))
-    assert not advance(addon.context, run) and not advance(addon.context, run)
-    assert addon.context.window_manager.isc.stage == "leave Edit Mode to see the result"
+    run = begin_run(WorkerRun("Decompose cup", script(0, folder), take, folder))
+    assert not advance_run(addon.context, run) and not advance_run(addon.context, run)
+    assert addon.context.window_manager.isc.stage == "leave Edit Mode to import the result"
     addon.ops.object.mode_set(mode="OBJECT")
-    assert advance(addon.context, run) and run.status.state == "done"
+    assert advance_run(addon.context, run) and run.status.state == "done"
 
 
 def test_loading_another_file_ends_the_run(addon: Any, folder: Path) -> None:
-    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    run = begin_run(WorkerRun("Decompose cup", script(9, folder), take, folder))
     run.step()
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     assert run.status.state == "cancelled" and not folder.exists()
@@ -431,7 +438,7 @@ def test_loading_another_file_ends_the_run(addon: Any, folder: Path) -> None:
 
 def test_unregistering_ends_the_run(blender: Any, folder: Path) -> None:
     blender_addon.register()
-    run = begin(Run("Decompose cup", script(9, folder), take, folder))
+    run = begin_run(WorkerRun("Decompose cup", script(9, folder), take, folder))
     run.step()
     blender_addon.unregister()
     assert run.status.state == "cancelled" and not folder.exists()
@@ -446,7 +453,7 @@ def test_closing_blender_ends_the_worker(tmp_path: Path) -> None:
     """
     import subprocess
 
-    environment = stand_in(
+    environment = fake_core(
         tmp_path,
         SLOW.replace(
             "while True",
@@ -458,16 +465,16 @@ import sys, time
 from pathlib import Path
 import bpy, blender_addon
 blender_addon.register()
-from blender_addon.operators.worker_run import Made, Run, begin
-from blender_addon.operators.request import Method
-from blender_addon.operators.run_steps import decompose
-from blender_addon.files.image_export import Picture
-from blender_addon.worker.process import WorkerEnvironment
+from blender_addon.operators.worker_run import RunOutput, WorkerRun, begin_run
+from blender_addon.operators.request import MethodSettings
+from blender_addon.operators.run_steps import decompose_steps
+from blender_addon.files.image_source import ImageSource
+from blender_addon.worker.commands import WorkerEnvironment
 environment = WorkerEnvironment(Path(sys.executable), (Path({str(environment.search[0])!r}),), Path({str(tmp_path / "cache")!r}))
 folder = Path({str(tmp_path / "run")!r})
 folder.mkdir()
-picture = Picture("cup", path=Path({str(tmp_path / "cup.png")!r}))
-run = begin(Run("Decompose cup", decompose(picture, None, None, Method(), folder, 0, environment), lambda *_: "", folder))
+picture = ImageSource("cup", path=Path({str(tmp_path / "cup.png")!r}))
+run = begin_run(WorkerRun("Decompose cup", decompose_steps(picture, None, None, MethodSettings(), folder, 0, environment), lambda *_: "", folder))
 end = time.monotonic() + 30
 while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exists():
     assert time.monotonic() < end

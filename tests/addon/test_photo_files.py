@@ -12,18 +12,21 @@ import pytest
 bpy = pytest.importorskip("bpy", reason="needs the extra `blender`")
 
 from blender_addon.files.image_export import (  # noqa: E402 (after the skip)
-    Picture,
-    codes,
-    examine,
-    hand_over,
-    hand_over_mask,
-    light,
-    mask_of,
-    orientation,
-    scaled,
+    export_image,
+    export_mask,
+    resize_mask,
+    to_codes,
+    to_linear,
+    to_mask,
+)
+from blender_addon.files.image_source import (  # noqa: E402
+    ImageSource,
+    exif_orientation,
+    inspect_image,
 )
 from isc_core.errors import InputError  # noqa: E402
-from isc_core.photo import read_photo, read_raster, srgb_to_linear  # noqa: E402
+from isc_core.imaging.srgb import srgb_to_linear  # noqa: E402
+from isc_core.photo import read_photo, read_raster  # noqa: E402
 
 WIDTH, HEIGHT = 14, 10
 
@@ -66,8 +69,8 @@ def last(steps: Any) -> Any:
 
 
 def given(image: Any, folder: Path) -> tuple[Path, str]:
-    picture = examine(image)
-    return last(hand_over(picture, folder / "photo")), picture.transfer
+    picture = inspect_image(image)
+    return last(export_image(picture, folder / "photo")), picture.transfer
 
 
 def known_file(path: Path, kind: type, channels: int = 3) -> np.ndarray:
@@ -170,7 +173,7 @@ def test_transparency_arrives_straight(tmp_path: Path, kind: type) -> None:
     )
     cv2.imwrite(str(tmp_path / "a.png"), stored)
     image = bpy.data.images.load(str(tmp_path / "a.png"))
-    path = last(hand_over(examine(image, as_pixels=True), tmp_path / "photo"))
+    path = last(export_image(inspect_image(image, as_pixels=True), tmp_path / "photo"))
     got = read_raster(path)
     peak = float(np.iinfo(kind).max)
     light_of = got.values if kind == np.uint16 else srgb_to_linear(got.values / 255)
@@ -196,7 +199,7 @@ def test_a_photo_with_a_rotation_flag_stays_as_blender_shows_it(
     flag[0x0112] = 6
     smooth = np.linspace(30, 220, HEIGHT * WIDTH * 3).reshape(HEIGHT, WIDTH, 3).astype(np.uint8)
     Image.fromarray(smooth).save(tmp_path / f"a{suffix}", exif=flag)
-    assert orientation((tmp_path / f"a{suffix}").read_bytes()) == 6
+    assert exif_orientation((tmp_path / f"a{suffix}").read_bytes()) == 6
     image = bpy.data.images.load(str(tmp_path / f"a{suffix}"))
     path, _ = given(image, tmp_path)
     assert read_raster(tmp_path / f"a{suffix}").values.shape[:2] == (WIDTH, HEIGHT), (
@@ -210,34 +213,39 @@ def test_a_photo_with_a_rotation_flag_stays_as_blender_shows_it(
 def test_upright_files_are_upright(tmp_path: Path) -> None:
     known_file(tmp_path / "a.png", np.uint8)
     known_file(tmp_path / "a.tif", np.uint8)
-    assert [orientation((tmp_path / name).read_bytes()) for name in ("a.png", "a.tif")] == [1, 1]
+    assert [exif_orientation((tmp_path / name).read_bytes()) for name in ("a.png", "a.tif")] == [
+        1,
+        1,
+    ]
     assert (
-        orientation(b"\xff\xd8\xff\xe1\0\0Exif\0\0II*\0\xff\xff\0\0") == 0
+        exif_orientation(b"\xff\xd8\xff\xe1\0\0Exif\0\0II*\0\xff\xff\0\0") == 0
     )  # a table outside of what was read: not trusted
 
 
 def test_a_wider_working_space_is_brought_to_rec709() -> None:
     to_rec709 = np.array([[1.6, -0.5, -0.1], [-0.1, 1.1, 0], [0, -0.1, 1.1]], np.float32)
-    picture = Picture(
+    picture = ImageSource(
         "a", size=(1, 1), channels=4, is_float=True, associated=True, to_rec709=to_rec709
     )
     pixels = np.array([[[0.2, 0.3, 0.1, 0.5]]], np.float32)
-    got = light(picture, pixels)
+    got = to_linear(picture, pixels)
     np.testing.assert_allclose(got[0, 0, :3], to_rec709 @ [0.4, 0.6, 0.2], rtol=1e-6)
     assert got[0, 0, 3] == 0.5
 
 
 def test_a_grey_float_image_has_three_channels() -> None:
-    picture = Picture("a", size=(2, 1), channels=1, is_float=True)
+    picture = ImageSource("a", size=(2, 1), channels=1, is_float=True)
     np.testing.assert_array_equal(
-        light(picture, np.array([[[0.25], [4.0]]], np.float32))[0], [[0.25] * 3, [4.0] * 3]
+        to_linear(picture, np.array([[[0.25], [4.0]]], np.float32))[0], [[0.25] * 3, [4.0] * 3]
     )
 
 
 def test_codes_survive_the_float_that_blender_makes_of_them() -> None:
     every = np.arange(256, dtype=np.float32).reshape(16, 16, 1) / 255
     opaque = np.concatenate([every, every, every, np.ones_like(every)], axis=2)
-    np.testing.assert_array_equal(codes(Picture("a"), opaque)[..., 0].ravel(), np.arange(256))
+    np.testing.assert_array_equal(
+        to_codes(ImageSource("a"), opaque)[..., 0].ravel(), np.arange(256)
+    )
 
 
 # --- masks ----------------------------------------------------------------------------------------
@@ -249,38 +257,40 @@ def test_a_painted_mask_fits_the_photo(tmp_path: Path) -> None:
     white[..., 3] = 1
     white[2:5, 3:9] = 1
     image.pixels.foreach_set(white[::-1].ravel())
-    path = last(hand_over_mask(examine(image, as_pixels=True), tmp_path / "mask"))
+    path = last(export_mask(inspect_image(image, as_pixels=True), tmp_path / "mask"))
     np.testing.assert_array_equal(np.load(path), white[..., 0] > 0)
 
 
 def test_a_mask_may_be_transparency() -> None:
     pixels = np.ones((2, 2, 4), np.float32)
     pixels[0, 0] = 0
-    np.testing.assert_array_equal(mask_of(Picture("m"), pixels), [[False, True], [True, True]])
+    np.testing.assert_array_equal(to_mask(ImageSource("m"), pixels), [[False, True], [True, True]])
 
 
 def test_a_mask_is_above_half_of_its_brightest_value() -> None:
     pixels = np.array([[[0, 0, 0, 1], [0.1, 0, 0, 1], [0.3, 0.3, 0.3, 1]]], np.float32)
-    np.testing.assert_array_equal(mask_of(Picture("m"), pixels), [[False, False, True]])
+    np.testing.assert_array_equal(to_mask(ImageSource("m"), pixels), [[False, False, True]])
 
 
 def test_an_empty_mask_is_refused() -> None:
     pixels = np.zeros((3, 3, 4), np.float32)
     pixels[..., 3] = 1
     with pytest.raises(InputError, match="mask m is empty: paint"):
-        mask_of(Picture("m"), pixels)
+        to_mask(ImageSource("m"), pixels)
 
 
 def test_a_mask_is_scaled_by_pixel_centres() -> None:
     mask = np.zeros((4, 6), bool)
     mask[1:3, 2:5] = True
-    np.testing.assert_array_equal(scaled(mask, (12, 8)), mask.repeat(2, 0).repeat(2, 1))
-    np.testing.assert_array_equal(scaled(scaled(mask, (18, 12)), (6, 4)), mask)
+    np.testing.assert_array_equal(resize_mask(mask, (12, 8)), mask.repeat(2, 0).repeat(2, 1))
+    np.testing.assert_array_equal(resize_mask(resize_mask(mask, (18, 12)), (6, 4)), mask)
 
 
 def test_a_mask_of_another_size_is_scaled_on_demand(tmp_path: Path) -> None:
     photo, mask = generated(), generated("mask", width=9, height=20)
-    path = last(hand_over_mask(examine(mask, as_pixels=True), tmp_path / "mask", tuple(photo.size)))
+    path = last(
+        export_mask(inspect_image(mask, as_pixels=True), tmp_path / "mask", tuple(photo.size))
+    )
     assert np.load(path).shape == (HEIGHT, WIDTH)
 
 
@@ -293,12 +303,12 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
     image.filepath = str(tmp_path / "nowhere.png")
     image.reload()
     with pytest.raises(InputError, match=r"photo has no data: its file .*nowhere.png is missing"):
-        examine(image)
+        inspect_image(image)
 
 
 def test_a_single_pixel_is_refused() -> None:
     with pytest.raises(InputError, match="is 1 x 1 pixels: choose a larger one"):
-        examine(generated(width=1, height=1))
+        inspect_image(generated(width=1, height=1))
 
 
 @pytest.mark.parametrize(
@@ -308,29 +318,30 @@ def test_what_is_no_single_picture_is_refused(source: str, word: str) -> None:
     image = generated()
     image.source = source
     with pytest.raises(InputError, match=word):
-        examine(image)
+        inspect_image(image)
 
 
 def test_a_byte_image_in_an_unknown_space_is_refused() -> None:
     image = generated()
     image.colorspace_settings.name = "ACEScg"
     with pytest.raises(InputError, match="colour space ACEScg: choose sRGB"):
-        examine(image)
+        inspect_image(image)
 
 
 def test_an_image_that_is_removed_meanwhile_is_missed(tmp_path: Path) -> None:
     image = generated()
-    steps = hand_over(examine(image), tmp_path / "photo")
+    steps = export_image(inspect_image(image), tmp_path / "photo")
     bpy.data.images.remove(image)
-    with pytest.raises(InputError, match="was removed or resized meanwhile"):
+    with pytest.raises(InputError, match="was removed or resized in the meantime"):
         last(steps)
 
 
 def test_a_folder_that_cannot_be_written_is_named(tmp_path: Path) -> None:
     with pytest.raises(
-        InputError, match="cannot write .*: No such file or directory; choose another cache folder"
+        InputError,
+        match=r"cannot write .* \(No such file or directory\): choose another cache folder",
     ):
-        last(hand_over(examine(generated()), tmp_path / "nowhere" / "photo"))
+        last(export_image(inspect_image(generated()), tmp_path / "nowhere" / "photo"))
 
 
 def test_names_of_any_letters_reach_the_worker(tmp_path: Path) -> None:
@@ -346,7 +357,7 @@ def test_the_worker_reads_light_and_mask_together(tmp_path: Path) -> None:
     shape[5:25, 8:30] = 1
     mask.pixels.foreach_set(shape[::-1].ravel())
     photo_path, transfer = given(image, tmp_path)
-    mask_path = last(hand_over_mask(examine(mask), tmp_path / "mask"))
+    mask_path = last(export_mask(inspect_image(mask), tmp_path / "mask"))
     photo = read_photo(photo_path, mask_path, transfer)
     np.testing.assert_array_equal(photo.mask, shape[..., 0] > 0)
     np.testing.assert_allclose(photo.image, srgb_to_linear(pixels_of(image)[..., :3]), atol=1e-6)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from blender_addon.files.result_arrays import Result, read_result
+from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from tests.addon.scene_fixture import bump, write_result
 
@@ -33,9 +33,9 @@ def test_everything_of_the_file_is_in_the_result(bump_folder: Path) -> None:
         assert np.array_equal(getattr(result, name), getattr(d, name)), name
     with np.load(bump_folder / "arrays.npz") as file:
         assert {name for name in file.files if not hasattr(result, name)} == set()
-        assert np.array_equal(result.sky, file["sky"]) and result.reflectance_scale == float(
-            file["reflectance_scale"]
-        )
+        assert np.array_equal(
+            result.environment_map, file["sky"]
+        ) and result.reflectance_scale == float(file["reflectance_scale"])
     assert (
         result.size == (88, 64)
         and result.name == "bump"
@@ -77,13 +77,13 @@ def spoilt(arrays: Arrays, name: str, value: float) -> Arrays:
 
 
 DAMAGES: dict[str, Callable[[Arrays], Arrays]] = {
-    "sky is missing": lambda a: without(a, "sky"),
+    "environment_map is missing": lambda a: without(a, "sky"),
     "normal has the shape": lambda a: a | {"normal": a["normal"][:-1]},
     "diffuse is float64": lambda a: a | {"diffuse": a["diffuse"].astype(float)},
-    "base_color holds NaN": lambda a: spoilt(a, "base_color", np.nan),
-    "holds no object": lambda a: a | {"mask": np.zeros_like(a["mask"])},
-    "points at what is not there": lambda a: spoilt(a, "faces", len(a["vertices"])),
-    "the mesh points": lambda a: spoilt(a, "vertex_pixel", -1),
+    "base_color contains NaN": lambda a: spoilt(a, "base_color", np.nan),
+    "contains no object": lambda a: a | {"mask": np.zeros_like(a["mask"])},
+    "refers to missing vertices or pixels": lambda a: spoilt(a, "faces", len(a["vertices"])),
+    "the mesh refers": lambda a: spoilt(a, "vertex_pixel", -1),
 }
 
 
@@ -113,7 +113,7 @@ def test_the_variation_of_the_gloss_is_read_where_there_is_one(
     with np.load(folder / "arrays.npz") as file:
         arrays = {name: file[name] for name in file.files}
     np.savez(folder / "arrays.npz", **arrays, specular_variation=arrays["confidence"])
-    result: Result = read_result(folder)
+    result: ResultArrays = read_result(folder)
     assert result.specular_variation is not None and np.array_equal(
         result.specular_variation, arrays["confidence"]
     )

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.files.result_arrays import Result, read_result
+from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from tests.addon.scene_fixture import bump, write_result
 from tests.addon.scene_render import pixels
@@ -32,15 +32,14 @@ KINDS = (
 )
 
 
-def build(result: Result, scene: Any = None, **options: Any) -> Any:
-    from blender_addon.scene import BuildOptions
-    from blender_addon.scene import build as build_scene
+def build(result: ResultArrays, scene: Any = None, **options: Any) -> Any:
+    from blender_addon.scene import BuildOptions, build_object
 
-    return build_scene(result, BuildOptions(**options), scene=scene)
+    return build_object(result, BuildOptions(**options), scene=scene)
 
 
 @pytest.fixture
-def result(bump_folder: Path) -> Result:
+def result(bump_folder: Path) -> ResultArrays:
     return read_result(bump_folder)
 
 
@@ -60,7 +59,7 @@ def census(bpy: Any) -> dict[str, list[str]]:
     ],
     ids=str,
 )
-def test_nothing_piles_up(blender: Any, result: Result, options: dict[str, Any]) -> None:
+def test_nothing_piles_up(blender: Any, result: ResultArrays, options: dict[str, Any]) -> None:
     build(result, **options)
     once = census(blender)
     build(result, **options)
@@ -70,7 +69,9 @@ def test_nothing_piles_up(blender: Any, result: Result, options: dict[str, Any])
     ]
 
 
-def test_other_options_leave_nothing_of_the_earlier_ones(blender: Any, result: Result) -> None:
+def test_other_options_leave_nothing_of_the_earlier_ones(
+    blender: Any, result: ResultArrays
+) -> None:
     build(result)
     plain = census(blender)
     build(result, sun=True, displacement=True, specular_from="image", size_metres=0.3)
@@ -81,7 +82,7 @@ def test_other_options_leave_nothing_of_the_earlier_ones(blender: Any, result: R
 
 
 def test_another_resolution_updates_the_same_object(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     built = build(result)
     once = census(blender)
@@ -97,7 +98,7 @@ def test_another_resolution_updates_the_same_object(
     assert (again.scene.render.resolution_x, again.scene.render.resolution_y) == (130, 100)
 
 
-def test_two_photos_stand_beside_each_other(blender: Any, result: Result) -> None:
+def test_two_photos_stand_beside_each_other(blender: Any, result: ResultArrays) -> None:
     first, second = build(result, name="one"), build(result, name="two")
     assert (
         first.object != second.object
@@ -107,13 +108,13 @@ def test_two_photos_stand_beside_each_other(blender: Any, result: Result) -> Non
     assert first.object.data != second.object.data and len(blender.data.node_groups) == 1
 
 
-def of_photo(result: Result, letter: str) -> Result:
+def of_photo(result: ResultArrays, letter: str) -> ResultArrays:
     """The same result as if it were that of another photo of the same name."""
     source = {**result.description["input"], "sha256": 64 * letter}
     return replace(result, description={**result.description, "input": source})
 
 
-def test_photos_of_one_name_do_not_replace_each_other(blender: Any, result: Result) -> None:
+def test_photos_of_one_name_do_not_replace_each_other(blender: Any, result: ResultArrays) -> None:
     """Cameras count from DSC0001 in every folder."""
     results = [of_photo(result, letter) for letter in "abc"]
     made = [build(one) for one in results]
@@ -133,23 +134,24 @@ def test_photos_of_one_name_do_not_replace_each_other(blender: Any, result: Resu
     ) == once
 
 
-def test_a_photo_of_unknown_origin_is_told_by_its_name(blender: Any, result: Result) -> None:
+def test_a_photo_of_unknown_origin_is_told_by_its_name(blender: Any, result: ResultArrays) -> None:
     thing = build(of_photo(result, "a")).object
     assert build(replace(result, description={}), name="bump").object == thing
 
 
-def test_an_image_is_the_same_photo_after_it_was_painted_on(blender: Any, result: Result) -> None:
-    from blender_addon.scene import BuildOptions
-    from blender_addon.scene import build as build_scene
+def test_an_image_is_the_same_photo_after_it_was_painted_on(
+    blender: Any, result: ResultArrays
+) -> None:
+    from blender_addon.scene import BuildOptions, build_object
 
     first, second = (blender.data.images.new("bump", 8, 8) for _ in range(2))
-    thing = build_scene(of_photo(result, "a"), BuildOptions(name="bump"), photo=first).object
+    thing = build_object(of_photo(result, "a"), BuildOptions(name="bump"), photo=first).object
     thing["isc_source_image"] = first
     assert (
-        build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=first).object == thing
+        build_object(of_photo(result, "b"), BuildOptions(name="bump"), photo=first).object == thing
     )
     assert (
-        build_scene(of_photo(result, "b"), BuildOptions(name="bump"), photo=second).object != thing
+        build_object(of_photo(result, "b"), BuildOptions(name="bump"), photo=second).object != thing
     )
 
 
@@ -166,7 +168,7 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_any_name_will_do(blender: Any, result: Result, name: str) -> None:
+def test_any_name_will_do(blender: Any, result: ResultArrays, name: str) -> None:
     built = build(result, name=name)
     once = census(blender)
     assert build(result, name=name).object == built.object and census(blender) == once
@@ -179,13 +181,13 @@ def test_any_name_will_do(blender: Any, result: Result, name: str) -> None:
     assert built.camera.name.endswith("camera")
 
 
-def test_names_that_start_alike_are_different_objects(blender: Any, result: Result) -> None:
+def test_names_that_start_alike_are_different_objects(blender: Any, result: ResultArrays) -> None:
     first, second = build(result, name="x" * 300), build(result, name="x" * 300 + "y")
     assert first.object != second.object
     assert build(result, name="x" * 300).object == first.object
 
 
-def test_renamed_things_are_found(blender: Any, result: Result) -> None:
+def test_renamed_things_are_found(blender: Any, result: ResultArrays) -> None:
     built = build(result)
     for part, name in (
         (built.object, "vase"),
@@ -230,7 +232,7 @@ def user_scene(bpy: Any) -> Any:
 
 
 @pytest.mark.parametrize("own", [True, False])
-def test_the_users_scene_stays_as_it_is(blender: Any, result: Result, own: bool) -> None:
+def test_the_users_scene_stays_as_it_is(blender: Any, result: ResultArrays, own: bool) -> None:
     scene = user_scene(blender)
     before, objects = state(scene), set(scene.objects)
     built = build(result, own_scene=own, sun=True)
@@ -258,20 +260,20 @@ CHANGES: dict[str, Callable[[Any, Any], bool]] = {
 
 
 @pytest.mark.parametrize("chosen", CHANGES)
-def test_a_checkbox_changes_what_it_says(blender: Any, result: Result, chosen: str) -> None:
+def test_a_checkbox_changes_what_it_says(blender: Any, result: ResultArrays, chosen: str) -> None:
     scene = user_scene(blender)
     scene.view_settings.view_transform = "AgX"
     built = build(result, own_scene=False, **{chosen: True})
     assert {name for name, changed in CHANGES.items() if changed(scene, built)} == {chosen}
 
 
-def test_a_scene_can_be_chosen(blender: Any, result: Result) -> None:
+def test_a_scene_can_be_chosen(blender: Any, result: ResultArrays) -> None:
     other = blender.data.scenes.new("other")
     assert build(result, scene=other, own_scene=False).object.name in other.objects
     assert not blender.context.scene.objects
 
 
-def test_what_it_was_made_of_is_written_down(blender: Any, result: Result) -> None:
+def test_what_it_was_made_of_is_written_down(blender: Any, result: ResultArrays) -> None:
     built = build(result, size_metres=0.25)
     for block in (built.object, built.collection):
         assert (block["isc_photo"], block["isc_model"], block["isc_separator"]) == (
@@ -284,23 +286,27 @@ def test_what_it_was_made_of_is_written_down(blender: Any, result: Result) -> No
         assert json.loads(block["isc_options"])["size_metres"] == 0.25
 
 
-def test_what_isc_made_is_recognised(blender: Any, result: Result) -> None:
-    from blender_addon.scene import find, is_isc
+def test_what_isc_made_is_recognised(blender: Any, result: ResultArrays) -> None:
+    from blender_addon.scene import find_built, is_isc_datablock
 
     built = build(result, sun=True)
     sun = next(thing for thing in built.collection.objects if thing.type == "LIGHT")
-    assert find(built.object) == built and find(built.camera) == built and find(sun) == built
+    assert (
+        find_built(built.object) == built
+        and find_built(built.camera) == built
+        and find_built(sun) == built
+    )
     stranger = blender.data.objects.new("cube", None)
     assert (
-        find(stranger) is None
-        and find(None) is None
-        and not is_isc(stranger)
-        and not is_isc(None)
-        and is_isc(built.object)
+        find_built(stranger) is None
+        and find_built(None) is None
+        and not is_isc_datablock(stranger)
+        and not is_isc_datablock(None)
+        and is_isc_datablock(built.object)
     )
 
 
-def check_loaded(bpy: Any, thing: Any, result: Result) -> None:
+def check_loaded(bpy: Any, thing: Any, result: ResultArrays) -> None:
     """An object that came out of a file is whole: mesh, normals, material, images with their exact
     values.
     """
@@ -328,20 +334,20 @@ def save(bpy: Any, path: Path) -> None:
 
 
 def test_everything_survives_saving_and_loading(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
-    from blender_addon.scene import find
+    from blender_addon.scene import find_built
 
     build(result, sun=True)
     once = census(blender)
     save(blender, tmp_path / "saved.blend")
     blender.ops.wm.open_mainfile(filepath=str(tmp_path / "saved.blend"))
     assert census(blender) == once
-    built = find(next(thing for thing in blender.data.objects if thing.type == "MESH"))
+    built = find_built(next(thing for thing in blender.data.objects if thing.type == "MESH"))
     assert built is not None
     check_loaded(blender, built.object, result)
     sky = next(node for node in built.world.node_tree.nodes if node.type == "TEX_ENVIRONMENT").image
-    np.testing.assert_array_equal(pixels(sky)[..., :3], result.sky)
+    np.testing.assert_array_equal(pixels(sky)[..., :3], result.environment_map)
     assert built.scene.camera == built.camera and built.world["isc_rotation"] == 90
     (shown,) = built.camera.data.background_images
     assert np.array_equal(pixels(shown.image)[..., 3] > 0.5, result.mask)
@@ -351,9 +357,9 @@ def test_everything_survives_saving_and_loading(
 
 @pytest.mark.parametrize("kind", ["objects", "collections", "scenes"])
 def test_everything_survives_appending(
-    blender: Any, result: Result, tmp_path: Path, kind: str
+    blender: Any, result: ResultArrays, tmp_path: Path, kind: str
 ) -> None:
-    from blender_addon.scene import find
+    from blender_addon.scene import find_built
 
     name = {"objects": "object", "collections": "collection", "scenes": "scene"}[kind]
     wanted = getattr(build(result), name).name
@@ -366,7 +372,7 @@ def test_everything_survives_appending(
     assert bool(blender.data.cameras) == (kind != "objects") and thing["isc_world"] in set(
         blender.data.worlds
     )
-    found = find(thing)
+    found = find_built(thing)
     assert found is not None and found.object == thing and found.world == thing["isc_world"]
     assert (found.camera is None) == (kind == "objects")
     assert build(result).object == thing, "what was appended is updated, too"
@@ -379,7 +385,7 @@ def link(bpy: Any, path: Path, kind: str, name: str) -> Any:
 
 
 def test_linked_things_are_refused_and_nothing_changes(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     name = build(result).collection.name
     save(blender, tmp_path / "saved.blend")
@@ -398,7 +404,7 @@ def test_linked_things_are_refused_and_nothing_changes(
     assert group.library is None, "the linked file's group was used"
 
 
-def test_a_linked_scene_is_refused(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_a_linked_scene_is_refused(blender: Any, result: ResultArrays, tmp_path: Path) -> None:
     blender.context.scene.name = "far"
     save(blender, tmp_path / "other.blend")
     blender.ops.wm.read_factory_settings(use_empty=True)
@@ -411,7 +417,7 @@ def test_a_linked_scene_is_refused(blender: Any, result: Result, tmp_path: Path)
 
 @pytest.mark.parametrize("size", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_size_that_is_none_is_refused_and_nothing_changes(
-    blender: Any, result: Result, size: float
+    blender: Any, result: ResultArrays, size: float
 ) -> None:
     before = census(blender)
     with pytest.raises(InputError, match="metres"):
@@ -419,14 +425,14 @@ def test_a_size_that_is_none_is_refused_and_nothing_changes(
     assert census(blender) == before
 
 
-def test_a_displaced_grid_with_a_back_is_refused(blender: Any, result: Result) -> None:
+def test_a_displaced_grid_with_a_back_is_refused(blender: Any, result: ResultArrays) -> None:
     with pytest.raises(InputError, match="choose"):
         build(result, displacement=True, closed_back=True)
     assert not blender.data.objects
 
 
 def test_a_colour_configuration_without_our_spaces_is_refused(
-    blender: Any, result: Result, monkeypatch: pytest.MonkeyPatch
+    blender: Any, result: ResultArrays, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(importlib.import_module("blender_addon.scene.build"), "DATA", "Cinema Data")
     before = census(blender)
@@ -435,7 +441,7 @@ def test_a_colour_configuration_without_our_spaces_is_refused(
     assert census(blender) == before
 
 
-def test_an_object_that_is_being_edited_is_refused(blender: Any, result: Result) -> None:
+def test_an_object_that_is_being_edited_is_refused(blender: Any, result: ResultArrays) -> None:
     built = build(result, own_scene=False)
     blender.context.view_layer.objects.active = built.object
     blender.ops.object.mode_set(mode="EDIT")
@@ -445,7 +451,7 @@ def test_an_object_that_is_being_edited_is_refused(blender: Any, result: Result)
     build(result, own_scene=False)
 
 
-def test_deleted_parts_are_made_again(blender: Any, result: Result) -> None:
+def test_deleted_parts_are_made_again(blender: Any, result: ResultArrays) -> None:
     built = build(result)
     once = census(blender)
     blender.data.objects.remove(built.camera)
@@ -456,7 +462,7 @@ def test_deleted_parts_are_made_again(blender: Any, result: Result) -> None:
     assert census(blender) == once
 
 
-def test_a_mesh_with_shape_keys_is_filled_anew(blender: Any, result: Result) -> None:
+def test_a_mesh_with_shape_keys_is_filled_anew(blender: Any, result: ResultArrays) -> None:
     built = build(result)
     built.object.shape_key_add(name="Basis")
     built.object.shape_key_add(name="bent")
@@ -464,7 +470,9 @@ def test_a_mesh_with_shape_keys_is_filled_anew(blender: Any, result: Result) -> 
     assert built.object.data.shape_keys is None and len(built.object.data.polygons) == 100
 
 
-def test_things_that_happen_to_have_its_names_are_left_alone(blender: Any, result: Result) -> None:
+def test_things_that_happen_to_have_its_names_are_left_alone(
+    blender: Any, result: ResultArrays
+) -> None:
     cube = blender.data.objects.new("bump", blender.data.meshes.new("bump"))
     clay, group = (
         blender.data.materials.new("bump"),
@@ -484,7 +492,7 @@ def test_things_that_happen_to_have_its_names_are_left_alone(blender: Any, resul
 
 
 def test_an_object_shadows_itself_where_it_stands_among_others(
-    blender: Any, result: Result
+    blender: Any, result: ResultArrays
 ) -> None:
     """The recovered shading holds the photo's shadows; in a user's scene people expect an object to
     cast one.

@@ -7,16 +7,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.files.result_arrays import Result, read_result
+from blender_addon.files.result_arrays import ResultArrays, read_result
 from tests.addon.scene_fixture import bump, write_result
 from tests.addon.scene_render import pixels, render
 
 
-def build(result: Result, photo: Any = None, **options: Any) -> Any:
-    from blender_addon.scene import BuildOptions
-    from blender_addon.scene import build as build_scene
+def build(result: ResultArrays, photo: Any = None, **options: Any) -> Any:
+    from blender_addon.scene import BuildOptions, build_object
 
-    return build_scene(result, BuildOptions(**options), photo=photo)
+    return build_object(result, BuildOptions(**options), photo=photo)
 
 
 @pytest.mark.parametrize(

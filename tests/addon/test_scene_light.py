@@ -7,25 +7,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.files.result_arrays import Result, read_result
-from isc_core.environment import directions, shading_under
+from blender_addon.files.result_arrays import ResultArrays, read_result
+from isc_core.shading.environment_map import directions, shading_under
 from tests.addon.scene_render import render
 
 
-def build(result: Result, **options: Any) -> Any:
-    from blender_addon.scene import BuildOptions
-    from blender_addon.scene import build as build_scene
+def build(result: ResultArrays, **options: Any) -> Any:
+    from blender_addon.scene import BuildOptions, build_object
 
-    return build_scene(result, BuildOptions(**options))
+    return build_object(result, BuildOptions(**options))
 
 
 @pytest.fixture
-def result(bump_folder: Path) -> Result:
+def result(bump_folder: Path) -> ResultArrays:
     return read_result(bump_folder)
 
 
 def lit(
-    built: Any, result: Result, folder: Path, samples: int = 200
+    built: Any, result: ResultArrays, folder: Path, samples: int = 200
 ) -> tuple[np.ndarray, np.ndarray]:
     """Direct light on a white surface, and where:
 
@@ -38,7 +37,7 @@ def lit(
 
 
 def test_the_world_gives_the_recovered_shading(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     seen, where = lit(build(result), result, tmp_path)
     wanted = result.shading[where] / result.reflectance_scale
@@ -55,23 +54,23 @@ def apart(seen: np.ndarray, wanted: np.ndarray) -> float:
 
 @pytest.mark.parametrize("axis", range(3))
 def test_light_comes_from_where_it_was(
-    blender: Any, result: Result, tmp_path: Path, axis: int
+    blender: Any, result: ResultArrays, tmp_path: Path, axis: int
 ) -> None:
     """A sky that shines red from one half of an axis and blue from the other."""
     side = directions(16)[..., axis] > 0
     sky = np.where(side[..., None], [1.0, 0.1, 0.1], [0.1, 0.1, 1.0]).astype(np.float32)
-    seen, where = lit(build(replace(result, sky=sky)), result, tmp_path, 100)
+    seen, where = lit(build(replace(result, environment_map=sky)), result, tmp_path, 100)
     assert apart(seen, shading_under(sky, result.normal[where].astype(float))) < 0.02
 
 
 def test_the_rotation_is_said_and_turns_the_light(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     from blender_addon.scene.world import MAPPING
 
     side = directions(16)[..., 0] > 0
     sky = np.where(side[..., None], [1.0, 0, 0], [0, 0, 1.0]).astype(np.float32)
-    built = build(replace(result, sky=sky))
+    built = build(replace(result, environment_map=sky))
     mapping = built.world.node_tree.nodes[MAPPING]
     assert np.rad2deg(mapping.inputs["Rotation"].default_value[2]) == pytest.approx(
         built.world["isc_rotation"]
@@ -82,7 +81,7 @@ def test_the_rotation_is_said_and_turns_the_light(
     assert apart(seen, turned) < 0.03
 
 
-def sunlit(result: Result) -> Result:
+def sunlit(result: ResultArrays) -> ResultArrays:
     direction = np.array([-0.5, 0.4, 0.768], np.float32)
     strength, ambient = np.array([2.0, 1.0, 0.5], np.float32), np.array([0.1, 0.2, 0.3], np.float32)
     return replace(
@@ -93,13 +92,13 @@ def sunlit(result: Result) -> Result:
     )
 
 
-def expected(result: Result, where: np.ndarray) -> np.ndarray:
+def expected(result: ResultArrays, where: np.ndarray) -> np.ndarray:
     facing = np.maximum(result.normal[where] @ result.sun_direction, 0)[:, None]
     return result.sun_strength / np.pi * facing + result.sun_ambient
 
 
 def test_the_sun_and_the_even_rest_give_the_shading_of_the_optimal_light(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     sunny = sunlit(result)
     built = build(sunny, sun=True)
@@ -113,7 +112,7 @@ def test_the_sun_and_the_even_rest_give_the_shading_of_the_optimal_light(
     )
 
 
-def test_an_object_is_relit_from_what_it_knows(blender: Any, result: Result) -> None:
+def test_an_object_is_relit_from_what_it_knows(blender: Any, result: ResultArrays) -> None:
     from blender_addon.scene.sun import relight
     from blender_addon.scene.world import SUN
 

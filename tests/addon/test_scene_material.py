@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.files.result_arrays import Result, read_result
-from isc_core.brdf.ggx import Ggx
-from isc_core.brdf.shading import directional, radiance
+from blender_addon.files.result_arrays import ResultArrays, read_result
+from isc_core.shading.brdf.ggx import Ggx
+from isc_core.shading.radiance import directional, radiance
 from tests.addon.scene_render import pixels, render
 
 SOCKETS = {
@@ -28,11 +28,10 @@ SOCKETS = {
 }
 
 
-def build(result: Result, **options: Any) -> Any:
-    from blender_addon.scene import BuildOptions
-    from blender_addon.scene import build as build_scene
+def build(result: ResultArrays, **options: Any) -> Any:
+    from blender_addon.scene import BuildOptions, build_object
 
-    return build_scene(result, BuildOptions(**options))
+    return build_object(result, BuildOptions(**options))
 
 
 def group_node(built: Any) -> Any:
@@ -41,7 +40,7 @@ def group_node(built: Any) -> Any:
     return dichromatic_node(built.material)
 
 
-def inside(result: Result, rings: int = 2) -> np.ndarray:
+def inside(result: ResultArrays, rings: int = 2) -> np.ndarray:
     """Pixels that the mesh covers for sure, away from the edge between the two paints."""
     mask = result.mask.copy()
     for _ in range(rings):
@@ -51,11 +50,11 @@ def inside(result: Result, rings: int = 2) -> np.ndarray:
 
 
 @pytest.fixture
-def result(bump_folder: Path) -> Result:
+def result(bump_folder: Path) -> ResultArrays:
     return read_result(bump_folder)
 
 
-def test_every_socket_has_a_tooltip_and_a_range(blender: Any, result: Result) -> None:
+def test_every_socket_has_a_tooltip_and_a_range(blender: Any, result: ResultArrays) -> None:
     tree = group_node(build(result)).node_tree
     inputs = {item.name: item for item in tree.interface.items_tree if item.in_out == "INPUT"}
     assert set(inputs) == SOCKETS and tree.name == "ISC Dichromatic"
@@ -73,7 +72,7 @@ def test_every_socket_has_a_tooltip_and_a_range(blender: Any, result: Result) ->
 
 
 def test_the_paint_is_the_base_color_to_float32(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     built = build(result)
     paint = render(built.scene, tmp_path)["Diffuse Color"]
@@ -82,7 +81,9 @@ def test_the_paint_is_the_base_color_to_float32(
     assert not built.material.node_tree.nodes.get("ISC Photo Highlights")
 
 
-def test_images_have_the_right_colour_space_and_are_packed(blender: Any, result: Result) -> None:
+def test_images_have_the_right_colour_space_and_are_packed(
+    blender: Any, result: ResultArrays
+) -> None:
     built = build(replace(result, specular_variation=result.confidence))
     spaces = {image["isc_role"]: image.colorspace_settings.name for image in blender.data.images}
     data = {"normal", "height", "confidence", "mask", "specular_variation"}
@@ -92,7 +93,7 @@ def test_images_have_the_right_colour_space_and_are_packed(blender: Any, result:
     np.testing.assert_array_equal(pixels(built.object["isc_map_height"])[..., 0], result.height)
 
 
-def test_recolouring_turns_the_hue(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_recolouring_turns_the_hue(blender: Any, result: ResultArrays, tmp_path: Path) -> None:
     built = build(result)
     node, here = group_node(built), inside(result)
     node.inputs["Hue"].default_value = 0.5 + 1 / 3
@@ -116,7 +117,7 @@ def lamp(built: Any, direction: np.ndarray) -> None:
     ensure_sun(built.object["isc_key"], built.collection, direction, np.ones(3)).data.angle = 0
 
 
-def test_gloss_is_added_to_the_paint(blender: Any, result: Result, tmp_path: Path) -> None:
+def test_gloss_is_added_to_the_paint(blender: Any, result: ResultArrays, tmp_path: Path) -> None:
     """Dichromatic: the gloss takes nothing from the paint, and grows with its gain."""
     built = build(result)
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
@@ -245,7 +246,7 @@ def test_a_specular_image_is_a_factor_of_the_level(
     assert mirrored(blender, tmp_path, 85).max() == 0
 
 
-def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result) -> None:
+def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: ResultArrays) -> None:
     fitted = replace(
         result, roughness=0.3, specular_level=1.7, specular_variation=result.confidence
     )
@@ -265,7 +266,7 @@ def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result
 
 
 def test_the_photos_own_highlights_are_seen_and_light_nothing(
-    blender: Any, result: Result, tmp_path: Path
+    blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     from blender_addon.scene.material import set_specular_gain
 
@@ -293,7 +294,7 @@ def test_the_photos_own_highlights_are_seen_and_light_nothing(
     )
 
 
-def test_what_people_set_stays(blender: Any, result: Result) -> None:
+def test_what_people_set_stays(blender: Any, result: ResultArrays) -> None:
     built = build(result)
     node = group_node(built)
     for name, value in (
@@ -314,7 +315,7 @@ def test_what_people_set_stays(blender: Any, result: Result) -> None:
 
 
 def test_the_group_is_shared_and_another_versions_is_left_alone(
-    blender: Any, result: Result
+    blender: Any, result: ResultArrays
 ) -> None:
     from blender_addon.scene.dichromatic import VERSION
 
@@ -333,7 +334,9 @@ def test_the_group_is_shared_and_another_versions_is_left_alone(
     assert group_node(second).inputs["Hue"].default_value == pytest.approx(0.2)
 
 
-def test_an_edited_group_is_kept_and_a_broken_one_replaced(blender: Any, result: Result) -> None:
+def test_an_edited_group_is_kept_and_a_broken_one_replaced(
+    blender: Any, result: ResultArrays
+) -> None:
     tree = group_node(build(result)).node_tree
     tree.nodes.new("ShaderNodeMath").name = "mine"
     assert "mine" in group_node(build(result, name="two")).node_tree.nodes
@@ -343,7 +346,7 @@ def test_an_edited_group_is_kept_and_a_broken_one_replaced(blender: Any, result:
     assert group_node(build(result, name="three")).node_tree != tree
 
 
-def test_the_normal_map_is_used_where_it_says_something(blender: Any, result: Result) -> None:
+def test_the_normal_map_is_used_where_it_says_something(blender: Any, result: ResultArrays) -> None:
     node = group_node(build(result))
     assert not node.inputs["Normal"].is_linked
     tilted = result.normal_map.copy()

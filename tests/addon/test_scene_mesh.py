@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.files.result_arrays import Result, read_result
-from isc_core.mesh import MeshOptions
+from blender_addon.files.result_arrays import ResultArrays, read_result
+from isc_core.result_files.mesh import MeshOptions
 from tests.addon.scene_fixture import bump, write_result
 
 
@@ -20,11 +20,10 @@ def got(values: Any, name: str, width: int, kind: type = np.float32) -> np.ndarr
     return out.reshape(-1, width) if width > 1 else out
 
 
-def build(result: Result, **options: Any) -> Any:
-    from blender_addon.scene import BuildOptions
-    from blender_addon.scene import build as build_scene
+def build(result: ResultArrays, **options: Any) -> Any:
+    from blender_addon.scene import BuildOptions, build_object
 
-    return build_scene(result, BuildOptions(**options))
+    return build_object(result, BuildOptions(**options))
 
 
 def test_places_normals_uv_and_confidence_are_the_results(blender: Any, bump_folder: Path) -> None:

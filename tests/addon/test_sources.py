@@ -48,13 +48,11 @@ def test_masks_come_from_a_file_or_a_folder(tmp_path: Path) -> None:
     masks = [touch(tmp_path / "masks" / "a.png"), touch(tmp_path / "masks" / "b_mask.png")]
     assert [source.mask for source in find_sources([a, b], tmp_path / "masks")] == masks
     masks[1].unlink()
-    with pytest.raises(InputError, match=r"holds no mask for b.jpg: name it b.png"):
+    with pytest.raises(InputError, match=r"contains no mask for b.jpg: name it b.png"):
         find_sources([a, b], tmp_path / "masks")
-    with pytest.raises(
-        InputError, match="is one file, but there are 2 photos: give a folder of masks"
-    ):
+    with pytest.raises(InputError, match="is one file for 2 photos: give a folder of masks"):
         find_sources([a, b], one)
-    with pytest.raises(InputError, match="there is no such mask"):
+    with pytest.raises(InputError, match="no such mask"):
         find_sources([a], tmp_path / "none.png")
 
 
@@ -68,9 +66,9 @@ def test_names_differ_even_where_capitals_do_not_count(tmp_path: Path) -> None:
 
 
 def test_what_is_not_there_or_holds_nothing_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"none.png: there is no such photo or folder"):
+    with pytest.raises(InputError, match=r"none.png: no such photo or folder"):
         find_sources([tmp_path / "none.png"], None)
-    with pytest.raises(InputError, match="holds no photo .* and no result"):
+    with pytest.raises(InputError, match="contains no photo .* and no result"):
         find_sources([tmp_path], None)
 
 
@@ -90,9 +88,7 @@ def test_where_the_files_go() -> None:
     assert output_files(one, Path("o.EXR"), (".png", ".exr"), "--render", together=False) == [
         Path("o.EXR")
     ]
-    with pytest.raises(
-        InputError, match="--render o.png is one file, but there are 2 objects: give a folder"
-    ):
+    with pytest.raises(InputError, match="--render o.png is one file for 2 objects: give a folder"):
         output_files(two, Path("o.png"), (".png", ".exr"), "--render", together=False)
 
 

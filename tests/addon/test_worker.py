@@ -18,20 +18,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from blender_addon.worker.process import (
-    Job,
-    Update,
-    Worker,
+from blender_addon.worker.commands import (
+    DecomposeJob,
     WorkerEnvironment,
-    box_mask,
-    start,
     start_arrays,
+    start_box_mask,
+    start_decompose,
     start_edit,
 )
-from isc_core.atomic import remove_unfinished, unfinished
+from blender_addon.worker.process import WorkerProcess, WorkerUpdate
 from isc_core.errors import InputError
-from isc_core.photo import linear_to_srgb
-from isc_core.result_folder import load, save
+from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.io.atomic import remove_unfinished, unfinished
+from isc_core.result_files.result_folder import load, save
 from tests.core.ball_scene import ball
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -79,24 +78,26 @@ def real(cache: Path) -> WorkerEnvironment:
 
 
 @pytest.fixture
-def stand_in(tmp_path: Path) -> Callable[[str], WorkerEnvironment]:
+def fake_core(tmp_path: Path) -> Callable[[str], WorkerEnvironment]:
     """Makes an environment whose `isc_core` behaves as the given lines say."""
 
     def make(lines: str) -> WorkerEnvironment:
-        package = tmp_path / "stand_in" / "isc_core"
+        package = tmp_path / "fake_core" / "isc_core"
         package.mkdir(parents=True)
         (package / "__init__.py").touch()
         (package / "__main__.py").write_text(STAND_IN + lines)
-        return WorkerEnvironment(Path(sys.executable), (tmp_path / "stand_in",), tmp_path / "cache")
+        return WorkerEnvironment(
+            Path(sys.executable), (tmp_path / "fake_core",), tmp_path / "cache"
+        )
 
     return make
 
 
 def ended(
-    worker: Worker,
+    worker: WorkerProcess,
     seconds: float = 120.0,
-    until: Callable[[Update], bool] = lambda update: update.state != "running",
-) -> Update:
+    until: Callable[[WorkerUpdate], bool] = lambda update: update.state != "running",
+) -> WorkerUpdate:
     """The first update that meets the condition: the worker's end, if nothing else is asked for."""
     deadline = time.monotonic() + seconds
     while not until(update := worker.poll()):
@@ -105,7 +106,7 @@ def ended(
     return update
 
 
-def at_stage(worker: Worker, stage: str) -> None:
+def at_stage(worker: WorkerProcess, stage: str) -> None:
     """Waits until the worker is there."""
     assert (
         ended(
@@ -115,14 +116,16 @@ def at_stage(worker: Worker, stage: str) -> None:
     )
 
 
-def process_of(worker: Worker) -> "subprocess.Popen[str]":
+def process_of(worker: WorkerProcess) -> "subprocess.Popen[str]":
     return worker._process
 
 
 def job(
     photo: Path, output: Path, mask: Path | None = None, model: str = "naive", **changes: Any
-) -> Job:
-    return Job(photo, output, mask, model, "none", "natural", 64, **{"threads": 1, **changes})
+) -> DecomposeJob:
+    return DecomposeJob(
+        photo, output, mask, model, "none", "natural", 64, **{"threads": 1, **changes}
+    )
 
 
 def ball_arrays(folder: Path) -> tuple[Path, Path]:
@@ -135,7 +138,7 @@ def ball_arrays(folder: Path) -> tuple[Path, Path]:
 
 def others(folder: Path, *expected: str) -> list[str]:
     """What is in a folder besides."""
-    return sorted({entry.name for entry in folder.iterdir()} - {"cache", "stand_in", *expected})
+    return sorted({entry.name for entry in folder.iterdir()} - {"cache", "fake_core", *expected})
 
 
 # --- real work ------------------------------------------------------------------------------------
@@ -145,8 +148,8 @@ def test_arrays_go_in_and_a_result_with_arrays_comes_out(
     tmp_path: Path, real: WorkerEnvironment
 ) -> None:
     photo, mask = ball_arrays(tmp_path)
-    seen: list[Update] = []
-    worker = start(job(photo, tmp_path / "new" / "result", mask), real)
+    seen: list[WorkerUpdate] = []
+    worker = start_decompose(job(photo, tmp_path / "new" / "result", mask), real)
     final = ended(worker, until=lambda update: seen.append(update) or update.state != "running")  # type: ignore[func-returns-value]
     assert (final.state, final.fraction) == ("done", 1.0), final
     assert final.message == f"look at {tmp_path / 'new' / 'result' / 'preview.png'}"
@@ -165,8 +168,8 @@ def test_arrays_go_in_and_a_result_with_arrays_comes_out(
 
 
 def test_a_mistake_is_told_in_one_line(tmp_path: Path, real: WorkerEnvironment) -> None:
-    final = ended(start(job(tmp_path / "nowhere.png", tmp_path / "result"), real))
-    assert (final.state, final.report) == ("failed", "")
+    final = ended(start_decompose(job(tmp_path / "nowhere.png", tmp_path / "result"), real))
+    assert (final.state, final.log) == ("failed", "")
     assert final.message == f"{tmp_path / 'nowhere.png'}: there is no such file"
     assert others(tmp_path) == []
 
@@ -180,9 +183,13 @@ def test_masks_edits_and_arrays_are_made_by_workers_too(
         np.rint(255 * linear_to_srgb(np.clip(d.image, 0, 1))).astype(np.uint8),
     )
     save(d, tmp_path / "result")
-    final = ended(box_mask(tmp_path / "photo.npy", (4, 4, 62, 52), tmp_path / "mask.png", real))
+    final = ended(
+        start_box_mask(tmp_path / "photo.npy", (4, 4, 62, 52), tmp_path / "mask.png", real)
+    )
     assert final.state == "done" and (tmp_path / "mask.png").is_file(), final
-    final = ended(box_mask(tmp_path / "photo.npy", (-4, 4, 62, 52), tmp_path / "other.png", real))
+    final = ended(
+        start_box_mask(tmp_path / "photo.npy", (-4, 4, 62, 52), tmp_path / "other.png", real)
+    )
     assert final.state == "failed" and "-4" in final.message
     assert ended(start_arrays(tmp_path / "result", real)).state == "done"
     assert (tmp_path / "result" / "arrays.npz").is_file()
@@ -201,7 +208,7 @@ def test_cancelled_while_it_compiles(tmp_path: Path, real: WorkerEnvironment) ->
     midst, and tidies up.
     """
     photo, mask = ball_arrays(tmp_path)
-    worker = start(job(photo, tmp_path / "new" / "result", mask, "sirfs"), real)
+    worker = start_decompose(job(photo, tmp_path / "new" / "result", mask, "sirfs"), real)
     at_stage(worker, "preparing the compiled kernels")
     worker.cancel()
     assert ended(worker, 30).state == "cancelled"
@@ -215,12 +222,12 @@ def test_the_worker_ends_when_its_program_does(tmp_path: Path, cache: Path) -> N
     photo, mask = ball_arrays(tmp_path)
     program = (
         "import os, sys, time\nfrom pathlib import Path\n"
-        "from blender_addon.worker.process import Job, WorkerEnvironment, start\n"
+        "from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment, start_decompose\n"
         "photo, mask, output, cache = map(Path, sys.argv[1:])\n"
         f"environment = WorkerEnvironment(Path(sys.executable), (Path({str(ROOT)!r}),), cache)\n"
-        "worker = start(Job(photo, output, mask, 'sirfs', 'none', 'natural', 64), environment)\n"
+        "worker = start_decompose(DecomposeJob(photo, output, mask, 'sirfs', 'none', 'natural', 64), environment)\n"
         "while not worker.poll().stage.startswith('preparing the compiled'): time.sleep(0.01)\n"
-        "print(worker._process.pid, flush=True)\nos._exit(9)\n"
+        "print(worker.pid, flush=True)\nos._exit(9)\n"
     )
     command = [sys.executable, "-c", program, photo, mask, tmp_path / "new" / "result", cache]
     done = subprocess.run(
@@ -270,7 +277,7 @@ Maker = Callable[[str], WorkerEnvironment]
 
 
 def test_the_environment_is_the_one_that_is_named(
-    tmp_path: Path, stand_in: Maker, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, fake_core: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in (
         "PYTHONHOME",
@@ -282,33 +289,35 @@ def test_the_environment_is_the_one_that_is_named(
         "NUMBA_NUM_THREADS",
     ):
         monkeypatch.setenv(name, "wrong")
-    environment = stand_in(
+    environment = fake_core(
         "say('done', output='', lines=[json.dumps([dict(os.environ), sys.path, os.getcwd(), sys.flags.no_user_site])])"
     )
-    final = ended(start(job(tmp_path / "a.png", tmp_path / "out", threads=3), environment))
+    final = ended(
+        start_decompose(job(tmp_path / "a.png", tmp_path / "out", threads=3), environment)
+    )
     variables, path, folder, no_user_site = json.loads(final.message)
     assert "wrong" not in variables.values()
     assert (variables["PYTHONPATH"], variables["NUMBA_CACHE_DIR"]) == (
-        str(tmp_path / "stand_in"),
+        str(tmp_path / "fake_core"),
         str(tmp_path / "cache"),
     )
     assert (
         variables["OMP_NUM_THREADS"] == variables["OPENBLAS_NUM_THREADS"] == "3"
         and variables["PATH"] == os.environ["PATH"]
     )
-    assert path[0] == str(tmp_path / "stand_in") and folder not in path and no_user_site == 1
+    assert path[0] == str(tmp_path / "fake_core") and folder not in path and no_user_site == 1
     assert "OMP_NUM_THREADS" not in environment.variables()
 
 
 def test_what_is_asked_for_reaches_the_command(
-    tmp_path: Path, stand_in: Maker, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, fake_core: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    environment = stand_in("say('done', output='', lines=words)")
-    asked = Job(
+    environment = fake_core("say('done', output='', lines=words)")
+    asked = DecomposeJob(
         Path("-a.png"), Path("out"), Path("m.png"), "mdr", "isc", "laboratory", 300, 2, "linear"
     )
-    words = ended(start(asked, environment)).message.split("\n")
+    words = ended(start_decompose(asked, environment)).message.split("\n")
     here = tmp_path.resolve()
     assert words[:5] == ["decompose", str(here / "-a.png"), "--arrays", "-o", str(here / "out")]
     pairs = dict(zip(words[5::2], words[6::2], strict=True))
@@ -327,10 +336,12 @@ def test_what_is_asked_for_reaches_the_command(
 @posix
 @pytest.mark.parametrize("how", ["cancel", "kill"])
 def test_a_stubborn_worker_is_killed_with_all_its_children(
-    tmp_path: Path, stand_in: Maker, how: str
+    tmp_path: Path, fake_core: Maker, how: str
 ) -> None:
     child = "import subprocess\nchild = subprocess.Popen(['sleep', '300'])\nprint(child.pid, file=sys.stderr, flush=True)\n"
-    worker = start(job(tmp_path / "a.png", tmp_path / "new" / "out"), stand_in(child + STUBBORN))
+    worker = start_decompose(
+        job(tmp_path / "a.png", tmp_path / "new" / "out"), fake_core(child + STUBBORN)
+    )
     at_stage(worker, "asleep")
     assert (tmp_path / "new" / ".out.0a1b2c3d.partial" / "maps.exr").is_file()
     assert os.getpriority(os.PRIO_PROCESS, process_of(worker).pid) == min(
@@ -340,47 +351,47 @@ def test_a_stubborn_worker_is_killed_with_all_its_children(
     assert worker.poll().state == "running", "nobody has waited"
     final = ended(worker, 20)
     assert (final.state, process_of(worker).returncode) == ("cancelled", -signal.SIGKILL)
-    wait_for_the_end_of(int(final.report))
+    wait_for_the_end_of(int(final.log))
     assert others(tmp_path) == []
 
 
 @posix
-def test_a_worker_that_is_killed_by_others_is_a_failure(tmp_path: Path, stand_in: Maker) -> None:
+def test_a_worker_that_is_killed_by_others_is_a_failure(tmp_path: Path, fake_core: Maker) -> None:
     earlier = tmp_path / ".out.11111111.partial"
     earlier.mkdir()
-    worker = start(
+    worker = start_decompose(
         job(tmp_path / "a.png", tmp_path / "out"),
-        stand_in("print('so far so good', file=sys.stderr, flush=True)\n" + STUBBORN),
+        fake_core("print('so far so good', file=sys.stderr, flush=True)\n" + STUBBORN),
     )
     at_stage(worker, "asleep")
     process_of(worker).kill()
     final = ended(worker, 20)
-    assert (final.state, final.fraction, final.report) == ("failed", 0.5, "so far so good")
+    assert (final.state, final.fraction, final.log) == ("failed", 0.5, "so far so good")
     assert "killed (SIGKILL)" in final.message and "\n" not in final.message
     assert others(tmp_path) == [earlier.name], "another process may be at work there"
 
 
-def test_a_crash_gives_its_last_words(tmp_path: Path, stand_in: Maker) -> None:
+def test_a_crash_gives_its_last_words(tmp_path: Path, fake_core: Maker) -> None:
     lines = "write_half()\nprint('x' * 20000, file=sys.stderr)\nprint('not json\\n[1, 2]\\n{\"half\": ')\nraise RuntimeError('out of ink')"
-    final = ended(start(job(tmp_path / "a.png", tmp_path / "out"), stand_in(lines)))
+    final = ended(start_decompose(job(tmp_path / "a.png", tmp_path / "out"), fake_core(lines)))
     assert final.state == "failed"
     assert final.message == "the worker ended unexpectedly (exit code 1): RuntimeError: out of ink"
-    assert "Traceback" in final.report and len(final.report) <= 8000
+    assert "Traceback" in final.log and len(final.log) <= 8000
     assert others(tmp_path) == []
 
 
-def test_silence_is_a_failure(tmp_path: Path, stand_in: Maker) -> None:
-    final = ended(start(job(tmp_path / "a.png", tmp_path / "out"), stand_in("")))
+def test_silence_is_a_failure(tmp_path: Path, fake_core: Maker) -> None:
+    final = ended(start_decompose(job(tmp_path / "a.png", tmp_path / "out"), fake_core("")))
     assert (final.state, final.message) == (
         "failed",
-        "the worker ended unexpectedly (exit code 0): it left no message",
+        "the worker ended unexpectedly (exit code 0): no error message",
     )
 
 
 def test_a_missing_worker_is_one_line(tmp_path: Path) -> None:
     away = WorkerEnvironment(tmp_path / "no-python", (ROOT,), tmp_path / "cache")
     with pytest.raises(InputError, match="no-python .*install the extension again") as caught:
-        start(job(tmp_path / "a.png", tmp_path / "out"), away)
+        start_decompose(job(tmp_path / "a.png", tmp_path / "out"), away)
     assert "\n" not in str(caught.value)
 
 
@@ -396,7 +407,7 @@ def test_a_core_that_is_missing_is_said_to_be(tmp_path: Path) -> None:
     ):
         pytest.skip("isc_core is installed for every program of this machine")
     final = ended(
-        start(
+        start_decompose(
             job(tmp_path / "a.png", tmp_path / "out"),
             WorkerEnvironment(base, (tmp_path,), tmp_path / "cache"),
         )
@@ -410,13 +421,13 @@ def test_a_core_that_is_missing_is_said_to_be(tmp_path: Path) -> None:
 
 @posix
 def test_a_program_that_kills_and_leaves_at_once_leaves_nothing(
-    tmp_path: Path, stand_in: Maker
+    tmp_path: Path, fake_core: Maker
 ) -> None:
-    environment = stand_in(STUBBORN)
+    environment = fake_core(STUBBORN)
     program = (
-        "import sys, time\nfrom pathlib import Path\nfrom blender_addon.worker.process import Job, WorkerEnvironment, start\n"
+        "import sys, time\nfrom pathlib import Path\nfrom blender_addon.worker.commands import DecomposeJob, WorkerEnvironment, start_decompose\n"
         "search, cache, output = map(Path, sys.argv[1:])\n"
-        "worker = start(Job(output, output, None, '', '', '', 0), WorkerEnvironment(Path(sys.executable), (search,), cache))\n"
+        "worker = start_decompose(DecomposeJob(output, output, None, '', '', '', 0), WorkerEnvironment(Path(sys.executable), (search,), cache))\n"
         "while worker.poll().stage != 'asleep': time.sleep(0.01)\n"
         "worker.kill()\n"
     )
