@@ -1,8 +1,9 @@
-"""The demo's photo: `python -m synth.demo_scene -o DIR` renders a glazed gourd under a soft sky and
-two softboxes.
+"""The demo's photo: `python -m synth.demo_scene -o DIR` renders a glazed gourd under a soft
+environment
+and two softboxes.
 
-Writes `photo.png` (sRGB, 16 bits, with alpha: what a person would take) and `truth.exr` (what a
-decomposition should find).
+Writes `photo.png` (sRGB, 16 bits, with alpha: the photo) and `truth.exr` (the ground truth of its
+decomposition).
 """
 
 import argparse
@@ -31,9 +32,12 @@ _LAYERS = ("image", "diffuse", "specular", "reflectance", "shading")
 
 
 def demo_scene(size: int = SIZE) -> Scene:
-    """The gourd, tipped toward the viewer, in a picture of `size` x `size` pixels.
+    """Return the gourd, tipped toward the viewer, in a picture of `size` x `size` pixels.
 
-    Raises `InputError` for an impossible size.
+    Raises
+    ------
+    InputError
+        For an invalid size.
     """
     return Scene(
         gourd().turned(14),
@@ -44,7 +48,7 @@ def demo_scene(size: int = SIZE) -> Scene:
 
 
 def demo_lights() -> tuple[Light, ...]:
-    """A soft sky, a warm softbox above to the left, and a cool one to the right."""
+    """Return a soft environment, a warm softbox at the upper left, and a cool one to the right."""
     return (
         EnvironmentLight(0.55 * soft_environment()),
         panel_toward_origin((-5.0, 5.5, 7.0), (1.7, 1.7), (88.0, 80.0, 68.0)),
@@ -53,9 +57,24 @@ def demo_lights() -> tuple[Light, ...]:
 
 
 def demo_object(size: int = SIZE, samples: int = SAMPLES) -> GroundTruth:
-    """Renders the demo's object, exposed so that only its highlights reach 1.
+    """Render the demo's object, exposed so that only its highlights reach 1.
 
-    Raises `InputError` where Mitsuba is not installed.
+    Parameters
+    ----------
+    size : int, optional
+        Side of the picture in pixels.
+    samples : int, optional
+        Light paths per pixel.
+
+    Returns
+    -------
+    GroundTruth
+        The maps.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
     """
     scene = demo_scene(size)
     return exposed(
@@ -64,8 +83,17 @@ def demo_object(size: int = SIZE, samples: int = SAMPLES) -> GroundTruth:
 
 
 def soft_environment(rows: int = 64) -> np.ndarray:
-    """An environment of low frequencies, (rows, 2 rows, 3) float32, linear radiance, row 0 straight
-    up: sky, horizon, ground, a window.
+    """Return an environment of low frequencies: sky, horizon, ground, and a window.
+
+    Parameters
+    ----------
+    rows : int, optional
+        Rows of the image.
+
+    Returns
+    -------
+    (rows, 2 rows, 3) ndarray of float32
+        Linear radiance, row 0 straight up.
     """
     polar = (np.arange(rows) + 0.5) * np.pi / rows
     turn = (np.arange(2 * rows) + 0.5) * np.pi / rows
@@ -87,7 +115,7 @@ def soft_environment(rows: int = 64) -> np.ndarray:
 
 
 def write_truth(path: Path, truth: GroundTruth) -> None:
-    """Writes the ground truth as one multilayer EXR file, with the channel names of `maps.exr`."""
+    """Write the ground truth as a multilayer EXR file, with the channel names of `maps.exr`."""
     channels = {
         f"{name}.{c}": getattr(truth, name)[..., i] for name in _LAYERS for i, c in enumerate("RGB")
     }
@@ -97,7 +125,13 @@ def write_truth(path: Path, truth: GroundTruth) -> None:
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command. Returns 0, or 2 after one line about what was wrong."""
+    """Run the command.
+
+    Returns
+    -------
+    int
+        0, or 2 after a one-line error message.
+    """
     parser = argparse.ArgumentParser(
         prog="python -m synth.demo_scene",
         description="Render a glossy object with its ground truth.",
@@ -109,12 +143,12 @@ def main(arguments: list[str] | None = None) -> int:
         "--size", type=int, default=SIZE, help="side of the image in pixels (default: %(default)s)"
     )
     parser.add_argument(
-        "--samples", type=int, default=SAMPLES, help="rays per pixel (default: %(default)s)"
+        "--samples", type=int, default=SAMPLES, help="light paths per pixel (default: %(default)s)"
     )
     options = parser.parse_args(arguments)
     try:
         if options.size < SMALLEST or options.samples < 2:
-            raise InputError(f"--size must be {SMALLEST} or more and --samples 2 or more")
+            raise InputError(f"--size must be at least {SMALLEST} and --samples at least 2")
         require_writable(options.output, _FILES)
         truth = demo_object(options.size, options.samples)
         with new_folder(options.output, _FILES) as folder:

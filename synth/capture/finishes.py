@@ -1,18 +1,18 @@
-"""How glossy an object is: materials drawn at random, from eggshell paint to a glaze.
+"""Random finishes: materials from eggshell paint to a glaze.
 
-Equation: the exponent p is log-uniform over `EXPONENTS`; alpha of facets is that whose lobe is
-nearest (`isc_core.shading.brdf.roughness`): .028 to .44. Strength of blinn_phong: log-uniform over
-`STRENGTHS`, about the share of light that the gloss mirrors; insulators have .02 to .08 along the
-normal and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to
-1.5 (coated twice), ior 1.3 to 1.8. A varying gloss is one of: worn (matt where it was touched),
-smudged (broader within smudges), striped (matt bands).
+Equation: the exponent p is log-uniform over `EXPONENTS`; alpha of facets is that of the nearest
+lobe (`isc_core.shading.brdf.roughness`): .028 to .44. Strength of blinn_phong: log-uniform over
+`STRENGTHS`, about the specular share of the light; dielectrics have .02 to .08 at normal incidence
+and more toward grazing angles, which that model does not have. Strength of ggx: .6 (worn) to 1.5
+(coated twice), ior 1.3 to 1.8. A varying gloss is one of: worn (diffuse where it was touched),
+smudged (broader within smudges), striped (diffuse bands).
 
 Citation: A. Ngan, F. Durand, W. Matusik, "Experimental analysis of BRDF models", EGSR 2005,
 117-126, doi:10.2312/EGWR/EGSR05/117-126 (measured materials fitted with such lobes).
 
-Limits: gloss varies without regard to the albedo's own pattern. On a white albedo the strongest
-draws reflect more light than they get, by up to a tenth (blinn_phong) or toward grazing angles
-(ggx), as the sums of lobes in `materials` may.
+Limits: gloss varies independently of the albedo's pattern. On a white albedo the strongest draws
+reflect more light than they receive, by up to a tenth (blinn_phong) or toward grazing angles (ggx),
+as sums of lobes in `scene.materials` may.
 """
 
 from dataclasses import replace
@@ -32,7 +32,7 @@ EXPONENTS = (5.0, 2000.0)
 STRENGTHS = (0.02, 0.15)
 FACET_STRENGTHS = (0.6, 1.5)
 BROAD_BELOW, SHARP_ABOVE = 30.0, 300.0
-_CHANCE = 0.25  # of a varying gloss, where it is left to chance
+_CHANCE = 0.25  # probability of a varying gloss by default
 _TEXELS = 256
 _WIDEST = 0.5  # the largest alpha that has an exponent
 
@@ -40,12 +40,29 @@ _WIDEST = 0.5  # the largest alpha that has an exponent
 def make_material(
     model: str, albedo: np.ndarray, rng: np.random.Generator, varying: bool | None = None
 ) -> Material:
-    """A material of `model`, one of `FINISHES`, with this albedo (h, w, 3); its gloss is drawn, see
-    the module.
+    """Draw a material.
 
-    `varying`: whether gloss and strength are (256, 256) textures; None: one time in four, where the
-    model can (`VARYING`). Raises `InputError` for an unknown model, an albedo outside [0, 1], and
-    for varying gloss of a model that has none.
+    Parameters
+    ----------
+    model : str
+        One of `FINISHES`.
+    albedo : (h, w, 3) ndarray
+        Its albedo.
+    rng : numpy.random.Generator
+        Random numbers.
+    varying : bool, optional
+        Whether gloss and strength are (256, 256) textures. By default in one draw out of four, for
+        models in `VARYING`.
+
+    Returns
+    -------
+    Material
+        The material.
+
+    Raises
+    ------
+    InputError
+        For an unknown model, an albedo outside [0, 1], or varying gloss of another model.
     """
     if model not in FINISHES:
         raise InputError(f"unknown material {model!r}: choose {', '.join(FINISHES)}")
@@ -74,8 +91,12 @@ def make_material(
 
 
 def gloss_class(material: Material) -> str:
-    """ "matt", "broad" (exponent below 30), "medium" or "sharp" (above 300), by the median over the
-    texture.
+    """Classify a material by the median of its exponent.
+
+    Returns
+    -------
+    str
+        "diffuse", "broad" (exponent below 30), "medium" or "sharp" (above 300).
     """
     if material.is_diffuse or not np.any(material.strength):
         return "diffuse"
@@ -102,19 +123,19 @@ def _varied(material: Material, exponent: float, rng: np.random.Generator) -> Ma
 
 
 def _worn(rng: np.random.Generator) -> np.ndarray:
-    """(256, 256) in [0, 1]: large worn areas with ragged edges."""
+    """Large worn areas with ragged edges, (256, 256) in [0, 1]."""
     field = smooth_noise(rng, _TEXELS, rng.uniform(1.5, 3)) + 0.4 * fractal_noise(rng, _TEXELS, 2)
     return step(field - rng.uniform(-0.2, 0.8), 0.5)
 
 
 def _smudged(rng: np.random.Generator) -> np.ndarray:
-    """(256, 256) in [0, 1]: wiped smudges, longer than wide."""
+    """Wiped smudges, longer than wide, (256, 256) in [0, 1]."""
     field = smooth_noise(rng, _TEXELS, rng.uniform(6, 10), rng.uniform(1.5, 4))
     return rng.uniform(0.5, 1) * step(field - rng.uniform(0.3, 0.9), 0.8)
 
 
 def _striped(rng: np.random.Generator) -> np.ndarray:
-    """(256, 256) in [0, 1]: rings, upright stripes or screws."""
+    """Rings, upright stripes or screws, (256, 256) in [0, 1]."""
     u, v = grid(_TEXELS)
     count, turns = rng.integers(3, 9), rng.integers(0, 2)
     phase = count * v + turns * u if rng.random() < 0.6 else count * u

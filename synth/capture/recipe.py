@@ -1,19 +1,22 @@
-"""What a scene is made of, as a few words and numbers, and how they become that scene.
+"""The recipe of a scene: a few names and numbers, and how they become that scene.
 
-An object, a material and a light are members of families: the object "lathe03" is the fourth of the
-lathe's, the same one in every scene, under whatever material and light. So that this holds, each
-member draws from random numbers of its own, seeded by what it is called; what belongs to one scene
-alone (framing, exposure, samples, noise) draws from streams of the scene's seed.
+Objects, materials and lights are members of families: "lathe03" is the fourth lathe object, the
+same
+in every scene, with any material and light. Each member therefore has its own random numbers,
+seeded
+by its name; what belongs to a single scene (framing, exposure, samples, noise) is drawn from
+streams
+of the scene's seed.
 
 Equation: member (aspect, family, number): SeedSequence((crc32 aspect, crc32 family, number));
 scene: SeedSequence(seed, spawn_key=(k,)). The camera: pixels_per_unit = fill * size / extent, the
-extent being the wider side of the object's outline.
+extent being the wider side of the object's silhouette.
 
 Citation: M. E. O'Neill, "PCG: a family of simple fast space-efficient statistically good algorithms
 for random number generation", Harvey Mudd College HMC-CS-2014-0905 (2014) (NumPy's generator).
 
-Limits: members are the same only as long as the code that draws them is: `scene.json` therefore
-names the version.
+Limits: members stay the same only as long as the code that draws them: `scene.json` records the
+version.
 """
 
 from dataclasses import dataclass, field, replace
@@ -45,20 +48,19 @@ from .finishes import make_material
 from .sensor import Sensor, observe
 from .truth import GroundTruth, exposed, render_truth
 
-# Families that are read from a user's file instead of drawn; "mesh" is also the paint that a mesh
-# brings along.
+# Families that are read from a user's file instead of drawn; "mesh" is also the albedo of a mesh.
 MESH_FILE, HEIGHT_FILE, IMAGE_FILE = "mesh", "height", "image"
-_DISTANCE = 5.0  # of a pinhole, object units: as one photographs things on a table
+_DISTANCE = 5.0  # of a pinhole, object units: as for objects on a table
 _FILL = (0.85, 0.90)  # of the picture's side, by the object
-_LEVEL = (0.50, 0.75)  # of the brightest matt light
-_MOST_CLIPPED = 0.1  # of the image's values: what a photographer still accepts as highlights
+_LEVEL = (0.50, 0.75)  # of the brightest diffuse light
+_MOST_CLIPPED = 0.1  # of the image's values: an acceptable amount of clipped highlights
 _FRAMING, _EXPOSURE, _SAMPLES, _NOISE = range(4)  # streams of a scene's seed
 
 
 @dataclass(frozen=True)
 class FamilyMember:
-    """A member of a family of objects, materials or lights: the `family`'s name and its `number`,
-    from 0 on.
+    """A member of a family of objects, materials or lights: the family's name, and a number
+    from 0.
     """
 
     family: str
@@ -66,12 +68,12 @@ class FamilyMember:
 
     @property
     def name(self) -> str:
-        """As in folder names: `lathe03`."""
+        """Its name in folder names: `lathe03`."""
         return f"{self.family}{self.number:02d}"
 
     def generator(self, aspect: str) -> np.random.Generator:
-        """The random numbers that make one aspect ("shape", "albedo", "gloss", "light") of this
-        member, from their beginning.
+        """Return the random numbers of one aspect ("shape", "albedo", "gloss", "light") of this
+        member.
         """
         words = (crc32(text.encode()) for text in (aspect, self.family))
         return np.random.default_rng(np.random.SeedSequence([*words, self.number]))
@@ -79,9 +81,18 @@ class FamilyMember:
 
 @dataclass(frozen=True)
 class Sources:
-    """Files that a user brings along, None where none: `mesh` and `height` of objects,
-    `albedo_image`, `natural_lights` (the folder of natural_lights.mat), `hdr` (the environments,
-    one light each, in alphabetical order).
+    """A user's files, None without.
+
+    Attributes
+    ----------
+    mesh, height : Path or None
+        Objects.
+    albedo_image : Path or None
+        An albedo.
+    natural_lights : Path or None
+        The folder of natural_lights.mat.
+    hdr : tuple of Path
+        Environments, one light each, in alphabetical order.
     """
 
     mesh: Path | None = None
@@ -91,9 +102,17 @@ class Sources:
     hdr: tuple[Path, ...] = ()
 
     def check(self) -> bool:
-        """Reads the files once, before any work, and says whether the mesh has colours.
+        """Read the files once, before any work.
 
-        Raises `InputError`.
+        Returns
+        -------
+        bool
+            Whether the mesh has colours.
+
+        Raises
+        ------
+        InputError
+            If a file cannot be used.
         """
         if self.height is not None:
             read_height(self.height)
@@ -106,11 +125,27 @@ class Sources:
 
 @dataclass(frozen=True)
 class PictureSettings:
-    """How scenes are taken. `size`: of the square picture's side, pixels. `samples`, `bounces`,
-    `renderer`: see `RenderOptions`. `perspective`: a pinhole instead of an orthographic camera.
-    `exposure`: what 99.5 % of the diffuse layer's values stay below, > 0; None draws it for each
-    scene from .5 to .75, and takes less where more than a tenth of the image would be above 1.
-    `sensor`: what becomes of the light. Raises `InputError` for impossible values.
+    """How scenes are photographed.
+
+    Attributes
+    ----------
+    size : int
+        Side of the square picture in pixels.
+    samples, bounces, renderer
+        See `RenderOptions`.
+    perspective : bool
+        A pinhole instead of an orthographic camera.
+    exposure : float or None
+        The 99.5th percentile of the diffuse layer, > 0. None draws it for each scene from .5 to
+        .75, and
+        reduces it if more than a tenth of the image would be above 1.
+    sensor : Sensor
+        The sensor.
+
+    Raises
+    ------
+    InputError
+        For invalid values.
     """
 
     size: int = 256
@@ -125,14 +160,27 @@ class PictureSettings:
         Camera(self.size, self.size, 1.0)
         RenderOptions(self.samples, 0, self.bounces, self.renderer)
         if self.exposure is not None and not 0 < self.exposure < np.inf:
-            raise InputError("the exposure has to be finite and above 0")
+            raise InputError("the exposure must be finite and above 0")
 
 
 @dataclass(frozen=True)
 class Recipe:
-    """One scene. `seed` >= 0. `shape`, `material`, `light`: the members. `model`: the material's
-    reflectance, of `MODELS`; `albedo`: the family of its paint, of `ALBEDOS`, "image" or "mesh".
-    `picture`, `sources`: shared by all scenes of a run.
+    """One scene.
+
+    Attributes
+    ----------
+    seed : int
+        >= 0.
+    shape, material, light : FamilyMember
+        What is in the scene.
+    model : str
+        The material's reflectance model, of `MODELS`.
+    albedo : str
+        Family of its albedo, of `ALBEDOS`, "image" or "mesh".
+    picture : PictureSettings
+        How it is photographed.
+    sources : Sources
+        The user's files.
     """
 
     seed: int
@@ -146,15 +194,15 @@ class Recipe:
 
     @property
     def name(self) -> str:
-        """Of the scene's folder."""
+        """Name of the scene's folder."""
         return f"{self.shape.name}_{self.material.name}_{self.light.name}_{self.seed:05d}"
 
     def stream(self, number: int) -> np.random.SeedSequence:
-        """The scene's own random numbers of one purpose."""
+        """Return the scene's random numbers of one purpose."""
         return np.random.SeedSequence(self.seed, spawn_key=(number,))
 
     def render_options(self) -> RenderOptions:
-        """What `render_truth` takes."""
+        """Return the options of `render_truth`."""
         seed = int(self.stream(_SAMPLES).generate_state(1)[0] & 0x7FFFFFFF)
         return RenderOptions(
             self.picture.samples, seed, self.picture.bounces, self.picture.renderer
@@ -162,9 +210,22 @@ class Recipe:
 
 
 def build(recipe: Recipe) -> Scene:
-    """The scene, its lights as bright as they come.
+    """Build a scene, its lights at their original brightness.
 
-    Raises `InputError` for unknown names and files that cannot be used.
+    Parameters
+    ----------
+    recipe : Recipe
+        The recipe.
+
+    Returns
+    -------
+    Scene
+        The scene.
+
+    Raises
+    ------
+    InputError
+        For unknown names, and files that cannot be used.
     """
     mesh = _mesh(recipe)
     fill = float(np.random.default_rng(recipe.stream(_FRAMING)).uniform(*_FILL))
@@ -177,9 +238,28 @@ def build(recipe: Recipe) -> Scene:
 
 
 def photograph(recipe: Recipe, monitor: Monitor | None = None) -> tuple[Scene, GroundTruth]:
-    """The scene with its lights set, and its truth as the sensor sees it.
+    """Build and render a scene, set its exposure, and apply the sensor.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    recipe : Recipe
+        The recipe.
+    monitor : Monitor, optional
+        Progress and cancellation.
+
+    Returns
+    -------
+    scene : Scene
+        With scaled lights.
+    truth : GroundTruth
+        As the sensor sees it.
+
+    Raises
+    ------
+    InputError
+        As `build`, and if Mitsuba is not installed.
+    Cancelled
+        If the user cancels.
     """
     scene = build(recipe)
     truth = render_truth(scene, recipe.render_options(), monitor)
@@ -194,8 +274,23 @@ def photograph(recipe: Recipe, monitor: Monitor | None = None) -> tuple[Scene, G
 
 
 def camera_around(mesh: Mesh, size: int, fill: float, perspective: bool = False) -> Camera:
-    """The camera in whose picture of `size` x `size` pixels the mesh, centred in x and y, reaches
-    `fill` of the wider side.
+    """Return the camera that frames a mesh.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        Centred in x and y.
+    size : int
+        Side of the picture in pixels.
+    fill : float
+        Share of the picture's side that the mesh fills, by its wider side.
+    perspective : bool, optional
+        A pinhole camera.
+
+    Returns
+    -------
+    Camera
+        The camera.
     """
     distance = _DISTANCE if perspective else np.inf
     nearer = 1 - mesh.vertices[:, 2:] / distance
@@ -213,7 +308,7 @@ def _mesh(recipe: Recipe) -> Mesh:
 
 
 def centred(mesh: Mesh) -> Mesh:
-    """With the middle of its outline on the camera's axis."""
+    """Return a mesh with the middle of its silhouette on the camera's axis."""
     low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
     return replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
 
@@ -226,7 +321,7 @@ def _material(recipe: Recipe) -> Material:
         albedo = read_mesh_file(_given(recipe.sources.mesh, "--mesh")).albedo
         if albedo is None:
             raise InputError(
-                f"{recipe.sources.mesh} has no colours of its own: name other --albedos"
+                f"{recipe.sources.mesh} has no colours of its own: choose other --albedos"
             )
     else:
         albedo = make_albedo(recipe.albedo, recipe.material.generator("albedo"))
@@ -235,9 +330,7 @@ def _material(recipe: Recipe) -> Material:
 
 def _lights(recipe: Recipe) -> tuple[Light, ...]:
     light, sources = recipe.light, recipe.sources
-    if (
-        light.family == "natural"
-    ):  # by its number in the file, so that no two members are the same light
+    if light.family == "natural":  # by its number in the file, so that all members differ
         found = load_natural_lights(_given(sources.natural_lights, "--natural-lights"))
         return (
             EnvironmentLight(

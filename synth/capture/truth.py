@@ -1,19 +1,21 @@
-"""One scene with everything that a decomposition has to find.
+"""One scene with the ground truth of everything that a decomposition estimates.
 
 Equation, at each pixel inside the mask: image = diffuse + specular + residual, diffuse =
-reflectance * shading. Place, normal and paint come from one ray through the pixel's centre
-(`surface`), radiance from one render whose lobes are kept apart (`rendering`). What a sensor does
-to the image (clipping, noise, codes) goes into the residual (`sensor`).
+reflectance * shading. Position, normal and reflectance come from one ray through the pixel's centre
+(`scene.surface`), radiance from one render with separate lobes (`rendering`). The sensor's effect
+on
+the image (clipping, noise, quantisation) is the residual (`sensor`).
 
-Rendered shading is not exp(SH(normal)): `illumination` is the light of that form that fits it best,
-and `light_fit_residual` says how well. It maximises sum(shading log(model) - model), Poisson
-regression with a logarithmic link, which is at home with black shadows.
+Rendered shading is not exp(SH(normal)): `illumination` is the best-fitting light of that form, and
+`light_fit_residual` the misfit. The fit maximises sum(shading log(model) - model), Poisson
+regression
+with a logarithmic link, which tolerates black shadows.
 
 Citation: P. McCullagh, J. A. Nelder, "Generalized linear models", 2nd edition (1989),
 doi:10.1201/9780203753736 (the fit).
 
-Limits: those of `surface` and `rendering`. Light that the fit has never seen (normals that no pixel
-has) is a guess, held back by a ridge.
+Limits: those of `scene.surface` and `rendering`. The fitted light is unconstrained for normals that
+do not occur; a ridge keeps it bounded.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -37,16 +39,29 @@ _DARKEST = 1e-6  # of the mean shading
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """Maps of the whole frame, float32, row 0 at the top; 0 outside the mask, where the normal is
-    (0, 0, 1).
+    """Maps of the whole frame, float32, row 0 at the top; outside the mask they are 0 and the
+    normal is (0, 0, 1).
 
-    `image, diffuse, specular, residual, reflectance, shading`: (H, W, 3) linear Rec.709. `normal`:
-    (H, W, 3) unit, x right, y up, z toward the viewer. `height`: (H, W) pixels toward the viewer.
-    `mask`: (H, W) bool. `strength`, `gloss`: (H, W) of the material's gloss, see `materials`.
-    `shading_variance`, `specular_variance`: (H, W, 3) of the estimates, by Monte Carlo.
-    `illumination`: (9, 3) coefficients of log shading, fitted; `light_fit_residual`: RMS of shading
-    less its fit, over the RMS of shading. `environment`: (rows, 2 rows, 3) all lights as seen from
-    the origin, laid out as `isc_core.shading.environment_map` says.
+    Attributes
+    ----------
+    image, diffuse, specular, residual, reflectance, shading : (H, W, 3) ndarray
+        Linear Rec.709.
+    normal : (H, W, 3) ndarray
+        Unit, x right, y up, z toward the viewer.
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    mask : (H, W) ndarray of bool
+        The object.
+    strength, gloss : (H, W) ndarray
+        Of the material's specular lobe, see `scene.materials`.
+    shading_variance, specular_variance : (H, W, 3) ndarray
+        Of the Monte Carlo estimates.
+    illumination : (9, 3) ndarray
+        Fitted coefficients of log shading, camera frame.
+    light_fit_residual : float
+        RMS of shading minus its fit, relative to the RMS of shading.
+    environment : (rows, 2 rows, 3) ndarray
+        All lights as seen from the origin, laid out as in `isc_core.shading.environment_map`.
     """
 
     image: np.ndarray
@@ -67,7 +82,7 @@ class GroundTruth:
     environment: np.ndarray
 
     def brightened(self, gain: float) -> "GroundTruth":
-        """The same scene with all its lights `gain` (> 0) times as bright."""
+        """Return the same scene with all its lights `gain` (> 0) times as bright."""
         maps = ("image", "diffuse", "specular", "residual", "shading", "environment")
         changes = {name: getattr(self, name) * np.float32(gain) for name in maps}
         squares = {
@@ -79,7 +94,7 @@ class GroundTruth:
         return replace(self, **changes, **squares, illumination=light)
 
     def arrays(self) -> dict[str, np.ndarray]:
-        """Every map by name."""
+        """Return every map by name."""
         return {
             field.name: getattr(self, field.name)
             for field in fields(self)
@@ -90,16 +105,35 @@ class GroundTruth:
 def render_truth(
     scene: Scene, options: RenderOptions | None = None, monitor: Monitor | None = None
 ) -> GroundTruth:
-    """Renders a scene with its ground truth.
+    """Render a scene with its ground truth.
 
-    Raises `InputError` where Mitsuba is not installed or nothing is in view; `Cancelled`.
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    options : RenderOptions, optional
+        Samples, seed, bounces and renderer.
+    monitor : Monitor, optional
+        Progress and cancellation.
+
+    Returns
+    -------
+    GroundTruth
+        The maps.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed or the object is not in view.
+    Cancelled
+        If the user cancels.
     """
     tracer = Tracer(scene.mesh)
     surface = find_surface(scene, tracer)
     lit = light_surface(
         surface, scene.material, scene.lights, tracer, options or RenderOptions(), monitor
     )
-    # In a penumbra the estimate of few samples may be below 0; light is not.
+    # In a penumbra the estimate from few samples may be negative; light is not.
     found = np.maximum(lit.shading, 0)
     illumination, misfit = fit_light(surface.normal, found)
     picture = surface.image
@@ -132,8 +166,27 @@ def render_truth(
 def exposed(
     scene: Scene, truth: GroundTruth, level: float, share: float = 0.995, layer: str = "diffuse"
 ) -> tuple[Scene, GroundTruth]:
-    """The scene and its truth under lights so bright that `share` of the values of `layer` inside
-    the mask stay below `level`.
+    """Scale a scene's lights to a given exposure.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    truth : GroundTruth
+        Its render.
+    level : float
+        Value of the quantile after scaling.
+    share : float, optional
+        The quantile, of the values inside the mask.
+    layer : str, optional
+        Which layer.
+
+    Returns
+    -------
+    scene : Scene
+        With scaled lights.
+    truth : GroundTruth
+        With scaled layers.
     """
     peak = float(np.quantile(getattr(truth, layer)[truth.mask], share))
     gain = level / peak if peak > 0 else 1.0
@@ -143,11 +196,21 @@ def exposed(
 
 
 def fit_light(normal: np.ndarray, shading: np.ndarray) -> tuple[np.ndarray, float]:
-    """The light (9, 3) whose exp(SH(normal)) is nearest to the shading, and what is left: RMS over
-    the RMS of shading.
+    """Fit a light of the form exp(SH(normal)) to rendered shading.
 
-    `normal`: (N, 3) unit. `shading`: (N, 3) >= 0. A channel that is black everywhere gets a
-    constant that is nearly black.
+    Parameters
+    ----------
+    normal : (N, 3) ndarray
+        Unit normals.
+    shading : (N, 3) ndarray
+        Shading >= 0. A black channel gets a nearly black constant.
+
+    Returns
+    -------
+    light : (9, 3) ndarray
+        Log-shading coefficients.
+    residual : float
+        RMS of the misfit, relative to the RMS of shading.
     """
     basis = real_sh(normal)
     light = np.stack(
@@ -158,7 +221,7 @@ def fit_light(normal: np.ndarray, shading: np.ndarray) -> tuple[np.ndarray, floa
 
 
 def _fit_channel(basis: np.ndarray, shading: np.ndarray) -> np.ndarray:
-    """Newton's steps on the Poisson likelihood, halved where one climbs."""
+    """Newton steps on the Poisson likelihood, halved where one increases the loss."""
     mean = max(float(shading.mean()), 1e-12)
     target = shading / mean
     light = np.zeros(9)

@@ -1,3 +1,3 @@
-"""Commands of `isc` that come with the generator, one a file, as entry points of the group
+"""Commands of `isc` that come with the generator, one per module, as entry points of the group
 `isc.commands`.
 """

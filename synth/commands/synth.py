@@ -1,4 +1,4 @@
-"""`isc synth`: renders glossy objects whose ground truth is known."""
+"""`isc synth`: render glossy objects with ground truth."""
 
 import argparse
 import math
@@ -23,23 +23,25 @@ from ..scene.variant import slower_without
 from ..shapes import SHAPES
 from . import glossy_mit
 
-_EXAMPLES = """  isc synth --count 200 --size 128 -o scenes              about six of ten scenes to train on, the others held out
-  isc synth --count 20 --shapes lathe --materials ggx --lights area --clip --bits 8 --noise 0.01 -o photos
+_EXAMPLES = """  isc synth --count 200 --size 128 -o scenes
+  isc synth --count 20 --shapes lathe --materials ggx --lights area --clip --bits 8 -o photos
   isc synth --count 10 --mesh bust.obj --albedo-image marble.png -o busts
 
-A scene's seed decides what is in it: --seed 200 --count 100 makes the scenes that follow those of --count 200. The same command goes on
-where it was interrupted; a larger --count adds scenes."""
+About six out of ten scenes are for training, the others have held-out objects, materials or lights.
+A scene depends on its seed only: --seed 200 --count 100 renders the scenes that follow those of
+--count 200. The same command continues an interrupted run; a larger --count adds scenes."""
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command, and those below it, to the parser."""
+    """Add the command, and its subcommands, to the parser."""
     parser = add_command(
         commands,
         "synth",
         run,
         "render glossy objects with ground truth",
-        "Renders a data set of glossy objects: photos, and what a decomposition should find in them. Each scene is a folder with "
-        "preview.png (look at this first), maps.exr and scene.json; README.md describes the set.",
+        "Render a data set of glossy objects: photos with the ground truth of their decomposition. "
+        "Each scene is a folder with preview.png, maps.exr and scene.json; README.md describes the "
+        "set.",
         _EXAMPLES,
     )
     parser.add_argument(
@@ -47,57 +49,61 @@ def declare(commands: Commands) -> None:
         "--output",
         type=Path,
         metavar="DIR",
-        help="the folder to write; an interrupted run in it goes on",
+        help="output folder; an interrupted run continues",
     )
     parser.add_argument(
-        "--count", type=count, default=20, metavar="N", help="how many scenes (default %(default)s)"
+        "--count",
+        type=count,
+        default=20,
+        metavar="N",
+        help="number of scenes (default: %(default)s)",
     )
     parser.add_argument(
         "--seed",
         type=count,
         default=0,
         metavar="S",
-        help="of the first scene (default %(default)s)",
+        help="seed of the first scene (default: %(default)s)",
     )
     _add_choices(parser)
     _add_picture(parser)
-    glossy_mit.declare(parser.add_subparsers(title="another data set", metavar="SET"))
+    glossy_mit.declare(parser.add_subparsers(title="other data sets", metavar="SET"))
 
 
 def _add_choices(parser: argparse.ArgumentParser) -> None:
-    what = parser.add_argument_group("what is in the scenes")
+    what = parser.add_argument_group("content of the scenes")
     known = {"shapes": SHAPES, "materials": MODELS, "albedos": ALBEDOS, "splits": SPLITS}
     for option, all_names in known.items():
         what.add_argument(
             f"--{option}",
             type=names,
             metavar="a,b",
-            help=f"of {', '.join(all_names)} (default: all)",
+            help=f"{', '.join(all_names)} (default: all)",
         )
     drawn = ", ".join(name for name in RIGS if name not in FROM_FILES)
     what.add_argument(
         "--lights",
         type=names,
         metavar="a,b",
-        help=f"of {', '.join(RIGS)} (default: {drawn}, and those whose files are given)",
+        help=f"{', '.join(RIGS)} (default: {drawn}, and those whose files are given)",
     )
     what.add_argument(
         "--mesh",
         type=Path,
         metavar="FILE",
-        help="a mesh of your own, in its own colours, instead of --shapes or beside them",
+        help="your own mesh, with its colours; replaces --shapes, or is added to them",
     )
     what.add_argument(
         "--height",
         type=Path,
         metavar="FILE",
-        help="a height map of your own (Z.mat, .npy, .exr), likewise",
+        help="your own height map (Z.mat, .npy, .exr), likewise",
     )
     what.add_argument(
         "--albedo-image",
         type=Path,
         metavar="FILE",
-        help="an image to paint objects with, instead of --albedos or beside them",
+        help="your own albedo texture; replaces --albedos, or is added to them",
     )
     what.add_argument("--natural-lights", type=Path, metavar="ROOT", help=FROM_FILES["natural"])
     what.add_argument("--hdr", type=Path, metavar="FILE|DIR", help=FROM_FILES["hdr"])
@@ -105,66 +111,82 @@ def _add_choices(parser: argparse.ArgumentParser) -> None:
 
 def _add_picture(parser: argparse.ArgumentParser) -> None:
     usual = PictureSettings()
-    how = parser.add_argument_group("how they are taken")
+    how = parser.add_argument_group("photography")
     how.add_argument(
         "--size",
         type=count,
         default=usual.size,
         metavar="N",
-        help="side of the picture, pixels (default %(default)s)",
+        help="side of the picture in pixels (default: %(default)s)",
     )
     how.add_argument(
         "--samples",
         type=count,
         default=usual.samples,
         metavar="N",
-        help="light paths a pixel (default %(default)s)",
+        help="light paths per pixel (default: %(default)s)",
     )
     how.add_argument(
         "--bounces",
         type=count,
         default=usual.bounces,
         metavar="N",
-        help="of light within the object (default %(default)s)",
+        help="interreflections on the object (default: %(default)s)",
     )
     how.add_argument(
-        "--perspective", action="store_true", help="a pinhole camera instead of an orthographic one"
+        "--perspective", action="store_true", help="pinhole camera instead of an orthographic one"
     )
     how.add_argument(
         "--exposure",
         type=positive,
         metavar="X",
-        help="what 99.5 %% of the matt light stays below (default: .5 to .75 by the scene, less for mirrors)",
+        help="99.5th percentile of the diffuse layer (default: .5 to .75, drawn per scene)",
     )
-    how.add_argument(
-        "--clip", action="store_true", help="lose what is brighter than 1, as sensors do"
-    )
+    how.add_argument("--clip", action="store_true", help="clip light above 1, as sensors do")
     how.add_argument(
         "--noise",
         type=_share,
         default=0.0,
         metavar="X",
-        help="the sensor's noise, of full scale (default: none)",
+        help="sensor noise relative to full scale (default: none)",
     )
     how.add_argument(
         "--bits",
         type=count,
         choices=DEPTHS,
         default=0,
-        help="of the image's sRGB codes, implies --clip (default: none)",
+        help="bits of the sRGB codes, implies --clip (default: none)",
     )
     how.add_argument(
         "--renderer",
         choices=get_args(Renderer),
         default=usual.renderer,
-        help="default: %(default)s, the fastest that runs",
+        help="renderer; auto is the fastest available (default: %(default)s)",
     )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work; what can be wrong is found before it begins."""
+    """Run the command.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        The parsed options.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    list of str
+        Lines for the user.
+
+    Raises
+    ------
+    InputError
+        For invalid input, before the work begins.
+    """
     if options.output is None:
-        raise InputError("give the folder to write: isc synth -o DIR (see `isc synth --help`)")
+        raise InputError("the output folder is missing: isc synth -o DIR")
     sources = _sources(options)
     sensor = Sensor(clip=options.clip or options.bits > 0, noise=options.noise, bits=options.bits)
     picture = PictureSettings(
@@ -182,32 +204,32 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if (advice := slower_without()) and not options.quiet:
         print(f"isc: {advice}", file=sys.stderr)
     outcome = make_dataset(wanted, options.output, monitor)
-    kept = f", {outcome.kept} were there already" if outcome.kept else ""
+    kept = f", {outcome.kept} kept" if outcome.kept else ""
     return hints(
-        options, f"{outcome.made} scenes made{kept}: {options.output / 'README.md'} describes them"
+        options, f"{outcome.made} scenes rendered{kept}, see {options.output / 'README.md'}"
     )
 
 
-def _choices(options: argparse.Namespace, sources: Sources, painted: bool) -> Choices:
-    """The families asked for; files that are given take part, and where nothing was named beside
-    them, alone. `painted`: whether the mesh has colours, which are its paint unless another is
-    named.
+def _choices(options: argparse.Namespace, sources: Sources, coloured: bool) -> Choices:
+    """The chosen families. Given files are added, and replace the defaults where nothing was named.
+
+    `coloured`: whether the mesh has colours, which are its albedo unless another one is named.
     """
     usual = Choices()
     own = [
         name for name, path in ((MESH_FILE, sources.mesh), (HEIGHT_FILE, sources.height)) if path
     ]
     shapes = _together(options.shapes, tuple(own), () if own else usual.shapes)
-    paints = (
+    own_albedos = (
         [IMAGE_FILE]
         if sources.albedo_image
         else [MESH_FILE]
-        if painted and shapes == (MESH_FILE,) and not options.albedos
+        if coloured and shapes == (MESH_FILE,) and not options.albedos
         else []
     )
-    albedos = _together(options.albedos, tuple(paints), () if paints else usual.albedos)
-    if MESH_FILE in albedos and not painted:
-        raise InputError("the mesh has no colours of its own: name other --albedos")
+    albedos = _together(options.albedos, tuple(own_albedos), () if own_albedos else usual.albedos)
+    if MESH_FILE in albedos and not coloured:
+        raise InputError("the mesh has no colours of its own: choose other --albedos")
     from_files = tuple(
         name for name, given in (("natural", sources.natural_lights), ("hdr", sources.hdr)) if given
     )
@@ -235,7 +257,7 @@ def _sources(options: argparse.Namespace) -> Sources:
 
 
 def _panoramas(path: Path) -> tuple[Path, ...]:
-    """The file, or those of the folder. Raises `InputError` where there is none."""
+    """The file, or those of the folder."""
     if path.is_file():
         return (path,)
     found = tuple(
@@ -247,7 +269,8 @@ def _panoramas(path: Path) -> tuple[Path, ...]:
     )
     if not found:
         raise InputError(
-            f"{path} holds no {' or '.join(PANORAMAS)} file: name a latitude-longitude picture, or a folder of them"
+            f"{path} has no {' or '.join(PANORAMAS)} file: give a latitude-longitude image, or a "
+            "folder of them"
         )
     return found
 

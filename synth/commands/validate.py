@@ -1,5 +1,6 @@
-"""`isc validate`: how large the errors of every stage are on rendered scenes, what causes them, and
-whether they are accepted.
+"""`isc validate`: the errors of every stage on rendered scenes, their causes, and whether they meet
+the
+bounds.
 """
 
 import argparse
@@ -15,7 +16,7 @@ from isc_core.progress import Monitor
 from isc_core.separation import BEST, METHODS
 
 _EXAMPLES = """  isc synth --count 60 --size 128 -o scenes
-  isc validate scenes -o validation                     then open validation/report.html
+  isc validate scenes -o validation
   isc validate scenes -o models --stages separation --models mdr,mbp,joint
   isc validate scenes -o shen --separator shen_2013 --bounds none
   isc validate scenes -o validation --update-bounds bounds.json"""
@@ -23,94 +24,108 @@ _NO_BOUNDS = "none"
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "validate",
         run,
-        "errors of every stage on rendered scenes, their causes, and whether they are accepted",
-        "Runs the stages over a dataset of isc synth: tables of errors with confidence intervals, an error budget by swapping in the truth "
-        "for one stage at a time, slices by gloss, light, albedo, material and size, pictures, and models side by side. Writes a folder "
-        "with report.html, report.json and summary.md. Exits with 1 where a bound is broken; the maps that show why are then in its "
-        "folder evidence.",
+        "measure every stage on rendered scenes",
+        "Run the stages on a data set of isc synth. The report (report.html, report.json, "
+        "summary.md) has errors with confidence intervals, an error budget by substituting the "
+        "ground truth for one stage at a time, slices by gloss, light, albedo, material and size, "
+        "pictures, and a comparison of models. The exit code is 1 if a bound is violated; the "
+        "maps of the worst scenes are then in the folder evidence.",
         _EXAMPLES,
     )
-    parser.add_argument(
-        "dataset", metavar="DATASET", type=Path, help="a folder that isc synth wrote"
-    )
+    parser.add_argument("dataset", metavar="DATASET", type=Path, help="output folder of isc synth")
     parser.add_argument(
         "-o",
         "--output",
         type=Path,
         required=True,
         metavar="DIR",
-        help="the folder to write; an earlier report is replaced",
+        help="output folder; an earlier report is replaced",
     )
-    parser.add_argument(
-        "--split", metavar="NAME", help="run one split of the dataset (default: all)"
-    )
+    parser.add_argument("--split", metavar="NAME", help="split to run (default: all)")
     parser.add_argument(
         "--scenes",
         type=count,
         default=0,
         metavar="N",
-        help="run N scenes, drawn by --seed (default: all)",
+        help="number of scenes, drawn by --seed (default: all)",
     )
-    stages = "separation, sirfs, gloss (default: all, and the chain with its error budget)"
+    stages = "separation, sirfs, gloss (default: all, and the whole chain with its error budget)"
     parser.add_argument("--stages", type=names, metavar="a,b", help=stages)
-    models = f"compare these with plain SIRFS and with SIRFS on the true diffuse layer: {', '.join(SEPARATING_MODELS)} (default: none)"
+    models = f"models to compare with plain SIRFS: {', '.join(SEPARATING_MODELS)} (default: none)"
     parser.add_argument("--models", type=names, metavar="a,b", help=models)
     parser.add_argument(
         "--separator",
         choices=METHODS,
         default=BEST,
         metavar="NAME",
-        help="how to separate (default %(default)s)",
+        help="separation method (default: %(default)s)",
     )
     parser.add_argument(
         "--illumination",
         choices=ILLUMINATIONS,
         default=ILLUMINATIONS[0],
-        help="which lights SIRFS expects",
+        help="light prior of SIRFS (default: %(default)s)",
     )
     parser.add_argument(
         "--seed",
         type=count,
         default=0,
         metavar="S",
-        help="of everything drawn at random (default 0)",
+        help="seed of all random draws (default: 0)",
     )
     parser.add_argument(
         "--bounds",
         metavar="FILE",
-        help="bounds to judge by (default: those of the package; none: judge nothing)",
+        help="regression bounds; none to skip them (default: those of the package)",
     )
     parser.add_argument(
         "--update-bounds",
         type=Path,
         metavar="FILE",
-        help="write bounds that this run keeps with a margin",
+        help="write bounds that this run meets, with a margin",
     )
     parser.add_argument(
         "--renders",
         type=count,
         default=3,
         metavar="N",
-        help="how many scenes to render again as a check (default 3)",
+        help="number of scenes to render again as a check (default: 3)",
     )
     parser.add_argument(
         "--threads",
         type=count,
         default=0,
         metavar="N",
-        help="how many scenes at once (0: one for each core)",
+        help="number of scenes in parallel; 0 for one per core (default: 0)",
     )
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work; what can be wrong is found before it begins.
+    """Run the command.
 
-    Raises `Rejected` where a bound is broken, with the report written.
+    Parameters
+    ----------
+    options : argparse.Namespace
+        The parsed options.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    list of str
+        Lines for the user.
+
+    Raises
+    ------
+    Rejected
+        If a bound is violated; the report is written.
+    InputError
+        For invalid input, before the work begins.
     """
     from ..validation.measurement.bounds import SHIPPED, bounds_from, read_bounds, write_bounds
     from ..validation.measurement.measure import ValidationOptions
@@ -136,7 +151,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.update_bounds is not None:
         require_writable_file(options.update_bounds)
     if options.output.resolve() == options.dataset.resolve():
-        raise InputError("the report cannot replace the dataset: name another folder for -o")
+        raise InputError("the report cannot replace the data set: choose another folder for -o")
     outcome = validate(
         options.dataset, wanted, bounds, options.renders, _command(options), monitor.part(0, 0.9)
     )
@@ -144,12 +159,12 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     if options.update_bounds is not None:
         write_bounds(options.update_bounds, bounds_from(outcome.figures))
     if outcome.failures:
-        raise Rejected("\n".join([*outcome.failures, f"look at {options.output / 'report.html'}"]))
-    return [*outcome.notes, *hints(options, f"look at {options.output / 'report.html'}")]
+        raise Rejected("\n".join([*outcome.failures, f"report: {options.output / 'report.html'}"]))
+    return [*outcome.notes, *hints(options, f"report: {options.output / 'report.html'}")]
 
 
 def _command(options: argparse.Namespace) -> str:
-    """The command that makes the report again."""
+    """The command that repeats the run."""
     words = ["isc", "validate", str(options.dataset), "-o", str(options.output)]
     for name, default in (
         ("split", None),

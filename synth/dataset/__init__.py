@@ -1,3 +1,3 @@
-"""Data sets of rendered scenes: which scenes a run holds (`splits`), their files (`scene_folder`,
-`description`, `card`), making them (`run`) and reading them again (`reading`).
+"""Data sets of rendered scenes: `settings` and `splits` define the scenes of a run, `generate`
+renders them, `scene_folder`, `description` and `card` write their files, and `reading` reads them.
 """

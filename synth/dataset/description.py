@@ -1,7 +1,7 @@
-"""What `scene.json` says: how a scene was made, in which units and frames, and the few numbers that
-are not maps.
+"""The content of `scene.json`: how a scene was made, units and frames, and the numbers that are not
+maps.
 
-It holds no time and no path, so that the same seed gives the same bytes.
+It contains no time and no path, so that the same seed gives the same bytes.
 """
 
 from dataclasses import asdict, fields
@@ -28,23 +28,59 @@ UNITS = {
     "frame": "x right, y up, z toward the viewer; row 0 at the top",
     "height": "pixels toward the viewer; object units times pixels_per_unit",
     "light": "linear Rec.709, scene-referred; 1 is the sensor's full scale",
-    "shading": "radiance of a white matt surface: diffuse = reflectance * shading",
-    "environment": "latitude-longitude, row 0 straight up, first column away from the viewer, a quarter along is right",
+    "shading": "radiance of a white diffuse surface: diffuse = reflectance * shading",
+    "environment": (
+        "latitude-longitude, row 0 straight up, first column away from the viewer, right at a "
+        "quarter of the width"
+    ),
 }
-ILLUMINATION = "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, x right, y up, z toward the viewer"
+ILLUMINATION = (
+    "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, "
+    "x right, y up, z toward the viewer"
+)
 CONVENTIONS = {
     "lambert": "f = albedo / pi",
-    "oren_nayar": "f = albedo times Oren & Nayar's rough matt lobe, slope deviation sigma in radians",
-    "blinn_phong": "f = albedo / pi + strength (gloss + 8) / (8 pi) cos(n, h)^gloss: gloss is the exponent, normalised Blinn-Phong",
-    "ggx": "f = albedo / pi + strength D G F / (4 cos cos): gloss is alpha of GGX (Blender's roughness squared), F by Schlick from f0",
-    "roughplastic": "Mitsuba's roughplastic, GGX, nonlinear off: gloss is alpha, the interface's Fresnel term is exact for ior",
+    "oren_nayar": (
+        "f = albedo times Oren & Nayar's rough diffuse lobe, slope deviation sigma in radians"
+    ),
+    "blinn_phong": (
+        "f = albedo / pi + strength (gloss + 8) / (8 pi) cos(n, h)^gloss: gloss is the exponent, "
+        "normalised Blinn-Phong"
+    ),
+    "ggx": (
+        "f = albedo / pi + strength D G F / (4 cos cos): gloss is alpha of GGX (Blender's "
+        "roughness squared), F by Schlick from f0"
+    ),
+    "roughplastic": (
+        "Mitsuba's roughplastic, GGX, nonlinear off: gloss is alpha, the interface's Fresnel term "
+        "is exact for ior"
+    ),
 }
 
 
 def describe(
     split: str, recipe: Recipe, scene: Scene, truth: GroundTruth, checksums: dict[str, str]
 ) -> dict[str, Any]:
-    """The content of `scene.json`, ready for JSON. `checksums`: SHA-256 of the files beside it."""
+    """Return the content of `scene.json`.
+
+    Parameters
+    ----------
+    split : str
+        The scene's split.
+    recipe : Recipe
+        How it was made.
+    scene : Scene
+        Its lights, material and camera.
+    truth : GroundTruth
+        Its maps.
+    checksums : dict of str to str
+        SHA-256 of the files beside it.
+
+    Returns
+    -------
+    dict
+        JSON values.
+    """
     shape, light = recipe.shape, recipe.light
     return {
         "schema_version": SCHEMA_VERSION,
@@ -76,7 +112,7 @@ def describe(
 
 
 def describe_picture(picture: PictureSettings) -> dict[str, Any]:
-    """The settings of a picture that decide what is in the files."""
+    """Return the settings of a picture that affect the files, as JSON values."""
     return {
         "size": picture.size,
         "samples": picture.samples,
@@ -89,7 +125,7 @@ def describe_picture(picture: PictureSettings) -> dict[str, Any]:
 
 
 def specular_share(truth: GroundTruth) -> float:
-    """The specular layer's part of all light inside the mask, [0, 1]."""
+    """Return the specular share of all light inside the mask, [0, 1]."""
     specular, diffuse = (
         float(layer[truth.mask].sum(dtype=np.float64)) for layer in (truth.specular, truth.diffuse)
     )
@@ -97,7 +133,7 @@ def specular_share(truth: GroundTruth) -> float:
 
 
 def versions() -> dict[str, str]:
-    """Of all that has a say in the numbers."""
+    """Return the versions of everything that affects the numbers."""
     found = {"isc": __version__}
     for name in ("mitsuba", "drjit", "numpy"):
         try:
@@ -121,9 +157,8 @@ def _render(recipe: Recipe) -> dict[str, Any]:
 
 
 def _camera(camera: Camera) -> dict[str, Any]:
-    """`view_width`: object units across the picture at the origin (Blender's orthographic scale).
-
-    `focal_length`: pixels.
+    """The camera; `view_width`: object units across the picture at the origin (Blender's
+    orthographic scale), `focal_length`: pixels.
     """
     return {
         "kind": "perspective" if camera.perspective else "orthographic",
@@ -154,7 +189,7 @@ def _material(material: Material) -> dict[str, Any]:
 
 
 def _span(values: float | np.ndarray) -> dict[str, float]:
-    """A texture in three numbers; a number is all of them."""
+    """A texture in three numbers, all equal for a uniform one."""
     return {
         "least": float(np.min(values)),
         "median": float(np.median(values)),
@@ -167,8 +202,8 @@ def _mean_color(layer: np.ndarray, mask: np.ndarray) -> list[float]:
 
 
 def _light(light: Light) -> dict[str, Any]:
-    """Every number of a light; of an environment only its size, its pixels being in
-    `environment.exr`.
+    """Every number of a light; of an environment only its size, since `environment.exr` has its
+    pixels.
     """
     kind = type(light).__name__.removesuffix("Light").lower()
     if isinstance(light, EnvironmentLight):
@@ -183,5 +218,5 @@ def _light(light: Light) -> dict[str, Any]:
 
 
 def _sensor(sensor: Sensor) -> dict[str, Any]:
-    """All but the exposure, which a picture has of its own."""
+    """All but the exposure, which the picture has."""
     return {name: value for name, value in asdict(sensor).items() if name != "exposure_level"}

@@ -1,11 +1,11 @@
-"""Making a data set: scene after scene, each whole or not at all, so that an interrupted run goes
-on where it stopped.
+"""Rendering a data set scene by scene, each written completely or not at all, so that an
+interrupted run can continue.
 
-`manifest.json` is written before the first scene that lacks and says what the run is to become; a
-folder that holds another run is left alone. A scene that is there is kept if it is the one planned
-and none of its files has changed since.
+`manifest.json` is written before the first missing scene and describes the whole run; a folder with
+another run is refused. An existing scene is kept if it is the planned one and none of its files was
+modified.
 
-Limits: a kept scene may come from another version of the program; its `scene.json` says which.
+Limits: a kept scene may come from another version of the program; its `scene.json` records it.
 """
 
 import gc
@@ -13,7 +13,7 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,47 +21,27 @@ from isc_core.errors import InputError
 from isc_core.io.atomic import new_file, require_writable_file
 from isc_core.progress import Monitor, ProgressEvent
 
-from ..capture.recipe import PictureSettings, Recipe, Sources, photograph
+from ..capture.recipe import Recipe, photograph
 from ..rendering.bsdfs import load_drjit
 from ..scene.variant import has_llvm, load_mitsuba
 from .card import card
 from .description import describe_picture
 from .reading import MANIFEST, read_description, read_object, require_intact
 from .scene_folder import checksum, write_scene
-from .splits import SPLITS, Choices, make_pools
+from .settings import DatasetSettings
+from .splits import SPLITS, make_pools
 
 SCHEMA_VERSION = 1
 KIND = "isc synth data set"
-MOST_SCENES = 100_000  # seeds have five digits in folder names
-_LOOKING = 0.02  # of the whole, for what is there already
-# scenes after which compiled kernels are let go; those needed again come from Dr.Jit's files
+_LOOKING = 0.02  # of the progress, for checking existing scenes
+# Scenes after which compiled kernels are released; Dr.Jit reloads those it needs from its files.
 _KERNELS_KEPT = 50
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
 @dataclass(frozen=True)
-class DatasetSettings:
-    """A data set: the scenes of the seeds `seed` ... `seed` + `count` - 1, drawn from `choices`,
-    taken as `picture` says, with the files of `sources`. Raises `InputError` for an impossible
-    count or seed.
-    """
-
-    count: int
-    seed: int = 0
-    choices: Choices = field(default_factory=Choices)
-    picture: PictureSettings = field(default_factory=PictureSettings)
-    sources: Sources = field(default_factory=Sources)
-
-    def __post_init__(self) -> None:
-        if not (self.count >= 1 and self.seed >= 0 and self.seed + self.count <= MOST_SCENES):
-            raise InputError(
-                f"{self.count} scenes from seed {self.seed} on cannot be made: their seeds have to be from 0 to {MOST_SCENES - 1}"
-            )
-
-
-@dataclass(frozen=True)
 class PlannedScene:
-    """One scene to be made, and its split."""
+    """One scene to be rendered, and its split."""
 
     split: str
     recipe: Recipe
@@ -69,16 +49,29 @@ class PlannedScene:
 
 @dataclass(frozen=True)
 class DatasetOutcome:
-    """How many scenes were `made`, and how many were there already and `kept`."""
+    """How many scenes were rendered (`made`), and how many already existed (`kept`)."""
 
     made: int
     kept: int
 
 
 def plan(run: DatasetSettings) -> tuple[PlannedScene, ...]:
-    """All scenes of a run, in the order of their seeds.
+    """Return all scenes of a run, in the order of their seeds.
 
-    Raises `InputError` for splits and sources that cannot be had.
+    Parameters
+    ----------
+    run : DatasetSettings
+        The data set.
+
+    Returns
+    -------
+    tuple of PlannedScene
+        The scenes.
+
+    Raises
+    ------
+    InputError
+        For impossible splits and unusable sources.
     """
     pools = make_pools(run.choices, run.sources)
     seeds = range(run.seed, run.seed + run.count)
@@ -89,9 +82,28 @@ def plan(run: DatasetSettings) -> tuple[PlannedScene, ...]:
 
 
 def make_dataset(run: DatasetSettings, out: Path, monitor: Monitor | None = None) -> DatasetOutcome:
-    """Makes the scenes of `run` that `out` lacks.
+    """Render the scenes of a data set that a folder lacks.
 
-    Raises `InputError` where `out` holds anything else, and `Cancelled`.
+    Parameters
+    ----------
+    run : DatasetSettings
+        The data set.
+    out : Path
+        Its folder.
+    monitor : Monitor, optional
+        Progress and cancellation.
+
+    Returns
+    -------
+    DatasetOutcome
+        Number of scenes.
+
+    Raises
+    ------
+    InputError
+        If `out` contains anything else, or a source cannot be used.
+    Cancelled
+        If the user cancels.
     """
     monitor = monitor or Monitor()
     load_mitsuba()
@@ -100,7 +112,7 @@ def make_dataset(run: DatasetSettings, out: Path, monitor: Monitor | None = None
     require_this_run(out, settings, run.count)
     missing = []
     for index, scene in enumerate(planned):
-        monitor.report("looking for finished scenes", _LOOKING * index / len(planned))
+        monitor.report("checking existing scenes", _LOOKING * index / len(planned))
         if not is_finished(out / scene.split / scene.recipe.name, scene):
             missing.append(scene)
     if missing:
@@ -129,8 +141,9 @@ def _make(missing: list[PlannedScene], total: int, out: Path, monitor: Monitor) 
 
 
 def _tidy(index: int) -> None:
-    """Keeps the memory of a long run flat: renderers hold buffers in reference cycles, and Dr.Jit
-    keeps every kernel that it compiled.
+    """Limit the memory of a long run: renderers keep buffers in reference cycles, and Dr.Jit keeps
+    every
+    kernel that it compiled.
     """
     gc.collect()
     if index % _KERNELS_KEPT == _KERNELS_KEPT - 1 and has_llvm():
@@ -140,12 +153,12 @@ def _tidy(index: int) -> None:
 
 
 def _constant(text: str, left: str, monitor: Monitor) -> Callable[[ProgressEvent], None]:
-    """Progress inside a scene, under the scene's own text; files take the last tenth."""
+    """Progress inside a scene, with the scene's own text; files take the last tenth."""
     return lambda event: monitor.progress(ProgressEvent(text, 0.9 * event.fraction, left))
 
 
 def _time_left(seconds: float, done: int, total: int) -> str:
-    """What the scenes before suggest, in words; nothing before the first one."""
+    """Estimated remaining time; empty before the first scene is done."""
     if not done:
         return ""
     left = seconds / done * (total - done)
@@ -153,7 +166,7 @@ def _time_left(seconds: float, done: int, total: int) -> str:
 
 
 def is_finished(folder: Path, scene: PlannedScene) -> bool:
-    """Whether the folder holds this very scene, undamaged."""
+    """Return whether a folder contains this scene, undamaged."""
     try:
         content = read_description(folder)
         require_intact(folder, content)
@@ -165,8 +178,9 @@ def is_finished(folder: Path, scene: PlannedScene) -> bool:
 
 
 def describe_run(run: DatasetSettings) -> dict[str, Any]:
-    """What decides the scenes of a run, whatever their number: two runs are the same where this is
-    equal.
+    """Return what defines the scenes of a run except for their number, as JSON values.
+
+    Two runs are the same if this is equal.
     """
     choices, sources = run.choices, run.sources
     return {
@@ -188,11 +202,24 @@ def describe_run(run: DatasetSettings) -> dict[str, Any]:
 
 
 def require_this_run(out: Path, settings: dict[str, Any], count: int) -> None:
-    """Raises `InputError` unless `out` is new, empty, or holds this run, begun or finished, with no
-    more scenes than `count`.
+    """Check that a folder is new, empty, or contains this run, with at most as many scenes.
+
+    Parameters
+    ----------
+    out : Path
+        The folder.
+    settings : dict
+        The settings, from `describe_run`.
+    count : int
+        Number of scenes.
+
+    Raises
+    ------
+    InputError
+        If it contains anything else.
     """
     if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file: name a folder")
+        raise InputError(f"{out} is a file: choose a folder")
     path = out / MANIFEST
     if not path.is_file():
         if out.is_dir() and any(entry.name not in _LITTER for entry in out.iterdir()):
@@ -209,17 +236,15 @@ def require_this_run(out: Path, settings: dict[str, Any], count: int) -> None:
         or not isinstance(theirs, dict)
         or not isinstance(found.get("count"), int)
     ):
-        raise InputError(
-            f"{path} is not the manifest of a data set of isc synth: choose another folder"
-        )
+        raise InputError(f"{path} is not a manifest of isc synth: choose another folder")
     if different := [name for name in settings if theirs.get(name) != settings[name]]:
         name = different[0]
-        raise InputError(
-            f"{out} holds another run ({name} {_short(theirs.get(name))}, not {_short(settings[name])}): choose another folder"
-        )
+        difference = f"{name} {_short(theirs.get(name))}, not {_short(settings[name])}"
+        raise InputError(f"{out} contains another run ({difference}): choose another folder")
     if found["count"] > count:
         raise InputError(
-            f"{out} holds a run of {found['count']} scenes: ask for at least as many, or choose another folder"
+            f"{out} contains a run of {found['count']} scenes: use at least as many, or choose "
+            "another folder"
         )
 
 
@@ -229,7 +254,7 @@ def _short(value: Any) -> str:
 
 
 def _described(path: Path | None) -> dict[str, str] | None:
-    """A user's file by its name and content. Raises `InputError` where it cannot be read."""
+    """A user's file by name and content."""
     if path is None:
         return None
     try:
@@ -246,7 +271,7 @@ def _write_root(
     *,
     complete: bool,
 ) -> None:
-    """`manifest.json` and `README.md`; what says so already is left alone."""
+    """Write `manifest.json` and `README.md` unless they are up to date."""
     counted = Counter(scene.split for scene in planned)
     splits = {name: counted[name] for name in SPLITS if counted[name]}
     manifest = {
@@ -260,7 +285,7 @@ def _write_root(
     }
     texts = {
         MANIFEST: json.dumps(manifest, indent=1) + "\n",
-        "README.md": card(settings, run.count, splits),
+        "README.md": card(run, splits),
     }
     for name, text in texts.items():
         content = text.encode()

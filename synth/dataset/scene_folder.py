@@ -1,11 +1,10 @@
 """The files of one rendered scene.
 
-`maps.exr` has the channels of a result folder of `isc decompose`, so that truth and result compare
-name by name. `material.exr`: `strength.Y` and `gloss.Y` of the material. `variance.exr`: of the
+`maps.exr` has the channels of a result folder of `isc decompose`, so that ground truth and result
+compare by name. `material.exr`: `strength.Y` and `gloss.Y` of the material. `variance.exr`: of the
 Monte Carlo estimates of diffuse, specular and shading. `environment.exr`: all lights as seen from
-the origin. `photo.png`: what a camera would store, the mask as alpha. `preview.png`: what a person
-looks at first. `scene.json`: everything else, with the checksums of the files beside it (see
-`description`).
+the origin. `photo.png`: the photo, the mask as alpha. `preview.png`: a contact sheet. `scene.json`:
+everything else, with the checksums of the files beside it (see `description`).
 """
 
 import hashlib
@@ -41,9 +40,25 @@ _PREVIEW = 0.5  # of the sheet's size
 
 
 def write_scene(folder: Path, split: str, recipe: Recipe, scene: Scene, truth: GroundTruth) -> None:
-    """Writes the folder, whole or not at all.
+    """Write a scene's folder, completely or not at all.
 
-    Raises `InputError` where it holds something else or cannot be written.
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    split : str
+        The scene's split.
+    recipe : Recipe
+        How it was made.
+    scene : Scene
+        Lights, material and camera.
+    truth : GroundTruth
+        The maps.
+
+    Raises
+    ------
+    InputError
+        If the folder contains other files or cannot be written.
     """
     with new_folder(folder, FILES) as partial:
         write_channels(partial / "maps.exr", map_channels(truth))
@@ -62,10 +77,7 @@ def write_scene(folder: Path, split: str, recipe: Recipe, scene: Scene, truth: G
 
 
 def map_channels(truth: GroundTruth) -> dict[str, np.ndarray]:
-    """The channels of `maps.exr`.
-
-    Truth is to be trusted wherever there is any: confidence is the mask.
-    """
+    """Return the channels of `maps.exr`. Ground truth is certain: confidence is the mask."""
     mask = truth.mask.astype(np.float32)
     channels: dict[str, np.ndarray] = {}
     for name, letters in LAYERS.items():
@@ -75,13 +87,28 @@ def map_channels(truth: GroundTruth) -> dict[str, np.ndarray]:
 
 
 def planes(values: np.ndarray, letters: str, prefix: str = "") -> dict[str, np.ndarray]:
-    """A map (H, W) or (H, W, C) as channels, one for each of the `letters`."""
+    """Split a map (H, W) or (H, W, C) into channels.
+
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+        The map.
+    letters : str
+        One letter per channel.
+    prefix : str, optional
+        Prefix of the names.
+
+    Returns
+    -------
+    dict of str to (H, W) ndarray
+        The channels.
+    """
     stack = values if values.ndim == 3 else values[..., None]
     return {f"{prefix}{letter}": stack[..., index] for index, letter in enumerate(letters)}
 
 
 def checksum(path: Path) -> str:
-    """SHA-256 of a file, in hexadecimal digits."""
+    """Return the SHA-256 of a file in hexadecimal digits."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

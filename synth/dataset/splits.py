@@ -1,12 +1,13 @@
-"""Which objects, materials and lights there are, which of them are held out, and which of them meet
-in the scene of a seed.
+"""The available objects, materials and lights, which of them are held out, and which of them a
+scene's seed combines.
 
 Equation: of each family every fifth member (number mod 5 = 4) is held out; of materials every fifth
-round through the albedos, number = round * albedos + albedo. A scene of "train" takes members that
-are seen only; of "test_objects", "test_materials", "test_lights" one that is held out in that
-aspect alone; of "test" three held-out ones. The split follows from the scene's seed, so that a
-longer run begins with the shorter one; the rule knows no run, so that what one run holds out no
-other run has trained on.
+round through the albedos, number = round * albedos + albedo. A scene of "train" has only members
+that are not held out; of "test_objects", "test_materials", "test_lights" one held-out member in
+that
+aspect alone; of "test" three. The split follows from the scene's seed, so that a longer run begins
+with the shorter one; the rule is the same for all runs, so that no run trains on what another one
+holds out.
 
 Citation: S. Kaufman et al., "Leakage in data mining: formulation, detection, and avoidance", ACM
 Transactions on Knowledge Discovery from Data 6(4) (2012), doi:10.1145/2382577.2382579.
@@ -60,15 +61,26 @@ SPLITS = tuple(_HELD_OUT)
 _EVERY = 5
 _MEMBERS = 20  # of a family of objects or lights
 _ROUNDS = 5  # of a material through the albedos
-_GLOSSY_WEIGHT = 3  # of a glossy model beside a matt one
+_GLOSSY_WEIGHT = 3  # of a glossy model relative to a diffuse one
 
 
 @dataclass(frozen=True)
 class Choices:
-    """The families that scenes are drawn from, by name: `shapes`, `materials` (models), `albedos`,
-    `lights`; and the `splits` wanted, an empty one meaning all that can be. "mesh", "height" and
-    "image" are the user's files ("mesh" among the albedos: its own colours). Raises `InputError`
-    for unknown names.
+    """The families that scenes are drawn from, by name.
+
+    Attributes
+    ----------
+    shapes, materials, albedos, lights : tuple of str
+        "mesh", "height" and "image" are the user's files ("mesh" among the albedos: its own
+        colours);
+        materials are models.
+    splits : tuple of str
+        The splits; empty for all possible ones.
+
+    Raises
+    ------
+    InputError
+        For unknown or repeated names.
     """
 
     shapes: tuple[str, ...] = SHAPES
@@ -87,14 +99,14 @@ class Choices:
         }
         for kind, (names, all_names) in known.items():
             if unknown := [name for name in names if name not in all_names]:
-                raise InputError(f"unknown {kind} {unknown[0]!r}: choose of {', '.join(all_names)}")
+                raise InputError(f"unknown {kind} {unknown[0]!r}: choose {', '.join(all_names)}")
             if len(set(names)) < len(names) or not (names or kind == "split"):
-                raise InputError(f"name each {kind} once, and at least one")
+                raise InputError(f"give each {kind} once, and at least one")
 
 
 @dataclass(frozen=True)
 class _Member:
-    """A part, what else is fixed with it, and whether it is held out."""
+    """A family member, what else is fixed with it, and whether it is held out."""
 
     part: FamilyMember
     held_out: bool
@@ -106,7 +118,12 @@ class _Member:
 class Pools:
     """All members that a run draws from.
 
-    `pattern`: the splits that its scenes go through, by seed.
+    Attributes
+    ----------
+    shape, material, light : tuple
+        The members.
+    pattern : tuple of str
+        The splits that scenes cycle through, by seed.
     """
 
     shape: tuple[_Member, ...]
@@ -115,11 +132,26 @@ class Pools:
     pattern: tuple[str, ...]
 
     def split_of(self, seed: int) -> str:
-        """Where the scene of a seed belongs."""
+        """Return the split of a seed's scene."""
         return self.pattern[seed % len(self.pattern)]
 
     def recipe(self, seed: int, picture: PictureSettings, sources: Sources) -> Recipe:
-        """The scene of a seed."""
+        """Return the recipe of a seed's scene.
+
+        Parameters
+        ----------
+        seed : int
+            The seed.
+        picture : PictureSettings
+            How it is photographed.
+        sources : Sources
+            The user's files.
+
+        Returns
+        -------
+        Recipe
+            The recipe.
+        """
         rng = np.random.default_rng(np.random.SeedSequence(seed))
         held = _HELD_OUT[self.split_of(seed)].split()
         shape, material, light = (
@@ -139,9 +171,24 @@ class Pools:
 
 
 def make_pools(choices: Choices, sources: Sources) -> Pools:
-    """The members of all families chosen.
+    """Return the members of all chosen families.
 
-    Raises `InputError` where a split that was asked for has nothing held out.
+    Parameters
+    ----------
+    choices : Choices
+        The families.
+    sources : Sources
+        The user's files.
+
+    Returns
+    -------
+    Pools
+        The members.
+
+    Raises
+    ------
+    InputError
+        If a requested split has nothing held out, or a file is missing.
     """
     shapes = tuple(
         _Member(part, held)
@@ -169,7 +216,8 @@ def make_pools(choices: Choices, sources: Sources) -> Pools:
     possible = [name for name in SPLITS if not lacking & set(_HELD_OUT[name].split())]
     if impossible := [name for name in choices.splits if name not in possible]:
         raise InputError(
-            f"the split {impossible[0]} cannot be made: nothing is held out of what was chosen; name more, or leave it out"
+            f"the split {impossible[0]} is not possible: the choice has no held-out members; choose "
+            "more families, or omit the split"
         )
     wanted = choices.splits or tuple(possible)
     return Pools(shapes, materials, lights, tuple(name for name in _PATTERN if name in wanted))
@@ -195,7 +243,7 @@ def _lights_of(name: str, sources: Sources) -> int:
         return int(load_natural_lights(sources.natural_lights).shape[2])
     if name == "hdr" and sources.hdr:
         return len(sources.hdr)
-    raise InputError(f"the light {name!r} is read from files: name {FROM_FILES[name]}")
+    raise InputError(f"the light {name!r} is read from files: give {FROM_FILES[name]}")
 
 
 def _materials(model: str, albedos: tuple[str, ...]) -> list[_Member]:
@@ -216,7 +264,9 @@ def _materials(model: str, albedos: tuple[str, ...]) -> list[_Member]:
 
 
 def _drawn(members: tuple[_Member, ...], held_out: bool, rng: np.random.Generator) -> _Member:
-    """One of them: first the family, glossy materials more often than matt ones, then the member."""
+    """Draw a member: first the family, glossy ones more often than diffuse ones, then the
+    member.
+    """
     eligible = [member for member in members if member.held_out == held_out]
     families = sorted({member.model or member.part.family for member in eligible})
     weights = np.array([1.0 if name in DIFFUSE_MODELS else _GLOSSY_WEIGHT for name in families])

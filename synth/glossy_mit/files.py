@@ -1,17 +1,17 @@
-"""The files of one object under one light at one level, laid out as the set lays them out.
+"""The files of one object under one light at one level, in the layout of the MIT-Berkeley set.
 
-`laboratory/OBJECT` holds what is read of a photographed object, `natural/OBJECT` the same images as
-the natural folder has them, so that both readers find them. 16-bit files hold linear values of
+`laboratory/OBJECT` contains what is read of a photographed object, `natural/OBJECT` the same images
+as the natural folder has them, so that both readers work. 16-bit files contain linear values of
 1/65535; original = diffuse + specular exactly, in codes.
 
 Equation: one gain for all levels of an object under a light, so that they differ in the specular
-layer only: the brightest value of the highest level, and of the shading, comes just below 1. Only
-where this would leave the diffuse layer in the dark (99 % of it below 0.02) it is lifted to there,
-and highlights clip, in the original and the specular codes. The gain goes into the light's constant
+layer only: the brightest value of the highest level, and of the shading, is just below 1. Only if
+this would darken the diffuse layer too much (99 % of it below 0.02) it is raised to that level, and
+highlights clip, in the original and the specular codes. The gain is added to the light's constant
 coefficient.
 
-Limits: a diffuse value below one code becomes one code, because the set's readers take 0 for "no
-object here".
+Limits: a diffuse value below one code becomes one code, because the set's readers interpret 0 as
+background.
 """
 
 import io
@@ -37,7 +37,7 @@ RECORD = "object.json"
 _MATLAB_HEADER = b"MATLAB 5.0 MAT-file, written by isc synth glossy-mit".ljust(116)
 _WHITE = 65535
 _BRIGHTEST = 0.9999
-_DARKEST = 0.02  # what 99 % of the diffuse layer stays below, at least
+_DARKEST = 0.02  # smallest 99th percentile of the diffuse layer
 LABORATORY_FILES = (
     RECORD,
     "original.png",
@@ -65,9 +65,16 @@ NATURAL_FILES = (
 
 @dataclass(frozen=True)
 class Exposed:
-    """An object under one light, scaled for its files. `shading`, `diffuse`, `gloss`: (N, 3), the
-    gloss at strength 1; `gain`: by which they were multiplied; `light`: (9, 3) coefficients of our
-    convention that belong to this `shading`.
+    """An object under one light, scaled for its files.
+
+    Attributes
+    ----------
+    source : Source
+        The object.
+    layers : Layers
+        Its unscaled layers.
+    gain : float
+        Factor of `shading`, `diffuse` and the specular layer, (N, 3) each.
     """
 
     source: Source
@@ -76,37 +83,41 @@ class Exposed:
 
     @cached_property
     def shading(self) -> np.ndarray:
+        """Scaled shading, (N, 3)."""
         return self.gain * self.layers.shading
 
     @cached_property
     def diffuse(self) -> np.ndarray:
+        """Scaled diffuse layer, (N, 3)."""
         return self.source.reflectance * self.shading
 
     @cached_property
     def light(self) -> np.ndarray:
+        """Log-shading coefficients (9, 3) of `shading`, camera frame."""
         light = self.layers.light.copy()
         light[0] += np.log(self.gain) * np.sqrt(4 * np.pi)
         return light
 
     def strength(self, level: float) -> float:
-        """Of the gloss, so that it holds `level` per cent of all light."""
+        """Return the strength at which the specular layer has `level` per cent of all light."""
         return strength_for(level, self.diffuse, self.gain * self.layers.gloss)
 
     def specular(self, level: float) -> np.ndarray:
-        """The specular layer (N, 3), nothing clipped."""
+        """Return the specular layer (N, 3), unclipped."""
         return self.strength(level) * self.gain * self.layers.gloss
 
     def specular_codes(self, level: float) -> np.ndarray:
-        """Its codes (N, 3), of what the clipped original still holds of it."""
+        """Return its codes (N, 3), as far as the clipped original contains them."""
         return np.minimum(_codes(self.specular(level)), _WHITE - self.diffuse_codes)
 
     @cached_property
     def diffuse_codes(self) -> np.ndarray:
+        """Codes (N, 3) of the diffuse layer."""
         return np.maximum(_codes(self.diffuse), 1)
 
     @cached_property
     def shared_files(self) -> dict[str, bytes]:
-        """What does not depend on the level: the files' contents by name, those of the natural
+        """Contents of the files that do not depend on the level, by name; those of the natural
         folder as `natural/NAME`.
         """
         whole, light = self.source.whole, light_to_reference(self.light)
@@ -133,7 +144,22 @@ class Exposed:
 
 
 def exposed(source: Source, layers: Layers, highest_level: float) -> Exposed:
-    """The layers scaled as the module says, for levels up to `highest_level`."""
+    """Scale layers as described in the module.
+
+    Parameters
+    ----------
+    source : Source
+        The object.
+    layers : Layers
+        Its layers.
+    highest_level : float
+        Largest specular share, per cent.
+
+    Returns
+    -------
+    Exposed
+        The scaled object.
+    """
     diffuse = source.reflectance * layers.shading
     image = diffuse + strength_for(highest_level, diffuse, layers.gloss) * layers.gloss
     usual = float(np.quantile(diffuse.max(-1), 0.99))
@@ -144,8 +170,19 @@ def exposed(source: Source, layers: Layers, highest_level: float) -> Exposed:
 
 
 def strength_for(level: float, diffuse: np.ndarray, gloss: np.ndarray) -> float:
-    """What the gloss is multiplied by to hold `level` per cent of the sum of both layers; 0 where
-    there is no gloss at all.
+    """Return the factor at which a specular layer has a given share of the light.
+
+    Parameters
+    ----------
+    level : float
+        The share, per cent of both layers.
+    diffuse, gloss : (N, 3) ndarray
+        The diffuse layer, and the specular layer at strength 1.
+
+    Returns
+    -------
+    float
+        The factor; 0 for a black specular layer.
     """
     mirrored = float(gloss.sum(dtype=float))
     return (
@@ -154,9 +191,21 @@ def strength_for(level: float, diffuse: np.ndarray, gloss: np.ndarray) -> float:
 
 
 def write_object(root: Path, picture: Exposed, level: float) -> None:
-    """Writes natural/OBJECT and then laboratory/OBJECT, each whole or not at all.
+    """Write natural/OBJECT and then laboratory/OBJECT, each completely or not at all.
 
-    Raises `InputError` where that is impossible.
+    Parameters
+    ----------
+    root : Path
+        Folder of the set.
+    picture : Exposed
+        The object.
+    level : float
+        Specular share, per cent.
+
+    Raises
+    ------
+    InputError
+        If the folders cannot be written.
     """
     name, shared = picture.source.name, picture.shared_files
     specular = picture.specular(level)
@@ -179,16 +228,13 @@ def write_object(root: Path, picture: Exposed, level: float) -> None:
         write_channels(
             folder / "specular.exr", {channel: frame[..., k] for k, channel in enumerate("RGB")}
         )
-        record = describe(picture, level, codes) | {
-            "files": {file: checksum(folder / file) for file in LABORATORY_FILES[1:]}
-        }
+        files = {file: checksum(folder / file) for file in LABORATORY_FILES[1:]}
+        record = asdict(object_record(picture, level, codes)) | {"files": files}
         (folder / RECORD).write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
 def is_written(root: Path, name: str) -> bool:
-    """Whether all files of an object are there; folders appear whole, so that they are what they
-    were.
-    """
+    """Return whether all files of an object exist; folders are always complete."""
     natural, laboratory = (
         (root / light / name, files)
         for light, files in (("natural", NATURAL_FILES), ("laboratory", LABORATORY_FILES))
@@ -198,8 +244,60 @@ def is_written(root: Path, name: str) -> bool:
     )
 
 
-def describe(picture: Exposed, level: float, codes: np.ndarray) -> dict[str, Any]:
-    """What `object.json` says, but for the checksums. `codes`: (N, 3) of the specular layer."""
+@dataclass(frozen=True)
+class ObjectRecord:
+    """What `object.json` contains, except for the checksums.
+
+    Attributes
+    ----------
+    object : str
+        Name of the object.
+    pixels : int
+        Number of its pixels.
+    specular_share, specular_share_of_codes : float
+        Specular share of the light, unclipped and in the files.
+    clipped_share : float
+        Share of the clipped pixels.
+    gain, gloss_strength : float
+        Factors of both layers and of the specular layer.
+    light_fit_residual, environment_fit_residual : float
+        Relative RMS of the misfits, see `Layers`.
+    gloss_noise : float
+        Relative RMS of the specular layer's standard error.
+    panel : dict or None
+        The panel, by the fields of `PanelLight`.
+    """
+
+    object: str
+    pixels: int
+    specular_share: float
+    specular_share_of_codes: float
+    clipped_share: float
+    gain: float
+    gloss_strength: float
+    light_fit_residual: float
+    environment_fit_residual: float
+    gloss_noise: float
+    panel: dict[str, list[float]] | None
+
+
+def object_record(picture: Exposed, level: float, codes: np.ndarray) -> ObjectRecord:
+    """Measure what `object.json` records.
+
+    Parameters
+    ----------
+    picture : Exposed
+        The object.
+    level : float
+        Specular share, per cent.
+    codes : (N, 3) ndarray
+        Codes of the specular layer.
+
+    Returns
+    -------
+    ObjectRecord
+        The record.
+    """
     specular, layers = picture.specular(level), picture.layers
     both = float(specular.sum(dtype=float) + picture.diffuse.sum(dtype=float))
     in_codes = float(
@@ -211,19 +309,19 @@ def describe(picture: Exposed, level: float, codes: np.ndarray) -> dict[str, Any
         if layers.panel is None
         else {key: np.asarray(value).tolist() for key, value in asdict(layers.panel).items()}
     )
-    return {
-        "object": picture.source.name,
-        "pixels": len(specular),
-        "specular_share": float(specular.sum(dtype=float)) / both,
-        "specular_share_of_codes": in_codes,
-        "clipped_share": float(clipped.mean()),
-        "gain": picture.gain,
-        "gloss_strength": picture.strength(level),
-        "light_fit_residual": layers.light_residual,
-        "environment_fit_residual": layers.environment_residual,
-        "gloss_noise": layers.noise,
-        "panel": panel,
-    }
+    return ObjectRecord(
+        object=picture.source.name,
+        pixels=len(specular),
+        specular_share=float(specular.sum(dtype=float)) / both,
+        specular_share_of_codes=in_codes,
+        clipped_share=float(clipped.mean()),
+        gain=picture.gain,
+        gloss_strength=picture.strength(level),
+        light_fit_residual=layers.light_residual,
+        environment_fit_residual=layers.environment_residual,
+        gloss_noise=layers.noise,
+        panel=panel,
+    )
 
 
 def _codes(values: np.ndarray) -> np.ndarray:
@@ -231,17 +329,17 @@ def _codes(values: np.ndarray) -> np.ndarray:
 
 
 def _png(pixels: np.ndarray) -> bytes:
-    """A PNG of (h, w) or (h, w, 3) codes."""
+    """Encode codes (h, w) or (h, w, 3) as PNG."""
     done, content = cv2.imencode(
         ".png", pixels[..., ::-1] if pixels.ndim == 3 else pixels, [cv2.IMWRITE_PNG_COMPRESSION, 3]
     )
     if not done:
-        raise OSError("the PNG encoder gave nothing")
+        raise OSError("the PNG encoder returned nothing")
     return content.tobytes()
 
 
 def _matlab(variables: dict[str, Any]) -> bytes:
-    """A MATLAB 5 file; its header names no date, so that equal values give equal bytes."""
+    """Encode a MATLAB 5 file; its header has no date, so that equal values give equal bytes."""
     stream = io.BytesIO()
     scipy.io.savemat(stream, variables, do_compression=True)
     return _MATLAB_HEADER + stream.getvalue()[len(_MATLAB_HEADER) :]

@@ -1,8 +1,8 @@
-"""Making the glossy sets: object after object, each folder whole or not at all, so that an
-interrupted run goes on where it stopped.
+"""Making the glossy sets object by object, each folder written completely or not at all, so that an
+interrupted run can continue.
 
-`run.json` is written first and says what the folder is; one that holds anything else, or a run with
-other settings, is left alone. Objects, and the physical variant, may be added to a run.
+`run.json` is written first and identifies the folder; a folder with anything else, or a run with
+other settings, is refused. Objects, and the physical variant, may be added to a run.
 """
 
 import json
@@ -33,9 +33,14 @@ _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 @dataclass(frozen=True)
 class GlossyOutcome:
-    """`roots`: the data sets, relative to the output's folder.
+    """The result of a run.
 
-    `made`, `kept`: how many objects were made, and were there already.
+    Attributes
+    ----------
+    roots : tuple of str
+        The data sets, relative to the output folder.
+    made, kept : int
+        How many objects were made, and how many already existed.
     """
 
     roots: tuple[str, ...]
@@ -50,11 +55,32 @@ def make_glossy(
     objects: Sequence[str] | None = None,
     monitor: Monitor | None = None,
 ) -> GlossyOutcome:
-    """Makes the glossy sets of the objects (default: all) below `root`, the folder of the
-    MIT-Berkeley set, into `out`.
+    """Make the glossy sets of some objects.
 
-    Raises `InputError` for unknown objects, files that are missing or damaged, and an `out` that
-    holds anything else; `Cancelled`.
+    Parameters
+    ----------
+    root : Path
+        Folder of the MIT-Berkeley set.
+    out : Path
+        Folder of the output.
+    settings : GlossySettings
+        Levels, samples, seed, exponent and variant.
+    objects : sequence of str, optional
+        Their names; all by default.
+    monitor : Monitor, optional
+        Progress and cancellation.
+
+    Returns
+    -------
+    GlossyOutcome
+        The result.
+
+    Raises
+    ------
+    InputError
+        For unknown objects, missing or damaged files, or an `out` that contains anything else.
+    Cancelled
+        If the user cancels.
     """
     monitor = monitor or Monitor()
     names = tuple(dict.fromkeys(objects)) if objects else list_objects(root, "laboratory")
@@ -62,9 +88,7 @@ def make_glossy(
         for illumination in ILLUMINATIONS:
             check_request(root, name, illumination, "diffuse")
     if out.resolve().is_relative_to(root.resolve()):
-        raise InputError(
-            f"{out} is inside the data set that is read: choose a folder outside of {root}"
-        )
+        raise InputError(f"{out} is inside the data set: choose a folder outside of {root}")
     _require_this_run(out, settings)
     _write_json(out / RUN, {"kind": KIND, "settings": settings.to_json()})
     roots = _known_roots(out, settings)
@@ -80,7 +104,7 @@ def make_glossy(
 def _make_object(
     root: Path, out: Path, name: str, settings: GlossySettings, monitor: Monitor
 ) -> bool:
-    """What of an object is missing; whether anything was."""
+    """Make the missing files of an object; whether there were any."""
     missing = [
         prefix
         for prefix in _prefixes(settings)
@@ -103,7 +127,7 @@ def _make_object(
 
 
 def _prefixes(settings: GlossySettings) -> tuple[str, ...]:
-    """Folders below the output's: of the exact sets, and of the physical ones."""
+    """Subfolders of the exact sets, and of the physical ones."""
     return ("", "physical") if settings.physical else ("",)
 
 
@@ -112,7 +136,7 @@ def _paths(prefix: str, settings: GlossySettings) -> list[Path]:
 
 
 def _known_roots(out: Path, settings: GlossySettings) -> tuple[str, ...]:
-    """The sets that are made now, and those that an earlier run has left."""
+    """The sets of this run, and those of earlier runs."""
     everything = root_names(GlossySettings(**{**vars(settings), "physical": True}))
     return tuple(
         name for name in everything if name in root_names(settings) or (out / name).is_dir()
@@ -120,9 +144,9 @@ def _known_roots(out: Path, settings: GlossySettings) -> tuple[str, ...]:
 
 
 def _require_this_run(out: Path, settings: GlossySettings) -> None:
-    """Raises `InputError` unless `out` is new, empty or holds a run with these settings."""
+    """Check that `out` is new, empty or contains a run with these settings."""
     if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is a file: name a folder")
+        raise InputError(f"{out} is a file: choose a folder")
     require_writable_file(out / RUN)
     if not (out / RUN).is_file():
         if out.is_dir() and any(entry.name not in _LITTER for entry in out.iterdir()):
@@ -137,13 +161,14 @@ def _require_this_run(out: Path, settings: GlossySettings) -> None:
     for name, value in wanted.items():
         if theirs.get(name) != value:
             raise InputError(
-                f"{out} holds another run ({name} {theirs.get(name)}, not {value}): choose another folder"
+                f"{out} contains another run ({name} {theirs.get(name)}, not {value}): choose "
+                "another folder"
             )
 
 
 def _write_cards(out: Path, settings: GlossySettings, roots: tuple[str, ...]) -> None:
-    """`scene.json` and `README.md` of every set, from the records of the objects that are there;
-    the index of all of them.
+    """Write `scene.json` and `README.md` of every set, from the records of its objects, and
+    the index.
     """
     for level in settings.levels:
         for light in LIGHTS:
@@ -159,7 +184,7 @@ def _write_cards(out: Path, settings: GlossySettings, roots: tuple[str, ...]) ->
                     "physical": name.startswith("physical/"),
                     "command": command(settings),
                     "versions": versions(),
-                    "licence": "derived from research data under its own terms; not to be redistributed",
+                    "licence": "research data under its own terms; do not redistribute",
                     "objects": {path.parent.name: read_object(path) for path in records},
                 }
                 _write_json(out / name / "scene.json", scene)

@@ -1,18 +1,21 @@
-"""What a gloss without shadows mirrors: of an environment, and of a panel, at points that an
-orthographic camera along -z sees.
+"""The specular layer without shadows under an environment or a panel, at points seen by an
+orthographic
+camera along -z.
 
-Problem: a render by random samples leaves grain of some per cent in the gloss, and methods that
-remove highlights read grain as texture. Without shadows there is nothing to trace: the integral
-over the light can be summed up, pixel by pixel of the environment.
+Problem: a Monte Carlo render leaves noise of a few per cent in the specular layer, and methods that
+remove highlights take noise for texture. Without shadows nothing has to be traced: the integral
+over
+the light is a sum over the pixels of the environment.
 
-Equation: radiance(n) = sum_j (p + 8) / (8 pi) (n . h_j)^p max(0, n . w_j) E_j, h_j midway between
-w_j and the viewer, E_j the irradiance of a piece of the light across its beam. Normals are visited
-in small groups; a group leaves out what (n . h)^p makes less than 1e-7.
+Equation: radiance(n) = sum_j (p + 8) / (8 pi) (n . h_j)^p max(0, n . w_j) E_j, h_j halfway between
+w_j and the viewer, E_j the irradiance of a piece of the light perpendicular to its beam. Normals
+are
+processed in small groups; a group omits pieces for which (n . h)^p is below 1e-7.
 
 Citation: J. F. Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH
 1977, doi:10.1145/563858.563893.
 
-Limits: pieces are six to a lobe's width, which leaves about 1e-3 of the brightest value;
+Limits: there are six pieces per width of the lobe, which leaves about 1e-3 of the brightest value;
 `synth.rendering` estimates the same integral.
 """
 
@@ -25,13 +28,28 @@ from ..scene.lights import PanelLight
 
 _VIEW = np.array([0.0, 0.0, 1.0])
 _CELLS = 10  # normals in one cube of side 1 / _CELLS make a group
-_PIECES = 6.0  # rows of an environment to the square root of the exponent
+_PIECES = 6.0  # rows of an environment per square root of the exponent
 _FAINTEST = 1e-7
 _BLOCK = 1024
 
 
 def environment_gloss(radiance: np.ndarray, normal: np.ndarray, exponent: float) -> np.ndarray:
-    """The gloss (N, 3) of strength 1 at unit normals (N, 3) under an environment (rows, 2 rows, 3)."""
+    """Compute the specular layer of strength 1 under an environment.
+
+    Parameters
+    ----------
+    radiance : (rows, 2 rows, 3) ndarray
+        The environment.
+    normal : (N, 3) ndarray
+        Unit normals.
+    exponent : float
+        Of the normalised Blinn-Phong lobe.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        Radiance toward the viewer.
+    """
     rows = len(radiance) * int(np.ceil(max(1.0, _PIECES * np.sqrt(exponent) / len(radiance))))
     power = (resampled(radiance, rows) * solid_angles(rows)[..., None]).reshape(-1, 3)
     toward = directions(rows).reshape(-1, 3)
@@ -55,8 +73,21 @@ def environment_gloss(radiance: np.ndarray, normal: np.ndarray, exponent: float)
 def panel_layers(
     panel: PanelLight, position: np.ndarray, normal: np.ndarray, exponent: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shading and gloss of strength 1, (N, 3) each, of points (N, 3) with unit normals (N, 3)
-    before a panel.
+    """Compute shading and specular layer of strength 1 under a panel.
+
+    Parameters
+    ----------
+    panel : PanelLight
+        The panel.
+    position, normal : (N, 3) ndarray
+        Points and unit normals.
+    exponent : float
+        Of the normalised Blinn-Phong lobe.
+
+    Returns
+    -------
+    shading, specular : (N, 3) ndarray
+        The layers.
     """
     count = max(8, int(np.ceil(1.2 * np.sqrt(exponent))))
     steps = (np.arange(count) + 0.5) * 2 / count - 1
@@ -91,7 +122,7 @@ def _factor(exponent: float) -> float:
 
 
 def _groups(normal: np.ndarray) -> list[np.ndarray]:
-    """Indices of normals that are near each other."""
+    """Indices of normals that are close to each other."""
     cells = np.round(normal * _CELLS).astype(int) @ np.array([1, 100, 10000])
     order = np.argsort(cells, kind="stable")
     groups = np.split(order, np.flatnonzero(np.diff(cells[order])) + 1) if len(order) else []

@@ -1,13 +1,14 @@
-"""The two layers of an object under each light: shading exactly as the set has it, and the gloss
-beside it.
+"""The two layers of an object under each light: shading exactly as in the set, and the specular
+layer.
 
-Equation: shading = exp(SH(normal)) [+ P], gloss = G(environment) [+ G(panel)], where
-`isc_core.shading.environment_map` fits the environment to exp(SH), P is the panel's irradiance over pi, and G
-the normalised Blinn-Phong lobe of strength 1 (see `gloss`). In the physical variant
-`synth.rendering` renders both layers under environment and panel, with the object's own shadows.
+Equation: shading = exp(SH(normal)) [+ P], specular = G(environment) [+ G(panel)], where
+`isc_core.shading.environment_map` fits the environment to exp(SH), P is the panel's irradiance
+divided by pi, and G the normalised Blinn-Phong lobe of strength 1 (see `gloss`). In the physical
+variant `synth.rendering` renders both layers under environment and panel, with the object's own
+shadows.
 
-Limits: what lights the object from behind is a guess. The physical variant has the grain of its
-samples, `noise` says of which size.
+Limits: light from behind the object is unconstrained. The physical variant has the noise of its
+samples, measured by `noise`.
 """
 
 from dataclasses import dataclass, replace
@@ -30,21 +31,32 @@ from .settings import GlossySettings
 from .source import Source
 
 _PANEL_DISTANCE = 4.0
-_PANEL_ANGLES = (10.0, 20.0)  # degrees, between which its sides are seen
-_TILTS = (8.0, 27.0)  # degrees from the viewer, of normals that mirror it
+_PANEL_ANGLES = (10.0, 20.0)  # range of its angular size, degrees
+_TILTS = (8.0, 27.0)  # of normals that mirror it, degrees from the viewer
 _FEW = 0.02  # of the pixels
-_PANEL_SHARE = 0.75  # of the shading that the set's own light gives on the average
+_PANEL_SHARE = 0.75  # of the mean shading under the set's own light
 _ENVIRONMENT_ROWS = 32
-_PROBES = 4096  # about as many pixels tell how well the environment fits
+_PROBES = 4096  # number of pixels that measure the environment's misfit, about
 
 
 @dataclass(frozen=True)
 class Layers:
-    """An object under one light. `shading`, `gloss`: (N, 3) >= 0, the gloss at strength 1. `light`:
-    (9, 3), the log-shading coefficients: the set's own, or those that fit best where there are
-    none; `light_residual`: RMS of shading less exp(SH), over the RMS of shading.
-    `environment_residual`: the same of the environment's shading to the set's own. `noise`: RMS
-    standard error of the gloss, over its RMS. `panel`: the panel that was added, or None.
+    """An object under one light.
+
+    Attributes
+    ----------
+    shading, gloss : (N, 3) ndarray
+        Shading, and the specular layer at strength 1.
+    light : (9, 3) ndarray
+        Log-shading coefficients: the set's own, or the best fit.
+    light_residual : float
+        RMS of shading minus exp(SH), relative to the RMS of shading.
+    environment_residual : float
+        RMS of the environment's shading minus the set's own, likewise.
+    noise : float
+        RMS standard error of the specular layer, relative to its RMS.
+    panel : PanelLight or None
+        The added panel.
     """
 
     shading: np.ndarray
@@ -58,14 +70,16 @@ class Layers:
 
 @dataclass(frozen=True)
 class _Part:
-    """What one light gives: `shading`, `gloss` (N, 3), and the `variance` (N, 3) of the gloss."""
+    """The contribution of one light: `shading`, `gloss` (N, 3), and the `variance` (N, 3) of the
+    latter.
+    """
 
     shading: np.ndarray
     gloss: np.ndarray
     variance: np.ndarray
 
     def plus(self, other: "_Part", gain: float) -> "_Part":
-        """Both lights at once, the other one `gain` times as bright."""
+        """Both lights together, the other one `gain` times as bright."""
         return _Part(
             self.shading + gain * other.shading,
             self.gloss + gain * other.gloss,
@@ -80,10 +94,30 @@ class _Part:
 def make_layers(
     source: Source, settings: GlossySettings, monitor: Monitor, tracer: Tracer | None = None
 ) -> dict[str, Layers]:
-    """The layers under each of `settings.LIGHTS`. `tracer`: the object, for the physical variant;
-    without one nothing casts a shadow.
+    """Compute the layers under each of `settings.LIGHTS`.
 
-    Raises `Cancelled`; `InputError` where the physical variant cannot be rendered here.
+    Parameters
+    ----------
+    source : Source
+        The object.
+    settings : GlossySettings
+        Exponent, samples and seed.
+    monitor : Monitor
+        Progress and cancellation.
+    tracer : Tracer, optional
+        The object, for the physical variant; without it there are no shadows.
+
+    Returns
+    -------
+    dict of str to Layers
+        By light.
+
+    Raises
+    ------
+    InputError
+        If the physical variant cannot be rendered on this machine.
+    Cancelled
+        If the user cancels.
     """
     surface = surface_of(source, settings.exponent)
     panel = _panel(surface, source.name, settings.seed)
@@ -117,8 +151,9 @@ def make_layers(
 
 
 def surface_of(source: Source, exponent: float) -> Surface:
-    """The object's points as the renderer takes them, where `synth.shapes.height_field` has them:
-    object units, the crop's middle at 0.
+    """Return the object's points for the renderer, placed as by `synth.shapes.height_field`.
+
+    Object units, the centre of the crop at 0.
     """
     (rows, columns), height = np.nonzero(source.mask), source.height[source.mask]
     down, across = source.mask.shape
@@ -153,7 +188,7 @@ def _lit(
     tracer: Tracer | None,
     monitor: Monitor,
 ) -> _Part:
-    """One light, traced where there is something to trace."""
+    """The contribution of one light, traced if there is a tracer."""
     if tracer is not None:
         options = RenderOptions(samples=settings.samples, seed=settings.seed)
         lit = light_surface(
@@ -177,8 +212,8 @@ def _fitted(source: Source, part: _Part, residual: float, panel: PanelLight | No
 
 
 def _panel(surface: Surface, name: str, seed: int) -> PanelLight:
-    """A white panel that the object mirrors toward the viewer somewhere, on the upper side if it
-    can; drawn by the seed and the name.
+    """A white panel that the object mirrors toward the viewer, preferably on its upper side; drawn
+    by seed and name.
     """
     rng = np.random.default_rng([seed, crc32(name.encode())])
     tilt = np.degrees(np.arccos(np.clip(surface.normal[:, 2], -1, 1)))

@@ -1,4 +1,4 @@
-"""What a glossy set is made with, and how its folders are called."""
+"""The settings of a glossy set, and the names of its folders."""
 
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -14,10 +14,25 @@ _HIGHEST_EXPONENT = 2000.0
 
 @dataclass(frozen=True)
 class GlossySettings:
-    """`levels`: per cent of the light inside the mask that is specular, each within (0, 100).
-    `samples`: light paths a pixel of the physical variant, >= 2. `seed`: of the panels and of these
-    samples, >= 0. `exponent`: of the normalised Blinn-Phong lobe, 1 to 2000. `physical`: also the
-    variant that is rendered with shadows. Raises `InputError` outside these ranges.
+    """Settings of a glossy set.
+
+    Attributes
+    ----------
+    levels : tuple of float
+        Specular share of the light inside the mask, per cent, in (0, 100).
+    samples : int
+        Light paths per pixel of the physical variant, >= 2.
+    seed : int
+        Of the panels and of these samples, >= 0.
+    exponent : float
+        Of the normalised Blinn-Phong lobe, 1 to 2000.
+    physical : bool
+        Make the variant with shadows too.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     levels: tuple[float, ...] = (10.0, 25.0, 50.0)
@@ -33,27 +48,26 @@ class GlossySettings:
             or not all(0 < level < 100 for level in self.levels)
         ):
             raise InputError(
-                "levels are per cent of the light: different numbers above 0 and below 100, like 10,25,50"
+                "levels are percentages of the light: give different numbers above 0 and below "
+                "100, such as 10,25,50"
             )
         if self.samples < 2 or self.seed < 0:
-            raise InputError("samples have to be 2 or more, and the seed 0 or more")
+            raise InputError("use at least 2 samples, and a seed of at least 0")
         if not 1 <= self.exponent <= _HIGHEST_EXPONENT:
-            raise InputError(f"the exponent has to be from 1 to {_HIGHEST_EXPONENT:g}")
+            raise InputError(f"the exponent must be from 1 to {_HIGHEST_EXPONENT:g}")
 
     def to_json(self) -> dict[str, Any]:
-        """What two runs into one folder have to share: all but whether the physical variant is
-        wanted too.
-        """
+        """Return what two runs in one folder must share: everything but `physical`."""
         shared = {key: value for key, value in asdict(self).items() if key != "physical"}
         return {"schema_version": SCHEMA_VERSION, **shared, "levels": list(self.levels)}
 
 
 def root_names(settings: GlossySettings) -> tuple[str, ...]:
-    """The data sets that are made, as folders below the output's."""
+    """Return the folders of the data sets, relative to the output."""
     names = tuple(root_name(level, light) for level in settings.levels for light in LIGHTS)
     return names + (tuple(f"physical/{name}" for name in names) if settings.physical else ())
 
 
 def root_name(level: float, light: str) -> str:
-    """The folder of one level and light."""
+    """Return the folder of one level and light."""
     return f"level-{level:g}_{light}"

@@ -1,7 +1,7 @@
-"""One object of the MIT-Berkeley set, as the generator needs it: known pixels as a list, and the
-frame that they came from.
+"""One object of the MIT-Berkeley set in the generator's form: known pixels as a list, and their
+frame.
 
-Limits: a pixel counts where the mask holds, the reflectance is above 0 and all heights around it
+Limits: a pixel is used where the mask is set, the reflectance is above 0 and all heights around it
 are known, so that its normal is exact.
 """
 
@@ -20,11 +20,26 @@ from isc_core.shading.spherical_harmonics import light_from_reference
 
 @dataclass(frozen=True)
 class Source:
-    """`frame`: rows and columns of the set's files. `rows`, `columns`: 0-based, of its evaluation
-    crop, (h,) and (w,). `mask`: (h, w) bool, the N pixels that are used. `height`: (h, w) pixels
-    toward the viewer, NaN outside `mask`. `reflectance`, `normal`: (N, 3). `lights`: for each
-    illumination the (9, 3) coefficients of log shading, in our convention. `crop_file`: the bytes
-    of crop_idx.mat.
+    """An object of the set.
+
+    Attributes
+    ----------
+    name : str
+        Its name.
+    frame : (int, int)
+        Rows and columns of the set's files.
+    rows, columns : (h,) and (w,) ndarray of int
+        0-based indices of its evaluation crop.
+    mask : (h, w) ndarray of bool
+        The N pixels that are used.
+    height : (h, w) ndarray
+        Pixels toward the viewer, NaN outside `mask`.
+    reflectance, normal : (N, 3) ndarray
+        Reflectance and unit normals.
+    lights : dict of str to (9, 3) ndarray
+        Log-shading coefficients of each illumination, camera frame.
+    crop_file : bytes
+        Content of crop_idx.mat.
     """
 
     name: str
@@ -40,13 +55,26 @@ class Source:
 
     @property
     def pixels_per_unit(self) -> float:
-        """Pixels of one object unit: the object is two units wide or high, as in
+        """Pixels per object unit: the object is two units wide or high, as in
         `synth.shapes.height_field`.
         """
         return float(max(np.ptp(places) + 1 for places in np.nonzero(self.mask))) / 2
 
     def whole(self, values: np.ndarray, outside: float = 0.0) -> np.ndarray:
-        """Values (N[, C]) of the pixels as a picture of the whole frame, `outside` elsewhere."""
+        """Arrange values of the pixels as an image of the whole frame.
+
+        Parameters
+        ----------
+        values : (N,) or (N, C) ndarray
+            One value per pixel.
+        outside : float, optional
+            Value elsewhere.
+
+        Returns
+        -------
+        (H, W) or (H, W, C) ndarray
+            The image.
+        """
         crop = np.full((*self.mask.shape, *values.shape[1:]), outside, values.dtype)
         crop[self.mask] = values
         frame = np.full((*self.frame, *values.shape[1:]), outside, values.dtype)
@@ -55,9 +83,24 @@ class Source:
 
 
 def load_source(root: Path, name: str) -> Source:
-    """Reads an object.
+    """Read an object.
 
-    Raises `InputError` for files that are missing or damaged, and where no height is known.
+    Parameters
+    ----------
+    root : Path
+        Folder of the set.
+    name : str
+        The object.
+
+    Returns
+    -------
+    Source
+        The object.
+
+    Raises
+    ------
+    InputError
+        If a file is missing or damaged, or no height is known.
     """
     truths = {illumination: load_object(root, name, illumination) for illumination in ILLUMINATIONS}
     truth = truths["laboratory"]
@@ -75,7 +118,7 @@ def load_source(root: Path, name: str) -> Source:
     mask = truth.mask & np.isfinite(normal).all(-1) & (truth.reflectance > 0).all(-1)
     if not mask.any():
         raise InputError(
-            f"{name}: no pixel of its mask has a known height and reflectance: leave the object out"
+            f"{name}: no pixel of its mask has a known height and reflectance: omit the object"
         )
     return Source(
         name=name,

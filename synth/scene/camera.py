@@ -1,4 +1,4 @@
-"""The camera that all maps are made with.
+"""The camera of all maps.
 
 World and camera share one frame: x right, y up, z toward the viewer, the origin in the middle of
 the picture. Lengths are object units, `pixels_per_unit` pixels each at the origin, so height in
@@ -6,13 +6,14 @@ pixels = z * pixels_per_unit. Pixel (row, column) covers [column, column + 1] x 
 centre is at (column + .5, row + .5), row 0 at the top.
 
 Equation: orthographic, x = (column + .5 - width / 2) / pixels_per_unit, y = (height / 2 - row - .5)
-/ pixels_per_unit, looking along -z. Perspective: a pinhole at z = `distance`, scaled so that the
-plane z = 0 appears just as large.
+/ pixels_per_unit, along -z. Perspective: a pinhole at z = `distance`, scaled so that the plane z =
+0
+appears at the same size.
 
 Citation: R. Hartley and A. Zisserman, "Multiple view geometry in computer vision", 2nd edition
 (2004), doi:10.1017/CBO9780511811685.
 
-Limits: no lens: no distortion, no depth of field.
+Limits: no lens distortion, no depth of field.
 """
 
 import math
@@ -22,16 +23,29 @@ import numpy as np
 
 from isc_core.errors import InputError
 
-# Where orthographic rays start, object units: far before anything that is in the picture.
+# Start of orthographic rays in object units, far in front of any object.
 FAR = 100.0
 SMALLEST, LARGEST = 8, 4096
 
 
 @dataclass(frozen=True)
 class Camera:
-    """`width`, `height`: of the picture in pixels, 8 to 4096. `pixels_per_unit`: > 0, of the object
-    at the origin. `distance`: of a pinhole from the origin in object units, > 1.5; infinite for an
-    orthographic camera. Raises `InputError` outside these ranges.
+    """An orthographic or pinhole camera on the z axis.
+
+    Attributes
+    ----------
+    width, height : int
+        Size of the picture in pixels, 8 to 4096.
+    pixels_per_unit : float
+        Scale at the origin, > 0.
+    distance : float
+        Distance of the pinhole from the origin in object units, > 1.5; infinite for an orthographic
+        camera.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     width: int
@@ -42,23 +56,33 @@ class Camera:
     def __post_init__(self) -> None:
         if not (SMALLEST <= self.width <= LARGEST and SMALLEST <= self.height <= LARGEST):
             raise InputError(
-                f"a picture of {self.width} x {self.height} pixels cannot be made: choose {SMALLEST} to {LARGEST} a side"
+                f"a picture of {self.width} x {self.height} pixels cannot be rendered: choose "
+                f"{SMALLEST} to {LARGEST} a side"
             )
         if not (math.isfinite(self.pixels_per_unit) and self.pixels_per_unit > 0):
-            raise InputError("pixels_per_unit has to be finite and above 0")
+            raise InputError("pixels_per_unit must be finite and above 0")
         if not self.distance > 1.5:
             raise InputError(
-                "the camera is inside the object: its distance has to be above 1.5 object units"
+                "the camera is inside the object: its distance must be above 1.5 object units"
             )
 
     @property
     def perspective(self) -> bool:
-        """Whether rays meet in a pinhole."""
+        """Whether this is a pinhole camera."""
         return math.isfinite(self.distance)
 
     def rays(self, across: float = 0.5, down: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-        """Origins and unit directions (H, W, 3) of the rays through the point (across, down) in [0,
-        1]^2 of each pixel.
+        """Return the rays through one point of each pixel.
+
+        Parameters
+        ----------
+        across, down : float, optional
+            The point within the pixel, [0, 1]; its centre by default.
+
+        Returns
+        -------
+        origins, directions : (H, W, 3) ndarray
+            Origins and unit directions.
         """
         x = (np.arange(self.width) + across - self.width / 2) / self.pixels_per_unit
         y = (self.height / 2 - np.arange(self.height) - down) / self.pixels_per_unit
@@ -75,9 +99,14 @@ class Camera:
         )
 
     def matrices(self) -> dict[str, list[list[float]]]:
-        """World to camera, 4 x 4 each: "opencv" (x right, y down, z away from the viewer) and
-        "blender" (x right, y up, z toward the viewer, the camera's own place as origin). An
-        orthographic camera stands at z = `FAR`.
+        """Return the world-to-camera matrices.
+
+        Returns
+        -------
+        dict
+            4 x 4 matrices: "opencv" (x right, y down, z away from the viewer) and "blender" (x
+            right, y up,
+            z toward the viewer, the camera at the origin). An orthographic camera is at z = `FAR`.
         """
         back = self.distance if self.perspective else FAR
         blender = np.eye(4)

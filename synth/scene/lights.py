@@ -1,18 +1,17 @@
-"""Lights, as plain numbers; every renderer here makes of them what it needs.
+"""Lights as plain numbers, which every renderer here converts to its own form.
 
-Directions point from the object toward the light, in the camera's frame (x right, y up, z toward
-the viewer), lengths are object units. All radiometric values are linear Rec.709 triples >= 0.
-Environments are pictures laid out as `isc_core.shading.environment_map` says.
+Directions point from the object toward the light, in the camera frame (x right, y up, z toward the
+viewer); lengths are object units. All radiometric values are linear Rec.709 triples >= 0.
+Environments are images laid out as in `isc_core.shading.environment_map`.
 
-Equation: the irradiance of a surface with the normal n: directional, E max(0, n . d); point, I
-max(0, n . d) / r^2; panel and environment, the integral of L max(0, n . w) over the solid angle
-that they fill.
+Equation: the irradiance of a surface with the normal n: directional, E max(0, n . d); point,
+I max(0, n . d) / r^2; panel and environment, the integral of L max(0, n . w) over their solid
+angle.
 
 Citation: F. E. Nicodemus et al., "Geometrical considerations and nomenclature for reflectance", NBS
 Monograph 160 (1977), doi:10.6028/NBS.MONO.160.
 
-Limits: no light has a size smaller than its samples tell, none is seen by the camera, panels shine
-to their front only.
+Limits: lights are invisible to the camera; panels emit to their front only.
 """
 
 from collections.abc import Sequence
@@ -26,9 +25,14 @@ from isc_core.shading.environment_map import directions, resampled, solid_angles
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """From far away.
+    """A distant light.
 
-    `direction` (3,): unit, toward the light. `irradiance` (3,): on a plane across the beam.
+    Attributes
+    ----------
+    direction : (3,) ndarray
+        Unit, toward the light.
+    irradiance : (3,) ndarray
+        On a plane perpendicular to it.
     """
 
     direction: np.ndarray
@@ -41,7 +45,15 @@ class DirectionalLight:
 
 @dataclass(frozen=True)
 class PointLight:
-    """`position` (3,): outside the object. `intensity` (3,): radiant intensity, per steradian."""
+    """A point light.
+
+    Attributes
+    ----------
+    position : (3,) ndarray
+        Outside the object, object units.
+    intensity : (3,) ndarray
+        Radiant intensity, per steradian.
+    """
 
     position: np.ndarray
     intensity: np.ndarray
@@ -53,9 +65,16 @@ class PointLight:
 
 @dataclass(frozen=True)
 class PanelLight:
-    """A rectangular area light. `centre` (3,); `right`, `up` (3,): half its sides, at right angles
-    to each other; it shines toward right x up. `radiance` (3,): alike everywhere on it and toward
-    all sides in front.
+    """A rectangular area light.
+
+    Attributes
+    ----------
+    centre : (3,) ndarray
+        Object units.
+    right, up : (3,) ndarray
+        Half its sides, at right angles; it emits toward right x up.
+    radiance : (3,) ndarray
+        Uniform over its area and over all directions in front.
     """
 
     centre: np.ndarray
@@ -69,26 +88,29 @@ class PanelLight:
         _check("radiance", self.radiance, (3,), light=True)
         if self.area <= 0 or abs(float(np.dot(self.right, self.up))) > 1e-6 * self.area:
             raise InputError(
-                "a panel's sides have to be at right angles to each other, and longer than 0"
+                "a panel's sides must be at right angles to each other and longer than 0"
             )
 
     @property
     def normal(self) -> np.ndarray:
-        """(3,): the unit direction toward which it shines."""
+        """Unit direction of emission, (3,)."""
         across = np.cross(self.right, self.up)
         return across / np.linalg.norm(across)
 
     @property
     def area(self) -> float:
-        """Square object units."""
+        """Area in square object units."""
         return 4 * float(np.linalg.norm(np.cross(self.right, self.up)))
 
 
 @dataclass(frozen=True)
 class EnvironmentLight:
-    """From all around, infinitely far.
+    """An infinitely distant environment.
 
-    `radiance`: (rows, 2 rows, 3), rows >= 4, laid out as `isc_core.shading.environment_map.directions` says.
+    Attributes
+    ----------
+    radiance : (rows, 2 rows, 3) ndarray
+        rows >= 4, laid out as in `isc_core.shading.environment_map.directions`.
     """
 
     radiance: np.ndarray
@@ -107,9 +129,21 @@ Lights = Sequence[Light]
 def panel_toward_origin(
     centre: Sequence[float], size: tuple[float, float], radiance: Sequence[float]
 ) -> PanelLight:
-    """A panel at `centre` that faces the origin;
+    """Return a panel that faces the origin.
 
-    `size`: width and height in object units, the height as upright as it can be.
+    Parameters
+    ----------
+    centre : sequence of float
+        Its position.
+    size : (float, float)
+        Width and height in object units; the height is as upright as possible.
+    radiance : sequence of float
+        Linear Rec.709.
+
+    Returns
+    -------
+    PanelLight
+        The panel.
     """
     place = np.asarray(centre, float)
     forward = -place / np.linalg.norm(place)
@@ -121,7 +155,7 @@ def panel_toward_origin(
 
 
 def scaled(light: Light, gain: float) -> Light:
-    """The same light, `gain` times as bright."""
+    """Return the same light, `gain` times as bright."""
     if isinstance(light, DirectionalLight):
         return DirectionalLight(light.direction, light.irradiance * gain)
     if isinstance(light, PointLight):
@@ -132,11 +166,23 @@ def scaled(light: Light, gain: float) -> Light:
 
 
 def lights_as_environment(lights: Lights, rows: int) -> np.ndarray:
-    """All lights as seen from the origin: (rows, 2 rows, 3) float32 radiance. Point and directional
-    lights fill one pixel.
+    """Render all lights as seen from the origin.
 
-    Panels are painted on the pixels whose centres they cover, so that their radiance is kept; one
-    too small for any keeps its irradiance.
+    Point and directional lights fill one pixel. Panels fill the pixels whose centres they cover,
+    which
+    keeps their radiance; one that covers none keeps its irradiance.
+
+    Parameters
+    ----------
+    lights : sequence of Light
+        The lights.
+    rows : int
+        Rows of the image.
+
+    Returns
+    -------
+    (rows, 2 rows, 3) ndarray of float32
+        Radiance.
     """
     towards, solid = directions(rows), solid_angles(rows)
     total = np.zeros((rows, 2 * rows, 3))
@@ -156,7 +202,7 @@ def lights_as_environment(lights: Lights, rows: int) -> np.ndarray:
 
 
 def _beam(light: DirectionalLight | PointLight | PanelLight) -> tuple[np.ndarray, np.ndarray]:
-    """The direction in which the origin sees a light, and the irradiance across that beam."""
+    """The direction in which the origin sees a light, and the irradiance perpendicular to it."""
     if isinstance(light, DirectionalLight):
         return light.direction, np.asarray(light.irradiance)
     place = np.asarray(light.position if isinstance(light, PointLight) else light.centre, float)
@@ -170,7 +216,7 @@ def _beam(light: DirectionalLight | PointLight | PanelLight) -> tuple[np.ndarray
 
 
 def _seen_through(panel: PanelLight, towards: np.ndarray) -> np.ndarray:
-    """Which of the directions (..., 3) from the origin meet the panel's front."""
+    """Which of the directions (..., 3) from the origin hit the panel's front."""
     along = towards @ panel.normal
     facing = along < -1e-9
     distance = float(panel.centre @ panel.normal) / np.where(facing, along, -1)
@@ -184,8 +230,8 @@ def _check(
 ) -> None:
     value = np.asarray(value)
     if value.shape != shape or not np.isfinite(value).all():
-        raise InputError(f"a light's {name} has to be finite numbers of shape {shape}")
+        raise InputError(f"a light's {name} must be finite numbers of shape {shape}")
     if unit and abs(float(np.linalg.norm(value)) - 1) > 1e-6:
-        raise InputError(f"a light's {name} has to be of length 1")
+        raise InputError(f"a light's {name} must have length 1")
     if light and (value < 0).any():
         raise InputError(f"a light's {name} cannot be negative")

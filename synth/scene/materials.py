@@ -1,22 +1,23 @@
-"""What the surface of an object reflects: a coloured matt body and, on most materials, a white
-gloss on top of it.
+"""Reflectance of an object's surface: a coloured diffuse lobe and, on most materials, a white
+specular lobe on top.
 
-Equation: f_r = albedo * body + strength * interface, the lobes of `isc_core.shading.brdf` or of Mitsuba's
-rough plastic:
+Equation: f_r = albedo * diffuse + strength * specular, the lobes of `isc_core.shading.brdf` or of
+Mitsuba's rough plastic:
 
-    lambert        1 / pi                                           no gloss oren_nayar     the
-    rough matt body of slope deviation `sigma`   no gloss blinn_phong    1 / pi      +  strength (p
-    + 8) / (8 pi) cos^p   p = gloss, "normalised" ggx            1 / pi      +  strength D G F / (4
-    cos cos)      alpha = gloss, Schlick's F with f0 = ((ior - 1) / (ior + 1))^2 roughplastic
-    Mitsuba's, GGX facets: the exact Fresnel term of `ior`, alpha = gloss (uniform), strength 1;
-                   its body loses what the gloss mirrors (`nonlinear` off: the body stays
-                   proportional to the albedo)
+    lambert       1 / pi              no specular lobe
+    oren_nayar    the rough diffuse lobe of slope deviation `sigma`, no specular lobe
+    blinn_phong   1 / pi  +  strength (p + 8) / (8 pi) cos^p     p = gloss, "normalised"
+    ggx           1 / pi  +  strength D G F / (4 cos cos)        alpha = gloss, Schlick's F with
+                                                                 f0 = ((ior - 1) / (ior + 1))^2
+    roughplastic  Mitsuba's, GGX facets: the exact Fresnel term of `ior`, alpha = gloss (uniform),
+                  strength 1; its diffuse lobe loses what the interface reflects (`nonlinear` off:
+                  it stays proportional to the albedo)
 
-Citation: see the modules of `isc_core.shading.brdf`; W. Jakob et al., Mitsuba 3 renderer, 2022 (rough
-plastic).
+Citation: see the modules of `isc_core.shading.brdf`; W. Jakob et al., Mitsuba 3 renderer, 2022
+(rough plastic).
 
-Limits: insulators; the gloss is white. Textures are sampled bilinearly; u wraps around, v stops at
-its ends.
+Limits: dielectrics; the specular lobe is white. Textures are sampled bilinearly; u wraps around, v
+is clamped.
 """
 
 from dataclasses import dataclass
@@ -36,7 +37,12 @@ _RANGES = {"blinn_phong": (1.0, 10000.0), "ggx": (0.01, 1.0), "roughplastic": (0
 class SurfaceReflectance:
     """A material at N points.
 
-    `albedo`: (N, 3) in [0, 1]. `strength`, `gloss`: (N,), see the module; 0 for matt models.
+    Attributes
+    ----------
+    albedo : (N, 3) ndarray
+        In [0, 1].
+    strength, gloss : (N,) ndarray
+        Of the specular lobe, see the module; 0 for diffuse models.
     """
 
     albedo: np.ndarray
@@ -46,11 +52,27 @@ class SurfaceReflectance:
 
 @dataclass(frozen=True)
 class Material:
-    """`albedo`: (h, w, 3) texture, linear Rec.709 in [0, 1], row 0 at v = 0, columns along u.
-    `model`: one of `MODELS`. `gloss`: exponent of blinn_phong, alpha of ggx and roughplastic: a
-    number, or an (h, w) texture (not for roughplastic). `strength`: of the gloss, >= 0: a number or
-    an (h, w) texture (1 for roughplastic). `ior`: of ggx and roughplastic, in (1, 3]. `sigma`: of
-    oren_nayar, radians in [0, pi/2]. Raises `InputError` outside these ranges.
+    """A material with its textures.
+
+    Attributes
+    ----------
+    albedo : (h, w, 3) ndarray
+        Linear Rec.709 in [0, 1], row 0 at v = 0, columns along u.
+    model : str
+        One of `MODELS`.
+    gloss : float or (h, w) ndarray
+        Exponent of blinn_phong, alpha of ggx and roughplastic (a number for the latter).
+    strength : float or (h, w) ndarray
+        Of the specular lobe, >= 0 (1 for roughplastic).
+    ior : float
+        Of ggx and roughplastic, in (1, 3].
+    sigma : float
+        Of oren_nayar, radians in [0, pi/2].
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     albedo: np.ndarray
@@ -70,38 +92,38 @@ class Material:
             or not albedo.size
             or not ((albedo >= 0) & (albedo <= 1)).all()
         ):
-            raise InputError("an albedo has to be an (h, w, 3) picture with values from 0 to 1")
+            raise InputError("an albedo must be an (h, w, 3) image with values from 0 to 1")
         if not (1 < self.ior <= 3 and 0 <= self.sigma <= np.pi / 2):
-            raise InputError("ior has to be above 1 and at most 3, sigma within 0 and pi/2")
+            raise InputError("ior must be above 1 and at most 3, sigma between 0 and pi/2")
         if self.is_diffuse:
             return
         if any(
             np.ndim(values) not in (0, 2) or not np.size(values)
             for values in (self.gloss, self.strength)
         ):
-            raise InputError("the gloss and its strength have to be numbers or (h, w) textures")
+            raise InputError("the gloss and its strength must be numbers or (h, w) textures")
         low, high = _RANGES[self.model]
         if not ((np.asarray(self.gloss) >= low) & (np.asarray(self.gloss) <= high)).all():
-            raise InputError(f"the gloss of {self.model} has to be from {low:g} to {high:g}")
+            raise InputError(f"the gloss of {self.model} must be from {low:g} to {high:g}")
         if not (np.isfinite(self.strength).all() and (np.asarray(self.strength) >= 0).all()):
-            raise InputError("the strength of a gloss has to be finite and 0 or more")
+            raise InputError("the strength of a gloss must be finite and at least 0")
         if self.model == "roughplastic" and (
             np.ndim(self.gloss) or np.ndim(self.strength) or self.strength != 1
         ):
-            raise InputError("roughplastic has one gloss for the whole object, and strength 1")
+            raise InputError("roughplastic needs a uniform gloss and strength 1")
 
     @property
     def is_diffuse(self) -> bool:
-        """Whether there is no gloss at all."""
+        """Whether there is no specular lobe."""
         return self.model in DIFFUSE_MODELS
 
     @property
     def f0(self) -> float:
-        """What the gloss mirrors along the normal, of ggx and roughplastic."""
+        """Reflectance at normal incidence of ggx and roughplastic."""
         return ((self.ior - 1) / (self.ior + 1)) ** 2
 
     def at(self, uv: np.ndarray) -> SurfaceReflectance:
-        """The material at texture coordinates (N, 2)."""
+        """Return the material at texture coordinates (N, 2)."""
         albedo = texture_at(np.asarray(self.albedo, float), uv)
         if self.is_diffuse:
             return SurfaceReflectance(albedo, np.zeros(len(uv)), np.zeros(len(uv)))
@@ -112,9 +134,19 @@ class Material:
 
 
 def texture_at(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
-    """A texture (h, w[, C]) at coordinates (N, 2), bilinear between texel centres:
+    """Sample a texture bilinearly between texel centres.
 
-    (N[, C]). u wraps around, v is clamped.
+    Parameters
+    ----------
+    texture : (h, w) or (h, w, C) ndarray
+        The texture.
+    uv : (N, 2) ndarray
+        Coordinates; u wraps around, v is clamped.
+
+    Returns
+    -------
+    (N,) or (N, C) ndarray
+        The values.
     """
     rows, columns = texture.shape[:2]
     x, y = uv[:, 0] * columns - 0.5, np.clip(uv[:, 1] * rows - 0.5, 0, rows - 1)
@@ -130,5 +162,5 @@ def texture_at(texture: np.ndarray, uv: np.ndarray) -> np.ndarray:
 
 
 def _texture(values: float | np.ndarray) -> np.ndarray:
-    """A number as a texture of one texel; a texture as it is."""
+    """A number as a texture of one texel; a texture unchanged."""
     return np.atleast_2d(np.asarray(values, float))

@@ -1,4 +1,4 @@
-"""Triangle meshes with smooth normals and texture coordinates; among them closed surfaces swept
+"""Triangle meshes with smooth normals and texture coordinates, among them closed surfaces swept
 around the y axis.
 """
 
@@ -10,9 +10,18 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Mesh:
-    """`vertices`, `normals`:
+    """A triangle mesh.
 
-    (N, 3) float, object units, y up, normals outward. `uv`: (N, 2) in [0, 1]. `faces`: (M, 3) int.
+    Attributes
+    ----------
+    vertices : (N, 3) ndarray
+        Object units, y up.
+    normals : (N, 3) ndarray
+        Unit, outward.
+    uv : (N, 2) ndarray
+        Texture coordinates in [0, 1].
+    faces : (M, 3) ndarray of int
+        Vertex indices, counter-clockwise from outside.
     """
 
     vertices: np.ndarray
@@ -21,17 +30,19 @@ class Mesh:
     faces: np.ndarray
 
     def turned(self, degrees_x: float) -> "Mesh":
-        """The mesh turned about the x axis; a positive angle tips its top toward the viewer (+z)."""
+        """Return the mesh rotated about the x axis; a positive angle tips its top toward the viewer
+        (+z).
+        """
         c, s = np.cos(np.radians(degrees_x)), np.sin(np.radians(degrees_x))
         return self.rotated(np.array([[1, 0, 0], [0, c, -s], [0, s, c]]))
 
     def rotated(self, rotation: np.ndarray) -> "Mesh":
-        """The mesh turned by a rotation matrix (3, 3)."""
+        """Return the mesh rotated by a matrix (3, 3)."""
         return Mesh(self.vertices @ rotation.T, self.normals @ rotation.T, self.uv, self.faces)
 
     def fitted(self) -> "Mesh":
-        """The mesh moved so that the middle of its box is the origin, and scaled so that the larger
-        of its x and y extents is 2.
+        """Return the mesh centred by its bounding box, the larger of its x and y extents
+        scaled to 2.
         """
         low, high = self.vertices.min(0), self.vertices.max(0)
         scale = 2 / (high - low)[:2].max()
@@ -39,11 +50,18 @@ class Mesh:
 
 
 def swept(points: np.ndarray) -> Mesh:
-    """The mesh of a closed surface given on a grid.
+    """Make a mesh of a closed surface on a grid.
 
-    `points`: (rows, columns, 3), row 0 at the top pole and the last at the bottom one; the columns
-    go around once, counter-clockwise seen from above, and the last repeats the first. `u` runs with
-    the columns, `v` from 0 at the top to 1, as a texture's rows do.
+    Parameters
+    ----------
+    points : (rows, columns, 3) ndarray
+        Row 0 at the top pole, the last at the bottom one; columns go around once, counter-clockwise
+        from above, and the last repeats the first.
+
+    Returns
+    -------
+    Mesh
+        `u` runs with the columns, `v` from 0 at the top to 1.
     """
     rows, columns = points.shape[:2]
     u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
@@ -54,8 +72,17 @@ def swept(points: np.ndarray) -> Mesh:
 
 
 def grid_faces(rows: int, columns: int) -> np.ndarray:
-    """The triangles (M, 3) of a grid of vertices in row order; counter-clockwise where rows run
-    down and columns to the right.
+    """Return the triangles of a grid of vertices.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Size of the grid, in row order.
+
+    Returns
+    -------
+    (M, 3) ndarray of int
+        Counter-clockwise if rows run down and columns to the right.
     """
     corner = np.arange(rows * columns).reshape(rows, columns)
     a, b, c, d = (
@@ -68,17 +95,28 @@ def grid_faces(rows: int, columns: int) -> np.ndarray:
 
 
 def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Unit normals (N, 3): the mean of those of the faces around each vertex, by sin(angle) /
-    (product of the sides) there, which is exact where the vertices lie on a sphere (N. Max 1999,
-    doi:10.1080/10867651.1999.10487501); (0, 0, 1) where there are none.
+    """Return vertex normals from adjacent faces.
 
-    Vertices that lie in one place have to be one vertex, or they make a crease.
+    Each face is weighted by sin(angle) / (product of the sides) at the vertex, which is exact for
+    vertices on a sphere (N. Max 1999, doi:10.1080/10867651.1999.10487501).
+
+    Parameters
+    ----------
+    vertices : (N, 3) ndarray
+        Positions; vertices at the same position must be merged, or they form a crease.
+    faces : (M, 3) ndarray of int
+        Triangles.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        Unit normals; (0, 0, 1) for vertices without faces.
     """
     corner = vertices[faces]
     sides = corner - np.roll(corner, 1, axis=1)
     square = (sides**2).sum(-1)
     across = np.cross(sides[:, 1], sides[:, 2])
-    product = square * np.roll(square, -1, axis=1)  # of the two sides that meet at each corner
+    product = square * np.roll(square, -1, axis=1)  # of the two sides at each corner
     weights = (across[:, None] / np.where(product > 0, product, np.inf)[..., None]).reshape(-1, 3)
     total = np.stack(
         [np.bincount(faces.ravel(), weights[:, i], len(vertices)) for i in range(3)], -1
@@ -88,7 +126,7 @@ def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def joined(first: Mesh, second: Mesh) -> Mesh:
-    """Two meshes as one; where they overlap, both surfaces stay."""
+    """Concatenate two meshes; where they overlap, both surfaces stay."""
     vertices, normals, uv = (
         np.concatenate([getattr(mesh, part) for mesh in (first, second)])
         for part in ("vertices", "normals", "uv")
@@ -99,7 +137,7 @@ def joined(first: Mesh, second: Mesh) -> Mesh:
 
 
 def _grid_normals(points: np.ndarray) -> np.ndarray:
-    """Outward unit normals of a swept grid, by central differences that wrap around the seam."""
+    """Outward unit normals of a swept grid, by central differences across the seam."""
     ring = points[:, :-1]
     around = np.roll(ring, -1, axis=1) - np.roll(ring, 1, axis=1)
     normals = np.cross(np.gradient(ring, axis=0), around)
@@ -109,7 +147,7 @@ def _grid_normals(points: np.ndarray) -> np.ndarray:
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
-    """Writes a binary PLY file with normals and texture coordinates, as Mitsuba reads it."""
+    """Write a binary PLY file with normals and texture coordinates, in Mitsuba's layout."""
     names = ["x", "y", "z", "nx", "ny", "nz", "u", "v"]
     table = np.hstack([mesh.vertices, mesh.normals, mesh.uv]).astype("<f4")
     triangles = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])

@@ -1,6 +1,4 @@
-"""A scene: one object of one material under some lights before one camera; everything as plain
-numbers.
-"""
+"""A scene as plain numbers: one object of one material, lights, and a camera."""
 
 from dataclasses import dataclass
 
@@ -12,9 +10,18 @@ from .meshes import Mesh
 
 @dataclass(frozen=True)
 class Scene:
-    """`mesh`: the object, object units, in the camera's frame, within about 1 of the origin.
+    """A scene.
 
-    `lights`: one or more.
+    Attributes
+    ----------
+    mesh : Mesh
+        The object, object units, camera frame, within about 1 of the origin.
+    material : Material
+        Its material.
+    lights : tuple of Light
+        At least one.
+    camera : Camera
+        The camera.
     """
 
     mesh: Mesh

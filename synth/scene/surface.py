@@ -1,11 +1,12 @@
-"""What the camera sees of an object before any light is on: a point, a normal and a reflectance for each
-pixel.
+"""The visible surface of an object: a point, a normal and a reflectance for each pixel.
 
-Place and normal come from the one ray through each pixel's centre, so that nothing is averaged over
-an edge and truth is exact. SurfaceReflectance is averaged over the pixel's footprint, as a camera does, so that
-prints have no jagged edges.
+Position and normal come from the single ray through each pixel's centre, so that nothing is
+averaged
+over an edge and the ground truth is exact. Reflectance is averaged over the pixel's footprint, as
+in
+a camera, so that prints are antialiased.
 
-Limits: what lies before what is decided by the centre alone: outlines are not smoothed.
+Limits: visibility is decided at the centre alone: silhouettes are not antialiased.
 """
 
 from dataclasses import dataclass
@@ -19,18 +20,25 @@ from .scene import Scene
 from .tracing import Tracer
 
 _FOOTPRINT = 3  # rays a side of a pixel, for its reflectance
-_SAME_PLACE = (
-    3.0  # a ray of the footprint counts where it hits within so many pixels of the centre's hit
-)
+_SAME_PLACE = 3.0  # pixels: farther from the centre's hit, a ray of the footprint does not count
 
 
 @dataclass(frozen=True)
 class Surface:
     """The N visible points, in row order of `mask`.
 
-    `mask`: (H, W) bool. `position`: (N, 3) object units; `normal`: (N, 3) unit, toward the viewer;
-    `view`: (N, 3) unit, toward the camera; `uv`: (N, 2). `reflectance`: the material there, `albedo` and
-    `strength` averaged over the pixel, `gloss` at its centre.
+    Attributes
+    ----------
+    mask : (H, W) ndarray of bool
+        The object.
+    position : (N, 3) ndarray
+        Object units.
+    normal, view : (N, 3) ndarray
+        Unit normals toward the viewer, and unit directions toward the camera.
+    uv : (N, 2) ndarray
+        Texture coordinates.
+    reflectance : SurfaceReflectance
+        The material; `albedo` and `strength` averaged over the pixel, `gloss` at its centre.
     """
 
     mask: np.ndarray
@@ -41,8 +49,19 @@ class Surface:
     reflectance: SurfaceReflectance
 
     def image(self, values: np.ndarray, outside: tuple[float, ...] | float = 0.0) -> np.ndarray:
-        """Values (N[, C]) of the points as a picture (H, W[, C]) float32 that is `outside`
-        elsewhere.
+        """Arrange values of the points as an image.
+
+        Parameters
+        ----------
+        values : (N,) or (N, C) ndarray
+            One value per point.
+        outside : tuple of float or float, optional
+            Value outside the mask.
+
+        Returns
+        -------
+        (H, W) or (H, W, C) ndarray of float32
+            The image.
         """
         picture = np.empty((*self.mask.shape, *values.shape[1:]), np.float32)
         picture[...] = outside
@@ -51,11 +70,29 @@ class Surface:
 
 
 def find_surface(scene: Scene, tracer: Tracer) -> Surface:
-    """What `scene.camera` sees. Raises `InputError` where it sees nothing of the object."""
+    """Return the surface that a scene's camera sees.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+    tracer : Tracer
+        Its object.
+
+    Returns
+    -------
+    Surface
+        The visible points.
+
+    Raises
+    ------
+    InputError
+        If the object is not in view.
+    """
     origins, directions = (part.reshape(-1, 3) for part in scene.camera.rays())
     hits = tracer.hits(origins, directions)
     if not hits.valid.any():
-        raise InputError("the camera sees nothing of the object: its mask would be empty")
+        raise InputError("the object is not in view: its mask would be empty")
     mask = hits.valid.reshape(scene.camera.height, scene.camera.width)
     position, uv = hits.position[hits.valid], hits.uv[hits.valid]
     reflectance = _footprint_reflectance(scene, tracer, mask, position, uv)

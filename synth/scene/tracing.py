@@ -1,10 +1,10 @@
-"""Rays against one mesh, in whichever variant Mitsuba runs: what is hit, and what is in the way.
+"""Intersections of rays with one mesh, in any variant of Mitsuba: nearest hits and occlusion.
 
 The LLVM variants trace whole arrays of rays at once; `scalar_rgb` traces them one by one, at some
-millions a second.
+millions per second.
 
-Limits: positions are found in float32, to about 1e-6 of the object. Rays that start on the surface
-are lifted off it by `LIFT`.
+Limits: positions are computed in float32, to about 1e-6 of the object. Rays that start on the
+surface are lifted off it by `LIFT`.
 """
 
 from collections.abc import Iterator
@@ -18,16 +18,25 @@ import numpy as np
 from .meshes import Mesh, write_ply
 from .variant import load_mitsuba
 
-# Object units; objects are about 2 wide.
+# In object units; objects are about 2 wide.
 LIFT = 2e-4
 _VECTOR = 64  # bytes
 
 
 @dataclass(frozen=True)
 class Hits:
-    """The nearest hit of each of M rays. `valid`: (M,) bool. `position`: (M, 3); `normal`: (M, 3)
-    unit, interpolated between vertices, turned toward the ray's origin; `uv`: (M, 2). All 0 where
-    nothing is hit.
+    """The nearest hit of each of M rays. All values are 0 for rays that miss.
+
+    Attributes
+    ----------
+    valid : (M,) ndarray of bool
+        Whether the ray hits.
+    position : (M, 3) ndarray
+        Object units.
+    normal : (M, 3) ndarray
+        Unit, interpolated between vertices, turned toward the ray's origin.
+    uv : (M, 2) ndarray
+        Texture coordinates.
     """
 
     valid: np.ndarray
@@ -37,7 +46,18 @@ class Hits:
 
 
 class Tracer:
-    """A mesh, ready to be hit. Raises `InputError` where Mitsuba is not installed."""
+    """A mesh, ready for ray tracing.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        The mesh.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
+    """
 
     def __init__(self, mesh: Mesh) -> None:
         mi = load_mitsuba()
@@ -49,8 +69,19 @@ class Tracer:
         self._scalar = mi.variant().startswith("scalar")
 
     def hits(self, origins: np.ndarray, directions: np.ndarray) -> Hits:
-        """The nearest hits of rays (M, 3), (M, 3)."""
-        if not len(origins):  # Dr.Jit ends the process over arrays without entries
+        """Return the nearest hits of rays.
+
+        Parameters
+        ----------
+        origins, directions : (M, 3) ndarray
+            Origins and unit directions.
+
+        Returns
+        -------
+        Hits
+            One entry per ray.
+        """
+        if not len(origins):  # Dr.Jit aborts the process on empty arrays
             return Hits(np.zeros(0, bool), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 2)))
         columns = (
             self._scalar_hits(origins, directions)
@@ -67,8 +98,19 @@ class Tracer:
     def blocked(
         self, origins: np.ndarray, directions: np.ndarray, distances: np.ndarray | float
     ) -> np.ndarray:
-        """(M,) bool: whether something stands within `distances` (M,) or one number (infinite for
-        far lights) along the rays (M, 3).
+        """Test whether rays are blocked.
+
+        Parameters
+        ----------
+        origins, directions : (M, 3) ndarray
+            Origins and unit directions.
+        distances : (M,) ndarray or float
+            Length of the rays, infinite for distant lights.
+
+        Returns
+        -------
+        (M,) ndarray of bool
+            True where the mesh is hit within the distance.
         """
         if not len(origins):
             return np.zeros(0, bool)
@@ -89,8 +131,8 @@ class Tracer:
         import drjit
 
         hit = self.scene.ray_intersect(mi.Ray3f(_points(origins), _vectors(directions)))
-        # FamilyMember by part: a whole vector becomes an array by a kernel that is compiled anew for every
-        # number of rays.
+        # Component by component: the conversion of a whole vector is a kernel that is compiled anew
+        # for every number of rays.
         parts = [hit.is_valid(), *hit.p, *hit.sh_frame.n, *hit.uv]
         drjit.eval(parts)
         columns = np.stack([np.array(part, dtype=float) for part in parts], axis=1)
@@ -109,8 +151,8 @@ class Tracer:
 
 
 def _rows(values: np.ndarray) -> Iterator[tuple[float, ...]]:
-    """The rows of (M, 3) one by one; as tuples, for as many lists would keep the garbage collector
-    busy.
+    """The rows of (M, 3) one by one, as tuples: as many lists would slow down the garbage
+    collector.
     """
     return zip(*values.T.tolist(), strict=True)
 
@@ -128,9 +170,11 @@ def _parts(values: np.ndarray) -> list[object]:
 
 
 def lanes(values: np.ndarray) -> Any:
-    """Numbers (N,) as an array of Dr.Jit, in an LLVM variant. Dr.Jit reads them where they lie, and
-    its kernels have it in them whether that is a multiple of a vector's length: here it always is,
-    so that no kernel is compiled twice.
+    """Convert numbers (N,) to a Dr.Jit array, in an LLVM variant.
+
+    Dr.Jit reads the numbers in place, and its kernels depend on whether their address is a multiple
+    of
+    the vector length: here it always is, so that no kernel is compiled twice.
     """
     room = np.empty(values.size + _VECTOR // 4, np.float32)
     start = -room.ctypes.data % _VECTOR // 4

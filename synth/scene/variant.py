@@ -1,8 +1,8 @@
-"""Mitsuba 3, in the fastest variant that this machine can run.
+"""Mitsuba 3 in the fastest variant that this machine supports.
 
-The LLVM variants compile their kernels with the system's libLLVM. An old one does not make them
-fail, it aborts the whole process, and Dr.Jit lists the backend all the same; its version is
-therefore asked before the first kernel.
+The LLVM variants compile their kernels with the system's libLLVM. An old one does not raise an
+error, it aborts the whole process, although Dr.Jit lists the backend; its version is therefore
+checked before the first kernel.
 
 Reference: W. Jakob et al., Dr.Jit: a just-in-time compiler for differentiable rendering, 2022,
 doi:10.1145/3528223.3530099.
@@ -17,14 +17,17 @@ _MISSING = "rendering needs Mitsuba: install it with `pip install 'isc3d[synth]'
 
 
 def llvm_is_usable(major: int) -> bool:
-    """Whether a libLLVM of this major version (-1: none found) compiles Dr.Jit's kernels."""
+    """Return whether a libLLVM of this major version (-1: none) compiles Dr.Jit's kernels."""
     return major >= OLDEST_LLVM
 
 
 def newest_llvm() -> int:
-    """The major version of the libLLVM that Dr.Jit finds, -1 for none; loads no kernel.
+    """Return the major version of the libLLVM that Dr.Jit loads, -1 for none; loads no kernel.
 
-    Raises `InputError` without Dr.Jit.
+    Raises
+    ------
+    InputError
+        If Dr.Jit is not installed.
     """
     try:
         import drjit
@@ -34,10 +37,17 @@ def newest_llvm() -> int:
 
 
 def load_mitsuba() -> ModuleType:
-    """The `mitsuba` module, with the variant chosen: `llvm_ad_rgb`, or `scalar_rgb` where there is
-    no libLLVM of version 19 or later.
+    """Return the `mitsuba` module with a variant selected.
 
-    Raises `InputError` where Mitsuba is not installed.
+    Returns
+    -------
+    module
+        In the variant `llvm_ad_rgb`, or `scalar_rgb` without libLLVM 19 or later.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
     """
     try:
         import mitsuba
@@ -51,17 +61,29 @@ def load_mitsuba() -> ModuleType:
 
 
 def has_llvm() -> bool:
-    """Whether Mitsuba runs in an LLVM variant. Raises `InputError` where it is not installed."""
+    """Return whether Mitsuba runs in an LLVM variant.
+
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
+    """
     return str(load_mitsuba().variant()).startswith("llvm")
 
 
 def slower_without() -> str:
-    """One line that says what would make rendering faster here; empty where nothing is amiss.
+    """Return advice that would make rendering faster on this machine; empty if there is none.
 
-    Raises `InputError` without Mitsuba.
+    Raises
+    ------
+    InputError
+        If Mitsuba is not installed.
     """
     if has_llvm():
         return ""
     found = newest_llvm()
-    what = "no libLLVM was found" if found < 0 else f"libLLVM {found} is too old"
-    return f"{what}, so rendering is slower (scalar_rgb): install libLLVM {OLDEST_LLVM} or later (Debian: apt-get install libllvm19)"
+    what = "libLLVM was not found" if found < 0 else f"libLLVM {found} is too old"
+    return (
+        f"{what}, so rendering is slower (scalar_rgb): install libLLVM {OLDEST_LLVM} or later "
+        "(Debian: apt-get install libllvm19)"
+    )

@@ -310,7 +310,7 @@ def test_separations_are_measured_on_it(made: Path) -> None:
 def test_the_card_says_what_it_is_and_the_record_what_was_measured(made: Path) -> None:
     for name in root_names(GlossySettings()):
         text = (made / name / "README.md").read_text(encoding="utf-8")
-        assert "not to be redistributed" in text and "isc synth glossy-mit ROOT" in text
+        assert "do not redistribute" in text and "isc synth glossy-mit ROOT" in text
         scene = json.loads((made / name / "scene.json").read_text(encoding="utf-8"))
         record = scene["objects"][OBJECT]
         assert record["specular_share"] == pytest.approx(scene["level"] / 100, rel=1e-6)

@@ -200,7 +200,7 @@ def test_open_meshes_are_refused_with_their_open_edges(tmp_path: Path) -> None:
         ("v 2 2 2\nv 2 2 2\nv 2 2 2\nf 1 2 3\n", "no size"),
         ("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\nf 1 3 2\n", "no volume"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 3 2\n", "no volume"),
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 2\n", "an area"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 2\n", "degenerate"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n", "not there|not a readable"),
         (CUBE.replace("f 1/1 2/2 3/3", "f 1/1 3/3 2/2"), "opposite orientations"),
     ],
