@@ -6,8 +6,9 @@ vectors alone, so each iteration reads the memory twice: once for the products, 
 direction. Products are float64 sums in a fixed order (see `numerics`).
 
 Citation: J. Nocedal 1980, doi:10.1090/S0025-5718-1980-0572855-7 (two-loop recursion); W. Chen, Z.
-Wang, J. Zhou, "Large-scale L-BFGS using MapReduce", NIPS 2014 (on inner products); J. Nocedal, S. J.
-Wright, "Numerical Optimization" (2006), section 3.5, doi:10.1007/978-0-387-40065-5 (line search).
+Wang, J. Zhou, "Large-scale L-BFGS using MapReduce", NIPS 2014 (on inner products); J. Nocedal, S.
+J. Wright, "Numerical Optimization" (2006), section 3.5, doi:10.1007/978-0-387-40065-5 (line
+search).
 
 Limits: smooth unconstrained functions; small kinks are tolerated, not resolved.
 """
@@ -30,7 +31,7 @@ class LbfgsOptions:
     iterations, evaluations : int
         Largest number of each.
     loss_tolerance : float
-        Stop once `loss_window` previous losses lie within this relative distance of the current one.
+        Stop once `loss_window` previous losses lie within this relative distance of the current.
     loss_window : int
         Number of previous losses compared.
     gradient_tolerance : float
