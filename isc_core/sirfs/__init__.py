@@ -1,0 +1,15 @@
+"""SIRFS: shape, illumination and reflectance from the shading of one image.
+
+Problem: a diffuse image is reflectance times shading; find the height map and the light whose
+shading leaves the most likely reflectance, given statistics of natural shapes, reflectances and
+lights.
+
+Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
+2015, doi:10.1109/TPAMI.2014.2377712.
+
+The way of an image: `recover` cuts out the object and brings it to one size (`problem.Problem`);
+`solver` minimises the objective over a `pyramid` of heights and a whitened light. The terms are in
+`surface`, `reflectance`, `illumination` and `silhouette`; `numpy_engine` evaluates them in plain
+NumPy, `numba_engine` by compiled `kernels`, and tests compare the two. `settings` holds the weights
+and the starts, `priors` the statistics, `normal_prior` the expectation of predicted normals.
+"""

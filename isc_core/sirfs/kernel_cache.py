@@ -8,9 +8,16 @@ from ..progress import Monitor
 
 
 def announce_compilation(engine: str, monitor: Monitor) -> None:
-    """Reports a stage of its own when the next solve by `engine` ("auto", "numba", "numpy") will
-    compile first: 20 s in silence look like a fault. Call before the first solve: where no cache
-    folder can be written, it also sees to it that kernels work without.
+    """Report a stage of its own if the next solve will compile its kernels first.
+
+    Compilation takes about 20 s, during which the solver would seem to hang. Call this before the
+    first solve: it also makes sure that the kernels work where no cache folder can be written.
+
+    Parameters
+    ----------
+    engine : str
+        "auto", "numba" or "numpy".
+    monitor : Monitor
     """
     if engine == "numpy" or not numba_available():
         return
@@ -21,7 +28,7 @@ def announce_compilation(engine: str, monitor: Monitor) -> None:
 
 
 def kernels_compiled() -> bool:
-    """Whether the kernels, as they are now, were compiled before. Needs Numba."""
+    """Return whether the kernels, in their current version, were compiled before. Needs Numba."""
     from . import kernels
 
     kernel = kernels.forward_rows
@@ -34,7 +41,7 @@ def kernels_compiled() -> bool:
 
 
 def _folder() -> Path:
-    """Where the kernels are kept."""
+    """Folder of the compiled kernels."""
     from . import kernels
 
     return Path(str(kernels.forward_rows.stats.cache_path))

@@ -287,7 +287,7 @@ def forward_rows(first, last, padded, photo, light, whiten, surface, reflectance
 
 @jit(math=REASSOCIATED, inline=True)
 def _mix(source, matrix, target):
-    """target[c] = sum_d matrix[c, d] source[d], row by row."""
+    """Write target[c] = sum_d matrix[c, d] source[d], row by row."""
     width = source.shape[1]
     if source.shape[0] == 1:
         for j in range(width):
@@ -617,9 +617,14 @@ def gather_color(palette, photo, grid, cells, node_gradient, gradient):
 
 @jit(math=REASSOCIATED)
 def blur_color(counts, taps, blurred):
-    """Separable blur of counts (A, B, N), zero padded, only where it can matter:
+    """Blur the node counts along each axis, zero padded, only where it can matter.
 
-    `blurred` is right on occupied rows.
+    Parameters
+    ----------
+    counts : (A, B, N) float64 ndarray
+    taps : (2 k + 1,) ndarray
+    blurred : (A, B, N) float64 ndarray
+        Output; correct on occupied rows, 0 elsewhere.
     """
     size_a, size_b, size_c = counts.shape
     half = len(taps) // 2
@@ -806,8 +811,9 @@ def backward_rows(first, last, surface, spans, light, whiten, pulls, scales, in_
 
 @jit(math=REASSOCIATED, inline=True)
 def _curvature_derivatives(row, dk, out):
-    """Adds what the curvature's gradient dk (W,), times n3^3, asks of the five derivatives in `out`
-    (5, W); the last three are set.
+    """Add the gradient of the curvature, dk (W,) times n3^3, to those of the derivatives.
+
+    `out` is (5, W); its last three rows are overwritten.
     """
     t = row.dtype.type
     one, half = t(1), t(0.5)
@@ -837,7 +843,7 @@ def _curvature_derivatives(row, dk, out):
 
 @jit(math=REASSOCIATED, inline=True)
 def _light_sums(d, n1, n2, n3, sums):
-    """Sums of d times 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
+    """Write the sums of d times 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
     t = d.dtype.type
     s0, s1, s2, s3, s4, s5, s6, s7, s8 = t(0), t(0), t(0), t(0), t(0), t(0), t(0), t(0), t(0)
     for j in range(len(d)):
@@ -866,8 +872,16 @@ def _light_sums(d, n1, n2, n3, sums):
 
 @jit(math=REASSOCIATED)
 def adjoint_rows(first, last, d, wide):
-    """Rows [first, last) of the gradient of the padded height, (H+2, W+2), from those of its
-    derivatives, (5, H+4, W+4).
+    """Compute rows [first, last) of the gradient of the padded height.
+
+    Parameters
+    ----------
+    first, last : int
+        Rows of this call.
+    d : (5, H + 4, W + 4) ndarray
+        Gradients of the five derivatives, with a zero border.
+    wide : (H + 2, W + 2) ndarray
+        Output.
     """
     t = wide.dtype.type
     two, quarter, eighth = t(2), t(0.25), t(0.125)

@@ -1,15 +1,21 @@
-"""What somebody who looked at the photo believes of its normals, as a prior of SIRFS' shape.
+"""Predicted normals as a prior on SIRFS' shape.
 
-Where the normal's part in the image plane is t = (N1, N2), and m is what was seen of it, give or
-take s a component,
+Problem: shading alone leaves many shapes; a network predicts the mean and the deviation of each
+normal from the whole photo, and SIRFS can expect them.
+
+Equation: with the normal's part in the image plane t = (N1, N2), the predicted mean m and the
+deviation s of each component,
   cost = w/n_v * sum over valid pixels of |t - m|^2 / (2 s^2):
-the outline's term (`silhouette`), with another expectation. The solver begins at the height Z whose
-slopes are nearest to m's,
+the term of `silhouette` with another expectation. The solver starts at the height Z whose slopes
+are nearest to those of m,
   min over Z of sum over neighbours of (Z' - Z - slope)^2, slope = m / sqrt(1 - |m|^2),
-on a coarse grid: B. K. P. Horn and M. J. Brooks, "The variational approach to shape from shading",
-Computer Vision, Graphics, and Image Processing 33(2) (1986), doi:10.1016/0734-189X(86)90114-3.
+on a coarse grid.
 
-Limits: s is of one pixel, while neighbours err alike; w makes up for that in the mean.
+Citation: B. K. P. Horn and M. J. Brooks, "The variational approach to shape from shading", Computer
+Vision, Graphics, and Image Processing 33(2) (1986), doi:10.1016/0734-189X(86)90114-3.
+
+Limits: s is the deviation of one pixel, while errors of neighbours are correlated; w compensates
+for that on average.
 """
 
 import numpy as np
@@ -29,12 +35,40 @@ _PRECISION = 1e-6  # relative residual: the start need not be more exact
 def expected_normals(
     mask: np.ndarray, profile: SilhouetteProfile | None, predicted: NormalEstimate | None
 ) -> ExpectedNormals | None:
+    """Return the normals expected inside a mask.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    profile : SilhouetteProfile or None
+        Profile to expect from the silhouette if nothing was predicted.
+    predicted : NormalEstimate or None
+        Predicted normals, (H, W).
+
+    Returns
+    -------
+    ExpectedNormals or None
+        None if neither is known.
+    """
     if predicted is not None:
         return normals_from_prediction(predicted, mask)
     return None if profile is None else normals_from_silhouette(mask, profile)
 
 
 def normals_from_prediction(predicted: NormalEstimate, mask: np.ndarray) -> ExpectedNormals:
+    """Return predicted normals in the reference's frame.
+
+    Parameters
+    ----------
+    predicted : NormalEstimate
+        Camera frame, (H, W).
+    mask : (H, W) bool ndarray
+        The object; where it reaches beyond the prediction, the nearest predicted normal continues.
+
+    Returns
+    -------
+    ExpectedNormals
+    """
     nearest = tuple(
         ndimage.distance_transform_edt(
             predicted.deviation <= 0, return_distances=False, return_indices=True
@@ -47,8 +81,18 @@ def normals_from_prediction(predicted: NormalEstimate, mask: np.ndarray) -> Expe
 
 
 def height_of_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The height (H, W) in pixels, 0 at its lowest and outside `mask` (H, W) bool, whose slopes are
-    nearest to those of the mean normals (H, W, 3); nothing finer than 4 pixels.
+    """Integrate mean normals to a height map, nothing finer than 4 pixels.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) ndarray
+        Mean normals, camera frame.
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W) ndarray
+        Pixels toward the viewer, 0 at its lowest and outside the mask.
     """
     cover = _cells(mask.astype(float))
     sums = [_cells(np.where(mask, normal[..., k], 0)) for k in (0, 1)]
@@ -70,7 +114,7 @@ def height_of_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def _cells(values: np.ndarray) -> np.ndarray:
-    """Means of cells of (H, W), which goes on as 0."""
+    """Means of cells of (H, W), which is padded with 0."""
     rows, columns = (-(-n // _STEP) for n in values.shape)
     padded = np.pad(
         values, [(0, _STEP * n - m) for n, m in zip((rows, columns), values.shape, strict=True)]

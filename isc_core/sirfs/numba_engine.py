@@ -1,7 +1,7 @@
-"""The SIRFS objective on compiled kernels and a few threads: the engine that users run.
+"""The SIRFS objective on compiled kernels and a few threads: the engine for production.
 
-Rows are split into blocks whose number depends on the image alone, and every sum is taken in a
-fixed order: the result is the same, to the byte, on one thread or many.
+Determinism: rows are split into blocks whose number depends on the image alone, and every sum is
+taken in a fixed order, so the result is the same to the byte on one thread or many.
 """
 
 from collections.abc import Callable
@@ -24,21 +24,21 @@ _MONOMIAL_SCALES = np.array([C4, 2 * C2, 2 * C2, 2 * C2, 2 * C1, 2 * C1, C3, 2 *
 
 
 def _fold_light(light: np.ndarray) -> np.ndarray:
-    """The light (9, C) as coefficients of 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
+    """Light (9, C) as coefficients of 1, n2, n3, n1, n1 n2, n2 n3, n3^2, n1 n3, n1^2 - n2^2."""
     folded = light * _MONOMIAL_SCALES[:, None]
     folded[0] -= C5 * light[6]
     return folded
 
 
 def _unfold_light_gradient(sums: np.ndarray) -> np.ndarray:
-    """The adjoint of `_fold_light`."""
+    """Adjoint of `_fold_light`."""
     gradient = sums * _MONOMIAL_SCALES[:, None]
     gradient[6] -= C5 * sums[0]
     return gradient
 
 
 def _from_zero(table: TabulatedPotential) -> tuple[float, np.ndarray]:
-    """The part of `table` that arguments above 0 need: where its first node is, and its costs."""
+    """The part of `table` that arguments above 0 need: its first node, and its costs."""
     first = min(max(int(np.floor(-table.low / table.step)), 0), len(table.values) - 2)
     return table.low + first * table.step, table.values[first:]
 
@@ -66,9 +66,17 @@ def _spans(valid: np.ndarray) -> np.ndarray:
 
 
 class NumbaEngine:
-    """Evaluates one `Problem` in `dtype` on `workers`.
+    """Evaluate the objective of one problem.
 
-    Buffers are reused: an evaluation's arrays are its own only until the next.
+    Buffers are reused: the arrays of an evaluation are valid until the next one.
+
+    Parameters
+    ----------
+    problem : Problem
+    dtype : type
+        float32 or float64.
+    workers : ThreadPool, optional
+        By default, one thread.
     """
 
     def __init__(
@@ -146,7 +154,20 @@ class NumbaEngine:
         self._palette_terms: dict[str, float] = {}
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
-        """The objective at `height` (H, W) and `light` (9, C), with its gradients."""
+        """Compute the objective and its gradients.
+
+        Parameters
+        ----------
+        height : (H, W) ndarray
+            Pixels toward the viewer.
+        light : (9, C) ndarray
+            Log-shading coefficients, reference convention.
+
+        Returns
+        -------
+        Evaluation
+            With an infinite slant term and zero gradients if the geometry is not finite.
+        """
         p = self.problem
         self._pad(height)
         folded = _fold_light(np.asarray(light, float)).astype(self.dtype)
@@ -193,7 +214,7 @@ class NumbaEngine:
         )
 
     def _shares(self, rows: int) -> list[tuple[int, int]]:
-        """Rows for kernels whose result does not depend on how rows are split: one share a thread."""
+        """Rows for kernels whose result does not depend on the split: one share a thread."""
         n = self._workers.threads
         return [(rows * k // n, rows * (k + 1) // n) for k in range(n)]
 

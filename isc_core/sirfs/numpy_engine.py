@@ -1,5 +1,5 @@
-"""The SIRFS objective in plain NumPy: the path that always works, and the one the compiled engine
-is held against.
+"""The SIRFS objective in plain NumPy: always available, and the reference of the compiled
+engine.
 """
 
 import numpy as np
@@ -12,7 +12,14 @@ from .silhouette import silhouette_cost
 
 
 class NumpyEngine:
-    """Evaluates one `Problem` in `dtype` (sums always in float64)."""
+    """Evaluate the objective of one problem; sums are always float64.
+
+    Parameters
+    ----------
+    problem : Problem
+    dtype : type
+        float32 or float64.
+    """
 
     def __init__(self, problem: Problem, dtype: type[np.floating] = np.float64) -> None:
         self.problem = problem
@@ -21,7 +28,19 @@ class NumpyEngine:
         self._log_image = np.ascontiguousarray(problem.log_image, self.dtype)
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
-        """The objective at `height` (H, W) and `light` (9, C), with its gradients."""
+        """Compute the objective and its gradients.
+
+        Parameters
+        ----------
+        height : (H, W) ndarray
+            Pixels toward the viewer.
+        light : (9, C) ndarray
+            Log-shading coefficients, reference convention.
+
+        Returns
+        -------
+        Evaluation
+        """
         p = self.problem
         g = surface.geometry(np.asarray(height, float), self.dtype)
         functions = basis(g.n1, g.n2, g.n3)

@@ -1,6 +1,4 @@
-"""One SIRFS problem: the photo's logarithm, where it is valid, the contour, and what is believed
-beforehand.
-"""
+"""One SIRFS problem: the image's logarithm, its valid pixels, the contour, and the priors."""
 
 from dataclasses import dataclass
 
@@ -31,14 +29,29 @@ PAIR_OFFSETS = (
 
 @dataclass(frozen=True)
 class Problem:
-    """`log_image`: (H, W, C) natural logarithm of linear intensities, 0 where not `valid`; `valid`:
-    (H, W) bool.
+    """A SIRFS problem.
 
-    `mask`: (H, W) bool, the object; `contour`: its occluding contour.
-
-    `silhouette`: what the outline says of the normals. `shading_only`: shape-from-shading mode,
-    reflectance is taken as one unknown colour. `pixel_weight`: (H, W) in [0, 1], how much a valid pixel
-    counts in the terms of reflectance, of a pair the product; not 0 everywhere. None: 1.
+    Attributes
+    ----------
+    log_image : (H, W, C) ndarray
+        Natural logarithm of linear intensities, 0 where not `valid`.
+    valid : (H, W) bool ndarray
+        Pixels whose values count.
+    mask : (H, W) bool ndarray
+        The object.
+    contour : Contour
+        Its occluding contour.
+    priors : Priors
+    weights : Weights
+    observation : DepthObservation or None
+        Observed depth.
+    shading_only : bool
+        Shape-from-shading mode: the reflectance is one unknown colour.
+    silhouette : ExpectedNormals or None
+        Expected normals, from the silhouette or from a prediction.
+    pixel_weight : (H, W) ndarray or None
+        Weight of a valid pixel in the reflectance terms, in [0, 1] and not 0 everywhere; a pair
+        counts with the product. None: 1.
     """
 
     log_image: np.ndarray
@@ -60,7 +73,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Terms:
-    """The weighted terms of the objective at one state."""
+    """Weighted terms of the objective at one state, one attribute a term."""
 
     curvature: float = 0.0
     contour: float = 0.0
@@ -75,13 +88,20 @@ class Terms:
 
     @property
     def total(self) -> float:
-        """The objective's value."""
+        """Value of the objective."""
         return sum(self.__dict__.values())
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Terms with the gradients of their sum with respect to the height (H, W) and the light (9, C)."""
+    """Terms of the objective, and the gradients of their sum.
+
+    Attributes
+    ----------
+    terms : Terms
+    height_gradient : (H, W) ndarray
+    light_gradient : (9, C) ndarray
+    """
 
     terms: Terms
     height_gradient: np.ndarray

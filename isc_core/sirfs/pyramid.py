@@ -1,11 +1,14 @@
 """Heights as sums over the levels of a Gaussian pyramid's adjoint, so that one optimiser moves all
 scales at once.
 
-Z = y_1 + D^T (y_2 + D^T (y_3 + ...)) with D one step down: the filter (1,3,3,1)/sqrt(8) along each
-axis with replicated edges, then every second sample. The gradient of y_1 is dZ, that of y_{k+1} is
-D dy_k (Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712). A step up doubles heights, as pixels
-half as large ask for. Limits: the replicated edges give nodes of very small levels large weights at
-the border, so levels stop at `SMALLEST`.
+Equation: Z = y_1 + D^T (y_2 + D^T (y_3 + ...)) with D one step down: the filter (1,3,3,1)/sqrt(8)
+along each axis with replicated edges, then every second sample. The gradient of y_1 is dZ, that of
+y_{k+1} is D dy_k. A step up doubles heights, since pixels are half as large.
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
+
+Limits: replicated edges give the border nodes of very small levels large weights, so levels stop at
+`SMALLEST`.
 """
 
 import numpy as np
@@ -15,9 +18,18 @@ SMALLEST = 4
 
 
 def level_shapes(shape: tuple[int, ...], levels: int | None = None) -> list[tuple[int, ...]]:
-    """Shapes of the levels for heights of `shape`, the finest first:
+    """Return the shapes of the levels, finest first.
 
-    `levels` of them, or as many as stay at or above `SMALLEST`.
+    Parameters
+    ----------
+    shape : tuple of int
+        Shape of the height map.
+    levels : int, optional
+        Number of levels; by default, as many as stay at or above `SMALLEST`.
+
+    Returns
+    -------
+    list of tuple of int
     """
     shapes = [shape]
     while levels is None or len(shapes) < levels:
@@ -29,18 +41,29 @@ def level_shapes(shape: tuple[int, ...], levels: int | None = None) -> list[tupl
 
 
 def down(fine: np.ndarray) -> np.ndarray:
-    """One step down: (H, W) to (ceil(H/2), ceil(W/2))."""
+    """Take one step down: (H, W) to (ceil(H / 2), ceil(W / 2))."""
     return _down_rows(_down_rows(fine).T).T
 
 
 def up(coarse: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """The adjoint of `down` for fine maps of `shape`."""
+    """Apply the adjoint of `down`.
+
+    Parameters
+    ----------
+    coarse : (ceil(H / 2), ceil(W / 2)) ndarray
+    shape : tuple of int
+        Shape (H, W) of the fine map.
+
+    Returns
+    -------
+    (H, W) ndarray
+    """
     rows = _up_rows(np.ascontiguousarray(coarse.T), shape[1]).T
     return _up_rows(np.ascontiguousarray(rows), shape[0])
 
 
 def _down_rows(fine: np.ndarray) -> np.ndarray:
-    """Filter and decimation along the first axis."""
+    """Filter and decimate along the first axis."""
     n = (fine.shape[0] + 1) // 2
     padded = np.concatenate([fine[:1], fine, fine[-1:], fine[-1:]])
     a, b = fine.dtype.type(TAPS[0]), fine.dtype.type(TAPS[1])
@@ -49,7 +72,7 @@ def _down_rows(fine: np.ndarray) -> np.ndarray:
 
 
 def _up_rows(coarse: np.ndarray, size: int) -> np.ndarray:
-    """The adjoint of `_down_rows` for `size` fine rows."""
+    """Adjoint of `_down_rows` for `size` fine rows."""
     n = coarse.shape[0]
     padded = np.zeros((size + 3, *coarse.shape[1:]), coarse.dtype)
     outer, inner = coarse * coarse.dtype.type(TAPS[0]), coarse * coarse.dtype.type(TAPS[1])
@@ -63,7 +86,7 @@ def _up_rows(coarse: np.ndarray, size: int) -> np.ndarray:
 
 
 def synthesise(levels: list[np.ndarray]) -> np.ndarray:
-    """The height map that the levels (finest first) stand for."""
+    """Return the height map of the levels, finest first."""
     height = levels[-1]
     for level in levels[-2::-1]:
         height = level + up(height, level.shape)
@@ -71,7 +94,14 @@ def synthesise(levels: list[np.ndarray]) -> np.ndarray:
 
 
 def analyse(gradient: np.ndarray, out: list[np.ndarray]) -> None:
-    """The adjoint of `synthesise`: writes the gradients of all levels into `out`."""
+    """Apply the adjoint of `synthesise`.
+
+    Parameters
+    ----------
+    gradient : (H, W) ndarray
+    out : list of ndarray
+        Output: the gradient of each level, finest first.
+    """
     out[0][...] = gradient
     for fine, coarse in zip(out[:-1], out[1:], strict=True):
         coarse[...] = down(fine)

@@ -1,7 +1,7 @@
-"""What SIRFS believes of reflectance: locally smooth, few colours, likely colours.
+"""SIRFS' priors on reflectance: locally smooth, few colours, likely colours.
 
-With log reflectance A = log I - log shading (n pixels in the crop) and a pixel's pixel_weight t in [0, 1],
-0 where not valid, n_t = sum t:
+Equation: with log reflectance A = log I - log shading (n pixels in the crop), a pixel's weight t in
+[0, 1], 0 where not valid, and n_t = sum t:
   smoothness  w (3/25)/(C n) * sum over pairs of t_p t_q cost(sqrt(m^2 + 1e-8)), m = 0.5 |B (A_p -
   A_q)|^2   (colour)
               w 3/(25 n) * sum of t_p t_q cost(A_p - A_q)
@@ -10,7 +10,10 @@ With log reflectance A = log I - log shading (n pixels in the crop) and a pixel'
   quadratic Renyi entropy with
               a Parzen window (Principe & Xu 1999), by splatting onto a grid, blurring and summing
   absolute    w/(8 n_t) * sum of t F at w, F tabulated on the same grid
-Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: no term for highlights.
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
+
+Limits: no term for highlights.
 """
 
 from dataclasses import dataclass
@@ -32,9 +35,21 @@ ABSOLUTE_DIVISOR = 8.0
 def smoothness_cost(
     log_reflectance: np.ndarray, pixel_weight: np.ndarray, priors: Priors, weight: float
 ) -> tuple[float, np.ndarray]:
-    """The smoothness term and its gradient with respect to `log_reflectance` (H, W, C);
+    """Compute the smoothness term.
 
-    `pixel_weight` (H, W).
+    Parameters
+    ----------
+    log_reflectance : (H, W, C) ndarray
+    pixel_weight : (H, W) ndarray
+        0 where not valid.
+    priors : Priors
+    weight : float
+
+    Returns
+    -------
+    cost : float
+    gradient : (H, W, C) ndarray
+        With respect to `log_reflectance`.
     """
     t = log_reflectance.dtype.type
     valid, pixel_weight = pixel_weight > 0, pixel_weight.astype(t)
@@ -66,11 +81,24 @@ def smoothness_cost(
 
 @dataclass(frozen=True)
 class Splat:
-    """Trilinear weights of samples on the occupied part of a grid.
+    """Multilinear weights of n samples on the occupied part of a grid.
 
-    `shape`: of the occupied part; `start`: its first node on each axis; `index`: (2^C, n_v) flat
-    nodes; `weight`: (2^C, n_v); `side`: (n_v, C) position in the cell; `inside`: (n_v, C) false
-    where a value was clamped.
+    Attributes
+    ----------
+    shape : tuple of int
+        Shape of the occupied part.
+    start : tuple of int
+        Its first node on each axis.
+    index : (2^C, n) ndarray
+        Flat node of each corner.
+    weight : (2^C, n) ndarray
+        Weight of each corner.
+    side : (n, C) ndarray
+        Position in the cell.
+    inside : (n, C) bool ndarray
+        False where a value was clamped.
+    step : float
+        Spacing of the nodes.
     """
 
     shape: tuple[int, ...]
@@ -83,7 +111,18 @@ class Splat:
 
 
 def splat(samples: np.ndarray, table: AbsoluteTable) -> Splat:
-    """Where `samples` (n_v, C) fall on the grid of `table`."""
+    """Find where samples fall on the grid of a table.
+
+    Parameters
+    ----------
+    samples : (n, C) ndarray
+        Whitened log reflectance.
+    table : AbsoluteTable
+
+    Returns
+    -------
+    Splat
+    """
     nodes, channels = table.values.shape[0], samples.shape[1]
     step = (table.high - table.low) / (nodes - 1)
     position = (samples.astype(float) - table.low) / step
@@ -106,8 +145,17 @@ def splat(samples: np.ndarray, table: AbsoluteTable) -> Splat:
 
 
 def gather_gradient(where: Splat, node_gradient: np.ndarray) -> np.ndarray:
-    """Gradient of the samples (n_v, C) from the gradient of the node counts (shape of the occupied
-    part).
+    """Compute the gradient of the samples from that of the node counts.
+
+    Parameters
+    ----------
+    where : Splat
+    node_gradient : ndarray
+        Of the shape of the occupied part.
+
+    Returns
+    -------
+    (n, C) ndarray
     """
     flat = node_gradient.ravel()
     channels = where.side.shape[1]
@@ -124,8 +172,21 @@ def gather_gradient(where: Splat, node_gradient: np.ndarray) -> np.ndarray:
 
 
 def parzen_taps(sigma: float, step: float, count: float, channels: int) -> np.ndarray:
-    """Blur weights of one axis for the Parzen window of `parsimony_sigma / 20`, and the share
-    1/count^2 of all axes together.
+    """Return the blur weights of one axis for the Parzen window.
+
+    Parameters
+    ----------
+    sigma : float
+        `parsimony_sigma / 20`.
+    step : float
+        Spacing of the nodes.
+    count : float
+        Sum of the pixels' weights; all axes together divide by its square.
+    channels : int
+
+    Returns
+    -------
+    (2 k + 1,) ndarray
     """
     half = min(100, int(np.ceil(6 * sigma / step)))
     k = np.arange(-half, half + 1)
@@ -133,7 +194,19 @@ def parzen_taps(sigma: float, step: float, count: float, channels: int) -> np.nd
 
 
 def blur(counts: np.ndarray, taps: np.ndarray) -> np.ndarray:
-    """Zero-padded separable blur; the result is floored at the smallest float64 step from 1."""
+    """Blur node counts along each axis, zero padded.
+
+    The result is floored at the float64 machine epsilon.
+
+    Parameters
+    ----------
+    counts : ndarray
+    taps : (2 k + 1,) ndarray
+
+    Returns
+    -------
+    ndarray
+    """
     for axis in range(counts.ndim):
         counts = ndimage.correlate1d(counts, taps, axis=axis, mode="constant")
     return np.maximum(counts, np.finfo(float).eps)
@@ -142,8 +215,21 @@ def blur(counts: np.ndarray, taps: np.ndarray) -> np.ndarray:
 def palette_cost(
     log_reflectance: np.ndarray, pixel_weight: np.ndarray, priors: Priors, weights: Weights
 ) -> tuple[float, float, np.ndarray]:
-    """The parsimony and absolute terms, and the gradient of their sum with respect to
-    `log_reflectance` (H, W, C); `pixel_weight` (H, W).
+    """Compute the parsimony and absolute terms.
+
+    Parameters
+    ----------
+    log_reflectance : (H, W, C) ndarray
+    pixel_weight : (H, W) ndarray
+        0 where not valid.
+    priors : Priors
+    weights : Weights
+
+    Returns
+    -------
+    parsimony, absolute : float
+    gradient : (H, W, C) ndarray
+        Of their sum with respect to `log_reflectance`.
     """
     whiten, valid = priors.parsimony_whiten, pixel_weight > 0
     samples = log_reflectance[valid].astype(float) @ whiten.T
@@ -173,8 +259,19 @@ def palette_cost(
 def one_color_cost(
     log_reflectance: np.ndarray, pixel_weight: np.ndarray, weight: float
 ) -> tuple[float, np.ndarray]:
-    """Shape-from-shading mode: weight/(2 n_t) * sum of t (A - mean A)^2, the mean with t, and its
-    gradient (H, W, C); `pixel_weight` (H, W).
+    """Compute the term of shape-from-shading mode, weight/(2 n_t) * sum of t (A - mean A)^2.
+
+    Parameters
+    ----------
+    log_reflectance : (H, W, C) ndarray
+    pixel_weight : (H, W) ndarray
+        t; the mean is weighted with it too.
+    weight : float
+
+    Returns
+    -------
+    cost : float
+    gradient : (H, W, C) ndarray
     """
     valid = pixel_weight > 0
     away, share = log_reflectance[valid].astype(float), pixel_weight[valid].astype(float)[:, None]

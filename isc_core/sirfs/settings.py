@@ -1,10 +1,9 @@
-"""How the terms of the SIRFS objective are weighed, and where the solver begins.
+"""Weights of the terms of the SIRFS objective, and where the solver starts.
 
 The three published weight sets are those of the SIRFS release 1.5 (Barron & Malik 2015,
-doi:10.1109/TPAMI.2014.2377712), as printed with it. Grey photos under natural light have no
-published set: the laboratory grey set stands in for it where published weights are asked for; ours
-is our grey laboratory set, changed mostly as the published colour sets differ between the two
-lights.
+doi:10.1109/TPAMI.2014.2377712), as printed with it. Grey photos in natural light have no published
+set; `published_weights` returns the laboratory grey set for them. Our set for them is our grey
+laboratory set, changed mostly as the published colour sets differ between the two lights.
 """
 
 from dataclasses import dataclass, replace
@@ -12,11 +11,15 @@ from dataclasses import dataclass, replace
 
 @dataclass(frozen=True)
 class Start:
-    """Where the solver begins (ours; published: a flat shape and no light).
+    """Where the solver starts (ours; published: a flat shape and no light).
 
-    `dome`: how much of the dome that the outline suggests (`silhouette.ExpectedNormals`), where the
-    problem has one and no depth was seen. `light`: how much of the log light that the priors
-    expect.
+    Attributes
+    ----------
+    dome : float
+        Factor on the dome of the expected normals (`silhouette.ExpectedNormals`), if the problem
+        has one and no depth was observed.
+    light : float
+        Factor on the log light that the priors expect.
     """
 
     dome: float = 0.0
@@ -27,14 +30,32 @@ class Start:
 class Weights:
     """Multipliers of the objective's terms.
 
-    `smoothness`: reflectance varies little between neighbours. `parsimony`: few reflectance colours
-    (Renyi entropy), measured with a Parzen window of `parsimony_sigma / 20` in whitened log colour.
-    `absolute`: likely reflectance colours. `curvature`: mean curvature varies little. `slant`:
-    surfaces face all directions equally often. `contour`: normals on the occluding contour point
-    outward, with the penalty's power `contour_power`. `light`: likely illuminations. `silhouette`:
-    surfaces lean outward near the outline (ours; not in the published sets). `shading_only`: in
-    shape-from-shading mode, how strictly reflectance is one colour. `starts`: one at least; each is
-    tried, and the one that leads deeper goes on.
+    Attributes
+    ----------
+    smoothness : float
+        Reflectance varies little between neighbours.
+    parsimony : float
+        Few reflectance colours (Renyi entropy).
+    parsimony_sigma : float
+        Parzen window of the parsimony term, times 20, in whitened log colour.
+    absolute : float
+        Likely reflectance colours.
+    curvature : float
+        Mean curvature varies little.
+    slant : float
+        Surfaces face all directions equally often.
+    contour : float
+        Normals on the occluding contour point outward.
+    light : float
+        Likely illuminations.
+    contour_power : float
+        Power of the contour term's penalty.
+    silhouette : float
+        Normals are near the expected ones (ours; not in the published sets).
+    shading_only : float
+        In shape-from-shading mode, the reflectance is one colour.
+    starts : tuple of Start
+        At least one; each is tried, and the one with the lowest loss goes on.
     """
 
     smoothness: float
@@ -56,9 +77,9 @@ COLOR_LABORATORY = Weights(13.4543, 3.3636, 1.6818, 4.7568, 6.7272, 2.3784, 4, 4
 GREY_LABORATORY = Weights(6.7272, 1.4142, 1.6818, 4, 6.7272, 2.3784, 3.3636, 4.7568)
 
 
-# Chosen with the shipped priors, leave-one-object-out on ten objects; docs/results.md has the method
-# and its uncertainty. The grey laboratory set follows the coloured one halfway; the grey natural one
-# differs from it mostly as the published colour sets do.
+# Chosen with the shipped priors, leave-one-object-out on ten objects; docs/results.md has the
+# method and its uncertainty. The grey laboratory set follows the coloured one halfway; the grey
+# natural one differs from it mostly as the published colour sets do.
 ISC_NATURAL = replace(
     COLOR_NATURAL,
     smoothness=1.4 * COLOR_NATURAL.smoothness,
@@ -99,9 +120,20 @@ PREDICTED_NORMALS_WEIGHT = 0.4
 
 
 def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = False) -> Weights:
-    """Our own set for "natural" or "laboratory" illumination and 3 or 1 channels;
+    """Return our own set of weights.
 
-    `normals_predicted`: with what was seen of the shape.
+    Parameters
+    ----------
+    illumination : str
+        "natural" or "laboratory".
+    channels : int
+        3 or 1.
+    normals_predicted : bool
+        Whether the expected normals are predicted by a network.
+
+    Returns
+    -------
+    Weights
     """
     if channels == 1:
         chosen = ISC_GREY_NATURAL if illumination == "natural" else ISC_GREY_LABORATORY
@@ -111,7 +143,19 @@ def isc_weights(illumination: str, channels: int, *, normals_predicted: bool = F
 
 
 def published_weights(illumination: str, channels: int) -> Weights:
-    """The published set for "natural" or "laboratory" illumination and 3 or 1 channels."""
+    """Return the published set of weights.
+
+    Parameters
+    ----------
+    illumination : str
+        "natural" or "laboratory".
+    channels : int
+        3 or 1.
+
+    Returns
+    -------
+    Weights
+    """
     if channels == 1:
         return GREY_LABORATORY
     return COLOR_NATURAL if illumination == "natural" else COLOR_LABORATORY

@@ -1,15 +1,20 @@
-"""What the outline says of the inside: near the silhouette surfaces lean outward, deep inside they
-face the viewer.
+"""What the silhouette suggests of the normals inside: near it surfaces lean outward, far from it
+they face the viewer.
 
-For a pixel at distance d from the silhouette, u = d / max d, let c be the outward direction (minus
-the gradient of the smoothed distance) and t = (N1, N2) the normal's part in the image plane. Over
-real objects t has mean m(u) c and spread s(u) a component:
+Problem: the occluding contour constrains the silhouette itself only, and inside it convex and
+concave are equally likely. This term carries the constraint inward.
+
+Equation: for a pixel at distance d from the silhouette, u = d / max d, let c be the outward
+direction (minus the gradient of the smoothed distance) and t = (N1, N2) the normal's part in the
+image plane. Over real objects t has mean m(u) c and a spread s(u) of each component:
   cost = w/n_v * sum over valid pixels of |t - m(u) c|^2 / (2 s(u)^2).
-The profile m, s is fitted to objects of known shape (`fitting`). The occluding contour alone speaks
-only of the outline itself; this term carries it inward, where convex and concave would otherwise be
-equally likely. The dome that the profile adds up to is where the solver begins. Ours; in the spirit
-of inflation from contours (Terzopoulos, Witkin & Kass 1988, doi:10.1016/0004-3702(88)90080-X).
-Limits: one object seen whole; hollow forms disagree with it.
+The profile m, s is fitted to objects of known shape (`prior_fitting`). The dome whose normals are
+the means is where the solver starts.
+
+Citation: ours; in the spirit of inflation from contours (D. Terzopoulos, A. Witkin, M. Kass 1988,
+doi:10.1016/0004-3702(88)90080-X).
+
+Limits: one object, wholly inside the frame; hollow forms disagree with it.
 """
 
 from dataclasses import dataclass
@@ -27,11 +32,17 @@ _SMOOTHING = 0.05
 
 @dataclass(frozen=True)
 class ExpectedNormals:
-    """Expected in-plane part of the normal, `down` and `right`, and its `precision` 1/s^2, each (H,
-    W); 0 outside the mask.
+    """Expected normals and the height map they add up to, each (H, W); 0 outside the mask.
 
-    `dome`: (H, W) heights in pixels of what leans so everywhere, a slope of m / sqrt(1 - m^2) at
-    depth u adding up to Z(d) = d_max integral_0^u m / sqrt(1 - m^2) du; 0 outside.
+    Attributes
+    ----------
+    down, right : ndarray
+        Expected in-plane part of the unit normal.
+    precision : ndarray
+        1 / s^2 of each component.
+    dome : ndarray
+        Height in pixels of these normals; from the silhouette, with a slope of m / sqrt(1 - m^2) at
+        depth u, Z(d) = d_max integral_0^u m / sqrt(1 - m^2) du.
     """
 
     down: np.ndarray
@@ -41,20 +52,38 @@ class ExpectedNormals:
 
 
 def silhouette_coordinates(mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Relative depth u in (0, 1] and the outward direction (down, right) of every pixel of `mask`
-    (H, W) bool.
+    """Compute the relative depth and the outward direction of every pixel.
 
-    A mask that reaches the border goes on beyond it: there is no silhouette. One without any
-    outline is deep everywhere, u = 1.
+    A mask that reaches the border continues beyond it: there is no silhouette. A mask without any
+    silhouette is deep everywhere, u = 1.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    u : (H, W) ndarray
+        Relative depth, in (0, 1] inside the mask.
+    down, right : (H, W) ndarray
+        Outward direction in the image plane.
     """
     distance, deepest = _depth(mask)
     return distance / deepest, *_outward(distance, deepest)
 
 
 def silhouette_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
-    """Unit normals (H, W, 3), camera frame, that lean outward as `profile` says on average;
+    """Compute unit normals that lean outward as a profile does on average.
 
-    (0, 0, 1) outside `mask` (H, W) bool.
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    profile : SilhouetteProfile
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Camera frame; (0, 0, 1) outside the mask.
     """
     u, down, right = silhouette_coordinates(mask)
     lean = np.where(mask, np.clip(profile.at(u)[0], -_STEEPEST, _STEEPEST), 0)
@@ -63,9 +92,9 @@ def silhouette_normals(mask: np.ndarray, profile: SilhouetteProfile) -> np.ndarr
 
 
 def _depth(mask: np.ndarray) -> tuple[np.ndarray, float]:
-    """How far each pixel (H, W) lies behind the outline, and the most of it, at least 1.
+    """Distance of each pixel (H, W) from the silhouette, and the largest, at least 1.
 
-    Ones where there is no outline.
+    Ones if there is no silhouette.
     """
     padded = np.pad(mask, 1, mode="edge")
     distance = (
@@ -82,7 +111,17 @@ def _outward(distance: np.ndarray, deepest: float) -> tuple[np.ndarray, np.ndarr
 
 
 def normals_from_silhouette(mask: np.ndarray, profile: SilhouetteProfile) -> ExpectedNormals:
-    """What `profile` expects inside `mask` (H, W) bool."""
+    """Return the normals that a profile expects inside a mask.
+
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    profile : SilhouetteProfile
+
+    Returns
+    -------
+    ExpectedNormals
+    """
     distance, deepest = _depth(mask)
     u, (down, right) = distance / deepest, _outward(distance, deepest)
     mean, spread = profile.at(u)
@@ -103,7 +142,21 @@ def _dome_at(u: np.ndarray, profile: SilhouetteProfile) -> np.ndarray:
 def silhouette_cost(
     n1: np.ndarray, n2: np.ndarray, valid: np.ndarray, field: ExpectedNormals, weight: float
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """The term and its gradients with respect to n1 and n2, all (H, W)."""
+    """Compute the term of the expected normals.
+
+    Parameters
+    ----------
+    n1, n2 : (H, W) ndarray
+        Components of the unit normal, down and right.
+    valid : (H, W) bool ndarray
+    field : ExpectedNormals
+    weight : float
+
+    Returns
+    -------
+    cost : float
+    gradient_n1, gradient_n2 : (H, W) ndarray
+    """
     scale = weight / max(int(valid.sum()), 1)
     strength = (np.where(valid, field.precision, 0) * scale).astype(n1.dtype)
     away1, away2 = n1 - field.down.astype(n1.dtype), n2 - field.right.astype(n1.dtype)

@@ -1,12 +1,15 @@
-"""Shape and illumination from one image: the minimiser of the SIRFS objective (Barron & Malik
-2015).
+"""Shape and illumination from one image: the minimiser of the SIRFS objective.
 
-One L-BFGS run moves the height's pyramid levels and the whitened light together. Reflectance is not
-an unknown: log A = log I - log shading reproduces the image exactly. It begins where
-`settings.Start` says; of several starts the one goes on that has the lowest loss after a while.
+Problem: one L-BFGS run moves the levels of the height's pyramid and the whitened light together.
+Reflectance is not an unknown: log A = log I - log shading reproduces the image exactly. The solver
+starts at `settings.Start`; of several starts, the one with the lowest loss after a number
+of evaluations goes on.
+
+Citation: J. T. Barron, J. Malik, "Shape, Illumination, and Reflectance from Shading", TPAMI 37(8),
+2015, doi:10.1109/TPAMI.2014.2377712.
+
 Limits: the objective has many minima; this finds one of them. Solving halved problems first finds
-others, as often worse as better, and saved no time. Source: Barron & Malik, "Shape, Illumination,
-and Reflectance from Shading", TPAMI 37(8), 2015, doi:10.1109/TPAMI.2014.2377712.
+others, as often worse as better, and saved no time.
 """
 
 import os
@@ -17,8 +20,8 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import InputError
-from ..numerics.lbfgs import Algebra, LbfgsOptions, LbfgsResult, Minimisation, NumpyAlgebra
 from ..numerics.jit import numba_available
+from ..numerics.lbfgs import Algebra, LbfgsOptions, LbfgsResult, Minimisation, NumpyAlgebra
 from ..numerics.linear import solve_linear
 from ..numerics.thread_pool import ThreadPool
 from ..progress import Monitor
@@ -41,12 +44,21 @@ _COARSER = 16
 
 @dataclass(frozen=True)
 class SolverOptions:
-    """How a problem is solved; none of it changes what is solved.
+    """How a problem is solved; the options do not change what is solved.
 
-    `engine`: "numba", "numpy", or "auto" for compiled kernels where they can be had. `single`:
-    float32 unknowns (production) or float64. `threads`: 0 for all cores. `levels`: of the height's
-    pyramid, None for as many as make sense. `lbfgs`: the optimiser's; it stops at twice the
-    published tolerance, since what the last evaluations gain in loss they do not gain in accuracy.
+    Attributes
+    ----------
+    engine : str
+        "numba", "numpy", or "auto" for compiled kernels if Numba is installed.
+    single : bool
+        float32 unknowns (production) or float64.
+    threads : int
+        Number of threads; 0 for all cores.
+    levels : int or None
+        Levels of the height's pyramid; None for as many as make sense.
+    lbfgs : LbfgsOptions
+        The optimiser's. It stops at twice the published tolerance: what the last evaluations gain
+        in loss, they do not gain in accuracy.
     """
 
     engine: str = "auto"
@@ -58,10 +70,22 @@ class SolverOptions:
 
 @dataclass(frozen=True)
 class SirfsResult:
-    """`height`: (H, W) float64, pixels, toward the viewer. `light`: (9, C) float64, reference
-    convention.
+    """Solution of a problem.
 
-    `terms`: of the objective there. `evaluations` of it; `reason`: why the optimiser stopped.
+    Attributes
+    ----------
+    height : (H, W) float64 ndarray
+        Pixels toward the viewer.
+    light : (9, C) float64 ndarray
+        Log-shading SH coefficients, reference convention.
+    terms : Terms
+        Terms of the objective there.
+    iterations, evaluations : int
+        Steps of the optimiser, and evaluations of the objective.
+    reason : str
+        Why the optimiser stopped, see `LbfgsResult`.
+    converged : bool
+        Whether it stopped because there was no more to gain.
     """
 
     height: np.ndarray
@@ -74,16 +98,24 @@ class SirfsResult:
 
 
 class Engine(Protocol):
-    """Something that evaluates the objective."""
+    """Evaluates the objective."""
 
     def evaluate(self, height: np.ndarray, light: np.ndarray) -> Evaluation:
-        """The objective and its gradients at `height` (H, W) and `light` (9, C)."""
+        """Compute the objective and its gradients at `height` (H, W) and `light` (9, C)."""
         ...
 
 
 def thread_count(options: SolverOptions) -> int:
-    """How many threads `options` ask for on this machine, at most `MOST_THREADS`; 0 means the cores
-    that this process may use.
+    """Return the number of threads of a solve.
+
+    Parameters
+    ----------
+    options : SolverOptions
+
+    Returns
+    -------
+    int
+        At most `MOST_THREADS`; for 0 threads, the number of cores that this process may use.
     """
     allowed = (
         len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -92,7 +124,18 @@ def thread_count(options: SolverOptions) -> int:
 
 
 class Backend:
-    """The engine and its algebra, chosen once for a solve."""
+    """The engine and its algebra, chosen once for a solve.
+
+    Parameters
+    ----------
+    options : SolverOptions
+    workers : ThreadPool
+
+    Raises
+    ------
+    InputError
+        If the engine is unknown, or Numba is required but not installed.
+    """
 
     def __init__(self, options: SolverOptions, workers: ThreadPool) -> None:
         if options.engine not in ("auto", "numba", "numpy"):
@@ -106,6 +149,7 @@ class Backend:
         self._workers = workers
 
     def engine(self, problem: Problem) -> Engine:
+        """Return the engine for `problem`."""
         if not self.compiled:
             return NumpyEngine(problem, self.dtype)
         from .numba_engine import NumbaEngine
@@ -113,6 +157,7 @@ class Backend:
         return NumbaEngine(problem, self.dtype, self._workers)
 
     def algebra(self) -> Algebra:
+        """Return the algebra for L-BFGS."""
         if not self.compiled:
             return NumpyAlgebra()
         from .vector_kernels import CompiledAlgebra
@@ -120,8 +165,18 @@ class Backend:
         return CompiledAlgebra(self._workers)
 
     def synthesise(self, levels: list[np.ndarray]) -> np.ndarray:
-        """The height in float64, whatever the levels are stored in: a rounded coarse level still
-        gives a smooth height.
+        """Return the height in float64, whatever the levels are stored in.
+
+        A rounded coarse level still gives a smooth height.
+
+        Parameters
+        ----------
+        levels : list of ndarray
+            Finest first.
+
+        Returns
+        -------
+        (H, W) float64 ndarray
         """
         height = levels[-1].astype(float)
         if not self.compiled:
@@ -135,6 +190,14 @@ class Backend:
         return height
 
     def analyse(self, gradient: np.ndarray, out: list[np.ndarray]) -> None:
+        """Apply the adjoint of `synthesise`.
+
+        Parameters
+        ----------
+        gradient : (H, W) ndarray
+        out : list of ndarray
+            Output: the gradient of each level, finest first.
+        """
         if not self.compiled:
             analyse(gradient, out)
             return
@@ -146,8 +209,28 @@ class Backend:
 
 
 class ParameterVector:
-    """One vector that holds the pyramid levels and the whitened light, or only what is not known
-    beforehand.
+    """All unknowns of a problem in one vector, and the objective as a function of it.
+
+    The vector holds the pyramid levels of the height and the whitened light, without what is known.
+    Calling the object with ``(x, gradient_out)`` returns the loss at `x`.
+
+    Attributes
+    ----------
+    x : (N,) ndarray
+        Unknowns of the last evaluation.
+    terms : Terms
+        Terms of the last evaluation.
+    evaluations : int
+        Number of evaluations.
+
+    Parameters
+    ----------
+    problem : Problem
+    backend : Backend
+    levels : int or None
+        Levels of the pyramid, see `SolverOptions`.
+    known_height : (H, W) ndarray or None
+    known_light : (9, C) ndarray or None
     """
 
     def __init__(
@@ -170,13 +253,14 @@ class ParameterVector:
         self.terms = Terms()
 
     def levels(self, vector: np.ndarray) -> list[np.ndarray]:
-        """Views of the pyramid levels in `vector`."""
+        """Return views of the pyramid levels in `vector`."""
         return [
             vector[a:b].reshape(s)
             for a, b, s in zip(self._edges[:-1], self._edges[1:], self.shapes, strict=True)
         ]
 
     def height(self) -> np.ndarray:
+        """Return the height (H, W) of `x`."""
         return (
             self._backend.synthesise(self.levels(self.x))
             if self._known_height is None
@@ -184,6 +268,7 @@ class ParameterVector:
         )
 
     def light(self) -> np.ndarray:
+        """Return the light (9, C) of `x`."""
         if self._known_light is not None:
             return self._known_light
         prior = self._problem.priors.light
@@ -194,8 +279,15 @@ class ParameterVector:
         return unstack(stacked, self.channels)
 
     def at(self, start: Start) -> np.ndarray:
-        """The vector of `start`, as far as the unknowns are unknown and nothing else is seen of
-        them.
+        """Return the vector of a start; the dome is left out if depth was observed.
+
+        Parameters
+        ----------
+        start : Start
+
+        Returns
+        -------
+        (N,) ndarray
         """
         p, x = self._problem, np.zeros_like(self.x)
         prior = p.priors.light
@@ -233,10 +325,31 @@ def solve(
     known_light: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> SirfsResult:
-    """Minimises the objective of `problem`.
+    """Minimise the objective of a problem.
 
-    Begins as the problem's weights say (`settings.Start`). `known_height` (H, W) or `known_light`
-    (9, C) are kept as given. Progress reports carry the loss. Raises `Cancelled`.
+    Progress reports carry the loss as their detail.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its weights define the starts.
+    options : SolverOptions, optional
+    known_height : (H, W) ndarray, optional
+        Kept as given.
+    known_light : (9, C) ndarray, optional
+        Kept as given.
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    SirfsResult
+
+    Raises
+    ------
+    InputError
+        If a known shape or light is not finite, or the engine is not available.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or SolverOptions(), monitor or Monitor()
     for given in (known_height, known_light):
@@ -276,6 +389,24 @@ def multi_start(
     algebra: Algebra,
     monitor: Monitor,
 ) -> Minimisation:
+    """Return the minimisation that goes on.
+
+    Parameters
+    ----------
+    unknowns : ParameterVector
+    starts : sequence of Start
+        Equal ones count once.
+    options : LbfgsOptions
+    algebra : Algebra
+    monitor : Monitor
+        Receives the lowest loss so far.
+
+    Returns
+    -------
+    Minimisation
+        From the only start, not run yet; of several, the one whose loss is lowest after `_TRIAL`
+        evaluations.
+    """
     points: list[np.ndarray] = []
     for start in starts:
         point = unknowns.at(start)

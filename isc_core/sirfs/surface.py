@@ -1,13 +1,15 @@
-"""What SIRFS believes of shape: smooth mean curvature, no favoured slant, a contour that turns
-away.
+"""SIRFS' priors on shape: smooth mean curvature, isotropic normals, a contour that turns away.
 
-With heights Z in pixels, first derivatives Zi (down) and Zj (right) and second ones Zii, Zjj, Zij:
+Equation: with heights Z in pixels, first derivatives Zi (down) and Zj (right) and second ones Zii,
+Zjj, Zij:
   mean curvature K = [(1 + Zi^2) Zjj - 2 Zi Zj Zij + (1 + Zj^2) Zii] / (2 (1 + Zi^2 + Zj^2)^1.5)
   curvature   w/(25 n) * sum over pairs of C(sqrt((K_p - K_q)^2 + 1e-8)),
   slant       w/n * sum sqrt((log N3)^2 + 0.01^2),
   contour     60 w/n * sum over contour points of max(0, 1 - N . c)^power.
-Source: Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712. Limits: orthographic, one smooth sheet,
-no holes.
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
+
+Limits: orthographic, one smooth sheet, no holes.
 """
 
 from dataclasses import dataclass
@@ -30,7 +32,19 @@ CONTOUR_CLOSE = 1e-3
 
 @dataclass(frozen=True)
 class Geometry:
-    """Derivatives, normals and mean curvature of a height map, each (H, W)."""
+    """Local geometry of a height map, each (H, W).
+
+    Attributes
+    ----------
+    zi, zj : ndarray
+        First derivatives, down and right.
+    zii, zjj, zij : ndarray
+        Second derivatives.
+    n1, n2, n3 : ndarray
+        Unit normal (down, right, toward the viewer).
+    curvature : ndarray
+        Mean curvature, 1 / pixel.
+    """
 
     zi: np.ndarray
     zj: np.ndarray
@@ -44,8 +58,19 @@ class Geometry:
 
 
 def geometry(height: np.ndarray, dtype: npt.DTypeLike = None) -> Geometry:
-    """The local geometry of `height` (H, W), in `dtype` (the height's if None) but for differences
-    of heights, which keep the height's.
+    """Compute the local geometry of a height map.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    dtype : dtype, optional
+        Type of the result, by default that of `height`. Differences of heights are always taken in
+        the type of `height`.
+
+    Returns
+    -------
+    Geometry
     """
     padded = np.pad(height, 1, mode="edge")
     zi, zj, zii, zjj, zij = (
@@ -60,8 +85,19 @@ def geometry(height: np.ndarray, dtype: npt.DTypeLike = None) -> Geometry:
 def height_gradient(
     g: Geometry, d1: np.ndarray, d2: np.ndarray, d3: np.ndarray, dk: np.ndarray
 ) -> np.ndarray:
-    """Gradient of the height from gradients of the normal's components and of the curvature, all
-    (H, W).
+    """Compute the gradient of the height from those of the normal and the curvature.
+
+    Parameters
+    ----------
+    g : Geometry
+    d1, d2, d3 : (H, W) ndarray
+        Gradients with respect to the normal's components.
+    dk : (H, W) ndarray
+        Gradient with respect to the mean curvature.
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     n3, n3cubed = g.n3, g.n3**3
     along = g.zi * d1 + g.zj * d2 - d3
@@ -77,7 +113,18 @@ def height_gradient(
 
 
 def pair_slices(down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Index pairs that select p and q of all pairs with q = p + (down, right); down >= 0."""
+    """Return the index pairs that select p and q of all pairs with q = p + (down, right).
+
+    Parameters
+    ----------
+    down : int
+        At least 0.
+    right : int
+
+    Returns
+    -------
+    p, q : tuple of slice
+    """
     a, b = max(right, 0), max(-right, 0)
     rows_p, rows_q = slice(None, -down or None), slice(down, None)
     return (rows_p, slice(b, -a or None)), (rows_q, slice(a, -b or None))
@@ -86,8 +133,21 @@ def pair_slices(down: int, right: int) -> tuple[tuple[slice, slice], tuple[slice
 def curvature_cost(
     curvature: np.ndarray, valid: np.ndarray, table: TabulatedPotential, weight: float
 ) -> tuple[float, np.ndarray]:
-    """The curvature term over pairs of `valid` pixels and its gradient with respect to `curvature`,
-    both (H, W).
+    """Compute the curvature term over pairs of valid pixels.
+
+    Parameters
+    ----------
+    curvature : (H, W) ndarray
+        Mean curvature, 1 / pixel.
+    valid : (H, W) bool ndarray
+    table : TabulatedPotential
+    weight : float
+
+    Returns
+    -------
+    cost : float
+    gradient : (H, W) ndarray
+        With respect to `curvature`.
     """
     gradient = np.zeros_like(curvature)
     total = 0.0
@@ -106,7 +166,20 @@ def curvature_cost(
 
 
 def slant_cost(n3: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
-    """The slant term and its gradient with respect to the normals' component toward the viewer."""
+    """Compute the slant term.
+
+    Parameters
+    ----------
+    n3 : (H, W) ndarray
+        Component of the normal toward the viewer.
+    weight : float
+
+    Returns
+    -------
+    cost : float
+    gradient : (H, W) ndarray
+        With respect to `n3`.
+    """
     x = -np.log(n3)
     soft = np.sqrt(x * x + SLANT_SOFTNESS**2)
     scale = n3.dtype.type(weight / n3.size)
@@ -116,9 +189,22 @@ def slant_cost(n3: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
 def contour_cost(
     n1: np.ndarray, n2: np.ndarray, contour: Contour, weight: float, power: float, pixels: int
 ):  # type: ignore[no-untyped-def]
-    """The contour term and its gradients with respect to n1 and n2 at the contour points only:
+    """Compute the contour term.
 
-    (cost, (P,), (P,)).
+    Parameters
+    ----------
+    n1, n2 : (H, W) ndarray
+        Components of the normal, down and right.
+    contour : Contour
+    weight, power : float
+    pixels : int
+        Number of pixels n of the image.
+
+    Returns
+    -------
+    cost : float
+    gradient_n1, gradient_n2 : (P,) ndarray
+        At the contour points only.
     """
     at = (contour.rows, contour.columns)
     x = n1[at].astype(float) * contour.down + n2[at].astype(float) * contour.right
@@ -133,8 +219,18 @@ def contour_cost(
 
 
 def observation_cost(height: np.ndarray, observed: DepthObservation) -> tuple[float, np.ndarray]:
-    """The observation's term, weight/n_seen * sum of (sqrt(1 + (difference/sigma)^2) - 1), and its
-    gradient (H, W).
+    """Compute the depth term, weight/n_seen * sum of (sqrt(1 + (difference/sigma)^2) - 1).
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    observed : DepthObservation
+
+    Returns
+    -------
+    cost : float
+    gradient : (H, W) ndarray
     """
     known = np.isfinite(observed.height)
     count = max(int(known.sum()), 1)

@@ -1,6 +1,4 @@
-"""Compiled passes over many vectors, for the pyramid and for L-BFGS; the same formulas as `pyramid`
-and `NumpyAlgebra`.
-"""
+"""Compiled passes over many vectors, with the formulas of `pyramid` and `NumpyAlgebra`."""
 
 # mypy: disable-error-code="no-untyped-def"
 # (the compiler infers the types of every call)
@@ -49,15 +47,20 @@ def _combine(first, last, coefficients, vectors, out):
 
 
 class CompiledAlgebra:
-    """`lbfgs.Algebra` on compiled kernels; sums are taken over a fixed number of parts, whatever
-    the threads.
+    """`lbfgs.Algebra` on compiled kernels.
+
+    Sums are taken over a fixed number of parts, whatever the number of threads.
+
+    Parameters
+    ----------
+    workers : ThreadPool
     """
 
     def __init__(self, workers: ThreadPool) -> None:
         self._workers = workers
 
     def products(self, vectors: np.ndarray, others: np.ndarray) -> np.ndarray:
-        """See `Algebra`."""
+        """Return all inner products, see `Algebra`."""
         others = np.ascontiguousarray(others)
         sums = np.zeros((_PARTS, len(vectors), len(others)))
         self._workers.run(
@@ -69,7 +72,7 @@ class CompiledAlgebra:
         return sums.sum(axis=0)
 
     def combine(self, coefficients: np.ndarray, vectors: np.ndarray, out: np.ndarray) -> None:
-        """See `Algebra`."""
+        """Write a linear combination into `out`, see `Algebra`."""
         c = coefficients.astype(out.dtype)
         self._workers.run([partial(_combine, a, b, c, vectors, out) for a, b in _parts(out.size)])
 
@@ -81,7 +84,13 @@ def _parts(length: int) -> list[tuple[int, int]]:
 
 @jit(math=ACCUMULATED)
 def down(fine, out):
-    """One pyramid step down, (H, W) into (ceil(H/2), ceil(W/2)); see `pyramid.down`."""
+    """Take one pyramid step down, see `pyramid.down`.
+
+    Parameters
+    ----------
+    fine : (H, W) ndarray
+    out : (ceil(H / 2), ceil(W / 2)) ndarray
+    """
     t = fine.dtype.type
     a, b = t(TAPS[0]), t(TAPS[1])
     height, width = fine.shape
@@ -103,7 +112,14 @@ def down(fine, out):
 
 @jit(math=ACCUMULATED)
 def up_add(coarse, fine, out):
-    """out = fine + the adjoint of `down` applied to `coarse`; see `pyramid.up`."""
+    """Write `fine` plus the adjoint of `down` applied to `coarse`, see `pyramid.up`.
+
+    Parameters
+    ----------
+    coarse : (ceil(H / 2), ceil(W / 2)) ndarray
+    fine : (H, W) ndarray
+    out : (H, W) ndarray
+    """
     t = coarse.dtype.type
     a, b = t(TAPS[0]), t(TAPS[1])
     height, width = fine.shape

@@ -102,7 +102,8 @@ def fit_light(
     spread = np.linalg.eigvalsh(covariance)
     if not spread[0] > 1e-9 * spread[-1]:
         raise InputError(
-            f"{len(samples)} lights, mirror images included, are too few for a prior of light: give more objects or lights"
+            f"{len(samples)} lights, mirror images included, are too few for a prior of light:"
+            " give more objects or lights"
         )
     return GaussianLight(mean, covariance, floor)
 

@@ -25,7 +25,7 @@ from .priors import Light
 _RINGS, _TURNS, _GRAZING = 12, 32, 0.1
 
 
-def _front() -> np.ndarray:
+def _front_normals() -> np.ndarray:
     """Normals (384, 3) evenly over those before the object, left and right alike."""
     z, turn = np.meshgrid(
         _GRAZING + (1 - _GRAZING) * (np.arange(_RINGS) + 0.5) / _RINGS,
@@ -35,26 +35,27 @@ def _front() -> np.ndarray:
     return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=-1).reshape(-1, 3)
 
 
-def _look() -> np.ndarray:
+def _light_terms() -> np.ndarray:
     """A (8, 9) for one channel, of the coefficients of `frames.real_sh`."""
     values = real_sh(FRONT_NORMALS)
     triangle = np.linalg.qr((values - values.mean(axis=0))[:, 1:] / np.sqrt(len(values)))[1]
     return np.hstack([np.zeros((8, 1)), triangle * np.sign(np.diag(triangle))[:, None]])
 
 
-FRONT_NORMALS = _front()
-LIGHT_TERMS = _look()
+FRONT_NORMALS = _front_normals()
+LIGHT_TERMS = _light_terms()
 
 
-def predicted_light_prior(prior: Light, seen: np.ndarray, deviations: np.ndarray) -> Light:
+def predicted_light_prior(prior: Light, predicted: np.ndarray, deviations: np.ndarray) -> Light:
     """`prior` for C channels, told that the light looks like `seen` (8,), give or take `deviations`
     (8,), > 0.
     """
     channels = len(prior.mean) // 9
-    look = np.hstack([LIGHT_TERMS @ light_from_reference(np.eye(9)) / channels] * channels)
-    across = np.einsum("ij,kj->ik", prior.covariance, look)
-    spread = np.einsum("ij,jk->ik", look, across) + np.diag(np.square(deviations))
+    terms = np.hstack([LIGHT_TERMS @ light_from_reference(np.eye(9)) / channels] * channels)
+    across = np.einsum("ij,kj->ik", prior.covariance, terms)
+    spread = np.einsum("ij,jk->ik", terms, across) + np.diag(np.square(deviations))
     gain = solve_linear(spread, across.T).T
-    mean = prior.mean + np.einsum("ij,j->i", gain, seen - np.einsum("ij,j->i", look, prior.mean))
+    residual = predicted - np.einsum("ij,j->i", terms, prior.mean)
+    mean = prior.mean + np.einsum("ij,j->i", gain, residual)
     covariance = prior.covariance - np.einsum("ij,kj->ik", gain, across)
     return Light(mean, (covariance + covariance.T) / 2, prior.unwhiten, mean)

@@ -22,7 +22,7 @@ from .scale_mixture import ScaleMixture
 
 SCHEMA_VERSION = 2
 _LIGHTS = ("natural", "laboratory")
-_COEFFICIENTS = 27
+_COEFFICIENTS = 27  # of a light of three channels
 
 
 def save_prior_set(path: str | Path, priors: PriorSet) -> None:
@@ -43,7 +43,8 @@ def load_prior_set(path: str | Path) -> PriorSet:
         data = Path(path).read_bytes()
     except OSError as error:
         raise InputError(
-            f"cannot read the priors {path} ({error.strerror}): give a file that 'isc fit-priors' wrote"
+            f"cannot read the priors {path} ({error.strerror}):"
+            " give a file that 'isc fit-priors' wrote"
         ) from error
     return _parse(data, str(path))
 
@@ -127,7 +128,8 @@ class _Reader:
         version = int(self.numbers("schema_version", ()))
         if version != SCHEMA_VERSION:
             raise InputError(
-                f"{self.source} has format version {version}, not {SCHEMA_VERSION}: fit the priors again"
+                f"{self.source} has format version {version}, not {SCHEMA_VERSION}:"
+                " fit the priors again"
             )
         whiten = self.numbers("parsimony_whiten", (3, 3))
         lights = Lights(**{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in _LIGHTS})

@@ -103,7 +103,7 @@ def fit_scale_mixture(
     """
     if samples.largest == 0:
         raise InputError(
-            "the training objects are flat or of one grey: give objects with some shape and paint"
+            "the training objects are flat or of one grey: give objects with some shape and texture"
         )
     used = samples.counts > 0
     counts = samples.counts[used]
