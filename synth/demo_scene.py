@@ -115,7 +115,15 @@ def soft_environment(rows: int = 64) -> np.ndarray:
 
 
 def write_truth(path: Path, truth: GroundTruth) -> None:
-    """Write the ground truth as a multilayer EXR file, with the channel names of `maps.exr`."""
+    """Write the ground truth as a multilayer EXR file, with the channel names of `maps.exr`.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    truth : GroundTruth
+        The maps.
+    """
     channels = {
         f"{name}.{c}": getattr(truth, name)[..., i] for name in _LAYERS for i, c in enumerate("RGB")
     }

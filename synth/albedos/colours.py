@@ -37,7 +37,20 @@ def colour(hue: float, purity: float, value: float) -> np.ndarray:
 
 
 def pigment(rng: np.random.Generator, hue: float | None = None) -> np.ndarray:
-    """Draw a saturated colour; the hue (in turns) is random unless given."""
+    """Draw a saturated colour.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    hue : float, optional
+        In turns; random by default.
+
+    Returns
+    -------
+    (3,) ndarray
+        Linear Rec.709.
+    """
     hue = rng.uniform() if hue is None else hue
     return colour(hue, rng.uniform(0.7, 0.97), rng.uniform(0.3, 1) * _brightest(hue))
 

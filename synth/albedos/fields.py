@@ -115,7 +115,20 @@ def softened(values: np.ndarray, texels: float = 0.7) -> np.ndarray:
 
 
 def step(values: np.ndarray, width: float) -> np.ndarray:
-    """Return 0 where `values` are below -width, 1 above +width, and a linear ramp between."""
+    """Return a linear ramp.
+
+    Parameters
+    ----------
+    values : ndarray
+        Any values.
+    width : float
+        Half width of the ramp.
+
+    Returns
+    -------
+    ndarray
+        0 where `values` are below -width, 1 above +width.
+    """
     return np.clip(0.5 + values / (2 * width), 0, 1)
 
 

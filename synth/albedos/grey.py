@@ -10,7 +10,20 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Rec.709
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Draw an achromatic texture (size, size, 3)."""
+    """Draw an achromatic texture.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+
+    Returns
+    -------
+    (size, size, 3) ndarray
+        Linear Rec.709.
+    """
     if rng.random() < 0.25:
         return np.full((size, size, 3), np.exp(rng.uniform(np.log(0.04), np.log(0.85))))
     coloured = (patches, prints, noise)[rng.integers(3)].texture(rng, size)

@@ -16,7 +16,20 @@ LARGEST_CHROMA = 0.12
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Draw a nearly achromatic texture (size, size, 3)."""
+    """Draw a nearly achromatic texture.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+
+    Returns
+    -------
+    (size, size, 3) ndarray
+        Linear Rec.709.
+    """
     return (_paper, _porcelain, _rubber, _stone)[rng.integers(4)](rng, size)
 
 

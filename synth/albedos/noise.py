@@ -13,7 +13,20 @@ from .fields import fractal_noise, grid, over, smooth_noise, softened, step
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Draw a texture (size, size, 3)."""
+    """Draw a texture of clouds, marble, wood, speckles or running glazes.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+
+    Returns
+    -------
+    (size, size, 3) ndarray
+        Linear Rec.709.
+    """
     return (_clouds, _marble, _wood, _speckles, _running_glaze)[rng.integers(5)](rng, size)
 
 

@@ -9,7 +9,20 @@ from .fields import ASPECT, grid, smooth_noise, softened
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Draw a texture (size, size, 3)."""
+    """Draw a texture of stripes, cells or level sets.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+
+    Returns
+    -------
+    (size, size, 3) ndarray
+        Linear Rec.709.
+    """
     colours = palette(rng, int(rng.integers(2, 7)))
     areas = (_stripes, _cells, _levels)[rng.integers(3)]
     return softened(colours[areas(rng, size, len(colours))])

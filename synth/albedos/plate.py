@@ -134,7 +134,7 @@ class Plate:
         cv2.putText(self._canvas, words, place, face, scale, 255, stroke, cv2.LINE_AA)
 
     def text_width(self, words: str, height: float, face: int, weight: float = 0.1) -> float:
-        """Return the width of `text` with the same parameters."""
+        """Return the width of `text` with the same parameters, in heights of the texture."""
         scale, stroke = self._letters(height, face, weight)
         return cv2.getTextSize(words, face, scale, stroke)[0][0] / self._scale
 

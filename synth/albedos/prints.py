@@ -13,7 +13,20 @@ from .plate import FACES, Plate, curve, word, write_lines
 
 
 def texture(rng: np.random.Generator, size: int) -> np.ndarray:
-    """Draw a texture (size, size, 3)."""
+    """Draw a texture of a label, a page, a band of letters or a drawing.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    size : int
+        Side in texels.
+
+    Returns
+    -------
+    (size, size, 3) ndarray
+        Linear Rec.709.
+    """
     return (_label, _page, _band, _drawing)[rng.integers(4)](rng, size)
 
 

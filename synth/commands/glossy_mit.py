@@ -74,7 +74,25 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Run the command."""
+    """Run the command.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+        The parsed options.
+    monitor : Monitor
+        Progress and cancellation.
+
+    Returns
+    -------
+    list of str
+        Lines for the user.
+
+    Raises
+    ------
+    InputError
+        For invalid input.
+    """
     settings = GlossySettings(
         options.levels, options.samples, options.seed, options.exponent, options.physical
     )

@@ -166,7 +166,20 @@ def _time_left(seconds: float, done: int, total: int) -> str:
 
 
 def is_finished(folder: Path, scene: PlannedScene) -> bool:
-    """Return whether a folder contains this scene, undamaged."""
+    """Check whether a folder contains a scene, undamaged.
+
+    Parameters
+    ----------
+    folder : Path
+        The folder.
+    scene : PlannedScene
+        The scene.
+
+    Returns
+    -------
+    bool
+        False if it is missing, incomplete, modified, or another scene.
+    """
     try:
         content = read_description(folder)
         require_intact(folder, content)

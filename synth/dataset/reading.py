@@ -19,7 +19,7 @@ from .scene_folder import DATA_FILES, VARIANCES, checksum
 from .splits import SPLITS
 
 MANIFEST = "manifest.json"
-_OLD_GLOSS_CLASSES = {"matt": "diffuse"}  # names of schema 1
+_OLD_GLOSS_CLASSES = {"matt": "diffuse"}  # schema 1
 _Kind = TypeVar("_Kind", str, int, float)
 
 

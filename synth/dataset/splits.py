@@ -216,8 +216,8 @@ def make_pools(choices: Choices, sources: Sources) -> Pools:
     possible = [name for name in SPLITS if not lacking & set(_HELD_OUT[name].split())]
     if impossible := [name for name in choices.splits if name not in possible]:
         raise InputError(
-            f"the split {impossible[0]} is not possible: the choice has no held-out members; choose "
-            "more families, or omit the split"
+            f"the split {impossible[0]} is not possible: the choice has no held-out members; "
+            "choose more families, or omit the split"
         )
     wanted = choices.splits or tuple(possible)
     return Pools(shapes, materials, lights, tuple(name for name in _PATTERN if name in wanted))

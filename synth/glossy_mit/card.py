@@ -46,7 +46,20 @@ def card(name: str, level: float, light: str, settings: GlossySettings) -> str:
 
 
 def index(settings: GlossySettings, roots: tuple[str, ...]) -> str:
-    """Write the README of the whole output, which lists the folders `roots`."""
+    """Write the README of the whole output.
+
+    Parameters
+    ----------
+    settings : GlossySettings
+        The settings of the run.
+    roots : tuple of str
+        Folders of the data sets.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     return render(__file__, "index.md.j2", command=command(settings), roots=roots)
 
 

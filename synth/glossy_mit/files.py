@@ -234,7 +234,20 @@ def write_object(root: Path, picture: Exposed, level: float) -> None:
 
 
 def is_written(root: Path, name: str) -> bool:
-    """Return whether all files of an object exist; folders are always complete."""
+    """Check whether all files of an object exist; folders are always complete.
+
+    Parameters
+    ----------
+    root : Path
+        Folder of the set.
+    name : str
+        The object.
+
+    Returns
+    -------
+    bool
+        Whether nothing is missing.
+    """
     natural, laboratory = (
         (root / light / name, files)
         for light, files in (("natural", NATURAL_FILES), ("laboratory", LABORATORY_FILES))

@@ -153,7 +153,17 @@ def make_layers(
 def surface_of(source: Source, exponent: float) -> Surface:
     """Return the object's points for the renderer, placed as by `synth.shapes.height_field`.
 
-    Object units, the centre of the crop at 0.
+    Parameters
+    ----------
+    source : Source
+        The object.
+    exponent : float
+        Of the specular lobe.
+
+    Returns
+    -------
+    Surface
+        Object units, the centre of the crop at 0.
     """
     (rows, columns), height = np.nonzero(source.mask), source.height[source.mask]
     down, across = source.mask.shape

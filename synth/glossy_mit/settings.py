@@ -69,5 +69,5 @@ def root_names(settings: GlossySettings) -> tuple[str, ...]:
 
 
 def root_name(level: float, light: str) -> str:
-    """Return the folder of one level and light."""
+    """Return the folder of one level (per cent) and light."""
     return f"level-{level:g}_{light}"

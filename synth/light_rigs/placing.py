@@ -85,5 +85,18 @@ def ambient(rng: np.random.Generator, weakest: float, strongest: float) -> Envir
 
 
 def perhaps_ambient(rng: np.random.Generator, share: float = 0.75) -> tuple[EnvironmentLight, ...]:
-    """Draw weak ambient light in `share` of the draws, otherwise none."""
+    """Draw weak ambient light, or none.
+
+    Parameters
+    ----------
+    rng : numpy.random.Generator
+        Random numbers.
+    share : float, optional
+        Probability of ambient light.
+
+    Returns
+    -------
+    tuple of EnvironmentLight
+        One light or none.
+    """
     return (ambient(rng, 0.02, 0.15),) if rng.uniform() < share else ()

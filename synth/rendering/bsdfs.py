@@ -52,18 +52,51 @@ class Lobes(Protocol):
     """The reflection of a point, diffuse and specular lobes separate."""
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
-        """Return f_r cos_light of the diffuse lobe for albedo 1, and of the specular lobe.
+        """Evaluate both lobes.
 
-        Both are 0 below the horizon.
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        diffuse, specular : Dr.Jit array
+            f_r cos_light of the diffuse lobe for albedo 1, and of the specular lobe; 0 below the
+            horizon.
         """
         ...
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return the density of `sample` in this direction, per steradian."""
+        """Return the density of `sample`.
+
+        Parameters
+        ----------
+        view, light : Dr.Jit vectors
+            Unit directions in the local frame.
+
+        Returns
+        -------
+        Dr.Jit array
+            Per steradian.
+        """
         ...
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
-        """Return a direction for the uniform random numbers `choice` and `place` (two)."""
+        """Sample a direction to the light.
+
+        Parameters
+        ----------
+        view : Dr.Jit vector
+            Unit direction to the camera, local frame.
+        choice, place : Dr.Jit array and point
+            One and two uniform random numbers.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction in the local frame.
+        """
         ...
 
 
@@ -75,15 +108,15 @@ class SpecularLobe(Protocol):
     """
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return f_r."""
+        """Return f_r, see `Lobes.values`."""
         ...
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return the density of `sample` in this direction, per steradian."""
+        """Return the density of `sample`, see `Lobes.density`."""
         ...
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
-        """Return a direction for two uniform random numbers."""
+        """Sample a direction to the light by two uniform random numbers, see `Lobes.sample`."""
         ...
 
 
@@ -94,17 +127,17 @@ class BlinnPhongLobe:
     exponent: Lanes
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return f_r."""
+        """See `SpecularLobe`."""
         return (self.exponent + 8) / (8 * math.pi) * self._lobe(view, light)
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return the density of `sample` in this direction, per steradian."""
+        """See `SpecularLobe`."""
         dr = load_drjit()
         across = dr.maximum(dr.dot(view, dr.normalize(view + light)), 1e-6)
         return (self.exponent + 1) / (2 * math.pi) * self._lobe(view, light) / (4 * across)
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
-        """Return a direction for two uniform random numbers."""
+        """See `SpecularLobe`."""
         dr, mi = load_drjit(), load_mitsuba()
         # 1 - cos^2 by way of the logarithm keeps its digits where the lobe is narrow.
         square = 1 - dr.exp(2 / (self.exponent + 1) * dr.log(dr.maximum(1 - place.x, 1e-30)))
@@ -137,7 +170,7 @@ class GgxLobe:
     f0: Lanes
 
     def value(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return f_r."""
+        """See `SpecularLobe`."""
         dr = load_drjit()
         half = dr.normalize(view + light)
         facets = self._facets()
@@ -153,13 +186,13 @@ class GgxLobe:
         )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return the density of `sample` in this direction, per steradian."""
+        """See `SpecularLobe`."""
         dr = load_drjit()
         half = dr.normalize(view + light)
         return self._facets().pdf(view, half) / (4 * dr.maximum(dr.dot(view, half), 1e-6))
 
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
-        """Return a direction for two uniform random numbers."""
+        """See `SpecularLobe`."""
         half, _ = self._facets().sample(view, place)
         return load_mitsuba().reflect(view, half)
 
@@ -187,7 +220,7 @@ class MaterialLobes:
     gloss: SpecularLobe | None = None
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
-        """Return f_r cos_light of both lobes."""
+        """See `Lobes`."""
         dr, mi = load_drjit(), load_mitsuba()
         lit = (view.z > 1e-9) & (light.z > 1e-9)
         diffuse = dr.select(lit, oren_nayar(self.sigma, view, light) * light.z, 0)
@@ -198,7 +231,7 @@ class MaterialLobes:
         )
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return the density of `sample` in this direction, per steradian."""
+        """See `Lobes`."""
         dr = load_drjit()
         diffuse = dr.maximum(light.z, 0) / math.pi
         if self.gloss is None:
@@ -208,7 +241,7 @@ class MaterialLobes:
         )
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
-        """Return a direction for the uniform random numbers `choice` and `place` (two)."""
+        """See `Lobes`."""
         dr, mi = load_drjit(), load_mitsuba()
         diffuse = mi.warp.square_to_cosine_hemisphere(place)
         if self.gloss is None:
@@ -234,7 +267,7 @@ class PlasticLobes:
     drawn: MaterialLobes
 
     def values(self, view: Lanes, light: Lanes) -> tuple[Lanes, Lanes]:
-        """Return f_r cos_light of both lobes."""
+        """See `Lobes`."""
         mi = load_mitsuba()
         parts = (mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection)
         contexts = [mi.BSDFContext(mi.TransportMode.Radiance, int(part)) for part in parts]
@@ -244,11 +277,11 @@ class PlasticLobes:
         return diffuse, gloss
 
     def density(self, view: Lanes, light: Lanes) -> Lanes:
-        """Return the density of `sample` in this direction, per steradian."""
+        """See `Lobes`."""
         return self.drawn.density(view, light)
 
     def sample(self, view: Lanes, choice: Lanes, place: Lanes) -> Lanes:
-        """Return a direction for the uniform random numbers `choice` and `place` (two)."""
+        """See `Lobes`."""
         return self.drawn.sample(view, choice, place)
 
 

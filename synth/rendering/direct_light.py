@@ -179,7 +179,22 @@ def draw_paths(
 
 
 def trace_paths(points: Points, paths: Paths, tracer: Tracer) -> np.ndarray:
-    """Return which samples reach their light, (M,) bool."""
+    """Test which samples reach their light.
+
+    Parameters
+    ----------
+    points : Points
+        The points.
+    paths : Paths
+        Their samples.
+    tracer : Tracer
+        The object.
+
+    Returns
+    -------
+    (M,) ndarray of bool
+        One entry per sample.
+    """
     return ~tracer.blocked(points.lifted()[paths.point], paths.direction, paths.reach)
 
 

@@ -65,7 +65,18 @@ class Sampler(Protocol):
         ...
 
     def seen(self, positions: np.ndarray, directions: np.ndarray) -> Seen:
-        """Return what rays from positions (M, 3) along unit directions (M, 3) hit."""
+        """Return what rays hit of the light.
+
+        Parameters
+        ----------
+        positions, directions : (M, 3) ndarray
+            Origins and unit directions.
+
+        Returns
+        -------
+        Seen
+            One entry per ray.
+        """
         ...
 
 

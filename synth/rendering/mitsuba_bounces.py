@@ -34,7 +34,17 @@ _AT_ONCE = 1 << 18  # light paths
 
 @dataclass(frozen=True)
 class World:
-    """What light interacts with: the material, the lights (none of them black) and the object."""
+    """What light interacts with.
+
+    Attributes
+    ----------
+    material : Material
+        The object's material.
+    lights : list of Beam or WideLight
+        The lights, none of them black.
+    tracer : Tracer
+        The object.
+    """
 
     material: Material
     lights: list[Beam | WideLight]

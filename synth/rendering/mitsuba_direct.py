@@ -106,7 +106,20 @@ def beam_light(points: Points, light: Beam, tracer: Tracer) -> tuple[Lanes, Lane
 
 
 def generator(lanes: int, seed: int) -> Lanes:
-    """Return random numbers for each lane, all of one seed (below 2^32)."""
+    """Return random numbers for many lanes.
+
+    Parameters
+    ----------
+    lanes : int
+        Number of lanes.
+    seed : int
+        Common seed, below 2^32.
+
+    Returns
+    -------
+    Dr.Jit generator
+        One stream per lane.
+    """
     dr, mi = load_drjit(), load_mitsuba()
     random = mi.PCG32(lanes)
     first, second = mi.sample_tea_32(dr.opaque(mi.UInt32, seed), dr.arange(mi.UInt32, lanes))

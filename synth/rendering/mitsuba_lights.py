@@ -33,17 +33,50 @@ class WideLight(Protocol):
     """A light that fills a solid angle."""
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return radiance, distance and density of `sample` for a direction."""
+        """Return what arrives along a direction.
+
+        Parameters
+        ----------
+        position, direction : Dr.Jit point and vector
+            Where the light arrives, and the unit direction toward it.
+
+        Returns
+        -------
+        radiance, distance, density : Dr.Jit colour and arrays
+            Radiance, distance of its source, and density of `sample` per steradian.
+        """
         ...
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
-        """Return a unit direction toward the light for the uniform random numbers `place` and
-        `inside` (two each).
+        """Sample a direction toward the light.
+
+        Parameters
+        ----------
+        position : Dr.Jit point
+            Where the light arrives.
+        place, inside : Dr.Jit points
+            Two uniform random numbers each.
+
+        Returns
+        -------
+        Dr.Jit vector
+            Unit direction.
         """
         ...
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """Return the shading (N, 3) of white diffuse points without shadows, in closed form."""
+        """Return the shading without shadows, in closed form.
+
+        Parameters
+        ----------
+        position, normal : (N, 3) ndarray
+            Points and unit normals.
+
+        Returns
+        -------
+        (N, 3) ndarray
+            Of a white diffuse surface.
+        """
         ...
 
 
@@ -68,7 +101,7 @@ class Environment:
         dr.make_opaque(self.rows)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return radiance, distance and density of `sample` for a direction."""
+        """See `WideLight`."""
         dr, mi = load_drjit(), load_mitsuba()
         del position
         rows = mi.Float(self.rows)
@@ -80,9 +113,7 @@ class Environment:
         return radiance, mi.Float(FAR), dr.gather(mi.Float, self.density, pixel)
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
-        """Return a unit direction for the uniform random numbers `place` and `inside` (two
-        each).
-        """
+        """See `WideLight`."""
         dr, mi = load_drjit(), load_mitsuba()
         del position
         row = _first_above(self.below, mi.UInt32(0), self.rows, place.x)
@@ -97,7 +128,7 @@ class Environment:
         return mi.Vector3f(across * sine, up, -across * cosine)
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """Return the shading (N, 3) of white diffuse points without shadows."""
+        """See `WideLight`."""
         del position
         return unoccluded_shading(self._radiance, normal)
 
@@ -119,7 +150,7 @@ class Panel:
         dr.make_opaque(self.centre, self.right, self.up, self.normal, self.radiance, self.area)
 
     def along(self, position: Lanes, direction: Lanes) -> tuple[Lanes, Lanes, Lanes]:
-        """Return radiance, distance and density of `sample` for a direction."""
+        """See `WideLight`."""
         dr = load_drjit()
         toward, facing = self.centre - position, -dr.dot(direction, self.normal)
         distance = -dr.dot(toward, self.normal) / dr.select(facing > 1e-9, facing, 1)
@@ -131,7 +162,7 @@ class Panel:
         return dr.select(inside, self.radiance, 0), distance, density
 
     def sample(self, position: Lanes, place: Lanes, inside: Lanes) -> Lanes:
-        """Return a unit direction for the uniform random numbers `place` (two)."""
+        """See `WideLight`."""
         dr = load_drjit()
         del inside
         return dr.normalize(
@@ -139,7 +170,7 @@ class Panel:
         )
 
     def unoccluded(self, position: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """Return the shading (N, 3) of white diffuse points without shadows."""
+        """See `WideLight`."""
         return unoccluded_panel(self._light, position, normal)
 
 

@@ -212,7 +212,20 @@ def cosine_directions(rng: np.random.Generator, points: Points, count: int) -> n
 
 
 def cosine_density(points: Points, light: np.ndarray) -> np.ndarray:
-    """Return the density (N,) of `cosine_directions` for unit directions (N, 3), per steradian."""
+    """Return the density of `cosine_directions`.
+
+    Parameters
+    ----------
+    points : Points
+        N points.
+    light : (N, 3) ndarray
+        Unit directions.
+
+    Returns
+    -------
+    (N,) ndarray
+        Per steradian.
+    """
     return np.maximum(_dot(points.normal, light), 0) / np.pi
 
 

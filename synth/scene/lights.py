@@ -155,7 +155,20 @@ def panel_toward_origin(
 
 
 def scaled(light: Light, gain: float) -> Light:
-    """Return the same light, `gain` times as bright."""
+    """Scale the brightness of a light.
+
+    Parameters
+    ----------
+    light : Light
+        The light.
+    gain : float
+        The factor.
+
+    Returns
+    -------
+    Light
+        Of the same kind.
+    """
     if isinstance(light, DirectionalLight):
         return DirectionalLight(light.direction, light.irradiance * gain)
     if isinstance(light, PointLight):

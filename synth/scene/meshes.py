@@ -126,7 +126,18 @@ def vertex_normals(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def joined(first: Mesh, second: Mesh) -> Mesh:
-    """Concatenate two meshes; where they overlap, both surfaces stay."""
+    """Concatenate two meshes.
+
+    Parameters
+    ----------
+    first, second : Mesh
+        The meshes.
+
+    Returns
+    -------
+    Mesh
+        Where they overlap, both surfaces stay.
+    """
     vertices, normals, uv = (
         np.concatenate([getattr(mesh, part) for mesh in (first, second)])
         for part in ("vertices", "normals", "uv")
@@ -147,7 +158,15 @@ def _grid_normals(points: np.ndarray) -> np.ndarray:
 
 
 def write_ply(path: Path, mesh: Mesh) -> None:
-    """Write a binary PLY file with normals and texture coordinates, in Mitsuba's layout."""
+    """Write a binary PLY file with normals and texture coordinates, in Mitsuba's layout.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    mesh : Mesh
+        The mesh.
+    """
     names = ["x", "y", "z", "nx", "ny", "nz", "u", "v"]
     table = np.hstack([mesh.vertices, mesh.normals, mesh.uv]).astype("<f4")
     triangles = np.empty(len(mesh.faces), dtype=[("count", "u1"), ("corners", "<i4", 3)])

@@ -56,5 +56,18 @@ def smooth_field(
 
 
 def ridged(values: np.ndarray, sharpness: float) -> np.ndarray:
-    """Return creases at the zeros of a smooth function: -|f|, rounded within 1 / sharpness."""
+    """Turn the zeros of a smooth function into creases.
+
+    Parameters
+    ----------
+    values : ndarray
+        The function f.
+    sharpness : float
+        The creases are rounded within 1 / sharpness.
+
+    Returns
+    -------
+    ndarray
+        About -|f|.
+    """
     return -np.hypot(values, 1 / sharpness)

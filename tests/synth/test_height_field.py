@@ -134,7 +134,7 @@ def test_bad_files_are_refused_by_name(tmp_path: Path) -> None:
         "objects.npy": "not a readable array",
         "several.npy": "several arrays",
         "other.mat": "'depth'",
-        "colour.exr": "no channel",
+        "colour.exr": "name the one with the heights",
         "empty.npy": "0 pixels",
         "junk.mat": "not a readable MATLAB",
         "junk.npy": "not a readable array",

@@ -143,5 +143,5 @@ def test_paint_is_not_taken_from_what_lies_behind() -> None:
 def test_seeing_nothing_is_the_users_mistake() -> None:
     mesh = ball(31, 0.1)
     away = Mesh(mesh.vertices + (50, 0, 0), mesh.normals, mesh.uv, mesh.faces)
-    with pytest.raises(InputError, match="nothing of the object"):
+    with pytest.raises(InputError, match="not in view"):
         find_surface(Scene(away, Material(GREY), (), Camera(16, 16, 8.0)), Tracer(away))

@@ -54,7 +54,17 @@ class Bound:
 
 @dataclass(frozen=True)
 class Verdict:
-    """A bound, the interval that was compared with it, and whether the bound is violated."""
+    """The result of one bound.
+
+    Attributes
+    ----------
+    bound : Bound
+        The bound.
+    interval : Interval
+        The figure that was compared with it.
+    broken : bool
+        Whether the bound is violated.
+    """
 
     bound: Bound
     interval: Interval

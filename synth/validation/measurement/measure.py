@@ -63,7 +63,17 @@ class ValidationOptions:
 
 @dataclass(frozen=True)
 class StageResult:
-    """One stage's scores (a dataclass of the stage) on one scene, and the run time in seconds."""
+    """The result of one stage on one scene.
+
+    Attributes
+    ----------
+    stage : str
+        Name of the stage.
+    scores : dataclass
+        Of the stage.
+    seconds : float
+        Run time.
+    """
 
     stage: str
     scores: Any

@@ -173,9 +173,21 @@ def run_chain(
 
 
 def chain_value(scores: Scores, metric: str) -> float:
-    """Return one error by its name in `METRICS`.
+    """Return one error of the chain.
 
-    "images" is the geometric mean of the errors of shading, reflectance and both locally.
+    Parameters
+    ----------
+    scores : Scores
+        All errors.
+    metric : str
+        A name in `METRICS`; "images" is the geometric mean of the errors of shading, reflectance
+        and
+        both locally.
+
+    Returns
+    -------
+    float
+        The error.
     """
     if metric == "images":
         return geometric_mean((scores.shading, scores.reflectance, scores.rs_mse))

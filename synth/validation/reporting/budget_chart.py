@@ -17,7 +17,19 @@ _RANGE = (-1.5, 2.5)  # shares beyond it are cut off
 
 @dataclass(frozen=True)
 class ChartBar:
-    """One bar: its name and value as text, its colour, and x, y, width, whiskers in pixels."""
+    """One bar.
+
+    Attributes
+    ----------
+    name, value : str
+        Texts at its left and right.
+    color : str
+        CSS colour.
+    left, top, width : float
+        Pixels.
+    whiskers : (float, float) or None
+        x of the interval's ends.
+    """
 
     name: str
     value: str
@@ -30,7 +42,17 @@ class ChartBar:
 
 @dataclass(frozen=True)
 class ChartGroup:
-    """The bars of one error, with its title and the title's place."""
+    """The bars of one error.
+
+    Attributes
+    ----------
+    title : str
+        The error.
+    top : float
+        y of the group in pixels.
+    bars : tuple of ChartBar
+        From top to bottom.
+    """
 
     title: str
     top: float

@@ -114,10 +114,10 @@ def score_lobe(truth: GroundTruth, answer: FittedLobe) -> LobeScores:
         The scores.
     """
     fit, light = answer.fit, truth.specular[truth.mask].sum(axis=1, dtype=float)
-    told = fit.determined and fit.alpha is not None
+    determined = fit.determined and fit.alpha is not None
     if light.sum() < _NO_GLOSS * truth.image[truth.mask].sum(dtype=float):
-        return LobeScores(invented=float(told))
-    if not told or fit.alpha is None:
+        return LobeScores(invented=float(determined))
+    if not determined or fit.alpha is None:
         return LobeScores(determined=0.0)
     true = _alpha(truth, light)
     return LobeScores(
@@ -126,7 +126,20 @@ def score_lobe(truth: GroundTruth, answer: FittedLobe) -> LobeScores:
 
 
 def show_lobe(truth: GroundTruth, answer: FittedLobe) -> tuple[StagePicture, ...]:
-    """Return the photo, the true and the fitted specular layer, with one exposure."""
+    """Return pictures of the specular layers, with one exposure.
+
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answer : FittedLobe
+        The fit.
+
+    Returns
+    -------
+    tuple of StagePicture
+        The photo, the true and the fitted specular layer.
+    """
     gain = exposure(truth.image, truth.mask)
     pairs = (
         ("photo", truth.image),

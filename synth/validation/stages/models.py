@@ -162,9 +162,19 @@ def score_models(truth: GroundTruth, answers: Variants[Estimate]) -> Variants[Sc
 
 
 def show_models(truth: GroundTruth, answers: Variants[Estimate]) -> tuple[StagePicture, ...]:
-    """Return the photo, then true and estimated diffuse layers, reflectance and normals.
+    """Return pictures of all variants, scaled to the truth's brightness.
 
-    Estimates are scaled to the truth's brightness.
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answers : Variants of Estimate
+        The estimated maps.
+
+    Returns
+    -------
+    tuple of StagePicture
+        The photo, then diffuse layers, reflectance and normals.
     """
     mask, items = truth.mask, answers.items()
     gain = exposure(truth.image, mask)

@@ -41,15 +41,37 @@ def exposure(values: np.ndarray, mask: np.ndarray) -> float:
 
 
 def lit(linear: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Convert linear light (H, W, 3) to sRGB colours in [0, 1], with the background outside the
-    mask.
+    """Convert linear light to display colours.
+
+    Parameters
+    ----------
+    linear : (H, W, 3) ndarray
+        Linear light, clipped to [0, 1].
+    mask : (H, W) ndarray of bool
+        The object.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        sRGB colours in [0, 1], with a dark background.
     """
     return np.where(mask[..., None], linear_to_srgb(np.clip(linear, 0, 1)), _BACKGROUND)
 
 
 def directions(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Convert unit normals (H, W, 3) to colours: x (right) red, y (up) green, z (to the viewer)
-    blue.
+    """Show normals as colours: x (right) red, y (up) green, z (toward the viewer) blue.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) ndarray
+        Unit normals.
+    mask : (H, W) ndarray of bool
+        The object.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        sRGB colours in [0, 1], with a dark background.
     """
     return np.where(mask[..., None], np.clip(0.5 + 0.5 * normal, 0, 1), _BACKGROUND)
 

@@ -136,7 +136,20 @@ def score_separation(truth: GroundTruth, answer: Separation) -> SeparationScores
 
 
 def show_separation(truth: GroundTruth, answer: Separation) -> tuple[StagePicture, ...]:
-    """Return true and estimated layers with one exposure, and the error of the diffuse layer."""
+    """Return pictures of the layers, with one exposure.
+
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answer : Separation
+        The estimated layers.
+
+    Returns
+    -------
+    tuple of StagePicture
+        The photo, true and estimated layers, and the error of the diffuse layer.
+    """
     gain = exposure(truth.image, truth.mask)
     pairs = [
         ("photo", truth.image),

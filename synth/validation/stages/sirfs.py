@@ -128,9 +128,19 @@ def score_sirfs(truth: GroundTruth, answer: Estimate) -> Scores:
 
 
 def show_sirfs(truth: GroundTruth, answer: Estimate) -> tuple[StagePicture, ...]:
-    """Return the photo, then true and estimated shading, reflectance, normals and height.
+    """Return pictures of the maps, scaled to the truth's brightness.
 
-    Estimates are scaled to the truth's brightness.
+    Parameters
+    ----------
+    truth : GroundTruth
+        The scene.
+    answer : Estimate
+        The estimated maps.
+
+    Returns
+    -------
+    tuple of StagePicture
+        The photo, then true and estimated shading, reflectance, normals and height.
     """
     mask = truth.mask
     shown = [StagePicture("photo", lit(exposure(truth.image, mask) * truth.image, mask))]
