@@ -7,7 +7,9 @@ import re
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import numpy as np
@@ -19,11 +21,13 @@ PACKAGES = ("isc_core", "synth", "blender_addon", "training", "benchmarks")
 # Where image, EXR and mesh libraries may be imported: where files become arrays and arrays become
 # files.
 IMAGE_LIBRARIES = {"cv2", "PIL", "OpenEXR", "trimesh", "imageio", "skimage", "png"}
-EDGES = {"photo", "mask", "exr", "decomposition", "result_folder", "mesh", "report", "datasets"}
+EDGES = ("io/exr.py", "io/decoders/", "photo/masks.py", "photo/grabcut.py", "result_files/")
 RENDERERS = {"mitsuba", "drjit"}
 BLENDER = {"bpy", "mathutils", "bmesh"}
 FORBIDDEN = {
-    "isc_core": {"isc_core", "synth", "blender_addon", "training", "benchmarks"} | RENDERERS | BLENDER,
+    "isc_core": {"isc_core", "synth", "blender_addon", "training", "benchmarks"}
+    | RENDERERS
+    | BLENDER,
     "synth": {"blender_addon", "training", "benchmarks"} | BLENDER,
     "blender_addon": {"synth", "training", "benchmarks"} | RENDERERS,
     "training": {"blender_addon", "benchmarks"} | BLENDER,
@@ -32,6 +36,8 @@ FORBIDDEN = {
 UNSAFE_MODULES = {"pickle", "cPickle", "dill", "marshal", "shelve"}
 LONGEST_FUNCTION = 80
 USUAL_FUNCTION = 40
+MOST_FILES = 20
+MOST_FILES_AT_THE_TOP = 12
 
 
 def sources(*packages: str) -> list[Path]:
@@ -98,9 +104,111 @@ def test_the_core_touches_files_only_at_its_edges() -> None:
         f"{where(path, node)} imports {name}"
         for path in sources("isc_core")
         for node, name in absolute_imports(parsed(path))
-        if name in IMAGE_LIBRARIES and not (path.parent.name == "isc_core" and path.stem in EDGES)
+        if name in IMAGE_LIBRARIES
+        and not path.relative_to(ROOT / "isc_core").as_posix().startswith(EDGES)
     ]
     assert not wrong, "\n".join(wrong)
+
+
+def imported_modules(package: str) -> Iterator[tuple[Path, tuple[str, ...]]]:
+    """Each module of `package`, and the modules of the same package that it imports."""
+    for path in sources(package):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        for node in ast.walk(parsed(path)):
+            if not isinstance(node, ast.ImportFrom):
+                continue
+            base = parts[: len(parts) - node.level] if node.level else ()
+            module = (*base, *(node.module or "").split(".")) if node.module else base
+            if module[:1] == (package,):
+                yield from ((path, (*module, alias.name)) for alias in node.names)
+
+
+def folder_of(module: tuple[str, ...]) -> tuple[str, ...]:
+    """The folder that holds a module, a package, or a name that one of them defines."""
+    while not (ROOT.joinpath(*module)).is_dir():
+        module = module[:-1]
+    return module
+
+
+def folder_imports(package: str) -> dict[tuple[str, ...], set[tuple[str, ...]]]:
+    """Which folders of `package` import which others.
+
+    The package's own top is left out: `errors` and `progress` serve every folder, and `__init__`
+    and `__main__` are the doors to them.
+    """
+    graph: dict[tuple[str, ...], set[tuple[str, ...]]] = {}
+    for path, module in imported_modules(package):
+        source, target = path.parent.relative_to(ROOT).parts, folder_of(module)
+        if len(source) > 1 and len(target) > 1 and source != target:
+            graph.setdefault(source, set()).add(target)
+    return graph
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_imports_between_folders_make_no_cycle(package: str) -> None:
+    graph = folder_imports(package)
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join("/".join(folder) for folder in error.args[1]))
+
+
+# The way of a photo: a folder imports only folders further up in this list.
+ROOMS = (
+    "numerics",
+    "io",
+    "imaging",
+    "photo",
+    "shading",
+    "scene",
+    "networks",
+    "inpainting",
+    "thresholding",
+    "illuminant",
+    "separation",
+    "baselines",
+    "sirfs",
+    "lobe_fitting",
+    "decompose",
+    "result_files",
+    "datasets",
+    "evaluation",
+    "prior_fitting",
+    "editing",
+    "batch",
+    "cli",
+)
+
+
+def test_the_core_follows_the_way_of_a_photo() -> None:
+    folders = {path.parent.name for path in (ROOT / "isc_core").glob("*/__init__.py")}
+    assert folders == set(ROOMS)
+    wrong = [
+        f"{'/'.join(source)} imports {'/'.join(target)}"
+        for source, targets in folder_imports("isc_core").items()
+        for target in targets
+        if ROOMS.index(target[1]) > ROOMS.index(source[1])
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_folders_are_small(package: str) -> None:
+    counts = Counter(path.parent.relative_to(ROOT).as_posix() for path in sources(package))
+    assert {folder: n for folder, n in counts.items() if n > MOST_FILES} == {}
+    assert counts["isc_core"] <= MOST_FILES_AT_THE_TOP
+
+
+def test_the_core_imports_fast() -> None:
+    """What starts first imports no numerical library: those take most of a second."""
+    code = (
+        "import sys, isc_core, isc_core.cli.main; "
+        "print(*sys.modules.keys() & {'numpy', 'scipy', 'numba', 'cv2', 'OpenEXR', 'trimesh'})"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.split() == []
 
 
 def test_relative_imports_stay_inside_their_package() -> None:
@@ -193,7 +301,10 @@ def test_every_public_function_says_what_it_does() -> None:
 
 def test_the_command_starts_without_numba() -> None:
     """Some machines have no build of Numba: the plain NumPy engine must do there."""
-    code = "import sys; sys.modules['numba'] = None; sys.modules['llvmlite'] = None; import isc_core.cli, isc_core.sirfs.numpy_engine"
+    code = (
+        "import sys; sys.modules['numba'] = None; sys.modules['llvmlite'] = None; "
+        "import isc_core.cli.main, isc_core.sirfs.numpy_engine"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -201,7 +312,8 @@ def test_the_command_starts_without_numba() -> None:
 
 
 def test_the_command_starts_without_a_renderer_or_blender() -> None:
-    code = f"import sys; sys.modules.update(dict.fromkeys({sorted(RENDERERS | BLENDER)})); import isc_core.cli"
+    missing = sorted(RENDERERS | BLENDER)
+    code = f"import sys; sys.modules.update(dict.fromkeys({missing})); import isc_core.cli.main"
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -271,7 +383,7 @@ def test_the_readme_names_commands_and_options_that_exist() -> None:
     """Every `isc COMMAND` of the README starts, and knows the options that stand in its section."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     commands = sorted(set(re.findall(r"\bisc ([a-z][a-z-]+)\b", readme)))
-    start = "import sys; from isc_core.cli import main; sys.exit(main())"
+    start = "import sys; from isc_core.cli.main import main; sys.exit(main())"
     known = {}
     for command in commands:
         done = subprocess.run(

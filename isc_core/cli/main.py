@@ -1,11 +1,10 @@
-"""The command `isc`: runs a sub-command and turns how it ended into an exit code and at most one
-line.
+"""The command `isc`: runs a sub-command and maps its end to an exit code and at most one line.
 
-0: done. 1: done, but what was measured breaks a bound; stderr says which. 2: something given cannot
-be used, or the machine has no room for it; one line on stderr says what to do. 130: cancelled by
-Ctrl-C (the first lets the work stop at its next step, the second stops it at once). Nothing
-half-written is left in any case. With `--progress json` a program is told instead of a person, see
-`json_progress`.
+0: done. 1: done, but a measurement violates a bound; stderr names it. 2: an input cannot be used,
+or the machine has no room for it; one line on stderr says what to do. 130: cancelled by Ctrl-C (the
+first lets the work stop at its next step, the second stops it at once). Nothing half-written
+remains in any case. With `--progress json` the output is for a program instead of a person, see
+`interface.json_progress`.
 """
 
 import re
@@ -23,8 +22,17 @@ _Speaker = TerminalSpeaker | JsonSpeaker
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs `isc` with `arguments`, those of the process if None, and returns its exit code; never
-    raises for a user's mistake.
+    """Run `isc`.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        By default those of the process.
+
+    Returns
+    -------
+    int
+        The exit code; a user's mistake never raises.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
     # Looked for here, so that complaints about the other options are told to a program, too.

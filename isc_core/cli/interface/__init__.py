@@ -1,1 +1,1 @@
-"""What every command shares: options, the terminal, and JSON progress."""
+"""What every command shares: options, the terminal, and progress as JSON."""

@@ -1,18 +1,20 @@
-"""How `isc --progress json` speaks to a program that runs it: one JSON object a line on standard
-output.
+"""The protocol of `isc --progress json`: one JSON object a line on standard output.
 
-    {"event": "progress", "stage": "shape and light", "fraction": 0.42}     any number; the
-    fraction, of the whole job, never falls {"event": "done", "output": "cup", "lines": ["look at
-    cup/preview.png"]} {"event": "failed", "message": "one line for people", "code": 2} {"event":
-    "cancelled"}                                                  one of these three comes last
+    {"event": "progress", "stage": "shape and light", "fraction": 0.42, "detail": "loss 46.100"}
+    {"event": "done", "output": "cup", "lines": ["look at cup/preview.png"]}
+    {"event": "failed", "message": "one line for people", "code": 2}
+    {"event": "cancelled"}
 
-The program holds the other end of standard input: the line `cancel`, or its end because that
-program is no more, acts as Ctrl-C. The work is asked to stop, after a second it is interrupted
-wherever it is, both tidying up; ten seconds later the process ends in any case. Notes for people,
-and the trace of a fault, go to standard error.
+Any number of progress events comes first; their fraction, of the whole job, never decreases. One of
+the other three comes last.
 
-Limits: a process without standard input is not watched. Lines of standard output that are not JSON
-are not ours: ignore them.
+The calling program holds the other end of standard input: the line `cancel`, or the end of the
+stream because that program has ended, acts as Ctrl-C. The work is asked to stop; after a second it
+is interrupted wherever it is; both let it clean up. Ten seconds later the process ends in any case.
+Notes for people, and the traceback of a bug, go to standard error.
+
+Limits: a process without standard input is not watched. Ignore lines of standard output that are
+not JSON.
 """
 
 import _thread
@@ -38,7 +40,7 @@ _CANCELLED = 130
 class JsonSpeaker:
     """Reports to a program.
 
-    As a context manager, in the process's main thread, it lets the program cancel:
+    As a context manager, in the main thread of the process, it lets the program cancel by
     `KeyboardInterrupt`.
     """
 
@@ -51,24 +53,24 @@ class JsonSpeaker:
 
     @contextmanager
     def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
-        """Where the work reports to; it is told even to those who want no hints."""
+        """Provide the receiver of progress events; it reports even with --quiet."""
         del quiet
         yield self._step
 
     def done(self, output: str, lines: Sequence[str]) -> None:
-        """The work's result is written to `output`."""
+        """Report the output of a finished command."""
         self._say("done", output=output, lines=list(lines))
 
     def failed(self, message: str, code: int) -> None:
-        """One line says why there is no result."""
+        """Report the error message and exit code of a failed command."""
         self._say("failed", message=message, code=code)
 
     def rejected(self, lines: Sequence[str], code: int) -> None:
-        """The result is written, but breaks bounds, a line each."""
+        """Report the violated bounds of a result."""
         self._say("failed", message="; ".join(lines), code=code)
 
     def cancelled(self) -> None:
-        """The work was stopped, and left nothing."""
+        """Report that the command was cancelled."""
         self._say("cancelled")
 
     def _step(self, event: ProgressEvent) -> None:

@@ -1,6 +1,4 @@
-"""How options are read: a parser whose complaints are one line, and the types that several commands
-share.
-"""
+"""Option parsing: a parser with one-line errors, and the option types that commands share."""
 
 import argparse
 import math
@@ -35,22 +33,37 @@ class _Help(argparse.RawDescriptionHelpFormatter):
 
 
 class Parser(argparse.ArgumentParser):
-    """Raises `InputError` instead of printing its usage; options cannot be shortened, so that new
-    ones never change old scripts.
+    """An argument parser that raises `InputError` instead of printing its usage.
+
+    Options cannot be abbreviated, so that new ones never change old scripts.
     """
 
     def __init__(self, **options: Any) -> None:
         super().__init__(allow_abbrev=False, formatter_class=_Help, **options)
 
     def error(self, message: str) -> NoReturn:
-        """Raises `InputError`."""
+        """Raise `InputError`."""
         raise InputError(f"{message} (see `{self.prog} --help`)")
 
 
 def add_command(
     commands: Commands, name: str, run: Any, summary: str, description: str, examples: str
 ) -> argparse.ArgumentParser:
-    """A sub-command's parser, with what all of them have."""
+    """Add the parser of a sub-command, with the options that all commands have.
+
+    Parameters
+    ----------
+    commands : object
+        Returned by `add_subparsers`.
+    name : str
+    run : callable
+        Called with the options and a `Monitor`.
+    summary, description, examples : str
+
+    Returns
+    -------
+    argparse.ArgumentParser
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         help=summary,
@@ -63,10 +76,13 @@ def add_command(
 
 
 def add_speech(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
-    """--quiet and --progress.
+    """Add --quiet and --progress.
 
-    `again`: for an action of a command that has them, so that they may stand before it or behind
-    it.
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+    again : bool
+        For an action of a command that has them, so that they may stand before or after it.
     """
     told = (
         argparse.SUPPRESS if again else None
@@ -86,12 +102,12 @@ def add_speech(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
 
 
 def hints(options: argparse.Namespace, *lines: str) -> list[str]:
-    """Lines to print that only help a person: none with --quiet."""
+    """Return lines that only help a person: none with --quiet."""
     return [] if options.quiet else list(lines)
 
 
 def add_photo(parser: argparse.ArgumentParser) -> None:
-    """PHOTO, --mask, --transfer."""
+    """Add PHOTO, --mask and --transfer."""
     parser.add_argument(
         "photo",
         metavar="PHOTO",
@@ -109,7 +125,7 @@ def add_photo(parser: argparse.ArgumentParser) -> None:
 
 
 def add_transfer(parser: argparse.ArgumentParser) -> None:
-    """--transfer."""
+    """Add --transfer."""
     parser.add_argument(
         "--transfer",
         choices=TRANSFERS,
@@ -119,7 +135,7 @@ def add_transfer(parser: argparse.ArgumentParser) -> None:
 
 
 def add_limits(parser: argparse.ArgumentParser) -> None:
-    """--max-pixels."""
+    """Add --max-pixels."""
     parser.add_argument(
         "--max-pixels",
         type=whole,
@@ -130,14 +146,12 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
 
 
 def limits_of(options: argparse.Namespace) -> Limits:
-    """What the files that a command reads may ask for."""
+    """Return the limits of files that a command reads."""
     return Limits(max_pixels=options.max_pixels)
 
 
 def add_settings(parser: argparse.ArgumentParser) -> None:
-    """What the command's `Settings` are read from but for --engine and --threads; --priors and
-    --arrays.
-    """
+    """Add the options of `Settings` except --engine and --threads; and --priors and --arrays."""
     usual = Settings()
     parser.add_argument(
         "--model",
@@ -216,7 +230,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
 def add_engine(
     parser: argparse.ArgumentParser, threads: str = "how many threads to use (0: one for each core)"
 ) -> None:
-    """--engine and --threads."""
+    """Add --engine and --threads."""
     parser.add_argument(
         "--engine",
         choices=("auto", "numba", "numpy"),
@@ -227,7 +241,7 @@ def add_engine(
 
 
 def count(text: str) -> int:
-    """A whole number from 0 on."""
+    """Parse a whole number, 0 or more."""
     try:
         value = int(text)
     except ValueError:
@@ -238,7 +252,7 @@ def count(text: str) -> int:
 
 
 def whole(text: str) -> int:
-    """A whole number from 1 on."""
+    """Parse a whole number, 1 or more."""
     value = count(text)
     if value == 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
@@ -246,7 +260,7 @@ def whole(text: str) -> int:
 
 
 def number(text: str) -> float:
-    """A finite number other than 0."""
+    """Parse a finite number other than 0."""
     try:
         value = float(text)
     except ValueError:
@@ -257,7 +271,7 @@ def number(text: str) -> float:
 
 
 def positive(text: str) -> float:
-    """A finite number above 0."""
+    """Parse a finite number greater than 0."""
     value = number(text)
     if value < 0:
         raise argparse.ArgumentTypeError(f"{text!r} is not above 0")

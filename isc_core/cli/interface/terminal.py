@@ -1,6 +1,4 @@
-"""What a person at a terminal sees and presses: the progress bar, results and complaints, and
-Ctrl-C.
-"""
+"""Terminal output and input: the progress bar, results, errors, and Ctrl-C."""
 
 import contextlib
 import os
@@ -22,15 +20,13 @@ _REDRAW_SECONDS = 0.08
 
 
 def discard_output() -> None:
-    """Points standard output at nothing, so that what is still buffered does not fail once more
-    when Python ends.
-    """
+    """Redirect standard output to nothing, so that buffered output does not fail again at exit."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def printable(text: str, stream: TextIO) -> str:
-    """`text`, which may have several lines, in characters that `stream` can write."""
+    """Return `text`, of one or more lines, in characters that `stream` can encode."""
     coding = getattr(stream, "encoding", None) or "utf-8"
     return (
         "\n".join(map(readable, text.split("\n"))).encode(coding, "backslashreplace").decode(coding)
@@ -38,11 +34,11 @@ def printable(text: str, stream: TextIO) -> str:
 
 
 class TerminalSpeaker:
-    """Speaks to a person: results on standard output, all else on standard error."""
+    """Reports to a person: results on standard output, all else on standard error."""
 
     @contextmanager
     def progress(self, quiet: bool) -> Iterator[Callable[[ProgressEvent], None]]:
-        """Where the work reports to while it lasts."""
+        """Provide the receiver of progress events for the duration of the work."""
         with ProgressBar(sys.stderr, quiet=quiet) as bar:
             yield bar
 
@@ -58,24 +54,24 @@ class TerminalSpeaker:
         pass
 
     def done(self, output: str, lines: Sequence[str]) -> None:
-        """The work's result is written to `output`; `lines` say what a person should know."""
+        """Print the lines of a finished command."""
         del output
         for line in lines:
             print(printable(line, sys.stdout))
 
     def failed(self, message: str, code: int) -> None:
-        """One line says why there is no result."""
+        """Print the error message of a failed command."""
         del code
         print(f"isc: error: {message}", file=sys.stderr)
 
     def rejected(self, lines: Sequence[str], code: int) -> None:
-        """The result is written, but breaks bounds, a line each."""
+        """Print the violated bounds of a result, one line each."""
         del code
         for line in lines:
             print(f"isc: rejected: {line}", file=sys.stderr)
 
     def cancelled(self) -> None:
-        """The work was stopped, and left nothing."""
+        """Print that the command was cancelled."""
         print("isc: cancelled", file=sys.stderr)
 
 
@@ -137,11 +133,11 @@ class ProgressBar:
 
 
 class Interrupts:
-    """While in use: the first Ctrl-C asks the work to stop, a second one raises
-    `KeyboardInterrupt`; SIGTERM ends the process with 143.
+    """Ctrl-C and SIGTERM as cancellation.
 
-    All three let the work tidy up. Outside the main thread, and where Ctrl-C is ignored (`nohup`),
-    nothing is changed.
+    The first Ctrl-C asks the work to stop, a second one raises `KeyboardInterrupt`; SIGTERM ends
+    the process with 143. All three let the work clean up. Nothing changes outside the main thread,
+    and where Ctrl-C is ignored (`nohup`).
     """
 
     def __init__(self) -> None:
@@ -149,7 +145,7 @@ class Interrupts:
         self._before: dict[int, object] = {}
 
     def monitor(self, progress: Callable[[ProgressEvent], None]) -> Monitor:
-        """The monitor to work with."""
+        """Return the monitor to work with."""
         return Monitor(progress, lambda: self._asked)
 
     def _on_interrupt(self, number: int, frame: FrameType | None) -> None:

@@ -42,7 +42,7 @@ ACTIONS: tuple[EditAction, ...] = (
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "edit",
@@ -73,7 +73,23 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work; what can be wrong is found before anything is written."""
+    """Edit a result; problems are found before anything is written.
+
+    Parameters
+    ----------
+    options : argparse.Namespace
+    monitor : Monitor
+
+    Returns
+    -------
+    list of str
+        Lines to print.
+
+    Raises
+    ------
+    InputError
+        If the result, the photo or an option cannot be used.
+    """
     read = (getattr(options, name, None) for name in ("photo", "mask", "region", "light"))
     require_writable_edit(options.output, read)
     if options.photo is None and (options.mask is not None or options.transfer is not None):

@@ -9,7 +9,7 @@ from .action import ActionResult, EditAction
 from .options import number
 
 
-def edit(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     layers = []
     for layer in ("diffuse", "specular"):
         values = {
@@ -27,7 +27,7 @@ def edit(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     return ActionResult(edit_layers(d, DichromaticEdit(*layers)), {})
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def _add_options(parser: argparse.ArgumentParser) -> None:
     usual = LayerEdit()
     parser.add_argument(
         "--remove", choices=("diffuse", "specular"), help="leave the other layer alone"
@@ -50,5 +50,5 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 ACTION = EditAction(
-    "dichromatic", "the diffuse and the specular layer, edited separately", edit, add_options
+    "dichromatic", "the diffuse and the specular layer, edited separately", _act, _add_options
 )

@@ -15,7 +15,7 @@ _LOOKS = {
 }
 
 
-def change(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     usual: dict[str, float] = _LOOKS.get(options.look, {})
     if options.present is not None and options.exponent is None and "sharper" not in usual:
         raise InputError(
@@ -33,7 +33,7 @@ def change(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     return ActionResult(change_gloss(d, gloss), {})
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--look",
         choices=tuple(_LOOKS),
@@ -65,4 +65,4 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-ACTION = EditAction("gloss", "glossier, rougher or metallic", change, add_options)
+ACTION = EditAction("gloss", "glossier, rougher or metallic", _act, _add_options)

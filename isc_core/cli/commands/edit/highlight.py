@@ -22,7 +22,7 @@ from .panels import ball_panel
 _USUAL_LEVEL = 0.7
 
 
-def add_new_highlight(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     lobe = lobe_of(options) or known_lobe(d) or Lobe()
     light = _chosen_light(d, options)
     level = options.strength if options.replace or options.strength is not None else _USUAL_LEVEL
@@ -50,7 +50,7 @@ def _chosen_light(d: Decomposition, options: argparse.Namespace) -> DirectionalL
     )
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def _add_options(parser: argparse.ArgumentParser) -> None:
     add_direction(parser)
     parser.add_argument(
         "--like",
@@ -67,6 +67,4 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--replace", action="store_true", help="take the present highlights away")
 
 
-ACTION = EditAction(
-    "highlight", "a new highlight on the recovered shape", add_new_highlight, add_options
-)
+ACTION = EditAction("highlight", "a new highlight on the recovered shape", _act, _add_options)

@@ -27,7 +27,7 @@ _OTHER_LIGHTS = (
 )
 
 
-def find_direction(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     del options
     shading, specular = explain_shading(d), explain_specular(d)
     edit = relight(d, NewLight(directional=shading.light), Relighting(highlights="keep"))
@@ -142,6 +142,6 @@ def _add_nothing(parser: argparse.ArgumentParser) -> None:
 ACTION = EditAction(
     "light-direction",
     "the single light that best explains the shading, and the highlights",
-    find_direction,
+    _act,
     _add_nothing,
 )

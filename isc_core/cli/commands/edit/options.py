@@ -17,6 +17,7 @@ from ...interface.options import (
 
 
 def add_common(parser: argparse.ArgumentParser) -> None:
+    """Add the options of every action: the photo, the output and the progress."""
     picture = parser.add_argument_group("the photo")
     picture.add_argument(
         "--photo",
@@ -44,6 +45,7 @@ def add_common(parser: argparse.ArgumentParser) -> None:
 
 
 def add_lobe(parser: argparse.ArgumentParser) -> None:
+    """Add --exponent and --alpha."""
     parser.add_argument(
         "--exponent", type=number, metavar="P", help="Blinn-Phong's, 1 to 1e5, larger is sharper"
     )
@@ -56,6 +58,7 @@ def add_lobe(parser: argparse.ArgumentParser) -> None:
 
 
 def add_direction(parser: argparse.ArgumentParser) -> None:
+    """Add --direction and --color."""
     parser.add_argument(
         "--direction",
         type=number,
@@ -72,6 +75,7 @@ def add_direction(parser: argparse.ArgumentParser) -> None:
 
 
 def lobe_of(options: argparse.Namespace) -> Lobe | None:
+    """Return the lobe of --exponent or --alpha, or None; raise `InputError` for both."""
     if options.exponent is not None and options.alpha is not None:
         raise InputError("--exponent and --alpha both say how rough the lobe is: give one of them")
     if options.exponent is None and options.alpha is None:
@@ -80,6 +84,7 @@ def lobe_of(options: argparse.Namespace) -> Lobe | None:
 
 
 def number(text: str) -> float:
+    """Parse a finite number."""
     try:
         value = float(text)
     except ValueError:
@@ -90,6 +95,7 @@ def number(text: str) -> float:
 
 
 def color(text: str) -> np.ndarray:
+    """Parse a colour rrggbb to linear light (3,)."""
     digits = text.removeprefix("#")
     try:
         codes = np.array([int(digits[k : k + 2], 16) for k in (0, 2, 4)])
@@ -103,6 +109,7 @@ def color(text: str) -> np.ndarray:
 
 
 def plain(value: object) -> object:
+    """Convert a value to JSON-ready types."""
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     return readable(str(value)) if isinstance(value, Path) else value

@@ -12,6 +12,18 @@ from ....shading.spherical_harmonics import real_sh
 
 
 def ball_panel(color: np.ndarray, label: str, remark: str) -> Panel:
+    """Return a panel with a picture of a sphere.
+
+    Parameters
+    ----------
+    color : (N, N, 3) ndarray
+        Linear light; scaled to its own white.
+    label, remark : str
+
+    Returns
+    -------
+    Panel
+    """
     coverage = sphere_normals(len(color))[1]
     return Panel(
         color * 0.95 / max(float(np.percentile(color[coverage > 0.5].max(-1), 99.5)), 1e-9),
@@ -22,6 +34,7 @@ def ball_panel(color: np.ndarray, label: str, remark: str) -> Panel:
 
 
 def recovered_light_panel(d: Decomposition) -> Panel:
+    """Return a panel with a white sphere under the recovered light."""
     return ball_panel(
         np.exp(real_sh(sphere_normals(320)[0]) @ d.illumination),
         "Recovered light",
@@ -30,9 +43,21 @@ def recovered_light_panel(d: Decomposition) -> Panel:
 
 
 def directional_ball(light: DirectionalLight, exponent: float | None = None) -> np.ndarray:
-    """A ball in the directed part of the light alone: an ambient rest hides where it comes from."""
+    """Render a sphere in the directional part of a light alone; an ambient term hides its origin.
+
+    Parameters
+    ----------
+    light : DirectionalLight
+    exponent : float, optional
+        Blinn-Phong exponent of a lobe.
+
+    Returns
+    -------
+    (N, N, 3) ndarray
+    """
     return render_sphere(replace(light, ambient=np.zeros(3)), exponent=exponent)[0]
 
 
 def empty_panel(label: str, remark: str) -> Panel:
+    """Return a panel without a picture."""
     return Panel(np.full((320, 320, 3), 0.03), sphere_normals(320)[1], label, remark)

@@ -19,7 +19,7 @@ from .action import ActionResult, EditAction
 from .options import color, number, plain
 
 
-def recolour_object(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     change = ColourEdit(
         options.hue, options.saturation, options.value, options.color, options.match_brightness
     )
@@ -65,7 +65,7 @@ def _read_region(path: Path, d: Decomposition, limits: Limits) -> np.ndarray:
     return region[np.ix_(rows, columns)]
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def _add_options(parser: argparse.ArgumentParser) -> None:
     usual = ColourEdit()
     parser.add_argument(
         "--hue", type=number, default=usual.hue, metavar="DEGREES", help="turns the hue"
@@ -121,6 +121,4 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )
 
 
-ACTION = EditAction(
-    "recolour", "another reflectance under the same gloss", recolour_object, add_options
-)
+ACTION = EditAction("recolour", "another reflectance under the same gloss", _act, _add_options)

@@ -23,7 +23,7 @@ from .panels import ball_panel, recovered_light_panel
 _COEFFICIENTS = ("", ".json", ".npy")  # files of lights that are no pictures
 
 
-def relight_object(d: Decomposition, options: argparse.Namespace) -> ActionResult:
+def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
     rotation = turn(options.yaw, options.pitch, options.roll)
     light, fixed = _new_light(d, options, rotation)
     lobe = lobe_of(options)
@@ -87,7 +87,7 @@ def _read_coefficients(path: Path) -> np.ndarray:
     return light.astype(float)
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
+def _add_options(parser: argparse.ArgumentParser) -> None:
     for name, text in (
         ("yaw", "front to the right"),
         ("pitch", "top to the front"),
@@ -129,6 +129,4 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_lobe(parser)
 
 
-ACTION = EditAction(
-    "relight", "the recovered light rotated, or another light", relight_object, add_options
-)
+ACTION = EditAction("relight", "the recovered light rotated, or another light", _act, _add_options)
