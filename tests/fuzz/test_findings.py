@@ -468,4 +468,4 @@ def test_commands_hold_the_limit_of_pixels(
     assert "20 x 24 pixels" in capfd.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
     assert main([*command, "--max-pixels", "0"]) == 2
-    assert "not a whole number from 1 on" in capfd.readouterr().err
+    assert "not a whole number, 1 or more" in capfd.readouterr().err

@@ -22,16 +22,18 @@ _GROUP = "isc.commands"
 
 _EXAMPLES = """examples:
   isc decompose cup.png -o cup                          everything, into the folder cup
-  isc mask photo.jpg --box 120,80,400,360 -o mask.png   first cut the object out, where the background is not black
+  isc mask photo.jpg --box 120,80,400,360 -o mask.png   first mask the object if needed
   isc decompose photo.jpg --mask mask.png -o result
-`isc COMMAND --help` shows every option. Exit code: 0 done, 2 something cannot be used, 130 cancelled."""
+`isc COMMAND --help` shows every option.
+Exit codes: 0 done, 1 done with failures, 2 an input cannot be used, 130 cancelled."""
 
 
 def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; what it parses has `run`, to be called, and `quiet`."""
     parser = Parser(
         prog="isc",
-        description="Intrinsic scene characteristics from one photo of a glossy object: diffuse and specular light, shape, illumination, "
+        description="Intrinsic scene characteristics from one photo of a glossy object: diffuse and "
+        "specular light, shape, illumination, "
         "shading and reflectance, and a textured mesh.",
         epilog=_EXAMPLES,
     )
@@ -51,7 +53,11 @@ def _declare_other(entry: EntryPoint, commands: Commands) -> None:
     try:
         module = entry.load()
     except ImportError as error:
-        reason = f"isc {entry.name} cannot start ({error}): install it with `pip install 'isc3d[{entry.module.partition('.')[0]}]'`"
+        extra = entry.module.partition(".")[0]
+        reason = (
+            f"isc {entry.name} cannot start ({error}): install it with "
+            f"`pip install 'isc3d[{extra}]'`"
+        )
     else:
         module.declare(commands)
         return

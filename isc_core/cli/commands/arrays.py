@@ -15,7 +15,7 @@ _EXAMPLES = """  isc arrays cup"""
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "arrays",
@@ -32,7 +32,7 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work; what can be wrong is found before it begins."""
+    """Run the command; problems are found before the work begins."""
     monitor.report("reading", 0.0)
     result, path = load(options.result), options.result / ARRAYS
     require_writable_file(path)

@@ -25,18 +25,19 @@ from ..interface.options import (
     positive,
 )
 
-_EXAMPLES = """  isc batch photos -o results                       every photo of the folder; cup_mask.png is the mask of cup.jpg
+_EXAMPLES = """  isc batch photos -o results          every photo of the folder; cup_mask.png masks cup.jpg
   isc batch 'catalogue/**/*.jpg' --masks masks -o results --timeout 300
   isc batch list.csv -o results --workers 4 --memory 4GB
   isc batch list.jsonl -o /net/results --scheduler tcp://node7:8786
 
-A manifest is CSV with a header (image,mask,name,max_size,...) or JSON lines ({"image": "cup.png", "options": {"max_size": 256}});
-paths in it are relative to its folder. Inputs may be URLs that fsspec knows (s3://bucket/photos). Give the same command again to go on:
-what is finished is skipped. Exit code 1: all images were tried and some failed, see failures.jsonl."""
+A manifest is CSV with a header (image,mask,name,max_size,...) or JSON lines
+({"image": "cup.png", "options": {"max_size": 256}}); its paths are relative to its folder.
+Inputs may be URLs that fsspec supports (s3://bucket/photos). Run the same command again to
+resume: finished images are skipped. Exit code 1: some images failed, see failures.jsonl."""
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "batch",
@@ -103,7 +104,7 @@ def _add_crew(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work. Raises `Rejected` where images failed."""
+    """Run the command; raise `Rejected` if images failed."""
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     batch = Batch(
         options.inputs, options.output, options.masks, ImageRecipe(settings, options.transfer),

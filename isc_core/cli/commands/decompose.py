@@ -7,9 +7,9 @@ from pathlib import Path
 from ...decompose.pipeline import KnownInputs, Settings, decompose
 from ...photo import Photo, read_photo
 from ...progress import Monitor
+from ...result_files.diagnostics_text import note_lines
 from ...result_files.known_inputs import read_height, read_light
 from ...result_files.result_folder import require_room, require_writable_result, save
-from ...result_files.status_lines import status_lines
 from ...sirfs.priors.prior_file import load_prior_set
 from ..interface.options import (
     Commands,
@@ -27,13 +27,14 @@ _EXAMPLES = """  isc decompose cup.png -o cup
   isc decompose photo.jpg --mask mask.png --model sirfs -o result
   isc decompose scan.tif --transfer linear --depth sensor.exr --depth-sigma 3 -o result
 
-height maps (--shape, --depth): of the photo's size, in photo pixels toward the viewer. EXR: a channel Y or Z, or height.Z;
-NumPy .npy; PNG or TIFF of 16 bits, where one code is 1/64 pixel and 0 is a hole; or the folder of an earlier result.
-NaN is a hole. --height-scale changes the unit: -0.2 for a distance from the camera of which one unit is 0.2 pixels."""
+Height maps (--shape, --depth) have the photo's size, in photo pixels toward the viewer: EXR with
+a channel Y, Z or height.Z; NumPy .npy; PNG or TIFF of 16 bits, where one code is 1/64 pixel and 0
+is a hole; or the folder of an earlier result. NaN is a hole. --height-scale changes the unit: -0.2
+for distances from the camera whose unit is 0.2 pixels."""
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "decompose",
@@ -99,7 +100,7 @@ def _add_evidence(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work; what can be wrong is found before it begins."""
+    """Run the command; problems are found before the work begins."""
     settings = Settings(**{f.name: getattr(options, f.name) for f in fields(Settings)})
     settings.check()
     require_writable_result(options.output, inputs=(options.photo, options.mask))
@@ -118,7 +119,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     save(result, options.output, arrays=options.arrays, monitor=monitor.part(0.8, 1.0))
     return hints(
         options,
-        *status_lines(result.provenance.status),
+        *note_lines(result.provenance.diagnostics),
         f"look at {options.output / 'preview.png'}",
     )
 

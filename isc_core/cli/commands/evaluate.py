@@ -25,7 +25,7 @@ _PRIOR = "as for isc decompose (default %(default)s, so that SIRFS is measured b
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "evaluate",
@@ -82,7 +82,7 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work."""
+    """Run the command."""
     if options.json is not None:
         require_writable_file(options.json)
     original = options.input == "original"

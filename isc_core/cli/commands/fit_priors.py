@@ -17,7 +17,7 @@ _EXAMPLES = """  isc fit-priors DATA -o priors.npz
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "fit-priors",
@@ -40,7 +40,7 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work."""
+    """Run the command."""
     ensure_cache_folder()
     # These declare compiled functions, which needs the folder, and time that the other commands
     # should not spend.

@@ -11,7 +11,7 @@ _EXAMPLES = """  isc mask photo.jpg --box 120,80,400,360 -o mask.png"""
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "mask",
@@ -37,7 +37,7 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work."""
+    """Run the command."""
     del monitor  # one step of a second or two
     found = cut_out(
         options.photo, options.box, options.output, options.transfer, limits_of(options)

@@ -24,7 +24,7 @@ _EXAMPLES = """  isc separate cup.png -o cup-layers
 
 
 def declare(commands: Commands) -> None:
-    """Adds the command to the parser."""
+    """Add the command to the parser."""
     parser = add_command(
         commands,
         "separate",
@@ -47,7 +47,8 @@ def declare(commands: Commands) -> None:
         "--variant",
         default=IMPROVED,
         metavar="NAME",
-        help="improved (default), paper (as published) or, where there is one, sihr (as in that public toolbox)",
+        help="improved (default), paper (as published) or, for some methods, sihr (as in that "
+        "public toolbox)",
     )
     parser.add_argument(
         "--set",
@@ -55,13 +56,14 @@ def declare(commands: Commands) -> None:
         default=[],
         dest="changes",
         metavar="NAME=VALUE",
-        help="change an option of the method; can be given again; an unknown NAME lists those that there are",
+        help="change an option of the method; can be repeated; an unknown NAME lists all options",
     )
     parser.add_argument(
         "--prior",
         type=Path,
         metavar="FILE",
-        help=f"for {BEST}: a grey image of the photo's size, how probable a visible highlight is: black never, middle grey (0.5) not known",
+        help=f"for {BEST}: a grey image of the photo's size, the probability of a highlight: "
+        "black never, middle grey (0.5) unknown",
     )
     parser.add_argument(
         "-o",
@@ -74,7 +76,7 @@ def declare(commands: Commands) -> None:
 
 
 def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
-    """Does the work; what can be wrong is found before it begins."""
+    """Run the command; problems are found before the work begins."""
     changes = parse_changes(options.method, options.variant, options.changes)
     if options.prior is not None and options.method != BEST:
         raise InputError(f"--prior is for the method {BEST} alone")
@@ -110,7 +112,10 @@ def _notes(options: argparse.Namespace, photo: Photo, layers: Separation) -> Ite
     if has_colour(photo.image, photo.mask):
         yield "no highlight could be proven, so the photo was left as it is"
     else:
-        yield "the photo has no colour, which tells highlights from paint, so it was left as it is; a colour photo would help"
+        yield (
+            "the photo has no colour, which distinguishes highlights from reflectance, so it was "
+            "left unchanged: use a colour photo"
+        )
 
 
 def _read_prior(path: Path, size: tuple[int, ...], limits: Limits) -> np.ndarray:

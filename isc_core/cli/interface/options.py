@@ -91,13 +91,14 @@ def add_speech(parser: argparse.ArgumentParser, *, again: bool = False) -> None:
         "--quiet",
         action="store_true",
         default=told or False,
-        help="show no progress, and print nothing but what was asked for",
+        help="show no progress and print results only",
     )
     parser.add_argument(
         "--progress",
         choices=("bar", "json"),
         default=told or "bar",
-        help="json: for programs, a JSON object a line on stdout, cancelled by `cancel` or the end of stdin (default bar)",
+        help="json: for programs, one JSON object a line on stdout, cancelled by `cancel` or the "
+        "end of stdin (default bar)",
     )
 
 
@@ -118,7 +119,8 @@ def add_photo(parser: argparse.ArgumentParser) -> None:
         "--mask",
         type=Path,
         metavar="MASK",
-        help="image of the photo's size, the object white on black (default: the photo's alpha channel, else what is not black)",
+        help="image of the photo's size, the object white on black (default: the photo's alpha "
+        "channel, else the pixels that are not black)",
     )
     add_transfer(parser)
     add_limits(parser)
@@ -141,7 +143,8 @@ def add_limits(parser: argparse.ArgumentParser) -> None:
         type=whole,
         default=USUAL.max_pixels,
         metavar="N",
-        help="refuse images of more pixels (width x height), before they are unpacked (default %(default)s)",
+        help="refuse images with more pixels (width x height) before they are unpacked "
+        "(default %(default)s)",
     )
 
 
@@ -169,14 +172,14 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
         "--illumination",
         choices=ILLUMINATIONS,
         default=usual.illumination,
-        help="which lights to expect (default %(default)s)",
+        help="kind of light to expect (default %(default)s)",
     )
     parser.add_argument(
         "--max-size",
         type=count,
         default=usual.max_size,
         metavar="N",
-        help="long side of the object, in pixels, in the maps (default %(default)s; 0: the photo's)",
+        help="long side of the object in the maps, in pixels (default %(default)s; 0: the photo's)",
     )
     parser.add_argument(
         "--full-size", action="store_true", help="bring the result back to the photo's resolution"
@@ -187,25 +190,28 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--confidence-weights",
         action="store_true",
-        help="of joint and mdr: pixels whose separation is in doubt weigh less in shape and light",
+        help="for joint and mdr: weight pixels by the confidence of their separation",
     )
     parser.add_argument(
         "--light-colour",
         choices=LIGHT_COLOURS,
         default=usual.light_colour,
-        help="the light is white, or has the colour that the highlights tell, where they do (default %(default)s)",
+        help="colour of the light: white, or estimated from highlights where they determine it "
+        "(default %(default)s)",
     )
     parser.add_argument(
         "--light-prior",
         choices=LIGHT_PRIORS,
         default=usual.light_prior,
-        help="expect the light that the photo seems to show, or that of all photos alike (default %(default)s)",
+        help="prior of the light: predicted from the photo, or that of the data set "
+        "(default %(default)s)",
     )
     parser.add_argument(
         "--shape-prior",
         choices=SHAPE_PRIORS,
         default=usual.shape_prior,
-        help="expect the shape that the photo seems to show, or what its outline alone suggests (default %(default)s)",
+        help="prior of the shape: predicted from the photo, or from its silhouette alone "
+        "(default %(default)s)",
     )
     parser.add_argument(
         "--arrays",
@@ -247,7 +253,7 @@ def count(text: str) -> int:
     except ValueError:
         value = -1
     if value < 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 0 on")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, 0 or more")
     return value
 
 
@@ -255,7 +261,7 @@ def whole(text: str) -> int:
     """Parse a whole number, 1 or more."""
     value = count(text)
     if value == 0:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 on")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number, 1 or more")
     return value
 
 

@@ -18,14 +18,15 @@ from . import dichromatic, gloss, highlight, light_direction, recolour, relight
 from .action import ActionResult, EditAction
 from .options import add_common, plain
 
-_EXAMPLES = """  isc edit cup light-direction -o light                                where the light is, and how sure that is
-  isc edit cup highlight --direction -0.5 0.6 0.6 -o glint             a new highlight
+_EXAMPLES = """  isc edit cup light-direction -o light      the light's direction and uncertainty
+  isc edit cup highlight --direction -0.5 0.6 0.6 -o glint      a new highlight
   isc edit cup gloss --look metallic -o metal
-  isc edit cup dichromatic --remove specular --photo cup.png -o matt   the same in the photo itself, at its size
-  isc edit cup recolour --cluster 2 --color 2060c0 -o blue             clusters.png shows the parts
+  isc edit cup dichromatic --remove specular --photo cup.png -o diffuse      in the photo itself
+  isc edit cup recolour --cluster 2 --color 2060c0 -o blue      clusters.png shows the clusters
   isc edit cup relight --yaw 60 -o turned
 
-every action takes --photo, --mask, --transfer and -o; `isc edit RESULT ACTION --help` shows what else."""
+Every action takes --photo, --mask, --transfer and -o.
+`isc edit RESULT ACTION --help` shows its other options."""
 
 
 _NOT_PARAMETERS = ("run", "act", "quiet", "progress", "output", "action", "usual", "max_pixels")
@@ -47,12 +48,10 @@ def declare(commands: Commands) -> None:
         commands,
         "edit",
         run,
-        "other light, gloss or colour for a decomposed photo",
-        "Edits what isc decompose found: RESULT is its folder. Writes a folder with the picture "
-        "(edited.png, edited.exr), "
-        "before_after.png (look at this first) and edit.json. With --photo the edit is brought "
-        "back into the photo, "
-        "at its size and in its coding.",
+        "another light, gloss or colour for a decomposed photo",
+        "Edits a result of isc decompose. Writes a folder with the picture (edited.png, "
+        "edited.exr), before_after.png (look at this first) and edit.json. With --photo the edit "
+        "is applied to the photo, at its size and in its encoding.",
         _EXAMPLES,
     )
     parser.add_argument(

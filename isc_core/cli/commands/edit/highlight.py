@@ -55,14 +55,16 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--like",
         choices=("shading", "specular"),
-        help="without --direction: the one light that best explains the shading (default) or the present highlights",
+        help="without --direction: the light that best explains the shading (default) or the "
+        "present highlights",
     )
     add_lobe(parser)
     parser.add_argument(
         "--strength",
         type=number,
         metavar="S",
-        help="1: as bright as the photo's white (default 0.7; with --replace, as much light as was there)",
+        help="1: as bright as the photo's white (default 0.7; with --replace, the energy of the "
+        "present highlights)",
     )
     parser.add_argument("--replace", action="store_true", help="take the present highlights away")
 

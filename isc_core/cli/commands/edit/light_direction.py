@@ -59,7 +59,7 @@ def _act(d: Decomposition, options: argparse.Namespace) -> ActionResult:
         f"{label}: {_line(found)}"
         for label, found in (("shading", shading), ("highlights", specular))
     ]
-    lines.append(f"at first sight: {_predicted_line(light_estimate)}")
+    lines.append(f"predicted: {_predicted_line(light_estimate)}")
     return ActionResult(edit, measured, tuple(panels), None, tuple(lines), layers=False)
 
 
@@ -77,7 +77,10 @@ def _line(found: DirectionEstimate) -> str:
     x, y, z = found.light.direction
     lobe = "" if found.exponent is None else f", exponent {found.exponent:.0f}"
     share = f"explains {100 * found.explained:.0f} %"
-    return f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees on this shape, {share}{lobe}"
+    return (
+        f"from {x:.3f} {y:.3f} {z:.3f} (right, up, toward the viewer) ± {found.cone:.1f} degrees "
+        f"on this shape, {share}{lobe}"
+    )
 
 
 def _record(found: DirectionEstimate) -> dict[str, object]:
@@ -94,7 +97,7 @@ def _record(found: DirectionEstimate) -> dict[str, object]:
 
 
 def _predicted_panel(d: Decomposition, light_estimate: LightEstimate) -> Panel:
-    label, remark = "At first sight", _likeliest(light_estimate)
+    label, remark = "Predicted", _likeliest(light_estimate)
     if not light_estimate.determined:
         return empty_panel(label, remark)
     light, share = share_explained(d, light_estimate.direction)
@@ -108,8 +111,8 @@ def _predicted_panel(d: Decomposition, light_estimate: LightEstimate) -> Panel:
 def _likeliest(light_estimate: LightEstimate) -> str:
     shares = {
         "smooth light": light_estimate.none,
-        "one lamp": light_estimate.one,
-        "several lamps": light_estimate.several,
+        "one source": light_estimate.one,
+        "several sources": light_estimate.several,
     }
     likely = max(shares, key=lambda name: shares[name])
     return f"{likely} ({100 * shares[likely]:.0f} %)"
@@ -117,9 +120,12 @@ def _likeliest(light_estimate: LightEstimate) -> str:
 
 def _predicted_line(light_estimate: LightEstimate) -> str:
     if not light_estimate.determined:
-        return f"{_likeliest(light_estimate)}, no direction that could be told"
+        return f"{_likeliest(light_estimate)}, direction undetermined"
     x, y, z = light_estimate.direction
-    return f"{_likeliest(light_estimate)}, the strongest from {x:.3f} {y:.3f} {z:.3f} ± {light_estimate.cone:.1f} degrees, whatever the shape"
+    return (
+        f"{_likeliest(light_estimate)}, the strongest from {x:.3f} {y:.3f} {z:.3f} "
+        f"± {light_estimate.cone:.1f} degrees, independent of the shape"
+    )
 
 
 def _predicted_record(light_estimate: LightEstimate) -> dict[str, object]:

@@ -104,7 +104,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--light",
         type=Path,
         metavar="FILE",
-        help="another light: a result folder, a JSON file or .npy of 9 x 3 coefficients, or a panorama, twice as wide as high",
+        help="another light: a result folder, a JSON file or .npy of 9 x 3 coefficients, or an "
+        "environment map (twice as wide as high)",
     )
     add_direction(parser)
     parser.add_argument(
@@ -124,7 +125,8 @@ def _add_options(parser: argparse.ArgumentParser) -> None:
         "--highlights",
         choices=HIGHLIGHTS,
         default="auto",
-        help="what becomes of them (auto: rendered if the lobe is known, fitted or given, else scaled as the shading)",
+        help="what happens to highlights (auto: rendered if a lobe is fitted or given, else scaled "
+        "with the shading)",
     )
     add_lobe(parser)
 
