@@ -1,4 +1,4 @@
-"""Small scenes with known answers, for the tests of the renderers."""
+"""Small scenes with known results, for the tests of the renderers."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -44,7 +44,7 @@ def ball(rows: int = 121, radius: float = 1.0) -> Mesh:
 
 
 def skittle() -> Mesh:
-    """A body with a deep waist: it shades itself and sends light to itself."""
+    """A body with a deep waist: it casts shadows and reflects light onto itself."""
     polar, angle = np.linspace(0, np.pi, 61)[:, None], np.linspace(0, 2 * np.pi, 121)[None]
     width = 0.9 * np.sin(polar) * (1 - 0.75 * np.exp(-((np.cos(polar) / 0.3) ** 2)))
     points = np.stack(
@@ -70,8 +70,8 @@ def toward(x: float, y: float, z: float) -> np.ndarray:
     return np.array([x, y, z]) / np.linalg.norm([x, y, z])
 
 
-def sky(rows: int = 16, seed: int = 0) -> EnvironmentLight:
-    """An uneven sky with a window that is much brighter."""
+def environment(rows: int = 16, seed: int = 0) -> EnvironmentLight:
+    """An uneven environment with a window that is much brighter."""
     radiance = np.random.default_rng(seed).random((rows, 2 * rows, 3)) ** 3
     radiance[rows // 4 : rows // 4 + 2, rows : rows + 3] += (15.0, 12.0, 9.0)
     return EnvironmentLight(radiance)
@@ -83,7 +83,7 @@ def lights() -> dict[str, Light]:
         "directional": DirectionalLight(toward(-0.5, 0.6, 0.6), np.array([3.0, 2.0, 1.0])),
         "point": PointLight(np.array([1.5, 2.0, 2.0]), np.array([5.0, 6.0, 7.0])),
         "panel": panel_toward_origin((-2, 2.5, 2.5), (1.2, 0.8), (20, 18, 16)),
-        "environment": sky(),
+        "environment": environment(),
     }
 
 
@@ -101,10 +101,9 @@ def materials() -> dict[str, Material]:
 
 
 def mitsuba_camera(size: int, half: float = 1.0, samples: int = 1) -> dict[str, Any]:
-    """A camera of Mitsuba's own:
+    """One of Mitsuba's own cameras: `size` x `size` pixels that see [-half, half]^2 along -z.
 
-    `size` x `size` pixels that see [-half, half]^2 along -z; one sample is the ray through the
-    centre.
+    One sample is the ray through the centre.
     """
     look = load_mitsuba().ScalarTransform4f().look_at([0, 0, 10], [0, 0, 0], [0, 1, 0])
     wide = look @ load_mitsuba().ScalarTransform4f().scale([half, half, 1])

@@ -1,4 +1,4 @@
-"""Paints: in range, the same for the same seed, without a seam, and each family what its name says."""
+"""Albedos: in range, reproducible, without a seam, and each family with its own properties."""
 
 from pathlib import Path
 
@@ -37,7 +37,7 @@ def test_every_texture_is_in_range_and_follows_from_its_seed(name: str) -> None:
 
 @pytest.mark.parametrize("name", ALBEDOS)
 def test_textures_close_around_u(name: str) -> None:
-    """What changes across the seam changes no more than between any two neighbours elsewhere."""
+    """Differences across the seam are no larger than between other neighbours."""
     seam = inside = 0.0
     for seed in SEEDS:
         albedo = made(name, seed).astype(float)
@@ -77,7 +77,7 @@ def test_grey_is_exactly_grey_and_near_grey_nearly() -> None:
     assert max(chroma(made("near_grey", seed)).max() for seed in SEEDS) > 0.03
 
 
-def test_most_coloured_paints_are_coloured() -> None:
+def test_most_coloured_albedos_are_coloured() -> None:
     for name in ("uniform", "patches", "noise"):
         assert np.median([np.median(chroma(made(name, seed))) for seed in SEEDS]) > 0.2
 
@@ -106,7 +106,7 @@ def test_stretch_is_along_u() -> None:
     )  # in texels, which are ASPECT times as wide as high
 
 
-def test_a_plate_prints_where_it_is_told_also_across_the_seam() -> None:
+def test_a_plate_prints_at_the_given_place_also_across_the_seam() -> None:
     plate = Plate(128)
     plate.box(ASPECT - 0.2, 0.25, 0.4, 0.5)
     cover = plate.cover()

@@ -13,7 +13,7 @@ from isc_core.shading.brdf import blinn_phong, ggx, lambert, oren_nayar
 from isc_core.shading.brdf.energy import directional_albedo
 from isc_core.shading.brdf.model import Model
 from isc_core.shading.environment_map import directions, shading_under, solid_angles
-from isc_core.shading.radiance import Lights, radiance
+from isc_core.shading.radiance import DistantLights, radiance
 from synth.rendering import Lit, RenderOptions, array_lobes, light_surface
 from synth.rendering.light_sampling import EnvironmentSampler, PanelSampler, sampler_of
 from synth.rendering.reflection import Points, Reflection
@@ -29,7 +29,17 @@ from synth.scene.lights import (
 from synth.scene.materials import Material
 from synth.scene.variant import load_mitsuba
 from synth.validation.checks.pixel_test import PixelTestOptions, pixel_test
-from tests.synth.small_scenes import GREY, Seen, ball, lights, materials, seen, skittle, sky, toward
+from tests.synth.small_scenes import (
+    GREY,
+    Seen,
+    ball,
+    environment,
+    lights,
+    materials,
+    seen,
+    skittle,
+    toward,
+)
 
 MODELS: dict[str, tuple[Model, Model | None]] = {
     "lambert": (lambert.Lambert(), None),
@@ -77,10 +87,10 @@ def points_seen_from(view: np.ndarray, strength: float, gloss: float, count: int
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_a_far_light_gives_what_the_reflectance_model_says(sphere: Seen, model: str) -> None:
+def test_a_distant_light_matches_the_reflectance_model(sphere: Seen, model: str) -> None:
     light = DirectionalLight(toward(-0.3, 0.4, 0.8), np.array([3.0, 2.0, 1.0]))
     result = lit(sphere, materials()[model], light)
-    arriving = Lights(light.direction[None], light.irradiance[None])
+    arriving = DistantLights(light.direction[None], light.irradiance[None])
     surface = sphere.surface
     body, gloss = MODELS[model]
     # Where the light grazes, the mesh's facets shade each other.
@@ -114,8 +124,8 @@ def test_the_white_furnace_has_no_noise(sphere: Seen) -> None:
     assert np.sqrt(result.shading_variance.max()) < 2e-3
 
 
-def test_a_matt_ball_under_a_sky_shows_the_closed_form(sphere: Seen) -> None:
-    light = sky()
+def test_a_diffuse_ball_under_an_environment_matches_the_closed_form(sphere: Seen) -> None:
+    light = environment()
     result = lit(sphere, materials()["lambert"], light)
     fine = np.repeat(np.repeat(light.radiance, 8, 0), 8, 1)
     np.testing.assert_allclose(
@@ -124,11 +134,11 @@ def test_a_matt_ball_under_a_sky_shows_the_closed_form(sphere: Seen) -> None:
 
 
 @pytest.mark.parametrize("name", ["oren_nayar", "blinn_phong", "ggx"])
-def test_lobes_under_a_sky_are_those_of_quadrature(sphere: Seen, name: str) -> None:
-    light, rows = sky(), 128
+def test_lobes_under_an_environment_match_quadrature(sphere: Seen, name: str) -> None:
+    light, rows = environment(), 128
     result = lit(sphere, materials()[name], light, samples=256)
     fine = np.repeat(np.repeat(light.radiance, rows // 16, 0), rows // 16, 1)
-    arriving = Lights(
+    arriving = DistantLights(
         directions(rows).reshape(-1, 3), (fine * solid_angles(rows)[..., None]).reshape(-1, 3)
     )
     chosen = np.random.default_rng(0).choice(len(sphere.surface.position), 36, replace=False)
@@ -184,9 +194,7 @@ def test_the_gloss_of_a_panel_is_that_of_quadrature(sphere: Seen) -> None:
 def test_directions_drawn_by_the_gloss_integrate_it(
     model: str, gloss: float, cosine: float
 ) -> None:
-    """The mean of f cos / density over drawn directions is the share of light that the lobe
-    reflects.
-    """
+    """The mean of f cos / density over sampled directions is the albedo of the lobe."""
     material = Material(GREY, model, gloss, 1.0)
     reflection = Reflection(material)
     view = np.array([np.sqrt(1 - cosine**2), 0, cosine])
@@ -205,8 +213,8 @@ def test_directions_drawn_by_the_gloss_integrate_it(
     assert spread < 0.01 * estimate
 
 
-def test_directions_toward_a_sky_bring_all_its_light() -> None:
-    light = sky()
+def test_directions_toward_an_environment_integrate_its_light() -> None:
+    light = environment()
     sampler = EnvironmentSampler(light)
     drawn = sampler.draw(np.random.default_rng(0), np.zeros((1, 3)), 20000)[0]
     found = sampler.seen(np.zeros((len(drawn), 3)), drawn)
@@ -217,8 +225,8 @@ def test_directions_toward_a_sky_bring_all_its_light() -> None:
     )
 
 
-def test_a_sky_is_looked_up_where_its_pixels_look() -> None:
-    light = sky(rows=8)
+def test_an_environment_is_looked_up_in_the_direction_of_its_pixels() -> None:
+    light = environment(rows=8)
     found = EnvironmentSampler(light).seen(np.zeros((128, 3)), directions(8).reshape(-1, 3))
     np.testing.assert_array_equal(found.radiance, light.radiance.reshape(-1, 3))
 
@@ -290,7 +298,7 @@ def test_fresnel_at_known_angles() -> None:
 
 
 def test_full_shadow_is_black_and_nothing_is_negative(waisted: Seen) -> None:
-    for light in (lights()["panel"], lights()["directional"], sky()):
+    for light in (lights()["panel"], lights()["directional"], environment()):
         result = lit(waisted, materials()["blinn_phong"], light)
         assert result.specular.min() >= 0
         assert result.shading.min() > -0.01 * result.shading.max()
@@ -314,7 +322,7 @@ def test_the_object_stands_in_its_own_light(waisted: Seen) -> None:
 
 @pytest.mark.parametrize("samples", [2, 3, 5])
 def test_few_samples_have_a_variance_too(waisted: Seen, samples: int) -> None:
-    result = lit(waisted, materials()["ggx"], sky(), samples=samples)
+    result = lit(waisted, materials()["ggx"], environment(), samples=samples)
     # The body has none where no sample met a shadow.
     for variance, share in ((result.shading_variance, 0.1), (result.specular_variance, 0.8)):
         assert np.isfinite(variance).all()
@@ -359,8 +367,8 @@ def test_two_lights_add_up(waisted: Seen) -> None:
     np.testing.assert_allclose(together.specular, apart[0].specular + apart[1].specular)
 
 
-def test_a_white_body_in_a_white_sky_loses_nothing_once_light_bounces(waisted: Seen) -> None:
-    """The furnace of a concave body: what shadow takes away comes back from the part that casts it."""
+def test_a_white_object_in_a_white_environment_loses_no_light_with_bounces(waisted: Seen) -> None:
+    """The furnace test of a concave object: shadowed light returns by interreflection."""
     white, light = Material(np.ones((2, 2, 3)), "lambert"), EnvironmentLight(np.ones((8, 16, 3)))
     dark, once, often = (
         lit(waisted, white, light, samples=64, bounces=bounces).shading for bounces in (0, 1, 8)

@@ -75,7 +75,7 @@ def rendered(bsdf: dict[str, object], light: dict[str, object], samples: int = 1
 
 
 def sphere_normals() -> tuple[np.ndarray, np.ndarray]:
-    """Which pixels see the sphere, its very edge apart, and the normals there."""
+    """Which pixels see the sphere except for its edge, and the normals there."""
     across = ((np.arange(SIZE) + 0.5) * 2 / SIZE - 1) * HALF
     x, y = np.meshgrid(across, -across)
     inside = x**2 + y**2 < 0.97
@@ -138,7 +138,7 @@ def test_the_plugin_evaluates_either_lobe_alone_and_they_add_up() -> None:
 
 
 @pytest.mark.parametrize("name", ["blinn_phong 8", "ggx .6"])
-def test_under_a_white_sky_mitsuba_sees_the_energy_of_the_lobe(name: str) -> None:
+def test_under_a_white_environment_mitsuba_sees_the_energy_of_the_lobe(name: str) -> None:
     if not has_llvm():
         pytest.skip("thousands of paths through Python need an LLVM variant")
     parameters, model = LOBES[name]

@@ -1,5 +1,5 @@
-"""Data sets on disk: what the files hold, that a run goes on where it stopped, and that nothing of
-anybody else's is touched.
+"""Data sets on disk: the content of the files, continuing an interrupted run, and refusing other
+people's folders.
 """
 
 import json
@@ -47,7 +47,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def root(made: Path, tmp_path: Path) -> Path:
-    """A copy that may be spoilt."""
+    """A copy that a test may damage."""
     return Path(shutil.copytree(made, tmp_path / "set"))
 
 
@@ -168,7 +168,7 @@ def test_separations_can_be_judged_on_it(made: Path) -> None:
     assert np.array_equal(rendered.mask, truth.mask)
 
 
-def test_the_description_says_how_and_in_which_frame(made: Path) -> None:
+def test_the_description_records_settings_and_frame(made: Path) -> None:
     for scene in plan(RUN):
         content = json.loads((made / scene.split / scene.recipe.name / "scene.json").read_text())
         assert content["material"]["convention"] == CONVENTIONS[scene.recipe.model]
@@ -190,8 +190,8 @@ def test_the_description_says_how_and_in_which_frame(made: Path) -> None:
 def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it(
     tmp_path: Path, perspective: bool
 ) -> None:
-    """Heights, taken back into space and through the OpenCV matrix, land on the centres of their
-    pixels.
+    """Heights, converted to space and projected by the OpenCV matrix, hit the centres of
+    their pixels.
     """
     make_dataset(
         DatasetSettings(1, 5, CHOICES, replace(PICTURE, perspective=perspective)), tmp_path / "set"
@@ -213,7 +213,7 @@ def test_the_camera_of_the_description_puts_the_surface_where_the_picture_has_it
 def test_the_same_seed_gives_the_same_bytes(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Also where the renderer's kernels were let go in between."""
+    """Also if the renderer's kernels were released in between."""
     monkeypatch.setattr(run_module, "_KERNELS_KEPT", 1)
     make_dataset(replace(RUN, count=2), tmp_path / "again")
     ours, theirs = contents(tmp_path / "again"), contents(made)

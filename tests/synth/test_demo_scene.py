@@ -1,6 +1,4 @@
-"""The demo's render: a photo worth decomposing, the light where it should be, and what the files
-hold.
-"""
+"""The demo's render: its photo, the direction of its light, and the content of its files."""
 
 from pathlib import Path
 
@@ -28,8 +26,8 @@ def test_the_photo_shows_highlights_and_is_exposed(truth: GroundTruth) -> None:
 
 
 def test_light_from_above_left_falls_there(truth: GroundTruth) -> None:
-    """The frame of the lights is the frame of the image: the window of the sky and the key light
-    are on their sides.
+    """Lights and image share one frame: the window of the environment and the key light are on
+    their sides.
     """
     shading = truth.shading.mean(-1)
     up_left = (truth.normal[..., 0] < -0.4) & (truth.normal[..., 1] > 0.2) & truth.mask
@@ -37,7 +35,7 @@ def test_light_from_above_left_falls_there(truth: GroundTruth) -> None:
     assert shading[up_left].mean() > 1.3 * shading[down_right].mean()
 
 
-def test_the_sky_is_positive_and_brighter_than_the_ground() -> None:
+def test_the_environment_is_positive_and_brighter_above() -> None:
     sky = soft_environment(32)
     assert sky.shape == (32, 64, 3)
     assert sky.min() > 0

@@ -1,4 +1,4 @@
-"""Random materials: within what they promise, glossy as their class says."""
+"""Random materials: within their ranges, and in the right gloss class."""
 
 import numpy as np
 import pytest
@@ -64,7 +64,7 @@ def test_gloss_is_log_uniform_over_its_range(model: str) -> None:
     assert np.square(counts - 100).sum() / 100 < 24.3  # chi-square of 7 degrees, one in a thousand
 
 
-def test_strengths_and_iors_are_those_of_paints_and_glazes() -> None:
+def test_strengths_and_iors_are_those_of_dielectrics() -> None:
     strengths = np.array([material.strength for material in drawn("blinn_phong", 400, False)])
     assert STRENGTHS[0] <= strengths.min() < 0.025
     assert 0.12 < strengths.max() <= STRENGTHS[1]
@@ -94,7 +94,7 @@ def test_varying_gloss_is_broader_where_it_is_weaker(model: str) -> None:
     assert np.median(spans) < 0.8
 
 
-def test_gloss_varies_one_time_in_four_unless_told() -> None:
+def test_gloss_varies_one_time_in_four_by_default() -> None:
     varied = np.mean([np.ndim(material.gloss) == 2 for material in drawn("ggx", 600)])
     assert abs(varied - 0.25) < 4 * np.sqrt(0.25 * 0.75 / 600)
     assert not any(
@@ -122,7 +122,7 @@ def test_classes_by_alpha() -> None:
         assert found == ["broad", "broad", "broad", "medium", "medium", "sharp", "sharp"]
 
 
-def test_what_does_not_shine_is_matt() -> None:
+def test_materials_without_specular_lobe_are_diffuse() -> None:
     assert {
         gloss_class(material) for model in ("lambert", "oren_nayar") for material in drawn(model, 5)
     } == {"diffuse"}

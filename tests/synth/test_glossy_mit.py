@@ -1,5 +1,5 @@
-"""The glossy MIT-Berkeley set: the set's own diffuse layer, a gloss that physics tells, files that
-the set's own readers read.
+"""The glossy MIT-Berkeley set: the set's own diffuse layer, a physically correct specular layer,
+files that the set's own readers read.
 """
 
 import argparse
@@ -104,7 +104,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 @pytest.mark.parametrize("exponent", [10.0, 100.0, 1000.0])
 def test_the_gloss_of_an_environment_is_the_integral_of_the_lobe(exponent: float) -> None:
-    """Against `isc_core.shading.brdf`, which sums over a finer environment without leaving anything out."""
+    """Against `isc_core.shading.brdf`, summed over a finer environment without omissions."""
     sky = np.random.default_rng(1).gamma(1.0, size=(8, 16, 3))
     normal, rows = facing(6), 160
     toward, solid = directions(rows).reshape(-1, 3), solid_angles(rows).reshape(-1, 1)
@@ -118,7 +118,7 @@ def test_the_gloss_of_an_environment_is_the_integral_of_the_lobe(exponent: float
 
 
 def test_a_uniform_environment_seen_head_on_gives_the_lobes_energy() -> None:
-    """Closed form, see `isc_core.shading.brdf.blinn_phong`: (p + 8) (p + 2^(-p/2)) / ((p + 2) (p + 4))."""
+    """Closed form of `shading.brdf.blinn_phong`: (p + 8) (p + 2^(-p/2)) / ((p + 2) (p + 4))."""
     for exponent in (9.0, 100.0):
         wanted = (
             (exponent + 8) * (exponent + 2 ** (-exponent / 2)) / ((exponent + 2) * (exponent + 4))
@@ -138,8 +138,8 @@ def test_a_panel_far_away_is_a_piece_of_an_environment() -> None:
 
 
 def test_the_gloss_is_what_mitsuba_renders(bump: Source) -> None:
-    """A z-test at every pixel and channel, corrected for their number; shadows kept out by a tracer
-    that nothing is before.
+    """A z-test at every pixel and channel, corrected for their number; an empty tracer removes
+    shadows.
     """
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     from synth.rendering import RenderOptions, light_surface
@@ -307,7 +307,7 @@ def test_separations_are_measured_on_it(made: Path) -> None:
     assert not truth.clipped.any()
 
 
-def test_the_card_says_what_it_is_and_the_record_what_was_measured(made: Path) -> None:
+def test_the_card_describes_the_set_and_the_record_its_measurements(made: Path) -> None:
     for name in root_names(GlossySettings()):
         text = (made / name / "README.md").read_text(encoding="utf-8")
         assert "do not redistribute" in text and "isc synth glossy-mit ROOT" in text
@@ -477,7 +477,7 @@ def parsed(*words: str) -> argparse.Namespace:
     return parser.parse_args(["glossy-mit", *words])
 
 
-def test_the_command_makes_the_sets_and_says_how_to_measure_on_them(
+def test_the_command_makes_the_sets_and_prints_how_to_evaluate_on_them(
     small: Path, tmp_path: Path
 ) -> None:
     options = parsed(

@@ -1,4 +1,4 @@
-"""Height maps: what the camera sees is the map, pixel by pixel; what cannot be one is refused."""
+"""Height maps: the camera sees the map pixel by pixel; invalid maps are refused."""
 
 from pathlib import Path
 

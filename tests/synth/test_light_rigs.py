@@ -1,5 +1,5 @@
-"""Random lights: the same for the same seed, on the viewer's side, near white, never negative;
-files are read as they are.
+"""Random lights: reproducible, on the viewer's side, near white, never negative; files are read
+unchanged.
 """
 
 from dataclasses import fields
@@ -31,7 +31,7 @@ ROWS = 32
 
 
 def facing() -> np.ndarray:
-    """The normals of a ball, spread as a camera sees them, (N, 3)."""
+    """The normals of a ball as a camera sees them, (N, 3)."""
     x, y = np.meshgrid(np.linspace(-0.97, 0.97, 24), np.linspace(-0.97, 0.97, 24))
     x, y = x[x * x + y * y < 0.95], y[x * x + y * y < 0.95]
     return np.stack([x, y, np.sqrt(1 - x * x - y * y)], -1)
@@ -96,7 +96,7 @@ def test_invented_lights_are_nearly_white_yet_not_all_alike(name: str) -> None:
     ("name", "kind"),
     [("point", PointLight), ("directional", DirectionalLight), ("area", PanelLight)],
 )
-def test_lamps_come_alone_or_in_pairs_and_mostly_with_weak_light_from_around(
+def test_small_lights_come_alone_or_in_pairs_and_mostly_with_ambient_light(
     name: str, kind: type
 ) -> None:
     lamps = [sum(isinstance(light, kind) for light in lights) for lights in draws(name)]
@@ -129,7 +129,7 @@ def test_light_comes_from_the_viewers_side(name: str) -> None:
         ).sum() >= -1e-6
 
 
-def test_natural_lights_give_the_shading_that_the_file_tells(shared: Path) -> None:
+def test_natural_lights_give_the_shading_of_the_file(shared: Path) -> None:
     folder = shared / "data" / "mit_berkeley_train"
     lights = load_natural_lights(folder)
     for seed in range(4):
@@ -191,6 +191,6 @@ def test_lights_of_files_need_the_files(name: str) -> None:
         make_lights(name, np.random.default_rng(0))
 
 
-def test_an_unknown_light_is_told_the_known_ones() -> None:
+def test_an_unknown_light_lists_the_known_ones() -> None:
     with pytest.raises(InputError, match=", ".join(RIGS)):
         make_lights("candle", np.random.default_rng(0))

@@ -1,6 +1,4 @@
-"""Lights: what they cast is what radiometry says, and nothing is lost when they become an
-environment.
-"""
+"""Lights: their irradiance follows radiometry, and is kept when they become an environment."""
 
 from collections.abc import Callable
 
@@ -41,7 +39,7 @@ def irradiance(environment: np.ndarray, normal: np.ndarray) -> np.ndarray:
 def test_small_lights_keep_their_irradiance_in_an_environment(
     light: Light, across: np.ndarray, rows: int
 ) -> None:
-    """A plane across the beam gets it all, and one turned away by 60 degrees half of it, to the
+    """A plane perpendicular to the beam gets all of it, and one at 60 degrees half of it, to the
     size of a pixel.
     """
     picture = lights_as_environment((light,), rows)

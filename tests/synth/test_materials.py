@@ -1,4 +1,4 @@
-"""Materials and their textures: values at texel centres, the seam, the ends, and what is refused."""
+"""Materials and their textures: values at texel centres, the seam, the ends, and bad input."""
 
 from typing import Any
 
@@ -47,7 +47,7 @@ def test_u_wraps_around_and_v_stops() -> None:
     )
 
 
-def test_a_paint_holds_what_the_material_has_there() -> None:
+def test_reflectance_at_a_point_is_that_of_the_material() -> None:
     rng = np.random.default_rng(3)
     albedo, gloss, strength = (
         rng.uniform(size=(6, 4, 3)),

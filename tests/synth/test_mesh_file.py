@@ -1,5 +1,5 @@
-"""Meshes from files: their size, normals and colours come through; whatever cannot be rendered is
-refused in one line.
+"""Meshes from files: size, normals and colours are kept; meshes that cannot be rendered are refused
+in one line.
 """
 
 import base64
@@ -101,7 +101,7 @@ def test_a_texture_comes_through_linear_and_the_right_way_up(tmp_path: Path) -> 
     )
 
 
-def test_colours_of_vertices_are_painted_as_they_are_seen_from_the_front(tmp_path: Path) -> None:
+def test_colours_of_vertices_are_projected_from_the_front(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(4)
     shade = np.clip((ball.vertices + 1) * 127.5, 0, 255).astype(np.uint8)
     ball.visual.vertex_colors = np.c_[shade, np.full(len(shade), 255)]
@@ -117,7 +117,7 @@ def test_colours_of_vertices_are_painted_as_they_are_seen_from_the_front(tmp_pat
     )
 
 
-def test_pieces_of_different_colours_become_one_painted_mesh(tmp_path: Path) -> None:
+def test_pieces_of_different_colours_become_one_textured_mesh(tmp_path: Path) -> None:
     scene = trimesh.Scene()
     for x, colour in ((-1.5, (1.0, 0.0, 0.0, 1.0)), (1.5, (0.0, 0.25, 0.0, 1.0))):
         ball = trimesh.creation.icosphere(3)

@@ -1,4 +1,4 @@
-"""Swept surfaces and the demo's gourd: closed, oriented outward, painted within range."""
+"""Swept surfaces and the demo's gourd: closed, oriented outward, albedo in range."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Light on a surface by Mitsuba's kernels against closed forms, quadrature of the core's models,
+"""Lighting of a surface by Mitsuba's kernels against closed forms, quadrature of the core's models,
 and Mitsuba's own path tracer.
 """
 
@@ -121,7 +121,7 @@ def test_a_light_from_afar_gives_the_models_radiance_without_noise(name: str) ->
     assert not found.shading_variance.any() and not found.specular_variance.any()
 
 
-def test_a_lamp_fades_with_the_square_of_its_distance() -> None:
+def test_a_point_light_falls_off_with_the_square_of_its_distance() -> None:
     surface, found = lit(ball(), MATERIALS["blinn_phong 20"][0], LAMP)
     toward = LAMP.position - surface.position
     square = (toward**2).sum(axis=1, keepdims=True)
@@ -135,7 +135,7 @@ def test_a_lamp_fades_with_the_square_of_its_distance() -> None:
     np.testing.assert_allclose(found.shading[away], expected[away], atol=1e-4 * expected.max())
 
 
-def test_under_smooth_light_a_matt_ball_is_the_closed_form_without_noise() -> None:
+def test_under_smooth_light_a_diffuse_ball_is_the_closed_form_without_noise() -> None:
     # Degree by degree the clamped cosine keeps pi, 2 pi / 3, pi / 4 of the light; the matt body
     # divides by pi.
     light = np.random.default_rng(3).normal(size=(9, 3)) * 0.1
@@ -181,7 +181,7 @@ def test_a_panel_is_the_quadrature_of_the_models(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["blinn_phong 20", "blinn_phong 2000", "ggx .05", "ggx .5"])
-def test_a_white_sky_shows_the_energy_of_the_gloss(name: str) -> None:
+def test_a_white_environment_shows_the_energy_of_the_lobe(name: str) -> None:
     material, _, gloss = MATERIALS[name]
     surface, found = lit(
         ball(), material, EnvironmentLight(np.ones((16, 32, 3))), size=12, samples=512
@@ -200,7 +200,7 @@ def test_a_white_sky_shows_the_energy_of_the_gloss(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["oren_nayar", "blinn_phong 20", "ggx .5"])
-def test_a_sky_is_the_quadrature_of_the_models(name: str) -> None:
+def test_an_environment_matches_quadrature_of_the_models(name: str) -> None:
     material, body, gloss = MATERIALS[name]
     light = sky()
     surface, found = lit(ball(), material, light, size=12, samples=2048)

@@ -1,5 +1,5 @@
-"""The test of images: right ones pass as often as it says, wrong ones do not, and what shows why is
-kept.
+"""The test of images: correct ones pass at the stated rate, wrong ones fail, and their maps are
+written.
 """
 
 from pathlib import Path

@@ -1,5 +1,5 @@
-"""Recipes: a member of a family is the same wherever it appears, a scene whenever it is made; what
-is held out is never trained on.
+"""Recipes: a member of a family is the same wherever it appears, a scene whenever it is made, and
+held-out members never appear in train.
 """
 
 from dataclasses import replace
@@ -54,7 +54,7 @@ def pools() -> Pools:
 
 @pytest.fixture(scope="module")
 def names(pools: Pools) -> dict[str, dict[str, set[str]]]:
-    """The members that 3000 scenes show, by split and aspect."""
+    """The members that appear in 3000 scenes, by split and aspect."""
     found: dict[str, dict[str, set[str]]] = {
         split: {aspect: set() for aspect in ASPECTS} for split in SPLITS
     }
@@ -224,7 +224,7 @@ def test_a_scene_depends_on_its_seed_alone(pools: Pools) -> None:
 
 
 def test_fewer_albedos_leave_the_names_of_materials() -> None:
-    """blinn_phong08 is the same paint whether all families were allowed or one."""
+    """blinn_phong08 is the same material whether all families were allowed or one."""
     few = make_pools(Choices(albedos=("print",)), Sources())
     all_of_them = {m.part.name: m.albedo for m in make_pools(Choices(), Sources()).material}
     assert all(all_of_them[m.part.name] == "print" for m in few.material)
@@ -290,7 +290,7 @@ def test_impossible_pictures_are_refused(wrong: dict[str, float]) -> None:
         PictureSettings(**wrong)
 
 
-def test_natural_lights_are_told_apart_by_their_number(shared: Path) -> None:
+def test_natural_lights_differ_by_their_number(shared: Path) -> None:
     sources = Sources(natural_lights=shared / "data" / "mit_berkeley_train")
     lights = make_pools(Choices(lights=("natural",)), sources).light
     assert len(lights) > 100

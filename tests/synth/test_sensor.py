@@ -1,4 +1,6 @@
-"""The sensor: identities, the stated noise, clipping and codes, and a photo that reads back."""
+"""The sensor: identities, the stated noise, clipping and quantisation, and a photo that can be read
+back.
+"""
 
 from pathlib import Path
 
@@ -13,7 +15,7 @@ from synth.capture.truth import GroundTruth
 
 
 def truth_of(diffuse: np.ndarray, specular: np.ndarray, mask: np.ndarray) -> GroundTruth:
-    """A truth whose layers are given, (H, W, 3) each, and whose other maps do not matter here."""
+    """A ground truth with the given layers, (H, W, 3) each; its other maps are irrelevant here."""
     diffuse, specular = (
         np.where(mask[..., None], layer, 0).astype(np.float32) for layer in (diffuse, specular)
     )

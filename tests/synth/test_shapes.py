@@ -1,5 +1,5 @@
-"""Random objects: closed, smooth, of the promised size and pose; the same from the same seed;
-textured without a seam before the viewer.
+"""Random objects: closed, smooth, of the promised size and pose, reproducible, and textured without
+a seam on the visible side.
 """
 
 from functools import cache
@@ -48,7 +48,9 @@ def facing(mesh: Mesh) -> tuple[np.ndarray, np.ndarray]:
 
 
 def assert_closed(mesh: Mesh) -> None:
-    """Watertight, wound outward, by trimesh; vertices that textures or creases split count as one."""
+    """Watertight and oriented outward, by trimesh; vertices split by textures or creases
+    count as one.
+    """
     solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     solid.merge_vertices(merge_tex=True, merge_norm=True, digits_vertex=9)
     whole = solid.faces
@@ -121,7 +123,7 @@ def test_textures_have_no_seam_on_the_side_that_is_seen(name: str) -> None:
 def test_unknown_shapes_are_refused_with_the_known_ones() -> None:
     with pytest.raises(
         InputError,
-        match="unknown shape 'teapot': choose superquadric, blobby, displaced, lathe, extruded, height_field",
+        match="unknown shape 'teapot': choose superquadric, blobby, displaced, lathe, extruded",
     ):
         make_shape("teapot", np.random.default_rng(0))
 

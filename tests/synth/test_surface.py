@@ -1,4 +1,6 @@
-"""What the camera sees of a ball: place, normal, outline and paint against the closed form."""
+"""The visible surface of a ball: position, normal, silhouette and reflectance against the
+closed form.
+"""
 
 import numpy as np
 import pytest
@@ -93,8 +95,8 @@ def checkerboard(cells: int) -> Material:
     return Material(np.repeat(board[..., None], 3, 2), "blinn_phong", 50.0, board)
 
 
-def test_paint_finer_than_pixels_is_averaged() -> None:
-    """Cells of a third of a pixel: what a camera sees is nearly their mean."""
+def test_reflectance_finer_than_pixels_is_averaged() -> None:
+    """Cells of a third of a pixel: a camera sees nearly their mean."""
     material = checkerboard(128)
     fine = seen(ball(181), material, size=SIZE)
     middle = fine.surface.normal[:, 2] > 0.6
@@ -106,7 +108,7 @@ def test_paint_finer_than_pixels_is_averaged() -> None:
         assert values.std() < 0.5 * material.at(fine.surface.uv[middle]).strength.std()
 
 
-def test_paint_coarser_than_pixels_stays_sharp_but_at_edges() -> None:
+def test_reflectance_coarser_than_pixels_stays_sharp_except_at_edges() -> None:
     material = checkerboard(8)
     surface = seen(ball(181), material, size=2 * SIZE).surface
     centre = material.at(surface.uv)
@@ -117,9 +119,9 @@ def test_paint_coarser_than_pixels_stays_sharp_but_at_edges() -> None:
     np.testing.assert_array_equal(surface.reflectance.gloss, 50.0)
 
 
-def test_paint_is_not_taken_from_what_lies_behind() -> None:
-    """A small white ball before a large black one: at its outline the footprint covers both, the
-    paint is that of the nearer one.
+def test_reflectance_is_not_taken_from_the_background() -> None:
+    """A small white ball before a large black one: at its silhouette the footprint covers both; the
+    reflectance is that of the nearer one.
     """
     small, large = ball(61, 0.4), ball(61, 1.0)
     vertices = np.concatenate([small.vertices + (0, 0, 1.5), large.vertices])

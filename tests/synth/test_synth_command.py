@@ -1,6 +1,4 @@
-"""The command `isc synth` as a user calls it, and how `isc` finds commands of packages that build
-on it.
-"""
+"""The command `isc synth` as a user calls it, and the discovery of commands of other packages."""
 
 import json
 import subprocess
@@ -39,7 +37,7 @@ def synth(out: Path | None, *arguments: str, count: int = 1) -> int:
 
 
 def refusal(capsys: pytest.CaptureFixture[str]) -> str:
-    """The one line on stderr, without its head."""
+    """The line on stderr without its prefix."""
     lines = [line for line in capsys.readouterr().err.splitlines() if "libLLVM" not in line]
     assert len(lines) == 1 and lines[0].startswith("isc: error: "), lines
     return lines[0].removeprefix("isc: error: ")
@@ -56,7 +54,7 @@ def isolated(code: str, *arguments: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_help_needs_no_mitsuba_and_running_says_what_to_install(tmp_path: Path) -> None:
+def test_help_needs_no_mitsuba_and_running_prints_what_to_install(tmp_path: Path) -> None:
     start = "from isc_core.cli.main import main; sys.exit(main(sys.argv[1:]))"
     shown = isolated(start, "synth", "--help")
     assert shown.returncode == 0, shown.stderr
@@ -73,7 +71,10 @@ def test_help_needs_no_mitsuba_and_running_says_what_to_install(tmp_path: Path) 
 
 
 def test_the_parser_loads_no_renderer() -> None:
-    code = "import sys; from isc_core.cli.commands import build_parser; build_parser(); sys.exit(bool({'mitsuba', 'drjit'} & set(sys.modules)))"
+    code = (
+        "import sys; from isc_core.cli.commands import build_parser; build_parser(); "
+        "sys.exit(bool({'mitsuba', 'drjit'} & set(sys.modules)))"
+    )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -241,7 +242,7 @@ def test_files_of_the_user_come_in(tmp_path: Path, capsys: pytest.CaptureFixture
     assert str(tmp_path) not in text and "derived from them" in text
 
 
-def test_a_painted_mesh_keeps_its_paint(tmp_path: Path) -> None:
+def test_a_textured_mesh_keeps_its_albedo(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     (tmp_path / "solid.obj").write_text("mtllib solid.mtl\nusemtl red\n" + TETRAHEDRON)
     (tmp_path / "solid.mtl").write_text("newmtl red\nKd 0.5 0.1 0.1\n")

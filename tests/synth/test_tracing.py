@@ -1,4 +1,4 @@
-"""Rays against a ball: what they hit, what stands in their way, in both kinds of variant."""
+"""Rays against a ball: hits and occlusion, in both kinds of variant."""
 
 from collections.abc import Iterator
 
@@ -25,7 +25,7 @@ def sphere(request: pytest.FixtureRequest) -> Iterator[Tracer]:
 
 
 def rays_around(count: int = 500) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Rays toward the origin's neighbourhood, and how far from it they pass."""
+    """Rays past the origin, and how far from it they pass."""
     rng = np.random.default_rng(0)
     origins = rng.normal(size=(count, 3))
     origins *= 3 / np.linalg.norm(origins, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""The truth of a scene: its identities, its units, and the light that is fitted to its shading."""
+"""The ground truth of a scene: its identities, its units, and the light fitted to its shading."""
 
 import numpy as np
 import pytest

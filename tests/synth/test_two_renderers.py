@@ -1,5 +1,5 @@
-"""The two renderers share no code for light and material, and the variants of Mitsuba none for
-rays: each is the other's test.
+"""The two renderers share no code for light and material, and Mitsuba's variants none for rays:
+each tests the other.
 """
 
 import dataclasses
@@ -40,7 +40,7 @@ def waisted() -> Seen:
 
 @contextmanager
 def variant(name: str) -> Iterator[None]:
-    """Mitsuba in another variant for a while."""
+    """Mitsuba temporarily in another variant."""
     mi = load_mitsuba()
     usual = mi.variant()
     mi.set_variant(name)
@@ -105,7 +105,7 @@ def test_arrays_and_kernels_agree_on_light_that_bounces(waisted: Seen, light: st
 
 @needs_llvm
 def test_the_comparison_finds_two_per_cent(waisted: Seen) -> None:
-    """What the test above is able to see."""
+    """The sensitivity of the test above."""
     one, other = (
         render(waisted, "ggx", "environment", "arrays", 1),
         render(waisted, "ggx", "environment", "mitsuba", 2),

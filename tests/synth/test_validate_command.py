@@ -1,6 +1,4 @@
-"""`isc validate` on small rendered scenes: what it writes, what it accepts and rejects, and how it
-refuses bad input.
-"""
+"""`isc validate` on small rendered scenes: its output, acceptance and rejection, and bad input."""
 
 import json
 import shutil
@@ -81,7 +79,7 @@ def validate(dataset: Path, out: Path, *more: str) -> int:
 
 
 class Page(HTMLParser):
-    """Every tag that opens is closed; what the page refers to and says."""
+    """A page whose tags are all closed; its links and its text."""
 
     def __init__(self, text: str) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Scores, budgets and intervals of a validation, on scenes whose answers are known in closed form."""
+"""Scores, budgets and intervals of a validation, on scenes with known results."""
 
 from dataclasses import replace
 from itertools import permutations
@@ -120,7 +120,7 @@ def facts(name: str, **changes: object) -> SceneFacts:
 
 
 def chain(error: dict[frozenset[str], float]) -> ChainScores:
-    """A scene whose every error, when truths S are given, is `error[S]`."""
+    """A scene whose every error, under the ground truths S, is `error[S]`."""
     scores = tuple(Scores(*([error[frozenset(truths)]] * 6)) for truths in COMBINATIONS)
     return ChainScores(scores, scores[0], scores[-1], 0.1)
 
@@ -169,7 +169,7 @@ def test_confidence_that_knows_the_error_ranks_and_removes_it() -> None:
     assert good.rank < -0.9 and bad.rank > 0.9 and good.removed > 0.9 > 0.1 > bad.removed
 
 
-def test_of_a_matt_scene_only_what_was_taken_counts() -> None:
+def test_on_a_diffuse_scene_only_removed_light_counts() -> None:
     truth = sphere(share=0.0)
     left = Separation(
         truth.diffuse, truth.specular, truth.residual, np.ones((SIZE, SIZE), np.float32)
@@ -416,8 +416,10 @@ def test_a_run_keeps_its_own_bounds_and_they_survive_the_file(tmp_path: Path) ->
         '{"schema_version": 99, "bounds": []}',
         '{"schema_version": 1, "bounds": 3}',
         '{"schema_version": 1, "bounds": [{"stage": "separation"}]}',
-        '{"schema_version": 1, "bounds": [{"stage": "s", "metric": "m", "kind": "all", "value": "all", "limit": NaN}]}',
-        '{"schema_version": 1, "bounds": [{"stage": "s", "metric": "m", "kind": "all", "value": 3, "limit": 1}]}',
+        '{"schema_version": 1, "bounds": [{"stage": "s", "metric": "m", "kind": "all", '
+        '"value": "all", "limit": NaN}]}',
+        '{"schema_version": 1, "bounds": [{"stage": "s", "metric": "m", "kind": "all", '
+        '"value": 3, "limit": 1}]}',
     ],
 )
 def test_files_that_hold_no_bounds_are_refused(tmp_path: Path, text: str) -> None:

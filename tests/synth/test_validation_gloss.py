@@ -1,4 +1,4 @@
-"""The stage "gloss": right where the truth is known, silent where it cannot be."""
+"""The stage "gloss": correct where the truth is known, undetermined where it cannot be."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ def test_the_roughness_of_a_ball_in_the_sun_is_found(material: Material) -> None
     assert found.explained > 0.8
 
 
-def test_nothing_is_told_of_a_matt_ball_and_under_a_smooth_sky() -> None:
+def test_nothing_is_determined_on_a_diffuse_ball_or_under_a_smooth_environment() -> None:
     assert scores(rendered(Material(RED, "lambert"), SUN)) == LobeScores(invented=0.0)
     assert scores(rendered(Material(RED, "ggx", 0.2, 1.0), SKY)) == LobeScores(determined=0.0)
 

@@ -1,4 +1,4 @@
-"""The stage "models": the models' own answers, each found once; means and shares that follow from
+"""The stage "models": the models' own results, each solved once; means and shares that follow from
 the scenes; tables by material.
 """
 
@@ -62,9 +62,7 @@ EVERY = StageOptions(models=("mbp", "joint", "mdr"))
 
 @pytest.fixture(autouse=True)
 def small_solves(monkeypatch: pytest.MonkeyPatch) -> None:
-    """SIRFS solved at 24 pixels instead of 256, and not to the end: what is tested here does not
-    depend on it.
-    """
+    """SIRFS at 24 pixels instead of 256, and not converged: irrelevant to these tests."""
     monkeypatch.setattr(shape, "RecoverOptions", partial(RecoverOptions, solve_size=24, margin=6))
     monkeypatch.setattr(
         shape, "SolverOptions", partial(SolverOptions, lbfgs=LbfgsOptions(evaluations=25))

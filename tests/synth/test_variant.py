@@ -1,4 +1,4 @@
-"""Which of Mitsuba's variants is chosen, and what a user without Mitsuba reads."""
+"""The choice of Mitsuba's variant, and the message without Mitsuba."""
 
 import subprocess
 import sys
@@ -39,7 +39,7 @@ def test_without_mitsuba_the_message_names_the_extra(monkeypatch: pytest.MonkeyP
 def test_without_a_recent_llvm_scalar_kernels_run_and_one_line_names_the_package(
     found: int,
 ) -> None:
-    """In a process of its own: a variant, once set, stays."""
+    """In a separate process: a variant cannot be changed once set."""
     pytest.importorskip("mitsuba", reason="needs the extra `synth`")
     code = (
         "import numpy as np\n"
