@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.datasets.mit_berkeley import list_objects, load_object
-from isc_core.decompose.assumption_checks import CLEAR, SEVERAL, doubts_of
+from isc_core.decompose.assumption_checks import check_scene
 from isc_core.errors import InputError
 from isc_core.networks.light_network import (
     LampNetwork,
@@ -32,7 +32,8 @@ from isc_core.networks.scene_classifier import (
     read_appearance,
     shipped_appearance,
 )
-from isc_core.photo.photo import read_photo
+from isc_core.photo import read_photo
+from isc_core.scene.diagnostics import WarningKind
 from training.data.rendered_scenes import scenes_in
 
 
@@ -112,36 +113,37 @@ def _cases(given: argparse.Namespace) -> Iterator[Case]:
 
 
 def report(cases: list[Case], appearance: AppearanceNetwork, lamps: LampNetwork) -> None:
-    """Prints the table, and what is with_warnings of the photos.
+    """Prints the table, and the warnings of each photo.
 
     Raises `InputError` where there are none.
     """
     if not cases:
         raise InputError("there is nothing to judge: name folders of scenes, --photos or --data")
     found = [
-        doubts_of(
-            classify_scene(case.image, case.mask, appearance),
-            predict_light(case.image, case.mask, lamps),
-        )
+        [
+            warning.kind
+            for warning in check_scene(
+                classify_scene(case.image, case.mask, appearance),
+                predict_light(case.image, case.mask, lamps),
+            )
+        ]
         for case in cases
     ]
     lines = [
-        "| photos | number | with_warnings | mirror or glass | several lights |",
+        "| photos | number | with warnings | mirror or glass | several lights |",
         "|---|---:|---:|---:|---:|",
     ]
     for group in sorted({case.group for case in cases}):
-        rows = [doubts for doubts, case in zip(found, cases, strict=True) if case.group == group]
+        rows = [kinds for kinds, case in zip(found, cases, strict=True) if case.group == group]
         shares = [
-            np.mean([bool(doubts) if kind is None else kind in doubts for doubts in rows])
-            for kind in (None, CLEAR, SEVERAL)
+            np.mean([bool(kinds) if kind is None else kind in kinds for kinds in rows])
+            for kind in (None, WarningKind.MIRROR_OR_GLASS, WarningKind.SEVERAL_LIGHTS)
         ]
         lines.append(
             f"| {group} | {len(rows)} | " + " | ".join(f"{share:.1%}" for share in shares) + " |"
         )
-    named = [
-        (case, doubts) for case, doubts in zip(cases, found, strict=True) if case.name and doubts
-    ]
-    lines += ["", *(f"{case.group}: {case.name}: {'; '.join(doubts)}" for case, doubts in named)]
+    named = [(case, kinds) for case, kinds in zip(cases, found, strict=True) if case.name and kinds]
+    lines += ["", *(f"{case.group}: {case.name}: {'; '.join(kinds)}" for case, kinds in named)]
     sys.stdout.write("\n".join(lines) + "\n")
 
 

@@ -17,19 +17,19 @@ import numpy as np
 import scipy.io
 
 from blender_addon.files.result_arrays import read_result
-from isc_core.appearance import read_appearance
 from isc_core.batch.item import Recipe
 from isc_core.batch.manifest import Manifest
-from isc_core.brdf.fitting import Interval, LobeFit, LobeLight
-from isc_core.datasets import load_natural_lights, load_object
-from isc_core.evidence_files import read_light
-from isc_core.lamp_network import read_lamp_network
+from isc_core.datasets.mit_berkeley import load_natural_lights, load_object
+from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.networks.layer_network import read_network
+from isc_core.networks.light_network import read_lamp_network
+from isc_core.networks.scene_classifier import read_appearance
 from isc_core.photo import read_photo
-from isc_core.pipeline import Settings, decompose
-from isc_core.result_folder import load, save
-from isc_core.separation.filter_statistics import read_table
-from isc_core.separation.layer_network import read_network
-from isc_core.sirfs.prior_file import load_prior_set
+from isc_core.result_files.known_inputs import read_light
+from isc_core.result_files.result_folder import load, save
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOutcome, LobeLight
+from isc_core.separation.support.filter_statistics import read_table
+from isc_core.sirfs.priors.prior_file import load_prior_set
 from synth.dataset.reading import list_scenes, read_facts, read_truth
 from synth.shapes.height_field import read_height
 from synth.validation.measurement.bounds import read_bounds
@@ -254,8 +254,9 @@ def _result() -> dict[str, bytes]:
         found = decompose(read_photo(folder / "ball.png"), Settings(model="naive"), name="ball.png")
         interval, spread = Interval(0.2, 0.3), Interval(np.full(3, 0.5), np.full(3, 2.0))
         light = LobeLight(np.array([0.0, 0.6, 0.8]), 4.0, np.ones(3), spread)
+        outcome = LobeFitOutcome.DETERMINED
         lobe = LobeFit(
-            "ggx", True, "", 0.25, interval, (light,), np.ones(3), spread, 0.5, found.specular
+            "ggx", outcome, 0.25, interval, (light,), np.ones(3), spread, 0.5, found.specular
         )
         save(replace(found, brdf=lobe), folder / "result", arrays=True)
         return {

@@ -11,13 +11,14 @@ import numpy as np
 
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_object
 from isc_core.evaluation.metrics import Scores, score
-from isc_core.evaluation.runner import pose
+from isc_core.shading.occluding_contour import occluding_contour
 from isc_core.shading.spherical_harmonics import (
     light_from_reference,
     normal_from_reference,
     real_sh,
 )
 from isc_core.shading.surface_stencils import normals
+from isc_core.sirfs.normal_prior import expected_normals
 from isc_core.sirfs.priors.priors import Priors
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
@@ -92,7 +93,9 @@ def problem(truth: MitBerkeleyObject, priors: Priors, weights: Weights) -> Probl
     """
     image = truth.image[..., : priors.channels]
     log_image = np.where(truth.valid[..., None], np.log(np.where(image > 0, image, 1)), 0.0)
-    return pose(truth, log_image, priors, weights)
+    contour = occluding_contour(truth.mask, drop_near_edge=True)
+    expected = expected_normals(truth.mask, priors.silhouette, None)
+    return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=expected)
 
 
 def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:

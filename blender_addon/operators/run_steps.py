@@ -82,7 +82,8 @@ def decompose_steps(
         # Exported copies are no longer needed; the user's own files are not in the run's folder.
         if exported is not None and exported.parent == folder:
             exported.unlink(missing_ok=True)
-    return RunOutput(folder / RESULT, result_notes(folder / RESULT))
+    notes = translate_message(result_notes(folder / RESULT), {})
+    return RunOutput(folder / RESULT, notes)
 
 
 def mask_steps(

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.exr import read_channels
-from ..photo.photo import read_linear
+from ..photo import read_linear
 
 _IMAGE_SUFFIXES = (".exr", ".png", ".bmp", ".tif", ".tiff")
 _MULTILAYER = ("maps.exr", "truth.exr")
@@ -129,7 +129,8 @@ def _image(folder: Path, layer: str) -> Path:
     )
     if found is None:
         raise InputError(
-            f"{folder} has neither {' nor '.join(_MULTILAYER)} nor an image named {layer}: it is no rendered scene"
+            f"{folder} has neither {' nor '.join(_MULTILAYER)} nor an image named {layer}: it is "
+            "no rendered scene"
         )
     return found
 

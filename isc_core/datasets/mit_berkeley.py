@@ -18,7 +18,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..io.matlab import read_matrix
-from ..photo.photo import read_raster
+from ..photo import read_raster
 
 ILLUMINATIONS = ("natural", "laboratory")
 INPUTS = ("diffuse", "original")
@@ -88,7 +88,8 @@ def check_request(root: str | Path, name: str, illumination: str, input: str) ->
         and not (_folder(Path(root), "natural") / name / "original.png").is_file()
     ):
         raise InputError(
-            "the natural images of this set have no highlights: use --input diffuse, or --illumination laboratory"
+            "the natural images of this set have no highlights: use --input diffuse, or "
+            "--illumination laboratory"
         )
 
 
@@ -149,7 +150,8 @@ def _folder(root: Path, illumination: str) -> Path:
         if (root / name).is_dir():
             return root / name
     raise InputError(
-        f"{root} has no folder {' or '.join(_FOLDERS[illumination])}: give the folder that contains the MIT-Berkeley set"
+        f"{root} has no folder {' or '.join(_FOLDERS[illumination])}: give the folder that "
+        "contains the MIT-Berkeley set"
     )
 
 
@@ -197,11 +199,13 @@ def _cut(
     """The crop of a file's whole array, (h, w) for one channel, (h, w, 3) for three."""
     if full.shape[2:] != ((channels,) if channels > 1 else ()) or full.ndim < 2:
         raise InputError(
-            f"{path}: shape {full.shape} where {channels} channel(s) were expected: is it the file of the data set?"
+            f"{path}: shape {full.shape} where {channels} channel(s) were expected: is it the file "
+            "of the data set?"
         )
     for indices, size in zip(crop, full.shape[:2], strict=True):
         if not 0 < indices.size <= size or indices.min() < 0 or indices.max() >= size:
             raise InputError(
-                f"{path}: its {full.shape[1]} x {full.shape[0]} pixels do not hold the crop: is it a file of the data set?"
+                f"{path}: its {full.shape[1]} x {full.shape[0]} pixels do not hold the crop: is it "
+                "a file of the data set?"
             )
     return np.ascontiguousarray(full[np.ix_(*crop)])

@@ -1,19 +1,35 @@
-"""The baselines as models: the whole photo is taken as diffuse, and one direct method gives shape
-and light.
+"""The baselines as models: the whole photo is taken as diffuse, and one direct method recovers
+shape and light.
 """
 
 import numpy as np
 
 from .. import baselines
+from ..scene.diagnostics import Diagnostics, StopReason
 from .layers import unseparated
 from .shape import height_of_maps
-from .task import Answer, Task
+from .task import DecompositionTask, SceneEstimate
 
 
-def baseline(task: Task) -> Answer:
-    """What the baseline named in the settings makes of the photo.
+def baseline(task: DecompositionTask) -> SceneEstimate:
+    """Run the baseline that the settings name.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings.
+
+    Returns
+    -------
+    SceneEstimate
+        Without a specular layer.
+
+    Raises
+    ------
+    InputError
+        If the baseline cannot use this photo.
+    Cancelled
+        If the monitor cancels.
     """
     name, working = task.settings.model, task.working
     split, diffuse = unseparated(task)
@@ -22,5 +38,6 @@ def baseline(task: Task) -> Answer:
         floor = max(working.code_value / 2, float(np.finfo(diffuse.dtype).tiny))
         log_image = np.log(np.maximum(np.where(working.mask[..., None], diffuse, 1), floor))
         guess = baselines.estimate(name, log_image, working.mask)
-    status = {"converged": True, "reason": "direct method"}
-    return Answer(split, height_of_maps(guess.height, task), guess.light, status)
+    direct = Diagnostics(converged=True, reason=StopReason.DIRECT)
+    height = height_of_maps(guess.height, task)
+    return SceneEstimate(split, height, guess.light, direct, log_shading=guess.log_shading)

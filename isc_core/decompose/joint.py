@@ -1,41 +1,39 @@
-"""Joint MDR: what shape and light explain tells a highlight from paint where colour cannot, and
-what paint is under it.
+"""Joint MDR: recovered shape and light separate highlights that colour cannot, and restore the
+albedo under them.
 
-Problem: MDR believes a separation by colour. On grey paint, where colours tell nothing, that leaves
-the highlights in the diffuse image: shape and light are bent to explain them, and the reflectance
-shows them as bright paint.
+Problem: MDR relies on a separation by colour. On grey albedo, where colour carries no information,
+that leaves highlights in the diffuse image: shape and light are bent to explain them, and the
+reflectance shows them as bright albedo.
 
-Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and what
-the layer network has learned of the form of highlights (`networks.layer_network`): it expects y =
+Equation: image = D + s, D = R exp(SH(normal)). The start is the separation by colour, D_0, and the
+layer network's prediction of the shape of highlights (`networks.layer_network`): it expects y =
 log(I / D) with an error b, and D_1 = min(D_0, I e^-max(y - b / 2, 0)), the light between D_0 and
-D_1 held to be nearly white (`separation.support.light_tint`). SIRFS on D_1 gives shape and light. They give
-a better separation: where the network took much of what colour had left (`ResidualHighlights.doubtful`), too
-little of the paint is seen to be believed; it is continued from around, in the light that falls
-there,
+D_1 being nearly white (`separation.support.light_tint`). SIRFS on D_1 gives shape and light. They
+give a better separation: where the network removed much of what colour had left
+(`ResidualHighlights.unreliable`), too little of the albedo is visible; it is continued from the
+surroundings, in the shading at that place,
 
-    log R = average of log D_1 - SH(normal) over what is near and not doubtful,   D = min(D_1, R
-    exp(SH(normal)))
+    log R = average of log D_1 - SH(normal) over nearby reliable pixels,
+    D = min(D_1, R exp(SH(normal)))
 
-An object is touched only where highlights stand out that colour has left (`JointOptions`): else the
-answer is MDR's.
+An object is changed only where highlights stand out that colour has left (`JointOptions`);
+otherwise the result is MDR's.
 
 Energy: E = E_SIRFS(log D; height, light) + b sum_c mean log(D_c / I_c). The second term belongs to
-the change of variables from D to what was seen: a density of log D is one of I times 1 / D. The
-step from D_1 to D is kept if E falls by it, else D_1 stays: E never rises. There is one step: SIRFS
-again on D bends the shape by what the continued paint gets wrong, and did not pay
+the change of variables from D to the observed image: a density of log D is one of I times 1 / D.
+The step from D_1 to D is kept if E falls, otherwise D_1 stays: E never rises. There is one step:
+SIRFS again on D bends the shape by the errors of the continued albedo, and did not pay
 (docs/methods/joint.md).
 
 Citation: inpainting of highlights that keeps to the light: P. Tan, S. Lin, L. Quan, H.-Y. Shum
-2003, doi:10.1109/ICCV.2003.1238333; averages of what is known: H. Knutsson and C.-F. Westin 1993,
+2003, doi:10.1109/ICCV.2003.1238333; averages of known values: H. Knutsson and C.-F. Westin 1993,
 doi:10.1109/CVPR.1993.341081.
 
-Limits: those of the network. A broad veil without a peak stays. Paint that ends under a highlight
+Limits: those of the network. A broad veil without a peak stays. Albedo that ends under a highlight
 is continued smoothly.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy import ndimage
@@ -43,15 +41,14 @@ from scipy import ndimage
 from ..imaging.smoothing import masked_gaussian
 from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
 from ..scene.decomposition import Separation
+from ..scene.diagnostics import JointOutcome
 from ..separation.support.light_tint import held_to_light
 from .layers import separated_first, shaded
 from .lobe import fit_specular
-from .shape import Shape, energy_of, recover_shape, trust_of
-from .task import Answer, Task
+from .shape import Shape, confidence_weight, energy_of, recover_shape
+from .task import DecompositionTask, SceneEstimate
 
-_TAKEN = "highlights that colour does not show were taken off, and the paint under them continued with the help of shape and light"
-_NOT_CONTINUED = "highlights that colour does not show were taken off; continuing the paint under them did not lower the energy"
-_NOTHING_LEFT = "no highlights but those that colour shows: the same as mdr"
+# shares of the object's diagonal: distances from which albedo is continued
 _REACHES = (
     0.004,
     0.008,
@@ -60,125 +57,157 @@ _REACHES = (
     0.06,
     0.12,
     0.25,
-)  # of the object's diagonal: how far paint is continued from
-_HALF = 0.5  # of the object doubtful: there is nothing to continue its paint from
+)
+_HALF = 0.5  # of the object unreliable: there is nothing to continue its albedo from
 _SPECK = 0.005  # of the object's diagonal
-_ENOUGH = 0.1  # of a neighbourhood that is known: nearer ones decide
-Found = TypeVar("Found")
+_ENOUGH = 0.1  # of a neighbourhood known: nearer ones decide
 
 
 @dataclass(frozen=True)
 class JointOptions:
-    """`above_usual`: highlights stand out if the largest y that colour has left is by so much above
-    what 90 % of the object show. `doubtful`: from which y on paint is not believed.
-    `change_of_variables`: b of the energy. `network`: how it is asked.
+    """When highlights stand out, and how the step beyond MDR is weighed.
+
+    Attributes
+    ----------
+    above_usual : float
+        Highlights stand out if the largest y that colour has left exceeds the 90th percentile by
+        this much.
+    unreliable_from : float
+        y above which albedo is unreliable.
+    change_of_variables : float
+        b of the energy.
+    network : NetworkOptions
+        How the layer network is applied.
     """
 
     above_usual: float = 0.3
-    doubtful: float = 0.15
+    unreliable_from: float = 0.15
     change_of_variables: float = 5.0
     network: NetworkOptions = field(default_factory=NetworkOptions)
 
 
 @dataclass(frozen=True)
 class ResidualHighlights:
-    """`diffuse` (H, W, 3):
+    """Highlights that a separation by colour has left.
 
-    D_1. `doubtful` (H, W) bool: where not even that is to be believed; never more than half of the
-    mask.
+    Attributes
+    ----------
+    diffuse : (H, W, 3) ndarray
+        D_1, the diffuse image without them.
+    unreliable : (H, W) ndarray of bool
+        Where even `diffuse` shows too little of the albedo; at most half of the mask.
     """
 
     diffuse: np.ndarray
-    doubtful: np.ndarray
+    unreliable: np.ndarray
 
 
 @dataclass(frozen=True)
-class Explain(Generic[Found]):
-    """How shape and light are found and asked: `solve` gives them for a diffuse image (H, W, 3);
-    `shading` (H, W, 3) is what they give, above 0 inside the mask; `energy` is the SIRFS objective
-    of a diffuse image at them. All of one photo's pixels.
+class JointStep:
+    """Shape and light of D_1, and the diffuse image after the step.
+
+    Attributes
+    ----------
+    shape : Shape
+        Recovered from D_1.
+    diffuse : (h, w, 3) ndarray
+        D if the step was kept, otherwise D_1.
+    kept : bool
+        Whether albedo was continued.
     """
 
-    solve: Callable[[np.ndarray], Found]
-    shading: Callable[[Found], np.ndarray]
-    energy: Callable[[np.ndarray, Found], float]
-
-
-@dataclass(frozen=True)
-class Step(Generic[Found]):
-    """`shape`: what `Explain.solve` gave.
-
-    `diffuse` (H, W, 3): what is left in the end. `taken`: whether paint was continued.
-    """
-
-    shape: Found
+    shape: Shape
     diffuse: np.ndarray
-    taken: bool
+    kept: bool
 
 
-def joint(task: Task, options: JointOptions | None = None) -> Answer:
-    """MDR on what colour and form tell of the layers; the step beyond it, if the energy falls.
+def joint(task: DecompositionTask, options: JointOptions | None = None) -> SceneEstimate:
+    """Run MDR on layers from colour and the network, then the step beyond it if the energy falls.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings.
+    options : JointOptions, optional
+        Thresholds.
+
+    Returns
+    -------
+    SceneEstimate
+        MDR's where no residual highlights stand out.
+
+    Raises
+    ------
+    InputError
+        If the photo cannot be separated or the known quantities do not fit.
+    Cancelled
+        If the monitor cancels.
     """
     options, monitor, working = options or JointOptions(), task.monitor, task.working
     split, layers = separated_first(task)
     with task.clock.stage("separation"):
-        found = doubt(working.image, layers.diffuse, working.mask, options)
-    trust = trust_of(believed(layers.confidence, found), task.settings.confidence_weights)
-    explain = Explain(
-        solve=lambda image: recover_shape(image, task, monitor.part(0.08, 0.9), trust),
-        shading=lambda shape: shaded(shape.working_height, shape.light, working.mask)[1],
-        energy=lambda image, shape: energy_of(image, shape, task, trust),
+        residual = detect_residual_highlights(
+            working.image, layers.diffuse, working.mask, options, task.options.layer_network
+        )
+    weight = confidence_weight(
+        without_unreliable(layers.confidence, residual), task.settings.confidence_weights
     )
-    step = stepped(found, layers.diffuse, working.mask, explain, options)
-    said = _NOTHING_LEFT
-    if found is not None:
-        said = _TAKEN if step.taken else _NOT_CONTINUED
-        split = _split(split, found, step, task, options)
+    step = _step(task, residual, layers.diffuse, weight, options)
+    outcome = JointOutcome.UNCHANGED
+    if residual is not None:
+        outcome = JointOutcome.CONTINUED if step.kept else JointOutcome.REMOVED
+        split = _split(split, residual, step, task, options)
     lobe = fit_specular(split, step.shape, task, monitor.part(0.92, 0.96))
-    return Answer(
-        split,
-        step.shape.height,
-        step.shape.light,
-        step.shape.status | lobe.status | {"joint": said},
-        lobe.brdf,
-    )
+    diagnostics = replace(step.shape.diagnostics, lobe=lobe.diagnostics, joint=outcome)
+    return SceneEstimate(split, step.shape.height, step.shape.light, diagnostics, lobe.brdf)
 
 
-def stepped(
-    found: ResidualHighlights | None,
+def _step(
+    task: DecompositionTask,
+    residual: ResidualHighlights | None,
     by_colour: np.ndarray,
-    mask: np.ndarray,
-    explain: Explain[Found],
+    weight: np.ndarray | None,
     options: JointOptions,
-) -> Step[Found]:
-    """Shape and light of D_1, then the step to D where E falls by it.
-
-    `found`: what `doubt` says of the separation's diffuse image `by_colour` (H, W, 3), which stays
-    where that is None.
-    """
-    if found is None:
-        return Step(explain.solve(by_colour), by_colour, False)
-    start = found.diffuse
-    shape = explain.solve(start)
-    cleaner = repaint(found, explain.shading(shape), start, mask)
-    before, after = explain.energy(start, shape), explain.energy(cleaner, shape)
-    taken = lowers_energy(before, after, start, cleaner, mask, options)
-    return Step(shape, cleaner if taken else start, taken)
+) -> JointStep:
+    """Shape and light of D_1, then the step to D where E falls; `by_colour` (h, w, 3) is D_0."""
+    monitor, mask = task.monitor.part(0.08, 0.9), task.working.mask
+    if residual is None:
+        return JointStep(recover_shape(by_colour, task, monitor, weight), by_colour, False)
+    start = residual.diffuse
+    shape = recover_shape(start, task, monitor, weight)
+    _, shading = shaded(shape.working_height, shape.light, mask, task.options.layer_dtype)
+    cleaner = continue_albedo(residual, shading, start, mask)
+    before, after = (energy_of(diffuse, shape, task, weight) for diffuse in (start, cleaner))
+    kept = lowers_energy(before, after, start, cleaner, mask, options)
+    return JointStep(shape, cleaner if kept else start, kept)
 
 
-def doubt(
+def detect_residual_highlights(
     image: np.ndarray,
     diffuse: np.ndarray,
     mask: np.ndarray,
     options: JointOptions | None = None,
     network: LayerNetwork | None = None,
 ) -> ResidualHighlights | None:
-    """Where the highlights of `image` (H, W, 3) are that a separation's `diffuse` (H, W, 3) still
-    shows; None if none stand out.
+    """Find highlights that a separation by colour has left in the diffuse image.
 
-    `network`: the shipped one if None.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709.
+    diffuse : (H, W, 3) ndarray
+        The separation's diffuse layer.
+    mask : (H, W) ndarray of bool
+        The object.
+    options : JointOptions, optional
+        Thresholds.
+    network : LayerNetwork, optional
+        The shipped one by default.
+
+    Returns
+    -------
+    ResidualHighlights or None
+        None if no highlights stand out.
     """
     options, inside = options or JointOptions(), mask[..., None]
     expected, _ = log_ratio(image, mask, network or shipped_network(), options.network)
@@ -188,40 +217,66 @@ def doubt(
     )
     left = np.where(inside, np.maximum(expected - np.maximum(taken, 0), 0), 0)
     level = left.mean(axis=2)
-    # What is a few pixels wide does not count: texture is.
+    # Structures of a few pixels do not count: they are texture.
     broad = ndimage.grey_opening(level, max(3, 2 * round(_SPECK * _diagonal(mask)) + 1))[mask]
     if float(broad.max()) - float(np.quantile(broad, 0.9)) <= options.above_usual:
         return None
-    doubtful = ndimage.binary_opening(level > options.doubtful, np.ones((2, 2))) & mask
-    if doubtful[mask].mean() > _HALF:
-        doubtful = np.zeros_like(mask)
+    unreliable = ndimage.binary_opening(level > options.unreliable_from, np.ones((2, 2))) & mask
+    if unreliable[mask].mean() > _HALF:
+        unreliable = np.zeros_like(mask)
     cleaner = held_to_light(diffuse, diffuse * np.exp(-left), options.network.tint)
-    return ResidualHighlights(cleaner.astype(diffuse.dtype), doubtful)
+    return ResidualHighlights(cleaner.astype(diffuse.dtype), unreliable)
 
 
-def believed(confidence: np.ndarray, found: ResidualHighlights | None) -> np.ndarray:
-    """A separation's `confidence` (H, W), 0 where `found` doubts."""
-    return (
-        confidence if found is None else np.where(found.doubtful, 0, confidence).astype(np.float32)
-    )
+def without_unreliable(confidence: np.ndarray, residual: ResidualHighlights | None) -> np.ndarray:
+    """Set a separation's confidence to 0 where its albedo is unreliable.
 
+    Parameters
+    ----------
+    confidence : (H, W) ndarray
+        In [0, 1].
+    residual : ResidualHighlights or None
+        The residual highlights.
 
-def repaint(
-    found: ResidualHighlights, shading: np.ndarray, start: np.ndarray, mask: np.ndarray
-) -> np.ndarray:
-    """The diffuse image (H, W, 3), nowhere above `start` (H, W, 3), with the paint of doubtful
-    pixels continued from around them.
-
-    `shading` (H, W, 3): > 0 inside `mask`.
+    Returns
+    -------
+    (H, W) ndarray
+        The lower confidence; unchanged for None.
     """
-    known, inside = mask & ~found.doubtful, mask[..., None]
-    log_paint = np.log(
+    if residual is None:
+        return confidence
+    return np.where(residual.unreliable, 0, confidence).astype(np.float32)
+
+
+def continue_albedo(
+    residual: ResidualHighlights, shading: np.ndarray, start: np.ndarray, mask: np.ndarray
+) -> np.ndarray:
+    """Continue the albedo of unreliable pixels from their surroundings.
+
+    Parameters
+    ----------
+    residual : ResidualHighlights
+        D_1 and its unreliable pixels.
+    shading : (H, W, 3) ndarray
+        Above 0 inside the mask.
+    start : (H, W, 3) ndarray
+        Upper bound of the result.
+    mask : (H, W) ndarray of bool
+        The object.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        The diffuse image.
+    """
+    known, inside = mask & ~residual.unreliable, mask[..., None]
+    log_albedo = np.log(
         np.maximum(
-            np.where(known[..., None], found.diffuse / np.where(inside, shading, 1), 1), 1e-9
+            np.where(known[..., None], residual.diffuse / np.where(inside, shading, 1), 1), 1e-9
         )
     )
-    paint = np.exp(_continued(log_paint, known, mask))
-    diffuse = np.where(found.doubtful[..., None], paint * shading, found.diffuse)
+    albedo = np.exp(_continued(log_albedo, known, mask))
+    diffuse = np.where(residual.unreliable[..., None], albedo * shading, residual.diffuse)
     return np.where(inside, np.minimum(diffuse, start), 0).astype(start.dtype)
 
 
@@ -233,8 +288,23 @@ def lowers_energy(
     mask: np.ndarray,
     options: JointOptions,
 ) -> bool:
-    """Whether E falls from `start` (H, W, 3), where the SIRFS objective is `before`, to `cleaner`
-    (H, W, 3), where it is `after`.
+    """Decide whether E falls from D_1 to D.
+
+    Parameters
+    ----------
+    before, after : float
+        SIRFS objective at `start` and at `cleaner`.
+    start, cleaner : (H, W, 3) ndarray
+        D_1 and D.
+    mask : (H, W) ndarray of bool
+        The object.
+    options : JointOptions
+        The weight b.
+
+    Returns
+    -------
+    bool
+        Whether the step is kept.
     """
     darker = np.log(np.maximum(cleaner[mask], 1e-9) / np.maximum(start[mask], 1e-9))
     return (
@@ -244,33 +314,35 @@ def lowers_energy(
 
 def _split(
     start: Separation,
-    found: ResidualHighlights,
-    step: Step[Shape],
-    task: Task,
+    residual: ResidualHighlights,
+    step: JointStep,
+    task: DecompositionTask,
     options: JointOptions,
 ) -> Separation:
-    """The layers of the maps' photo, whose separation is `start`;
-
-    `found` and `step` are those of the working one.
+    """The layers of the maps' photo, whose separation by colour is `start`; `residual` and `step`
+    are those of the working photo.
     """
-    photo, diffuse, shape = task.maps, step.diffuse, step.shape
+    photo, diffuse, shape, dtype = task.maps, step.diffuse, step.shape, task.options.layer_dtype
     if not task.one_scale:
-        of_maps = doubt(photo.image, start.diffuse, photo.mask, options)
+        of_maps = detect_residual_highlights(
+            photo.image, start.diffuse, photo.mask, options, task.options.layer_network
+        )
         if of_maps is None:
             return start
-        found, diffuse = of_maps, of_maps.diffuse
-        if step.taken:
-            _, shading = shaded(shape.height, shape.light, photo.mask)
-            diffuse = repaint(of_maps, shading, of_maps.diffuse, photo.mask)
-    diffuse = diffuse.astype(np.float32)
+        residual, diffuse = of_maps, of_maps.diffuse
+        if step.kept:
+            _, shading = shaded(shape.height, shape.light, photo.mask, dtype)
+            diffuse = continue_albedo(of_maps, shading, of_maps.diffuse, photo.mask)
+    diffuse = diffuse.astype(dtype)
     specular = np.where(
         photo.mask[..., None], start.specular + (start.diffuse - diffuse), 0
     ).astype(np.float32)
-    return Separation(diffuse, specular, start.residual, believed(start.confidence, found))
+    confidence = without_unreliable(start.confidence, residual)
+    return Separation(diffuse, specular, start.residual, confidence)
 
 
 def _continued(values: np.ndarray, known: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """`values` (H, W, 3) where they are not `known`: averages of the nearest ones that are."""
+    """`values` (H, W, 3), replaced by averages of the nearest known ones where not `known`."""
     diagonal = _diagonal(mask)
     answer, settled = np.zeros_like(values), np.zeros(known.shape)
     for reach in _REACHES:

@@ -1,10 +1,11 @@
-"""The steps that several models take: separating a photo, and shading a recovered shape."""
+"""Steps that several models share: separating a photo, and shading a recovered shape."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from ..photo.photo import Photo
+from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..separation import separate
@@ -15,68 +16,169 @@ from ..shading.spherical_harmonics import (
     real_sh,
 )
 from ..shading.surface_stencils import normals
-from .task import Task
+from .task import DecompositionTask
+
+_Dtype = type[np.floating[Any]]
 
 
-def separated(photo: Photo, method: str, monitor: Monitor | None = None) -> Separation:
-    """The photo's layers by a method of `separation.METHODS`. Raises `InputError`, `Cancelled`."""
-    return separate(method, photo.image, photo.mask, photo.clipped, monitor=monitor)
+def separated(
+    photo: Photo, method: str, monitor: Monitor | None = None, dtype: _Dtype = np.float32
+) -> Separation:
+    """Separate a photo into its layers.
 
+    Parameters
+    ----------
+    photo : Photo
+        The photo.
+    method : str
+        One of `separation.METHODS`.
+    monitor : Monitor, optional
+        Receives progress.
+    dtype : type, optional
+        Precision of the diffuse layer. In float64 it is the image less the specular layer, so that
+        it equals an image of that precision where nothing was separated.
 
-def separated_first(task: Task) -> tuple[Separation, Separation]:
-    """The layers of the maps' photo by the separator of the settings, and those of the working one.
+    Returns
+    -------
+    Separation
+        Layers that sum to the image.
 
-    Raises `InputError`, `Cancelled`.
+    Raises
+    ------
+    InputError
+        If the method cannot separate this photo.
+    Cancelled
+        If the monitor cancels.
     """
-    method, monitor = task.settings.separator, task.monitor
+    split = separate(method, photo.image, photo.mask, photo.clipped, monitor=monitor)
+    if dtype == np.float32:
+        return split
+    diffuse = np.maximum(photo.image.astype(dtype) - split.specular - split.residual, 0)
+    return replace(split, diffuse=diffuse)
+
+
+def separated_first(task: DecompositionTask) -> tuple[Separation, Separation]:
+    """Separate the photo at both scales by the separator of the settings.
+
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings.
+
+    Returns
+    -------
+    maps, working : Separation
+        Layers at the scale of the maps and at the working scale.
+
+    Raises
+    ------
+    InputError
+        If the method cannot separate this photo.
+    Cancelled
+        If the monitor cancels.
+    """
+    method, monitor, dtype = task.settings.separator, task.monitor, task.options.layer_dtype
     monitor.report(f"separating ({method})", 0.03)
     with task.clock.stage("separation"):
         split = (
-            separated(task.maps, method, monitor.part(0.03, 0.06))
+            separated(task.maps, method, monitor.part(0.03, 0.06), dtype)
             if task.split is None
             else task.split
         )
         return split, split if task.one_scale else separated(
-            task.working, method, monitor.part(0.06, 0.08)
+            task.working, method, monitor.part(0.06, 0.08), dtype
         )
 
 
-def unseparated(task: Task) -> tuple[Separation, np.ndarray]:
-    """All light taken as diffuse: the layers of the maps' photo, and the diffuse image (H, W, 3) of
-    the working one.
+def unseparated(task: DecompositionTask) -> tuple[Separation, np.ndarray]:
+    """Take all light as diffuse.
+
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo.
+
+    Returns
+    -------
+    split : Separation
+        Layers of the maps' photo; the specular layer is 0.
+    diffuse : (h, w, 3) ndarray
+        Diffuse image of the working photo.
     """
     task.monitor.report("preparing", 0.03)
+    dtype = task.options.layer_dtype
     with task.clock.stage("separation"):
-        split = separated(task.maps, "none")
-        return split, split.diffuse if task.one_scale else separated(task.working, "none").diffuse
+        split = separated(task.maps, "none", dtype=dtype)
+        return split, split.diffuse if task.one_scale else separated(
+            task.working, "none", dtype=dtype
+        ).diffuse
 
 
 def scale_confidence(split: Separation, share: float = 0.5) -> Separation:
-    """The same layers, with that share of their confidence."""
+    """Return the same layers with their confidence multiplied by `share`.
+
+    Parameters
+    ----------
+    split : Separation
+        The layers.
+    share : float, optional
+        Factor in [0, 1].
+
+    Returns
+    -------
+    Separation
+        The layers with the lower confidence.
+    """
     return replace(split, confidence=np.float32(share) * split.confidence)
 
 
 def shaded(
-    height: np.ndarray, light: np.ndarray, mask: np.ndarray
+    height: np.ndarray, light: np.ndarray, mask: np.ndarray, dtype: _Dtype = np.float32
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Normals (H, W, 3), camera frame, (0, 0, 1) outside the mask, and shading (H, W, 3), 0
-    outside, float32: shading = exp(SH(normal)).
+    """Compute normals and shading of a height under a light: shading = exp(SH(normal)).
 
-    `height` (H, W) and `light` (9, 3) in the reference convention.
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+    light : (9, 3) ndarray
+        Log-shading SH coefficients, reference convention.
+    mask : (H, W) ndarray of bool
+        The object.
+    dtype : type, optional
+        Precision of the result.
+
+    Returns
+    -------
+    normal : (H, W, 3) ndarray
+        Unit normals, camera frame; (0, 0, 1) outside the mask.
+    shading : (H, W, 3) ndarray
+        Linear Rec.709; 0 outside the mask.
     """
-    normal = normal_from_reference(normals(height)).astype(np.float32)
+    normal = normal_from_reference(normals(height)).astype(dtype)
     normal[~mask] = (0, 0, 1)
-    shading = np.zeros((*mask.shape, 3), np.float32)
+    shading = np.zeros((*mask.shape, 3), dtype)
     shading[mask] = np.exp(
         np.einsum("nk,kc->nc", real_sh(normal[mask].astype(float)), light_from_reference(light))
     )
     return normal, shading
 
 
-def shifted(light: np.ndarray, log_colour: np.ndarray | float) -> np.ndarray:
-    """The light (9, C), reference convention, with `log_colour`, (3,) or one number, added to the
-    log shading; of one channel the mean.
+def scaled_light(light: np.ndarray, log_factor: np.ndarray | float) -> np.ndarray:
+    """Multiply the shading of a light by a constant factor.
+
+    Parameters
+    ----------
+    light : (9, C) ndarray
+        Log-shading SH coefficients, reference convention.
+    log_factor : (3,) ndarray or float
+        Logarithm of the factor of each channel. A light of one channel takes the mean.
+
+    Returns
+    -------
+    (9, C) ndarray
+        The scaled light.
     """
-    ours, gain = light_from_reference(light), np.broadcast_to(log_colour, 3)
+    ours, gain = light_from_reference(light), np.broadcast_to(log_factor, 3)
     ours[0] += np.sqrt(4 * np.pi) * (gain if ours.shape[1] == 3 else gain.mean())
     return light_to_reference(ours)

@@ -1,79 +1,96 @@
-"""The colour of the light, where a photo tells it: the photo is explained as it would be under
-white light, and the colour put back.
+"""The colour of the light, where a photo determines it: the photo is explained as under white light,
+and the colour is put back.
 
-Problem: separations, and what a lamp may look like, take the light for white.
+Problem: separations, and the priors of a lamp's colour, assume white light.
 
 Equation: with the light's colour c of mean 1 (`illuminant`), I' = I / c is explained by a model as
-I' = D' + S' + rest'. Then
+I' = D' + S' + residual'. Then
 
-    D = c D',   S = c S',   rest = c rest',   log shading = log shading' + log c,
+    D = c D',   S = c S',   residual = c residual',   log shading = log shading' + log c,
 
-so that I = D + S + rest and the reflectance D / shading is that under white light.
+so that I = D + S + residual, and the reflectance D / shading is that under white light.
 
 Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694.
 
-Limits: those of `illuminant`: few photos tell the colour. Where one does not, the light is taken
-for white, and the status says why. Light of a stronger colour than a lamp's is mostly noticed, see
-`light_gamut`; the result is then less to be trusted, and says so.
+Limits: those of `illuminant`: few photos determine the colour. Otherwise the light is taken for
+white, and the diagnostics give the reason. Light of a stronger colour than a lamp's is mostly
+noticed, see `illuminant.gamut`; the confidence is then lower.
 """
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from ..illuminant.illuminant import Illuminant, estimate_illuminant, tinted, whitened
-from ..photo.photo import Photo
+from ..photo import Photo
 from ..scene.decomposition import Separation
+from ..scene.diagnostics import LightColourDiagnostics
 from ..scene.lobe_fit import Interval, LobeFit
-from .layers import scale_confidence, shifted
+from .layers import scale_confidence, scaled_light
 from .settings import LIGHT_COLOURS
-from .task import Answer, Task
+from .task import DecompositionTask, SceneEstimate
 
 WHITE, ESTIMATE = LIGHT_COLOURS
-_COLOURED = 0.1  # of a channel's share: less cannot be told from white
-_STRONG = "the light may be strongly coloured, or all of the paint is: highlights and paint are less to be trusted; white light would tell"
-_HINT = "the light is coloured: --light-colour estimate takes that into account"
+_COLOURED = 0.1  # of a channel's share: less cannot be distinguished from white
 
 
-def under_light(task: Task, solver: Callable[[Task], Answer]) -> Answer:
-    """What `solver` makes of the photo under white light, back under the light's colour where that
-    is known and asked for.
+def under_light(
+    task: DecompositionTask, solver: Callable[[DecompositionTask], SceneEstimate]
+) -> SceneEstimate:
+    """Run a model under white light, and put back the light's colour where it is to be used.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings.
+    solver : callable
+        The model.
+
+    Returns
+    -------
+    SceneEstimate
+        Under the photo's own light.
+
+    Raises
+    ------
+    InputError
+        If the model cannot explain this photo.
+    Cancelled
+        If the monitor cancels.
     """
-    with task.clock.stage("light colour"):
+    if not task.options.check_assumptions and task.settings.light_colour == WHITE:
+        return solver(task)
+    with task.clock.stage("estimate light colour"):
         light = estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
     used = light.determined and task.settings.light_colour == ESTIMATE
-    answer = _back(solver(_whitened(task, light.colour)), light.colour) if used else solver(task)
-    split = scale_confidence(answer.split) if light.too_strong else answer.split
-    return replace(
-        answer, split=split, status=answer.status | {"light_colour": _status(light, used)}
+    estimate = _back(solver(_whitened(task, light.colour)), light.colour) if used else solver(task)
+    split = scale_confidence(estimate.split) if light.too_strong else estimate.split
+    diagnostics = replace(estimate.diagnostics, light_colour=_diagnostics(light, used))
+    return replace(estimate, split=split, diagnostics=diagnostics)
+
+
+def _diagnostics(light: Illuminant, used: bool) -> LightColourDiagnostics:
+    red, green, blue = (round(float(part), 4) for part in light.colour)
+    return LightColourDiagnostics(
+        ESTIMATE if used else WHITE,
+        (red, green, blue),
+        round(light.confidence, 4),
+        light.outcome,
+        light.determined and float(np.abs(light.colour - 1).max()) > _COLOURED,
     )
 
 
-def _status(light: Illuminant, used: bool) -> dict[str, Any]:
-    """For people and programs, JSON-ready: the estimate, and what was made of it."""
-    coloured = light.determined and float(np.abs(light.colour - 1).max()) > _COLOURED
-    return {
-        "used": ESTIMATE if used else WHITE,
-        "estimate": [round(float(part), 4) for part in light.colour],
-        "confidence": round(light.confidence, 4),
-        "determined": light.determined,
-        "reason": light.reason,
-        "help": _STRONG if light.too_strong else _HINT if coloured and not used else "",
-    }
-
-
-def _whitened(task: Task, colour: np.ndarray) -> Task:
-    """The same task under white light."""
+def _whitened(task: DecompositionTask, colour: np.ndarray) -> DecompositionTask:
+    """The task under white light."""
     working = _recoloured(task.working, colour)
     maps = working if task.one_scale else _recoloured(task.maps, colour)
     split = None if task.split is None else _relit(task.split, 1 / colour)
     light = task.known.light
     known = (
-        task.known if light is None else replace(task.known, light=shifted(light, -np.log(colour)))
+        task.known
+        if light is None
+        else replace(task.known, light=scaled_light(light, -np.log(colour)))
     )
     return replace(task, working=working, maps=maps, split=split, known=known)
 
@@ -82,13 +99,13 @@ def _recoloured(photo: Photo, colour: np.ndarray) -> Photo:
     return replace(photo, image=whitened(photo.image, colour))
 
 
-def _back(answer: Answer, colour: np.ndarray) -> Answer:
-    """The answer under the light again; height and confidence stay."""
-    brdf = None if answer.brdf is None else _lobe(answer.brdf, colour)
+def _back(estimate: SceneEstimate, colour: np.ndarray) -> SceneEstimate:
+    """The estimate under the photo's light; height and confidence stay."""
+    brdf = None if estimate.brdf is None else _lobe(estimate.brdf, colour)
     return replace(
-        answer,
-        split=_relit(answer.split, colour),
-        light=shifted(answer.light, np.log(colour)),
+        estimate,
+        split=_relit(estimate.split, colour),
+        light=scaled_light(estimate.light, np.log(colour)),
         brdf=brdf,
     )
 

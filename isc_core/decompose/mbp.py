@@ -1,19 +1,18 @@
-"""Modified Blinn-Phong: SIRFS explains the photo as it is, the highlights are then taken off its
-REFLECTANCE image.
+"""Modified Blinn-Phong: SIRFS explains the photo as it is, the highlights are then removed from the
+reflectance image.
 
-Problem: paint that changes and light that changes look alike to a separation. SIRFS' reflectance
-has the shading taken out: what is left of a highlight stands there as pale paint on evenly lit
-paint.
+Problem: changes of albedo and changes of light look alike to a separation. SIRFS' reflectance has
+the shading divided out: the rest of a highlight is pale albedo on evenly lit albedo.
 
 Equation: SIRFS gives I = R S, S = exp(SH(n)). With g the geometric mean of S over its channels, the
 separation splits the reflectance image under the photo's own light, I / g = P_d + P_s + P_r, so
 
     diffuse = P_d g,   specular = P_s g,   residual = P_r g,   reflectance = P_d g / S,
 
-which sum up to I and keep diffuse = reflectance * shading. The specular layer then is given to a
-Blinn-Phong lobe on the recovered normals. It is g that is divided by, since the light's hue is what
-SIRFS knows least: yellow fruit under white light comes out as orange fruit under blue light, and
-would get blue highlights. Measured on glossy objects, the two ways differ by 3 % of the
+which sum to I and keep diffuse = reflectance * shading. A Blinn-Phong lobe on the recovered normals
+is then fitted to the specular layer. The image is divided by g, since the light's hue is the least
+certain part of SIRFS' result: yellow fruit under white light comes out as orange fruit under blue
+light, and would get blue highlights. Measured on glossy objects, the two ways differ by 3 % of the
 reflectance's error at most.
 
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image"
@@ -24,6 +23,8 @@ highlights; what SIRFS explains of a highlight by its light or shape is in S and
 diffuse image.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..progress import Monitor
@@ -32,13 +33,28 @@ from ..separation import separate
 from .layers import shaded, unseparated
 from .lobe import fit_specular
 from .shape import recover_shape
-from .task import Answer, Task
+from .task import DecompositionTask, SceneEstimate
 
 
-def mbp(task: Task) -> Answer:
-    """Shape and light of the photo as it is, separation of the reflectance, the lobe.
+def mbp(task: DecompositionTask) -> SceneEstimate:
+    """Recover shape and light of the photo as it is, separate the reflectance, and fit the lobe.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings.
+
+    Returns
+    -------
+    SceneEstimate
+        With the layers of the reflectance image.
+
+    Raises
+    ------
+    InputError
+        If the reflectance cannot be separated or the known quantities do not fit.
+    Cancelled
+        If the monitor cancels.
     """
     method, monitor = task.settings.separator, task.monitor
     _, image = unseparated(task)
@@ -46,12 +62,13 @@ def mbp(task: Task) -> Answer:
     monitor.report(f"separating the reflectance ({method})", 0.88)
     photo = task.maps
     with task.clock.stage("separation"):
-        _, shading = shaded(shape.height, shape.light, photo.mask)
+        _, shading = shaded(shape.height, shape.light, photo.mask, task.options.layer_dtype)
         split = split_reflectance(
             photo.image, shading, photo.mask, photo.clipped, method, monitor.part(0.88, 0.92)
         )
     lobe = fit_specular(split, shape, task, monitor.part(0.92, 0.96), "blinn_phong")
-    return Answer(split, shape.height, shape.light, shape.status | lobe.status, lobe.brdf)
+    diagnostics = replace(shape.diagnostics, lobe=lobe.diagnostics)
+    return SceneEstimate(split, shape.height, shape.light, diagnostics, lobe.brdf)
 
 
 def split_reflectance(
@@ -62,15 +79,39 @@ def split_reflectance(
     method: str,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """The layers of `image` (H, W, 3) that the separation of its reflectance image gives; `shading`
-    (H, W, 3), above 0 in the mask.
+    """Separate an image by separating its reflectance image.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709.
+    shading : (H, W, 3) ndarray
+        Above 0 inside the mask.
+    mask : (H, W) ndarray of bool
+        The object.
+    clipped : (H, W) ndarray of bool or None
+        Pixels whose true value lies above the recorded one.
+    method : str
+        One of `separation.METHODS`.
+    monitor : Monitor, optional
+        Receives progress.
+
+    Returns
+    -------
+    Separation
+        Layers of `image`.
+
+    Raises
+    ------
+    InputError
+        If the method cannot separate this image.
+    Cancelled
+        If the monitor cancels.
     """
     inside = mask[..., None]
     level = np.log(np.where(inside, shading, 1)).mean(axis=2, keepdims=True, dtype=float)
-    # At the photo's own scale: what a separation takes for dark or bright must not depend on how
-    # SIRFS shares out R S.
+    # At the photo's own scale: a separation's notion of dark and bright must not depend on how
+    # SIRFS divides the image into R and S.
     factor = np.exp(level - level[mask].mean()).astype(np.float32)
     split = separate(
         method,

@@ -6,25 +6,43 @@ Equation: image = reflectance * shading + specular.
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image"
 (2016; no DOI); the dichromatic model: S. A. Shafer 1985, doi:10.1002/col.5080100409.
 
-With `Settings.confidence_weights` a pixel counts in SIRFS' terms of reflectance by the separation's
+With `Settings.confidence_weights` a pixel counts in SIRFS' reflectance terms by the separation's
 confidence (`sirfs.reflectance`).
 
-Limits: what the separation leaves or takes too much of, SIRFS believes.
+Limits: SIRFS takes the separation's errors, in either direction, at face value.
 """
+
+from dataclasses import replace
 
 from .layers import separated_first
 from .lobe import fit_specular
-from .shape import recover_shape, trust_of
-from .task import Answer, Task
+from .shape import confidence_weight, recover_shape
+from .task import DecompositionTask, SceneEstimate
 
 
-def mdr(task: Task) -> Answer:
-    """Separation, then shape and light of the diffuse image, then the lobe of the specular one.
+def mdr(task: DecompositionTask) -> SceneEstimate:
+    """Separate the photo, recover shape and light of the diffuse image, and fit the lobe.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo and the settings.
+
+    Returns
+    -------
+    SceneEstimate
+        With the separator's layers.
+
+    Raises
+    ------
+    InputError
+        If the photo cannot be separated or the known quantities do not fit.
+    Cancelled
+        If the monitor cancels.
     """
     split, working = separated_first(task)
-    trust = trust_of(working.confidence, task.settings.confidence_weights)
-    shape = recover_shape(working.diffuse, task, task.monitor.part(0.08, 0.92), trust)
+    weight = confidence_weight(working.confidence, task.settings.confidence_weights)
+    shape = recover_shape(working.diffuse, task, task.monitor.part(0.08, 0.92), weight)
     lobe = fit_specular(split, shape, task, task.monitor.part(0.92, 0.96))
-    return Answer(split, shape.height, shape.light, shape.status | lobe.status, lobe.brdf)
+    diagnostics = replace(shape.diagnostics, lobe=lobe.diagnostics)
+    return SceneEstimate(split, shape.height, shape.light, diagnostics, lobe.brdf)

@@ -1,18 +1,21 @@
-"""The models: how separation, shape and light are joined to explain one photo. One model a file,
+"""The models: how separation, shape and light are combined to explain one photo. One model a file,
 and one function that knows their names.
 
-A model is a function from a `Task` to an `Answer`: `plain.sirfs`, `mdr.mdr`, `mbp.mbp`,
-`joint.joint`, and the `baselines` to compare with. Of those that separate, `light_colour` decides
-which colour of light they see; those that find shape and light are told how the light and the shape
-look (`lamp_network`, `shape_network`), and of what they find `doubts` looks whether the photo shows
-what they assume.
+A model is a function from a `DecompositionTask` to a `SceneEstimate`: `sirfs_only.sirfs`,
+`mdr.mdr`, `mbp.mbp`, `joint.joint`, and the `baselines` to compare with. `light_colour` decides
+which colour of light the separating models see; those that recover shape and light are given the
+predicted light and normals (`networks.light_network`, `networks.normal_network`), and
+`assumption_checks` lowers the confidence of photos that violate what the models assume.
 """
 
 from dataclasses import replace
 
+import numpy as np
+
 from ..imaging.framing import is_cut
 from ..networks.light_network import predict_light
 from ..networks.normal_network import predict_normals
+from ..scene.light_estimate import LightEstimate
 from ..scene.normal_estimate import NormalEstimate
 from .assumption_checks import with_warnings
 from .baseline import baseline
@@ -22,43 +25,70 @@ from .mbp import mbp
 from .mdr import mdr
 from .settings import SEPARATING_MODELS, SIRFS_MODELS, Settings
 from .sirfs_only import sirfs
-from .task import Answer, Task
+from .task import DecompositionTask, SceneEstimate, SolveOptions
 
 _SOLVERS = {"mdr": mdr, "mbp": mbp, "joint": joint, "sirfs": sirfs}
 
 
-def solve(task: Task) -> Answer:
-    """What the model that `task.settings` names makes of the photo.
+def solve(task: DecompositionTask) -> SceneEstimate:
+    """Run the model that the settings name.
 
-    Raises `InputError`, `Cancelled`.
+    This is the one pipeline: `decompose` and every evaluation call it.
+
+    Parameters
+    ----------
+    task : DecompositionTask
+        The photo, the settings, and what a protocol changes.
+
+    Returns
+    -------
+    SceneEstimate
+        Layers, height and light.
+
+    Raises
+    ------
+    InputError
+        If the model cannot explain this photo.
+    Cancelled
+        If the monitor cancels.
     """
     solver = _SOLVERS.get(task.settings.model, baseline)
     if task.settings.model not in SIRFS_MODELS:
         return solver(task)
-    light_estimate = task.light_estimate
-    if light_estimate is None:
-        with task.clock.stage("light at first sight"):
-            light_estimate = predict_light(task.maps.image, task.maps.mask)
-    task = replace(task, light_estimate=light_estimate, seen=_seen_shape(task))
-    answer = under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
-    return with_warnings(task.maps, answer, light_estimate)
+    light_estimate = _light_estimate(task)
+    task = replace(task, light_estimate=light_estimate, normal_estimate=_normal_estimate(task))
+    estimate = (
+        under_light(task, solver) if task.settings.model in SEPARATING_MODELS else solver(task)
+    )
+    if light_estimate is None or not task.options.check_assumptions:
+        return estimate
+    return with_warnings(task.maps, estimate, light_estimate)
 
 
-def _seen_shape(task: Task) -> NormalEstimate | None:
-    """What was seen of the shape;
+def _light_estimate(task: DecompositionTask) -> LightEstimate | None:
+    """The predicted light; None where no step uses it."""
+    settings, options = task.settings, task.options
+    used = options.check_assumptions or options.fit_lobe or settings.uses_predicted_light
+    if task.light_estimate is not None or not used:
+        return task.light_estimate
+    with task.clock.stage("predict light"):
+        return predict_light(task.maps.image.astype(np.float32, copy=False), task.maps.mask)
 
-    None where that is not asked for, a depth tells more, or the frame cuts the object.
+
+def _normal_estimate(task: DecompositionTask) -> NormalEstimate | None:
+    """The predicted normals; None where the settings exclude them, a depth is known, or the frame
+    cuts the object.
     """
     if (
-        not task.settings.looks_at_shape
+        not task.settings.uses_predicted_normals
         or task.known.depth is not None
         or is_cut(task.working.mask)
     ):
         return None
-    if task.seen is not None:
-        return task.seen
-    with task.clock.stage("shape at first sight"):
-        return predict_normals(task.working.image, task.working.mask)
+    if task.normal_estimate is not None:
+        return task.normal_estimate
+    with task.clock.stage("predict normals"):
+        return predict_normals(task.working.image.astype(np.float32, copy=False), task.working.mask)
 
 
-__all__ = ["Answer", "Settings", "Task", "solve"]
+__all__ = ["DecompositionTask", "SceneEstimate", "Settings", "SolveOptions", "solve"]

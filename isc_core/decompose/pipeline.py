@@ -5,25 +5,24 @@ becomes maps that keep the identities.
 """
 
 import platform
-from dataclasses import dataclass
 from importlib import metadata
 
 import numpy as np
 
 from .. import __version__
 from ..errors import InputError
+from ..imaging.bounding_box import mask_box
 from ..imaging.framing import continued_height
 from ..imaging.resampling import nearest_samples
-from ..photo.photo import Photo, mask_box
+from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Decomposition, Provenance, Separation
+from ..scene.known_inputs import DepthObservation, KnownInputs, SceneConstraints
 from ..shading.spherical_harmonics import light_from_reference, light_to_reference
 from ..sirfs.priors.prior_set import PriorSet
-from ..sirfs.problem import DepthObservation
-from ..sirfs.recover import Known
 from .assumption_checks import share_in_blocks
 from .layers import shaded
-from .models import Answer, Settings, Task, solve
+from .models import DecompositionTask, SceneEstimate, Settings, solve
 from .settings import BASELINE_MODELS, ILLUMINATIONS, MODELS, SEPARATING_MODELS, SIRFS_MODELS
 from .task import Clock
 
@@ -32,7 +31,7 @@ __all__ = [
     "ILLUMINATIONS",
     "MODELS",
     "SIRFS_MODELS",
-    "Evidence",
+    "KnownInputs",
     "Settings",
     "assemble",
     "decompose",
@@ -41,27 +40,11 @@ __all__ = [
 _PACKAGES = ("numpy", "scipy", "numba")
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """What else is known of the scene, at the photo's full size: `height` the exact shape, `depth`
-    an observation of it with holes (NaN), both (H, W) in photo pixels toward the viewer; `light`
-    the exact illumination (9, 3), ISC's convention.
-
-    `depth_sigma`: the observation's standard error in photo pixels; `depth_weight`: of its term.
-    """
-
-    height: np.ndarray | None = None
-    light: np.ndarray | None = None
-    depth: np.ndarray | None = None
-    depth_sigma: float = 2.0
-    depth_weight: float = 10.0
-
-
 def decompose(
     photo: Photo,
     settings: Settings | None = None,
     *,
-    evidence: Evidence | None = None,
+    evidence: KnownInputs | None = None,
     prior_set: PriorSet | None = None,
     name: str = "",
     monitor: Monitor | None = None,
@@ -73,7 +56,7 @@ def decompose(
     """
     settings, evidence, monitor = (
         settings or Settings(),
-        evidence or Evidence(),
+        evidence or KnownInputs(),
         monitor or Monitor(),
     )
     settings.check()
@@ -91,7 +74,7 @@ def decompose(
             raise InputError(
                 "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region or use a larger photo"
             )
-    answer = solve(Task(working, maps, settings, known, prior_set, monitor, clock))
+    answer = solve(DecompositionTask(working, maps, settings, known, prior_set, monitor, clock))
     monitor.report("maps", 0.96)
     provenance = Provenance(
         _settings_json(settings),
@@ -99,13 +82,13 @@ def decompose(
         _versions(),
         clock.seconds,
         _input_json(maps, name),
-        answer.status,
+        answer.diagnostics,
     )
     with clock.stage("maps"):
         return assemble(maps, answer, provenance)
 
 
-def _check_used(settings: Settings, evidence: Evidence, prior_set: PriorSet | None) -> None:
+def _check_used(settings: Settings, evidence: KnownInputs, prior_set: PriorSet | None) -> None:
     """Raises `InputError` where something is given that the model does not look at."""
     if settings.model in SIRFS_MODELS:
         return
@@ -117,7 +100,7 @@ def _check_used(settings: Settings, evidence: Evidence, prior_set: PriorSet | No
         )
 
 
-def assemble(photo: Photo, answer: Answer, provenance: Provenance) -> Decomposition:
+def assemble(photo: Photo, answer: SceneEstimate, provenance: Provenance) -> Decomposition:
     """Normals, shading and reflectance that follow from the answer's height and light; `photo` is
     the one of its maps.
 
@@ -156,7 +139,7 @@ def _confidence(split: Separation, normal: np.ndarray, mask: np.ndarray) -> np.n
     )
 
 
-def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
+def _at_scale(evidence: KnownInputs, photo: Photo, working: Photo) -> SceneConstraints:
     """The evidence on the working photo's grid and in its pixels."""
     factor = working.scale / photo.scale
     for what, values in (("shape", evidence.height), ("depth", evidence.depth)):
@@ -179,13 +162,13 @@ def _at_scale(evidence: Evidence, photo: Photo, working: Photo) -> Known:
         )
     height = None if height is None else continued_height(height, working.mask)
     if evidence.depth is None:
-        return Known(height, light)
+        return SceneConstraints(height, light)
     seen = nearest_samples(evidence.depth, working.mask.shape, factor) * factor
     if not np.isfinite(seen[working.mask]).any():
         raise InputError(
             "the depth map has no value inside the mask, only holes: is it a map of this photo?"
         )
-    return Known(
+    return SceneConstraints(
         height, light, DepthObservation(seen, evidence.depth_sigma * factor, evidence.depth_weight)
     )
 

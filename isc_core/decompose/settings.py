@@ -53,9 +53,19 @@ class Settings:
     shape_prior: str = SEEN
 
     @property
-    def looks_at_shape(self) -> bool:
-        """Whether the shape is expected that the photo seems to show."""
+    def takes_priors(self) -> bool:
+        """Whether the model uses SIRFS priors."""
+        return self.model in SIRFS_MODELS
+
+    @property
+    def uses_predicted_normals(self) -> bool:
+        """Whether SIRFS expects the predicted normals."""
         return self.shape_prior == SEEN and self.illumination != LABORATORY
+
+    @property
+    def uses_predicted_light(self) -> bool:
+        """Whether SIRFS expects the predicted light."""
+        return self.light_prior == SEEN and self.illumination != LABORATORY
 
     def check(self) -> None:
         """Raises `InputError` for values that mean nothing."""

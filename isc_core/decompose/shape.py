@@ -1,110 +1,173 @@
-"""Shape and light of a diffuse image by SIRFS, as the models ask for it, and how that ended.
+"""Shape and light of a diffuse image by SIRFS, as the models use it.
 
-The priors know how bright paint and light are in photos. A float file may have any exposure: it is
-brought to one that photos have, and the light found is brought back, so that neither shape nor
-roughness depend on it. What the exposure of a photo tells of its paint is then lost: left out, the
-ten training objects have 2 % more error so (in natural and in laboratory light; at .55 11 %, at .4
-20 %).
+Problem: the priors know how bright albedo and light are in photos, but a float file may have any
+exposure.
+
+Equation: such an image is multiplied by a gain that brings it to the brightness of photos, and the
+recovered light is divided by the gain, so that neither shape nor roughness depend on the exposure.
+
+Limits: what the exposure of a photo says about its albedo is then lost: without it the ten training
+objects have 2 % more error (in natural and in laboratory light; at a level of .55 11 %, at .4 20 %).
 """
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..imaging.resampling import resample_height
-from ..photo.photo import Photo
+from ..photo import Photo
 from ..progress import Monitor
+from ..scene.diagnostics import Diagnostics, StopReason
+from ..scene.known_inputs import SceneConstraints
 from ..scene.light_estimate import LightEstimate
 from ..sirfs.kernel_cache import announce_compilation
-from ..sirfs.priors.predicted_light import seen_light
+from ..sirfs.priors.predicted_light import predicted_light_prior
 from ..sirfs.priors.prior_file import shipped_prior_set
 from ..sirfs.priors.priors import Priors
-from ..sirfs.recover import Known, Recovered, RecoverOptions, recover
+from ..sirfs.recover import Recovered, RecoverOptions, recover
 from ..sirfs.settings import isc_weights
 from ..sirfs.solver import SolverOptions
-from .layers import shifted
+from .layers import scaled_light
 from .settings import LABORATORY, USUAL
-from .task import Task
+from .task import DecompositionTask
 
-# of white, of the brightest channels' percentile below; of the training photos it is .23 to .87, of
-# others .4 to 1
-_USUAL = 0.75
+# Level of the brightest channels' percentile below, white being 1; it is .23 to .87 in the training
+# photos and .4 to 1 in others.
+_TYPICAL_LEVEL = 0.75
 _BRIGHT = 95.0  # percentile: most highlights are smaller
-_LEAST_TRUST = 0.05
+_LEAST_WEIGHT = 0.05
 
 
 @dataclass(frozen=True)
 class Shape:
-    """`height` (H, W) in pixels of the maps and `light` (9, 3), reference convention; `status`: how
-    they were found, JSON-ready. `working_height` (h, w): at the working scale.
+    """Recovered shape and light.
+
+    Attributes
+    ----------
+    height : (H, W) ndarray
+        Pixels of the maps, toward the viewer.
+    light : (9, 3) ndarray
+        Log-shading SH coefficients, reference convention.
+    diagnostics : Diagnostics
+        How the solver ended.
+    working_height : (h, w) ndarray
+        The height at the working scale, in its pixels.
     """
 
     height: np.ndarray
     light: np.ndarray
-    status: dict[str, Any]
+    diagnostics: Diagnostics
     working_height: np.ndarray
 
 
 def recover_shape(
-    diffuse: np.ndarray, task: Task, monitor: Monitor, trust: np.ndarray | None = None
+    diffuse: np.ndarray,
+    task: DecompositionTask,
+    monitor: Monitor,
+    weight: np.ndarray | None = None,
 ) -> Shape:
-    """SIRFS on the working photo's diffuse image (H, W, 3), brought to the scale of the maps.
-    `trust` (H, W): see `trust_of`.
+    """Recover shape and light by SIRFS, and bring the shape to the scale of the maps.
 
-    Raises `InputError`, `Cancelled`.
+    Parameters
+    ----------
+    diffuse : (h, w, 3) ndarray
+        Diffuse image of the working photo, linear Rec.709.
+    task : DecompositionTask
+        The photo, the settings and what is known of the scene.
+    monitor : Monitor
+        Receives progress.
+    weight : (h, w) ndarray, optional
+        Weight of each pixel's reflectance terms, see `confidence_weight`.
+
+    Returns
+    -------
+    Shape
+        Height, light and the solver's diagnostics.
+
+    Raises
+    ------
+    InputError
+        If the known quantities do not fit.
+    Cancelled
+        If the monitor cancels.
     """
-    result = _recover(diffuse, task, task.known, monitor, trust)
+    result = _recover(diffuse, task, task.known, monitor, weight)
     return Shape(
         height_of_maps(result.height, task),
         np.broadcast_to(result.light, (9, 3)).copy(),
-        _status(result),
+        _diagnostics(result),
         result.height,
     )
 
 
 def energy_of(
-    diffuse: np.ndarray, shape: Shape, task: Task, trust: np.ndarray | None = None
+    diffuse: np.ndarray, shape: Shape, task: DecompositionTask, weight: np.ndarray | None = None
 ) -> float:
-    """The SIRFS objective of the working photo's `diffuse` image (H, W, 3) at `shape`;
+    """Evaluate the SIRFS objective of a diffuse image at a given shape and light.
 
-    `trust` (H, W): see `trust_of`.
+    Parameters
+    ----------
+    diffuse : (h, w, 3) ndarray
+        Diffuse image of the working photo, linear Rec.709.
+    shape : Shape
+        Shape and light at which the objective is evaluated.
+    task : DecompositionTask
+        The photo and the settings.
+    weight : (h, w) ndarray, optional
+        As for `recover_shape`.
+
+    Returns
+    -------
+    float
+        The sum of all terms.
     """
-    return _recover(
-        diffuse, task, Known(shape.working_height, shape.light, task.known.depth), Monitor(), trust
-    ).terms.total
+    fixed = SceneConstraints(shape.working_height, shape.light, task.known.depth)
+    return _recover(diffuse, task, fixed, Monitor(), weight).terms.total
 
 
-def trust_of(confidence: np.ndarray, wanted: bool) -> np.ndarray | None:
-    """How much a pixel's reflectance counts in SIRFS, (H, W), of a separation's `confidence` (H, W)
-    in [0, 1]: never nothing.
+def confidence_weight(confidence: np.ndarray, enabled: bool) -> np.ndarray | None:
+    """Turn a separation's confidence into weights of SIRFS' reflectance terms.
 
-    None, so that all count alike, unless that is `wanted`.
+    Parameters
+    ----------
+    confidence : (h, w) ndarray
+        In [0, 1].
+    enabled : bool
+        Whether pixels are weighted at all.
+
+    Returns
+    -------
+    (h, w) ndarray of float64, or None
+        Weights, never 0; None where all pixels weigh alike.
     """
-    return np.maximum(confidence, _LEAST_TRUST).astype(np.float64) if wanted else None
+    return np.maximum(confidence, _LEAST_WEIGHT).astype(np.float64) if enabled else None
 
 
 def _recover(
-    diffuse: np.ndarray, task: Task, known: Known, monitor: Monitor, trust: np.ndarray | None
+    diffuse: np.ndarray,
+    task: DecompositionTask,
+    known: SceneConstraints,
+    monitor: Monitor,
+    weight: np.ndarray | None,
 ) -> Recovered:
     settings, working = task.settings, task.working
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
     priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
-    priors = looked_at(priors, task.light_estimate, settings.light_prior, settings.illumination)
-    options = RecoverOptions(
-        shading_only=settings.shading_only,
-        solver=SolverOptions(engine=settings.engine, threads=settings.threads),
+    priors = with_predicted_light(
+        priors, task.light_estimate, settings.light_prior, settings.illumination
     )
-    weights = isc_weights(settings.illumination, channels, shape_seen=task.seen is not None)
+    weights = isc_weights(
+        settings.illumination, channels, normals_predicted=task.normal_estimate is not None
+    )
     light = (
         known.light
         if known.light is None or channels == 3
         else known.light.mean(axis=1, keepdims=True)
     )
-    gain = _usual_exposure(working)
+    gain = _exposure_gain(working)
     if light is not None and gain != 1:
-        light = shifted(light, np.log(gain))
+        light = scaled_light(light, np.log(gain))
     with task.clock.stage("shape and light"):
         found = recover(
             diffuse[..., :channels] * diffuse.dtype.type(gain),
@@ -112,49 +175,99 @@ def _recover(
             gain * working.code_value / 2,
             priors,
             weights,
-            options,
-            trust=trust,
-            seen=task.seen,
-            known=Known(known.height, light, known.depth),
+            _recover_options(task),
+            pixel_weight=weight,
+            predicted_normals=task.normal_estimate,
+            silhouette=task.silhouette,
+            known=SceneConstraints(known.height, light, known.depth),
             monitor=monitor,
         )
-    return found if gain == 1 else replace(found, light=shifted(found.light, -np.log(gain)))
+    return found if gain == 1 else replace(found, light=scaled_light(found.light, -np.log(gain)))
 
 
-def looked_at(
+def _recover_options(task: DecompositionTask) -> RecoverOptions:
+    settings, options = task.settings, task.options
+    return RecoverOptions(
+        options.solve_size,
+        options.margin,
+        options.whole_frame,
+        options.drop_near_edge,
+        settings.shading_only,
+        SolverOptions(engine=settings.engine, threads=settings.threads),
+    )
+
+
+def with_predicted_light(
     priors: Priors, light_estimate: LightEstimate | None, light_prior: str, illumination: str
 ) -> Priors:
-    """`priors`, told how the photo's light looks where that is asked for and somebody looked.
+    """Replace the prior of the light by one around the predicted light.
 
-    A laboratory's light is known as well.
+    Parameters
+    ----------
+    priors : Priors
+        Priors of the data set.
+    light_estimate : LightEstimate or None
+        Predicted light.
+    light_prior : str
+        See `Settings.light_prior`.
+    illumination : str
+        See `Settings.illumination`; laboratory light is known, and stays as it is.
+
+    Returns
+    -------
+    Priors
+        Unchanged where no predicted light is to be used.
     """
     if light_estimate is None or light_prior == USUAL or illumination == LABORATORY:
         return priors
     return replace(
-        priors, light=seen_light(priors.light, light_estimate.light, light_estimate.deviations)
+        priors,
+        light=predicted_light_prior(priors.light, light_estimate.light, light_estimate.deviations),
     )
 
 
-def _usual_exposure(photo: Photo) -> float:
-    """What the light of a photo of unknown exposure is multiplied by, so that it is as bright as
-    photos are; 1 of others.
-    """
+def _exposure_gain(photo: Photo) -> float:
+    """The gain of a photo of unknown exposure; 1 for others."""
     if photo.exposed:
         return 1.0
     return exposure_normalisation(photo.image, photo.mask)
 
 
 def exposure_normalisation(image: np.ndarray, mask: np.ndarray) -> float:
-    """What linear light (H, W, C) is multiplied by, so that it is as bright inside `mask` (H, W)
-    bool as photos are.
+    """Compute the gain that makes an object as bright as those of photos.
+
+    Parameters
+    ----------
+    image : (H, W, C) ndarray
+        Linear light.
+    mask : (H, W) ndarray of bool
+        The object.
+
+    Returns
+    -------
+    float
+        Factor of the image.
     """
     brightest = image[mask].max(axis=1)
     level = float(np.percentile(brightest, _BRIGHT)) or float(brightest.max())
-    return _USUAL / level
+    return _TYPICAL_LEVEL / level
 
 
-def height_of_maps(height: np.ndarray, task: Task) -> np.ndarray:
-    """The working height (h, w) on the grid of the maps and in its pixels, smoothly: (H, W)."""
+def height_of_maps(height: np.ndarray, task: DecompositionTask) -> np.ndarray:
+    """Resample the working height to the grid of the maps.
+
+    Parameters
+    ----------
+    height : (h, w) ndarray
+        Working pixels toward the viewer.
+    task : DecompositionTask
+        Both scales.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Pixels of the maps, toward the viewer.
+    """
     if task.one_scale:
         return height
     return resample_height(height, task.maps.mask.shape, task.maps.scale / task.working.scale)
@@ -167,14 +280,12 @@ def _is_grey(image: np.ndarray, mask: np.ndarray) -> bool:
     )
 
 
-def _status(result: Recovered) -> dict[str, Any]:
-    trouble = "the solver ran out of evaluations, so the result may not be its best: a cleaner mask or the other --illumination may help"
-    return {
-        "converged": result.converged,
-        "reason": result.reason,
-        "loss": result.terms.total,
-        "terms": dict(result.terms.__dict__),
-        "iterations": result.iterations,
-        "evaluations": result.evaluations,
-        "help": "" if result.converged else trouble,
-    }
+def _diagnostics(result: Recovered) -> Diagnostics:
+    return Diagnostics(
+        converged=result.converged,
+        reason=StopReason(result.reason),
+        loss=result.terms.total,
+        terms=dict(result.terms.__dict__),
+        iterations=result.iterations,
+        evaluations=result.evaluations,
+    )

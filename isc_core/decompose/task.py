@@ -1,4 +1,4 @@
-"""What every model is given, and what it answers."""
+"""What every model is given, and what it returns."""
 
 import time
 from collections.abc import Iterator
@@ -8,52 +8,128 @@ from typing import Any
 
 import numpy as np
 
-from ..photo.photo import Photo
+from ..networks.layer_network import LayerNetwork
+from ..photo import Photo
 from ..progress import Monitor
 from ..scene.decomposition import Separation
+from ..scene.diagnostics import Diagnostics
+from ..scene.known_inputs import SceneConstraints
 from ..scene.light_estimate import LightEstimate
 from ..scene.lobe_fit import LobeFit
 from ..scene.normal_estimate import NormalEstimate
 from ..sirfs.priors.prior_set import PriorSet
-from ..sirfs.recover import Known
+from ..sirfs.recover import MARGIN, SOLVE_SIZE
 from .settings import Settings
 
 
 @dataclass
 class Clock:
-    """Seconds spent in each stage."""
+    """Seconds spent in each stage.
+
+    Attributes
+    ----------
+    seconds : dict of str to float
+        Seconds by stage, in the order in which the stages began.
+    """
 
     seconds: dict[str, float] = field(default_factory=dict)
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Adds up what the `with` block takes."""
+        """Add the duration of the `with` block to the stage `name`.
+
+        Parameters
+        ----------
+        name : str
+            Key in `seconds`.
+        """
         start = time.perf_counter()
         yield
         self.seconds[name] = round(self.seconds.get(name, 0.0) + time.perf_counter() - start, 4)
 
 
 @dataclass(frozen=True)
-class Task:
-    """One photo to be explained.
+class SolveOptions:
+    """How the pipeline runs, where a protocol asks for something other than `decompose`'s defaults.
 
-    `working`: the photo at the scale at which shape and light are looked for; `maps`: at the scale
-    of the result's maps, the same object where the two scales are one. `known`: at the working
-    scale. `prior_set`: the shipped one if None. `split`: the layers of `maps` by the separator of
-    the settings, where they have been found before; else None. `light_estimate`: how the photo's light
-    looks, `seen`: how its shape does, at the working scale; None where nobody has looked yet.
+    None of it is a user's setting: the defaults are what every user runs. Evaluation under a
+    published protocol sets the others, see `evaluation.runner`.
+
+    Attributes
+    ----------
+    solve_size : int
+        Long side of the object's box, pixels, at which SIRFS is solved; 0 for the working size.
+    margin : int
+        Pixels of empty space around the box at that size.
+    whole_frame : bool
+        SIRFS is solved on the frame as given, not on a window around the object.
+    drop_near_edge : bool
+        Occluding-contour points near the frame are ignored.
+    layer_dtype : type
+        Precision of the layers and of the shading that they are divided by.
+    fit_lobe : bool
+        A lobe is fitted to the specular layer.
+    check_assumptions : bool
+        The photo is checked against the models' assumptions, and the light's colour is estimated
+        even where it is not used.
+    layer_network : LayerNetwork or None
+        Network of the model joint; None for the shipped one.
+    """
+
+    solve_size: int = SOLVE_SIZE
+    margin: int = MARGIN
+    whole_frame: bool = False
+    drop_near_edge: bool = False
+    layer_dtype: type[np.floating[Any]] = np.float32
+    fit_lobe: bool = True
+    check_assumptions: bool = True
+    layer_network: LayerNetwork | None = None
+
+
+@dataclass(frozen=True)
+class DecompositionTask:
+    """One photo to be decomposed.
+
+    Attributes
+    ----------
+    working : Photo
+        The photo at the scale at which shape and light are recovered.
+    maps : Photo
+        The photo at the scale of the result's maps; the same object where the two scales agree.
+    settings : Settings
+        The user's settings.
+    known : SceneConstraints
+        Known shape, light and depth at the working scale.
+    prior_set : PriorSet or None
+        SIRFS priors; None for the shipped set.
+    monitor : Monitor
+        Receives progress; can cancel.
+    clock : Clock
+        Receives the duration of each stage.
+    split : Separation or None
+        Layers of `maps` by the separator of the settings, where already computed.
+    light_estimate : LightEstimate or None
+        Predicted light, where already computed.
+    normal_estimate : NormalEstimate or None
+        Predicted normals at the working scale, where already computed.
+    silhouette : (h, w) ndarray of bool or None
+        Outline of the object in `working`; None where it is the working photo's mask.
+    options : SolveOptions
+        What a protocol changes in the pipeline.
     """
 
     working: Photo
     maps: Photo
     settings: Settings
-    known: Known = field(default_factory=Known)
+    known: SceneConstraints = field(default_factory=SceneConstraints)
     prior_set: PriorSet | None = None
     monitor: Monitor = field(default_factory=Monitor)
     clock: Clock = field(default_factory=Clock)
     split: Separation | None = None
     light_estimate: LightEstimate | None = None
-    seen: NormalEstimate | None = None
+    normal_estimate: NormalEstimate | None = None
+    silhouette: np.ndarray | None = None
+    options: SolveOptions = field(default_factory=SolveOptions)
 
     @property
     def one_scale(self) -> bool:
@@ -62,15 +138,31 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """`split`: the layers of `Task.maps`, which sum up to the image. `height` (H, W) in pixels of
-    the maps and `light` (9, 3), both in SIRFS' reference convention: normals, shading and
-    reflectance follow from them. `status`: JSON-ready, how the solver ended. `brdf`: the lobe
-    fitted to the specular layer, None where the model has no specular layer.
+class SceneEstimate:
+    """What a model recovers from a photo.
+
+    Normals, shading and reflectance follow from height and light.
+
+    Attributes
+    ----------
+    split : Separation
+        Layers of `DecompositionTask.maps`, which sum to the image.
+    height : (H, W) ndarray
+        Pixels of the maps, toward the viewer.
+    light : (9, 3) ndarray
+        Log-shading SH coefficients, reference convention.
+    diagnostics : Diagnostics
+        How the solver ended, and what the checks found.
+    brdf : LobeFit or None
+        Lobe fitted to the specular layer; None where there is no such layer.
+    log_shading : (h, w, 3) ndarray or None
+        A baseline's own log shading at the working scale, where it has one. The maps of a result
+        never use it, since their shading is that of the light on the normals.
     """
 
     split: Separation
     height: np.ndarray
     light: np.ndarray
-    status: dict[str, Any]
+    diagnostics: Diagnostics
     brdf: LobeFit | None = None
+    log_shading: np.ndarray | None = None

@@ -1,50 +1,73 @@
-"""How each model is run on the MIT-Berkeley set: at the images' own scale, on the data set's crop,
-with the project's weights.
+"""How each model is run on the MIT-Berkeley set, under one of two protocols.
 
-The protocol of J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712: the image is
-explained where all its channels are above zero, and the occluding contour is that of the object's
-mask, without the points near the crop's frame.
+Both run the pipeline of `isc decompose` (`decompose.models.solve`). "reference" is the protocol of
+J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712: SIRFS is solved at the images' own
+scale on the data set's crop; the image is explained where all its channels are above zero; the
+occluding contour is that of the object's mask, without the points near the crop's frame. "users" is
+`decompose` at its defaults on the crop, its maps at the crop's resolution.
+
+Limits: under "reference" no lobe is fitted and no assumption is checked, since neither is scored.
 """
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 
-from .. import baselines
 from ..datasets.mit_berkeley import MitBerkeleyObject
-from ..decompose.joint import Explain, JointOptions, believed, doubt, stepped
-from ..decompose.mbp import split_reflectance
-from ..decompose.pipeline import BASELINE_MODELS, Settings
-from ..decompose.settings import OUTLINE, SEEN, USUAL
-from ..decompose.shape import looked_at, trust_of
+from ..decompose.models import solve
+from ..decompose.pipeline import decompose
+from ..decompose.settings import OUTLINE, SEEN, USUAL, Settings
+from ..decompose.task import DecompositionTask, SceneEstimate, SolveOptions
 from ..networks.layer_network import LayerNetwork
-from ..networks.light_network import predict_light
-from ..networks.normal_network import predict_normals
+from ..photo import Photo, PhotoSource
 from ..progress import Monitor
-from ..scene.decomposition import Separation
-from ..scene.normal_estimate import NormalEstimate
-from ..separation import BEST, separate
-from ..shading.occluding_contour import occluding_contour
+from ..separation import BEST
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
 from ..shading.surface_stencils import normals
-from ..sirfs.kernel_cache import announce_compilation
-from ..sirfs.normal_prior import expected_field
 from ..sirfs.priors.prior_set import PriorSet
-from ..sirfs.priors.priors import Priors
-from ..sirfs.problem import Problem
-from ..sirfs.settings import Weights, isc_weights
-from ..sirfs.solver import SirfsResult, SolverOptions, solve
 from .evaluate import Estimate, Runner
 
-_HALF_CODE = 0.5 / 65535  # the images have 16 bits; a separation may leave less than one code
+_CODE = 1 / 65535  # the images have 16 bits; a separation may leave less than half a code
+
+
+class Protocol(StrEnum):
+    """What is measured.
+
+    Attributes
+    ----------
+    REFERENCE
+        The published protocol: own scale, the data set's crop.
+    USERS
+        `decompose` at its defaults.
+    """
+
+    REFERENCE = "reference"
+    USERS = "users"
 
 
 @dataclass(frozen=True)
 class RunnerOptions:
-    """`model`: one of `decompose.pipeline.MODELS`; `separator`: one of `separation.METHODS`, for the models
-    that separate; `engine`, `threads`: see `SolverOptions`; `confidence_weights`, `light_prior`,
-    `shape_prior`: see `Settings`. SIRFS is measured by itself unless more is asked for: it expects
-    the usual lights, and what the outline suggests.
+    """What is run on each object.
+
+    The defaults measure SIRFS alone: priors of the data set, and of the silhouette.
+
+    Attributes
+    ----------
+    model : str
+        One of `decompose.settings.MODELS`.
+    separator : str
+        One of `separation.METHODS`, for the models that separate.
+    engine : str
+        See `SolverOptions`.
+    threads : int
+        See `SolverOptions`.
+    confidence_weights : bool
+        See `Settings`.
+    light_prior, shape_prior : str or None
+        See `Settings`. None: the default of the protocol.
+    protocol : Protocol
+        What is measured.
     """
 
     model: str = "sirfs"
@@ -52,208 +75,168 @@ class RunnerOptions:
     engine: str = "auto"
     threads: int = 0
     confidence_weights: bool = False
-    light_prior: str = USUAL
-    shape_prior: str = OUTLINE
+    light_prior: str | None = None
+    shape_prior: str | None = None
+    protocol: Protocol = Protocol.REFERENCE
 
-    def check(self) -> None:
-        """Raises `InputError` for values that mean nothing."""
-        Settings(
+    def settings(self, illumination: str = "natural") -> Settings:
+        """Return the pipeline's settings.
+
+        Parameters
+        ----------
+        illumination : str, optional
+            Illumination of the object.
+
+        Returns
+        -------
+        Settings
+            Under `Protocol.USERS` with maps at the photo's resolution.
+        """
+        users = self.protocol == Protocol.USERS
+        return Settings(
             self.model,
             self.separator,
+            illumination,
+            full_size=users,
             engine=self.engine,
             threads=self.threads,
             confidence_weights=self.confidence_weights,
-            light_prior=self.light_prior,
-            shape_prior=self.shape_prior,
-        ).check()
+            light_prior=self.light_prior or (SEEN if users else USUAL),
+            shape_prior=self.shape_prior or (SEEN if users else OUTLINE),
+        )
 
+    def check(self) -> None:
+        """Validate the options.
 
-@dataclass(frozen=True)
-class _Expected:
-    """What SIRFS is told beforehand; `seen`: of the shape, where it was asked for."""
-
-    priors: Priors
-    weights: Weights
-    seen: NormalEstimate | None = None
-
-
-def _expected(truth: MitBerkeleyObject, usual: Priors, options: RunnerOptions) -> _Expected:
-    photo = np.maximum(truth.image, 0).astype(np.float32)
-    light_estimate = predict_light(photo, truth.valid) if options.light_prior == SEEN else None
-    priors = looked_at(usual, light_estimate, options.light_prior, truth.illumination)
-    seen = predict_normals(photo, truth.valid) if options.shape_prior == SEEN else None
-    return _Expected(priors, isc_weights(truth.illumination, 3, shape_seen=seen is not None), seen)
+        Raises
+        ------
+        InputError
+            If a value is unknown or does not apply to the model.
+        """
+        self.settings().check()
 
 
 def make_runner(
     options: RunnerOptions, prior_set: PriorSet, network: LayerNetwork | None = None
 ) -> Runner:
-    """What `evaluate` runs on each object; `network`: of the model joint's layers, the shipped one
-    if None.
+    """Make the function that `evaluate` runs on each object.
 
-    Raises `InputError` for unknown options.
+    Parameters
+    ----------
+    options : RunnerOptions
+        Model and protocol.
+    prior_set : PriorSet
+        SIRFS priors.
+    network : LayerNetwork, optional
+        Network of the model joint under `Protocol.REFERENCE`; the shipped one by default.
+
+    Returns
+    -------
+    Runner
+        Explains one object.
+
+    Raises
+    ------
+    InputError
+        If the options are invalid.
     """
     options.check()
-    tables: dict[str, Priors] = {}
 
-    def run(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
-        diffuse, trust = _separated_first(truth, options)
-        log_image = _log(diffuse, truth)
-        if options.model in BASELINE_MODELS:
-            guess = baselines.estimate(options.model, log_image, truth.valid)
-            return _estimate(
-                truth, log_image, guess.height, guess.light, log_shading=guess.log_shading
-            )
-        announce_compilation(options.engine, monitor)
-        if truth.illumination not in tables:
-            tables[truth.illumination] = prior_set.priors(truth.illumination, 3)
-        expected = _expected(truth, tables[truth.illumination], options)
-        if options.model == "joint":
-            return joint_estimate(truth, expected, options, monitor, network)
-        result = solve_sirfs(truth, log_image, expected, options, monitor, trust)
-        if options.model == "mbp":
-            log_image = _log_separated_reflectance(truth, result, options)
-        return _estimate(truth, log_image, result.height, result.light, result)
+    def reference(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
+        task = reference_task(truth, options, prior_set, network, monitor)
+        return _estimate(truth, solve(task))
 
-    return run
+    def users(truth: MitBerkeleyObject, monitor: Monitor) -> Estimate:
+        return _as_users_run(truth, options, prior_set, monitor)
+
+    return users if options.protocol == Protocol.USERS else reference
 
 
-def pose(
+def reference_task(
     truth: MitBerkeleyObject,
-    log_image: np.ndarray,
-    priors: Priors,
-    weights: Weights,
-    trust: np.ndarray | None = None,
-    seen: NormalEstimate | None = None,
-) -> Problem:
-    """The problem as the reference program poses it; `log_image` (H, W, 3) is read where
-    `truth.valid`. `trust` (H, W): see `Problem`; `seen`: of the shape, instead of what the outline
-    suggests.
-    """
-    contour = occluding_contour(truth.mask, drop_near_edge=True)
-    field = expected_field(truth.mask, priors.silhouette, seen)
-    return Problem(
-        log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=field, trust=trust
-    )
-
-
-def solve_sirfs(
-    truth: MitBerkeleyObject,
-    log_image: np.ndarray,
-    expected: _Expected,
     options: RunnerOptions,
-    monitor: Monitor,
-    trust: np.ndarray | None = None,
-) -> SirfsResult:
-    """SIRFS on one object of the set;
-
-    `log_image` (H, W, 3) is read where `truth.valid`. Looks at nothing else but `truth.mask`.
-    """
-    problem = pose(truth, log_image, expected.priors, expected.weights, trust, expected.seen)
-    return solve(
-        problem, SolverOptions(engine=options.engine, threads=options.threads), monitor=monitor
-    )
-
-
-def joint_estimate(
-    truth: MitBerkeleyObject,
-    expected: _Expected,
-    options: RunnerOptions,
-    monitor: Monitor,
+    prior_set: PriorSet,
     network: LayerNetwork | None = None,
+    monitor: Monitor | None = None,
+) -> DecompositionTask:
+    """Set up one object under the reference protocol.
+
+    Only the image, its valid pixels and the mask of `truth` are read.
+
+    Parameters
+    ----------
+    truth : MitBerkeleyObject
+        The object.
+    options : RunnerOptions
+        Model and priors.
+    prior_set : PriorSet
+        SIRFS priors.
+    network : LayerNetwork, optional
+        Network of the model joint; the shipped one by default.
+    monitor : Monitor, optional
+        Receives progress.
+
+    Returns
+    -------
+    DecompositionTask
+        For `decompose.models.solve`.
+    """
+    photo = _photo(truth, truth.image, truth.valid)
+    protocol = SolveOptions(
+        solve_size=0,
+        whole_frame=True,
+        drop_near_edge=True,
+        layer_dtype=np.float64,
+        fit_lobe=False,
+        check_assumptions=False,
+        layer_network=network,
+    )
+    return DecompositionTask(
+        photo,
+        photo,
+        options.settings(truth.illumination),
+        prior_set=prior_set,
+        monitor=monitor or Monitor(),
+        silhouette=truth.mask,
+        options=protocol,
+    )
+
+
+def _as_users_run(
+    truth: MitBerkeleyObject, options: RunnerOptions, prior_set: PriorSet, monitor: Monitor
 ) -> Estimate:
-    """`decompose.joint` on one object; `network`: of its layers, the shipped one if None."""
-    joint, valid = JointOptions(), truth.valid
-    split = separate(options.separator, truth.image, valid)
-    by_colour = _left_of(truth, split)
-    found = doubt(truth.image, by_colour, valid, joint, network)
-    trust = trust_of(believed(split.confidence, found), options.confidence_weights)
-    how = SolverOptions(engine=options.engine, threads=options.threads)
-
-    def energy(diffuse: np.ndarray, there: SirfsResult) -> float:
-        problem = pose(
-            truth, _log(diffuse, truth), expected.priors, expected.weights, trust, expected.seen
-        )
-        return solve(problem, how, known_height=there.height, known_light=there.light).terms.total
-
-    explain = Explain(
-        solve=lambda diffuse: solve_sirfs(
-            truth, _log(diffuse, truth), expected, options, monitor, trust
-        ),
-        shading=lambda there: np.exp(
-            _log_shading(normal_from_reference(normals(there.height)), there.light)
-        ),
-        energy=energy,
-    )
-    step = stepped(found, by_colour, valid, explain, joint)
-    return _estimate(
-        truth, _log(step.diffuse, truth), step.shape.height, step.shape.light, step.shape
-    )
-
-
-def _separated_first(
-    truth: MitBerkeleyObject, options: RunnerOptions
-) -> tuple[np.ndarray, np.ndarray | None]:
-    """What shape and light are recovered from (H, W, 3), the diffuse image if separation comes
-    first, and its trust (H, W) if wanted.
-    """
-    if options.model != "mdr":
-        return truth.image, None
-    split = separate(options.separator, truth.image, truth.valid)
-    return _left_of(truth, split), trust_of(split.confidence, options.confidence_weights)
-
-
-def _left_of(truth: MitBerkeleyObject, split: Separation) -> np.ndarray:
-    """The diffuse image (H, W, 3) in the image's own precision, so that SIRFS sees the same image
-    where nothing was taken off.
-    """
-    return np.asarray(np.maximum(truth.image - split.specular, 0))
-
-
-def _log_separated_reflectance(
-    truth: MitBerkeleyObject, result: SirfsResult, options: RunnerOptions
-) -> np.ndarray:
-    """Log of the diffuse image (H, W, 3), 0 where it is not valid, if what SIRFS took for
-    reflectance is separated.
-    """
-    shading = np.exp(_log_shading(normal_from_reference(normals(result.height)), result.light))
-    return _log(
-        split_reflectance(truth.image, shading, truth.valid, None, options.separator).diffuse, truth
-    )
-
-
-def _log(diffuse: np.ndarray, truth: MitBerkeleyObject) -> np.ndarray:
-    return np.where(truth.valid[..., None], np.log(np.maximum(diffuse, _HALF_CODE)), 0.0)
-
-
-def _estimate(
-    truth: MitBerkeleyObject,
-    log_image: np.ndarray,
-    height: np.ndarray,
-    light: np.ndarray,
-    result: SirfsResult | None = None,
-    log_shading: np.ndarray | None = None,
-) -> Estimate:
-    """The maps that follow from height and light (9, 3), both in the reference's convention.
-
-    `log_shading` (H, W, 3): a method's own, where it has one; else that of the light on the
-    normals.
-    """
-    normal = normal_from_reference(normals(height))
-    log_shading = _log_shading(normal, light) if log_shading is None else log_shading
-    reflectance = np.where(truth.valid[..., None], np.exp(log_image - log_shading), 0.0)
-    loss, evaluations = (None, None) if result is None else (result.terms.total, result.evaluations)
+    """What `isc decompose` makes of the crop and the object's mask."""
+    photo = _photo(truth, truth.image.astype(np.float32), truth.mask)
+    settings = options.settings(truth.illumination)
+    given = prior_set if settings.takes_priors else None
+    result = decompose(photo, settings, prior_set=given, name=truth.name, monitor=monitor)
+    diagnostics = result.provenance.diagnostics
     return Estimate(
-        height,
-        normal,
-        np.exp(log_shading),
-        reflectance,
-        light_from_reference(light),
-        loss,
-        evaluations,
+        result.height.astype(float),
+        result.normal.astype(float),
+        result.shading.astype(float),
+        result.reflectance.astype(float),
+        result.illumination,
+        diagnostics.loss,
+        diagnostics.evaluations,
     )
 
 
-def _log_shading(normal: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """(H, W, 3) of normals in the camera's frame under a light in the reference's convention."""
-    return real_sh(normal) @ light_from_reference(light)
+def _photo(truth: MitBerkeleyObject, image: np.ndarray, mask: np.ndarray) -> Photo:
+    height, width = mask.shape
+    source = PhotoSource("", (width, height), 16, "linear", "file")
+    return Photo(image, mask, _CODE, np.zeros_like(truth.mask), source)
+
+
+def _estimate(truth: MitBerkeleyObject, found: SceneEstimate) -> Estimate:
+    """The maps that follow from height and light, in the data set's precision."""
+    normal = normal_from_reference(normals(found.height))
+    light = light_from_reference(found.light)
+    log_shading = real_sh(normal) @ light if found.log_shading is None else found.log_shading
+    valid = truth.valid[..., None]
+    log_diffuse = np.where(valid, np.log(np.maximum(found.split.diffuse, _CODE / 2)), 0.0)
+    reflectance = np.where(valid, np.exp(log_diffuse - log_shading), 0.0)
+    loss, evaluations = found.diagnostics.loss, found.diagnostics.evaluations
+    return Estimate(
+        found.height, normal, np.exp(log_shading), reflectance, light, loss, evaluations
+    )

@@ -41,6 +41,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..imaging.smoothing import masked_gaussian
+from ..scene.diagnostics import IlluminantOutcome
 from .gamut import PLANE, leads_to, turns, without_white
 
 _FINE = 0.006  # of the object's diagonal: changes are taken over twice this
@@ -69,16 +70,34 @@ class IlluminantOptions:
 
 @dataclass(frozen=True)
 class Illuminant:
-    """`colour` (3,) > 0, of mean 1: white where nothing can be said. `confidence` in [0, 1]: how
-    much of it is the photo's word. `determined`: whether that is enough; `reason`: why not, or on
-    what it rests. `too_strong`: the light may have a colour that no lamp has.
+    """The estimated colour of the light.
+
+    Attributes
+    ----------
+    colour : (3,) ndarray
+        Linear RGB > 0 of mean 1; white where the photo has no information.
+    confidence : float
+        Share of the data's precision in its weakest direction, in [0, 1].
+    outcome : IlluminantOutcome
+        Whether the photo determines the colour, and if not, why.
     """
 
     colour: np.ndarray
     confidence: float
-    determined: bool
-    reason: str
-    too_strong: bool = False
+    outcome: IlluminantOutcome
+
+    @property
+    def determined(self) -> bool:
+        """Whether the photo determines the colour."""
+        return self.outcome == IlluminantOutcome.DETERMINED
+
+    @property
+    def too_strong(self) -> bool:
+        """Whether the light may have a colour that no lamp has."""
+        return self.outcome in (
+            IlluminantOutcome.STRONG_OBJECT_COLOUR,
+            IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR,
+        )
 
 
 @dataclass(frozen=True)
@@ -113,42 +132,25 @@ def estimate_illuminant(
         raise InputError("usual must be above 0, doubt at least 0, enough within [0, 1]")
     changes = _changes(image, mask if clipped is None else mask & ~clipped)
     if without_white(changes.colour, changes.change):
-        return Illuminant(
-            np.ones(3),
-            0.0,
-            False,
-            "all of the object is of one strong colour, its brightest places too",
-            True,
-        )
+        return _white(IlluminantOutcome.STRONG_OBJECT_COLOUR)
     shift = np.zeros(2)
     precision = np.zeros((2, 2))
     for _ in range(_GATES):
         flanks = _flanks(changes, _colour(shift))
         if flanks.sum() < _FEW:
-            return Illuminant(
-                np.ones(3),
-                0.0,
-                False,
-                "no coloured paint carries a highlight whose flank can be seen",
-            )
+            return _white(IlluminantOutcome.NO_FLANKS)
         shift, precision = _planes(changes, flanks, shift, options)
     weakest = float(np.linalg.eigvalsh(precision)[0])
     confidence = weakest / (weakest + 1 / options.usual**2)
     if np.abs(PLANE @ shift).max() > _FARTHEST:
-        return Illuminant(
-            np.ones(3),
-            0.0,
-            False,
-            "what looks like highlights has too strong a colour for a light: it may be paint",
-            True,
-        )
+        return _white(IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR)
     determined = confidence >= options.enough
-    reason = (
-        f"{int(flanks.sum())} changes across highlights agree"
-        if determined
-        else "the highlights lie on one paint, or disagree"
-    )
-    return Illuminant(_colour(shift), confidence, determined, reason)
+    outcome = IlluminantOutcome.DETERMINED if determined else IlluminantOutcome.UNRELIABLE
+    return Illuminant(_colour(shift), confidence, outcome)
+
+
+def _white(outcome: IlluminantOutcome) -> Illuminant:
+    return Illuminant(np.ones(3), 0.0, outcome)
 
 
 def whitened(image: np.ndarray, colour: np.ndarray) -> np.ndarray:

@@ -19,14 +19,10 @@ from scipy.optimize import minimize_scalar
 from ..errors import InputError
 from ..scene.lobe_fit import (
     CONVENTION,
-    FOUND,
-    NARROW,
-    NO_LIGHT,
-    SMOOTH,
-    UNLIKE,
     Interval,
     LobeFit,
     LobeFitOptions,
+    LobeFitOutcome,
 )
 from .environment_response import Surroundings, respond_to, surroundings, table_of
 from .lamps import ALPHAS
@@ -65,9 +61,9 @@ def fit_under(
     """
     specular, normal, mask = seen.specular, seen.normal, seen.mask
     sky = _checked(radiance)
-    convention, empty = CONVENTION[options.model], np.zeros(specular.shape, np.float32)
+    convention = CONVENTION[options.model]
     if not radiance.any():
-        return LobeFit(convention, False, NO_LIGHT, None, None, (), None, None, 0.0, empty)
+        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, specular.shape)
     least = max(ALPHAS[0], 0.5 * np.pi / len(radiance))
     rungs = np.linspace(np.log(least), np.log(ALPHAS[1]), _RUNGS)
     tried = [_try(sky, pixels, options, rung) for rung in rungs]
@@ -89,26 +85,25 @@ def fit_under(
     sd_alpha, sd_strength, allowed = _deviations(sky, pixels, chosen, options)
     far = [t for t in tried if abs(t.log_alpha - chosen.log_alpha) > np.log(_FLAT)]
     flat = any(t.loss - chosen.loss < allowed or _alike(t, chosen, pixels) for t in far)
-    reason = (
-        UNLIKE
+    outcome = (
+        LobeFitOutcome.UNEXPLAINED
         if explained < _LEAST_EXPLAINED
-        else SMOOTH
+        else LobeFitOutcome.SMOOTH_LIGHT
         if flat
-        else NARROW
+        else LobeFitOutcome.NARROW
         if pixels.bright < _NARROWEST_PIXELS
-        else FOUND
+        else LobeFitOutcome.DETERMINED
     )
     factor = float(np.exp(min(sd_strength, 20)))
     interval = Interval(
         max(alpha * np.exp(-sd_alpha), ALPHAS[0]), min(alpha * np.exp(sd_alpha), 1.0)
     )
-    if reason == NARROW:
+    if outcome == LobeFitOutcome.NARROW:
         alpha, interval = float(interval.high), Interval(ALPHAS[0], interval.high)
-    known = reason in (FOUND, NARROW)
+    known = outcome in (LobeFitOutcome.DETERMINED, LobeFitOutcome.NARROW)
     return LobeFit(
         convention,
-        reason == FOUND,
-        reason,
+        outcome,
         alpha if known else None,
         interval if known else None,
         (),

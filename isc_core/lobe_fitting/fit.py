@@ -28,14 +28,10 @@ from ..progress import Monitor
 from ..scene.light_estimate import LightEstimate
 from ..scene.lobe_fit import (
     CONVENTION,
-    FOUND,
-    NARROW,
-    NO_LIGHT,
-    SMOOTH,
-    UNLIKE,
     Interval,
     LobeFit,
     LobeFitOptions,
+    LobeFitOutcome,
     LobeLight,
 )
 from ..shading.brdf.directions import unit
@@ -101,7 +97,7 @@ def fit_lobe(
         raise InputError(f"light_direction has shape {fixed.shape}: give one unit vector (3,)")
     monitor.report("fitting the gloss", 0.0)
     if seen.peak <= options.darkest:
-        return _nothing(seen, options, NO_LIGHT)
+        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, seen.specular.shape)
     most = (
         options.most_pixels if environment is None else min(options.most_pixels, _PIXELS_UNDER_SKY)
     )
@@ -225,9 +221,10 @@ def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOp
     image, gains, explained = _coloured(seen, problem, fitted)
     at = fitted.lamps.count + len(fitted.lamps.base)
     sd = float(np.sqrt(spread[at, at] + np.radians(options.normal_error) ** 2 + _MODEL_ALPHA**2))
-    reason = _reason(problem, fitted, explained, sd)
-    if reason == UNLIKE:
-        return replace(_nothing(seen, options, UNLIKE), explained=explained)
+    outcome = _outcome(problem, fitted, explained, sd)
+    if outcome == LobeFitOutcome.UNEXPLAINED:
+        empty = LobeFit.without_lobe(options.model, outcome, seen.specular.shape)
+        return replace(empty, explained=explained)
     lights = _lights(problem, fitted, spread, gains, options)
     alpha: float | None = fitted.lamps.alpha
     low, high = (
@@ -235,15 +232,14 @@ def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOp
         float(min(fitted.lamps.alpha * np.exp(min(sd, 20)), 1.0)),
     )
     interval: Interval | None = Interval(low, high)
-    if reason == NARROW:
+    if outcome == LobeFitOutcome.NARROW:
         alpha = max(high, _step(seen, pixels))
         interval = Interval(ALPHAS[0], alpha)
-    elif reason != FOUND:
+    elif outcome != LobeFitOutcome.DETERMINED:
         alpha = interval = None
     return LobeFit(
         CONVENTION[options.model],
-        reason == FOUND,
-        reason,
+        outcome,
         alpha,
         interval,
         lights,
@@ -295,14 +291,18 @@ def _step(seen: Observed, pixels: Pixels) -> float:
     return float(np.clip(np.arccos(np.clip(cosines.min(), -1, 1)), ALPHAS[0], 1))
 
 
-def _reason(problem: Problem, fitted: Fitted, explained: float, sd: float) -> str:
+def _outcome(problem: Problem, fitted: Fitted, explained: float, sd: float) -> LobeFitOutcome:
     if explained < _LEAST_EXPLAINED:
-        return UNLIKE
+        return LobeFitOutcome.UNEXPLAINED
     if problem.pixels.bright < _NARROWEST_PIXELS:
-        return NARROW
+        return LobeFitOutcome.NARROW
     alpha = fitted.lamps.alpha
     smooth = alpha > _WIDEST or (alpha > _WIDE and smooth_loss(problem.pixels) < fitted.loss)
-    return SMOOTH if smooth or _wider_does(problem, fitted, sd) else FOUND
+    return (
+        LobeFitOutcome.SMOOTH_LIGHT
+        if smooth or _wider_does(problem, fitted, sd)
+        else LobeFitOutcome.DETERMINED
+    )
 
 
 def _wider_does(problem: Problem, fitted: Fitted, sd: float) -> bool:
@@ -363,8 +363,3 @@ def _mean_colour(pixels: Pixels) -> np.ndarray:
     """(3,), of mean 1."""
     colour = pixels.weight @ pixels.colour
     return colour / max(float(colour.mean()), 1e-300)
-
-
-def _nothing(seen: Observed, options: LobeFitOptions, reason: str) -> LobeFit:
-    empty = np.zeros(seen.specular.shape, np.float32)
-    return LobeFit(CONVENTION[options.model], False, reason, None, None, (), None, None, 0.0, empty)

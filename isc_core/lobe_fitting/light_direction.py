@@ -31,7 +31,7 @@ from scipy.optimize import least_squares, nnls
 
 from ..imaging.luminance import luminance, white_of
 from ..scene.decomposition import Decomposition
-from ..scene.lobe_fit import NO_LIGHT
+from ..scene.lobe_fit import LobeFitOutcome
 from ..shading.brdf.blinn_phong import BlinnPhong
 from ..shading.lights import VIEW, DirectionalLight, sphere_directions
 from ..shading.radiance import directional, radiance
@@ -125,7 +125,9 @@ def explain_specular(d: Decomposition) -> DirectionEstimate:
     goes through any two faint specks.
     """
     samples = _samples(d, d.specular, _RIM)
-    if not samples.values.any() or (d.brdf is not None and d.brdf.reason == NO_LIGHT):
+    if not samples.values.any() or (
+        d.brdf is not None and d.brdf.outcome == LobeFitOutcome.NO_SPECULAR
+    ):
         return DirectionEstimate(DirectionalLight(VIEW, np.zeros(3)), 0.0, 180.0, None)
 
     def model(light: np.ndarray, rest: np.ndarray) -> np.ndarray:

@@ -48,15 +48,11 @@ from ..imaging.bounding_box import mask_slices
 from ..imaging.upsampling import enlarged
 from ..scene.light_estimate import LightEstimate
 from ..scene.lobe_fit import (
-    CLIPPED,
     CONVENTION,
-    FOUND,
-    NARROW,
-    NO_LIGHT,
-    SMOOTH,
     Interval,
     LobeFit,
     LobeFitOptions,
+    LobeFitOutcome,
     LobeLight,
 )
 from ..shading.brdf.ggx import F0
@@ -101,18 +97,7 @@ def fit_recovered(
         seen.specular[inside].mean(axis=1),
     )
     if brightest <= 0 or mirrored_light.sum() < _LEAST_SHARE * light_there.sum():
-        return LobeFit(
-            convention,
-            False,
-            NO_LIGHT,
-            None,
-            None,
-            (),
-            None,
-            None,
-            0.0,
-            np.zeros(seen.specular.shape, np.float32),
-        )
+        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, seen.specular.shape)
     by_brightness = 0.5 * float(np.log(F0 * brightest / (4 * _TILT * pixels.peak)))
     by_size = 0.5 * float(np.log(np.maximum(mirrored_light / pixels.peak - _TOPS, 0).mean()))
     log_alpha = _OFFSET + _SLOPE * by_brightness + _COVERED * by_size
@@ -141,29 +126,25 @@ def fit_recovered(
     image, explained = _predicted(
         seen, normal, replace(light, direction=mirrored_at), alpha, options
     )
-    reason = _reason(alpha, pixels, light_estimate)
+    outcome = _outcome(alpha, pixels, light_estimate)
     interval: Interval | None = Interval(
         max(alpha * np.exp(-_ALPHA_SPREAD), ALPHAS[0]), min(alpha * np.exp(_ALPHA_SPREAD), 1.0)
     )
-    if reason == SMOOTH:
-        return LobeFit(
-            convention, False, reason, None, None, (light,), None, None, explained, image
-        )
-    if reason in (NARROW, CLIPPED):
+    if outcome == LobeFitOutcome.SMOOTH_LIGHT:
+        return LobeFit(convention, outcome, None, None, (light,), None, None, explained, image)
+    if outcome.bounded:
         alpha = float(interval.high) if interval else alpha
         interval = Interval(ALPHAS[0], alpha)
-    return LobeFit(
-        convention, reason == FOUND, reason, alpha, interval, (light,), None, None, explained, image
-    )
+    return LobeFit(convention, outcome, alpha, interval, (light,), None, None, explained, image)
 
 
-def _reason(alpha: float, pixels: Pixels, light_estimate: LightEstimate | None) -> str:
+def _outcome(alpha: float, pixels: Pixels, light_estimate: LightEstimate | None) -> LobeFitOutcome:
     if pixels.peak_clipped > _MOST_CLIPPED:
         # also where the bound is so wide that it says little: that the light is smooth it does not
-        return CLIPPED
+        return LobeFitOutcome.CLIPPED
     if alpha > _WIDEST or (light_estimate is not None and light_estimate.smooth):
-        return SMOOTH
-    return NARROW if pixels.bright < _NARROWEST_PIXELS else FOUND
+        return LobeFitOutcome.SMOOTH_LIGHT
+    return LobeFitOutcome.NARROW if pixels.bright < _NARROWEST_PIXELS else LobeFitOutcome.DETERMINED
 
 
 def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:

@@ -30,7 +30,7 @@ from scipy import ndimage
 from scipy.optimize import nnls
 
 from ..scene.decomposition import Decomposition
-from ..scene.lobe_fit import NO_LIGHT, LobeFit
+from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.brdf.ggx import F0
 
 FITTED, BOUND, NONE_FOUND, NOT_FITTED = "fitted", "upper bound", "no highlights found", "not fitted"
@@ -63,7 +63,7 @@ def gloss_of(d: Decomposition) -> Gloss:
     fit = d.brdf
     if fit is None:
         return Gloss()
-    if fit.reason == NO_LIGHT:
+    if fit.outcome == LobeFitOutcome.NO_SPECULAR:
         return Gloss(specular=0.0, specular_source=NONE_FOUND)
     if fit.blender_roughness is None:
         return Gloss()

@@ -18,11 +18,11 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
 from ..errors import InputError
+from ..imaging.srgb import linear_to_srgb, srgb_to_linear
 from ..io.atomic import new_file
 from ..io.printable_names import readable
-from ..imaging.srgb import linear_to_srgb, srgb_to_linear
 from ..scene.decomposition import Decomposition, Separation
-from ..scene.lobe_fit import NO_LIGHT, LobeFit
+from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.spherical_harmonics import real_sh
 
 _PANEL, _GAP, _EDGE, _LABEL, _HEAD = 320, 20, 40, 38, 104  # pixels
@@ -369,27 +369,30 @@ def _round_step(step: float) -> float:
 
 
 def _title(d: Decomposition) -> tuple[str, str]:
-    given, settings, status = d.provenance.input, d.provenance.settings, d.provenance.status
+    given, settings = d.provenance.input, d.provenance.settings
+    diagnostics = d.provenance.diagnostics
     name = PurePath(str(given.get("name", ""))).name or "Decomposition"
     words = [f"{d.mask.shape[1]} x {d.mask.shape[0]} px"]
     words += [
         str(settings[key]) for key in ("model", "separator", "illumination") if settings.get(key)
     ]
-    if isinstance(loss := status.get("loss"), int | float):
-        words.append(f"loss {loss:.2f}")
-    if isinstance(converged := status.get("converged"), bool):
-        words.append("converged" if converged else "stopped early")
+    if diagnostics.loss is not None:
+        words.append(f"loss {diagnostics.loss:.2f}")
+    if diagnostics.converged is not None:
+        words.append("converged" if diagnostics.converged else "stopped early")
     if d.brdf is not None:
         words.append(_gloss(d.brdf))
-    if status.get("doubts"):
-        words.append("doubtful, see status.doubts")
+    if diagnostics.warnings:
+        words.append("unreliable, see status.warnings")
     return name, "   ·   ".join(words)
 
 
 def _gloss(fit: LobeFit) -> str:
     """The fit in a few words; roughness as Blender and glTF count it."""
     if fit.blender_roughness is None:
-        return "no highlights" if fit.reason == NO_LIGHT else "gloss undetermined"
+        return (
+            "no highlights" if fit.outcome == LobeFitOutcome.NO_SPECULAR else "gloss undetermined"
+        )
     return f"roughness {'' if fit.determined else 'at most '}{fit.blender_roughness:.2f}"
 
 

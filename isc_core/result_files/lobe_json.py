@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 
 from ..io.json_files import numbers
-from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeLight
+from ..scene.lobe_fit import CONVENTION, Interval, LobeFit, LobeFitOutcome, LobeLight
+from .diagnostics_json import old_lobe_outcome
 
 _LENGTH = 1e-3  # that a direction's may differ from 1
 
@@ -24,8 +25,7 @@ def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> Lobe
         raise ValueError(f"alpha is {alpha}, not within (0, 1]")
     return LobeFit(
         model=str(record["model"]),
-        determined=_truth(record["determined"]),
-        reason=str(record["reason"]),
+        outcome=_outcome(record),
         alpha=None if alpha is None else _number(alpha),
         alpha_interval=_interval(record["alpha_interval_68"], ()),
         lights=tuple(_light(light) for light in record["lights"]),
@@ -80,7 +80,10 @@ def _number(value: Any) -> float:
     return float(number)
 
 
-def _truth(value: Any) -> bool:
-    if not isinstance(value, bool):
-        raise ValueError(f"{value} instead of true or false")
-    return value
+def _outcome(record: Mapping[str, Any]) -> LobeFitOutcome:
+    """The outcome; of records of schema 1, which have a sentence instead, its meaning."""
+    if not isinstance(record["determined"], bool):
+        raise ValueError(f"{record['determined']} instead of true or false")
+    if "outcome" not in record:
+        return old_lobe_outcome(str(record["reason"]))
+    return LobeFitOutcome(record["outcome"])

@@ -19,21 +19,22 @@ import numpy as np
 from PIL import Image
 
 from ..errors import InputError
+from ..imaging.srgb import linear_to_srgb
 from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.printable_names import readable
 from ..lobe_fitting.specular_upper_bound import shown_gloss
-from ..imaging.srgb import linear_to_srgb
 from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.lobe_fit import LobeFit
 from .arrays_file import ARRAYS, write_arrays
 from .contact_sheet import contact_sheet, separation_sheet
+from .diagnostics_json import diagnostics_from_json
 from .lobe_json import lobe_fit_from_json
 from .mesh import MeshOptions, MeshResult, build_mesh
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 2: diagnostics are values, no sentences
 LAYERS = {
     **dict.fromkeys(COLOR_MAPS, "RGB"),
     "normal": "XYZ",
@@ -118,7 +119,8 @@ def load(folder: Path | str) -> Decomposition:
     folder = Path(folder)
     if not (folder / "decomposition.json").is_file():
         raise InputError(
-            f"{folder} is not a result folder (it has no decomposition.json): give the folder that isc decompose wrote"
+            f"{folder} is not a result folder (it has no decomposition.json): give the folder that "
+            "isc decompose wrote"
         )
     description = _read_json(folder / "decomposition.json")
     channels = read_channels(folder / "maps.exr")
@@ -179,7 +181,8 @@ def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> No
     least = _LEAST_BYTES + (_LEAST_BYTES_A_PIXEL + _ARRAY_BYTES_A_PIXEL * arrays) * pixels
     if (free := shutil.disk_usage(place).free) < least:
         raise InputError(
-            f"cannot write {folder}: no space is left on the disk ({free / 1e6:.1f} MB, at least {least / 1e6:.1f} are needed); "
+            f"cannot write {folder}: no space is left on the disk ({free / 1e6:.1f} MB, at least "
+            f"{least / 1e6:.1f} are needed); "
             "free some or choose another place"
         )
 
@@ -203,7 +206,7 @@ def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
         "versions": p.versions,
         "timings": p.timings,
         "input": p.input,
-        "status": p.status,
+        "status": p.diagnostics.to_json(),
     }
 
 
@@ -243,13 +246,15 @@ def _layers(
     }
     if missing := [name for group in names.values() for name in group if name not in channels]:
         raise InputError(
-            f"{path} lacks the channel {missing[0]}: it is not a result of isc decompose, or is damaged"
+            f"{path} lacks the channel {missing[0]}: it is not a result of isc decompose, or is "
+            "damaged"
         )
     if broken := [
         name for group in names.values() for name in group if not np.isfinite(channels[name]).all()
     ]:
         raise InputError(
-            f"{path} holds NaN or infinite values in {broken[0]}: it is damaged; decompose the photo again"
+            f"{path} holds NaN or infinite values in {broken[0]}: it is damaged; decompose the "
+            "photo again"
         )
     stacks = {
         layer: np.stack([channels[name] for name in group], -1) for layer, group in names.items()
@@ -266,7 +271,8 @@ def _read_json(path: Path) -> dict[str, Any]:
         raise InputError(f"{path} has no schema_version: it is not a result of isc decompose")
     if version > SCHEMA_VERSION:
         raise InputError(
-            f"{path} was written by a newer version (schema {version}, known here: {SCHEMA_VERSION}): update ISC"
+            f"{path} was written by a newer version (schema {version}, known here: "
+            f"{SCHEMA_VERSION}): update ISC"
         )
     return dict(description)
 
@@ -312,7 +318,8 @@ def _provenance(description: Mapping[str, Any], folder: Path) -> Provenance:
         raise InputError(
             f"{folder / 'decomposition.json'} has no usable input.{wrong}: it is damaged"
         )
-    return Provenance(**{name: description[name] for name in types})
+    kept = {name: description[name] for name in types if name != "status"}
+    return Provenance(**kept, diagnostics=diagnostics_from_json(description["status"]))
 
 
 def _wrong_input(given: Mapping[str, Any]) -> str:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..shading.spherical_harmonics import real_sh
+from .diagnostics import Diagnostics
 from .lobe_fit import LobeFit
 
 
@@ -40,7 +41,7 @@ class Provenance:
     versions: dict[str, str] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     input: dict[str, Any] = field(default_factory=dict)
-    status: dict[str, Any] = field(default_factory=dict)
+    diagnostics: Diagnostics = field(default_factory=Diagnostics)
 
 
 @dataclass(frozen=True)

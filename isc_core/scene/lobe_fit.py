@@ -1,4 +1,4 @@
-"""What a lobe fit is asked for, and what it answers."""
+"""Options and result of fitting a lobe to a specular image."""
 
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -8,6 +8,17 @@ import numpy as np
 from ..errors import InputError
 from ..shading.brdf.ggx import F0
 from ..shading.brdf.roughness import blender_from_alpha, exponent_from_alpha
+from .diagnostics import LobeFitOutcome
+
+__all__ = [
+    "CONVENTION",
+    "Interval",
+    "LobeFit",
+    "LobeFitOptions",
+    "LobeFitOutcome",
+    "LobeLight",
+    "LobeModel",
+]
 
 LobeModel = Literal["ggx", "blinn_phong"]
 
@@ -16,23 +27,37 @@ CONVENTION = {
     "blinn_phong": "blinn_phong: f_r = (p + 8) / (8 pi) cos^p, p = 2 / alpha^2 - 2",
 }
 
-NO_LIGHT = "undetermined: no specular light"
-SMOOTH = "undetermined: the light is smooth, any roughness explains it"
-NARROW = "the highlight is narrower than a pixel: only an upper bound"
-CLIPPED = "the highlight is brighter than the photo could show: only an upper bound"
-UNLIKE = "undetermined: the specular image has no highlight that a lobe explains"
-FOUND = "determined"
-
 
 @dataclass(frozen=True)
 class LobeFitOptions:
-    """`model`: of the lobe. `most_lights`: 1 to 3. `most_pixels`: that are looked at, >= 100.
-    `normal_error`: of the normals, degrees, [0, 90): 0 for exact ones, about 15 for recovered ones;
-    it widens the intervals. `floor`: deviation of the specular light as a share of its peak;
-    `relative`: as a share of itself. `darkest`: radiance >= 0 that is no highlight yet.
-    `thresholded`: the specular image is a separator's, which sees only what rises above an unknown
-    level. `recovered`: normals and shading too were recovered from the same photo, see `recovered`.
-    Raises `InputError` outside these.
+    """How a lobe is fitted.
+
+    Attributes
+    ----------
+    model : {"ggx", "blinn_phong"}
+        The lobe.
+    most_lights : int
+        At most so many lights, 1 to 3.
+    most_pixels : int
+        At most so many pixels are used, >= 100.
+    normal_error : float
+        Error of the normals, degrees, in [0, 90); it widens the intervals. 0 for exact normals,
+        about 15 for recovered ones.
+    floor : float
+        Deviation of the specular light as a share of its peak, in (0, 1).
+    relative : float
+        Deviation as a share of the light itself, in [0, 1).
+    darkest : float
+        Radiance >= 0 up to which nothing is a highlight.
+    thresholded : bool
+        The specular image is a separator's, which shows only light above an unknown level.
+    recovered : bool
+        Normals and shading were recovered from the same photo, see `lobe_fitting.recovered`.
+
+    Raises
+    ------
+    InputError
+        If a value is out of range.
     """
 
     model: LobeModel = "ggx"
@@ -57,14 +82,19 @@ class LobeFitOptions:
             and self.darkest >= 0
         ):
             raise InputError(
-                "normal_error has to be within [0, 90), floor within (0, 1), relative within [0, 1), darkest 0 or more"
+                "normal_error has to be within [0, 90), floor within (0, 1), relative within "
+                "[0, 1), darkest 0 or more"
             )
 
 
 @dataclass(frozen=True)
 class Interval:
-    """Holds the truth with a probability of 68 %: from `low` to `high`; numbers, or arrays of the
-    same shape.
+    """Interval that contains the truth with a probability of 68 %.
+
+    Attributes
+    ----------
+    low, high : float or ndarray
+        Its ends; arrays of the same shape for several quantities.
     """
 
     low: float | np.ndarray
@@ -73,10 +103,20 @@ class Interval:
 
 @dataclass(frozen=True)
 class LobeLight:
-    """One light. `direction` (3,): unit, x right, y up, z toward the viewer; it lies within `cone`
-    degrees with a probability of 68 %. `strength_light` (3,): the lobe's strength times the light's
-    irradiance on a plane across its beam, linear RGB; only this product can be known. Unit: the
-    photo's radiance x sr (W / m^2 where the photo is in W / (m^2 sr)). `interval`: of it.
+    """One light of a lobe fit.
+
+    Attributes
+    ----------
+    direction : (3,) ndarray
+        Unit vector toward the light, camera frame: x right, y up, z toward the viewer.
+    cone : float
+        The light lies within so many degrees of `direction` with a probability of 68 %.
+    strength_light : (3,) ndarray
+        Strength of the lobe times the light's irradiance on a plane across its beam, linear RGB;
+        only this product is observable. Radiance of the photo x sr (W / m^2 where the photo is in
+        W / (m^2 sr)).
+    interval : Interval
+        Of `strength_light`.
     """
 
     direction: np.ndarray
@@ -87,20 +127,35 @@ class LobeLight:
 
 @dataclass(frozen=True)
 class LobeFit:
-    """A lobe and its lights. `model`: what alpha means, in words. `determined`: whether alpha is;
-    else `reason` says why not.
+    """A lobe and its lights.
 
-    `alpha`: None where it is not known at all; where the highlight is narrower than a pixel, or
-    clipped, the upper bound. `alpha_interval`: likewise. `lights`: the brightest first; none where
-    there is no specular light, no lobe explains it, or an environment was given. `strength`,
-    `strength_interval`: of the lobe (3,), where an environment was given, else None. `explained`:
-    share of the squared specular image, in [0, 1]. `predicted`: (H, W, 3) float32, the specular
-    image of the fit, 0 outside the mask; what a separator left out is in it.
+    Attributes
+    ----------
+    model : str
+        The convention of `alpha`, one of `CONVENTION`.
+    outcome : LobeFitOutcome
+        How far `alpha` is determined.
+    alpha : float or None
+        Roughness of the lobe in (0, 1]; the upper bound where the outcome is bounded, None where it
+        is unknown.
+    alpha_interval : Interval or None
+        Of `alpha`.
+    lights : tuple of LobeLight
+        The brightest first; empty where there is no specular light, no lobe explains it, or an
+        environment map was given.
+    strength : (3,) ndarray or None
+        Of the lobe, where an environment map was given.
+    strength_interval : Interval or None
+        Of `strength`.
+    explained : float
+        Share of the squared specular image that the fit explains, in [0, 1].
+    predicted : (H, W, 3) ndarray of float32
+        Specular image of the fit, 0 outside the mask. It includes light that a separator left in
+        the diffuse layer.
     """
 
     model: str
-    determined: bool
-    reason: str
+    outcome: LobeFitOutcome
     alpha: float | None
     alpha_interval: Interval | None
     lights: tuple[LobeLight, ...]
@@ -109,32 +164,60 @@ class LobeFit:
     explained: float
     predicted: np.ndarray
 
+    @classmethod
+    def without_lobe(
+        cls, model: LobeModel, outcome: LobeFitOutcome, shape: tuple[int, ...]
+    ) -> "LobeFit":
+        """Make the result of a fit that found no lobe.
+
+        Parameters
+        ----------
+        model : {"ggx", "blinn_phong"}
+            The lobe.
+        outcome : LobeFitOutcome
+            Why there is none.
+        shape : tuple of int
+            Shape (H, W, 3) of the specular image.
+
+        Returns
+        -------
+        LobeFit
+            Without roughness and lights; the predicted image is 0.
+        """
+        empty = np.zeros(shape, np.float32)
+        return cls(CONVENTION[model], outcome, None, None, (), None, None, 0.0, empty)
+
+    @property
+    def determined(self) -> bool:
+        """Whether the roughness is determined."""
+        return self.outcome == LobeFitOutcome.DETERMINED
+
     @property
     def direction(self) -> np.ndarray | None:
-        """Of the brightest light, (3,)."""
+        """Unit vector (3,) toward the brightest light; None without lights."""
         return self.lights[0].direction if self.lights else None
 
     @property
     def strength_light(self) -> np.ndarray | None:
-        """Of the brightest light, (3,)."""
+        """`LobeLight.strength_light` (3,) of the brightest light; None without lights."""
         return self.lights[0].strength_light if self.lights else None
 
     @property
     def exponent(self) -> float | None:
-        """Blinn-Phong's exponent by the usual rule (see `shading.brdf.roughness`)."""
+        """Blinn-Phong exponent equivalent to `alpha` (see `shading.brdf.roughness`)."""
         return None if self.alpha is None else float(exponent_from_alpha(self.alpha))
 
     @property
     def blender_roughness(self) -> float | None:
-        """Of Blender's Principled surface and of glTF, in [0, 1]."""
+        """Roughness of Blender's Principled BSDF and of glTF, in [0, 1]."""
         return None if self.alpha is None else float(blender_from_alpha(self.alpha))
 
     def to_json(self) -> dict[str, Any]:
-        """Everything but the image, ready for JSON."""
+        """Return everything but the predicted image, ready for JSON."""
         return {
             "model": self.model,
             "determined": self.determined,
-            "reason": self.reason,
+            "outcome": self.outcome.value,
             "alpha": self.alpha,
             "alpha_interval_68": _pair(self.alpha_interval),
             "exponent": self.exponent,

@@ -3,6 +3,7 @@
 import numpy as np
 
 from isc_core.scene.decomposition import Decomposition, Provenance
+from isc_core.scene.diagnostics import Diagnostics
 from isc_core.shading.spherical_harmonics import real_sh
 
 LIGHT = np.array(
@@ -67,6 +68,6 @@ def ball(
                 "scale": 1.0,
                 "crop_box": [0, 0, *shape[::-1]],
             },
-            status={"converged": True, "loss": 46.1234},
+            diagnostics=Diagnostics(converged=True, loss=46.1234),
         ),
     )

@@ -695,7 +695,8 @@ def test_kernels_work_where_none_can_be_kept(tmp_path: Path) -> None:
     """
     pytest.importorskip("numba")
     check = (
-        "import os, numba; from isc_core.numerics.jit import ensure_cache_folder; ensure_cache_folder()\n"
+        "import os, numba; from isc_core.numerics.jit import ensure_cache_folder; "
+        "ensure_cache_folder()\n"
         "from isc_core.sirfs import kernels; print(kernels.forward_rows.stats.cache_path)"
     )
     environment = {
@@ -734,5 +735,5 @@ def test_kernels_count_as_compiled_once_they_were_used(result: Path) -> None:
     pytest.importorskip("numba")
     from isc_core.sirfs.kernel_cache import kernels_compiled
 
-    assert load(result / "result").provenance.status["converged"] in (True, False)
+    assert load(result / "result").provenance.diagnostics.converged in (True, False)
     assert kernels_compiled()

@@ -19,7 +19,7 @@ from isc_core.errors import InputError
 from isc_core.imaging.luminance import LUMINANCE, luminance, white_of
 from isc_core.lobe_fitting.light_direction import explain_specular
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.lobe_fit import LobeFit
+from isc_core.scene.lobe_fit import LobeFit, LobeFitOutcome
 from isc_core.shading.environment_map import directions, solid_angles
 from isc_core.shading.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
 from isc_core.shading.lobe_rendering import Lobe, lobe_in, lobe_under
@@ -288,11 +288,10 @@ def test_highlights_are_kept_scaled_removed_or_rendered(scene: Decomposition) ->
 
 def fitted(scene: Decomposition, determined: bool) -> Decomposition:
     alpha = 0.2 if determined else None
+    outcome = LobeFitOutcome.DETERMINED if determined else LobeFitOutcome.SMOOTH_LIGHT
     return replace(
         scene,
-        brdf=LobeFit(
-            "ggx: of the test", determined, "", alpha, None, (), None, None, 0.9, scene.specular
-        ),
+        brdf=LobeFit("ggx: of the test", outcome, alpha, None, (), None, None, 0.9, scene.specular),
     )
 
 
@@ -310,7 +309,15 @@ def test_a_fitted_lobe_is_rendered_and_an_undetermined_one_is_not(scene: Decompo
     bound = replace(
         scene,
         brdf=LobeFit(
-            "ggx: of the test", False, "narrow", 0.2, None, (), None, None, 0.9, scene.specular
+            "ggx: of the test",
+            LobeFitOutcome.NARROW,
+            0.2,
+            None,
+            (),
+            None,
+            None,
+            0.9,
+            scene.specular,
         ),
     )
     assert np.array_equal(relight(bound, light).specular, by_fit.specular)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from isc_core.lobe_fitting import fit_lobe
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.lobe_fitting import fit_lobe
 from isc_core.result_files.contact_sheet import (
     Answer,
     _title,
@@ -16,6 +16,12 @@ from isc_core.result_files.contact_sheet import (
     separation_sheet,
 )
 from isc_core.scene.decomposition import Decomposition, Provenance, Separation
+from isc_core.scene.diagnostics import (
+    AssumptionWarning,
+    Diagnostics,
+    LobeFitOutcome,
+    WarningKind,
+)
 from tests.core.ball_scene import ball
 
 LABELS = ("input", "diffuse", "specular", "reflectance", "shading", "normals", "height", "light")
@@ -145,7 +151,7 @@ def test_a_black_result_and_a_long_name_can_be_shown() -> None:
     named = replace(
         d.provenance,
         input={"name": "a long name " * 40 + ".png"},
-        status={"loss": float("nan"), "converged": False},
+        diagnostics=Diagnostics(loss=float("nan"), converged=False),
     )
     black = replace(
         d,
@@ -232,12 +238,14 @@ def test_the_title_says_what_was_fitted() -> None:
     assert fit.blender_roughness is not None
     assert _title(replace(d, brdf=fit))[1].endswith(f"roughness {fit.blender_roughness:.2f}")
     doubtful = replace(
-        d.provenance, status=d.provenance.status | {"doubts": ["it looks like a mirror"]}
+        d.provenance,
+        diagnostics=Diagnostics(warnings=(AssumptionWarning(WarningKind.MIRROR_OR_GLASS, 0.8),)),
     )
     assert (
-        "doubtful" in _title(replace(d, provenance=doubtful))[1] and "doubtful" not in _title(d)[1]
+        "unreliable" in _title(replace(d, provenance=doubtful))[1]
+        and "unreliable" not in _title(d)[1]
     )
-    assert _title(replace(d, brdf=replace(fit, determined=False)))[1].endswith(
+    assert _title(replace(d, brdf=replace(fit, outcome=LobeFitOutcome.NARROW)))[1].endswith(
         f"roughness at most {fit.blender_roughness:.2f}"
     )
     assert _title(replace(d, brdf=replace(fit, alpha=None)))[1].endswith("gloss undetermined")

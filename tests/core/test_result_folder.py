@@ -12,8 +12,8 @@ import pytest
 from PIL import Image
 
 from isc_core.errors import Cancelled, InputError
-from isc_core.lobe_fitting import fit_lobe
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.lobe_fitting import fit_lobe
 from isc_core.progress import Monitor
 from isc_core.result_files.result_folder import (
     DECOMPOSITION_FILES,
@@ -24,7 +24,7 @@ from isc_core.result_files.result_folder import (
     save_separation,
 )
 from isc_core.scene.decomposition import Decomposition, Separation
-from isc_core.scene.lobe_fit import LobeFit
+from isc_core.scene.lobe_fit import LobeFit, LobeFitOutcome
 from tests.core.ball_scene import ball
 
 CHANNELS = [
@@ -156,7 +156,7 @@ def test_a_fit_that_knows_nothing_is_read_back_with_its_reason(tmp_path: Path) -
     back = load(tmp_path / "out").brdf
     assert back is not None
     assert (back.determined, back.alpha, back.lights) == (False, None, ())
-    assert "no specular light" in back.reason
+    assert back.outcome == LobeFitOutcome.NO_SPECULAR
     assert not back.predicted.any()
 
 
@@ -224,15 +224,15 @@ def test_strided_maps_are_written_right(tmp_path: Path) -> None:
 
 def test_values_of_numpy_and_infinities_reach_the_json(tmp_path: Path) -> None:
     d = ball((24, 30), 9.0, (12, 15))
-    status = {
+    settings = {
         "loss": np.float32(1.5),
         "steps": np.int64(3),
         "bound": float("inf"),
         "sizes": np.array([1, 2]),
         "file": Path("a/b"),
     }
-    save(replace(d, provenance=replace(d.provenance, status=status)), tmp_path / "out")
-    assert load(tmp_path / "out").provenance.status == {
+    save(replace(d, provenance=replace(d.provenance, settings=settings)), tmp_path / "out")
+    assert load(tmp_path / "out").provenance.settings == {
         "loss": 1.5,
         "steps": 3,
         "bound": None,

@@ -84,12 +84,7 @@ def decomposed(
     photo = photo or case.made.photo()
     check_mask(photo.mask, "the mask")
     settings = Settings(
-        case.model,
-        case.separator,
-        case.illumination,
-        max_size=0,
-        engine=case.engine,
-        threads=count,
+        case.model, case.separator, case.illumination, max_size=0, engine=case.engine, threads=count
     )
     with small_solves():
         return decompose(photo, settings, monitor=monitor)
@@ -131,7 +126,7 @@ def test_maps_and_mesh_are_sound(case: DecompositionCase) -> None:
     between(-1e-9, 1 + 1e-9, progress=np.array(listener.fractions))
     assert np.isfinite(listener.losses).all(), f"losses {listener.losses}"
     for number in ("loss", "iterations", "evaluations"):
-        assert np.isfinite(d.provenance.status.get(number, 0.0)), number
+        assert np.isfinite(getattr(d.provenance.diagnostics, number) or 0.0), number
     built = build_mesh(d.height, d.normal, d.mask, d.reflectance)
     finite(vertices=built.mesh.vertices, base=built.base_color, detail=built.detail)
     between(0, len(built.mesh.vertices) - 1, faces=built.mesh.faces)

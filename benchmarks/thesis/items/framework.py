@@ -21,6 +21,7 @@ from isc_core.decompose.mbp import split_reflectance
 from isc_core.editing.relight import NewLight, relight
 from isc_core.imaging.channels import smallest
 from isc_core.lobe_fitting.light_direction import explain_shading
+from isc_core.result_files.diagnostics_text import outcome_text
 from isc_core.scene.decomposition import Decomposition
 from isc_core.separation import separate
 from isc_core.separation.chaotic_segmentation import (
@@ -344,7 +345,7 @@ def _lobe_rows(d: Decomposition) -> tuple[tuple[str, str | float], ...]:
     if d.brdf is None:
         return (("lobe", "none was fitted"),)
     alpha = "" if d.brdf.alpha is None else f"alpha {d.brdf.alpha:.2f}, "
-    state = "determined" if d.brdf.determined else d.brdf.reason or "undetermined"
+    state = "determined" if d.brdf.determined else outcome_text(d.brdf.outcome)
     return (
         ("lobe", f"{alpha}{state}"),
         ("share of the specular layer that it explains", d.brdf.explained),

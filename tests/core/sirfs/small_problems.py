@@ -11,7 +11,7 @@ from isc_core.scene.known_inputs import DepthObservation
 from isc_core.shading.irradiance_basis import basis
 from isc_core.shading.occluding_contour import occluding_contour
 from isc_core.shading.surface_stencils import normals
-from isc_core.sirfs.priors.priors import AbsoluteTable, Light, Priors, SilhouetteProfile
+from isc_core.sirfs.priors.priors import AbsoluteTable, LightPrior, Priors, SilhouetteProfile
 from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 from isc_core.sirfs.problem import Problem
 from isc_core.sirfs.settings import Weights
@@ -75,7 +75,7 @@ def made_priors(channels: int = 3, seed: int = 0) -> Priors:
     covariance = mixing @ mixing.T
     values, vectors = np.linalg.eigh(covariance)
     mean = np.ascontiguousarray(LIGHT[:, :channels].T).ravel()
-    light = Light(mean, covariance, (vectors * np.sqrt(values)) @ vectors.T, mean)
+    light = LightPrior(mean, covariance, (vectors * np.sqrt(values)) @ vectors.T, mean)
     table = ndimage.gaussian_filter(rng.normal(size=(NODES,) * channels), 2.0, mode="nearest")
     table = 8 * (table - table.min()) / np.ptp(table)
     smooth = square_table(6.0, (0.03, 0.3)) if channels == 3 else symmetric_table(4.0, (0.03, 0.3))

@@ -1,4 +1,4 @@
-"""Every term's hand-written gradient against finite differences, in both engines, colour and grey."""
+"""Every term's hand-written gradient against finite differences, both engines, colour and grey."""
 
 from dataclasses import replace
 from importlib.util import find_spec

@@ -6,12 +6,12 @@ import pytest
 from isc_core.shading.spherical_harmonics import light_from_reference, light_to_reference, real_sh
 from isc_core.sirfs.priors.predicted_light import FRONT_NORMALS, LIGHT_TERMS, predicted_light_prior
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
-from isc_core.sirfs.priors.priors import Light
+from isc_core.sirfs.priors.priors import LightPrior
 
 SEEN = np.array([0.5, 0.3, -0.2, 0.1, 0.05, -0.1, 0.02, 0.08])
 
 
-def prior(channels: int) -> Light:
+def prior(channels: int) -> LightPrior:
     return shipped_prior_set().priors("natural", channels).light
 
 
@@ -40,7 +40,9 @@ def test_the_look_of_a_mirrored_light_is_the_mirrored_look() -> None:
 @pytest.mark.parametrize("channels", [1, 3])
 def test_who_is_sure_is_believed_and_who_is_not_is_not(channels: int) -> None:
     usual = prior(channels)
-    sure, unsure = (predicted_light_prior(usual, SEEN, np.full(8, deviation)) for deviation in (1e-5, 1e4))
+    sure, unsure = (
+        predicted_light_prior(usual, SEEN, np.full(8, deviation)) for deviation in (1e-5, 1e4)
+    )
     np.testing.assert_allclose(look_of(sure.mean), SEEN, atol=1e-4)
     np.testing.assert_allclose(unsure.mean, usual.mean, atol=1e-5)
     np.testing.assert_allclose(unsure.covariance, usual.covariance, atol=1e-6)

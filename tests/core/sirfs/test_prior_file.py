@@ -13,7 +13,7 @@ from isc_core.sirfs.priors.absolute_table import CoarseTable
 from isc_core.sirfs.priors.color_mixture import ColorScaleMixture
 from isc_core.sirfs.priors.lights import Contrast, GaussianLight
 from isc_core.sirfs.priors.prior_file import load_prior_set, save_prior_set, shipped_prior_set
-from isc_core.sirfs.priors.prior_set import FitRecord, Lights, PriorSet
+from isc_core.sirfs.priors.prior_set import FitRecord, LightPriors, PriorSet
 from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.priors.scale_mixture import ScaleMixture
 
@@ -41,7 +41,7 @@ def prior_set() -> PriorSet:
         absolute=CoarseTable.of(rng.normal(size=(5, 5, 5)), 10),
         grey_absolute=CoarseTable.of(rng.normal(size=8), 16, np.float32),
         silhouette=SilhouetteProfile(np.linspace(0.6, 0, 7), np.full(7, 0.4)),
-        lights=Lights(light(27), light(27)),
+        lights=LightPriors(light(27), light(27)),
         record=FitRecord(("apple", "cup1"), Contrast(2.5, 1 / 3), {"iterations": "200"}),
     )
 

@@ -8,10 +8,10 @@ import pytest
 from isc_core.shading.surface_stencils import normals
 from isc_core.sirfs.priors.priors import SilhouetteProfile
 from isc_core.sirfs.silhouette import (
-    silhouette_coordinates,
-    silhouette_normals,
-    silhouette_cost,
     normals_from_silhouette,
+    silhouette_coordinates,
+    silhouette_cost,
+    silhouette_normals,
 )
 
 
@@ -78,7 +78,9 @@ def test_the_dome_leans_as_the_profile_says_on_average() -> None:
 
 def test_a_dome_scales_with_its_outline_and_does_not_end_where_the_photo_does() -> None:
     profile = SilhouetteProfile(np.array([0.6, 0.1]), np.array([0.2, 0.3]))
-    small, large = (normals_from_silhouette(m, profile).dome for m in (disc()[0], disc(161, 68.0)[0]))
+    small, large = (
+        normals_from_silhouette(m, profile).dome for m in (disc()[0], disc(161, 68.0)[0])
+    )
     assert large.max() == pytest.approx(2 * small.max(), rel=0.03)
     mask, _, _ = disc()
     cut = normals_from_silhouette(mask[:, :41], profile).dome

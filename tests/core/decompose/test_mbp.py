@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decompose.lobe import HIDDEN, MATT, NOT_LOOKED_FOR
 from isc_core.decompose.mbp import split_reflectance
-from isc_core.decompose.pipeline import Evidence, Settings, decompose
+from isc_core.decompose.pipeline import KnownInputs, Settings, decompose
 from isc_core.errors import InputError
 from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.diagnostics import LobeFitOutcome, LobeStatus, WarningKind
 from isc_core.separation import separate
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
@@ -44,8 +44,14 @@ def photo_of(d: Decomposition, image: np.ndarray) -> Photo:
     return Photo(image.astype(np.float32), d.mask, 1 / 4095, np.zeros(d.mask.shape, bool), source)
 
 
-def truth_of(d: Decomposition) -> Evidence:
-    return Evidence(height=d.height.astype(float), light=d.illumination)
+def lobe_status(d: Decomposition) -> LobeStatus:
+    lobe = d.provenance.diagnostics.lobe
+    assert lobe is not None
+    return lobe.status
+
+
+def truth_of(d: Decomposition) -> KnownInputs:
+    return KnownInputs(height=d.height.astype(float), light=d.illumination)
 
 
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
@@ -71,7 +77,7 @@ def test_the_lobe_of_a_known_shape_is_found(model: str) -> None:
     d = glossy()
     brdf = decompose(photo_of(d, d.image), Settings(model=model), evidence=truth_of(d)).brdf
     assert brdf is not None
-    assert brdf.determined, brdf.reason
+    assert brdf.determined, brdf.outcome
     assert brdf.alpha == pytest.approx(0.15, rel=0.5)
     assert brdf.direction is not None
     assert np.degrees(np.arccos(brdf.direction @ LAMP)) < 5
@@ -83,7 +89,7 @@ def test_the_whole_chain_keeps_the_identities() -> None:
     d = glossy((52, 60), 23.0)
     found = decompose(photo_of(d, d.image), Settings(model="mbp"))
     assert found.identity_errors().broken() == ()
-    assert found.provenance.status["converged"]
+    assert found.provenance.diagnostics.converged
     assert found.provenance.settings["separator"] == "isc"
     assert found.brdf is not None
 
@@ -103,8 +109,8 @@ def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
     assert found.brdf is not None
     assert not found.brdf.determined
     assert found.brdf.alpha is None
-    assert "no specular light" in found.brdf.reason
-    assert found.provenance.status["gloss"] == MATT
+    assert found.brdf.outcome == LobeFitOutcome.NO_SPECULAR
+    assert lobe_status(found) == LobeStatus.NO_HIGHLIGHTS
 
 
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
@@ -113,7 +119,7 @@ def test_where_nobody_looked_for_highlights_the_object_is_not_called_matt(model:
     found = decompose(
         photo_of(d, d.image), Settings(model=model, separator="none"), evidence=truth_of(d)
     )
-    assert found.brdf is None and found.provenance.status["gloss"] == NOT_LOOKED_FOR
+    assert found.brdf is None and lobe_status(found) == LobeStatus.NOT_FITTED
 
 
 def test_an_overexposed_object_is_not_called_matt() -> None:
@@ -126,8 +132,9 @@ def test_an_overexposed_object_is_not_called_matt() -> None:
         Settings(model="mdr"),
         evidence=truth_of(d),
     )
-    assert found.provenance.status["gloss"] == HIDDEN
-    assert any("too bright" in line for line in found.provenance.status["doubts"])
+    assert lobe_status(found) == LobeStatus.HIDDEN
+    kinds = {warning.kind for warning in found.provenance.diagnostics.warnings}
+    assert WarningKind.CLIPPED in kinds
 
 
 def test_the_exposure_of_a_float_file_does_not_matter() -> None:

@@ -19,13 +19,13 @@ from isc_core.lobe_fitting.recovered import blurred_normals
 from isc_core.lobe_fitting.response import respond
 from isc_core.progress import Monitor
 from isc_core.scene.light_estimate import PLACES, LightEstimate
-from isc_core.scene.lobe_fit import CLIPPED, NARROW, NO_LIGHT, SMOOTH, UNLIKE, LobeFitOptions
+from isc_core.scene.lobe_fit import LobeFitOptions, LobeFitOutcome
 from isc_core.shading.brdf.blinn_phong import BlinnPhong
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.brdf.model import Lobe
 from isc_core.shading.brdf.roughness import alpha_from_exponent
 from isc_core.shading.environment_map import directions, solid_angles
-from isc_core.shading.radiance import Lights, directional, environment, radiance
+from isc_core.shading.radiance import DistantLights, directional, environment, radiance
 
 VIEW = np.array([0.0, 0, 1])
 KEY = np.array([-0.48, 0.6, 0.64])
@@ -44,7 +44,7 @@ def ball(size: int = 96) -> tuple[np.ndarray, np.ndarray]:
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True), mask
 
 
-def seen(lobe: Lobe, lights: Lights, size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def seen(lobe: Lobe, lights: DistantLights, size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Specular image, normals and mask."""
     normal, mask = ball(size)
     return np.where(mask[..., None], radiance(lobe, normal, VIEW, lights), 0), normal, mask
@@ -113,7 +113,7 @@ def test_a_blinn_phong_lobe_is_found_exactly(exponent: float) -> None:
 def test_several_lights_are_counted(count: int) -> None:
     towards = np.array([KEY, [0.6, 0.0, 0.8], [-0.1, -0.7, np.sqrt(0.5)]])[:count]
     power = np.array([[3.0], [2.0], [1.5]])[:count] * [1, 0.9, 0.8]
-    fit = fit_lobe(*seen(Ggx(0.12), Lights(towards, power)))
+    fit = fit_lobe(*seen(Ggx(0.12), DistantLights(towards, power)))
     assert len(fit.lights) == count
     assert fit.alpha == pytest.approx(0.12, rel=0.01)
     for light, direction, strength in zip(fit.lights, towards, power, strict=True):
@@ -179,7 +179,7 @@ def test_without_specular_light_nothing_is_invented() -> None:
         fit_lobe(np.zeros(normal.shape), normal, mask),
         fit_lobe(np.ones(normal.shape), normal, np.zeros_like(mask)),
     ):
-        assert fit.reason == NO_LIGHT and not fit.determined
+        assert fit.outcome == LobeFitOutcome.NO_SPECULAR and not fit.determined
         assert fit.alpha is None and fit.lights == () and not fit.predicted.any()
 
 
@@ -197,7 +197,7 @@ def test_a_smooth_light_leaves_alpha_undetermined() -> None:
 def test_a_highlight_narrower_than_a_pixel_gives_an_upper_bound() -> None:
     specular, normal, mask = seen(Ggx(0.01), directional(KEY, COLOUR), 48)
     fit = fit_lobe(specular, normal, mask)
-    assert fit.reason == NARROW and not fit.determined
+    assert fit.outcome == LobeFitOutcome.NARROW and not fit.determined
     assert fit.alpha is not None and fit.alpha >= 0.01
 
 
@@ -239,7 +239,7 @@ def test_under_an_even_environment_alpha_is_undetermined() -> None:
     specular[mask] = respond_to(surroundings(sky), "ggx", normal[mask], 0.3)
     specular *= np.random.default_rng(0).uniform(0.7, 1.3, mask.shape)[..., None]
     fit = fit_lobe(specular, normal, mask, environment=sky)
-    assert fit.reason == SMOOTH and fit.alpha is None
+    assert fit.outcome == LobeFitOutcome.SMOOTH_LIGHT and fit.alpha is None
 
 
 def test_the_same_input_gives_the_same_answer_and_it_is_ready_for_json() -> None:
@@ -379,7 +379,7 @@ def test_a_light_that_looks_smooth_leaves_the_roughness_open() -> None:
         shading=shading,
         light_estimate=seen_at_first_sight(KEY, 0.7),
     )
-    assert not fit.determined and fit.alpha is None and "smooth" in fit.reason
+    assert not fit.determined and fit.alpha is None and fit.outcome == LobeFitOutcome.SMOOTH_LIGHT
 
 
 def test_the_recovered_fit_does_not_depend_on_the_exposure() -> None:
@@ -405,7 +405,7 @@ def test_a_highlight_brighter_than_the_photo_could_show_gives_an_upper_bound(
         cut, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, clipped=clipped
     )
     assert (
-        (fit.determined, fit.reason) == (False, CLIPPED)
+        (fit.determined, fit.outcome) == (False, LobeFitOutcome.CLIPPED)
         and fit.alpha is not None
         and fit.alpha_interval is not None
     )
@@ -431,7 +431,12 @@ def test_where_no_lobe_explains_the_light_none_and_no_lamps_are_made_up() -> Non
         0,
     )
     fit = fit_lobe(noise, normal, mask)
-    assert (fit.reason, fit.determined, fit.alpha, fit.lights) == (UNLIKE, False, None, ())
+    assert (fit.outcome, fit.determined, fit.alpha, fit.lights) == (
+        LobeFitOutcome.UNEXPLAINED,
+        False,
+        None,
+        (),
+    )
     assert not fit.predicted.any() and fit.explained < 0.25
 
 
@@ -440,7 +445,7 @@ def test_what_a_separator_leaves_on_a_matt_object_is_no_gloss() -> None:
     crumbs = np.zeros_like(shading)
     crumbs[40:44, 50:53] = 0.05
     fit = fit_lobe(crumbs, normal, mask, options=LobeFitOptions(recovered=True), shading=shading)
-    assert fit.reason == NO_LIGHT and fit.alpha is None and fit.lights == ()
+    assert fit.outcome == LobeFitOutcome.NO_SPECULAR and fit.alpha is None and fit.lights == ()
 
 
 @pytest.mark.parametrize("size", [40, 300])

@@ -8,16 +8,20 @@ import numpy as np
 import pytest
 
 from isc_core.decompose.light_colour import under_light
-from isc_core.decompose.models import Answer, Settings, Task
+from isc_core.decompose.models import DecompositionTask, SceneEstimate, Settings
 from isc_core.decompose.pipeline import decompose
 from isc_core.errors import InputError
 from isc_core.illuminant.illuminant import estimate_illuminant
 from isc_core.photo import Photo, PhotoSource
+from isc_core.result_files.diagnostics_text import STRONG_COLOUR, light_colour_advice
 from isc_core.scene.decomposition import Separation
-from isc_core.scene.lobe_fit import Interval, LobeFit, LobeLight
+from isc_core.scene.diagnostics import Diagnostics, IlluminantOutcome, StopReason
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOutcome, LobeLight
 from isc_core.separation import separate
 from isc_core.shading.spherical_harmonics import light_from_reference
-from tests.core.test_illuminant import LIGHT, PAINTS, ball
+from tests.core.illuminant.test_illuminant import LIGHT, PAINTS, ball
+
+MADE = Diagnostics(reason=StopReason.STEP)
 
 
 def photo_of(paints: np.ndarray, light: np.ndarray, gloss: float = 0.5, size: int = 120) -> Photo:
@@ -26,26 +30,34 @@ def photo_of(paints: np.ndarray, light: np.ndarray, gloss: float = 0.5, size: in
     return Photo(image.astype(np.float32), mask, 1 / 4095, np.zeros(mask.shape, bool), source)
 
 
-def task_of(photo: Photo, light_colour: str = "estimate") -> Task:
-    return Task(photo, photo, Settings(model="mdr", light_colour=light_colour))
+def task_of(photo: Photo, light_colour: str = "estimate") -> DecompositionTask:
+    return DecompositionTask(photo, photo, Settings(model="mdr", light_colour=light_colour))
 
 
-def seen_by(task: Task) -> Answer:
+def seen_by(task: DecompositionTask) -> SceneEstimate:
     """A model that separates and says that everything is evenly lit, with a white lobe."""
     split = separate("isc", task.maps.image, task.maps.mask)
     lamp = LobeLight(
         np.array([0.0, 0, 1]), 2.0, np.ones(3), Interval(0.5 * np.ones(3), 2 * np.ones(3))
     )
     brdf = LobeFit(
-        "ggx", True, "", 0.2, Interval(0.1, 0.3), (lamp,), None, None, 1.0, split.specular
+        "ggx",
+        LobeFitOutcome.DETERMINED,
+        0.2,
+        Interval(0.1, 0.3),
+        (lamp,),
+        None,
+        None,
+        1.0,
+        split.specular,
     )
-    return Answer(split, np.zeros(task.maps.mask.shape), np.zeros((9, 3)), {"reason": "made"}, brdf)
+    return SceneEstimate(split, np.zeros(task.maps.mask.shape), np.zeros((9, 3)), MADE, brdf)
 
 
 def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> None:
     photo, seen = photo_of(PAINTS, LIGHT), []
 
-    def solver(task: Task) -> Answer:
+    def solver(task: DecompositionTask) -> SceneEstimate:
         seen.append(task)
         return seen_by(task)
 
@@ -61,13 +73,11 @@ def test_what_is_seen_is_white_and_what_comes_back_has_the_light_s_colour() -> N
     shading = np.exp(light_from_reference(answer.light)[0] * np.sqrt(1 / (4 * np.pi)))
     np.testing.assert_allclose(shading, colour)
     assert answer.brdf is not None and np.allclose(answer.brdf.lights[0].strength_light, colour)
-    said = answer.status["light_colour"]
-    assert (
-        said["used"] == "estimate"
-        and said["determined"]
-        and np.allclose(said["estimate"], colour, atol=1e-4)
-    )
-    assert answer.status["reason"] == "made"
+    found = answer.diagnostics.light_colour
+    assert found is not None
+    assert found.used == "estimate" and found.determined
+    assert np.allclose(found.estimate, colour, atol=1e-4)
+    assert answer.diagnostics.reason == MADE.reason
 
 
 @pytest.mark.parametrize(("paints", "asked"), [(PAINTS, "white"), (PAINTS[:1], "estimate")])
@@ -78,9 +88,9 @@ def test_white_is_taken_where_that_is_asked_for_or_nothing_is_known(
     answer, usual = under_light(task_of(photo, asked), seen_by), seen_by(task_of(photo))
     np.testing.assert_array_equal(answer.split.diffuse, usual.split.diffuse)
     np.testing.assert_array_equal(answer.split.confidence, usual.split.confidence)
-    said = answer.status["light_colour"]
-    assert said["used"] == "white" and said["reason"]
-    assert ("--light-colour estimate" in said["help"]) == (asked == "white")
+    found = answer.diagnostics.light_colour
+    assert found is not None and found.used == "white"
+    assert ("--light-colour estimate" in light_colour_advice(found)) == (asked == "white")
 
 
 def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() -> None:
@@ -88,19 +98,17 @@ def test_light_of_a_colour_that_no_lamp_has_lowers_the_confidence_and_says_so() 
     answer, usual = under_light(task_of(photo), seen_by), seen_by(task_of(photo))
     assert estimate_illuminant(photo.image, photo.mask).too_strong
     np.testing.assert_allclose(answer.split.confidence, 0.5 * usual.split.confidence)
-    said = answer.status["light_colour"]
-    assert (
-        said["used"] == "white"
-        and "strongly coloured" in said["help"]
-        and "too strong" in said["reason"]
-    )
+    found = answer.diagnostics.light_colour
+    assert found is not None and found.used == "white"
+    assert light_colour_advice(found) == STRONG_COLOUR
+    assert found.outcome == IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR
 
 
 def test_layers_that_are_known_already_are_taken_along() -> None:
     photo = photo_of(PAINTS, LIGHT)
     split = separate("none", photo.image, photo.mask)
 
-    def given(task: Task) -> Answer:
+    def given(task: DecompositionTask) -> SceneEstimate:
         assert task.split is not None
         return replace(seen_by(task), split=task.split)
 
@@ -115,7 +123,8 @@ def test_the_identities_hold_in_the_end(model: str) -> None:
         Settings(model=model, light_colour="estimate", confidence_weights=model == "joint"),
     )
     assert d.identity_errors().broken() == ()
-    assert d.provenance.status["light_colour"]["used"] == "estimate"
+    light = d.provenance.diagnostics.light_colour
+    assert light is not None and light.used == "estimate"
     assert d.provenance.settings["light_colour"] == "estimate"
 
 

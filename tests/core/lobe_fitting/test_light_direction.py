@@ -10,7 +10,7 @@ import pytest
 from isc_core.editing.spheres import render_sphere
 from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, lobe_light
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.lobe_fit import NO_LIGHT, LobeFit
+from isc_core.scene.lobe_fit import LobeFit, LobeFitOutcome
 from isc_core.shading.lights import DirectionalLight, toward
 from tests.core.ball_scene import ball
 
@@ -130,7 +130,7 @@ def test_specks_of_a_matt_object_tell_no_light() -> None:
     scene = ball()
     specks = np.zeros_like(scene.specular)
     specks[30:32, 40] = 0.01
-    fit = LobeFit("ggx", False, NO_LIGHT, None, None, (), None, None, 0.0, np.zeros_like(specks))
+    fit = LobeFit.without_lobe("ggx", LobeFitOutcome.NO_SPECULAR, specks.shape)
     matt = replace(scene, specular=specks, brdf=fit)
     assert not explain_specular(matt).determined
     assert explain_specular(replace(matt, brdf=None)).exponent is not None, (

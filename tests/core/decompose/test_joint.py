@@ -7,12 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.decompose.joint import JointOptions, ResidualHighlights, doubt, joint, repaint
+from isc_core.decompose.joint import (
+    JointOptions,
+    ResidualHighlights,
+    continue_albedo,
+    detect_residual_highlights,
+    joint,
+)
 from isc_core.decompose.mdr import mdr
-from isc_core.decompose.models import Settings, Task
-from isc_core.decompose.task import Answer
+from isc_core.decompose.models import DecompositionTask, Settings
+from isc_core.decompose.task import SceneEstimate
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
+from isc_core.scene.diagnostics import JointOutcome
 from isc_core.scene.known_inputs import SceneConstraints
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
@@ -53,36 +60,38 @@ def photo_of(d: Decomposition) -> Photo:
     return Photo(d.image.astype(np.float32), d.mask, 1 / 4095, np.zeros(d.mask.shape, bool), source)
 
 
-def task_of(d: Decomposition) -> Task:
+def task_of(d: Decomposition) -> DecompositionTask:
     """With the true shape and light, so that nothing but the separation is asked for; or without
     them.
     """
     photo = photo_of(d)
     truth = SceneConstraints(d.height.astype(float), light_to_reference(d.illumination))
-    return Task(photo, photo, Settings(illumination="laboratory"), truth)
+    return DecompositionTask(photo, photo, Settings(illumination="laboratory"), truth)
 
 
 @pytest.fixture(scope="module")
-def glossy() -> tuple[Decomposition, Answer]:
+def glossy() -> tuple[Decomposition, SceneEstimate]:
     d = grey_ball(10)
     return d, joint(task_of(d))
 
 
-def error(d: Decomposition, answer: Answer) -> float:
+def error(d: Decomposition, answer: SceneEstimate) -> float:
     return float(np.square(answer.split.diffuse - d.diffuse)[d.mask].mean())
 
 
-def test_a_highlight_on_grey_paint_is_taken_off(glossy: tuple[Decomposition, Answer]) -> None:
+def test_a_highlight_on_grey_paint_is_taken_off(
+    glossy: tuple[Decomposition, SceneEstimate],
+) -> None:
     d, answer = glossy
     nothing = float(np.square(d.specular)[d.mask].mean())
     assert error(d, mdr(task_of(d))) > 0.5 * nothing
     assert error(d, answer) < 0.5 * nothing
-    assert answer.status["joint"].startswith(
-        "highlights that colour does not show were taken off, and"
-    )
+    assert answer.diagnostics.joint == JointOutcome.CONTINUED
 
 
-def test_the_layers_sum_up_and_are_not_negative(glossy: tuple[Decomposition, Answer]) -> None:
+def test_the_layers_sum_up_and_are_not_negative(
+    glossy: tuple[Decomposition, SceneEstimate],
+) -> None:
     d, answer = glossy
     split = answer.split
     assert np.abs(split.diffuse + split.specular + split.residual - d.image)[d.mask].max() < 1e-5
@@ -91,7 +100,7 @@ def test_the_layers_sum_up_and_are_not_negative(glossy: tuple[Decomposition, Ans
     assert not (split.diffuse[~d.mask].any() or split.specular[~d.mask].any())
 
 
-def test_the_same_again(glossy: tuple[Decomposition, Answer]) -> None:
+def test_the_same_again(glossy: tuple[Decomposition, SceneEstimate]) -> None:
     d, answer = glossy
     again = joint(task_of(d))
     np.testing.assert_array_equal(again.height, answer.height)
@@ -103,32 +112,32 @@ def test_a_matt_object_is_what_mdr_makes_of_it() -> None:
     found, start = joint(task_of(d)), mdr(task_of(d))
     np.testing.assert_array_equal(found.split.diffuse, start.split.diffuse)
     np.testing.assert_array_equal(found.height, start.height)
-    assert "no highlights" in found.status["joint"]
+    assert found.diagnostics.joint == JointOutcome.UNCHANGED
 
 
 def test_a_step_that_does_not_lower_the_energy_is_not_taken() -> None:
     d = grey_ball(10)
-    start = doubt(d.image, mdr(task_of(d)).split.diffuse, d.mask)
-    assert start is not None and start.doubtful.any()
+    start = detect_residual_highlights(d.image, mdr(task_of(d)).split.diffuse, d.mask)
+    assert start is not None and start.unreliable.any()
     found = joint(task_of(d), JointOptions(change_of_variables=-1e6))
     np.testing.assert_array_equal(found.split.diffuse, start.diffuse)
-    assert "did not lower" in found.status["joint"]
+    assert found.diagnostics.joint == JointOutcome.REMOVED
 
 
 def test_paint_is_continued_under_the_highlight() -> None:
     mask = np.zeros((40, 40), bool)
     mask[4:36, 4:36] = True
-    doubtful = np.zeros_like(mask)
-    doubtful[15:25, 15:25] = True
+    unreliable = np.zeros_like(mask)
+    unreliable[15:25, 15:25] = True
     shading = np.linspace(0.5, 1, 40)[None, :, None] * np.ones((40, 40, 3))
     diffuse = np.where(mask[..., None], 0.4 * shading, 0)
-    image = diffuse + 0.3 * doubtful[..., None]
-    found = repaint(ResidualHighlights(image, doubtful), shading, image, mask)
+    image = diffuse + 0.3 * unreliable[..., None]
+    found = continue_albedo(ResidualHighlights(image, unreliable), shading, image, mask)
     np.testing.assert_allclose(found, diffuse, atol=1e-6)
 
 
 def test_what_colour_has_taken_off_is_not_taken_twice() -> None:
     d = grey_ball(10)
-    found = doubt(d.image, d.diffuse, d.mask)
+    found = detect_residual_highlights(d.image, d.diffuse, d.mask)
     assert found is None
-    assert doubt(d.image, d.image, d.mask) is not None
+    assert detect_residual_highlights(d.image, d.image, d.mask) is not None

@@ -15,7 +15,7 @@ from isc_core.lobe_fitting.specular_level import (
     specular_variation,
 )
 from isc_core.scene.decomposition import Decomposition
-from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeModel
+from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeFitOutcome, LobeModel
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.radiance import directional, radiance
 from tests.core.ball_scene import ball
@@ -116,7 +116,7 @@ def test_an_upper_bound_is_called_one() -> None:
     d = lit(0.2, 1.0)
     assert d.brdf is not None
     narrow = replace(
-        d.brdf, determined=False, reason="narrow", alpha=0.01, alpha_interval=Interval(0.004, 0.01)
+        d.brdf, outcome=LobeFitOutcome.NARROW, alpha=0.01, alpha_interval=Interval(0.004, 0.01)
     )
     gloss = gloss_of(replace(d, brdf=narrow))
     assert gloss.roughness == pytest.approx(0.1)

@@ -40,7 +40,7 @@ def test_a_ball_is_rounder_in_the_light_that_was_seen(grey: bool) -> None:
         seen.provenance.settings["light_prior"] == "seen"
         and usual.provenance.settings["light_prior"] == "usual"
     )
-    assert seen.provenance.status["lamps"] == usual.provenance.status["lamps"]
+    assert seen.provenance.diagnostics.light_counts == usual.provenance.diagnostics.light_counts
 
 
 def test_the_laboratory_s_light_is_known() -> None:

@@ -5,14 +5,14 @@ suggests.
 import numpy as np
 import pytest
 
-from isc_core.decompose.pipeline import Evidence, Settings, decompose
+from isc_core.decompose.pipeline import KnownInputs, Settings, decompose
 from isc_core.errors import InputError
 from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.decomposition import Decomposition
 from tests.core.lit_balls import ball, under_lamps
 
 
-def found(evidence: Evidence | None = None, cut: int = 0, **settings: str) -> Decomposition:
+def found(evidence: KnownInputs | None = None, cut: int = 0, **settings: str) -> Decomposition:
     """A painted ball under one lamp, explained."""
     image, mask = (part[cut:] for part in under_lamps((-0.7, 0.2, 0.6)))
     photo = Photo(
@@ -39,7 +39,7 @@ def test_a_ball_is_rounder_as_it_was_seen() -> None:
 
 def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
     normal, _ = ball()
-    evidence = Evidence(depth=67.5 * normal[..., 2])
+    evidence = KnownInputs(depth=67.5 * normal[..., 2])
     one, other = (found(evidence, shape_prior=prior) for prior in ("seen", "outline"))
     np.testing.assert_array_equal(one.height, other.height)
 

@@ -1,0 +1,155 @@
+"""The diagnostics of a result as sentences, for commands and for programs that show a result."""
+
+from typing import Any
+
+from ..scene.diagnostics import (
+    AssumptionWarning,
+    Diagnostics,
+    JointOutcome,
+    LightColourDiagnostics,
+    LobeDiagnostics,
+    LobeFitOutcome,
+    LobeStatus,
+    WarningKind,
+)
+from .diagnostics_json import diagnostics_from_json
+
+STOPPED_EARLY = (
+    "the solver reached its evaluation limit, so the result may not be its best: try a cleaner "
+    "mask or the other --illumination"
+)
+STRONG_COLOUR = (
+    "the light, or all of the object, may have a strong colour: highlights and albedo are less "
+    "reliable; use white light"
+)
+COLOURED = "the light is coloured: use --light-colour estimate to account for it"
+
+_JOINT = {
+    JointOutcome.UNCHANGED: "no highlights beyond those that colour shows: the result is mdr's",
+    JointOutcome.REMOVED: (
+        "highlights that colour does not show were removed; continuing the albedo under them did "
+        "not lower the energy"
+    ),
+    JointOutcome.CONTINUED: (
+        "highlights that colour does not show were removed, and the albedo under them continued "
+        "with the help of shape and light"
+    ),
+}
+_LOBE = {
+    LobeFitOutcome.DETERMINED: "determined",
+    LobeFitOutcome.NO_SPECULAR: "undetermined: there is no specular light",
+    LobeFitOutcome.SMOOTH_LIGHT: "undetermined: the light is smooth, any roughness explains it",
+    LobeFitOutcome.NARROW: "the highlight is narrower than a pixel: only an upper bound",
+    LobeFitOutcome.CLIPPED: "the highlight is clipped: only an upper bound",
+    LobeFitOutcome.UNEXPLAINED: (
+        "undetermined: the specular image has no highlight that a lobe explains"
+    ),
+}
+_LOBE_STATUS = {
+    LobeStatus.NOT_FITTED: "not fitted: the separator none leaves no highlights to fit it to",
+    LobeStatus.NO_HIGHLIGHTS: (
+        "next to no highlights: the object is diffuse, or its highlights cannot be distinguished "
+        "from its albedo"
+    ),
+    LobeStatus.HIDDEN: "undetermined: clipping hides the highlights",
+}
+_WARNINGS = {
+    WarningKind.MIRROR_OR_GLASS: (
+        "the object looks like a mirror or transparent: the maps describe an opaque object, and "
+        "are unreliable"
+    ),
+    WarningKind.SEVERAL_LIGHTS: (
+        "there seem to be several lights, and the models assume one: shape, albedo and roughness "
+        "are less reliable; use one light if you can"
+    ),
+    WarningKind.CLIPPED: "{share}of the object is clipped, and is a guess there; expose less",
+    WarningKind.RAGGED_MASK: (
+        "the mask is so thin or ragged that the mesh leaves out {share}of it: fill the mask"
+    ),
+}
+
+
+def status_lines(status: Any) -> list[str]:
+    """Write the notes on a result, from the entry `status` of its decomposition.json.
+
+    Parameters
+    ----------
+    status : Any
+        The entry, of any schema; the file may be anybody's, and unusable parts are ignored.
+
+    Returns
+    -------
+    list of str
+        As for `note_lines`.
+    """
+    return note_lines(diagnostics_from_json(status))
+
+
+def note_lines(diagnostics: Diagnostics) -> list[str]:
+    """Write the notes on a result.
+
+    Parameters
+    ----------
+    diagnostics : Diagnostics
+        Of the result.
+
+    Returns
+    -------
+    list of str
+        Lines that begin with "note: " or "gloss: ".
+    """
+    lines = [f"note: {STOPPED_EARLY}"] if diagnostics.converged is False else []
+    if diagnostics.lobe is not None:
+        lines.append(f"gloss: {lobe_text(diagnostics.lobe)}")
+    advice = light_colour_advice(diagnostics.light_colour)
+    lines += [f"note: {advice}"] if advice else []
+    return lines + [f"note: {warning_text(warning)}" for warning in diagnostics.warnings]
+
+
+def joint_text(outcome: JointOutcome) -> str:
+    """Return the sentence for an outcome of the model joint."""
+    return _JOINT[outcome]
+
+
+def outcome_text(outcome: LobeFitOutcome) -> str:
+    """Return the sentence for an outcome of a lobe fit."""
+    return _LOBE[outcome]
+
+
+def lobe_text(lobe: LobeDiagnostics) -> str:
+    """Write the roughness with its interval, or why it is not determined.
+
+    Parameters
+    ----------
+    lobe : LobeDiagnostics
+        The fitted lobe.
+
+    Returns
+    -------
+    str
+        One line.
+    """
+    if lobe.status in _LOBE_STATUS:
+        return _LOBE_STATUS[lobe.status]
+    outcome = lobe.outcome or LobeFitOutcome.UNEXPLAINED
+    if lobe.roughness is None:
+        return _LOBE[outcome]
+    low, likely, high = lobe.roughness
+    if outcome.bounded:
+        return f"roughness at most {high:.2f}: {_LOBE[outcome]}"
+    return f"roughness {likely:.2f}, {low:.2f} to {high:.2f} with a probability of 68 %"
+
+
+def light_colour_advice(light: LightColourDiagnostics | None) -> str:
+    """Write what to do about the light's colour; "" for nothing."""
+    if light is None:
+        return ""
+    if light.too_strong:
+        return STRONG_COLOUR
+    return COLOURED if light.coloured and light.used == "white" else ""
+
+
+def warning_text(warning: AssumptionWarning) -> str:
+    """Return the sentence for a violated assumption."""
+    share = "much " if warning.value is None else f"{100 * warning.value:.0f} % "
+    return _WARNINGS[warning.kind].format(share=share)
