@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from isc_core.sirfs.priors.priors import AbsoluteTable, Light, Priors
+from isc_core.sirfs.priors.priors import AbsoluteTable, LightPrior, Priors
 from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 
 
@@ -17,7 +17,7 @@ def reference_priors(path: Path, illumination: str, channels: int = 3) -> Priors
     with np.load(path, allow_pickle=False) as f:
         d = {k: f[k] for k in f.files}
     kind = f"light_{'color' if channels == 3 else 'gray'}_{illumination}_"
-    light = Light(d[kind + "mu"], d[kind + "Sigma"], d[kind + "inverse"], d[kind + "mean"])
+    light = LightPrior(d[kind + "mu"], d[kind + "Sigma"], d[kind + "inverse"], d[kind + "mean"])
     curvature = TabulatedPotential(
         float(d["z_curv_lut_low"]), float(d["z_curv_lut_step"]), d["z_curv_lut_cost"]
     )

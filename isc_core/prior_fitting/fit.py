@@ -17,7 +17,7 @@ from ..progress import Monitor
 from ..sirfs.priors.absolute_table import splat
 from ..sirfs.priors.color_mixture import ColorCells, fit_color_mixture
 from ..sirfs.priors.lights import Contrast, fit_contrast, fit_light, mirrored, permuted, scaled
-from ..sirfs.priors.prior_set import FitRecord, Lights, PriorSet
+from ..sirfs.priors.prior_set import FitRecord, LightPriors, PriorSet
 from ..sirfs.priors.scale_mixture import Magnitudes, fit_scale_mixture
 from .absolute_color import COLOR_NODES, GREY_NODES, TableFitOptions, fit_absolute_table
 from .silhouette import fit_silhouette
@@ -176,7 +176,7 @@ def _histogram(points: Sequence[np.ndarray], nodes: int) -> np.ndarray:
 
 def fit_lights(
     objects: Sequence[ObjectStatistics], natural_lights: np.ndarray, options: LightFitOptions
-) -> tuple[Lights, Contrast]:
+) -> tuple[LightPriors, Contrast]:
     """The light priors and the factors on the contrast of `natural_lights` (9, 3, n)."""
     environments = fit_light(
         _augmented(natural_lights.transpose(2, 0, 1), options.mirror, options.permute_natural),
@@ -190,7 +190,7 @@ def fit_lights(
     laboratory = _augmented(
         np.array([o.laboratory_light for o in objects]), options.mirror, options.permute_laboratory
     )
-    return Lights(
+    return LightPriors(
         scaled(environments, contrast),
         fit_light(laboratory, options.laboratory_ridge, options.floor),
     ), contrast

@@ -21,7 +21,7 @@ from .brdf.model import Model, check_range
 from .brdf.roughness import exponent_from_alpha, fitted_exponent
 from .environment_map import directions, solid_angles
 from .lights import VIEW, DirectionalLight
-from .radiance import Lights, directional, radiance
+from .radiance import DistantLights, directional, radiance
 
 USUAL_EXPONENT = 60.0
 
@@ -81,7 +81,7 @@ def lobe_in(lobe: Lobe, normal: np.ndarray, sky: np.ndarray) -> np.ndarray:
     lit = (sky > 0).any(-1).reshape(-1)
     if not lit.any():
         return np.zeros((len(normal), 3))
-    lights = Lights(
+    lights = DistantLights(
         directions(rows).reshape(-1, 3)[lit],
         (solid_angles(rows)[..., None] * sky).reshape(-1, 3)[lit],
     )

@@ -27,7 +27,7 @@ from .spherical_harmonics import real_sh
 
 
 @dataclass(frozen=True)
-class Lights:
+class DistantLights:
     """`directions` (K, 3): unit vectors toward the lights, K >= 1. `irradiance` (K, 3): of each on
     a plane across its beam, >= 0. Raises `InputError` for anything else.
     """
@@ -45,18 +45,18 @@ class Lights:
         check_range("irradiance", self.irradiance, 0, np.inf)
 
 
-def directional(direction: np.ndarray, irradiance: np.ndarray | float = np.pi) -> Lights:
+def directional(direction: np.ndarray, irradiance: np.ndarray | float = np.pi) -> DistantLights:
     """One light from the unit vector `direction` (3,), irradiance a number or (3,), >= 0. At pi a
     white matt surface that faces it has radiance 1.
 
     Raises `InputError` for anything else.
     """
-    return Lights(
+    return DistantLights(
         np.reshape(direction, (1, -1)), np.broadcast_to(np.asarray(irradiance, float), (1, 3))
     )
 
 
-def environment(directions: np.ndarray, weights: np.ndarray, radiance: np.ndarray) -> Lights:
+def environment(directions: np.ndarray, weights: np.ndarray, radiance: np.ndarray) -> DistantLights:
     """Samples of an environment: unit vectors `directions` (K, 3), solid angles `weights` (K,) in
     sr, `radiance` (K, 3), both >= 0.
 
@@ -67,10 +67,10 @@ def environment(directions: np.ndarray, weights: np.ndarray, radiance: np.ndarra
             f"weights {np.shape(weights)} and radiance {np.shape(radiance)} have to be (K,) and (K, 3)"
         )
     check_range("weights", weights, 0, np.inf)
-    return Lights(np.asarray(directions, float), np.asarray(weights, float)[:, None] * radiance)
+    return DistantLights(np.asarray(directions, float), np.asarray(weights, float)[:, None] * radiance)
 
 
-def radiance(model: Model, normal: np.ndarray, view: np.ndarray, lights: Lights) -> np.ndarray:
+def radiance(model: Model, normal: np.ndarray, view: np.ndarray, lights: DistantLights) -> np.ndarray:
     """What leaves surfaces with `normal` (..., 3) toward `view` (3,) or (..., 3): (..., 3), in the
     unit of irradiance per sr, >= 0.
 

@@ -11,17 +11,17 @@ Limits: distant light, no cast shadows.
 
 import numpy as np
 
-from .priors.priors import Light
+from .priors.priors import LightPrior
 
 
-def light_cost(light: np.ndarray, prior: Light, weight: float) -> tuple[float, np.ndarray]:
+def light_cost(light: np.ndarray, prior: LightPrior, weight: float) -> tuple[float, np.ndarray]:
     """Compute the light's term, weight / (9 C) * 0.5 (l - mean)' covariance^-1 (l - mean).
 
     Parameters
     ----------
     light : (9, C) ndarray
         Coefficients; l is `stack(light)`.
-    prior : Light
+    prior : LightPrior
     weight : float
 
     Returns

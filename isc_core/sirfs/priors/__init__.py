@@ -1,1 +1,7 @@
-"""Statistics of natural shapes, reflectances and lights: the priors of SIRFS, and their files."""
+"""Statistics of natural shapes, reflectances and lights: the priors of SIRFS, and their files.
+
+`prior_set.PriorSet` is the compact form that is fitted and stored (`prior_file`); its method
+`priors` builds the tables that the solver reads (`priors.Priors`). `absolute_table`,
+`color_mixture`, `scale_mixture` and `lights` are the parts; `predicted_light` narrows the prior of
+the light to what a network predicted from the photo.
+"""

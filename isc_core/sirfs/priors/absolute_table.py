@@ -1,9 +1,10 @@
 """The cost of an absolute (whitened, log) reflectance as a table that stays small in a file.
 
-The full table of n nodes an axis is an upsampling by two of a coarse one: insert zeros, then filter
-with (1, 4, 6, 4, 1) / 8 along each axis, zero padded (P. J. Burt, E. H. Adelson 1983,
-doi:10.1109/TCOM.1983.1095851). Only the coarse one is stored. The model: J. T. Barron, J. Malik
-(2015), doi:10.1109/TPAMI.2014.2377712.
+Equation: the full table of n nodes an axis is an upsampling by two of a coarse one: insert zeros,
+then filter with (1, 4, 6, 4, 1) / 8 along each axis, zero padded. Only the coarse one is stored.
+
+Citation: P. J. Burt, E. H. Adelson 1983, doi:10.1109/TCOM.1983.1095851 (upsampling); J. T. Barron,
+J. Malik 2015, doi:10.1109/TPAMI.2014.2377712 (the model).
 """
 
 import itertools
@@ -19,10 +20,18 @@ LOW, HIGH = -7.0, 4.0
 
 @dataclass(frozen=True)
 class CoarseTable:
-    """A table of n = `nodes` a side as the upsampling of `base + coarse`, less its minimum;
-    `coarse` is (ceil(n/2),) * d, least 0.
+    """A table as the upsampling of `base + coarse`, less its minimum.
 
-    So a short float type keeps its digits where the cost is low, that is, where reflectances are.
+    A short float type then keeps its digits where the cost is low, that is, where reflectances are.
+
+    Attributes
+    ----------
+    coarse : (ceil(n / 2), ...) ndarray
+        One or three equal axes; least value 0.
+    base : float
+        What was subtracted from the coarse values.
+    nodes : int
+        Nodes n of the full table on each axis.
     """
 
     coarse: np.ndarray
@@ -31,18 +40,42 @@ class CoarseTable:
 
     @staticmethod
     def of(values: np.ndarray, nodes: int, dtype: type = np.float16) -> "CoarseTable":
-        """The coarse `values` (ceil(nodes/2),) * d kept as `dtype`."""
+        """Store coarse values compactly.
+
+        Parameters
+        ----------
+        values : (ceil(nodes / 2), ...) ndarray
+        nodes : int
+            Nodes of the full table on each axis.
+        dtype : type
+            Type to store.
+
+        Returns
+        -------
+        CoarseTable
+        """
         base = float(values.min())
         return CoarseTable((values - base).astype(dtype), base, nodes)
 
     def table(self) -> AbsoluteTable:
-        """The full table, float64, minimum 0, over [-7, 4] on each axis."""
+        """Return the full table, float64, minimum 0, over [-7, 4] on each axis."""
         values = synthesise(synthesis_matrix(self.nodes), self.coarse.astype(float) + self.base)
         return AbsoluteTable(LOW, HIGH, values - values.min())
 
 
 def synthesis_matrix(nodes: int, dtype: type = np.float64) -> scipy.sparse.csr_matrix:
-    """The upsampling of one axis from ceil(nodes/2) to `nodes` values."""
+    """Return the upsampling of one axis.
+
+    Parameters
+    ----------
+    nodes : int
+        Number of fine values.
+    dtype : type
+
+    Returns
+    -------
+    (nodes, ceil(nodes / 2)) sparse matrix
+    """
     coarse = -(-nodes // 2)
     taps = {-2: 0.125, -1: 0.5, 0: 0.75, 1: 0.5, 2: 0.125}
     rows = [
@@ -56,7 +89,17 @@ def synthesis_matrix(nodes: int, dtype: type = np.float64) -> scipy.sparse.csr_m
 
 
 def synthesise(matrix: scipy.sparse.spmatrix, values: np.ndarray) -> np.ndarray:
-    """Applies `matrix` (n, m) along every axis of `values` (m, ..., m)."""
+    """Apply a matrix along every axis.
+
+    Parameters
+    ----------
+    matrix : (n, m) sparse matrix
+    values : (m, ..., m) ndarray
+
+    Returns
+    -------
+    (n, ..., n) ndarray
+    """
     for _ in range(values.ndim):
         # Each turn treats the first axis and puts it last, so that after all turns the axes are in
         # order again.
@@ -66,10 +109,22 @@ def synthesise(matrix: scipy.sparse.spmatrix, values: np.ndarray) -> np.ndarray:
 
 
 def splat(points: np.ndarray, nodes: int, weights: np.ndarray) -> np.ndarray:
-    """Histogram (nodes,) * d of `points` (n, d) over [-7, 4]^d with multilinear weights; points
-    outside are moved to the border.
+    """Return the histogram of points over [-7, 4]^d with multilinear weights.
 
-    `weights` (n,) is what each point adds in all.
+    Points outside are moved to the border.
+
+    Parameters
+    ----------
+    points : (n, d) ndarray
+    nodes : int
+        On each axis.
+    weights : (n,) ndarray
+        What each point adds in total.
+
+    Returns
+    -------
+    (nodes, ...) ndarray
+        With d axes.
     """
     dimensions = points.shape[1]
     position = np.clip((points - LOW) * ((nodes - 1) / (HIGH - LOW)), 0, nodes - 1)
@@ -85,10 +140,20 @@ def splat(points: np.ndarray, nodes: int, weights: np.ndarray) -> np.ndarray:
 
 
 def log_likelihood(table: np.ndarray, histogram: np.ndarray) -> float:
-    """Mean log probability of `histogram` (sums to 1) under the distribution exp(-table) / sum
-    exp(-table) over the nodes.
+    """Return the mean log probability of a histogram under a table.
 
-    On objects that the table was not fitted to, this is what its smoothness is chosen by.
+    The distribution is exp(-table) / sum exp(-table) over the nodes. On objects that the table was
+    not fitted to, this criterion selects its smoothness.
+
+    Parameters
+    ----------
+    table : ndarray
+    histogram : ndarray
+        Of the same shape, sum 1.
+
+    Returns
+    -------
+    float
     """
     lowest = table.min()
     log_partition = np.log(np.exp(lowest - table).sum()) - lowest

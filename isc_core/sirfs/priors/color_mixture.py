@@ -1,14 +1,13 @@
-"""The Gaussian scale mixture of a colour difference: p(x) = sum_k w_k N(x; 0, v_k S), x in R^3, det
-S = 1.
+"""The Gaussian scale mixture of a colour difference.
 
-With fixed log-spaced variances v_k both the weights and the shared covariance S have closed-form
-steps of expectation maximisation (A. P. Dempster, N. M. Laird, D. B. Rubin 1977,
-doi:10.1111/j.2517-6161.1977.tb01600.x): S ~ sum_i (sum_k r_ik / v_k) x_i x_i^T with
-responsibilities r. The model: J. T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
+Equation: p(x) = sum_k w_k N(x; 0, v_k S), x in R^3, det S = 1. With fixed log-spaced variances v_k,
+both the weights and the shared covariance S have closed-form steps of expectation maximisation: S ~
+sum_i (sum_k r_ik / v_k) x_i x_i^T with responsibilities r. The samples enter as cells of
+(direction, log length), each with its count and the sum of x x^T: m = x^T S^-1 x / 2 of a cell is
+exactly the mean of its members for every S, and the loss is of second order in the cell's size.
 
-The samples enter as cells of (direction, log length), each with its count and the sum of x x^T: m =
-x^T S^-1 x / 2 of a cell is exactly its members' mean for every S, and what is lost is of second
-order in the cell's size.
+Citation: A. P. Dempster, N. M. Laird, D. B. Rubin 1977, doi:10.1111/j.2517-6161.1977.tb01600.x; the
+model: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 from collections.abc import Iterable
@@ -29,9 +28,14 @@ _PER_DECADE_OF_M = 300
 
 @dataclass(frozen=True)
 class ColorCells:
-    """Cells of colour differences:
+    """Cells of colour differences.
 
-    `counts` (n,) and `moments` (n, 3, 3), the sum of x x^T over each cell's members.
+    Attributes
+    ----------
+    counts : (n,) ndarray
+        Members of each cell.
+    moments : (n, 3, 3) ndarray
+        Sum of x x^T over the members of each cell.
     """
 
     counts: np.ndarray
@@ -39,7 +43,7 @@ class ColorCells:
 
     @staticmethod
     def of(x: np.ndarray) -> "ColorCells":
-        """The occupied cells of samples `x` (n, 3), finite."""
+        """Return the occupied cells of finite samples `x` (n, 3)."""
         x = np.asarray(x, float)
         used, cell = np.unique(_cell_index(x), return_inverse=True)
         counts = np.bincount(cell, minlength=len(used)).astype(float)
@@ -53,7 +57,7 @@ class ColorCells:
 
     @staticmethod
     def merged(parts: Iterable["ColorCells"]) -> "ColorCells":
-        """The cells of all samples of `parts` (at least one), not merged where they coincide."""
+        """Return the cells of all `parts` (at least one), without merging equal cells."""
         all_parts = list(parts)
         return ColorCells(
             np.concatenate([p.counts for p in all_parts]),
@@ -62,8 +66,8 @@ class ColorCells:
 
 
 def _cell_index(x: np.ndarray) -> np.ndarray:
-    """Cell of each sample: a face of the cube (of three, as x and -x are alike), two steps on it, a
-    step of log length.
+    """Cell of each sample: a face of the cube (of three, since x and -x are alike), two steps on
+    it, and a step of log length.
     """
     rows = np.arange(len(x))
     face = np.abs(x).argmax(axis=1)
@@ -83,8 +87,16 @@ def _cell_index(x: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class ColorScaleMixture:
-    """`variances` v_k and `weights` w_k (K,), `covariance` S (3, 3) with det 1, and `reach`, the
-    largest m it was fitted to.
+    """A fitted mixture.
+
+    Attributes
+    ----------
+    variances, weights : (K,) ndarray
+        v_k and w_k.
+    covariance : (3, 3) ndarray
+        S, with determinant 1.
+    reach : float
+        Largest m it was fitted to.
     """
 
     variances: np.ndarray
@@ -93,19 +105,19 @@ class ColorScaleMixture:
     reach: float
 
     def whiten(self) -> np.ndarray:
-        """The symmetric square root of S^-1, (3, 3): m = 0.5 |whiten x|^2."""
+        """Return the symmetric square root of S^-1, (3, 3): m = 0.5 |whiten x|^2."""
         values, vectors = np.linalg.eigh(self.covariance)
         return (vectors / np.sqrt(values)) @ vectors.T
 
     def log_density(self, m: np.ndarray) -> np.ndarray:
-        """log p as a function of m >= 0; same shape as `m`.
+        """Return log p as a function of m >= 0, of the shape of `m`.
 
-        The densest reachable m never underflows: max v is 32.
+        The density never underflows at a reachable m: the largest v is 32.
         """
         return np.log(_densities(np.asarray(m, float), self.variances) @ self.weights)
 
     def table(self) -> TabulatedPotential:
-        """The cost -log(p(m) / p(0)) on 100000 nodes from 0 to reach."""
+        """Return the cost -log(p(m) / p(0)) on 100000 nodes from 0 to `reach`."""
         nodes = np.linspace(0.0, self.reach, TABLE_NODES)
         log_density = np.concatenate([self.log_density(part) for part in np.array_split(nodes, 16)])
         return TabulatedPotential(0.0, self.reach / (TABLE_NODES - 1), log_density[0] - log_density)
@@ -114,10 +126,20 @@ class ColorScaleMixture:
 def fit_color_mixture(
     cells: ColorCells, iterations: int = 200, inner: int = 5
 ) -> ColorScaleMixture:
-    """The mixture of highest likelihood after `iterations` steps on the weights, every `inner`-th
-    one also on the covariance.
+    """Fit the mixture of highest likelihood.
 
-    The samples must span all three dimensions.
+    Parameters
+    ----------
+    cells : ColorCells
+        Their samples must span all three dimensions.
+    iterations : int
+        Steps on the weights.
+    inner : int
+        Every `inner`-th step is also one on the covariance.
+
+    Returns
+    -------
+    ColorScaleMixture
     """
     moments = cells.moments.reshape(-1, 9)
     covariance = _unit_determinant((moments.sum(axis=0) / cells.counts.sum()).reshape(3, 3))
@@ -136,9 +158,7 @@ def fit_color_mixture(
 def _distance_histogram(
     cells: ColorCells, covariance: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Cells of like m thrown together: the bin of each cell, and of each bin its count of samples
-    and their mean m.
-    """
+    """Merge cells of like m: the bin of each cell, and of each bin its count and its mean m."""
     m = _half_distance(cells, covariance)
     with np.errstate(divide="ignore"):
         fine = np.maximum(_PER_DECADE_OF_M * (np.log10(m) + 12), 0).astype(np.int64)

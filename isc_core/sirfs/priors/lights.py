@@ -1,17 +1,17 @@
 """Which light is likely: a Gaussian over the coefficients of the log shading, fitted to known
 lights.
 
-A light of C channels is the vector of its 9 C coefficients, channel by channel, in the reference's
-convention (`sirfs.priors.priors`): l ~ N(mean, covariance). J. T. Barron, J. Malik (2015),
-doi:10.1109/TPAMI.2014.2377712. The world has no preferred left, so every light counts also
-mirrored; a laboratory's lamps have no preferred colour, so its lights may count in every order of
-channels.
+Equation: a light of C channels is the vector of its 9 C coefficients, channel by channel, in the
+reference's convention (`sirfs.priors.priors`): l ~ N(mean, covariance). Left and right are equally
+likely, so every light also counts mirrored; a laboratory's lights have no preferred colour, so they
+may count in every order of channels.
 
-Environment maps as published are tamer than the light that falls on real objects. Factors on their
+Published environment maps have less contrast than the light on real objects. Factors on their
 coefficients (of log shading, so a factor is contrast) are fitted by the likelihood of the known
-objects' lights, none of which is among the maps: one for the mean of the channels and one for the
-channels' deviations from it, since it is the brightness of the maps that is tame and not their
-colour.
+objects' lights, none of which is among the maps: one for the mean of the channels, and one for the
+channels' deviations from it, since the maps lack contrast in brightness and not in colour.
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 import itertools
@@ -22,7 +22,7 @@ import scipy.linalg
 import scipy.optimize
 
 from ...errors import InputError
-from .priors import Light
+from .priors import LightPrior
 
 COEFFICIENTS = 9
 # Coefficients of N2, N1 N2 and N2 N3 change sign when left and right are exchanged.
@@ -31,26 +31,38 @@ _MIRROR = np.array([1.0, -1.0, 1.0, 1.0, -1.0, -1.0, 1.0, 1.0, 1.0])
 
 @dataclass(frozen=True)
 class GaussianLight:
-    """`mean` (n,) and `covariance` (n, n) of stacked coefficients, and the `floor` used where the
-    solver whitens them.
+    """A Gaussian over stacked coefficients.
+
+    Attributes
+    ----------
+    mean : (n,) ndarray
+    covariance : (n, n) ndarray
+    floor : float
+        Added to the covariance where the solver whitens the coefficients.
     """
 
     mean: np.ndarray
     covariance: np.ndarray
     floor: float = 0.01
 
-    def light(self) -> Light:
-        """With unwhiten = s (covariance + floor I)^(1/2), s such that lights of this Gaussian have
-        unit root mean square in u.
+    def light(self) -> LightPrior:
+        """Return the solver's form.
+
+        Its unwhiten = s (covariance + floor I)^(1/2), with s such that lights of this Gaussian
+        have unit root mean square in u.
+
+        Returns
+        -------
+        LightPrior
         """
         values, vectors = np.linalg.eigh(self.covariance)
         values = np.maximum(values, 0.0)
         scale = np.sqrt(np.mean(values / (values + self.floor)))
         unwhiten = scale * (vectors * np.sqrt(values + self.floor)) @ vectors.T
-        return Light(self.mean, self.covariance, unwhiten, self.mean)
+        return LightPrior(self.mean, self.covariance, unwhiten, self.mean)
 
     def grey(self) -> "GaussianLight":
-        """The Gaussian of the mean over channels, of 9 coefficients."""
+        """Return the Gaussian of the mean over channels, of 9 coefficients."""
         channels = len(self.mean) // COEFFICIENTS
         average = np.kron(np.full((1, channels), 1 / channels), np.eye(COEFFICIENTS))
         return GaussianLight(
@@ -58,7 +70,7 @@ class GaussianLight:
         )
 
     def log_likelihood(self, lights: np.ndarray) -> np.ndarray:
-        """log density of each of the `lights` (count, n); shape (count,)."""
+        """Return the log density (count,) of each of the stacked `lights` (count, n)."""
         factor = np.linalg.cholesky(self.covariance)
         white = scipy.linalg.solve_triangular(factor, (lights - self.mean).T, lower=True)
         log_determinant = 2 * np.log(np.diag(factor)).sum()
@@ -68,30 +80,44 @@ class GaussianLight:
 
 
 def mirrored(lights: np.ndarray) -> np.ndarray:
-    """The `lights` (count, 9, C) and their mirror images, (2 count, 9, C)."""
+    """Return the `lights` (count, 9, C) and their mirror images, (2 count, 9, C)."""
     return np.concatenate([lights, lights * _MIRROR[:, None]])
 
 
 def permuted(lights: np.ndarray) -> np.ndarray:
-    """The `lights` (count, 9, C) with their channels in every order."""
+    """Return the `lights` (count, 9, C) with their channels in every order."""
     return np.concatenate(
         [lights[:, :, list(order)] for order in itertools.permutations(range(lights.shape[2]))]
     )
 
 
 def stacked(lights: np.ndarray) -> np.ndarray:
-    """(count, 9, C) to (count, 9 C): channel by channel."""
+    """Flatten lights (count, 9, C) to (count, 9 C), channel by channel."""
     return lights.transpose(0, 2, 1).reshape(len(lights), -1)
 
 
 def fit_light(
     lights: np.ndarray, ridge: tuple[float, float] = (0.0, 0.0), floor: float = 0.01
 ) -> GaussianLight:
-    """The Gaussian of `lights` (count, 9, C).
+    """Fit a Gaussian to lights.
 
-    `ridge` is what its covariance gains, for want of lights to see it in: the variance of the
-    brightness, and that of the colour (see `Contrast`). Raises `InputError` where there are too few
-    different lights for a covariance.
+    Parameters
+    ----------
+    lights : (count, 9, C) ndarray
+    ridge : tuple of float
+        Variances of brightness and of colour added to the covariance, because few lights leave many
+        directions unobserved; see `Contrast` for the split.
+    floor : float
+        See `GaussianLight`.
+
+    Returns
+    -------
+    GaussianLight
+
+    Raises
+    ------
+    InputError
+        If there are too few different lights for a covariance.
     """
     samples = stacked(lights)
     mean = samples.mean(axis=0)
@@ -110,9 +136,14 @@ def fit_light(
 
 @dataclass(frozen=True)
 class Contrast:
-    """Factors on a light's coefficients:
+    """Factors on a light's coefficients.
 
-    `brightness` on their mean over channels, `color` on the deviations from it.
+    Attributes
+    ----------
+    brightness : float
+        On their mean over the channels.
+    color : float
+        On the channels' deviations from it.
     """
 
     brightness: float = 1.0
@@ -120,7 +151,17 @@ class Contrast:
 
 
 def scaled(lights: GaussianLight, contrast: Contrast) -> GaussianLight:
-    """The Gaussian of the same lights with their coefficients multiplied by `contrast`."""
+    """Return the Gaussian of lights with a scaled contrast.
+
+    Parameters
+    ----------
+    lights : GaussianLight
+    contrast : Contrast
+
+    Returns
+    -------
+    GaussianLight
+    """
     brightness = _brightness(len(lights.mean))
     change = contrast.brightness * brightness + contrast.color * (
         np.eye(len(lights.mean)) - brightness
@@ -131,10 +172,18 @@ def scaled(lights: GaussianLight, contrast: Contrast) -> GaussianLight:
 
 
 def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = True) -> Contrast:
-    """The factors on the `environments`' coefficients under which known `lights` (count, 9, C) are
-    likeliest.
+    """Fit the factors on environments under which known lights are likeliest.
 
-    `split`: whether brightness and colour have a factor each.
+    Parameters
+    ----------
+    environments : GaussianLight
+    lights : (count, 9, C) ndarray
+    split : bool
+        Whether brightness and colour have a factor each.
+
+    Returns
+    -------
+    Contrast
     """
     samples = stacked(lights)
 
@@ -155,7 +204,7 @@ def fit_contrast(environments: GaussianLight, lights: np.ndarray, split: bool = 
 
 
 def _brightness(size: int) -> np.ndarray:
-    """The projection of stacked coefficients on what the channels have in common, (size, size)."""
+    """Projection (size, size) of stacked coefficients on what the channels have in common."""
     channels = size // COEFFICIENTS
     return np.kron(np.full((channels, channels), 1 / channels), np.eye(COEFFICIENTS))
 

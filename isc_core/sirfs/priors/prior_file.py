@@ -16,7 +16,7 @@ from ...io.npy import parse_arrays
 from .absolute_table import CoarseTable
 from .color_mixture import ColorScaleMixture
 from .lights import Contrast, GaussianLight
-from .prior_set import FitRecord, Lights, PriorSet
+from .prior_set import FitRecord, LightPriors, PriorSet
 from .priors import SilhouetteProfile
 from .scale_mixture import ScaleMixture
 
@@ -26,18 +26,38 @@ _COEFFICIENTS = 27  # of a light of three channels
 
 
 def save_prior_set(path: str | Path, priors: PriorSet) -> None:
-    """Writes `priors` to `path` (.npz); the same set gives the same bytes.
+    """Write a prior set; the same set gives the same bytes.
 
-    Raises `InputError` where `path` cannot be written.
+    Parameters
+    ----------
+    path : path-like
+        Ends in .npz.
+    priors : PriorSet
+
+    Raises
+    ------
+    InputError
+        If `path` cannot be written.
     """
     with new_file(path) as partial, partial.open("wb") as file:
         _write_archive(file, _to_arrays(priors))
 
 
 def load_prior_set(path: str | Path) -> PriorSet:
-    """Reads a set that `save_prior_set` wrote.
+    """Read a set that `save_prior_set` wrote.
 
-    Raises `InputError` for a missing, damaged, foreign or newer file.
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    PriorSet
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, of another kind, or of a newer version.
     """
     try:
         data = Path(path).read_bytes()
@@ -50,7 +70,17 @@ def load_prior_set(path: str | Path) -> PriorSet:
 
 
 def shipped_prior_set() -> PriorSet:
-    """The set that comes with the package."""
+    """Read the set that ships with the package.
+
+    Returns
+    -------
+    PriorSet
+
+    Raises
+    ------
+    InputError
+        If it is missing or damaged.
+    """
     resource = importlib.resources.files(__package__) / "data" / "priors.npz"
     try:
         data = resource.read_bytes()
@@ -96,7 +126,7 @@ def _to_arrays(priors: PriorSet) -> dict[str, np.ndarray]:
 
 
 def _write_archive(file: IO[bytes], arrays: dict[str, np.ndarray]) -> None:
-    """As `np.savez_compressed`, but without the time of day in the archive."""
+    """As `np.savez_compressed`, without the time of day in the archive."""
     with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
             buffer = io.BytesIO()
@@ -118,7 +148,7 @@ def _parse(data: bytes, source: str) -> PriorSet:
 
 
 class _Reader:
-    """Takes a set out of the arrays of a file, checking each."""
+    """Read a set from the arrays of a file, checking each."""
 
     def __init__(self, arrays: dict[str, np.ndarray], source: str) -> None:
         self.arrays = arrays
@@ -132,7 +162,9 @@ class _Reader:
                 " fit the priors again"
             )
         whiten = self.numbers("parsimony_whiten", (3, 3))
-        lights = Lights(**{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in _LIGHTS})
+        lights = LightPriors(
+            **{name: self.light(f"lights.{name}", _COEFFICIENTS) for name in _LIGHTS}
+        )
         return PriorSet(
             curvature=self.mixture("curvature"),
             grey_smoothness=self.mixture("grey_smoothness"),

@@ -1,7 +1,7 @@
 """The fitted priors in compact form: a few numbers each, from which the solver's tables follow.
 
-Everything of Barron & Malik (2015), doi:10.1109/TPAMI.2014.2377712, for colour and grey photos in
-natural and laboratory light.
+All priors of J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712, for colour and grey
+photos in natural and laboratory light.
 """
 
 from dataclasses import dataclass, field
@@ -19,9 +19,13 @@ ILLUMINATIONS = ("natural", "laboratory")
 
 
 @dataclass(frozen=True)
-class Lights:
-    """A light prior for each kind of photo, in colour (27 coefficients); those for grey photos
-    follow.
+class LightPriors:
+    """Light priors for each kind of photo.
+
+    Attributes
+    ----------
+    natural, laboratory : GaussianLight
+        In colour (27 coefficients); those for grey photos follow.
     """
 
     natural: GaussianLight
@@ -30,8 +34,16 @@ class Lights:
 
 @dataclass(frozen=True)
 class FitRecord:
-    """Where a set comes from: the training objects' names, the factors on the environments'
-    contrast, the options as text.
+    """The origin of a set.
+
+    Attributes
+    ----------
+    objects : tuple of str
+        Names of the training objects.
+    natural_contrast : Contrast
+        Factors on the environments' contrast.
+    options : dict of str
+        Every option of the fit, as text.
     """
 
     objects: tuple[str, ...] = ()
@@ -43,7 +55,16 @@ class FitRecord:
 class PriorSet:
     """All priors, compact.
 
-    `parsimony_whiten` is (3, 3); the grey tables live in plain log reflectance.
+    Attributes
+    ----------
+    curvature, grey_smoothness : ScaleMixture
+    color_smoothness : ColorScaleMixture
+    parsimony_whiten : (3, 3) ndarray
+        Whitening of log reflectance; grey tables are over log reflectance itself.
+    absolute, grey_absolute : CoarseTable
+    silhouette : SilhouetteProfile
+    lights : LightPriors
+    record : FitRecord
     """
 
     curvature: ScaleMixture
@@ -53,14 +74,27 @@ class PriorSet:
     absolute: CoarseTable
     grey_absolute: CoarseTable
     silhouette: SilhouetteProfile
-    lights: Lights
+    lights: LightPriors
     record: FitRecord
 
     def priors(self, illumination: str = "natural", channels: int = 3) -> Priors:
-        """The solver's tables.
+        """Return the solver's tables.
 
-        `illumination`: "natural" or "laboratory"; `channels`: 3 or 1. Raises `InputError` for
-        others.
+        Parameters
+        ----------
+        illumination : str
+            "natural" or "laboratory".
+        channels : int
+            3 or 1.
+
+        Returns
+        -------
+        Priors
+
+        Raises
+        ------
+        InputError
+            For other values.
         """
         if illumination not in ILLUMINATIONS:
             raise InputError(

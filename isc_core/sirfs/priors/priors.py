@@ -1,6 +1,6 @@
-"""What SIRFS believes before it sees a photo: statistics of shape, reflectance and illumination.
+"""The priors as the SIRFS solver reads them: statistics of shape, reflectance and illumination.
 
-All are in the convention of the SIRFS reference (Barron & Malik 2015,
+All are in the convention of the SIRFS reference (J. T. Barron, J. Malik 2015,
 doi:10.1109/TPAMI.2014.2377712): lights are 9 coefficients a channel, stacked channel by channel,
 for normals in a (down, right, toward the viewer) frame.
 """
@@ -16,9 +16,14 @@ from .tabulated_potential import TabulatedPotential
 
 @dataclass(frozen=True)
 class AbsoluteTable:
-    """Cost of a whitened log colour:
+    """Cost of a whitened log colour, on a uniform grid.
 
-    `values` (n, n, n) for colour or (n,) for grey, nodes from `low` to `high` on each axis.
+    Attributes
+    ----------
+    low, high : float
+        First and last node on each axis.
+    values : (n, n, n) or (n,) ndarray
+        For colour or grey.
     """
 
     low: float
@@ -27,11 +32,17 @@ class AbsoluteTable:
 
 
 @dataclass(frozen=True)
-class Light:
+class LightPrior:
     """A Gaussian over the stacked light coefficients l (9 C numbers).
 
-    `mean` and `covariance` are the Gaussian of the light's cost. The solver works in u, with l =
-    unwhiten @ u + offset.
+    The solver works in u, with l = unwhiten @ u + offset.
+
+    Attributes
+    ----------
+    mean : (9 C,) ndarray
+    covariance : (9 C, 9 C) ndarray
+    unwhiten : (9 C, 9 C) ndarray
+    offset : (9 C,) ndarray
     """
 
     mean: np.ndarray
@@ -41,8 +52,9 @@ class Light:
 
     @cached_property
     def precision(self) -> np.ndarray:
-        """The inverse covariance, computed once: a library's solver would wake its threads at every
-        evaluation.
+        """Inverse covariance, computed once.
+
+        Not by LAPACK, whose threads would wake at every evaluation.
         """
         inverse = solve_linear(self.covariance, np.eye(len(self.covariance)))
         return (inverse + inverse.T) / 2
@@ -50,16 +62,19 @@ class Light:
 
 @dataclass(frozen=True)
 class SilhouetteProfile:
-    """How far surfaces have turned away at relative depth u = (k + 0.5) / K behind the silhouette:
+    """How far surfaces lean outward at relative depth u = (k + 0.5) / K behind the silhouette.
 
-    `mean` and `spread`, both (K,).
+    Attributes
+    ----------
+    mean, spread : (K,) ndarray
+        Mean and standard deviation of the normal's in-plane part.
     """
 
     mean: np.ndarray
     spread: np.ndarray
 
     def at(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Mean and spread at `u` in [0, 1], linearly interpolated."""
+        """Return mean and spread at `u` in [0, 1], linearly interpolated."""
         nodes = (np.arange(len(self.mean)) + 0.5) / len(self.mean)
         return np.interp(u, nodes, self.mean), np.interp(u, nodes, self.spread)
 
@@ -68,11 +83,21 @@ class SilhouetteProfile:
 class Priors:
     """Everything the SIRFS objective needs besides its weights.
 
-    `channels`: 3 (colour) or 1 (grey). `curvature`: cost of the difference x of two mean curvatures
-    (1 / pixel), symmetric, 0 at x = 0. `smoothness`: cost of m = 0.5 |smoothness_whiten (A_p -
-    A_q)|^2 in colour, of A_p - A_q itself in grey. `parsimony_whiten`: (C, C), takes log
-    reflectance to the space of the parsimony and absolute terms. `silhouette`: see `silhouette`;
-    None where nothing is known of it.
+    Attributes
+    ----------
+    channels : int
+        3 (colour) or 1 (grey).
+    curvature : TabulatedPotential
+        Cost of the difference x of two mean curvatures (1 / pixel), symmetric, 0 at x = 0.
+    smoothness : TabulatedPotential
+        Cost of m = 0.5 |smoothness_whiten (A_p - A_q)|^2 in colour, of A_p - A_q itself in grey.
+    smoothness_whiten : (C, C) ndarray
+    parsimony_whiten : (C, C) ndarray
+        Takes log reflectance to the space of the parsimony and absolute terms.
+    absolute : AbsoluteTable
+    light : LightPrior
+    silhouette : SilhouetteProfile or None
+        See `silhouette`; None if nothing is known of it.
     """
 
     channels: int
@@ -81,9 +106,9 @@ class Priors:
     smoothness_whiten: np.ndarray
     parsimony_whiten: np.ndarray
     absolute: AbsoluteTable
-    light: Light
+    light: LightPrior
     silhouette: SilhouetteProfile | None = None
 
     def without_silhouette(self) -> "Priors":
-        """The same without the silhouette term, as SIRFS was published."""
+        """Return the priors without the silhouette term, as SIRFS was published."""
         return replace(self, silhouette=None)

@@ -1,14 +1,13 @@
 """Zero-mean Gaussian scale mixtures of one number, for differences of curvature and of grey log
 reflectance.
 
-p(x) = sum_k w_k N(x; 0, s_k^2) with fixed, log-spaced s_k; the weights are fitted by expectation
-maximisation (A. P. Dempster, N. M. Laird, D. B. Rubin 1977,
-doi:10.1111/j.2517-6161.1977.tb01600.x). The use for shape and reflectance: J. T. Barron, J. Malik
-(2015), doi:10.1109/TPAMI.2014.2377712.
+Equation: p(x) = sum_k w_k N(x; 0, s_k^2) with fixed, log-spaced s_k; the weights are fitted by
+expectation maximisation. The samples (millions of pairs) enter as a histogram of |x| on a
+logarithmic grid with each bin's own mean of x^2, which is all that a Gaussian depends on; bins are
+1/300 of a decade wide, so the loss is of second order in 0.8 %.
 
-The samples (millions of pairs) enter as a histogram of |x| on a logarithmic grid with each bin's
-own mean of x^2, which is all that a Gaussian sees of them; bins are 1/300 of a decade wide, so that
-what is lost is of second order in 0.8 %.
+Citation: A. P. Dempster, N. M. Laird, D. B. Rubin 1977, doi:10.1111/j.2517-6161.1977.tb01600.x; the
+use for shape and reflectance: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 from collections.abc import Iterable
@@ -27,9 +26,16 @@ _PER_DECADE = 300
 
 @dataclass(frozen=True)
 class Magnitudes:
-    """A histogram of |x|:
+    """A histogram of |x|.
 
-    `counts` and `squares` (sum of x^2) of each bin, the sum of |x| and the largest |x|.
+    Attributes
+    ----------
+    counts, squares : (bins,) ndarray
+        Samples of each bin, and their sum of x^2.
+    absolute_sum : float
+        Sum of |x|.
+    largest : float
+        Largest |x|.
     """
 
     counts: np.ndarray
@@ -39,7 +45,7 @@ class Magnitudes:
 
     @staticmethod
     def of(x: np.ndarray) -> "Magnitudes":
-        """The histogram of samples `x` (any shape, finite).
+        """Return the histogram of finite samples `x` of any shape.
 
         Magnitudes below 1e-9 or above 1e3 share the first or last bin.
         """
@@ -58,7 +64,7 @@ class Magnitudes:
 
     @staticmethod
     def merged(parts: Iterable["Magnitudes"]) -> "Magnitudes":
-        """The histogram of all samples of `parts` together (at least one part)."""
+        """Return the histogram of all samples of `parts` (at least one) together."""
         all_parts = list(parts)
         counts = np.sum([p.counts for p in all_parts], axis=0)
         squares = np.sum([p.squares for p in all_parts], axis=0)
@@ -72,8 +78,14 @@ class Magnitudes:
 
 @dataclass(frozen=True)
 class ScaleMixture:
-    """`deviations` s_k and `weights` w_k (sum 1), both (K,), and `reach`, the largest |x| the
-    mixture was fitted to.
+    """A fitted mixture.
+
+    Attributes
+    ----------
+    deviations, weights : (K,) ndarray
+        s_k, and w_k with sum 1.
+    reach : float
+        Largest |x| it was fitted to.
     """
 
     deviations: np.ndarray
@@ -81,12 +93,12 @@ class ScaleMixture:
     reach: float
 
     def log_density(self, x: np.ndarray) -> np.ndarray:
-        """log p(x), not below -300; same shape as `x`."""
+        """Return log p(x), at least -300, of the shape of `x`."""
         density = _densities(np.asarray(x, float) ** 2, self.deviations) @ self.weights
         return np.log(np.maximum(density, np.exp(LOG_DENSITY_FLOOR)))
 
     def table(self) -> TabulatedPotential:
-        """The cost -log(p(x) / p(0)) on 20000 nodes from -reach to reach."""
+        """Return the cost -log(p(x) / p(0)) on 20000 nodes from -`reach` to `reach`."""
         nodes = np.linspace(-self.reach, self.reach, TABLE_NODES)
         peak = self.log_density(np.zeros(1))[0]
         return TabulatedPotential(
@@ -97,9 +109,26 @@ class ScaleMixture:
 def fit_scale_mixture(
     samples: Magnitudes, components: int = 40, iterations: int = 200
 ) -> ScaleMixture:
-    """The mixture of highest likelihood that `iterations` steps reach from equal weights.
+    """Fit the mixture of highest likelihood, starting at equal weights.
 
-    The deviations run from mean|x| / 1000 to 3 max|x|. Raises `InputError` where all samples are 0.
+    The deviations run from mean|x| / 1000 to 3 max|x|.
+
+    Parameters
+    ----------
+    samples : Magnitudes
+    components : int
+        Number of deviations.
+    iterations : int
+        Steps of expectation maximisation.
+
+    Returns
+    -------
+    ScaleMixture
+
+    Raises
+    ------
+    InputError
+        If all samples are 0.
     """
     if samples.largest == 0:
         raise InputError(
@@ -120,9 +149,21 @@ def fit_scale_mixture(
 def refine_weights(
     density: np.ndarray, counts: np.ndarray, weights: np.ndarray, iterations: int
 ) -> np.ndarray:
-    """Weights (K,) after some steps of expectation maximisation;
+    """Take some steps of expectation maximisation.
 
-    `density` (n, K) of the components, `counts` (n,).
+    Parameters
+    ----------
+    density : (n, K) ndarray
+        Of the components, at n samples.
+    counts : (n,) ndarray
+    weights : (K,) ndarray
+        Start.
+    iterations : int
+
+    Returns
+    -------
+    (K,) ndarray
+        Sum 1.
     """
     total = counts.sum()
     for _ in range(iterations):

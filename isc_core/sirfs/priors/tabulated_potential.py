@@ -1,9 +1,8 @@
-"""Costs tabulated on a uniform grid: the negative log densities of the priors, read with linear
-interpolation.
+"""Costs tabulated on a uniform grid: the negative log densities of the priors.
 
-Between nodes the value is interpolated linearly and the derivative is the slope of the current
-cell; beyond either end the end cell's slope goes on, so that a cost never goes flat where an
-optimiser could get lost.
+Between nodes the cost is interpolated linearly, and the derivative is the slope of the cell. Beyond
+either end the slope of the end cell continues, so that a cost is never flat where an optimiser
+could get lost.
 """
 
 from dataclasses import dataclass
@@ -13,9 +12,14 @@ import numpy as np
 
 @dataclass(frozen=True)
 class TabulatedPotential:
-    """A cost of one number:
+    """A cost of one number.
 
-    `values[k]` is the cost at `low + k * step`; `values` is float64 of shape (nodes,).
+    Attributes
+    ----------
+    low, step : float
+        Argument at the first node, and spacing of the nodes.
+    values : (nodes,) float64 ndarray
+        Cost at `low + k * step`.
     """
 
     low: float
@@ -23,7 +27,7 @@ class TabulatedPotential:
     values: np.ndarray
 
     def evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Cost and derivative at `x` (any shape), both float64 of x's shape."""
+        """Return cost and derivative at `x` (any shape), both float64 of its shape."""
         position = (np.asarray(x, float) - self.low) / self.step
         cell = np.clip(np.floor(position), 0, len(self.values) - 2).astype(np.int64)
         below = self.values[cell]

@@ -44,7 +44,9 @@ def ball(size: int = 96) -> tuple[np.ndarray, np.ndarray]:
     return normal / np.linalg.norm(normal, axis=-1, keepdims=True), mask
 
 
-def seen(lobe: Lobe, lights: DistantLights, size: int = 96) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def seen(
+    lobe: Lobe, lights: DistantLights, size: int = 96
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Specular image, normals and mask."""
     normal, mask = ball(size)
     return np.where(mask[..., None], radiance(lobe, normal, VIEW, lights), 0), normal, mask

@@ -150,7 +150,7 @@ def test_survives_a_wall_of_infinite_loss() -> None:
 
 
 def test_a_skipped_pair_costs_no_other_pair() -> None:
-    """Pairs without positive curvature are left out; the ones kept stay the newest that were good."""
+    """Pairs without positive curvature are left out; the kept ones are the newest good ones."""
     rng = np.random.default_rng(0)
     memory = _Memory(3, 8, np.dtype(float), NumpyAlgebra())
     memory.vectors[-1] = rng.normal(size=8)

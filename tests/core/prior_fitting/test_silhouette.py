@@ -3,7 +3,7 @@
 import numpy as np
 
 from isc_core.prior_fitting.silhouette import BINS, SilhouetteMoments, fit_silhouette
-from isc_core.sirfs.silhouette import silhouette_cost, normals_from_silhouette
+from isc_core.sirfs.silhouette import normals_from_silhouette, silhouette_cost
 
 
 def ball(radius: float, size: int) -> tuple[np.ndarray, np.ndarray]:

@@ -7,7 +7,7 @@ from isc_core.errors import InputError
 from isc_core.shading.brdf.energy import directional_albedo
 from isc_core.shading.brdf.ggx import Ggx
 from isc_core.shading.brdf.lambert import Lambert
-from isc_core.shading.radiance import Lights, directional, environment, radiance, sh_shading
+from isc_core.shading.radiance import DistantLights, directional, environment, radiance, sh_shading
 from isc_core.shading.spherical_harmonics import real_sh
 
 from .brdf.directions_at import GLOSSY_PAINT, UP, polar_units, random_units
@@ -31,7 +31,7 @@ def test_a_matt_sphere_under_one_light_is_the_clamped_cosine() -> None:
 def test_lights_add_up() -> None:
     normal, lights = (
         random_units(50),
-        Lights(random_units(3, seed=7), np.random.default_rng(1).uniform(0, 2, (3, 3))),
+        DistantLights(random_units(3, seed=7), np.random.default_rng(1).uniform(0, 2, (3, 3))),
     )
     together = radiance(GLOSSY_PAINT, normal, UP, lights)
     alone = [
@@ -80,7 +80,7 @@ def test_unfit_lights_are_refused() -> None:
     with pytest.raises(InputError, match="length 1"):
         directional(2 * UP)
     with pytest.raises(InputError, match="same K"):
-        Lights(np.zeros((0, 3)), np.zeros((0, 3)))
+        DistantLights(np.zeros((0, 3)), np.zeros((0, 3)))
     with pytest.raises(InputError, match="weights"):
         environment(random_units(4), np.ones(4), np.ones((3, 3)))
     with pytest.raises(InputError, match="weights"):
