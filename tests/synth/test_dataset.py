@@ -332,7 +332,7 @@ def test_foreign_folders_are_refused_and_left_alone(tmp_path: Path) -> None:
         "photos": "not empty",
         "text": "is a file",
         "text/below": "not a folder|is a file",
-        "other": "not the manifest",
+        "other": "not a manifest",
     }.items():
         with pytest.raises(InputError, match=message):
             make_dataset(RUN, tmp_path / name)
@@ -350,8 +350,16 @@ def test_a_scene_folder_with_somebody_elses_file_is_kept(root: Path) -> None:
 
 @pytest.mark.parametrize(("count", "seed"), [(0, 0), (-1, 0), (5, 99_999), (100_001, 0)])
 def test_impossible_counts_are_refused(count: int, seed: int) -> None:
-    with pytest.raises(InputError, match="cannot be made"):
+    with pytest.raises(InputError, match="not possible"):
         DatasetSettings(count, seed)
+
+
+def test_scenes_of_schema_1_are_read_with_the_new_gloss_class(root: Path) -> None:
+    path = list_scenes(root)[0] / "scene.json"
+    content = json.loads(path.read_text())
+    content["schema_version"], content["material"]["gloss_class"] = 1, "matt"
+    path.write_text(json.dumps(content))
+    assert read_facts(path.parent).gloss_class == "diffuse"
 
 
 def test_reading_refuses_what_is_not_ours(root: Path, tmp_path: Path) -> None:

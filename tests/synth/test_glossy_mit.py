@@ -412,7 +412,7 @@ def test_folders_of_something_else_are_left_alone(small: Path, tmp_path: Path) -
         GlossySettings(levels=(30.0,)),
         GlossySettings(levels=(25.0,), exponent=20.0),
     ):
-        with pytest.raises(InputError, match="holds another run"):
+        with pytest.raises(InputError, match="contains another run"):
             make_glossy(small, tmp_path / "out", other)
     assert contents(tmp_path / "out") == before
     assert contents(foreign) == {"thesis.tex": b"mine"}
@@ -502,5 +502,5 @@ def test_the_command_makes_the_sets_and_prints_how_to_evaluate_on_them(
 
 
 def test_levels_that_are_no_numbers_are_refused() -> None:
-    with pytest.raises(InputError, match="per cents"):
+    with pytest.raises(InputError, match="percentages"):
         parsed("ROOT", "-o", "x", "--levels", "10,lots")

@@ -98,8 +98,11 @@ def test_f0_is_that_of_glass() -> None:
         ({"model": "ggx", "gloss": 1.5}, "gloss of ggx"),
         ({"strength": -0.1}, "strength"),
         ({"strength": float("inf")}, "strength"),
-        ({"model": "roughplastic", "gloss": 0.1, "strength": 0.5}, "one gloss"),
-        ({"model": "roughplastic", "gloss": np.full((2, 2), 0.1), "strength": 1.0}, "one gloss"),
+        ({"model": "roughplastic", "gloss": 0.1, "strength": 0.5}, "uniform gloss"),
+        (
+            {"model": "roughplastic", "gloss": np.full((2, 2), 0.1), "strength": 1.0},
+            "uniform gloss",
+        ),
     ],
 )
 def test_impossible_materials_are_refused(values: dict[str, Any], message: str) -> None:

@@ -112,8 +112,8 @@ def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("--shapes", "teapot"), "unknown shape 'teapot': choose of superquadric"),
-        (("--materials", "ggx,velvet"), "unknown material 'velvet': choose of lambert"),
+        (("--shapes", "teapot"), "unknown shape 'teapot': choose superquadric"),
+        (("--materials", "ggx,velvet"), "unknown material 'velvet': choose lambert"),
         (("--albedos", "tartan"), "unknown albedo 'tartan'"),
         (("--lights", "laser"), "unknown light 'laser'"),
         (("--splits", "dev"), "unknown split 'dev'"),
@@ -122,10 +122,10 @@ def test_an_error_inside_a_command_is_not_taken_for_a_missing_package(
         (("--size", "4"), "choose 8 to 4096"),
         (("--size", "9999"), "choose 8 to 4096"),
         (("--size", "-5"), "is not a whole number"),
-        (("--samples", "1"), "samples have to be 2 or more"),
-        (("--bounces", "99"), "bounces 0 to 8"),
-        (("--seed", "99999", "--count", "2"), "cannot be made"),
-        (("--count", "0"), "cannot be made"),
+        (("--samples", "1"), "at least 2 samples"),
+        (("--bounces", "99"), "0 to 8 bounces"),
+        (("--seed", "99999", "--count", "2"), "not possible"),
+        (("--count", "0"), "not possible"),
         (("--count", "many"), "not a whole number"),
         (("--exposure", "0"), "--exposure"),
         (("--noise", "2"), "from 0 to below 1"),
@@ -162,12 +162,12 @@ def test_a_run_makes_scenes_and_goes_on(tmp_path: Path, capsys: pytest.CaptureFi
     assert synth(out, *loud, "--bits", "8", "--noise", "0.01") == 0
     shown = capsys.readouterr()
     assert (
-        "1 scenes made" in shown.out
+        "1 scenes rendered" in shown.out
         and "README.md" in shown.out
         and "isc: scene 1 of 1" in shown.err
     )
     assert synth(out, *loud, "--bits", "8", "--noise", "0.01", count=2) == 0
-    assert "1 scenes made, 1 were there already" in capsys.readouterr().out
+    assert "1 scenes rendered, 1 kept" in capsys.readouterr().out
     assert synth(out, *loud, "--bits", "16", "--noise", "0.01", count=2) == 2
     assert "another run (sensor" in refusal(capsys)
     picture = json.loads(next(out.glob("train/*/scene.json")).read_text())["picture"]
@@ -220,7 +220,7 @@ def test_files_of_the_user_come_in(tmp_path: Path, capsys: pytest.CaptureFixture
         synth(tmp_path / "set", "--mesh", str(tmp_path / "solid.obj"), "--splits", "test_objects")
         == 2
     )
-    assert "test_objects cannot be made" in refusal(capsys)
+    assert "test_objects is not possible" in refusal(capsys)
     sky = np.full((8, 16), 0.5, np.float32)
     (tmp_path / "lights").mkdir()
     write_channels(tmp_path / "lights" / "sky.exr", {"R": sky, "G": sky, "B": sky})

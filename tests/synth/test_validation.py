@@ -1,5 +1,6 @@
 """Scores, budgets and intervals of a validation, on scenes with known results."""
 
+import json
 from dataclasses import replace
 from itertools import permutations
 from pathlib import Path
@@ -426,6 +427,14 @@ def test_files_that_hold_no_bounds_are_refused(tmp_path: Path, text: str) -> Non
     (tmp_path / "bounds.json").write_text(text, encoding="utf-8")
     with pytest.raises(InputError, match="bounds.json"):
         read_bounds(tmp_path / "bounds.json")
+
+
+def test_bounds_of_schema_1_are_read_with_the_new_gloss_class(tmp_path: Path) -> None:
+    entry = {"stage": "gloss", "metric": "invented", "kind": "gloss", "value": "matt", "limit": 0.1}
+    content = {"schema_version": 1, "bounds": [entry]}
+    (tmp_path / "bounds.json").write_text(json.dumps(content), encoding="utf-8")
+    expected = Bound("gloss", "invented", "gloss", "diffuse", 0.1)
+    assert read_bounds(tmp_path / "bounds.json") == (expected,)
 
 
 def test_identities_hold_and_one_wrong_pixel_is_found() -> None:
