@@ -1,19 +1,22 @@
 """MkDocs hooks: pages of the documentation site that are derived from other files.
 
 One API page for each package folder of `isc_core`, written as mkdocstrings directives, and one page
-with the help text of every command, so that both references follow the code. CHANGELOG.md and SECURITY.md stay at the root of the repository
-and appear as pages; links that climb out of docs/ to them work in both places.
+with the help text of every command, so that both references follow the code. CHANGELOG.md and
+SECURITY.md stay at the root of the repository and appear as pages; links that climb out of docs/ to
+them work in both places.
 """
 
+import contextlib
+import io
 import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+
+from isc_core.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[1]
 CORE = ROOT / "isc_core"
@@ -105,15 +108,10 @@ def _api_index() -> str:
 
 def _help(*command: str) -> str:
     """What `isc COMMAND --help` prints."""
-    done = subprocess.run(
-        [sys.executable, "-m", "isc_core", *command, "--help"],
-        cwd=ROOT,
-        env={**os.environ, "COLUMNS": "96"},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    return done.stdout
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        main([*command, "--help"])
+    return printed.getvalue()
 
 
 def _choices(text: str) -> list[str]:
@@ -122,6 +120,7 @@ def _choices(text: str) -> list[str]:
 
 
 def _command_line() -> str:
+    os.environ["COLUMNS"] = "96"
     top = _help()
     parts = ["# Command line", "Generated from the help texts.", f"```text\n{top}```"]
     for command in _choices(top):
