@@ -1,6 +1,4 @@
-"""What fuzzing found, and what files can claim: each kept as a small file that has to be refused in
-one quiet line.
-"""
+"""Regression tests for fuzzing findings: small files that must be refused in one quiet line."""
 
 import io
 import json
@@ -14,10 +12,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.fuzzing import data_files
-from benchmarks.fuzzing.data_files import deflated, matlab
-from benchmarks.fuzzing.mesh_files import glb
-from benchmarks.fuzzing.pictures import array, ball, coded, codes, exr
 from isc_core.cli.main import main
 from isc_core.datasets.mit_berkeley import load_natural_lights
 from isc_core.errors import InputError
@@ -26,9 +20,9 @@ from isc_core.io.json_files import read_json
 from isc_core.io.limits import Limits
 from isc_core.io.matlab import read_matrix
 from isc_core.io.npy import read_array, read_arrays
-from isc_core.networks.layer_network import read_network
-from isc_core.networks.light_network import read_lamp_network
-from isc_core.networks.scene_classifier import read_appearance
+from isc_core.networks.layer_network import LayerNetwork
+from isc_core.networks.light_network import LightNetwork
+from isc_core.networks.scene_classifier import SceneClassifier
 from isc_core.photo import read_linear, read_photo
 from isc_core.result_files.known_inputs import read_light
 from isc_core.result_files.result_folder import load
@@ -37,11 +31,14 @@ from synth.dataset.reading import read_facts
 from synth.shapes.mesh_file import read_mesh_file
 from synth.validation.measurement.bounds import read_bounds
 from synth.validation.reporting.folder import FILES, report_files
+from tests.fuzz.data_files import deflated, matlab, result_files, scene_files
+from tests.fuzz.mesh_files import glb
+from tests.fuzz.pictures import array, ball, coded, codes, exr
 
 
 @pytest.fixture
 def refused(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Callable[..., None]:
-    """Gives a reader a file; it has to raise `InputError` with `words`, and to print nothing."""
+    """Give a reader a file; it must raise `InputError` with `words` and print nothing."""
 
     def check(
         read: Callable[[Path], object], name: str, data: bytes, words: str, **beside: bytes
@@ -105,7 +102,7 @@ def with_window(left: int, top: int, right: int, bottom: int) -> bytes:
         ((5, 5, 4, 4), "readable|damaged"),
     ],
 )
-def test_windows_of_an_exr_are_believed_only_as_far_as_it_goes(
+def test_exr_windows_that_claim_too_much_are_refused(
     refused: Callable[..., None], window: tuple[int, int, int, int], words: str
 ) -> None:
     for read in (read_channels, read_photo):
@@ -128,9 +125,7 @@ def test_deep_exr_and_strange_channels_are_refused(refused: Callable[..., None])
     )
 
 
-def test_the_limit_of_pixels_is_held_before_decoding(
-    refused: Callable[..., None], tmp_path: Path
-) -> None:
+def test_pixel_limit_applies_before_decoding(refused: Callable[..., None], tmp_path: Path) -> None:
     few = Limits(max_pixels=400)
     for suffix, pixels in (
         (".png", codes(16)),
@@ -169,7 +164,7 @@ HEADERS = {
 
 @pytest.mark.parametrize("case", HEADERS)
 @pytest.mark.parametrize("version", [1, 2])
-def test_headers_of_arrays_are_not_believed(
+def test_damaged_array_headers_are_refused(
     refused: Callable[..., None], case: str, version: int
 ) -> None:
     data = header(HEADERS[case], version) + bytes(64)
@@ -192,7 +187,7 @@ def test_archives_that_unpack_to_much_are_refused(refused: Callable[..., None]) 
     )
 
 
-def test_a_matrix_may_not_claim_more_than_it_holds(refused: Callable[..., None]) -> None:
+def test_matrix_that_claims_more_than_it_holds(refused: Callable[..., None]) -> None:
     data = bytearray(matlab({"depth": np.zeros((3, 3))}, packed=False))
     shape = data.index(struct.pack("<ii", 3, 3))
     data[shape : shape + 8] = struct.pack("<ii", 2**31 - 1, 2**31 - 1)
@@ -231,9 +226,7 @@ def test_matrices_are_read_as_they_were_written(tmp_path: Path) -> None:
     assert load_natural_lights(tmp_path).shape == (9, 3, 2)
 
 
-def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(
-    refused: Callable[..., None],
-) -> None:
+def test_tables_and_networks_with_nan_are_refused(refused: Callable[..., None]) -> None:
     table = shipped_table()
     members = {
         "spread": table.spread,
@@ -250,7 +243,7 @@ def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(
         "a.npz",
     )
     weights = {"weight00": np.full((3, 3), np.nan, np.float32), "bias00": np.zeros(3, np.float32)}
-    for read in (read_network, read_appearance, read_lamp_network):
+    for read in (LayerNetwork.read, SceneClassifier.read, LightNetwork.read):
         refused(
             read,
             "a.npz",
@@ -265,7 +258,7 @@ def test_tables_and_networks_with_values_that_are_no_numbers_are_refused(
 @pytest.mark.parametrize(
     "text", ["[" * 100_000, "{" * 100_000, '{"a":' * 100_000, "\ufeff{", "1" * 10_000, "", "\0"]
 )
-def test_json_that_is_none_is_refused(refused: Callable[..., None], text: str) -> None:
+def test_damaged_json_is_refused(refused: Callable[..., None], text: str) -> None:
     refused(read_json, "a.json", text.encode(), "a.json")
     refused(read_light, "a.json", text.encode(), "a.json")
     refused(lambda path: read_facts(path.parent), "scene.json", text.encode(), "scene.json")
@@ -276,7 +269,7 @@ def test_numbers_too_large_for_floats_are_refused(refused: Callable[..., None]) 
 
 
 @pytest.mark.parametrize("name", ["line\nend", "\x1b[2J", "\u202egnp.exe", "\udce9"])
-def test_what_files_say_cannot_steer_the_terminal(name: str) -> None:
+def test_messages_are_printable(name: str) -> None:
     assert str(InputError(f"channel {name}: not known")).isprintable()
     assert str(InputError("Größe 5 °: “x”")) == "Größe 5 °: “x”"
 
@@ -284,8 +277,12 @@ def test_what_files_say_cannot_steer_the_terminal(name: str) -> None:
 # --- meshes ---------------------------------------------------------------------------------------
 
 CUBE = """v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 {z}\nv 1 0 1\nv 1 1 1\nv 0 1 1
-f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5\nf 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n"""
-PLY = b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nend_header\n"
+f 1 3 2\nf 1 4 3\nf 5 6 7\nf 5 7 8\nf 1 2 6\nf 1 6 5
+f 2 3 7\nf 2 7 6\nf 3 4 8\nf 3 8 7\nf 4 1 5\nf 4 5 8\n"""
+PLY = (
+    b"ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\n"
+    b"property float z\nelement face 1\nend_header\n"
+)
 
 
 def test_meshes_that_trip_the_loader_are_refused(refused: Callable[..., None]) -> None:
@@ -319,9 +316,7 @@ def test_meshes_that_trip_the_loader_are_refused(refused: Callable[..., None]) -
         )
 
 
-def test_vertices_that_no_face_uses_are_no_matter(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_unused_vertices_do_not_matter(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "a.obj").write_text(
         CUBE.format(z=1).replace("f", "v 1e300 -1e308 nan\nf", 1), encoding="utf-8"
     )
@@ -335,7 +330,7 @@ def huge_number(text: bytes, key: bytes) -> bytes:
 
 
 def test_whole_numbers_of_any_length_are_refused(refused: Callable[..., None]) -> None:
-    result, scene = data_files._result(), data_files._scene()["scene.json"]
+    result, scene = result_files(), scene_files()["scene.json"]
     beside = {
         name.replace(".", "_"): data
         for name, data in result.items()
@@ -350,8 +345,9 @@ def test_whole_numbers_of_any_length_are_refused(refused: Callable[..., None]) -
         huge_number(scene, b"specular_share"),
         "specular_share",
     )
-    bounds = b'{"schema_version": 1, "bounds": [{"stage": "a", "metric": "b", "kind": "c", "value": "d", "limit": 1}]}'
-    refused(read_bounds, "bounds.json", huge_number(bounds, b"limit"), "has to be a number")
+    limit = {"stage": "a", "metric": "b", "kind": "c", "value": "d", "limit": 1}
+    bounds = json.dumps({"schema_version": 1, "bounds": [limit]}).encode()
+    refused(read_bounds, "bounds.json", huge_number(bounds, b"limit"), "must be a number")
 
 
 @pytest.mark.parametrize(
@@ -365,10 +361,10 @@ def test_whole_numbers_of_any_length_are_refused(refused: Callable[..., None]) -
         {"name": 3},
     ],
 )
-def test_what_a_result_says_of_its_photo_is_checked(
+def test_input_record_of_a_result_is_checked(
     refused: Callable[..., None], given: dict[str, object]
 ) -> None:
-    result = dict(data_files._result())
+    result = dict(result_files())
     described = json.loads(result.pop("decomposition.json"))
     described["input"] |= given
     beside = {name.replace(".", "_"): data for name, data in result.items()}
@@ -386,7 +382,7 @@ TEXTURED = (
 )
 
 
-def test_textures_are_pictures_of_a_bearable_size(refused: Callable[..., None]) -> None:
+def test_hostile_textures_are_refused(refused: Callable[..., None]) -> None:
     material = b"newmtl a\nmap_Kd a.png\n"
     size = struct.pack(">II", 60_000, 60_000)
     picture = coded(".png", codes())
@@ -406,7 +402,7 @@ def test_textures_are_pictures_of_a_bearable_size(refused: Callable[..., None]) 
 
 
 @pytest.mark.parametrize("uv", ["nan nan", "1e300 -1e300", "inf 0"])
-def test_texture_coordinates_without_end_are_quiet(
+def test_non_finite_texture_coordinates_are_quiet(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], uv: str
 ) -> None:
     text = CUBE.format(z=1)
@@ -439,7 +435,7 @@ def test_texture_coordinates_without_end_are_quiet(
         "evidence\\a\\x.exr",
     ],
 )
-def test_an_earlier_report_names_no_files_but_its_evidence(tmp_path: Path, name: str) -> None:
+def test_earlier_report_names_only_its_evidence(tmp_path: Path, name: str) -> None:
     report = {"evidence": ["evidence/scene3/diffuse.exr", name]}
     (tmp_path / "report.json").write_text(json.dumps(report), encoding="utf-8")
     assert report_files(tmp_path) == (*FILES, "evidence/scene3/diffuse.exr")
@@ -459,7 +455,7 @@ def test_a_mesh_opens_nothing_through_a_link_out_of_its_folder(tmp_path: Path) -
 @pytest.mark.parametrize(
     "words", ["decompose {} -o {}", "separate {} -o {}", "mask {} --box 2,2,14,14 -o {}.png"]
 )
-def test_commands_hold_the_limit_of_pixels(
+def test_commands_apply_the_pixel_limit(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], words: str
 ) -> None:
     (tmp_path / "a.png").write_bytes(coded(".png", codes()))
