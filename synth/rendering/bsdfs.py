@@ -139,7 +139,7 @@ class BlinnPhongLobe:
     def sample(self, view: Lanes, place: Lanes) -> Lanes:
         """See `SpecularLobe`."""
         dr, mi = load_drjit(), load_mitsuba()
-        # 1 - cos^2 by way of the logarithm keeps its digits where the lobe is narrow.
+        # 1 - cos^2 from the logarithm is accurate for narrow lobes.
         square = 1 - dr.exp(2 / (self.exponent + 1) * dr.log(dr.maximum(1 - place.x, 1e-30)))
         across, (sine, cosine) = dr.safe_sqrt(square), dr.sincos(2 * math.pi * place.y)
         half = mi.Vector3f(across * cosine, across * sine, dr.safe_sqrt(1 - square))

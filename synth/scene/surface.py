@@ -19,7 +19,7 @@ from .materials import SurfaceReflectance
 from .scene import Scene
 from .tracing import Tracer
 
-_FOOTPRINT = 3  # rays a side of a pixel, for its reflectance
+_FOOTPRINT = 3  # rays per side of a pixel, for its reflectance
 _SAME_PLACE = 3.0  # pixels: farther from the centre's hit, a ray of the footprint does not count
 
 

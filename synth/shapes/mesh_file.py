@@ -175,8 +175,8 @@ def read_mesh_file(path: str | Path, texture_size: int = TEXTURE_SIZE) -> MeshFi
         albedo = _projected(parts, vertices, uv, texture_size)
         faces = np.unique(place, return_index=True)[1][
             place[faces]
-        ]  # what lies in one place has one coordinate now
-    # One vertex of the mesh for each vertex of the file in each smooth group around it.
+        ]  # vertices at one position share their coordinates now
+    # One vertex of the mesh per vertex of the file and smooth group around it.
     groups = len(normals)
     keys, number = np.unique(faces.ravel() * groups + corners, return_inverse=True)
     source, group = keys // groups, keys % groups
@@ -225,7 +225,7 @@ def _read_parts(path: Path) -> list[_Part]:
             )
     if (
         kind == "obj" and not beside.given
-    ):  # trimesh invents a grey material for an OBJ file that names none
+    ):  # trimesh adds a grey material to an OBJ file without one
         return [replace(part, texture=None) for part in parts]
     return parts
 
@@ -278,7 +278,7 @@ def _part(scene: Any, node: str, kind: str) -> _Part | None:
         return None
     with np.errstate(
         invalid="ignore", over="ignore"
-    ):  # what is not finite is refused later, by name
+    ):  # non-finite vertices are refused later, with a message
         vertices = np.asarray(piece.vertices, float) @ transform[:3, :3].T + transform[:3, 3]
     if np.linalg.det(transform[:3, :3]) < 0:
         faces = faces[:, ::-1]
@@ -304,7 +304,7 @@ def _texture(material: Any) -> np.ndarray | None:
         if factor is None or (np.asarray(factor)[:3] == _NO_COLOUR).all():
             return None
     if image is not None:
-        if image.format not in (None, *_PICTURES):  # one that trimesh made itself has none
+        if image.format not in (None, *_PICTURES):  # images made by trimesh have no format
             raise ValueError("a texture of a kind that is not read")
         USUAL.check_pixels("a texture", *image.size)
     numbers = np.ones(3) if factor is None else np.asarray(factor)[:3]
@@ -479,7 +479,7 @@ def _rasterise(
     side = math.isqrt(len(depth))
     x, y = (part.vertices[part.faces, i] for i in range(2))
     toward = (x[:, 1] - x[:, 0]) * (y[:, 2] - y[:, 0]) > (x[:, 2] - x[:, 0]) * (y[:, 1] - y[:, 0])
-    shown = part.faces[toward]  # of a closed mesh the others are behind these
+    shown = part.faces[toward]  # the other faces of a closed mesh are hidden
     place = front[shown] * side
     longest = np.linalg.norm(place - np.roll(place, 1, 1), axis=-1).max(1, initial=0)
     steps = np.ceil(1.25 ** np.ceil(np.log(np.maximum(1.2 * longest, 1)) / np.log(1.25))).astype(
@@ -496,7 +496,7 @@ def _rasterise(
                 (cell[..., 1] * side + cell[..., 0]).ravel(),
                 (weights @ z[faces][..., None]).ravel(),
             )
-            order = np.argsort(near)  # the nearest last: it is the one that stays
+            order = np.argsort(near)  # the nearest last: it overwrites the others
             order = order[near[order] >= depth[index[order]]]
             colours = _colours_of(part, faces, weights).reshape(-1, 3)
             depth[index[order]], texture[index[order]] = near[order], colours[order]
@@ -512,7 +512,7 @@ def _colours_of(part: _Part, faces: np.ndarray, weights: np.ndarray) -> np.ndarr
         return np.full((len(faces), len(weights), 3), 0.5)
     if part.uv is None:
         return np.broadcast_to(part.texture[0, 0], (len(faces), len(weights), 3))
-    near = np.where(np.abs(part.uv) < _FARTHEST, part.uv, 0)  # what is no number, too
+    near = np.where(np.abs(part.uv) < _FARTHEST, part.uv, 0)  # NaN becomes 0 too
     uv = (weights @ near[faces]).reshape(-1, 2)
     return texture_at(part.texture, np.stack([uv[:, 0], np.mod(uv[:, 1], 1)], -1)).reshape(
         len(faces), len(weights), 3

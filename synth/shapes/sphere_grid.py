@@ -14,7 +14,7 @@ from functools import cache
 
 import numpy as np
 
-# along a side: 130 thousand triangles, 3 pixels each way where the object is 480 pixels wide
+# Along a side: 130 thousand triangles of about 3 pixels if the object is 480 pixels wide.
 CELLS = 104
 
 

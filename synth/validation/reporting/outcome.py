@@ -17,7 +17,7 @@ from ..measurement.substitution import COMBINATIONS, METRICS, Budget, budget
 from ..stages.models import Variants
 from ..stages.types import Metric
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2  # 2: the gloss class "matt" is called "diffuse"
 _PACKAGES = ("numpy", "scipy", "numba", "mitsuba")
 
 

@@ -107,7 +107,7 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
     light_estimate, normal_estimate = (
         predict_light(photo.image, photo.mask),
         predict_normals(photo.image, photo.mask),
-    )  # of the photo, also for its diffuse layer alone
+    )
 
     def solved(model: str, image: Photo, start: SceneEstimate | None = None) -> SceneEstimate:
         known = SceneConstraints() if start is None else SceneConstraints(start.height, start.light)
