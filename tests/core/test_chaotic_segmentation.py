@@ -18,7 +18,7 @@ from isc_core.separation.chaotic_segmentation import (
     find_specular,
     separate,
 )
-from tests.core.separation_scenes import assert_layers_hold, read
+from tests.core.separation.scenes import assert_layers_hold, read
 
 PAPER = VARIANTS["paper"]
 

@@ -32,7 +32,7 @@ from isc_core.separation import BEST, separate
 from isc_core.sirfs.priors.prior_file import load_prior_set, shipped_prior_set
 from tests.core.ball_scene import LIGHT
 from tests.core.command_line import ROOT, ball_codes, ball_photo, isc_command, run_isc, write_image
-from tests.core.separation_scenes import glossy_disc
+from tests.core.separation.scenes import glossy_disc
 
 COMMANDS = ("decompose", "separate", "mask", "evaluate", "fit-priors")
 

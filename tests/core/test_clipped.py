@@ -9,7 +9,7 @@ from isc_core.photo import read_photo
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import separate
 from isc_core.separation.support.layers import white_layers
-from tests.core.separation_scenes import glossy_disc, highlight_photo, psnr
+from tests.core.separation.scenes import glossy_disc, highlight_photo, psnr
 
 
 def clipped_disc(gain: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

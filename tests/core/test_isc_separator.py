@@ -18,7 +18,7 @@ from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import BEST, METHODS, isc, separate
 from isc_core.separation.isc import VARIANTS, IscOptions
-from tests.core.separation_scenes import PAINTS, assert_layers_hold, error_ratio
+from tests.core.separation.scenes import PAINTS, assert_layers_hold, error_ratio
 
 
 @dataclass(frozen=True)

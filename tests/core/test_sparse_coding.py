@@ -13,7 +13,7 @@ from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import sparse_coding
 from isc_core.separation.sparse_coding import VARIANTS, SparseCodingOptions, separate
-from tests.core.separation_scenes import read
+from tests.core.separation.scenes import read
 
 RED, GREEN, PALE_GREEN = (
     np.array([0.8, 0.15, 0.1]),

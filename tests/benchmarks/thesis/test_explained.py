@@ -36,7 +36,7 @@ from isc_core.shading.brdf.phong import Phong
 from isc_core.shading.lights import toward
 from isc_core.shading.spherical_harmonics import light_to_reference
 from tests.core.ball_scene import ball
-from tests.core.separation_scenes import glossy_disc
+from tests.core.separation.scenes import glossy_disc
 
 MODULES = (
     introduction,
@@ -182,7 +182,7 @@ def test_characteristics_are_those_of_a_saved_result(
 
 def test_tables_of_documentation_are_made(context: Context) -> None:
     assert "NOT" not in made("table-2.3", context).text
-    left = column(made("table-2.2", context), "highlight left (%), mean")
+    left = column(made("table-2.2", context), "residual highlight (%), mean")
     assert set(left) == {kind.name for kind in KINDS}
     assert len(made("table-2.1", context).tables[0].rows) == len(catalogue.MODELS)
 
@@ -224,7 +224,7 @@ def test_closed_forms_look_as_their_shape_and_light_say() -> None:
         assert np.array_equal(inside, shaded.mask)
         normal = truth_normal(shaded.height)
         known = np.isfinite(normal[..., 2]) & (normal[..., 2] > 0.5)
-        expected = introduction._ALBEDO * np.maximum(normal @ introduction.LIGHT, 0)
+        expected = introduction.ALBEDO * np.maximum(normal @ introduction.LIGHT, 0)
         assert np.abs(expected - shaded.image[..., 0])[known].mean() < 0.02
     ball_, method = introduction.sphere(64), "sfs-ikeuchi-horn"
     assert (
@@ -266,9 +266,9 @@ def test_edits_do_what_was_asked_for_and_nothing_else(context: Context) -> None:
     diffuse, specular = (
         column(answer, f"of the {layer} layer (%)") for layer in ("diffuse", "specular")
     )
-    assert diffuse["nothing asked for"] == specular["nothing asked for"] == 0
+    assert diffuse["no edit"] == specular["no edit"] == 0
     for name in diffuse:
-        if name != "nothing asked for":
+        if name != "no edit":
             layers = {"diffuse": diffuse[name], "specular": specular[name]}
             asked = name.split()[0]
             assert layers.pop(asked) > 1, name
