@@ -1,21 +1,20 @@
-"""How good is `--method isc` on photos without a say in its constants? These are chosen on all
-photos but one object's, which is measured.
+"""Cross-validate the constants of `--method isc`: choose without an object, measure on it.
 
   python -m benchmarks.separation.constants --data ../shared/data -o constants.csv [--candidates 60]
 
-Candidates are the shipped constants and random changes of them (seeded): each number of a few
-chosen at random is scaled, ramps are moved and stretched. Each candidate is measured once on every
-photo whose layers are known and on every diffuse image. Then, for each object, the best candidate
-by all other objects' figures is the one whose figures count for it. The score that chooses is
+Candidates are the shipped constants and seeded random changes of them: each number of a few chosen
+at random is scaled; ramps are moved and stretched. Each candidate is measured once on every photo
+with known layers and on every diffuse image. Then, for each object, the candidate that is best on
+all other objects counts. The score to minimise is
 
     sum log max(ratio, .05) + 20 sum max(0, ratio - 1.0005) + 1.5 sum min(max(0, change - .5), 3),
 
-ratio being the squared error over that of doing nothing, and change the per cent of a diffuse image
-that is taken for highlight. A file keeps what was measured, so that a run can be stopped and taken
-up again.
+where ratio is the squared error over that of the unchanged photo, and change the percentage of a
+diffuse image that is taken for highlights. The output file keeps all measurements; an interrupted
+run continues.
 
-Limits: the shipped constants were found on these photos, so candidates lie around them: this
-measures how much the last choice overfits, not the design, which saw all of them.
+Limits: the shipped constants were chosen on these photos, and the candidates lie around them. This
+measures how much the last choice overfits, not the design, which used all photos.
 """
 
 import argparse
@@ -33,7 +32,7 @@ from isc_core.datasets.highlight_set import SeparationTruth
 from isc_core.imaging.bounding_box import mask_slices
 from isc_core.separation.isc import VARIANTS, IscOptions, separate
 
-from .specular_removal import cases
+from .specular_removal import photo_cases
 
 _SEED = 20160101
 _CHANGED = 6
@@ -41,7 +40,7 @@ _COLUMNS = ("candidate", "group", "name", "value")
 
 
 def candidates(count: int) -> list[IscOptions]:
-    """The shipped options first, then `count` - 1 random changes of them."""
+    """Return the shipped options, followed by `count` - 1 random changes of them."""
     shipped, random = VARIANTS["improved"], np.random.default_rng(_SEED)
     return [shipped] + [_changed(shipped, random) for _ in range(count - 1)]
 
@@ -71,8 +70,8 @@ def _moved(value: Any, random: np.random.Generator) -> Any:
 
 @cache
 def _photos(data: Path) -> tuple[tuple[str, SeparationTruth], ...]:
-    """Group and truth of every photo, cut to its mask's box."""
-    return tuple((case.group, _cut(case.load())) for case in cases(data, None))
+    """Group and truth of every photo, cropped to its mask."""
+    return tuple((case.group, _cut(case.load())) for case in photo_cases(data, None))
 
 
 def _cut(truth: SeparationTruth) -> SeparationTruth:
@@ -85,8 +84,19 @@ def _cut(truth: SeparationTruth) -> SeparationTruth:
 
 
 def measure(data: Path, options: IscOptions) -> list[tuple[str, str, float]]:
-    """(group, name, value) of every photo: the error ratio, or the change in per cent for images
-    without highlight.
+    """Measure one candidate on every photo.
+
+    Parameters
+    ----------
+    data : Path
+        Root of the data sets.
+    options : IscOptions
+        The candidate.
+
+    Returns
+    -------
+    list of tuple
+        Group, name and value: the error ratio or, without highlights, the change in per cent.
     """
     return [(group, truth.name, _value(truth, options)) for group, truth in _photos(data)]
 
@@ -107,7 +117,7 @@ def _value(truth: SeparationTruth, options: IscOptions) -> float:
 
 
 def score(figures: dict[tuple[str, str], float]) -> float:
-    """What a candidate is chosen by; less is better."""
+    """Return the score of a candidate from its values by group and name; lower is better."""
     clean = [value for (group, _), value in figures.items() if "clean" in group]
     ratios = np.array([value for (group, _), value in figures.items() if "clean" not in group])
     harm = (
@@ -119,8 +129,21 @@ def score(figures: dict[tuple[str, str], float]) -> float:
 def left_out(
     table: dict[int, dict[tuple[str, str], float]],
 ) -> Iterator[tuple[str, str, float, float, int]]:
-    """Of each photo its group, name, figure with the shipped constants, figure with those chosen
-    without its object, and their number.
+    """Choose the constants without each object in turn.
+
+    Parameters
+    ----------
+    table : dict
+        Values by candidate, then by group and name.
+
+    Yields
+    ------
+    group, name : str
+        The photo.
+    shipped, chosen : float
+        Its values with the shipped constants and with those chosen without its object.
+    candidate : int
+        Number of the latter.
     """
     for thing in sorted({_object(name) for _, name in table[0]}):
         others = {
@@ -134,7 +157,7 @@ def left_out(
 
 
 def _object(name: str) -> str:
-    """What a photo shows: its diffuse images are named after their light as well."""
+    """The object of a photo: names of diffuse images begin with the light."""
     return name.split()[-1]
 
 
@@ -150,7 +173,7 @@ def _read(path: Path) -> dict[int, dict[tuple[str, str], float]]:
 
 
 def main() -> None:
-    """Measures what is missing, then prints the table."""
+    """Run the command line."""
     given = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -158,10 +181,10 @@ def main() -> None:
         "--data", type=Path, required=True, help="folder with highlight/ and mit_berkeley_train/"
     )
     given.add_argument(
-        "-o", "--output", type=Path, required=True, help="the file of figures, kept between runs"
+        "-o", "--output", type=Path, required=True, help="CSV file of all measurements"
     )
-    given.add_argument("--candidates", type=int, default=60)
-    given.add_argument("--processes", type=int, default=2)
+    given.add_argument("--candidates", type=int, default=60, help="candidates to measure")
+    given.add_argument("--processes", type=int, default=2, help="parallel processes")
     options = given.parse_args()
     table, wanted = _read(options.output), candidates(options.candidates)
     missing = [number for number in range(len(wanted)) if number not in table]
@@ -180,7 +203,7 @@ def main() -> None:
             file.flush()
             table[number] = {(group, name): value for group, name, value in rows}
             print(f"candidate {number}: {score(table[number]):.3f}", flush=True)
-    print("| photo | shipped | chosen without it | candidate |\n|---|---|---|---|")
+    print("| photo | shipped | chosen without its object | candidate |\n|---|---|---|---|")
     for group, name, shipped, chosen, best in left_out(table):
         print(f"| {group} {name} | {shipped:.3f} | {chosen:.3f} | {best} |")
 

@@ -1,15 +1,18 @@
-"""Filter statistics as a prior of the separation (thesis, section 3.6.5.1): fitted, drawn as in
-figure 3.12, and measured by an ablation.
+"""Fit, draw and measure filter statistics as a prior of the separation (thesis, 3.6.5.1).
 
-  python -m benchmarks.separation.filter_statistics fit SCENES -o FILE [--of seen|layers]    histograms and
-  temperature from SCENES/train python -m benchmarks.separation.filter_statistics figure SCENES -o DIR
-  diffuse against specular layers, one picture a filter python -m benchmarks.separation.filter_statistics
-  ablation SCENES --data DATA -o FILE      `isc` with and without, a Markdown table
+  python -m benchmarks.separation.filter_statistics fit SCENES -o FILE [--of photo|layers]
+  python -m benchmarks.separation.filter_statistics figure SCENES -o DIR
+  python -m benchmarks.separation.filter_statistics ablation SCENES --data DATA --tables NPZ...
+      -o MD
 
-SCENES is a folder of `isc synth`. `layers` takes the statistics of true diffuse and true specular
-layers, as the thesis does; `seen` those of the photo where a highlight is a quarter of the light or
-more, and where it is a twentieth or less. The temperature is the one that five groups of objects,
-each left out in turn, find most probable, both kinds of pixel weighing the same.
+SCENES is a run of `isc synth`. `fit` writes histograms and a temperature from SCENES/train;
+`figure` draws diffuse against specular layers, one image per filter (figure 3.12); `ablation` runs
+the method `isc` with and without the prior and writes a Markdown table.
+
+With `--of layers`, the statistics are those of true diffuse and true specular layers, as in the
+thesis; with `--of photo`, those of the photo where at least a quarter of the light is specular, and
+where at most a twentieth is. The temperature maximises the likelihood over five groups of objects,
+each left out in turn, with both kinds of pixel at equal weight.
 """
 
 import argparse
@@ -36,21 +39,31 @@ from isc_core.separation.support.filter_statistics import (
     read_table,
 )
 
-from ..plots import COLOURS, Plot
-from .specular_removal import cases
+from ..plots import COLOURS, AxesOptions, png_axes
+from .specular_removal import photo_cases
 
-_SEEN, _NONE = 0.25, 0.05  # of the light is specular
+_HIGHLIGHT, _NONE = 0.25, 0.05  # specular share of the light
 _FOLDS = 5
-_FEW = 30  # pixels of either kind, below which a photo has no area of its own
+_FEW = 30  # pixels of either kind that a photo needs for an area of its own
 _TEMPERATURES = np.geomspace(0.1, 30, 51)
-_PRIOR_COUNT = 2.0  # pixels that every bin has before it is counted, per thousand
+_PRIOR_COUNT = 2.0  # pixels added to every bin, per thousand
 _TESTS = ("test_objects", "test_materials", "test_lights", "test")
 
 
 @dataclass(frozen=True)
 class Sample:
-    """A scene: intensity (H, W), mask, and the pixels that count as `highlight` or `without`;
-    outputs (N, F, 2) of either kind.
+    """Filter outputs of a scene.
+
+    Attributes
+    ----------
+    thing : str
+        Name of the object.
+    intensity : (H, W) ndarray
+        Mean of the channels.
+    mask, highlight, without : (H, W) ndarray of bool
+        Pixels of the object, with a highlight, without one.
+    of_highlight, of_without : (N, F, 2) ndarray
+        Filter outputs of either kind.
     """
 
     thing: str
@@ -63,25 +76,69 @@ class Sample:
 
 
 def scenes(folder: Path, splits: Sequence[str]) -> list[Path]:
-    """The scenes' folders. Raises `InputError` where there are none."""
+    """List the folders of scenes.
+
+    Parameters
+    ----------
+    folder : Path
+        A run of `isc synth`.
+    splits : sequence of str
+        Names of its splits.
+
+    Returns
+    -------
+    list of Path
+        Ordered by split and name.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
     found = [path for split in splits for path in sorted((folder / split).glob("*/"))]
     if not found:
-        raise InputError(f"{folder} has no scenes in {', '.join(splits)}: make some with isc synth")
+        raise InputError(
+            f"no scenes in {', '.join(splits)} of `{folder}`; make some with isc synth"
+        )
     return found
 
 
 def sample(folder: Path, of: str) -> Sample:
-    """Outputs of a rendered photo (`of` "seen") or of its layers ("layers") in the pixels whose
-    kind is clear.
+    """Compute the filter outputs of a rendered scene.
+
+    Parameters
+    ----------
+    folder : Path
+        The scene.
+    of : {"photo", "layers"}
+        What to filter.
+
+    Returns
+    -------
+    Sample
+        Outputs at the pixels whose kind is clear.
     """
     return sample_of(load_rendered(folder), of)
 
 
 def sample_of(truth: SeparationTruth, of: str) -> Sample:
-    """The same of any photo whose layers are known."""
+    """Compute the filter outputs of a photo with known layers.
+
+    Parameters
+    ----------
+    truth : SeparationTruth
+        The photo and its layers.
+    of : {"photo", "layers"}
+        What to filter.
+
+    Returns
+    -------
+    Sample
+        Outputs at the pixels whose kind is clear.
+    """
     image, specular = truth.image.mean(axis=2), truth.specular.mean(axis=2)
     share = specular / np.maximum(image, 1e-9)
-    highlight, without = truth.mask & (share >= _SEEN), truth.mask & (share <= _NONE)
+    highlight, without = truth.mask & (share >= _HIGHLIGHT), truth.mask & (share <= _NONE)
     if of == "layers":
         kinds = (
             filter_outputs(specular, truth.mask),
@@ -103,7 +160,20 @@ def sample_of(truth: SeparationTruth, of: str) -> Sample:
 
 
 def fitted(samples: Sequence[Sample], temperature: float = 1.0) -> FilterTable:
-    """Histograms of the samples; the spread is the median of the outputs without highlight."""
+    """Build the histograms of samples.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        Not empty.
+    temperature : float, optional
+        To store.
+
+    Returns
+    -------
+    FilterTable
+        Its spread is the median absolute output without highlights.
+    """
     high = np.concatenate([one.of_highlight for one in samples])
     none = np.concatenate([one.of_without for one in samples])
     spread = np.array([np.nanmedian(np.abs(none[:, f])) for f in range(len(FILTERS))])
@@ -111,7 +181,7 @@ def fitted(samples: Sequence[Sample], temperature: float = 1.0) -> FilterTable:
 
 
 def _histograms(outputs: np.ndarray, spread: np.ndarray) -> np.ndarray:
-    """(F, BINS), smoothed and, but for the difference, symmetric where the filter is odd."""
+    """(F, BINS), smoothed; symmetric where the filter is odd, apart from the difference."""
     rows = []
     for f, (kind, _) in enumerate(FILTERS):
         values = outputs[:, f][np.isfinite(outputs[:, f])]
@@ -126,8 +196,21 @@ def _histograms(outputs: np.ndarray, spread: np.ndarray) -> np.ndarray:
 
 
 def calibrated(samples: Sequence[Sample]) -> tuple[FilterTable, float, float]:
-    """The table of all samples with the temperature of those left out, and what it does there: bits
-    a pixel gained over knowing nothing, and the area under the curve of hits against false alarms.
+    """Fit a table and its temperature.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        Of at least five objects.
+
+    Returns
+    -------
+    table : FilterTable
+        Of all samples, with the temperature fitted to left-out objects.
+    bits : float
+        Information per pixel on left-out objects.
+    area : float
+        Area under the ROC curve on left-out objects.
     """
     things = sorted({one.thing for one in samples})
     high: list[np.ndarray] = []
@@ -150,15 +233,26 @@ def calibrated(samples: Sequence[Sample]) -> tuple[FilterTable, float, float]:
 
 
 def area(yes: np.ndarray, no: np.ndarray) -> float:
-    """The probability that one of `yes` is larger than one of `no`."""
+    """Return the area under the ROC curve: how likely a `yes` exceeds a `no`."""
     ordered = np.sort(no)
     below = np.searchsorted(ordered, yes, "left") + np.searchsorted(ordered, yes, "right")
     return float(below.mean() / 2 / len(no))
 
 
-def judged(samples: Sequence[Sample], table: FilterTable) -> str:
-    """What the table says of photos that it was not fitted to: the area over all pixels, the mean
-    area within one photo, bits a pixel.
+def evaluated(samples: Sequence[Sample], table: FilterTable) -> str:
+    """Measure a table on photos that it was not fitted to.
+
+    Parameters
+    ----------
+    samples : sequence of Sample
+        The photos.
+    table : FilterTable
+        The table.
+
+    Returns
+    -------
+    str
+        Area over all pixels, mean area within one photo, bits per pixel.
     """
     yes, no, within = [], [], []
     for one in samples:
@@ -169,26 +263,37 @@ def judged(samples: Sequence[Sample], table: FilterTable) -> str:
             within.append(area(yes[-1], no[-1]))
     high, none = np.concatenate(yes), np.concatenate(no)
     bits = 1 - (np.logaddexp(0, -high).mean() + np.logaddexp(0, none).mean()) / 2 / np.log(2)
-    return f"area {area(high, none):.3f}, within one photo {np.mean(within):.3f} (mean of {len(within)}), {bits:.3f} bits a pixel"
+    return (
+        f"area {area(high, none):.3f}, within one photo {np.mean(within):.3f} "
+        f"(mean of {len(within)}), {bits:.3f} bits per pixel"
+    )
 
 
 def figure(folder: Path, output: Path) -> None:
-    """A picture of each filter's histograms on diffuse and on specular layers (figure 3.12)."""
+    """Draw each filter's histograms on diffuse and specular layers (figure 3.12 of the thesis).
+
+    Parameters
+    ----------
+    folder : Path
+        A run of `isc synth`.
+    output : Path
+        Folder of the PNG files.
+    """
     output.mkdir(parents=True, exist_ok=True)
     table = fitted([sample(path, "layers") for path in scenes(folder, ("train",))])
     top = float(max(table.without.max(), table.highlight.max()))
     for number, (kind, width) in enumerate(FILTERS):
         edges = bin_edges()
-        plot = Plot(
+        options = AxesOptions(
             f"{kind}, width {width:g} of the diagonal",
             "asinh(output / spread)",
             "share",
             (edges[0], edges[-1]),
             (0, 1.05 * top),
         )
-        plot.bars(edges, table.without[number], COLOURS[0], "diffuse layers")
-        plot.bars(edges, table.highlight[number], COLOURS[1], "specular layers")
-        plot.save(output / f"{kind}-{WIDTH_NAMES[width]}.png")
+        with png_axes(output / f"{kind}-{WIDTH_NAMES[width]}.png", options) as axes:
+            axes.stairs(table.without[number], edges, color=COLOURS[0], label="diffuse layers")
+            axes.stairs(table.highlight[number], edges, color=COLOURS[1], label="specular layers")
 
 
 WIDTH_NAMES = {width: f"{1000 * width:03.0f}" for _, width in FILTERS}
@@ -202,15 +307,25 @@ def _main_fit(given: argparse.Namespace) -> str:
             file, spread=table.spread.astype(np.float32), without=table.without.astype(np.float32),
             highlight=table.highlight.astype(np.float32), temperature=np.float32(table.temperature),
         )  # fmt: skip
-    tests = judged([sample(path, "seen") for path in scenes(given.scenes, _TESTS)], table)
-    left_out = f"area {hits:.3f}, {bits:.3f} bits a pixel"
-    return f"{len(samples)} scenes: temperature {table.temperature:.2f}\nobjects left out: {left_out}\ntest scenes: {tests}"
+    tests = evaluated([sample(path, "photo") for path in scenes(given.scenes, _TESTS)], table)
+    left_out = f"area {hits:.3f}, {bits:.3f} bits per pixel"
+    return (
+        f"{len(samples)} scenes: temperature {table.temperature:.2f}\n"
+        f"objects left out: {left_out}\ntest scenes: {tests}"
+    )
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """Of one photo: its group, and for each setting the squared error over that of doing nothing,
-    or, without highlights, the change in per cent of the photo's RMS.
+class AblationRow:
+    """Result of one photo.
+
+    Attributes
+    ----------
+    group, name : str
+        Group of photos, and the photo.
+    figures : tuple of float
+        Per setting: squared error over that of the unchanged photo; without highlights, the
+        change in per cent of the photo's RMS.
     """
 
     group: str
@@ -218,36 +333,55 @@ class Outcome:
     figures: tuple[float, ...]
 
 
-def outcomes(
+def ablation_rows(
     data: Path, folder: Path, settings: Sequence[Callable[[SeparationTruth], np.ndarray]]
-) -> Iterator[Outcome]:
-    """Each test scene of `folder` and each photo of `data` whose layers are known, under each
-    setting, a function to the diffuse layer.
+) -> Iterator[AblationRow]:
+    """Separate all test photos under each setting.
+
+    Parameters
+    ----------
+    data : Path
+        Root of the data sets.
+    folder : Path
+        A run of `isc synth`.
+    settings : sequence of callable
+        Functions from a photo to its diffuse layer.
+
+    Yields
+    ------
+    AblationRow
+        One per photo.
     """
     for path in scenes(folder, _TESTS):
-        yield _outcome("rendered", load_rendered(path), settings)
-    for case in cases(data, None):
-        yield _outcome(case.group, case.load(), settings)
+        yield _ablation_row("rendered", load_rendered(path), settings)
+    for case in photo_cases(data, None):
+        yield _ablation_row(case.group, case.load(), settings)
 
 
-def _outcome(
+def _ablation_row(
     group: str, truth: SeparationTruth, settings: Sequence[Callable[[SeparationTruth], np.ndarray]]
-) -> Outcome:
+) -> AblationRow:
     image, diffuse, mask = (
         np.asarray(layer, float) for layer in (truth.image, truth.diffuse, truth.mask)
     )
     inside = mask > 0
     highlight = np.square((image - diffuse)[inside]).sum()
-    matt = highlight <= 1e-8 * np.square(image[inside]).sum()
+    diffuse_only = highlight <= 1e-8 * np.square(image[inside]).sum()
     figures = []
     for setting in settings:
         answer = setting(truth)
-        off = np.square((answer - (image if matt else diffuse))[inside]).sum()
+        off = np.square((answer - (image if diffuse_only else diffuse))[inside]).sum()
         figures.append(
-            float(100 * np.sqrt(off / np.square(image[inside]).sum()) if matt else off / highlight)
+            float(
+                100 * np.sqrt(off / np.square(image[inside]).sum())
+                if diffuse_only
+                else off / highlight
+            )
         )
-    return Outcome(
-        f"{group} matt" if matt and group == "rendered" else group, truth.name, tuple(figures)
+    return AblationRow(
+        f"{group} diffuse" if diffuse_only and group == "rendered" else group,
+        truth.name,
+        tuple(figures),
     )
 
 
@@ -259,14 +393,26 @@ def _setting(table: FilterTable | None) -> Callable[[SeparationTruth], np.ndarra
     return diffuse
 
 
-def markdown(found: Sequence[Outcome], names: Sequence[str]) -> str:
-    """The table: of groups with highlights the geometric mean of the error ratios, the worst, and
-    how many got better or worse by 1 %; of those without, the mean and the largest change.
+def markdown(found: Sequence[AblationRow], names: Sequence[str]) -> str:
+    """Format the ablation.
+
+    Parameters
+    ----------
+    found : sequence of AblationRow
+        All photos.
+    names : sequence of str
+        Of the settings.
+
+    Returns
+    -------
+    str
+        Markdown: with highlights, the geometric mean of the error ratios, the maximum, and how many
+        photos changed by more than 1 %; without highlights, the mean and the maximum change.
     """
     lines = ["| group | photos | " + " | ".join(names) + " |", "|---" * (len(names) + 2) + "|"]
     for group in dict.fromkeys(one.group for one in found):
         rows = np.array([one.figures for one in found if one.group == group])
-        still = group.endswith(("clean", "matt"))
+        still = group.endswith(("clean", "diffuse"))
         typical = (
             rows.mean(axis=0) if still else np.exp(np.log(np.maximum(rows, 1e-3)).mean(axis=0))
         )
@@ -289,7 +435,7 @@ def _main_ablation(given: argparse.Namespace) -> str:
     tables = {Path(path).stem: read_table(path) for path in given.tables}
     settings = [_setting(None), *(_setting(table) for table in tables.values())]
     found = []
-    for one in outcomes(given.data, given.scenes, settings):
+    for one in ablation_rows(given.data, given.scenes, settings):
         found.append(one)
         print(
             f"{one.group:14s} {one.name:45s} " + "  ".join(f"{value:.4f}" for value in one.figures),
@@ -303,11 +449,17 @@ def _main_ablation(given: argparse.Namespace) -> str:
 
 def _main_figure(given: argparse.Namespace) -> str:
     figure(given.scenes, given.output)
-    return f"look at {given.output}"
+    return f"wrote figures to `{given.output}`"
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Runs, prints and writes."""
+    """Run the command line.
+
+    Parameters
+    ----------
+    words : sequence of str, optional
+        Arguments; by default those of the process.
+    """
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -315,12 +467,18 @@ def main(words: Sequence[str] | None = None) -> None:
     for name, run in (("fit", _main_fit), ("figure", _main_figure), ("ablation", _main_ablation)):
         command = commands.add_parser(name)
         command.set_defaults(run=run)
-        command.add_argument("scenes", type=Path, help="a folder of isc synth")
-        command.add_argument("-o", "--output", type=Path, required=True)
-    commands.choices["fit"].add_argument("--of", choices=("seen", "layers"), default="seen")
-    commands.choices["ablation"].add_argument("--data", type=Path, default=Path("../shared/data"))
+        command.add_argument("scenes", type=Path, help="a run of isc synth")
+        command.add_argument(
+            "-o", "--output", type=Path, required=True, help="file or folder to write"
+        )
+    commands.choices["fit"].add_argument(
+        "--of", choices=("photo", "layers"), default="photo", help="what to filter"
+    )
     commands.choices["ablation"].add_argument(
-        "--tables", nargs="+", type=Path, required=True, help="what `fit` wrote"
+        "--data", type=Path, default=Path("../shared/data"), help="root of the data sets"
+    )
+    commands.choices["ablation"].add_argument(
+        "--tables", nargs="+", type=Path, required=True, help="tables written by `fit`"
     )
     given = parser.parse_args(words)
     try:

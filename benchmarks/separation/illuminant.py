@@ -1,14 +1,15 @@
-"""How well the light's colour is found, and what it is worth to the separation.
+"""Measure the estimate of the light's colour, and its value for the separation.
 
   python -m benchmarks.separation.illuminant SCENES --data ../shared/data -o FILE [--splits train]
   [--colours-only]
 
-Each rendered scene is lit anew: its true diffuse and specular layers are multiplied by 1 + tint (1,
-0, -1), in an order drawn by scene, which is what such a light would have made of them exactly. The
-laboratory objects stay as they are; their true light is the colour of their specular layer. Errors
-are angles in degrees, beside that of calling the light white. Then `isc` separates the photo as it
-is, whitened where the colour is determined, whitened always, and whitened by the true colour:
-squared error of the diffuse layer over that of doing nothing, geometric mean. A Markdown table.
+Each rendered scene is relit: its true diffuse and specular layers are multiplied by 1 + tint * (1,
+0, -1), in an order drawn per scene, which is the exact effect of such a light. The laboratory
+objects stay as they are; their true light is the colour of their specular layer. Errors are angles
+in degrees, beside the error of assuming white. Then the method `isc` separates the photo as it is,
+whitened where the colour is determined, whitened always, and whitened by the true colour: squared
+error of the diffuse layer over that of the unchanged photo, geometric mean. Writes a Markdown
+table.
 """
 
 import argparse
@@ -28,17 +29,27 @@ from isc_core.separation import separate
 WHITE = np.ones(3)
 TINTS = (0.0, 0.05, 0.1, 0.2, 0.5, 0.8)
 _TESTS = ("test_objects", "test_materials", "test_lights", "test")
-# of the light is specular; below, the light's colour cannot be seen and the tint itself counts as
-# true
+# Specular share of the light below which the light's colour is not visible, and the tint itself
+# counts as true.
 _GLOSSY = 0.005
 _SEED = 5
+_ANGLES = ("angle", "of_white")
 
 
 @dataclass(frozen=True)
-class Found:
-    """One photo: its `group`; angles in degrees of the estimate and of white; whether it is
-    `determined`, and whether it is called `too_strong`; `ratios`: of the separations, as listed
-    above, or none.
+class ColourRow:
+    """Result of one photo.
+
+    Attributes
+    ----------
+    group : str
+        Group of photos.
+    angle, of_white : float
+        Errors of the estimate and of white, in degrees.
+    determined, too_strong : bool
+        Flags of the estimate.
+    ratios : tuple of float
+        Error ratios of the four separations, or none.
     """
 
     group: str
@@ -50,7 +61,7 @@ class Found:
 
 
 def angle(colour: np.ndarray, other: np.ndarray) -> float:
-    """Between two colours (3,), in degrees."""
+    """Return the angle between two colours (3,), in degrees."""
     return float(
         np.degrees(
             np.arccos(
@@ -61,7 +72,7 @@ def angle(colour: np.ndarray, other: np.ndarray) -> float:
 
 
 def relit(truth: SeparationTruth, colour: np.ndarray) -> SeparationTruth:
-    """The scene under a light of that colour (3,)."""
+    """Return the scene under a light of the given colour (3,)."""
     return replace(
         truth,
         image=(truth.image * colour).astype(np.float32),
@@ -70,8 +81,25 @@ def relit(truth: SeparationTruth, colour: np.ndarray) -> SeparationTruth:
     )
 
 
-def measure(group: str, truth: SeparationTruth, tint: np.ndarray, colours_only: bool) -> Found:
-    """One photo whose light was tinted by `tint` (3,)."""
+def measure(group: str, truth: SeparationTruth, tint: np.ndarray, colours_only: bool) -> ColourRow:
+    """Estimate the light's colour of one photo.
+
+    Parameters
+    ----------
+    group : str
+        Group of photos.
+    truth : SeparationTruth
+        The photo and its layers.
+    tint : (3,) ndarray
+        Colour that the light was multiplied by.
+    colours_only : bool
+        Skip the separations.
+
+    Returns
+    -------
+    ColourRow
+        The errors.
+    """
     specular, image = (
         truth.specular[truth.mask].sum(axis=0, dtype=float),
         truth.image[truth.mask].sum(dtype=float),
@@ -83,7 +111,7 @@ def measure(group: str, truth: SeparationTruth, tint: np.ndarray, colours_only: 
         as_white = _ratio(truth, WHITE)
         always = _ratio(truth, light.colour)
         ratios = (as_white, always if light.determined else as_white, always, _ratio(truth, true))
-    return Found(
+    return ColourRow(
         group,
         angle(light.colour, true),
         angle(WHITE, true),
@@ -100,12 +128,28 @@ def _ratio(truth: SeparationTruth, colour: np.ndarray) -> float:
     return float(np.square((diffuse - truth.diffuse)[truth.mask]).sum(dtype=float) / nothing)
 
 
-def photos(given: argparse.Namespace) -> Iterator[Found]:
-    """All of them, each tint a group."""
+def photos(given: argparse.Namespace) -> Iterator[ColourRow]:
+    """Measure all photos, one group per tint.
+
+    Parameters
+    ----------
+    given : argparse.Namespace
+        The command's options.
+
+    Yields
+    ------
+    ColourRow
+        One per photo.
+
+    Raises
+    ------
+    InputError
+        If there are no scenes.
+    """
     folders = [path for split in given.splits for path in sorted((given.scenes / split).glob("*/"))]
     if not folders:
         raise InputError(
-            f"{given.scenes} has no scenes in {', '.join(given.splits)}: make some with isc synth"
+            f"no scenes in {', '.join(given.splits)} of `{given.scenes}`; make some with isc synth"
         )
     for strength in TINTS:
         random = np.random.default_rng(_SEED)
@@ -122,11 +166,12 @@ def photos(given: argparse.Namespace) -> Iterator[Found]:
         yield measure("laboratory", load_laboratory(objects, name), WHITE, given.colours_only)
 
 
-def markdown(found: Sequence[Found]) -> str:
-    """The table of all groups."""
+def markdown(found: Sequence[ColourRow]) -> str:
+    """Format the rows of all groups as a Markdown table."""
     lines = [
-        "| photos | number | called strongly coloured | angle: estimate / white | largest | determined | their angle / white | largest "
-        "| isc as it is | if determined | always | true light |",
+        "| photos | number | too strongly coloured | angle: estimate / white | largest "
+        "| determined | their angle / white | largest "
+        "| isc unchanged | if determined | always | true light |",
         "|---" * 12 + "|",
     ]
     for group in dict.fromkeys(one.group for one in found):
@@ -151,22 +196,29 @@ def markdown(found: Sequence[Found]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _angles(rows: Sequence[Found]) -> str:
-    return f"{np.mean([one.angle for one in rows]):.2f}° / {np.mean([one.of_white for one in rows]):.2f}°"
+def _angles(rows: Sequence[ColourRow]) -> str:
+    estimate, white = (np.mean([getattr(one, name) for one in rows]) for name in _ANGLES)
+    return f"{estimate:.2f}° / {white:.2f}°"
 
 
 def main(words: Sequence[str] | None = None) -> None:
-    """Measures, prints and writes."""
+    """Run the command line.
+
+    Parameters
+    ----------
+    words : sequence of str, optional
+        Arguments; by default those of the process.
+    """
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("scenes", type=Path, help="a folder of isc synth")
+    parser.add_argument("scenes", type=Path, help="a run of isc synth")
     parser.add_argument(
         "--data", type=Path, default=Path("../shared/data"), help="folder with mit_berkeley_train/"
     )
-    parser.add_argument("-o", "--output", type=Path, required=True, help="the table")
-    parser.add_argument("--splits", nargs="+", default=list(_TESTS))
-    parser.add_argument("--colours-only", action="store_true", help="no separations")
+    parser.add_argument("-o", "--output", type=Path, required=True, help="Markdown file to write")
+    parser.add_argument("--splits", nargs="+", default=list(_TESTS), help="splits to measure")
+    parser.add_argument("--colours-only", action="store_true", help="skip the separations")
     given = parser.parse_args(words)
     try:
         text = markdown(list(photos(given)))

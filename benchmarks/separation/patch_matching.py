@@ -1,13 +1,13 @@
-"""How good and how fast is Coherency Sensitive Hashing, against comparing all pairs of patches?
+"""Compare Coherency Sensitive Hashing with the exhaustive comparison of all pairs of patches.
 
-  python -m benchmarks.separation.patch_matching [PHOTO ...] [--megapixels .5] [--sample 2000] [--tables 8]
+  python -m benchmarks.separation.patch_matching [PHOTO ...] [--megapixels .5] [--sample 2000]
+  [--tables 8]
 
-For each photo (enlarged or reduced to the size asked for; without one, a made-up texture): patches
-of a turned, enlarged and noisy copy are matched to those of the photo ("later view"), and patches
-of its right half to those of its left ("halves"). The exhaustive search goes through all source
-patches for a random sample of target patches by one matrix product (BLAS, float32, all cores); its
-time for all target patches is extrapolated from the sample. Distances of the matches are exact in
-both. Every time is the wall's; the compiler has run before.
+For each photo, resized (without one, a procedural texture), two pairs of images are matched: the
+photo and a rotated, enlarged, noisy copy ("later view"), and its two halves ("halves"). The
+exhaustive search compares all source patches with a random sample of target patches by one matrix
+product (BLAS, float32, all cores); its time for all target patches is extrapolated. The distances
+of the matches are exact in both. Times are wall-clock times after compilation.
 """
 
 import argparse
@@ -24,18 +24,28 @@ from isc_core.inpainting.coherency_sensitive_hashing import (
     Patches,
     patches_within,
 )
-from isc_core.photo.photo import read_photo
+from isc_core.photo import read_photo
 
-# Source patches that the exhaustive search compares at once: the products fit a processor's cache
-# then.
+# Source patches that the exhaustive search compares at once: the products then fit the cache.
 _BLOCK = 4096
 
 
 @dataclass(frozen=True)
-class Comparison:
-    """Of one pair of images: megapixels of the sources, seconds of both searches, mean distance and
-    mean squared distance of the found matches over those of the best ones, and the share of sampled
-    patches whose match is a best one.
+class MatchingRow:
+    """Result of one pair of images.
+
+    Attributes
+    ----------
+    name : str
+        Name of the pair.
+    megapixels : float
+        Size of the source.
+    exhaustive, hashing : float
+        Seconds of both searches.
+    distance, squared : float
+        Mean distance and mean squared distance of the matches over those of the best matches.
+    best : float
+        Share of sampled patches with a best match.
     """
 
     name: str
@@ -47,8 +57,8 @@ class Comparison:
     best: float
 
 
-def made_up(height: int, width: int) -> np.ndarray:
-    """A texture (height, width, 3) with shapes of all sizes and edges."""
+def procedural_texture(height: int, width: int) -> np.ndarray:
+    """Return a texture (height, width, 3) with shapes of all sizes and edges."""
     rng = np.random.default_rng(1)
     image = np.zeros((height, width, 3))
     for sigma in (1.0, 3.0, 9.0, 27.0):
@@ -59,8 +69,8 @@ def made_up(height: int, width: int) -> np.ndarray:
     return np.clip(0.5 + 0.1 * image, 0, 1)
 
 
-def seen_later(image: np.ndarray) -> np.ndarray:
-    """The same scene, turned by 4 degrees, enlarged by 4 % and with noise of half a percent."""
+def later_view(image: np.ndarray) -> np.ndarray:
+    """Return the image rotated by 4 degrees, enlarged by 4 %, with 0.5 % noise."""
     turn = (
         np.array([[np.cos(0.07), np.sin(0.07), 0], [-np.sin(0.07), np.cos(0.07), 0], [0, 0, 1.04]])
         / 1.04
@@ -72,13 +82,28 @@ def seen_later(image: np.ndarray) -> np.ndarray:
 
 
 def resized(image: np.ndarray, megapixels: float) -> np.ndarray:
-    """`image` (H, W, 3) with about so many pixels."""
+    """Resize an image (H, W, 3) to about the given number of megapixels."""
     factor = float(np.sqrt(megapixels * 1e6 / (image.shape[0] * image.shape[1])))
     return np.clip(ndimage.zoom(image, (factor, factor, 1), order=3 if factor > 1 else 1), 0, None)
 
 
 def vectors(patches: Patches, first: int, last: int, which: np.ndarray | None = None) -> np.ndarray:
-    """The patches `which`, or those of [first, last), as rows (n, 64 C)."""
+    """Collect patches as rows.
+
+    Parameters
+    ----------
+    patches : Patches
+        All patches of an image.
+    first, last : int
+        Range of patches, if `which` is None.
+    which : (n,) ndarray of int, optional
+        Indices of patches.
+
+    Returns
+    -------
+    (n, 64 C) ndarray
+        Their values.
+    """
     chosen = np.arange(first, min(last, len(patches))) if which is None else which
     rows, columns = patches.rows[chosen], patches.columns[chosen]
     return np.stack(
@@ -87,8 +112,21 @@ def vectors(patches: Patches, first: int, last: int, which: np.ndarray | None = 
 
 
 def exhaustive(source: Patches, target: Patches, sample: np.ndarray) -> tuple[np.ndarray, float]:
-    """Squared distances (n,) to the best source patch of the target patches `sample`, and the
-    seconds that took.
+    """Search all source patches.
+
+    Parameters
+    ----------
+    source, target : Patches
+        Patches to search, and to search for.
+    sample : (n,) ndarray of int
+        Indices of target patches.
+
+    Returns
+    -------
+    distance : (n,) ndarray
+        Squared distances to the best source patches.
+    seconds : float
+        Time taken.
     """
     wanted = vectors(target, 0, 0, sample)
     best, where = np.full(len(sample), np.inf, np.float32), np.zeros(len(sample), np.intp)
@@ -101,15 +139,31 @@ def exhaustive(source: Patches, target: Patches, sample: np.ndarray) -> tuple[np
         better = value < best
         best[better], where[better] = value[better], first + nearest[better]
     seconds = time.perf_counter() - start
-    # Once more for the winners: differences of large numbers are too rough for the distances
-    # themselves.
+    # Exact distances of the winners: the differences above lose digits.
     return ((wanted.astype(np.float64) - vectors(source, 0, 0, where)) ** 2).sum(axis=1), seconds
 
 
 def compare(
     name: str, first: np.ndarray, second: np.ndarray, sample: int, options: CshOptions
-) -> Comparison:
-    """Both searches for patches of `second` among those of `first`."""
+) -> MatchingRow:
+    """Search for patches of `second` among those of `first` with both methods.
+
+    Parameters
+    ----------
+    name : str
+        Name of the pair.
+    first, second : (H, W, 3) ndarray
+        Linear images.
+    sample : int
+        Number of target patches of the exhaustive search.
+    options : CshOptions
+        Of the hashing.
+
+    Returns
+    -------
+    MatchingRow
+        Times and quality.
+    """
     source, target = (
         patches_within(image, np.ones(image.shape[:2], bool)) for image in (first, second)
     )
@@ -119,7 +173,7 @@ def compare(
     which = np.random.default_rng(2).choice(len(target), min(sample, len(target)), replace=False)
     best, seconds = exhaustive(source, target, which)
     found = matches.distance[which].astype(np.float64)
-    return Comparison(
+    return MatchingRow(
         name,
         first.shape[0] * first.shape[1] / 1e6,
         seconds * len(target) / len(which),
@@ -131,35 +185,39 @@ def compare(
 
 
 def main() -> None:
-    """Prints one row for each pair of images."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("photos", nargs="*", type=Path)
-    parser.add_argument("--megapixels", type=float, default=0.5)
-    parser.add_argument("--sample", type=int, default=2000)
-    parser.add_argument("--tables", type=int, default=CshOptions().tables)
+    parser.add_argument("photos", nargs="*", type=Path, help="photos to match")
+    parser.add_argument("--megapixels", type=float, default=0.5, help="size after resizing")
+    parser.add_argument("--sample", type=int, default=2000, help="patches of the exhaustive search")
+    parser.add_argument("--tables", type=int, default=CshOptions().tables, help="hash tables")
     arguments = parser.parse_args()
     options = CshOptions(tables=arguments.tables)
-    compare("", made_up(40, 40), seen_later(made_up(40, 40)), 10, options)  # compiles
+    compare(
+        "", procedural_texture(40, 40), later_view(procedural_texture(40, 40)), 10, options
+    )  # compiles
     scenes = [
         (path.name, read_photo(path, transfer="linear", whole_frame=True).image)
         for path in arguments.photos
-    ] or [("made up", made_up(700, 714))]
+    ] or [("procedural", procedural_texture(700, 714))]
     print(
-        "pair                        Mpx  exhaustive s  hashing s  times faster  distance  squared  best found"
+        "pair                        Mpx  exhaustive s  hashing s  times faster  distance  squared"
+        "  best match"
     )
     for name, image in scenes:
         scene = resized(image.astype(np.float64), arguments.megapixels)
         middle = scene.shape[1] // 2
         for kind, first, second in (
-            ("later view", scene, seen_later(scene)),
+            ("later view", scene, later_view(scene)),
             ("halves", scene[:, :middle], scene[:, middle:]),
         ):
             row = compare(f"{name}, {kind}", first, second, arguments.sample, options)
             print(
-                f"{row.name:26s} {row.megapixels:5.2f} {row.exhaustive:12.0f} {row.hashing:11.2f} {row.exhaustive / row.hashing:13.0f}"
-                f" {row.distance:9.4f} {row.squared:8.4f} {row.best:10.1%}",
+                f"{row.name:26s} {row.megapixels:5.2f} {row.exhaustive:12.0f} {row.hashing:11.2f}"
+                f" {row.exhaustive / row.hashing:13.0f} {row.distance:9.4f}"
+                f" {row.squared:8.4f} {row.best:10.1%}",
                 flush=True,
             )
 

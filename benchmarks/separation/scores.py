@@ -1,6 +1,4 @@
-"""What the benchmark of separations measures on one photo, and the table of rows that it keeps on
-disk.
-"""
+"""Scores of a separation, and the CSV table of all scores."""
 
 import csv
 import hashlib
@@ -25,23 +23,48 @@ from isc_core.evaluation.image_metrics import (
 from isc_core.evaluation.metrics import lmse, mse, psnr
 from isc_core.scene.decomposition import Separation
 
-# Methods that read another method's file too.
+# Methods that use the file of another method.
 _BUILT_ON = {"isc": ("sparse_coding",)}
 
 
 @dataclass(frozen=True)
-class Row:
-    """One method in one variant on one photo; None: not measured, or not defined.
+class SeparationRow:
+    """Scores of one method in one variant on one photo; None: not measured or not defined.
 
-    `group`: "shen_zheng", "laboratory", "rendered", or "clean" for photos without any highlight.
-    `code`: of the method's source, so that a row is measured anew once the method changes. `psnr`:
-    dB, inside the mask, of values of range 1; `ssim` by channel, `ssim_volume` as MATLAB.
-    `mse_ratio`: the diffuse layer's mean square error over that of the untouched photo, inside the
-    mask; `mse_inside`, `mse_outside` the highlights; `specular_ratio`: the specular layer's over
-    that of none. `lmse_*`: Grosse's local error. `removed`: share of the squared error that leaves
-    with the least confident fifth; `area` under the sparsification curve; `rank`: correlation of
-    confidence and squared error. `change`: RMS of what was removed over the photo's RMS. `seconds`:
-    of this run; `megapixels` inside the mask; `refused`: why there is no answer.
+    Attributes
+    ----------
+    group : str
+        "shen_zheng", "laboratory", "rendered", or "clean" for photos without highlights.
+    image, method, variant : str
+        Names.
+    code : str
+        Hash of the method's source: the row is measured again when the method changes.
+    psnr : float or None
+        Of the diffuse layer inside the mask, dB, for values of range 1.
+    ssim, ssim_volume : float or None
+        By channel, and as MATLAB computes it.
+    mse_ratio : float or None
+        Mean squared error of the diffuse layer over that of the unchanged photo, inside the mask.
+    mse_inside, mse_outside : float or None
+        The same inside the highlights and elsewhere.
+    specular_ratio : float or None
+        Mean squared error of the specular layer over that of an empty one.
+    lmse_diffuse, lmse_specular : float or None
+        Grosse's local mean squared error.
+    removed : float or None
+        Share of the squared error in the least confident fifth of the pixels.
+    area : float or None
+        Area under the sparsification curve.
+    rank : float or None
+        Rank correlation of confidence and squared error.
+    change : float or None
+        RMS of the removed light over the RMS of the photo.
+    seconds : float or None
+        Of this run.
+    megapixels : float or None
+        Inside the mask.
+    refused : str
+        Error message, if the method refuses the photo.
     """
 
     group: str
@@ -68,15 +91,32 @@ class Row:
 
     @property
     def key(self) -> tuple[str, str, str, str]:
-        """Photo, method and variant."""
+        """Group, photo, method and variant."""
         return self.group, self.image, self.method, self.variant
 
 
 def measure(
     group: str, truth: SeparationTruth, method: str, variant: str
-) -> tuple[Row, Separation | None]:
-    """Separates and scores; None where the method refuses the photo."""
-    row = Row(
+) -> tuple[SeparationRow, Separation | None]:
+    """Separate a photo and score the result.
+
+    Parameters
+    ----------
+    group : str
+        Group of photos.
+    truth : SeparationTruth
+        The photo and its layers.
+    method, variant : str
+        The method.
+
+    Returns
+    -------
+    row : SeparationRow
+        The scores.
+    split : Separation or None
+        The result; None if the method refuses the photo.
+    """
+    row = SeparationRow(
         group,
         truth.name,
         method,
@@ -95,38 +135,69 @@ def measure(
 
 
 def source_code(method: str) -> str:
-    """Eight digits that change with the method's source file, and with any that is not a method's
-    own.
+    """Hash the source that a method depends on.
+
+    Parameters
+    ----------
+    method : str
+        Name of the method.
+
+    Returns
+    -------
+    str
+        Eight digits that change with the method's file and with any shared file.
     """
     folder = Path(separation.__file__).parent
     others = set(separation.METHODS) - {method, *_BUILT_ON.get(method, ())}
-    files = [path for path in sorted(folder.glob("*.py")) if path.stem not in others]
+    files = [path for path in sorted(folder.rglob("*.py")) if path.stem not in others]
     files += sorted((folder.parent / "inpainting").glob("*.py"))
     return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:8]
 
 
-def read_rows(path: Path) -> dict[tuple[str, str, str, str], Row]:
-    """The rows that an earlier run wrote; none where there is no such file or its columns have
-    changed.
+def read_rows(path: Path) -> dict[tuple[str, str, str, str], SeparationRow]:
+    """Read the table of an earlier run.
+
+    Parameters
+    ----------
+    path : Path
+        The CSV file.
+
+    Returns
+    -------
+    dict
+        Rows by key; empty without a file, or if its columns differ.
     """
     if not path.is_file():
         return {}
     with path.open(newline="", encoding="utf-8") as file:
         table = csv.DictReader(file)
-        if table.fieldnames != [field.name for field in fields(Row)]:
+        if table.fieldnames != [field.name for field in fields(SeparationRow)]:
             return {}
         rows = [
-            Row(**{field.name: _cell(line[field.name], field.type) for field in fields(Row)})
+            SeparationRow(
+                **{
+                    field.name: _cell(line[field.name], field.type)
+                    for field in fields(SeparationRow)
+                }
+            )
             for line in table
         ]
     return {row.key: row for row in rows}
 
 
-def write_rows(path: Path, rows: Iterable[Row]) -> None:
-    """Writes the whole table, or leaves the old one."""
+def write_rows(path: Path, rows: Iterable[SeparationRow]) -> None:
+    """Replace the table atomically.
+
+    Parameters
+    ----------
+    path : Path
+        The CSV file.
+    rows : iterable of SeparationRow
+        All rows.
+    """
     unfinished = path.with_suffix(".part")
     with unfinished.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, [field.name for field in fields(Row)])
+        table = csv.DictWriter(file, [field.name for field in fields(SeparationRow)])
         table.writeheader()
         table.writerows({name: _text(value) for name, value in asdict(row).items()} for row in rows)
     unfinished.replace(path)

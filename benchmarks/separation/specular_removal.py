@@ -1,17 +1,19 @@
-"""Every separation method in every variant on every photo whose layers are known.
+"""Measure every separation method in every variant on every photo with known layers.
 
-  python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR                      tables and
-  sheets python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR --photos
-  every photo through `isc separate`, and sheets python -m benchmarks.separation.specular_removal --data
-  ../shared/data -o DIR --speed              warm seconds and memory of one megapixel python -m
-  benchmarks.separation.specular_removal --data ../shared/data -o DIR --rendered SCENES    also the rendered
-  scenes in that folder
+  python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR
+  python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR --photos
+  python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR --speed
+  python -m benchmarks.separation.specular_removal --data ../shared/data -o DIR --rendered SCENES
+
+The first form writes tables and comparison sheets. `--photos` runs `isc separate` on every photo
+and writes sheets; `--speed` measures warm seconds and memory at one megapixel; `--rendered` adds
+the rendered scenes of a folder.
 
 Photos: Shen & Zheng's (values as stored, whole frame), the laboratory objects of MIT-Berkeley
-(linear, inside the mask), rendered scenes; and for what must be left alone the diffuse images of
-MIT-Berkeley, in which no highlight is. `none`, diffuse = input, is always a row. Writes rows.csv,
-tables.md, sheets/*.png. A row is kept until its method's source changes, so that a run can be
-stopped and taken up again; --fresh measures all anew.
+(linear, inside the mask), rendered scenes; and the diffuse images of MIT-Berkeley, which have no
+highlights and must not change. `none` (diffuse = input) is always included. Writes rows.csv,
+tables.md and sheets/*.png. A row is kept until the source of its method changes: an interrupted run
+continues; `--fresh` measures everything again.
 """
 
 import argparse
@@ -32,13 +34,14 @@ from isc_core.datasets.highlight_set import (
 )
 from isc_core.datasets.mit_berkeley import list_objects
 from isc_core.errors import InputError
+from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.io.exr import read_channels
-from isc_core.photo.photo import read_linear, read_photo, srgb_to_linear
+from isc_core.photo import read_linear, read_photo
 from isc_core.result_files.contact_sheet import Answer, comparison_sheet
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import IMPROVED, METHODS, variants
 
-from .scores import Row, measure, read_rows, source_code, write_rows
+from .scores import SeparationRow, measure, read_rows, source_code, write_rows
 from .speed import speed_table
 from .tables import tables
 
@@ -46,28 +49,49 @@ _PHOTO_SUFFIXES = {".bmp", ".ppm", ".png", ".jpg", ".tif"}
 
 
 @dataclass(frozen=True)
-class Case:
-    """A photo to come: its group and name, and how it is read."""
+class PhotoCase:
+    """A photo to measure.
+
+    Attributes
+    ----------
+    group, name : str
+        Group of photos, and the photo.
+    load : callable
+        Reads the photo and its layers.
+    """
 
     group: str
     name: str
     load: Callable[[], SeparationTruth]
 
 
-def cases(data: Path, rendered: Path | None) -> Iterator[Case]:
-    """All photos below `data` (folders highlight, mit_berkeley_train) and `rendered`."""
+def photo_cases(data: Path, rendered: Path | None) -> Iterator[PhotoCase]:
+    """List all photos.
+
+    Parameters
+    ----------
+    data : Path
+        Folder with highlight/ and mit_berkeley_train/.
+    rendered : Path or None
+        Folder of rendered scenes.
+
+    Yields
+    ------
+    PhotoCase
+        The photos, by group.
+    """
     highlight, objects = data / "highlight", data / "mit_berkeley_train"
     for name in list_shen_zheng(highlight):
-        yield Case("shen_zheng", name, lambda name=name: load_shen_zheng(highlight, name))  # type: ignore[misc]
+        yield PhotoCase("shen_zheng", name, lambda name=name: load_shen_zheng(highlight, name))  # type: ignore[misc]
     for name in list_objects(objects, "laboratory"):
-        yield Case("laboratory", name, lambda name=name: load_laboratory(objects, name))  # type: ignore[misc]
+        yield PhotoCase("laboratory", name, lambda name=name: load_laboratory(objects, name))  # type: ignore[misc]
     for folder in (
         sorted(path for path in rendered.iterdir() if path.is_dir()) if rendered is not None else ()
     ):
-        yield Case("rendered", folder.name, lambda folder=folder: load_rendered(folder))  # type: ignore[misc]
+        yield PhotoCase("rendered", folder.name, lambda folder=folder: load_rendered(folder))  # type: ignore[misc]
     for light in ("laboratory", "natural"):
         for name in list_objects(objects, light):
-            yield Case(
+            yield PhotoCase(
                 "clean",
                 f"{light} {name}",
                 lambda light=light, name=name: _without_highlights(objects, light, name),
@@ -85,13 +109,22 @@ def _without_highlights(objects: Path, light: str, name: str) -> SeparationTruth
     )
 
 
-def measure_all(given: argparse.Namespace) -> list[Row]:
-    """Measures what is not in the table yet, writing the table after each row; a sheet for each
-    photo with something new.
+def measure_all(given: argparse.Namespace) -> list[SeparationRow]:
+    """Measure what is missing; write the table after each row and the sheets that changed.
+
+    Parameters
+    ----------
+    given : argparse.Namespace
+        The command's options.
+
+    Returns
+    -------
+    list of SeparationRow
+        All rows, old and new.
     """
     table = given.output / "rows.csv"
     rows = {} if given.fresh else read_rows(table)
-    for case in cases(given.data, given.rendered):
+    for case in photo_cases(given.data, given.rendered):
         if given.images and case.name not in given.images:
             continue
         wanted = [
@@ -116,11 +149,11 @@ def measure_all(given: argparse.Namespace) -> list[Row]:
     return list(rows.values())
 
 
-def _stale(row: Row | None, method: str) -> bool:
+def _stale(row: SeparationRow | None, method: str) -> bool:
     return row is None or row.code != source_code(method)
 
 
-def _line(row: Row) -> str:
+def _line(row: SeparationRow) -> str:
     figures = [
         f"{name} {value:.4g}"
         for name in ("psnr", "mse_ratio", "change", "seconds")
@@ -131,7 +164,7 @@ def _line(row: Row) -> str:
     )
 
 
-def _keep(output: Path, case: Case, method: str, split: Separation) -> None:
+def _keep(output: Path, case: PhotoCase, method: str, split: Separation) -> None:
     folder = output / "layers" / case.group / case.name
     folder.mkdir(parents=True, exist_ok=True)
     layers = {
@@ -142,7 +175,10 @@ def _keep(output: Path, case: Case, method: str, split: Separation) -> None:
 
 
 def _sheet(
-    output: Path, case: Case, truth: SeparationTruth, rows: dict[tuple[str, str, str, str], Row]
+    output: Path,
+    case: PhotoCase,
+    truth: SeparationTruth,
+    rows: dict[tuple[str, str, str, str], SeparationRow],
 ) -> None:
     decode = srgb_to_linear if truth.coded else np.asarray
     answers = []
@@ -182,8 +218,17 @@ def _save(path: Path, sheet: object) -> None:
 
 
 def photos(given: argparse.Namespace) -> str:
-    """Every file of highlight/ and photos/ through `isc separate` with every method; a sheet for
-    each; the table of what ended how.
+    """Run `isc separate` with every method on every file of highlight/ and photos/.
+
+    Parameters
+    ----------
+    given : argparse.Namespace
+        The command's options.
+
+    Returns
+    -------
+    str
+        Markdown: how each run ended. Sheets are written.
     """
     lines = [
         "| photo | " + " | ".join(given.methods) + " |",
@@ -214,7 +259,7 @@ def photos(given: argparse.Namespace) -> str:
                     str(folder),
                 ]
             )
-            ends.append({0: "done", 2: "refused"}.get(code, f"ended with {code}"))
+            ends.append({0: "done", 2: "refused"}.get(code, f"exit code {code}"))
             if code == 0:
                 answers.append(_answer(folder, method, coded=transfer == "linear"))
                 shutil.rmtree(folder)
@@ -242,7 +287,7 @@ def _answer(folder: Path, method: str, coded: bool) -> Answer:
 
 
 def parser() -> argparse.ArgumentParser:
-    """The command's options."""
+    """Build the command's parser."""
     options = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
@@ -257,36 +302,41 @@ def parser() -> argparse.ArgumentParser:
         "--output",
         type=Path,
         required=True,
-        help="folder for rows.csv, tables.md and sheets/",
+        help="folder to write to",
     )
-    options.add_argument("--rendered", type=Path, help="folder of rendered scenes, one a folder")
+    options.add_argument("--rendered", type=Path, help="folder of rendered scenes")
     options.add_argument(
         "--methods",
         type=lambda text: text.split(","),
         default=list(METHODS),
-        help="names with commas between them",
+        help="comma-separated names (default: all)",
     )
     options.add_argument(
-        "--variants", type=lambda text: text.split(","), default=["improved", "paper", "sihr"]
+        "--variants",
+        type=lambda text: text.split(","),
+        default=["improved", "paper", "sihr"],
+        help="comma-separated names",
     )
     options.add_argument(
         "--images",
         type=lambda text: text.split(","),
         default=[],
-        help="names with commas between them; all without it",
+        help="comma-separated names (default: all)",
     )
-    options.add_argument("--fresh", action="store_true", help="measure all rows anew")
+    options.add_argument("--fresh", action="store_true", help="measure all rows again")
     options.add_argument(
         "--photos",
         action="store_true",
-        help="run the command on all photos, with and without truth",
+        help="run isc separate on all photos",
     )
-    options.add_argument("--speed", action="store_true", help="time one megapixel")
+    options.add_argument(
+        "--speed", action="store_true", help="measure time and memory at one megapixel"
+    )
     return options
 
 
 def main() -> None:
-    """Runs, prints and writes."""
+    """Run the command line."""
     options = parser()
     given = options.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)

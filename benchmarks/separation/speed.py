@@ -1,6 +1,4 @@
-"""Warm seconds and peak memory of every separation method on one megapixel, each in a process of
-its own.
-"""
+"""Warm seconds and peak memory of the separation methods at one megapixel, one process each."""
 
 import multiprocessing
 import resource
@@ -16,7 +14,7 @@ from isc_core.separation import separate
 
 _PIXELS = 1_000_000
 _REPEATS = 3
-# Seconds for a megapixel that are asked for, on two cores.
+# Target in seconds per megapixel, on two cores.
 _TARGETS = {
     **dict.fromkeys(("yang_2010", "shen_2009", "shen_2013", "mallick_2006", "yoon_2006"), 0.5),
     "isc": 1.5,
@@ -27,18 +25,29 @@ _TARGETS = {
 
 
 def megapixel(folder: Path) -> np.ndarray:
-    """Shen & Zheng's cups, enlarged to a million pixels, (H, W, 3) float32."""
+    """Return Shen & Zheng's cups, enlarged to a million pixels, (H, W, 3) float32."""
     image = load_shen_zheng(folder, "cups").image
     factor = float(np.sqrt(_PIXELS / (image.shape[0] * image.shape[1])))
     return np.clip(ndimage.zoom(image, (factor, factor, 1), order=1), 0, None)
 
 
 def speed_table(folder: Path, methods: Sequence[str]) -> str:
-    """Markdown: the best of three warm runs, its ratio to what is asked for and to `none`, and the
-    process's peak memory.
+    """Measure all methods.
+
+    Parameters
+    ----------
+    folder : Path
+        Shen & Zheng's photos.
+    methods : sequence of str
+        Names.
+
+    Returns
+    -------
+    str
+        Markdown: the best of three warm runs, its ratio to the target, peak memory.
     """
     lines = [
-        "| method | first run s | warm s | asked for s | ratio | peak memory MB |",
+        "| method | first run s | warm s | target s | ratio | peak memory MB |",
         "|---|---|---|---|---|---|",
     ]
     image = megapixel(folder)
@@ -47,17 +56,32 @@ def speed_table(folder: Path, methods: Sequence[str]) -> str:
         with context.Pool(1) as pool:
             first, warm, memory = pool.apply(timed, (method, image))
         target = _TARGETS.get(method)
-        asked = ("-", "-") if target is None else (f"{target:g}", f"{warm / target:.2f}")
+        against = ("-", "-") if target is None else (f"{target:g}", f"{warm / target:.2f}")
         lines.append(
-            f"| {method} | {first:.2f} | {warm:.3f} | {asked[0]} | {asked[1]} | {memory:.0f} |"
+            f"| {method} | {first:.2f} | {warm:.3f} | {against[0]} | {against[1]} | {memory:.0f} |"
         )
         print(lines[-1], flush=True)
     return "\n".join(lines) + "\n"
 
 
 def timed(method: str, image: np.ndarray) -> tuple[float, float, float]:
-    """Seconds of the first run (with compiling, or reading what was compiled), of the best warm
-    one, and the peak memory in MB.
+    """Time one method.
+
+    Parameters
+    ----------
+    method : str
+        Name.
+    image : (H, W, 3) ndarray
+        Linear.
+
+    Returns
+    -------
+    first : float
+        Seconds of the first run, with compilation or reading the cache.
+    warm : float
+        Seconds of the best warm run.
+    memory : float
+        Peak memory of the process, MB.
     """
     mask = np.ones(image.shape[:2], bool)
     seconds = []

@@ -1,4 +1,4 @@
-"""The tables of the separations' benchmark, as Markdown."""
+"""Markdown tables of the separation benchmark."""
 
 from collections.abc import Callable, Iterable, Sequence
 from itertools import product
@@ -8,9 +8,9 @@ import numpy as np
 from isc_core.evaluation.metrics import geometric_mean
 from isc_core.separation import IMPROVED, METHODS
 
-from .scores import Row
+from .scores import SeparationRow
 
-Cell = Callable[[Row], str]
+Cell = Callable[[SeparationRow], str]
 _CLAIMED = ("apple", "teabag2", "paper1", "animals", "cups")
 _GROUPS = {
     "shen_zheng": "Shen & Zheng's photos (values as stored, whole frame)",
@@ -19,11 +19,11 @@ _GROUPS = {
 }
 
 
-def tables(rows: Sequence[Row]) -> str:
-    """All tables that the rows allow."""
+def tables(rows: Sequence[SeparationRow]) -> str:
+    """Format all tables that the rows allow."""
     parts = [
-        "# Separations against the truth\n",
-        "`none` leaves the photo as it is: diffuse = input.\n",
+        "# Separations against ground truth\n",
+        "`none` leaves the photo unchanged: diffuse = input.\n",
     ]
     for group, title in _GROUPS.items():
         found = [row for row in rows if row.group == group]
@@ -35,7 +35,7 @@ def tables(rows: Sequence[Row]) -> str:
     clean = [row for row in rows if row.group == "clean"]
     if clean:
         parts += [
-            "## Photos without any highlight: RMS of what was removed, per cent of the photo's RMS\n",
+            "## Photos without highlights: RMS of the removed light, per cent of the photo's RMS\n",
             _table(clean, _percent, _worst),
         ]
     refused = sorted({f"- {row.method}, {row.image}: {row.refused}" for row in rows if row.refused})
@@ -44,10 +44,8 @@ def tables(rows: Sequence[Row]) -> str:
     return "\n".join(parts)
 
 
-def _claim(rows: Sequence[Row]) -> str:
-    """1 less the geometric mean of error ratios, per cent, as the thesis states its gain (7.6
-    diffuse, 53.5 specular); "" without rows.
-    """
+def _claim(rows: Sequence[SeparationRow]) -> str:
+    """Gains as the thesis states them (7.6 % diffuse, 53.5 % specular): 1 - mean ratio."""
     found = {
         (row.method, row.variant, row.group, row.image): row
         for row in rows
@@ -55,7 +53,8 @@ def _claim(rows: Sequence[Row]) -> str:
     }
     ours = {key[2:]: row for key, row in found.items() if key[:2] == ("sparse_coding", IMPROVED)}
     lines = [
-        "| against | variant | photos | diffuse MSE | specular MSE | diffuse LMSE | specular LMSE |",
+        "| against | variant | photos | diffuse MSE | specular MSE | diffuse LMSE "
+        "| specular LMSE |",
         "|---" * 7 + "|",
     ]
     for other, variant in product(("chaotic_segmentation", "tan_2005"), (IMPROVED, "paper")):
@@ -79,56 +78,60 @@ def _claim(rows: Sequence[Row]) -> str:
     return "\n".join(lines) + "\n" if len(lines) > 2 else ""
 
 
-def _gain(pairs: list[tuple[Row, Row]], name: str) -> str:
+def _gain(pairs: list[tuple[SeparationRow, SeparationRow]], name: str) -> str:
     values = [(getattr(ours, name), getattr(theirs, name)) for ours, theirs in pairs]
     ratios = [a / b for a, b in values if a is not None and b]
     return f"{100 * (1 - geometric_mean(ratios)):.1f} %" if ratios else "-"
 
 
-def _of_group(rows: list[Row]) -> list[str]:
+def _of_group(rows: list[SeparationRow]) -> list[str]:
     return [
         "PSNR of the diffuse layer, dB / SSIM (3-D) / SSIM (by channel)\n",
         _table(
             rows,
             lambda r: (
-                f"{_number(r.psnr, '.2f')} / {_number(r.ssim_volume, '.3f')} / {_number(r.ssim, '.3f')}"
+                f"{_number(r.psnr, '.2f')} / {_number(r.ssim_volume, '.3f')}"
+                f" / {_number(r.ssim, '.3f')}"
             ),
         ),
-        "Mean square error of the diffuse layer, relative to leaving the photo alone: everywhere (in the highlights, elsewhere)\n",
+        "Mean squared error of the diffuse layer, relative to the unchanged photo: everywhere "
+        "(in highlights, elsewhere)\n",
         _table(
             rows,
             lambda r: (
-                f"{_number(r.mse_ratio, '.3f')} ({_number(r.mse_inside, '.2f')}, {_number(r.mse_outside, '.2f')})"
+                f"{_number(r.mse_ratio, '.3f')} ({_number(r.mse_inside, '.2f')}, "
+                f"{_number(r.mse_outside, '.2f')})"
             ),
             _geometric("mse_ratio"),
         ),
-        "Mean square error of the specular layer, relative to finding none\n",
+        "Mean squared error of the specular layer, relative to an empty one\n",
         _table(rows, lambda r: _number(r.specular_ratio, ".3f"), _geometric("specular_ratio")),
         "Local error (LMSE) of the diffuse layer x 1000 / of the specular layer\n",
         _table(
             rows,
-            lambda r: (
-                f"{_number(None if r.lmse_diffuse is None else 1000 * r.lmse_diffuse, '.2f')} / {_number(r.lmse_specular, '.3f')}"
-            ),
+            lambda r: f"{_scaled(r.lmse_diffuse, 1000, '.2f')} / {_number(r.lmse_specular, '.3f')}",
             _geometric("lmse_specular"),
         ),
-        "Confidence: share of the squared error that leaves with the least confident fifth, per cent / area under the sparsification "
-        "curve / rank correlation with the error\n",
+        "Confidence: share of the squared error in the least confident fifth, per cent / area "
+        "under the sparsification curve / rank correlation with the error\n",
         _table(
             rows,
             lambda r: (
-                f"{_number(None if r.removed is None else 100 * r.removed, '.0f')} / {_number(r.area, '.2f')} / {_number(r.rank, '.2f')}"
+                f"{_scaled(r.removed, 100, '.0f')} / {_number(r.area, '.2f')}"
+                f" / {_number(r.rank, '.2f')}"
             ),
         ),
-        "Seconds of this run (megapixels a second)\n",
+        "Seconds of this run (megapixels per second)\n",
         _table(rows, _speed),
     ]
 
 
 def _table(
-    rows: list[Row], cell: Cell, last: tuple[str, Callable[[list[Row]], str]] | None = None
+    rows: list[SeparationRow],
+    cell: Cell,
+    last: tuple[str, Callable[[list[SeparationRow]], str]] | None = None,
 ) -> str:
-    """Methods and variants down, photos across; `last` sums up each line."""
+    """Methods and variants down, photos across; `last` summarises each line."""
     images = list(dict.fromkeys(row.image for row in rows))
     known = {(row.method, row.variant, row.image): row for row in rows}
     heads = ["method", "variant", *images, *([last[0]] if last else [])]
@@ -155,29 +158,33 @@ def _number(value: float | None, form: str) -> str:
     return "-" if value is None else format(value, form)
 
 
-def _percent(row: Row) -> str:
-    return _number(None if row.change is None else 100 * row.change, ".2f")
+def _scaled(value: float | None, factor: float, form: str) -> str:
+    return _number(None if value is None else factor * value, form)
 
 
-def _speed(row: Row) -> str:
+def _percent(row: SeparationRow) -> str:
+    return _scaled(row.change, 100, ".2f")
+
+
+def _speed(row: SeparationRow) -> str:
     if row.seconds is None or row.megapixels is None:
         return "-"
     return f"{row.seconds:.2f} ({row.megapixels / max(row.seconds, 1e-4):.2f})"
 
 
-def _present(rows: Iterable[Row], name: str) -> list[float]:
+def _present(rows: Iterable[SeparationRow], name: str) -> list[float]:
     return [value for row in rows if (value := getattr(row, name)) is not None]
 
 
-def _geometric(name: str) -> tuple[str, Callable[[list[Row]], str]]:
-    def of(rows: list[Row]) -> str:
+def _geometric(name: str) -> tuple[str, Callable[[list[SeparationRow]], str]]:
+    def of(rows: list[SeparationRow]) -> str:
         values = _present(rows, name)
         return f"{geometric_mean(values):.3f}" if values else "-"
 
     return f"geometric mean ({name})", of
 
 
-def _worst_change(rows: list[Row]) -> str:
+def _worst_change(rows: list[SeparationRow]) -> str:
     values = _present(rows, "change")
     return f"{100 * np.max(values):.2f}" if values else "-"
 

@@ -1,12 +1,11 @@
-"""The optimisers of thresholds against the exact optimum, on nine images and three numbers of
-thresholds, with equal budgets.
+"""Compare the threshold optimisers with the exact optimum on nine images, with equal budgets.
 
   python -m benchmarks.separation.thresholding -o DIR [--runs 50] [--evaluations 20000]
 
-Writes thresholding.csv (a row for each optimiser, image and number of thresholds), thresholding.md
-(tables), and PNG figures: the mutation rate, the logistic map's bifurcation, density and
-uniformised distribution, the dependence of its consecutive values, and how the searches converge.
-The images are those that scikit-image brings along.
+Writes thresholding.csv (one row per optimiser, image and number of thresholds), thresholding.md
+(tables) and PNG figures: the mutation rate; the bifurcation, density and uniformised distribution
+of the logistic map; the dependence of its consecutive values; the convergence of the searches. The
+images are those of scikit-image.
 """
 
 import argparse
@@ -32,7 +31,7 @@ from isc_core.thresholding.logistic_map import (
     uniformised,
 )
 
-from ..plots import COLOURS, Plot
+from ..plots import COLOURS, AxesOptions, png_axes
 
 IMAGES = ("camera", "coins", "moon", "page", "brick", "grass", "gravel", "clock", "astronaut")
 COUNTS = (3, 4, 5)
@@ -40,15 +39,19 @@ HIT = 1e-12  # relative: sets of thresholds with equal classes differ by roundin
 
 
 class OneOrbit:
-    """Uniform numbers as a straightforward reading gives them: each value of one orbit after the
-    other, dependent as they are.
+    """Uniform numbers from consecutive values of one chaotic orbit, with their dependence.
+
+    Parameters
+    ----------
+    seed : int
+        Chooses the start of the orbit.
     """
 
     def __init__(self, seed: int) -> None:
         self._x = 0.1 + 0.8 * ((seed + 1) * 0.618034 % 1)
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """The next numbers, of `shape`."""
+        """Return the next numbers as an array of the given shape."""
         x, values = self._x, []
         for _ in range(int(np.prod(shape))):
             x = 4 * x * (1 - x)
@@ -82,12 +85,27 @@ OPTIMISERS: dict[str, Callable[[OtsuObjective, int, int, int], Optimum]] = {
 
 
 @dataclass(frozen=True)
-class Row:
-    """What the runs of one optimiser on one image with `count` thresholds did.
+class ThresholdRow:
+    """Result of the runs of one optimiser on one image.
 
-    `mean`, `deviation`, `lowest` of the values found; `median_evaluations`, `most_evaluations`
-    until the optimum, over the runs that found it (NaN where none did); `used` evaluations and
-    milliseconds of a run.
+    Attributes
+    ----------
+    optimiser, image : str
+        Names.
+    count : int
+        Number of thresholds.
+    exact : float
+        Value of the exact optimum.
+    runs, hits : int
+        Runs, and runs that reached the optimum.
+    mean, deviation, lowest : float
+        Of the values reached.
+    median_evaluations, most_evaluations : float
+        Until the optimum, over the hits; NaN without hits.
+    used : int
+        Evaluations of a run.
+    milliseconds : float
+        Time of a run.
     """
 
     optimiser: str
@@ -106,21 +124,66 @@ class Row:
 
 
 def levels(name: str) -> np.ndarray:
-    """A grey image (H, W), uint8."""
+    """Return a grey test image.
+
+    Parameters
+    ----------
+    name : str
+        One of `IMAGES`.
+
+    Returns
+    -------
+    (H, W) ndarray
+        uint8.
+    """
     stored = getattr(data, name)()
     return stored if stored.ndim == 2 else np.rint(255 * rgb2gray(stored)).astype(np.uint8)
 
 
 def to_optimum(found: Optimum, best: float) -> float:
-    """Evaluations until a run reached the value `best`; NaN if it never did."""
+    """Count the evaluations until a run reached the optimum.
+
+    Parameters
+    ----------
+    found : Optimum
+        The run.
+    best : float
+        Value of the optimum.
+
+    Returns
+    -------
+    float
+        Evaluations; NaN if the run never reached it.
+    """
     reached = found.history[:, 1] >= best * (1 - HIT)
     return float(found.history[np.argmax(reached), 0]) if reached.any() else float("nan")
 
 
 def measure(
     name: str, image: str, objective: OtsuObjective, count: int, runs: int, evaluations: int
-) -> tuple[Row, np.ndarray]:
-    """The row, and the evaluations to the optimum (runs,) with NaN where it was missed."""
+) -> tuple[ThresholdRow, np.ndarray]:
+    """Run an optimiser with many seeds.
+
+    Parameters
+    ----------
+    name : str
+        Key of `OPTIMISERS`.
+    image : str
+        Name of the image.
+    objective : OtsuObjective
+        Of the image.
+    count : int
+        Number of thresholds.
+    runs, evaluations : int
+        Number of runs, and budget of each.
+
+    Returns
+    -------
+    row : ThresholdRow
+        The result.
+    needed : (runs,) ndarray
+        Evaluations until the optimum; NaN where it was missed.
+    """
     best = exact(objective, count).value
     start = time.perf_counter()
     found = [OPTIMISERS[name](objective, count, evaluations, seed) for seed in range(runs)]
@@ -133,17 +196,29 @@ def measure(
     )
     used = max(f.evaluations for f in found)
     spread = (float(values.mean()), float(values.std()), float(values.min()))
-    return Row(
+    return ThresholdRow(
         name, image, count, best, runs, len(hit), *spread, median, most, used, milliseconds
     ), needed
 
 
-def summary(rows: list[Row], needed: dict[str, np.ndarray]) -> str:
-    """Markdown: each optimiser over all images, by number of thresholds; and whether chaos makes a
-    difference.
+def summary(rows: list[ThresholdRow], needed: dict[str, np.ndarray]) -> str:
+    """Format the results over all images, and a test of the difference that chaos makes.
+
+    Parameters
+    ----------
+    rows : list of ThresholdRow
+        All results.
+    needed : dict of str to ndarray
+        Evaluations until the optimum, by optimiser.
+
+    Returns
+    -------
+    str
+        Markdown.
     """
     lines = [
-        "| optimiser | K=3 | K=4 | K=5 | runs that missed | evaluations to the optimum, median / 95 % / most | ms a run |",
+        "| optimiser | K=3 | K=4 | K=5 | missed runs "
+        "| evaluations to the optimum, median / 95 % / maximum | ms per run |",
         "|---|---|---|---|---|---|---|",
     ]
     for name in OPTIMISERS:
@@ -167,20 +242,19 @@ def summary(rows: list[Row], needed: dict[str, np.ndarray]) -> str:
         )
     lines.append("")
     for name in ("clonal_selection", "chaotic, one orbit"):
-        # A run that missed counts as one that needed longer than any.
+        # A missed run counts as slower than any other.
         pair = [np.nan_to_num(needed[which], nan=np.inf) for which in ("chaotic_clonal", name)]
         test = mannwhitneyu(*pair)
         share = test.statistic / (len(pair[0]) * len(pair[1]))
         lines.append(
-            f"Chaotic ClonalG needs more than {name} in {100 * share:.1f} % of pairs of runs (50 %: alike; p = {test.pvalue:.2g})."
+            f"Chaotic ClonalG needs more evaluations than {name} in {100 * share:.1f} % of pairs "
+            f"of runs (50 %: no difference; p = {test.pvalue:.2g})."
         )
     return "\n".join(lines) + "\n"
 
 
-def details(rows: list[Row]) -> str:
-    """Markdown: hits and standard deviation of every image and number of thresholds, the optimisers
-    side by side.
-    """
+def details(rows: list[ThresholdRow]) -> str:
+    """Format hits and standard deviations per image as a Markdown table."""
     lines = [
         "| image | K | exact optimum | "
         + " | ".join(f"{name}: hits, deviation" for name in OPTIMISERS)
@@ -201,90 +275,94 @@ def details(rows: list[Row]) -> str:
 
 
 def draw_map(folder: Path) -> None:
-    """The mutation rate and the logistic map (figures 3.5 to 3.8 of the thesis)."""
+    """Draw the mutation rate and the logistic map (figures 3.5 to 3.8 of the thesis)."""
     affinity = np.linspace(0, 1, 200)
-    plot = Plot("Mutation rate", "affinity f", "exp(-rho f)", (0, 1), (0, 1))
-    for decay, colour in zip((2, 3, 4, 5), COLOURS, strict=False):
-        plot.line(affinity, mutation_rate(affinity, decay), colour, f"rho = {decay}")
-    plot.save(folder / "mutation_rate.png")
+    options = AxesOptions("Mutation rate", "affinity f", "exp(-rho f)", (0, 1), (0, 1))
+    with png_axes(folder / "mutation_rate.png", options) as axes:
+        for decay, colour in zip((2, 3, 4, 5), COLOURS, strict=False):
+            label = f"rho = {decay}"
+            axes.plot(affinity, mutation_rate(affinity, decay), color=colour, label=label)
     rates = np.linspace(2.8, 4, 1000)
     ends = bifurcation(rates)
-    plot = Plot("Bifurcation of the logistic map", "r", "x", (2.8, 4), (0, 1))
-    plot.dots(np.broadcast_to(rates, ends.shape).ravel(), ends.ravel(), COLOURS[0])
-    plot.save(folder / "bifurcation.png")
-    edges = np.linspace(0, 1, 51)
+    options = AxesOptions("Bifurcation of the logistic map", "r", "x", (2.8, 4), (0, 1))
+    with png_axes(folder / "bifurcation.png", options) as axes:
+        axes.plot(np.broadcast_to(rates, ends.shape).ravel(), ends.ravel(), ",", color=COLOURS[0])
     x = orbit(0.1234, 100_000)
-    plot = Plot("Values of the logistic map at r = 4", "x", "density", (0, 1), (0, 5))
-    plot.bars(
-        edges, np.histogram(x, edges, density=True)[0], COLOURS[0], "an orbit of 100,000 values"
-    )
-    inner = np.linspace(0.002, 0.998, 500)
-    plot.line(inner, density(inner), COLOURS[1], "1 / (pi sqrt(x (1 - x)))")
-    plot.save(folder / "logistic_density.png")
-    plot = Plot("The uniformised map and a pseudo-random generator", "u", "density", (0, 1), (0, 2))
-    plot.bars(
-        edges,
-        np.histogram(uniformised(x), edges, density=True)[0],
-        COLOURS[0],
-        "(2 / pi) asin(sqrt(x)) of the orbit",
-    )
-    plot.bars(
-        edges,
-        np.histogram(np.random.default_rng(0).random(100_000), edges, density=True)[0],
-        COLOURS[1],
-        "pseudo-random",
-    )
-    plot.bars(
-        edges,
-        np.histogram(ChaoticNumbers(0).uniform((100_000,)), edges, density=True)[0],
-        COLOURS[2],
-        "many orbits, each eighth value",
-    )
-    plot.save(folder / "uniformised.png")
-    plot = Plot("Consecutive numbers", "u", "next u", (0, 1), (0, 1.25))
+    _draw_densities(folder, x)
+    options = AxesOptions("Consecutive numbers", "u", "next u", (0, 1), (0, 1.25))
     mixed, raw = ChaoticNumbers(0).uniform((4000,)), uniformised(x[:4000])
-    plot.dots(mixed[:-1], mixed[1:], COLOURS[0], "many orbits, each eighth value")
-    plot.dots(raw[:-1], raw[1:], COLOURS[1], "one orbit, each value")
-    plot.save(folder / "consecutive.png")
+    with png_axes(folder / "consecutive.png", options) as axes:
+        for values, colour, label in (
+            (mixed, COLOURS[0], "many orbits, every eighth value"),
+            (raw, COLOURS[1], "one orbit, every value"),
+        ):
+            axes.plot(values[:-1], values[1:], ".", markersize=2, color=colour, label=label)
+
+
+def _draw_densities(folder: Path, x: np.ndarray) -> None:
+    edges = np.linspace(0, 1, 51)
+    inner = np.linspace(0.002, 0.998, 500)
+    options = AxesOptions("Values of the logistic map at r = 4", "x", "density", (0, 1), (0, 5))
+    with png_axes(folder / "logistic_density.png", options) as axes:
+        heights = np.histogram(x, edges, density=True)[0]
+        axes.stairs(heights, edges, color=COLOURS[0], label="an orbit of 100,000 values")
+        axes.plot(inner, density(inner), color=COLOURS[1], label="1 / (pi sqrt(x (1 - x)))")
+    title = "The uniformised map and a pseudo-random generator"
+    options = AxesOptions(title, "u", "density", (0, 1), (0, 2))
+    with png_axes(folder / "uniformised.png", options) as axes:
+        for values, colour, label in (
+            (uniformised(x), COLOURS[0], "(2 / pi) asin(sqrt(x)) of the orbit"),
+            (np.random.default_rng(0).random(100_000), COLOURS[1], "pseudo-random"),
+            (ChaoticNumbers(0).uniform((100_000,)), COLOURS[2], "many orbits, every eighth value"),
+        ):
+            heights = np.histogram(values, edges, density=True)[0]
+            axes.stairs(heights, edges, color=colour, label=label)
 
 
 def draw_convergence(
     folder: Path, objectives: dict[str, OtsuObjective], runs: int, evaluations: int
 ) -> None:
-    """How far from the exact optimum each optimiser is on average, by evaluations, for five
-    thresholds.
+    """Draw the mean shortfall of each optimiser for five thresholds.
+
+    Parameters
+    ----------
+    folder : Path
+        Where to write convergence.png.
+    objectives : dict of str to OtsuObjective
+        By image.
+    runs, evaluations : int
+        Number of runs, and budget of each.
     """
     grid = np.arange(100, evaluations + 1, 100)
-    plot = Plot(
+    options = AxesOptions(
         "Five thresholds, mean of nine images",
         "evaluations",
         "log10 (relative shortfall + 1e-6)",
         (0, evaluations),
         (-6, -1),
     )
-    for name, colour in zip(OPTIMISERS, COLOURS, strict=False):
-        shortfalls = []
-        for objective in objectives.values():
-            best = exact(objective, 5).value
-            for seed in range(runs):
-                history = OPTIMISERS[name](objective, 5, evaluations, seed).history
-                last = np.searchsorted(history[:, 0], grid, side="right") - 1
-                shortfalls.append(1 - history[np.maximum(last, 0), 1] / best)
-        plot.line(grid, np.log10(np.maximum(np.mean(shortfalls, axis=0), 0) + 1e-6), colour, name)
-    plot.save(folder / "convergence.png")
+    with png_axes(folder / "convergence.png", options) as axes:
+        for name, colour in zip(OPTIMISERS, COLOURS, strict=False):
+            shortfalls = []
+            for objective in objectives.values():
+                best = exact(objective, 5).value
+                for seed in range(runs):
+                    history = OPTIMISERS[name](objective, 5, evaluations, seed).history
+                    last = np.searchsorted(history[:, 0], grid, side="right") - 1
+                    shortfalls.append(1 - history[np.maximum(last, 0), 1] / best)
+            mean = np.maximum(np.mean(shortfalls, axis=0), 0)
+            axes.plot(grid, np.log10(mean + 1e-6), color=colour, label=name)
 
 
 def main() -> None:
-    """Measures, prints the summary, writes the files."""
-    options = argparse.ArgumentParser(
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument(
-        "-o", "--output", type=Path, required=True, help="folder for the tables and figures"
-    )
-    options.add_argument("--runs", type=int, default=50)
-    options.add_argument("--evaluations", type=int, default=20_000)
-    given = options.parse_args()
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
+    parser.add_argument("--runs", type=int, default=50, help="runs per case")
+    parser.add_argument("--evaluations", type=int, default=20_000, help="budget of a run")
+    given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     draw_map(given.output)
     objectives = {image: OtsuObjective.of(levels(image)) for image in IMAGES}
@@ -298,11 +376,14 @@ def main() -> None:
         rows += [row for row, _ in cases]
         needed[name] = np.concatenate([each for _, each in cases])
         print(
-            f"{name}: {np.isfinite(needed[name]).sum()} of {needed[name].size} runs found the optimum",
+            f"{name}: {np.isfinite(needed[name]).sum()} of {needed[name].size} runs "
+            "reached the optimum",
             flush=True,
         )
     with (given.output / "thresholding.csv").open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file).writerows([[field.name for field in fields(Row)], *map(astuple, rows)])
+        csv.writer(file).writerows(
+            [[field.name for field in fields(ThresholdRow)], *map(astuple, rows)]
+        )
     text = summary(rows, needed) + "\n" + details(rows)
     (given.output / "thresholding.md").write_text(text, encoding="utf-8")
     print(text)

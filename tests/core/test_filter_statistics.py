@@ -7,7 +7,7 @@ import pytest
 from scipy import ndimage
 
 from benchmarks.separation.filter_statistics import (
-    Outcome,
+    AblationRow,
     Sample,
     calibrated,
     figure,
@@ -197,9 +197,9 @@ def test_the_separator_takes_it_as_one_more_voice():
 
 def test_the_ablation_counts_what_got_better_and_worse(tmp_path):
     rows = [
-        Outcome("rendered", "a", (0.5, 0.4)),
-        Outcome("rendered", "b", (0.5, 0.625)),
-        Outcome("clean", "c", (0.2, 0.4)),
+        AblationRow("rendered", "a", (0.5, 0.4)),
+        AblationRow("rendered", "b", (0.5, 0.625)),
+        AblationRow("clean", "c", (0.2, 0.4)),
     ]
     text = markdown(rows, ["without", "with"])
     assert (

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.separation import scores, specular_removal
-from benchmarks.separation.scores import Row, measure, read_rows, source_code, write_rows
+from benchmarks.separation.scores import SeparationRow, measure, read_rows, source_code, write_rows
 from benchmarks.separation.tables import tables
 from isc_core import separation
 from isc_core.datasets.highlight_set import SeparationTruth
@@ -87,8 +87,8 @@ def test_a_photo_without_highlights_has_no_truth_to_miss() -> None:
 
 
 def test_the_gain_is_one_less_the_geometric_mean_of_ratios() -> None:
-    def row(method: str, image: str, diffuse: float, specular: float) -> Row:
-        return Row(
+    def row(method: str, image: str, diffuse: float, specular: float) -> SeparationRow:
+        return SeparationRow(
             "laboratory",
             image,
             method,
@@ -111,8 +111,8 @@ def test_the_gain_is_one_less_the_geometric_mean_of_ratios() -> None:
         row("tan_2005", "phone", 1, 1),
     ]
     assert (
-        "| tan_2005 | improved | 2 (apple, teabag2, paper1, animals, cups) | 50.0 % | 50.0 % | 0.0 % | 0.0 % |"
-        in tables(rows)
+        "| tan_2005 | improved | 2 (apple, teabag2, paper1, animals, cups) | 50.0 % | 50.0 % | 0.0 "
+        "% | 0.0 % |" in tables(rows)
     )
     assert "Sparse Coding against" not in tables(rows[3:])
 
@@ -120,7 +120,7 @@ def test_the_gain_is_one_less_the_geometric_mean_of_ratios() -> None:
 def test_rows_come_back_from_disk(tmp_path: Path) -> None:
     rows = [
         measure("laboratory", truth(), "none", "improved")[0],
-        Row("clean", "b, c", "tan_2005", "paper", "12ab", refused='says "no"'),
+        SeparationRow("clean", "b, c", "tan_2005", "paper", "12ab", refused='says "no"'),
     ]
     write_rows(tmp_path / "rows.csv", rows)
     found = read_rows(tmp_path / "rows.csv")
@@ -142,7 +142,7 @@ def test_a_run_is_taken_up_where_it_was_left(
 
     def counted(
         group: str, photo: SeparationTruth, method: str, variant: str
-    ) -> tuple[Row, Separation | None]:
+    ) -> tuple[SeparationRow, Separation | None]:
         measured.append(method)
         return measure(group, photo, method, variant)
 
