@@ -4,7 +4,7 @@ diffuse image.
   python -m benchmarks.decomposition.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT
   [--objects a,b] [--sets level-25_natural]
                                     [--networks FOLDER] [--models plain,joint] [--roundings K]
-                                    [--shape-prior seen]
+                                    [--shape-prior predicted]
 
 Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them.
 `--networks`: a network for each object that has not seen it, `OBJECT.npz` of
@@ -29,11 +29,11 @@ import numpy as np
 from benchmarks.records import append_row, read_rows
 from benchmarks.sirfs.mit_berkeley import rounded
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, list_objects, load_object
-from isc_core.decompose.settings import OUTLINE, SHAPE_PRIORS
+from isc_core.decompose.settings import SHAPE_PRIORS, ShapePrior
 from isc_core.evaluation.evaluate import Estimate, paired_bootstrap
 from isc_core.evaluation.metrics import score
 from isc_core.evaluation.runner import RunnerOptions, make_runner
-from isc_core.networks.layer_network import LayerNetwork, read_network
+from isc_core.networks.layer_network import LayerNetwork
 from isc_core.progress import Monitor
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 
@@ -60,7 +60,7 @@ def run(
     seen: MitBerkeleyObject,
     diffuse: MitBerkeleyObject,
     network: LayerNetwork | None,
-    shape_prior: str = OUTLINE,
+    shape_prior: str = ShapePrior.SILHOUETTE,
 ) -> tuple[Estimate, float]:
     """A model's answer and its seconds."""
     truth = diffuse if model == "true diffuse" else seen
@@ -97,7 +97,7 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
             if not missing:
                 continue
             photos = photo_of(folder, name)
-            network = read_network(given.networks / f"{name}.npz") if given.networks else None
+            network = LayerNetwork.read(given.networks / f"{name}.npz") if given.networks else None
             for rounding, model in missing:
                 seen, diffuse = (rounded(photo, rounding) for photo in photos)
                 answer, seconds = run(model, seen, diffuse, network, given.shape_prior)
@@ -194,7 +194,7 @@ def main() -> None:
     parser.add_argument(
         "--shape-prior",
         choices=SHAPE_PRIORS,
-        default=RunnerOptions().shape_prior,
+        default=ShapePrior.SILHOUETTE.value,
         help="as for isc evaluate",
     )
     parser.add_argument("-o", "--output", type=Path, required=True)

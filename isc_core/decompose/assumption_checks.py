@@ -12,7 +12,7 @@ the object, and a mask too ragged for a mesh.
 
 Citation: see `networks.scene_classifier` and `networks.light_network`.
 
-Limits: measured in docs/methods/doubts.md. Strongly coloured light is covered by
+Limits: measured in docs/methods/assumption_checks.md. Strongly coloured light is covered by
 `illuminant.gamut`.
 """
 

@@ -39,7 +39,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..imaging.smoothing import masked_gaussian
-from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
+from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import JointOutcome
 from ..separation.support.light_tint import held_to_light
@@ -210,7 +210,7 @@ def detect_residual_highlights(
         None if no highlights stand out.
     """
     options, inside = options or JointOptions(), mask[..., None]
-    expected, _ = log_ratio(image, mask, network or shipped_network(), options.network)
+    expected, _ = log_ratio(image, mask, network or LayerNetwork.shipped(), options.network)
     taken = np.log(
         np.maximum(np.where(inside, image, 1), 1e-9)
         / np.maximum(np.where(inside, diffuse, 1), 1e-9)

@@ -28,10 +28,9 @@ from ..scene.decomposition import Separation
 from ..scene.diagnostics import LightColourDiagnostics
 from ..scene.lobe_fit import Interval, LobeFit
 from .layers import scale_confidence, scaled_light
-from .settings import LIGHT_COLOURS
+from .settings import LightColour
 from .task import DecompositionTask, SceneEstimate
 
-WHITE, ESTIMATE = LIGHT_COLOURS
 _COLOURED = 0.1  # of a channel's share: less cannot be distinguished from white
 
 
@@ -59,11 +58,11 @@ def under_light(
     Cancelled
         If the monitor cancels.
     """
-    if not task.options.check_assumptions and task.settings.light_colour == WHITE:
+    if not task.options.check_assumptions and task.settings.light_colour == LightColour.WHITE:
         return solver(task)
     with task.clock.stage("estimate light colour"):
         light = estimate_illuminant(task.working.image, task.working.mask, task.working.clipped)
-    used = light.determined and task.settings.light_colour == ESTIMATE
+    used = light.determined and task.settings.light_colour == LightColour.ESTIMATE
     estimate = _back(solver(_whitened(task, light.colour)), light.colour) if used else solver(task)
     split = scale_confidence(estimate.split) if light.too_strong else estimate.split
     diagnostics = replace(estimate.diagnostics, light_colour=_diagnostics(light, used))
@@ -73,7 +72,7 @@ def under_light(
 def _diagnostics(light: Illuminant, used: bool) -> LightColourDiagnostics:
     red, green, blue = (round(float(part), 4) for part in light.colour)
     return LightColourDiagnostics(
-        ESTIMATE if used else WHITE,
+        LightColour.ESTIMATE if used else LightColour.WHITE,
         (red, green, blue),
         round(light.confidence, 4),
         light.outcome,

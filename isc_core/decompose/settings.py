@@ -1,6 +1,7 @@
-"""What a decomposition is asked for: the names of the models, and what they can be told."""
+"""The settings of a decomposition: names of the models, and a user's choices."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from .. import baselines
 from ..errors import InputError
@@ -8,39 +9,142 @@ from ..separation import BEST, METHODS
 
 SIRFS_MODELS = ("mdr", "mbp", "joint", "sirfs")
 SEPARATING_MODELS = ("mdr", "mbp", "joint")
-WEIGHING_MODELS = ("mdr", "joint")
+WEIGHTING_MODELS = ("mdr", "joint")
 BASELINE_MODELS = tuple(baselines.METHODS)
 MODELS = SIRFS_MODELS + BASELINE_MODELS
-NATURAL, LABORATORY = ILLUMINATIONS = ("natural", "laboratory")
-LIGHT_COLOURS = ("white", "estimate")
-SEEN, USUAL, OUTLINE = "seen", "usual", "outline"
-LIGHT_PRIORS = (SEEN, USUAL)
-SHAPE_PRIORS = (SEEN, OUTLINE)
+
+
+class Illumination(StrEnum):
+    """The kind of light that the priors describe.
+
+    Attributes
+    ----------
+    NATURAL
+        Light of natural environments.
+    LABORATORY
+        Light of the MIT-Berkeley laboratory.
+    """
+
+    NATURAL = "natural"
+    LABORATORY = "laboratory"
+
+
+class LightColour(StrEnum):
+    """The assumed colour of the light.
+
+    Attributes
+    ----------
+    WHITE
+        White.
+    ESTIMATE
+        Estimated from the photo's highlights, where they determine it.
+    """
+
+    WHITE = "white"
+    ESTIMATE = "estimate"
+
+
+class LightPrior(StrEnum):
+    """The prior of the light.
+
+    Attributes
+    ----------
+    PREDICTED
+        Around the light predicted from the photo (`networks.light_network`); in natural
+        illumination.
+    DATASET
+        The distribution over all photos of the illumination.
+    """
+
+    PREDICTED = "predicted"
+    DATASET = "dataset"
+
+
+class ShapePrior(StrEnum):
+    """The prior of the shape.
+
+    Attributes
+    ----------
+    PREDICTED
+        Normals predicted from the photo (`networks.normal_network`); in natural illumination, where
+        no depth is known and the frame does not cut the object.
+    SILHOUETTE
+        Normals that the silhouette suggests.
+    """
+
+    PREDICTED = "predicted"
+    SILHOUETTE = "silhouette"
+
+
+ILLUMINATIONS = tuple(one.value for one in Illumination)
+LIGHT_COLOURS = tuple(one.value for one in LightColour)
+LIGHT_PRIORS = tuple(one.value for one in LightPrior)
+SHAPE_PRIORS = tuple(one.value for one in ShapePrior)
+
+# Values of earlier versions, accepted for one version.
+_RENAMED = {
+    "light_prior": {"seen": LightPrior.PREDICTED, "usual": LightPrior.DATASET},
+    "shape_prior": {"seen": ShapePrior.PREDICTED, "outline": ShapePrior.SILHOUETTE},
+}
+
+
+def renamed_value(setting: str, value: str) -> str | None:
+    """Look up the current name of a setting's value of an earlier version.
+
+    Parameters
+    ----------
+    setting : str
+        Name of the field in `Settings`.
+    value : str
+        The value.
+
+    Returns
+    -------
+    str or None
+        The current name; None where the value was not renamed.
+    """
+    return _RENAMED.get(setting, {}).get(value)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What a decomposition is asked for.
+    """A user's choices for a decomposition.
 
-    `model`: one of `MODELS`. `separator`: one of `separation.METHODS`, used by `SEPARATING_MODELS`.
-    `illumination`: "natural" or "laboratory", which lights to expect. `max_size`: the object's long
-    side in pixels at which the maps are made, 0 for the photo's; SIRFS is solved at a size of its
-    own, `recover.SOLVE_SIZE`. `full_size`: the maps are then brought to the photo's resolution.
-    `engine`, `threads`: see `SolverOptions`. `seed`: written into the result; no step of these
-    models draws random numbers. `shading_only`: shape-from-shading mode, an object of one colour.
-    `confidence_weights`: of "mdr" and "joint", whether pixels whose separation is in doubt weigh
-    less in SIRFS' terms of reflectance. `light_colour`: of `SEPARATING_MODELS`, "white", or
-    "estimate" for the colour that the photo's highlights tell, where they do. `light_prior`: of
-    `SIRFS_MODELS`, which lights SIRFS expects: those that the photo's looks like ("seen", see
-    `lamp_network`; in natural illumination), or those of all photos of this `illumination`
-    ("usual"). `shape_prior`: of `SIRFS_MODELS`, what SIRFS expects of the shape: what the photo
-    looks like ("seen", see `shape_network`; in natural illumination, where no depth is known and
-    the frame does not cut the object), or what its outline alone suggests ("outline").
+    Attributes
+    ----------
+    model : str
+        One of `MODELS`.
+    separator : str
+        One of `separation.METHODS`, for `SEPARATING_MODELS`.
+    illumination : Illumination or str
+        The kind of light.
+    max_size : int
+        Long side of the object, pixels, at which the maps are made; 0 for the photo's. SIRFS is
+        solved at a size of its own, `recover.SOLVE_SIZE`.
+    full_size : bool
+        The maps are brought to the photo's resolution.
+    engine : str
+        "auto", "numba" or "numpy", see `SolverOptions`.
+    threads : int
+        See `SolverOptions`; 0 for all cores.
+    seed : int
+        Written into the result; no step of these models draws random numbers.
+    shading_only : bool
+        Shape-from-shading mode: an object of one colour.
+    confidence_weights : bool
+        For `WEIGHTING_MODELS`: pixels with an uncertain separation have less weight in SIRFS'
+        reflectance terms.
+    light_colour : LightColour or str
+        For `SEPARATING_MODELS`: the assumed colour of the light.
+    light_prior : LightPrior or str
+        For `SIRFS_MODELS`: the prior of the light.
+    shape_prior : ShapePrior or str
+        For `SIRFS_MODELS`: the prior of the shape.
     """
 
     model: str = "joint"
     separator: str = BEST
-    illumination: str = "natural"
+    illumination: str = Illumination.NATURAL
     max_size: int = 512
     full_size: bool = False
     engine: str = "auto"
@@ -48,9 +152,15 @@ class Settings:
     seed: int = 0
     shading_only: bool = False
     confidence_weights: bool = False
-    light_colour: str = "white"
-    light_prior: str = SEEN
-    shape_prior: str = SEEN
+    light_colour: str = LightColour.WHITE
+    light_prior: str = LightPrior.PREDICTED
+    shape_prior: str = ShapePrior.PREDICTED
+
+    def __post_init__(self) -> None:
+        for setting in _RENAMED:
+            current = renamed_value(setting, getattr(self, setting))
+            if current is not None:
+                object.__setattr__(self, setting, current)
 
     @property
     def takes_priors(self) -> bool:
@@ -60,15 +170,23 @@ class Settings:
     @property
     def uses_predicted_normals(self) -> bool:
         """Whether SIRFS expects the predicted normals."""
-        return self.shape_prior == SEEN and self.illumination != LABORATORY
+        natural = self.illumination != Illumination.LABORATORY
+        return natural and self.shape_prior == ShapePrior.PREDICTED
 
     @property
     def uses_predicted_light(self) -> bool:
-        """Whether SIRFS expects the predicted light."""
-        return self.light_prior == SEEN and self.illumination != LABORATORY
+        """Whether SIRFS expects the predicted light; that of the laboratory is known."""
+        natural = self.illumination != Illumination.LABORATORY
+        return natural and self.light_prior == LightPrior.PREDICTED
 
     def check(self) -> None:
-        """Raises `InputError` for values that mean nothing."""
+        """Validate the settings.
+
+        Raises
+        ------
+        InputError
+            If a value is unknown, or does not apply to the model.
+        """
         for name, value, known in (
             ("model", self.model, MODELS),
             ("separator", self.separator, METHODS),
@@ -80,13 +198,15 @@ class Settings:
         ):
             if value not in known:
                 raise InputError(f'unknown {name} "{value}": choose {", ".join(known)}')
-        if self.confidence_weights and self.model not in WEIGHING_MODELS:
+        if self.confidence_weights and self.model not in WEIGHTING_MODELS:
             raise InputError(
-                f"--confidence-weights means nothing to {self.model}: use --model {' or '.join(WEIGHING_MODELS)}"
+                f"--confidence-weights does not apply to {self.model}: "
+                f"use --model {' or '.join(WEIGHTING_MODELS)}"
             )
-        if self.light_colour != "white" and self.model not in SEPARATING_MODELS:
+        if self.light_colour != LightColour.WHITE and self.model not in SEPARATING_MODELS:
             raise InputError(
-                f"--light-colour means nothing to {self.model}: use --model {' or '.join(SEPARATING_MODELS)}"
+                f"--light-colour does not apply to {self.model}: "
+                f"use --model {' or '.join(SEPARATING_MODELS)}"
             )
         if self.max_size < 0 or self.threads < 0:
             raise InputError(

@@ -28,7 +28,6 @@ from ..sirfs.recover import Recovered, RecoverOptions, recover
 from ..sirfs.settings import isc_weights
 from ..sirfs.solver import SolverOptions
 from .layers import scaled_light
-from .settings import LABORATORY, USUAL
 from .task import DecompositionTask
 
 # Level of the brightest channels' percentile below, white being 1; it is .23 to .87 in the training
@@ -154,9 +153,8 @@ def _recover(
     announce_compilation(settings.engine, monitor)
     channels = 1 if _is_grey(diffuse, working.mask) else 3
     priors = (task.prior_set or shipped_prior_set()).priors(settings.illumination, channels)
-    priors = with_predicted_light(
-        priors, task.light_estimate, settings.light_prior, settings.illumination
-    )
+    if settings.uses_predicted_light and task.light_estimate is not None:
+        priors = with_predicted_light(priors, task.light_estimate)
     weights = isc_weights(
         settings.illumination, channels, normals_predicted=task.normal_estimate is not None
     )
@@ -197,33 +195,23 @@ def _recover_options(task: DecompositionTask) -> RecoverOptions:
     )
 
 
-def with_predicted_light(
-    priors: Priors, light_estimate: LightEstimate | None, light_prior: str, illumination: str
-) -> Priors:
+def with_predicted_light(priors: Priors, light_estimate: LightEstimate) -> Priors:
     """Replace the prior of the light by one around the predicted light.
 
     Parameters
     ----------
     priors : Priors
         Priors of the data set.
-    light_estimate : LightEstimate or None
+    light_estimate : LightEstimate
         Predicted light.
-    light_prior : str
-        See `Settings.light_prior`.
-    illumination : str
-        See `Settings.illumination`; laboratory light is known, and stays as it is.
 
     Returns
     -------
     Priors
-        Unchanged where no predicted light is to be used.
+        With the new prior of the light.
     """
-    if light_estimate is None or light_prior == USUAL or illumination == LABORATORY:
-        return priors
-    return replace(
-        priors,
-        light=predicted_light_prior(priors.light, light_estimate.light, light_estimate.deviations),
-    )
+    light = predicted_light_prior(priors.light, light_estimate.light, light_estimate.deviations)
+    return replace(priors, light=light)
 
 
 def _exposure_gain(photo: Photo) -> float:

@@ -1,9 +1,13 @@
-"""Scoring a method on the MIT-Berkeley set, object by object, and comparing two methods.
+"""Scores of a method on the MIT-Berkeley set, object by object, and comparison of two methods.
 
-Each error of `evaluation.metrics.Scores` is summed up by its geometric mean over the objects (J. T. Barron, J.
-Malik 2015, doi:10.1109/TPAMI.2014.2377712), so that no single object or unit decides. Two methods
-are compared by the ratio of their geometric means; its interval comes from resampling the objects
-(B. Efron 1979, "Bootstrap methods: another look at the jackknife", doi:10.1214/aos/1176344552).
+Problem: errors of different units, on few objects, need one summary and its uncertainty.
+
+Equation: each error of `evaluation.metrics.Scores` is summarised by its geometric mean over the
+objects, so that no single object or unit dominates. Two methods are compared by the ratio of their
+geometric means; its interval comes from resampling the objects.
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712; B. Efron 1979, "Bootstrap
+methods: another look at the jackknife", doi:10.1214/aos/1176344552.
 
 Limits: with ten objects the percentile interval is somewhat too narrow, and objects of one family
 (two cups, two frogs) are not independent.
@@ -40,12 +44,22 @@ _HEADINGS = (
 
 @dataclass(frozen=True)
 class Estimate:
-    """A method's answer for one object, on the object's crop (h, w), in the project's conventions.
+    """A method's estimate for one object, on the object's crop.
 
-    `height`: (h, w) pixels toward the viewer. `normal`: (h, w, 3) unit vectors, x right, y up, z
-    toward the viewer. `shading`, `reflectance`: (h, w, 3) linear, read where the input is valid.
-    `light`: (9, 3) coefficients of orthonormal real spherical harmonics of log shading. `loss`,
-    `evaluations`: of the solver at its end, where it has them.
+    Attributes
+    ----------
+    height : (h, w) ndarray
+        Pixels toward the viewer.
+    normal : (h, w, 3) ndarray
+        Unit vectors, camera frame: x right, y up, z toward the viewer.
+    shading, reflectance : (h, w, 3) ndarray
+        Linear, read where the input is valid.
+    light : (9, 3) ndarray
+        Log-shading SH coefficients, ISC's convention.
+    loss : float or None
+        The solver's final objective.
+    evaluations : int or None
+        The solver's evaluations.
     """
 
     height: np.ndarray
@@ -57,15 +71,29 @@ class Estimate:
     evaluations: int | None = None
 
 
-# What is evaluated: it sees the object's `image`, `valid` and `mask`, reports its progress, and
-# must not look at the truth.
+# A method under evaluation: it reads the object's `image`, `valid` and `mask`, never the ground
+# truth, and reports its progress.
 Runner = Callable[[MitBerkeleyObject, Monitor], Estimate]
 
 
 @dataclass(frozen=True)
 class ObjectResult:
-    """One object's errors, the solver's final loss and evaluations (None where it has none), and
-    the seconds that it took.
+    """Errors of one object.
+
+    Attributes
+    ----------
+    name, illumination : str
+        The object.
+    valid_pixels : int
+        Number of valid pixels.
+    scores : Scores
+        The errors.
+    loss : float or None
+        The solver's final objective.
+    evaluations : int or None
+        The solver's evaluations.
+    seconds : float
+        Run time.
     """
 
     name: str
@@ -79,40 +107,61 @@ class ObjectResult:
 
 @dataclass(frozen=True)
 class EvaluationReport:
-    """The errors of `model` on `input` images: one result for each object and illumination, in the
-    order they were run.
+    """Errors of a method on a set of objects.
+
+    Attributes
+    ----------
+    model : str
+        Name of the method.
+    input : str
+        "diffuse" or "original".
+    results : tuple of ObjectResult
+        One for each object and illumination, in the order of the runs.
+    protocol : str
+        What was measured, see `runner.Protocol`.
     """
 
     model: str
     input: str
     results: tuple[ObjectResult, ...]
+    protocol: str = "reference"
 
     @property
     def illuminations(self) -> tuple[str, ...]:
-        """The illuminations that were run, in order."""
+        """The illuminations, in order."""
         return tuple(dict.fromkeys(result.illumination for result in self.results))
 
     def under(self, illumination: str) -> tuple[ObjectResult, ...]:
-        """The results under one illumination."""
+        """Return the results under one illumination."""
         return tuple(result for result in self.results if result.illumination == illumination)
 
     def mean(self, illumination: str) -> Scores:
-        """Geometric means over the objects; the `average` of these is the geometric mean of the
-        objects' averages.
+        """Compute the geometric means over the objects under one illumination.
+
+        Parameters
+        ----------
+        illumination : str
+            One of `illuminations`.
+
+        Returns
+        -------
+        Scores
+            Their `average` is the geometric mean of the objects' averages.
         """
         rows = [asdict(result.scores) for result in self.under(illumination)]
         return Scores(**{name: geometric_mean(row[name] for row in rows) for name in rows[0]})
 
     def mean_seconds(self, illumination: str) -> float:
-        """Geometric mean of the seconds an object."""
+        """Return the geometric mean of the seconds per object."""
         return geometric_mean(result.seconds for result in self.under(illumination))
 
     def to_json(self) -> dict[str, Any]:
-        """The report as values for `json.dump`; the sets are named "illumination/input"."""
+        """Return the report as JSON values; the sets are named "illumination/input"."""
         return {
             "dataset": "mit-berkeley",
             "model": self.model,
             "input": self.input,
+            "protocol": self.protocol,
             "geometric_means": {
                 f"{light}/{self.input}": _scores_json(self.mean(light))
                 | {"seconds": self.mean_seconds(light)}
@@ -127,8 +176,8 @@ class EvaluationReport:
         }
 
     def table(self) -> str:
-        """The report as an aligned Markdown table: a row an object, and the geometric mean below
-        each illumination.
+        """Return an aligned Markdown table: one row per object, and the geometric mean below each
+        illumination.
         """
         rows: list[tuple[str, ...]] = [_HEADINGS]
         for light in self.illuminations:
@@ -140,7 +189,15 @@ class EvaluationReport:
 
 
 class Ratio(NamedTuple):
-    """A ratio of geometric means and its 95 % interval; below 1, the first method errs less."""
+    """A ratio of geometric means, below 1 where the first method has smaller errors.
+
+    Attributes
+    ----------
+    ratio : float
+        The ratio.
+    low, high : float
+        Its 95 % interval.
+    """
 
     ratio: float
     low: float
@@ -154,14 +211,42 @@ def evaluate(
     illuminations: Sequence[str] = ("natural", "laboratory"),
     input: str = "diffuse",
     model: str,
+    protocol: str = "reference",
     runner: Runner,
     monitor: Monitor | None = None,
 ) -> EvaluationReport:
-    """Runs `runner` on the objects below `root` and scores its answers.
+    """Run a method on objects of the set, and score its estimates.
 
-    `objects`: names, or None for all. `input`: "diffuse" or "original" (laboratory only). `model`:
-    what the report calls the method. Raises `InputError` for unknown names or options before the
-    first run, and `Cancelled` between objects.
+    Parameters
+    ----------
+    root : path
+        Folder of the data set.
+    objects : sequence of str, optional
+        Names; all objects by default.
+    illuminations : sequence of str, optional
+        "natural", "laboratory".
+    input : str, optional
+        "diffuse" or "original" (laboratory only).
+    model : str
+        Name of the method in the report.
+    protocol : str, optional
+        Name of the protocol in the report.
+    runner : Runner
+        The method.
+    monitor : Monitor, optional
+        Receives progress.
+
+    Returns
+    -------
+    EvaluationReport
+        One result for each object and illumination.
+
+    Raises
+    ------
+    InputError
+        If a name or option is unknown; before the first run.
+    Cancelled
+        If the monitor cancels; between objects.
     """
     monitor = monitor or Monitor()
     wanted = [
@@ -180,23 +265,39 @@ def evaluate(
         part.report(f"{name}, {light}", 0.0)
         results.append(_run(load_object(root, name, light, input), runner, part))
     monitor.report("evaluated", 1.0)
-    return EvaluationReport(model, input, tuple(results))
+    return EvaluationReport(model, input, tuple(results), protocol)
 
 
 def paired_bootstrap(
     log_avg_a: Iterable[float], log_avg_b: Iterable[float], seed: int, *, resamples: int = 10_000
 ) -> Ratio:
-    """The ratio a / b of two geometric means over the same objects, with the percentile interval of
-    resampled objects.
+    """Compare two methods on the same objects, with the percentile interval of resampled objects.
 
-    `log_avg_a[k]`, `log_avg_b[k]`: natural logarithm of the two methods' errors on object k (the
-    mean over its lights, where there are several). Raises `ValueError` for fewer than two objects,
-    unequal lengths or values that are not finite.
+    Parameters
+    ----------
+    log_avg_a, log_avg_b : iterable of float
+        Natural logarithm of each method's error on each object (the mean over its lights, where
+        there are several).
+    seed : int
+        Of the resampling.
+    resamples : int, optional
+        Number of resamples.
+
+    Returns
+    -------
+    Ratio
+        a / b of the geometric means.
+
+    Raises
+    ------
+    ValueError
+        If there are fewer than two objects, unequal lengths or values that are not finite.
     """
     a, b = (np.asarray(list(values), float) for values in (log_avg_a, log_avg_b))
     if a.ndim != 1 or a.shape != b.shape or a.size < 2 or not np.isfinite([a, b]).all():
         raise ValueError(
-            f"a paired comparison needs the same two or more objects with finite values, not {a.shape} and {b.shape}"
+            "a paired comparison needs the same two or more objects with finite values, not "
+            f"{a.shape} and {b.shape}"
         )
     difference = a - b
     drawn = np.random.default_rng(seed).integers(0, a.size, size=(resamples, a.size))
@@ -206,23 +307,23 @@ def paired_bootstrap(
 
 def _run(truth: MitBerkeleyObject, runner: Runner, monitor: Monitor) -> ObjectResult:
     start = time.perf_counter()
-    answer = runner(truth, monitor)
+    estimate = runner(truth, monitor)
     seconds = time.perf_counter() - start
     scores = score(
         truth,
-        height=answer.height,
-        normal=answer.normal,
-        shading=answer.shading,
-        reflectance=answer.reflectance,
-        light=answer.light,
+        height=estimate.height,
+        normal=estimate.normal,
+        shading=estimate.shading,
+        reflectance=estimate.reflectance,
+        light=estimate.light,
     )
     return ObjectResult(
         truth.name,
         truth.illumination,
         int(truth.valid.sum()),
         scores,
-        answer.loss,
-        answer.evaluations,
+        estimate.loss,
+        estimate.evaluations,
         seconds,
     )
 
@@ -259,9 +360,7 @@ def _row(
 
 
 def _markdown(rows: Sequence[Sequence[str]]) -> str:
-    """Rows of cells, the first of them the heading, as a Markdown table: two columns of text, then
-    numbers.
-    """
+    """A Markdown table of rows, the first one the heading: two columns of text, then numbers."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     rules = ["-" * width if k < 2 else "-" * (width - 1) + ":" for k, width in enumerate(widths)]
     lines = []

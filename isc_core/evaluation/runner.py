@@ -17,7 +17,7 @@ import numpy as np
 from ..datasets.mit_berkeley import MitBerkeleyObject
 from ..decompose.models import solve
 from ..decompose.pipeline import decompose
-from ..decompose.settings import OUTLINE, SEEN, USUAL, Settings
+from ..decompose.settings import LightPrior, Settings, ShapePrior
 from ..decompose.task import DecompositionTask, SceneEstimate, SolveOptions
 from ..networks.layer_network import LayerNetwork
 from ..photo import Photo, PhotoSource
@@ -101,8 +101,9 @@ class RunnerOptions:
             engine=self.engine,
             threads=self.threads,
             confidence_weights=self.confidence_weights,
-            light_prior=self.light_prior or (SEEN if users else USUAL),
-            shape_prior=self.shape_prior or (SEEN if users else OUTLINE),
+            light_prior=self.light_prior or (LightPrior.PREDICTED if users else LightPrior.DATASET),
+            shape_prior=self.shape_prior
+            or (ShapePrior.PREDICTED if users else ShapePrior.SILHOUETTE),
         )
 
     def check(self) -> None:

@@ -22,7 +22,7 @@ from ..scene.decomposition import Decomposition
 from ..shading.brdf.ggx import F0
 from ..shading.brdf.roughness import alpha_from_blender
 from ..shading.environment_map import environment_from_shading, resampled
-from ..shading.lobe_rendering import Lobe, lobe_in
+from ..shading.lobe_rendering import Lobe, lobe_in_environment
 from .specular_level import LOWERED, Gloss, gloss_of
 
 _ROWS = 16  # of the sky: a lobe of a smooth one is smooth
@@ -49,7 +49,7 @@ def specular_upper_bound(d: Decomposition, roughness: float, sky: np.ndarray) ->
     rows >= 16.
     """
     lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
-    sheen = lobe_in(lobe, d.normal[d.mask].astype(float), resampled(sky, _ROWS))
+    sheen = lobe_in_environment(lobe, d.normal[d.mask].astype(float), resampled(sky, _ROWS))
     seen = d.image[d.mask]
     # A channel of zero tells nothing: cameras cut there what their colours cannot hold.
     room = np.divide(

@@ -23,7 +23,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from isc_core.datasets.mit_berkeley import list_objects, load_object
-from isc_core.decompose.settings import LABORATORY
+from isc_core.decompose.settings import Illumination
 from isc_core.io.atomic import new_file
 from synth.albedos import ALBEDOS as TEXTURES
 from synth.albedos import make_albedo
@@ -105,8 +105,8 @@ def measured_objects(root: Path) -> Iterator[tuple[str, dict[str, np.ndarray]]]:
     arrays : dict of str to ndarray
         Content of the file.
     """
-    for k, name in enumerate(list_objects(root, LABORATORY)):
-        truth = load_object(root, name, LABORATORY)
+    for k, name in enumerate(list_objects(root, Illumination.LABORATORY)):
+        truth = load_object(root, name, Illumination.LABORATORY)
         mesh = centred(mesh_of_height(np.where(truth.mask, truth.height, np.nan)))
         for copy in range(_COPIES):
             yield f"{name}-{copy}", traced(mesh, name, np.random.default_rng([19, k, copy]))

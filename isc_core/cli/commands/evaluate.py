@@ -5,13 +5,13 @@ import json
 from pathlib import Path
 
 from ...datasets.mit_berkeley import ILLUMINATIONS, INPUTS
-from ...decompose.settings import LIGHT_PRIORS, SHAPE_PRIORS
+from ...decompose.settings import LIGHT_PRIORS, SHAPE_PRIORS, LightPrior, ShapePrior
 from ...evaluation.evaluate import evaluate
-from ...evaluation.runner import RunnerOptions, make_runner
+from ...evaluation.runner import Protocol, RunnerOptions, make_runner
 from ...io.atomic import new_file, require_writable_file
 from ...progress import Monitor
 from ...sirfs.priors.prior_file import load_prior_set, shipped_prior_set
-from ..interface.options import Commands, add_command, add_engine, names
+from ..interface.options import Commands, add_command, add_engine, current_name, names
 
 _EXAMPLES = """  isc evaluate DATA --dataset mit-berkeley --json scores.json
   isc evaluate DATA --dataset mit-berkeley --objects apple,cup1 --illumination natural
@@ -21,7 +21,7 @@ The package's own priors were fitted on the training objects of this set. For a 
   isc fit-priors DATA --leave-out apple -o priors.npz
   isc evaluate DATA --dataset mit-berkeley --objects apple --priors priors.npz"""
 
-_PRIOR = "as for isc decompose (default %(default)s, so that SIRFS is measured by itself)"
+_PRIOR = "as for isc decompose (default for --protocol reference: {}, which measures SIRFS alone)"
 
 
 def declare(commands: Commands) -> None:
@@ -64,10 +64,23 @@ def declare(commands: Commands) -> None:
         "--confidence-weights", action="store_true", help="of joint and mdr: as for isc decompose"
     )
     parser.add_argument(
-        "--light-prior", choices=LIGHT_PRIORS, default=RunnerOptions().light_prior, help=_PRIOR
+        "--light-prior",
+        type=current_name("light_prior"),
+        choices=LIGHT_PRIORS,
+        help=_PRIOR.format(LightPrior.DATASET),
     )
     parser.add_argument(
-        "--shape-prior", choices=SHAPE_PRIORS, default=RunnerOptions().shape_prior, help=_PRIOR
+        "--shape-prior",
+        type=current_name("shape_prior"),
+        choices=SHAPE_PRIORS,
+        help=_PRIOR.format(ShapePrior.SILHOUETTE),
+    )
+    parser.add_argument(
+        "--protocol",
+        choices=tuple(one.value for one in Protocol),
+        default=Protocol.REFERENCE.value,
+        help="reference: the published protocol, at the images' own scale on the data set's crop; "
+        "users: what isc decompose does by default (default %(default)s)",
     )
     parser.add_argument(
         "--priors",
@@ -89,7 +102,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     model = options.model or ("joint" if original else "sirfs")
     runner_options = RunnerOptions(
         model, options.separator, options.engine, options.threads, options.confidence_weights,
-        options.light_prior, options.shape_prior,
+        options.light_prior, options.shape_prior, Protocol(options.protocol),
     )  # fmt: skip
     runner_options.check()
     prior_set = shipped_prior_set() if options.priors is None else load_prior_set(options.priors)
@@ -99,6 +112,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
         illuminations=_illuminations(options.illumination, original),
         input=options.input,
         model=model,
+        protocol=options.protocol,
         runner=make_runner(runner_options, prior_set),
         monitor=monitor,
     )

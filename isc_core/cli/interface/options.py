@@ -2,7 +2,9 @@
 
 import argparse
 import math
+import sys
 import textwrap
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,6 +15,7 @@ from ...decompose.settings import (
     MODELS,
     SHAPE_PRIORS,
     Settings,
+    renamed_value,
 )
 from ...errors import InputError
 from ...io.limits import USUAL, Limits
@@ -201,6 +204,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--light-prior",
+        type=current_name("light_prior"),
         choices=LIGHT_PRIORS,
         default=usual.light_prior,
         help="prior of the light: predicted from the photo, or that of the data set "
@@ -208,6 +212,7 @@ def add_settings(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--shape-prior",
+        type=current_name("shape_prior"),
         choices=SHAPE_PRIORS,
         default=usual.shape_prior,
         help="prior of the shape: predicted from the photo, or from its silhouette alone "
@@ -244,6 +249,31 @@ def add_engine(
         help="compiled kernels, or plain NumPy (auto: compiled if possible)",
     )
     parser.add_argument("--threads", type=count, default=0, metavar="N", help=threads)
+
+
+def current_name(setting: str) -> Callable[[str], str]:
+    """Make the type of an option whose values were renamed.
+
+    Parameters
+    ----------
+    setting : str
+        Field of `Settings`.
+
+    Returns
+    -------
+    callable
+        Replaces a value of an earlier version, and names the new one on stderr.
+    """
+
+    def read(text: str) -> str:
+        current = renamed_value(setting, text)
+        if current is None:
+            return text
+        option = f"--{setting.replace('_', '-')}"
+        sys.stderr.write(f"isc: {option} {text} is now called {current}: use {option} {current}\n")
+        return str(current)
+
+    return read
 
 
 def count(text: str) -> int:

@@ -32,13 +32,14 @@ def error(d: Decomposition) -> float:
 def test_a_ball_is_rounder_in_the_light_that_was_seen(grey: bool) -> None:
     toward = (-0.7, 0.2, 0.6)
     seen, usual = (
-        found(toward, grey, shape_prior="outline", light_prior=prior) for prior in ("seen", "usual")
+        found(toward, grey, shape_prior="silhouette", light_prior=prior)
+        for prior in ("predicted", "dataset")
     )
     assert seen.identity_errors().broken() == ()
     assert error(seen) < 0.9 * error(usual)
     assert (
-        seen.provenance.settings["light_prior"] == "seen"
-        and usual.provenance.settings["light_prior"] == "usual"
+        seen.provenance.settings["light_prior"] == "predicted"
+        and usual.provenance.settings["light_prior"] == "dataset"
     )
     assert seen.provenance.diagnostics.light_counts == usual.provenance.diagnostics.light_counts
 
@@ -46,7 +47,7 @@ def test_a_ball_is_rounder_in_the_light_that_was_seen(grey: bool) -> None:
 def test_the_laboratory_s_light_is_known() -> None:
     one, other = (
         found((0.5, 0.5, 0.7), illumination="laboratory", light_prior=prior)
-        for prior in ("seen", "usual")
+        for prior in ("predicted", "dataset")
     )
     np.testing.assert_array_equal(one.height, other.height)
     np.testing.assert_array_equal(one.illumination, other.illumination)

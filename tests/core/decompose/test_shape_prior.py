@@ -28,30 +28,30 @@ def error(d: Decomposition) -> float:
 
 
 def test_a_ball_is_rounder_as_it_was_seen() -> None:
-    seen, outline = found(), found(shape_prior="outline")
+    seen, outline = found(), found(shape_prior="silhouette")
     assert seen.identity_errors().broken() == ()
     assert error(seen) < 0.8 * error(outline)
     assert (
-        seen.provenance.settings["shape_prior"] == "seen"
-        and outline.provenance.settings["shape_prior"] == "outline"
+        seen.provenance.settings["shape_prior"] == "predicted"
+        and outline.provenance.settings["shape_prior"] == "silhouette"
     )
 
 
 def test_a_depth_that_is_known_is_better_than_one_that_was_seen() -> None:
     normal, _ = ball()
     evidence = KnownInputs(depth=67.5 * normal[..., 2])
-    one, other = (found(evidence, shape_prior=prior) for prior in ("seen", "outline"))
+    one, other = (found(evidence, shape_prior=prior) for prior in ("predicted", "silhouette"))
     np.testing.assert_array_equal(one.height, other.height)
 
 
 def test_what_the_frame_cuts_was_not_seen_whole() -> None:
-    one, other = (found(cut=60, shape_prior=prior) for prior in ("seen", "outline"))
+    one, other = (found(cut=60, shape_prior=prior) for prior in ("predicted", "silhouette"))
     np.testing.assert_array_equal(one.height, other.height)
 
 
 def test_in_the_laboratory_the_outline_is_enough() -> None:
     one, other = (
-        found(illumination="laboratory", shape_prior=prior) for prior in ("seen", "outline")
+        found(illumination="laboratory", shape_prior=prior) for prior in ("predicted", "silhouette")
     )
     np.testing.assert_array_equal(one.height, other.height)
 

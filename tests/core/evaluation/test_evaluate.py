@@ -1,6 +1,7 @@
 """The evaluation's bookkeeping, on a small data set that the tests write themselves."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +12,13 @@ import scipy.io
 
 from isc_core.baselines import retinex
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject, load_object
+from isc_core.decompose.pipeline import decompose
+from isc_core.decompose.settings import LightPrior, Settings, ShapePrior
 from isc_core.errors import Cancelled, InputError
 from isc_core.evaluation.evaluate import Estimate, EvaluationReport, evaluate, paired_bootstrap
 from isc_core.evaluation.metrics import truth_normal
-from isc_core.evaluation.runner import RunnerOptions, make_runner
+from isc_core.evaluation.runner import Protocol, RunnerOptions, make_runner
+from isc_core.photo import Photo, PhotoSource
 from isc_core.progress import Monitor
 from isc_core.shading.spherical_harmonics import light_from_reference, reference_basis
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
@@ -115,6 +119,39 @@ def test_where_nothing_is_taken_off_the_answer_is_that_of_plain_sirfs(
     np.testing.assert_array_equal(other.reflectance, plain.reflectance)
 
 
+def test_the_users_protocol_measures_decompose_itself(root: Path) -> None:
+    truth = load_object(root, "ball", "natural")
+    options = RunnerOptions("sirfs", threads=1, protocol=Protocol.USERS)
+    found = make_runner(options, shipped_prior_set())(truth, Monitor())
+    source = PhotoSource("", truth.mask.shape[::-1], 16, "linear", "file")
+    clipped = np.zeros_like(truth.mask)
+    photo = Photo(truth.image.astype(np.float32), truth.mask, 1 / 65535, clipped, source)
+    result = decompose(photo, Settings("sirfs", threads=1, full_size=True))
+    for name in ("height", "normal", "shading", "reflectance"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(result, name))
+    np.testing.assert_array_equal(found.light, result.illumination)
+    assert found.loss == result.provenance.diagnostics.loss
+    reference = make_runner(RunnerOptions("sirfs", threads=1), shipped_prior_set())
+    assert not np.allclose(reference(truth, Monitor()).height, found.height, atol=0.1)
+    baseline = make_runner(replace(options, model="retinex"), shipped_prior_set())
+    assert np.isfinite(baseline(truth, Monitor()).height).all()
+    report = evaluate(
+        root,
+        objects=["ball"],
+        illuminations=["natural"],
+        model="sirfs",
+        protocol=Protocol.USERS,
+        runner=lambda *_: found,
+    )
+    assert json.loads(json.dumps(report.to_json()))["protocol"] == "users"
+
+
+def test_old_names_of_priors_are_still_read(root: Path) -> None:
+    old, new = Settings(light_prior="usual", shape_prior="outline"), Settings()
+    assert (old.light_prior, old.shape_prior) == (LightPrior.DATASET, ShapePrior.SILHOUETTE)
+    assert Settings(light_prior="seen", shape_prior="seen") == new
+
+
 def test_what_was_seen_is_expected_where_that_is_asked_for(root: Path) -> None:
     def height(illumination: str, **priors: str) -> np.ndarray:
         options = RunnerOptions(threads=1, **priors)  # type: ignore[arg-type]
@@ -124,9 +161,9 @@ def test_what_was_seen_is_expected_where_that_is_asked_for(root: Path) -> None:
 
     by_itself = height("natural")
     for prior in ("light_prior", "shape_prior"):
-        assert not np.array_equal(height("natural", **{prior: "seen"}), by_itself)
+        assert not np.array_equal(height("natural", **{prior: "predicted"}), by_itself)
     np.testing.assert_array_equal(
-        height("laboratory", light_prior="seen"), height("laboratory")
+        height("laboratory", light_prior="predicted"), height("laboratory")
     )  # its light is known
     with pytest.raises(InputError, match="unknown shape prior"):
         RunnerOptions(shape_prior="round").check()
