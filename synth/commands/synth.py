@@ -13,7 +13,8 @@ from isc_core.progress import Monitor
 from ..albedos import ALBEDOS
 from ..capture.recipe import HEIGHT_FILE, IMAGE_FILE, MESH_FILE, PictureSettings, Sources
 from ..capture.sensor import DEPTHS, Sensor
-from ..dataset.generate import DatasetSettings, make_dataset
+from ..dataset.generate import make_dataset
+from ..dataset.settings import DatasetSettings
 from ..dataset.splits import SPLITS, Choices
 from ..light_rigs import FROM_FILES, RIGS
 from ..light_rigs.files import PANORAMAS

@@ -23,9 +23,10 @@ from synth.capture.recipe import PictureSettings, Recipe, photograph
 from synth.capture.sensor import Sensor
 from synth.dataset import generate as run_module
 from synth.dataset.description import CONVENTIONS
-from synth.dataset.generate import DatasetSettings, make_dataset, plan
+from synth.dataset.generate import make_dataset, plan
 from synth.dataset.reading import list_scenes, read_facts, read_truth
 from synth.dataset.scene_folder import FILES
+from synth.dataset.settings import DatasetSettings
 from synth.dataset.splits import SPLITS, Choices
 from synth.scene.materials import MODELS
 

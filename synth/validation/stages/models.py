@@ -104,6 +104,7 @@ def run_models(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> 
         )
     photo = _photo(inputs)
     split = separated(photo, options.separator, monitor) if inputs.split is None else inputs.split
+    # Estimated from the photo, also for the run on its diffuse layer.
     light_estimate, normal_estimate = (
         predict_light(photo.image, photo.mask),
         predict_normals(photo.image, photo.mask),
