@@ -1,5 +1,5 @@
-"""Simple decompositions that SIRFS is compared with: one method a file, and one function that knows
-their names.
+"""Simple decompositions to compare SIRFS with: one method a file, and `estimate`, which selects
+one by name.
 """
 
 import numpy as np
@@ -12,11 +12,24 @@ METHODS = ("naive", "retinex", "sfs-tsai-shah", "sfs-ikeuchi-horn")
 
 
 def estimate(method: str, log_image: np.ndarray, mask: np.ndarray) -> BaselineEstimate:
-    """Shape, shading and light by the named method's defaults.
+    """Estimate shape, shading and light by a method's defaults.
 
-    `log_image` (H, W, 3) natural logarithm of a linear diffuse image, finite in the `mask` (H, W)
-    bool. Raises `InputError` for a name that is not one of `METHODS`, and for arrays that do not
-    fit.
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+    log_image : (H, W, 3) ndarray
+        Natural logarithm of a linear diffuse image, finite in the mask.
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    BaselineEstimate
+
+    Raises
+    ------
+    InputError
+        For an unknown method, and for arrays that do not fit.
     """
     match method:
         case "naive":

@@ -13,9 +13,17 @@ MARGIN = 3
 
 @dataclass(frozen=True)
 class Box:
-    """Rows and columns [start, stop) of a mask's bounding box in a frame of `shape` (H, W), and how
-    many empty pixels are put around it: (above, below), (left, right). None where the frame cuts
-    the object, since there it has no contour.
+    """Bounding box of a mask, with a margin.
+
+    Attributes
+    ----------
+    shape : tuple of int
+        The frame's (H, W).
+    rows, columns : tuple of int
+        [start, stop) of the box.
+    around : tuple of tuple of int
+        Empty pixels around it: (above, below), (left, right); 0 where the frame cuts the object,
+        which has no contour there.
     """
 
     shape: tuple[int, int]
@@ -25,7 +33,21 @@ class Box:
 
     @classmethod
     def of(cls, mask: np.ndarray) -> "Box":
-        """The box of `mask` (H, W) bool. Raises `InputError` when the mask is empty."""
+        """Return the box of a mask.
+
+        Parameters
+        ----------
+        mask : (H, W) bool ndarray
+
+        Returns
+        -------
+        Box
+
+        Raises
+        ------
+        InputError
+            If the mask is empty.
+        """
         if not mask.any():
             raise InputError("the mask is empty: mark at least the object's pixels")
         spans, margins = [], []
@@ -37,12 +59,14 @@ class Box:
         return cls((mask.shape[0], mask.shape[1]), spans[0], spans[1], (margins[0], margins[1]))
 
     def crop(self, array: np.ndarray) -> np.ndarray:
-        """(H, W, ...) to the box with its margin, which is zero."""
+        """Crop an array (H, W, ...) to the box with its margin, which is zero."""
         inside = array[slice(*self.rows), slice(*self.columns)]
         return np.pad(inside, [*self.around, *[(0, 0)] * (array.ndim - 2)])
 
     def place(self, cropped: np.ndarray) -> np.ndarray:
-        """The box with its margin back in the frame, (H, W); its border values go on outward."""
+        """Put the box with its margin back into the frame, (H, W); its border values continue
+        outward.
+        """
         for axis, (start, stop) in enumerate((self.rows, self.columns)):
             first = start - self.around[axis][0]
             last = stop + self.around[axis][1]

@@ -1,4 +1,4 @@
-"""What every baseline hands on, and the way from a shading image to it."""
+"""The result of every baseline, and the way to it from a shading image."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,13 +15,19 @@ Solver = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class BaselineEstimate:
-    """A shape and a light, from which the pipeline makes normals, shading and reflectance so that
-    its identities hold.
+    """A shape and a light, from which the pipeline derives normals, shading and reflectance so
+    that its identities hold.
 
-    `height` (H, W) float64, pixels toward the viewer, mean 0 in the mask. It goes on beyond the
-    mask, so that normals at the rim mean something. `log_shading` (H, W, 3) float64, the method's
-    own shading, 0 outside the mask. `light` (9, 3) float64, reference convention, fitted to the log
-    shading with the normals of the height.
+    Attributes
+    ----------
+    height : (H, W) float64 ndarray
+        Pixels toward the viewer, mean 0 in the mask. It continues beyond the mask, so that normals
+        at the rim are meaningful.
+    log_shading : (H, W, 3) float64 ndarray
+        The method's own shading, 0 outside the mask.
+    light : (9, 3) float64 ndarray
+        Log-shading SH coefficients, reference convention, fitted to the log shading with the
+        normals of the height.
     """
 
     height: np.ndarray
@@ -30,8 +36,18 @@ class BaselineEstimate:
 
 
 def from_log_shading(log_shading: np.ndarray, mask: np.ndarray, solve: Solver) -> BaselineEstimate:
-    """Shape from a shading image by `solve(brightness, mask, light vector) -> height`, and the
-    light that goes with it.
+    """Estimate the shape from a shading image, and the light that fits it.
+
+    Parameters
+    ----------
+    log_shading : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    solve : Solver
+        ``solve(brightness, mask, light vector) -> height``.
+
+    Returns
+    -------
+    BaselineEstimate
     """
     brightness = np.where(mask, np.exp(log_shading.mean(axis=2)), 0)
     height = solve(brightness, mask, estimate_light(brightness, mask))
@@ -39,8 +55,22 @@ def from_log_shading(log_shading: np.ndarray, mask: np.ndarray, solve: Solver) -
 
 
 def grey_log_shading(log_image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The log shading (H, W, 3) of an evenly coloured object: the log of the channels' mean, with
-    median 0 in the mask.
+    """Return the log shading of an object of one albedo: the log of the channels' mean.
+
+    Parameters
+    ----------
+    log_image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Median 0 in the mask.
+
+    Raises
+    ------
+    InputError
+        As `check_log_image`.
     """
     check_log_image(log_image, mask)
     grey = np.zeros(mask.shape)
@@ -50,16 +80,29 @@ def grey_log_shading(log_image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def check_log_image(log_image: np.ndarray, mask: np.ndarray) -> None:
-    """Raises `InputError` unless `log_image` is (H, W, 3) and finite in a non-empty `mask` (H, W)
-    bool.
+    """Check the inputs of a baseline.
+
+    Parameters
+    ----------
+    log_image : (H, W, 3) ndarray
+        Finite in the mask.
+    mask : (H, W) bool ndarray
+        Not empty.
+
+    Raises
+    ------
+    InputError
+        If one of them does not fit.
     """
     if log_image.ndim != 3 or log_image.shape[2] != 3:
         raise InputError(
-            f"a baseline needs a colour image of shape (H, W, 3), not {log_image.shape}: convert it to RGB"
+            f"a baseline needs a colour image of shape (H, W, 3), not {log_image.shape}:"
+            " convert it to RGB"
         )
     if mask.shape != log_image.shape[:2] or mask.dtype != bool:
         raise InputError(
-            f"the mask must be boolean and {log_image.shape[:2]} like the image, not {mask.dtype} {mask.shape}"
+            f"the mask must be boolean and {log_image.shape[:2]} like the image,"
+            f" not {mask.dtype} {mask.shape}"
         )
     if not mask.any():
         raise InputError("the mask is empty: mark at least the object's pixels")

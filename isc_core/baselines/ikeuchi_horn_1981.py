@@ -5,14 +5,16 @@ Problem: find stereographic coordinates (u, v) = 2 (n_x, n_y) / (1 + n_z) of the
 minimise
   sum of (E - R(u, v))^2 + weight * (|grad u|^2 + |grad v|^2),   R = max(0, n . l),
 with n in the image plane, along the contour's normal, where the object turns away: there (u, v) has
-length 2, which slopes could not express. Setting the derivative to zero gives the iteration (u, v)
-<- mean of neighbours + (E - R) grad R / weight.
+length 2, which slopes could not express.
 
-Citations: K. Ikeuchi and B. K. P. Horn, "Numerical shape from shading and occluding boundaries",
-Artificial Intelligence 17(1-3), 141-184 (1981), doi:10.1016/0004-3702(81)90023-0. The normals are
-made a surface by least squares as in R. T. Frankot and R. Chellappa, IEEE TPAMI 10(4), 439-451
-(1988), doi:10.1109/34.3909, but in the mask. From coarse to fine, because the contour's news
-travels one pixel an iteration.
+Equation: setting the derivative to zero gives the iteration (u, v) <- mean of neighbours + (E - R)
+grad R / weight, from coarse to fine, because the contour's influence travels one pixel an
+iteration. The normals become a surface by least squares.
+
+Citation: K. Ikeuchi and B. K. P. Horn, "Numerical shape from shading and occluding boundaries",
+Artificial Intelligence 17(1-3), 141-184 (1981), doi:10.1016/0004-3702(81)90023-0. The integration
+is as in R. T. Frankot and R. Chellappa, IEEE TPAMI 10(4), 439-451 (1988), doi:10.1109/34.3909, but
+in the mask.
 
 Limits: one distant light, one albedo; every contour is taken for an occluding one, so flat sheets
 bulge; smoothness flattens detail.
@@ -34,9 +36,16 @@ _COARSEST = 24
 
 @dataclass(frozen=True)
 class IkeuchiHorn1981Options:
-    """`weight`: of the smoothness, > 0, for brightness scaled to a light of length 1. `iterations`:
-    on each grid. `steepest`: the least n_z, in (0, 1), that slopes are taken from; the contour
-    itself would be infinitely steep.
+    """How the normals are found.
+
+    Attributes
+    ----------
+    weight : float
+        Of the smoothness, > 0, for brightness scaled to a light of length 1.
+    iterations : int
+        On each grid.
+    steepest : float
+        Least n_z, in (0, 1), from which slopes are taken; at the contour they would be infinite.
     """
 
     weight: float = 1.0
@@ -47,10 +56,23 @@ class IkeuchiHorn1981Options:
 def estimate(
     log_image: np.ndarray, mask: np.ndarray, options: IkeuchiHorn1981Options | None = None
 ) -> BaselineEstimate:
-    """Shape and light of an evenly coloured object: all its brightness is shading.
+    """Estimate shape and light of an object of one albedo: all its brightness is shading.
 
-    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool.
-    Raises `InputError` for an empty mask.
+    Parameters
+    ----------
+    log_image : (H, W, 3) ndarray
+        Natural logarithm of a linear image, finite in the mask.
+    mask : (H, W) bool ndarray
+    options : IkeuchiHorn1981Options, optional
+
+    Returns
+    -------
+    BaselineEstimate
+
+    Raises
+    ------
+    InputError
+        If the mask is empty.
     """
     return from_log_shading(
         grey_log_shading(log_image, mask),
@@ -65,11 +87,26 @@ def height_from_brightness(
     light: np.ndarray,
     options: IkeuchiHorn1981Options | None = None,
 ) -> np.ndarray:
-    """Height (H, W), float64, pixels toward the viewer, mean 0 in the mask, continued beyond its
-    rim by two pixels.
+    """Compute the height from a grey shading image.
 
-    `brightness` (H, W), linear; `light` (3,) points to the light (x right, y up, z toward the
-    viewer), brightness being max(0, n . light). Raises `InputError` for an empty mask.
+    Parameters
+    ----------
+    brightness : (H, W) ndarray
+        Linear, max(0, n . light).
+    mask : (H, W) bool ndarray
+    light : (3,) ndarray
+        Toward the light, camera frame.
+    options : IkeuchiHorn1981Options, optional
+
+    Returns
+    -------
+    (H, W) float64 ndarray
+        Pixels toward the viewer, mean 0 in the mask, continued beyond its rim by two pixels.
+
+    Raises
+    ------
+    InputError
+        If the mask is empty.
     """
     options = options or IkeuchiHorn1981Options()
     box = Box.of(mask)
@@ -81,9 +118,22 @@ def height_from_brightness(
 
 
 def height_from_normals(normals: np.ndarray, mask: np.ndarray, steepest: float) -> np.ndarray:
-    """The height (H, W) whose slopes fit `normals` (H, W, 3) (x right, y up, z toward) best; two
-    pixels beyond the mask the rim's slopes go on, so that differences across the rim mean
-    something, and further out the height stays.
+    """Integrate normals in least squares.
+
+    Two pixels beyond the mask the rim's slopes continue, so that differences across the rim are
+    meaningful; further out the height is constant.
+
+    Parameters
+    ----------
+    normals : (H, W, 3) ndarray
+        Camera frame.
+    mask : (H, W) bool ndarray
+    steepest : float
+        See `IkeuchiHorn1981Options`.
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     wide = ndimage.binary_dilation(mask, np.ones((3, 3)), iterations=2)
     nearest = ndimage.distance_transform_edt(~mask, return_distances=False, return_indices=True)
@@ -101,7 +151,7 @@ def height_from_normals(normals: np.ndarray, mask: np.ndarray, steepest: float) 
 def _solve(
     shade: np.ndarray, mask: np.ndarray, light: np.ndarray, options: IkeuchiHorn1981Options
 ) -> np.ndarray:
-    """Coordinates (2, H, W), 0 outside the mask; starts from the same problem at half the size."""
+    """Coordinates (2, H, W), 0 outside the mask; started from the same problem at half the size."""
     if min(mask.shape) >= 2 * _COARSEST:
         smaller = _solve(_halved(shade, mask), _block_any(mask), light, options)
         start = (

@@ -1,18 +1,18 @@
-"""The direction of one distant light from an image of a convex, evenly coloured, matt object (Zheng
+"""The direction of one distant light from an image of a convex diffuse object of one albedo (Zheng
 & Chellappa 1991).
 
 Problem: E = max(0, n . l) with unknown n; find l, whose length is albedo times strength.
 
-Tilt: brightness grows toward the light, so the tilt is the direction of the mean unit gradient of
-E. Slant: the ratio of the mean brightness to its root mean square depends on the slant alone once
-the normals' distribution is known; here it is that of a sphere, attached shadow included. The
+Equation: brightness grows toward the light, so the tilt is the direction of the mean unit gradient
+of E. The ratio of the mean brightness to its root mean square depends on the slant alone once the
+distribution of the normals is known; here it is that of a sphere, attached shadow included. The
 length follows from the mean brightness.
 
 Citation: Q. Zheng and R. Chellappa, "Estimation of illuminant direction, albedo, and shape from
 shading", IEEE TPAMI 13(7), 680-702 (1991), doi:10.1109/34.85658.
 
-Limits: one light, one albedo, a rounded object: a shallow relief has no sphere's normals, and
-texture looks like slant.
+Limits: one light, one albedo, a rounded object: a shallow relief does not have the normals of a
+sphere, and texture looks like slant.
 """
 
 from functools import cache
@@ -24,12 +24,22 @@ _SLANTS = np.deg2rad(np.arange(0.0, 81.0))
 
 
 def estimate_light(brightness: np.ndarray, mask: np.ndarray, smoothing: float = 1.0) -> np.ndarray:
-    """Light vector (3,) in the frame x right, y up, z toward the viewer; its length is in units of
-    `brightness`.
+    """Estimate the light vector.
 
-    `brightness` (H, W) >= 0, linear; `mask` (H, W) bool, not empty; `smoothing` is the sigma in
-    pixels of the Gaussian before gradients are taken. A frontal light is the answer where gradients
-    tell nothing.
+    Parameters
+    ----------
+    brightness : (H, W) ndarray
+        Linear, >= 0.
+    mask : (H, W) bool ndarray
+        Not empty.
+    smoothing : float
+        Sigma in pixels of the Gaussian before gradients are taken.
+
+    Returns
+    -------
+    (3,) ndarray
+        Camera frame; its length is in units of `brightness`. A frontal light where there are no
+        gradients.
     """
     inside = brightness[mask].astype(float)
     mean, power = float(inside.mean()), float(np.mean(inside**2))

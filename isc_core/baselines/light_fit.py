@@ -1,11 +1,10 @@
-"""The light that a log shading and normals call for.
+"""The light that fits a log shading and normals.
 
-Problem: find L that minimises mean over the mask of |b(n) L - log shading|^2 + ridge * |L without
-its constant|^2, a channel at a time; b are the nine functions of the SIRFS reference (Barron &
-Malik 2015, doi:10.1109/TPAMI.2014.2377712).
+Equation: L minimises the mean over the mask of |b(n) L - log shading|^2 + ridge * |L without its
+constant|^2, a channel at a time; b are the nine functions of the SIRFS reference. The ridge spares
+the constant, so a flat shape, whose normals carry no direction, gets a uniform light.
 
-The ridge spares the constant, so a flat shape, whose normals tell nothing of direction, gets a
-light from everywhere.
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 import numpy as np
@@ -17,10 +16,27 @@ from ..shading.irradiance_basis import basis
 def fit_light(
     log_shading: np.ndarray, normals: np.ndarray, mask: np.ndarray, ridge: float = 1e-3
 ) -> np.ndarray:
-    """Light (9, C) float64, reference convention.
+    """Fit a light.
 
-    `log_shading` (H, W, C) natural logarithm; `normals` (H, W, 3) unit vectors (down, right, toward
-    the viewer); `mask` (H, W) bool; `ridge` > 0. Raises `InputError` for an empty mask.
+    Parameters
+    ----------
+    log_shading : (H, W, C) ndarray
+        Natural logarithm.
+    normals : (H, W, 3) ndarray
+        Unit vectors (down, right, toward the viewer).
+    mask : (H, W) bool ndarray
+    ridge : float
+        > 0.
+
+    Returns
+    -------
+    (9, C) float64 ndarray
+        Reference convention.
+
+    Raises
+    ------
+    InputError
+        If the mask is empty.
     """
     if not mask.any():
         raise InputError("the mask is empty: mark at least the object's pixels")

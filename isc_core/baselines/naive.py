@@ -1,4 +1,4 @@
-"""The row below which no method should fall: a flat shape under no light, so reflectance = image."""
+"""The lower bound for every method: a flat shape without light, so that reflectance = image."""
 
 import numpy as np
 
@@ -6,9 +6,21 @@ from .estimate import BaselineEstimate, check_log_image
 
 
 def estimate(log_image: np.ndarray, mask: np.ndarray) -> BaselineEstimate:
-    """`log_image` (H, W, 3), `mask` (H, W) bool.
+    """Return a flat shape.
 
-    Raises `InputError` for arrays that do not fit or an empty mask.
+    Parameters
+    ----------
+    log_image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    BaselineEstimate
+
+    Raises
+    ------
+    InputError
+        For arrays that do not fit or an empty mask.
     """
     check_log_image(log_image, mask)
     return BaselineEstimate(np.zeros(mask.shape), np.zeros(log_image.shape), np.zeros((9, 3)))

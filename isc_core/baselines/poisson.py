@@ -1,15 +1,16 @@
-"""Heights (or log images) from wanted differences between neighbouring pixels, inside a mask.
+"""Heights (or log images) from differences between neighbouring pixels, inside a mask.
 
 Problem: minimise the sum over pairs of 4-neighbours p, q in the mask of (z_q - z_p - d_pq)^2. The
-normal equations are a Poisson equation with natural borders: nothing outside the mask matters.
-(Least-squares integration of a field that need not be integrable goes back to B. K. P. Horn and M.
-J. Brooks, CVGIP 33(2), 174-208 (1986), doi:10.1016/0734-189X(86)90114-3.)
+normal equations are a Poisson equation with natural borders: nothing outside the mask matters. Each
+connected part of the mask has mean zero.
 
-Solved by conjugate gradients, preconditioned by one V-cycle of multigrid with bilinear
-interpolation and Galerkin coarse operators: about 15 iterations whatever the size. Each connected
-part of the mask comes out with mean zero. (M. R. Hestenes and E. Stiefel, J. Res. Natl. Bur. Stand.
-49(6), 409-436 (1952), doi:10.6028/jres.049.044.) All sums are taken here, in one order: a library's
-would round otherwise on one thread than on two.
+Equation: conjugate gradients, preconditioned by one V-cycle of multigrid with bilinear
+interpolation and Galerkin coarse operators: about 15 iterations whatever the size. All sums are
+taken here, in one order: a library's would round differently on one thread than on two.
+
+Citation: least-squares integration of a field that need not be integrable: B. K. P. Horn and M. J.
+Brooks, CVGIP 33(2), 174-208 (1986), doi:10.1016/0734-189X(86)90114-3; conjugate gradients: M. R.
+Hestenes and E. Stiefel, J. Res. Natl. Bur. Stand. 49(6), 409-436 (1952), doi:10.6028/jres.049.044.
 """
 
 from dataclasses import dataclass
@@ -22,8 +23,8 @@ from ..numerics.linear import solve_linear
 _COARSEST = 60
 _DAMPING = 0.7
 _MOST_STEPS = 200
-# of the coarsest diagonal: makes its inverse exist; the constants that it lifts are taken off in
-# the end
+# Share of the coarsest diagonal that makes its inverse exist; the constants that it adds are
+# removed in the end.
 _LIFT = 1e-9
 
 
@@ -56,12 +57,21 @@ class _Multigrid:
 def integrate(
     right: np.ndarray, down: np.ndarray, mask: np.ndarray, tolerance: float = 1e-6
 ) -> np.ndarray:
-    """Values (H, W) or (H, W, C), float64, 0 outside the mask, mean 0 over each 4-connected part of
-    it.
+    """Integrate differences in least squares.
 
-    `right[i, j]` is the wanted z[i, j+1] - z[i, j] and `down[i, j]` the wanted z[i+1, j] - z[i, j],
-    (H, W) or (H, W, C); pairs that leave the `mask` (H, W) bool are ignored. `tolerance` bounds the
-    relative residual of the normal equations.
+    Parameters
+    ----------
+    right, down : (H, W) or (H, W, C) ndarray
+        Target of z[i, j+1] - z[i, j] and of z[i+1, j] - z[i, j].
+    mask : (H, W) bool ndarray
+        Pairs that leave it are ignored.
+    tolerance : float
+        Relative residual of the normal equations.
+
+    Returns
+    -------
+    (H, W) or (H, W, C) float64 ndarray
+        0 outside the mask, mean 0 over each 4-connected part of it.
     """
     out = np.zeros(right.shape)
     if not mask.any():
@@ -103,9 +113,8 @@ def _dot(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def _differences(mask: np.ndarray) -> tuple[sparse.csr_array, np.ndarray, np.ndarray]:
-    """The matrix (pairs, pixels) of differences z_q - z_p, and which pairs it holds:
-
-    (H, W-1) and (H-1, W) bool.
+    """The matrix (pairs, pixels) of differences z_q - z_p, and which pairs it holds: (H, W-1) and
+    (H-1, W) bool.
     """
     index = np.full(mask.shape, -1)
     index[mask] = np.arange(mask.sum())
@@ -131,7 +140,8 @@ def _build(operator: sparse.csr_array, mask: np.ndarray) -> _Multigrid:
     coarsest = operator.toarray()
     largest = coarsest.diagonal().max(initial=0) or 1.0
     return _Multigrid(
-        levels, solve_linear(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest)))
+        levels,
+        solve_linear(coarsest + _LIFT * largest * np.eye(len(coarsest)), np.eye(len(coarsest))),
     )
 
 

@@ -1,17 +1,18 @@
 """Colour Retinex, then shape from its shading (Grosse et al. 2009).
 
-Problem: split log image = log shading + log reflectance. A difference between neighbours belongs to
-reflectance where it is large in brightness (its mean over the channels) or in chromaticity (what is
-left), else to shading; the shading image is the one whose differences fit those best in least
-squares. Its level in each channel, which differences do not tell, is set to median 0, so the
-overall colour stays in the reflectance.
+Problem: split log image = log shading + log reflectance.
+
+Equation: a difference between neighbours belongs to reflectance where it is large in brightness
+(its mean over the channels) or in chromaticity (the remainder), else to shading; the shading image
+is the one whose differences fit those best in least squares. Its level in each channel, which
+differences do not determine, is set to median 0, so the overall colour stays in the reflectance.
 
 Citation: R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman, "Ground truth dataset and baseline
 evaluations for intrinsic image algorithms", ICCV 2009, 2335-2342, doi:10.1109/ICCV.2009.5459428;
 after E. H. Land and J. J. McCann (1971), doi:10.1364/JOSA.61.000001. Shape by Ikeuchi & Horn 1981
 (`ikeuchi_horn_1981`).
 
-Limits: creases and shadow borders are taken for paint, soft paint for shading.
+Limits: creases and shadow borders count as reflectance, gradual changes of reflectance as shading.
 """
 
 from dataclasses import dataclass, field
@@ -26,9 +27,16 @@ from .poisson import integrate
 
 @dataclass(frozen=True)
 class RetinexOptions:
-    """`brightness_threshold`, `chromaticity_threshold`: differences of natural logarithms above
-    which a pair of neighbours is a reflectance edge, >= 0; the latter bounds the length of the
-    channels' differences less their mean. `shape`: of the shape step.
+    """Which differences are reflectance edges, and how the shape is found.
+
+    Attributes
+    ----------
+    brightness_threshold : float
+        Difference of natural logarithms above which a pair of neighbours is a reflectance edge, >=
+        0.
+    chromaticity_threshold : float
+        The same for the length of the channels' differences less their mean.
+    shape : IkeuchiHorn1981Options
     """
 
     brightness_threshold: float = 0.3
@@ -39,10 +47,23 @@ class RetinexOptions:
 def estimate(
     log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions | None = None
 ) -> BaselineEstimate:
-    """Shape and light from the shading of a painted object.
+    """Estimate shape and light from the shading of a textured object.
 
-    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool.
-    Raises `InputError` for an empty mask.
+    Parameters
+    ----------
+    log_image : (H, W, 3) ndarray
+        Natural logarithm of a linear image, finite in the mask.
+    mask : (H, W) bool ndarray
+    options : RetinexOptions, optional
+
+    Returns
+    -------
+    BaselineEstimate
+
+    Raises
+    ------
+    InputError
+        If the mask is empty.
     """
     options = options or RetinexOptions()
     shading = log_shading(log_image, mask, options)
@@ -54,8 +75,23 @@ def estimate(
 def log_shading(
     log_image: np.ndarray, mask: np.ndarray, options: RetinexOptions | None = None
 ) -> np.ndarray:
-    """Log shading (H, W, 3), float64, median 0 in the mask in every channel, 0 outside; log
-    reflectance is the rest of the image.
+    """Split the log image; log reflectance is the remainder.
+
+    Parameters
+    ----------
+    log_image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    options : RetinexOptions, optional
+
+    Returns
+    -------
+    (H, W, 3) float64 ndarray
+        Log shading, median 0 in the mask in every channel, 0 outside.
+
+    Raises
+    ------
+    InputError
+        For arrays that do not fit or an empty mask.
     """
     check_log_image(log_image, mask)
     options = options or RetinexOptions()
@@ -65,13 +101,13 @@ def log_shading(
     right, down = np.zeros_like(image), np.zeros_like(image)
     right[:, :-1], down[:-1] = np.diff(image, axis=1), np.diff(image, axis=0)
     for difference in (right, down):
-        difference[_is_paint(difference, options)] = 0
+        difference[_is_reflectance_edge(difference, options)] = 0
     shading = integrate(right, down, inside)
     shading[inside] -= np.median(shading[inside], axis=0)
     return np.where(mask[..., None], box.place(shading), 0)
 
 
-def _is_paint(difference: np.ndarray, options: RetinexOptions) -> np.ndarray:
+def _is_reflectance_edge(difference: np.ndarray, options: RetinexOptions) -> np.ndarray:
     brightness = difference.mean(axis=2)
     chromaticity = np.linalg.norm(difference - brightness[..., None], axis=2)
     return (np.abs(brightness) > options.brightness_threshold) | (

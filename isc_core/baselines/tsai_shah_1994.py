@@ -1,7 +1,8 @@
 """Shape from shading by a local linear approximation in the height itself (Tsai & Shah 1994).
 
 Problem: E = R(p, q) = max(0, n . l), with slopes p, q taken as differences of neighbouring heights.
-Then E - R is a function of each pixel's own height once its neighbours are held, and a damped
+
+Equation: E - R is a function of each pixel's own height once its neighbours are fixed, and a damped
 Newton step solves it, all pixels at once:
   z <- z + R' (E - R) / (W + R'^2),   R' = dR/dz,   starting at z = 0.
 
@@ -11,9 +12,9 @@ are taken toward the neighbours that lie away from the light, so that both slope
 sign; in a fixed direction R' vanishes for lights from one diagonal. And the damping stays, where
 the published gain shrinks with every step and ends before distant pixels have agreed.
 
-Limits: local, so noise goes straight into the height and convex is not told from concave, save by a
-start that lets bright be high; nearly blind under frontal light, where a flat surface has R' = 0
-(the light is then leaned by `least_lean`).
+Limits: local, so noise goes straight into the height, and convex and concave are distinguished by
+the start alone, where bright is high; insensitive under frontal light, where a flat surface has R'
+= 0 (the light is then tilted by `least_lean`).
 """
 
 from dataclasses import dataclass
@@ -27,10 +28,20 @@ from .estimate import BaselineEstimate, from_log_shading, grey_log_shading
 
 @dataclass(frozen=True)
 class TsaiShah1994Options:
-    """`steps`: Newton steps per pixel of the object's longer side, > 0, since news travels a pixel
-    a step. `damping`: W, > 0; larger is slower and bears more noise. `least_lean`: least sine of
-    the angle between light and line of sight, in (0, 1). `smoothing`: sigma of the Gaussian over
-    the final height, as a share of the square root of the object's area; 0 for none.
+    """How the height is found.
+
+    Attributes
+    ----------
+    steps : float
+        Newton steps per pixel of the object's longer side, > 0, since changes travel a pixel a
+        step.
+    damping : float
+        W, > 0; larger is slower and less sensitive to noise.
+    least_lean : float
+        Least sine of the angle between light and line of sight, in (0, 1).
+    smoothing : float
+        Sigma of the Gaussian over the final height, as a share of the square root of the object's
+        area; 0 for none.
     """
 
     steps: float = 1.6
@@ -42,10 +53,23 @@ class TsaiShah1994Options:
 def estimate(
     log_image: np.ndarray, mask: np.ndarray, options: TsaiShah1994Options | None = None
 ) -> BaselineEstimate:
-    """Shape and light of an evenly coloured object: all its brightness is shading.
+    """Estimate shape and light of an object of one albedo: all its brightness is shading.
 
-    `log_image` (H, W, 3) natural logarithm of a linear image, finite in the `mask` (H, W) bool.
-    Raises `InputError` for an empty mask.
+    Parameters
+    ----------
+    log_image : (H, W, 3) ndarray
+        Natural logarithm of a linear image, finite in the mask.
+    mask : (H, W) bool ndarray
+    options : TsaiShah1994Options, optional
+
+    Returns
+    -------
+    BaselineEstimate
+
+    Raises
+    ------
+    InputError
+        If the mask is empty.
     """
     return from_log_shading(
         grey_log_shading(log_image, mask),
@@ -60,11 +84,26 @@ def height_from_brightness(
     light: np.ndarray,
     options: TsaiShah1994Options | None = None,
 ) -> np.ndarray:
-    """Height (H, W), float64, pixels toward the viewer, mean 0 in the mask; beyond it the nearest
-    rim height.
+    """Compute the height from a grey shading image.
 
-    `brightness` (H, W), linear; `light` (3,) points to the light (x right, y up, z toward the
-    viewer), brightness being max(0, n . light). Raises `InputError` for an empty mask.
+    Parameters
+    ----------
+    brightness : (H, W) ndarray
+        Linear, max(0, n . light).
+    mask : (H, W) bool ndarray
+    light : (3,) ndarray
+        Toward the light, camera frame.
+    options : TsaiShah1994Options, optional
+
+    Returns
+    -------
+    (H, W) float64 ndarray
+        Pixels toward the viewer, mean 0 in the mask; beyond it the nearest rim height.
+
+    Raises
+    ------
+    InputError
+        If the mask is empty.
     """
     options = options or TsaiShah1994Options()
     box = Box.of(mask)
@@ -74,9 +113,9 @@ def height_from_brightness(
     # Turned so that the light comes from the lower left; `_newton` then looks left and down alike.
     flips = tuple(axis for axis, turned in ((0, y > 0), (1, x > 0)) if turned)
     shade = np.clip(np.flip(shade, flips) / strength, 0, 1)
-    solved = np.flip(_newton(shade, np.flip(inside, flips), (-abs(x), -abs(y), z), options), flips)
+    height = np.flip(_newton(shade, np.flip(inside, flips), (-abs(x), -abs(y), z), options), flips)
     sigma = options.smoothing * float(np.sqrt(inside.sum()))
-    smooth = _smooth_inside(solved, inside, sigma) if sigma > 0 else solved
+    smooth = _smooth_inside(height, inside, sigma) if sigma > 0 else height
     nearest = ndimage.distance_transform_edt(~inside, return_distances=False, return_indices=True)
     return box.place((smooth - smooth[inside].mean())[tuple(nearest)])
 
@@ -95,8 +134,8 @@ def _newton(
     light: tuple[float, float, float],
     options: TsaiShah1994Options,
 ) -> np.ndarray:
-    """Heights for a light with x, y <= 0, from differences to the left and lower neighbours that
-    are in the mask.
+    """Heights for a light with x, y <= 0, from differences to the left and lower neighbours in the
+    mask.
     """
     x, y, z = light
     left, below = np.zeros_like(mask), np.zeros_like(mask)

@@ -1,14 +1,15 @@
 """Which reflectances are likely at all: a smooth density over whitened log colour, fitted to a
 histogram.
 
-Minimises over tables f   sum p f + log sum exp(-f) + (c / nodes) sum sqrt(|second derivatives of
-f|^2 + 1e-5), the negative log likelihood of the histogram p and a robust thin-plate energy. J. T.
-Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
-doi:10.1109/TPAMI.2014.2377712. The problem is convex; f is written as the sum of the levels of a
-pyramid whose finest level is 0 (see `absolute_table`), which lets L-BFGS (D. C. Liu, J. Nocedal
-1989, doi:10.1007/BF01589116) move large and small features alike.
+Equation: minimise over tables f   sum p f + log sum exp(-f) + (c / nodes) sum sqrt(|second
+derivatives of f|^2 + 1e-5), the negative log likelihood of the histogram p and a robust thin-plate
+energy. The problem is convex; f is written as the sum of the levels of a pyramid whose finest level
+is 0 (see `absolute_table`), so that L-BFGS moves large and small features alike.
 
-Limits: where the data say nothing the table rises along straight lines to the border of its range.
+Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
+doi:10.1109/TPAMI.2014.2377712; D. C. Liu, J. Nocedal 1989, doi:10.1007/BF01589116 (L-BFGS).
+
+Limits: where there are no data, the table rises along straight lines to the border of its range.
 """
 
 from collections.abc import Callable
@@ -33,10 +34,20 @@ def _ignore(loss: float) -> None:
 class TableFitOptions:
     """How a table is fitted.
 
-    `smoothness`: the constant c. `levels`: levels of the pyramid, the frozen finest one included.
-    `memory`: pairs that L-BFGS keeps. `tolerance`: stop when the last five losses lie within this
-    share of the present one. `runs`: restarts from the result, with an empty memory. `max_steps`:
-    of each run.
+    Attributes
+    ----------
+    smoothness : float
+        The constant c.
+    levels : int
+        Levels of the pyramid, the fixed finest one included.
+    memory : int
+        Pairs that L-BFGS keeps.
+    tolerance : float
+        Stop when the last five losses lie within this relative distance of the current one.
+    runs : int
+        Restarts from the result, with an empty memory.
+    max_steps : int
+        Steps of each run.
     """
 
     smoothness: float = 512.0
@@ -50,9 +61,20 @@ class TableFitOptions:
 def fit_absolute_table(
     histogram: np.ndarray, options: TableFitOptions, on_step: Callable[[float], None] = _ignore
 ) -> CoarseTable:
-    """The table for `histogram` p ((n,) * d, sum 1), in half precision if d > 1.
+    """Fit a table to a histogram.
 
-    `on_step` receives the loss after every step and may raise to stop.
+    Parameters
+    ----------
+    histogram : (n, ...) ndarray
+        p, with one or three equal axes, sum 1.
+    options : TableFitOptions
+    on_step : callable, optional
+        Receives the loss after every step, and may raise to stop.
+
+    Returns
+    -------
+    CoarseTable
+        In half precision if there are three axes.
     """
     problem = _Problem(histogram, options)
     unknowns = np.zeros(problem.size, np.float32)
@@ -90,7 +112,7 @@ class _Problem:
         self.size = int(self.ends[-1])
 
     def coarse(self, unknowns: np.ndarray) -> np.ndarray:
-        """The second finest level with everything below it added, whose upsampling is the table."""
+        """The second finest level with all coarser ones added, whose upsampling is the table."""
         parts = np.split(unknowns, self.ends[:-1])
         levels = [part.reshape(shape) for part, shape in zip(parts, self.shapes, strict=True)]
         total = levels[-1]
@@ -99,10 +121,7 @@ class _Problem:
         return total
 
     def loss(self, unknowns: np.ndarray, gradient: np.ndarray) -> float:
-        """The loss at `unknowns`; writes its gradient.
-
-        Fields are float32, sums over them float64.
-        """
+        """Return the loss, and write its gradient; fields are float32, sums over them float64."""
         f = synthesise(self.matrices[0], self.coarse(unknowns))
         value, slope = _negative_log_likelihood(f, self.histogram)
         bending, bending_slope = roughness(f)

@@ -1,8 +1,7 @@
-"""How likely the fitted reflectance statistics find objects that they have not seen: what
-smoothness is chosen by.
+"""The likelihood of objects under reflectance statistics fitted to the others; the criterion that
+selects the table's smoothness.
 
-Leave-one-object-out cross-validation (M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x) of the
-table of absolute colour.
+Citation: M. Stone 1974, doi:10.1111/j.2517-6161.1974.tb00994.x (leave-one-out cross-validation).
 """
 
 from collections.abc import Mapping
@@ -22,11 +21,23 @@ def held_out_log_likelihood(
     channels: int = 3,
     monitor: Monitor | None = None,
 ) -> np.ndarray:
-    """Mean log likelihood of each object's pixels under the table fitted to all the others,
-    (objects,), in order of name.
+    """Score each object under the table fitted to all the others.
 
     Nodes of the grid are the outcomes: figures are comparable between `options`, not between
     numbers of `channels`.
+
+    Parameters
+    ----------
+    statistics : mapping of str to ObjectStatistics
+    options : TableFitOptions
+    channels : int
+        3 or 1.
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    (objects,) ndarray
+        Mean log likelihood of each object's pixels, in order of name.
     """
     monitor = monitor or Monitor()
     names = sorted(statistics)
@@ -36,11 +47,10 @@ def held_out_log_likelihood(
         rest = [statistics[other] for other in names if other != name]
         if channels == 3:
             whiten = fit_whitening(rest)
-            seen, unseen = (
-                color_histogram(rest, whiten),
-                color_histogram([statistics[name]], whiten),
-            )
+            fitted = color_histogram(rest, whiten)
+            held_out = color_histogram([statistics[name]], whiten)
         else:
-            seen, unseen = grey_histogram(rest), grey_histogram([statistics[name]])
-        likelihoods.append(log_likelihood(fit_absolute_table(seen, options).table().values, unseen))
+            fitted, held_out = grey_histogram(rest), grey_histogram([statistics[name]])
+        table = fit_absolute_table(fitted, options).table().values
+        likelihoods.append(log_likelihood(table, held_out))
     return np.array(likelihoods)

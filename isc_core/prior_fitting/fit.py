@@ -1,9 +1,10 @@
 """Fits every prior of SIRFS to a selection of training objects.
 
-The recipe is that of J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from
-shading", doi:10.1109/TPAMI.2014.2377712; each statistic has its own module beside this one. Objects
-count alike in the statistics of absolute colour, pixels (pairs of pixels) alike in those of
-smoothness. No random numbers.
+Each statistic has its own module beside this one. Objects count alike in the statistics of absolute
+colour, pixels (pairs of pixels) alike in those of smoothness. No random numbers.
+
+Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
+doi:10.1109/TPAMI.2014.2377712.
 """
 
 import itertools
@@ -29,14 +30,23 @@ from .whitening import parsimony_whitening
 class LightFitOptions:
     """How the light priors are fitted.
 
-    `natural_contrast`: the factors on the environments' coefficients; None fits them to the
-    training objects' natural lights. Likelihood asks for 2.6 in brightness (1.9 if colour shares
-    the factor); held-out accuracy is best nearer 1.6 in brightness and 0.7 in colour, the default.
-    `split_contrast`: with a factor each for brightness and colour. `mirror`: lights also count with
-    left and right exchanged. `permute_natural`, `permute_laboratory`: with every order of the
-    channels. `laboratory_ridge`: see `fit_light`; ten lights leave many directions unseen, so that
-    a held-out one is much likelier with some. `floor`: added where the solver whitens, see
-    `GaussianLight`.
+    Attributes
+    ----------
+    natural_contrast : Contrast or None
+        Factors on the environments' coefficients; None fits them to the training objects' natural
+        lights. Likelihood alone gives 2.6 in brightness (1.9 if colour shares the factor); held-out
+        accuracy is best nearer 1.6 in brightness and 0.7 in colour, the default.
+    split_contrast : bool
+        Whether brightness and colour have a factor each.
+    mirror : bool
+        Whether lights also count with left and right exchanged.
+    permute_natural, permute_laboratory : bool
+        Whether lights count with every order of the channels.
+    laboratory_ridge : tuple of float
+        See `fit_light`; ten lights leave many directions unobserved, so a held-out light is much
+        likelier with some.
+    floor : float
+        Added where the solver whitens, see `GaussianLight`.
     """
 
     natural_contrast: Contrast | None = field(default_factory=lambda: Contrast(1.6, 0.7))
@@ -50,12 +60,20 @@ class LightFitOptions:
 
 @dataclass(frozen=True)
 class FitOptions:
-    """How the priors are fitted. `components`: of the mixtures of one number. `iterations`: of
-    expectation maximisation, for all.
+    """How the priors are fitted.
 
-    `whiten_floor`: see `whitening`. `light`: the lights. `absolute`, `grey_absolute`: the tables of
-    absolute reflectance; the grey one's smoothness is where held-out objects are likeliest, and
-    being of 256 numbers it can be fitted closely.
+    Attributes
+    ----------
+    components : int
+        Components of the mixtures of one number.
+    iterations : int
+        Steps of expectation maximisation, for all mixtures.
+    whiten_floor : float
+        See `whitening`.
+    absolute, grey_absolute : TableFitOptions
+        The tables of absolute reflectance. The grey one's smoothness is where held-out objects are
+        likeliest; with 256 numbers it can be fitted closely.
+    light : LightFitOptions
     """
 
     components: int = 40
@@ -68,7 +86,7 @@ class FitOptions:
     light: LightFitOptions = field(default_factory=LightFitOptions)
 
     def with_fitted_contrast(self) -> "FitOptions":
-        """The same with the contrast of the natural lights fitted to the objects' own lights."""
+        """Return options that fit the contrast of the natural lights to the objects' own lights."""
         return replace(self, light=replace(self.light, natural_contrast=None))
 
 
@@ -86,11 +104,27 @@ def fit_priors(
     options: FitOptions | None = None,
     monitor: Monitor | None = None,
 ) -> PriorSet:
-    """The priors of the objects in `statistics` (name to `collect_statistics`' result), to which
-    order does not matter.
+    """Fit the priors of a selection of objects.
 
-    `natural_lights`: (9, 3, n), lights of environments in the reference's convention. Raises
-    `InputError` where there are fewer than two objects, and `Cancelled` through `monitor`.
+    Parameters
+    ----------
+    statistics : mapping of str to ObjectStatistics
+        See `collect_statistics`; the order does not matter.
+    natural_lights : (9, 3, n) ndarray
+        Lights of environments, reference convention.
+    options : FitOptions, optional
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    PriorSet
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two objects.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or FitOptions(), monitor or Monitor()
     if len(statistics) < 2:
@@ -139,9 +173,7 @@ def fit_priors(
 
 
 def _steps(stage: str, monitor: Monitor) -> Callable[[float], None]:
-    """Reports the steps of a table's fit; how many there will be is not known, so the fraction
-    closes in on 1.
-    """
+    """Report the steps of a table's fit; their number is unknown, so the fraction approaches 1."""
     count = itertools.count(1)
 
     def on_step(loss: float) -> None:
@@ -151,21 +183,31 @@ def _steps(stage: str, monitor: Monitor) -> Callable[[float], None]:
 
 
 def fit_whitening(objects: Sequence[ObjectStatistics], floor: float = 0.01) -> np.ndarray:
-    """The (3, 3) whitening of log reflectance, every object counting alike."""
+    """Return the (3, 3) whitening of log reflectance; every object counts alike."""
     return parsimony_whitening(np.mean([o.second_moment() for o in objects], axis=0), floor)
 
 
 def color_histogram(
     objects: Sequence[ObjectStatistics], whiten: np.ndarray, nodes: int = COLOR_NODES
 ) -> np.ndarray:
-    """The histogram (nodes, nodes, nodes) of whitened log reflectance, sum 1, every object counting
-    alike.
+    """Return the histogram of whitened log reflectance; every object counts alike.
+
+    Parameters
+    ----------
+    objects : sequence of ObjectStatistics
+    whiten : (3, 3) ndarray
+    nodes : int
+
+    Returns
+    -------
+    (nodes, nodes, nodes) ndarray
+        Sum 1.
     """
     return _histogram([o.log_reflectance @ whiten.T for o in objects], nodes)
 
 
 def grey_histogram(objects: Sequence[ObjectStatistics], nodes: int = GREY_NODES) -> np.ndarray:
-    """The histogram (nodes,) of grey log reflectance, sum 1, every object counting alike."""
+    """Return the histogram (nodes,) of grey log reflectance, sum 1; every object counts alike."""
     return _histogram([o.grey_log_reflectance for o in objects], nodes)
 
 
@@ -177,7 +219,20 @@ def _histogram(points: Sequence[np.ndarray], nodes: int) -> np.ndarray:
 def fit_lights(
     objects: Sequence[ObjectStatistics], natural_lights: np.ndarray, options: LightFitOptions
 ) -> tuple[LightPriors, Contrast]:
-    """The light priors and the factors on the contrast of `natural_lights` (9, 3, n)."""
+    """Fit the light priors.
+
+    Parameters
+    ----------
+    objects : sequence of ObjectStatistics
+    natural_lights : (9, 3, n) ndarray
+    options : LightFitOptions
+
+    Returns
+    -------
+    lights : LightPriors
+    contrast : Contrast
+        Factors on the contrast of `natural_lights`.
+    """
     environments = fit_light(
         _augmented(natural_lights.transpose(2, 0, 1), options.mirror, options.permute_natural),
         floor=options.floor,

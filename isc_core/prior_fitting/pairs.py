@@ -1,8 +1,10 @@
 """Differences over the pairs of neighbouring pixels on which SIRFS measures smoothness.
 
 The pairs are those of the objective (`problem.PAIR_OFFSETS`): two pixels in one 5x5 window, each
-unordered pair once. J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from
-shading", doi:10.1109/TPAMI.2014.2377712.
+unordered pair once.
+
+Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
+doi:10.1109/TPAMI.2014.2377712.
 """
 
 import numpy as np
@@ -12,11 +14,18 @@ from ..sirfs.surface import pair_slices
 
 
 def pair_differences(values: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """Differences of `values` (H, W) or (H, W, C) over all pairs whose two pixels are in `valid`
-    (H, W) bool.
+    """Return the differences over all pairs of valid pixels.
 
-    Returns (pairs,) or (pairs, C), grouped by offset; what `values` holds outside `valid` is never
-    used.
+    Parameters
+    ----------
+    values : (H, W) or (H, W, C) ndarray
+        Never read outside `valid`.
+    valid : (H, W) bool ndarray
+
+    Returns
+    -------
+    (pairs,) or (pairs, C) ndarray
+        Grouped by offset.
     """
     differences = []
     for offset in PAIR_OFFSETS:

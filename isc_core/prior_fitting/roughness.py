@@ -1,13 +1,14 @@
-"""How much a table bends: the sum over interior nodes of sqrt(|second derivatives|^2 + e), a robust
+"""The bending of a table: the sum over interior nodes of sqrt(|second derivatives|^2 + e), a robust
 thin-plate energy.
 
-|.|^2 = sum_a f_aa^2 + 2 sum_{a<b} f_ab^2, f_aa by (1, -2, 1), f_ab by (1, 0, -1)/2 on both axes,
-each smoothed by (1, 2, 1)/4 on the other axes. Thin plates: J. Duchon (1977),
-doi:10.1007/BFb0086566; as a prior on absolute colour: J. T. Barron, J. Malik (2015),
-doi:10.1109/TPAMI.2014.2377712.
+Equation: |.|^2 = sum_a f_aa^2 + 2 sum_{a<b} f_ab^2, f_aa by (1, -2, 1), f_ab by (1, 0, -1)/2 on
+both axes, each smoothed by (1, 2, 1)/4 on the other axes.
 
-Two engines hold the same formula: plain NumPy for any number of axes, and compiled rows for the
-three of colour.
+Citation: thin plates: J. Duchon (1977), doi:10.1007/BFb0086566; as a prior on absolute colour: J.
+T. Barron, J. Malik (2015), doi:10.1109/TPAMI.2014.2377712.
+
+Two engines compute the same formula: plain NumPy for any number of axes, and compiled rows, about
+ten times faster, for the three of colour.
 """
 
 import itertools
@@ -23,9 +24,20 @@ _SECOND = (1.0, -2.0, 1.0)
 
 
 def roughness(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.ndarray]:
-    """The energy and its gradient (shape and type of `f`);
+    """Compute the energy and its gradient.
 
-    `f` has at least 3 nodes on each of its axes.
+    Parameters
+    ----------
+    f : ndarray
+        With at least 3 nodes on each axis.
+    softening : float
+        e.
+
+    Returns
+    -------
+    energy : float
+    gradient : ndarray
+        Of the shape and type of `f`.
     """
     if numba_available() and f.ndim == 3 and f.dtype == np.float32:
         gradient = np.zeros_like(f)
@@ -34,7 +46,18 @@ def roughness(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.ndarray
 
 
 def roughness_numpy(f: np.ndarray, softening: float = 1e-5) -> tuple[float, np.ndarray]:
-    """The same as `roughness`, always in NumPy."""
+    """Compute the same as `roughness`, always in NumPy.
+
+    Parameters
+    ----------
+    f : ndarray
+    softening : float
+
+    Returns
+    -------
+    energy : float
+    gradient : ndarray
+    """
     terms = []
     for a, b in itertools.combinations_with_replacement(range(f.ndim), 2):
         along = _SECOND if a == b else _FIRST
@@ -55,7 +78,7 @@ def _correlate(f: np.ndarray, taps: Taps) -> np.ndarray:
 
 
 def _spread(g: np.ndarray, taps: Taps) -> np.ndarray:
-    """The transpose of `_correlate`."""
+    """Transpose of `_correlate`."""
     for axis, t in enumerate(taps):
         g = np.moveaxis(g, axis, 0)
         out = np.zeros((g.shape[0] + 2, *g.shape[1:]), g.dtype)
@@ -67,8 +90,8 @@ def _spread(g: np.ndarray, taps: Taps) -> np.ndarray:
 
 @jit
 def _rows(f, softening, gradient):  # type: ignore[no-untyped-def]
-    """One row along the last axis at a time: the six products of filters on the first two axes,
-    then the filters on the last.
+    """Process one row along the last axis at a time: the six products of filters on the first two
+    axes, then the filters on the last.
     """
     n0, n1, n2 = f.shape
     q, h = np.float32(0.25), np.float32(0.5)
@@ -129,7 +152,7 @@ def _rows(f, softening, gradient):  # type: ignore[no-untyped-def]
 
 @jit(inline=True)
 def _add_transposed(t, b, gradient, i, j):  # type: ignore[no-untyped-def]
-    """Adds the transpose of a row's filters; `t` (6, n) is 0 at both ends, `b` is scratch."""
+    """Add the transpose of a row's filters; `t` (6, n) is 0 at both ends, `b` is scratch."""
     n2 = t.shape[1]
     q, h, two = np.float32(0.25), np.float32(0.5), np.float32(2)
     eighth, sixteenth = np.float32(0.125), np.float32(0.0625)

@@ -1,9 +1,9 @@
 """How surfaces lean behind their silhouettes, measured on objects of known shape: the profile of
 the `silhouette` term.
 
-For every pixel with a known normal, u is its relative depth behind the silhouette and x, y are the
-normal's components in the image plane along and across the outward direction. In each of `BINS`
-bins of u: mean = E[x], spread^2 = (Var[x] + E[y^2]) / 2. Objects count alike.
+Equation: for every pixel with a known normal, u is its relative depth behind the silhouette and x,
+y are the normal's components in the image plane along and across the outward direction. In each of
+`BINS` bins of u: mean = E[x], spread^2 = (Var[x] + E[y^2]) / 2. Objects count alike.
 """
 
 from collections.abc import Sequence
@@ -20,16 +20,30 @@ BINS = 16
 
 @dataclass(frozen=True)
 class SilhouetteMoments:
-    """One object's shares: of its pixels in each bin, and of the sums of x, x^2 and y^2 there;
+    """Moments of one object.
 
-    (4, BINS).
+    Attributes
+    ----------
+    sums : (4, BINS) ndarray
+        Share of the object's pixels in each bin, and of the sums of x, x^2 and y^2 there.
     """
 
     sums: np.ndarray
 
     @classmethod
     def of(cls, height: np.ndarray, mask: np.ndarray) -> "SilhouetteMoments":
-        """Of a height map (H, W), NaN where unknown, in `mask` (H, W) bool."""
+        """Measure the moments of an object.
+
+        Parameters
+        ----------
+        height : (H, W) ndarray
+            Pixels toward the viewer, NaN where unknown.
+        mask : (H, W) bool ndarray
+
+        Returns
+        -------
+        SilhouetteMoments
+        """
         u, down, right = silhouette_coordinates(mask)
         normal = normals(height)
         known = mask & np.isfinite(normal).all(axis=-1)
@@ -43,14 +57,24 @@ class SilhouetteMoments:
 
 
 def fit_silhouette(objects: Sequence[SilhouetteMoments]) -> SilhouetteProfile:
-    """The profile of all `objects`; a bin that no object reaches takes its neighbours' values."""
+    """Fit the profile of all objects; an empty bin takes its neighbours' values.
+
+    Parameters
+    ----------
+    objects : sequence of SilhouetteMoments
+
+    Returns
+    -------
+    SilhouetteProfile
+    """
     count, along, along2, across2 = np.sum([o.sums for o in objects], axis=0)
-    seen = count > 0
-    n = np.where(seen, count, 1)
+    occupied = count > 0
+    n = np.where(occupied, count, 1)
     mean = along / n
     variance = (along2 / n - mean**2 + across2 / n) / 2
     bins = np.arange(BINS)
     filled = (
-        np.interp(bins, bins[seen], v[seen]) for v in (mean, np.sqrt(np.maximum(variance, 1e-4)))
+        np.interp(bins, bins[occupied], v[occupied])
+        for v in (mean, np.sqrt(np.maximum(variance, 1e-4)))
     )
     return SilhouetteProfile(*filled)

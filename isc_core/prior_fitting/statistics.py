@@ -20,9 +20,19 @@ from .silhouette import SilhouetteMoments
 class TrainingObject:
     """An object whose intrinsic characteristics are known.
 
-    `reflectance`: (H, W, 3) linear. `valid`: (H, W) bool, where the reflectance can be trusted.
-    `height`: (H, W) pixels, toward the viewer, NaN where unknown. `mask`: (H, W) bool, the object.
-    `natural_light`, `laboratory_light`: (9, 3), in the reference's convention (`sirfs.priors.priors`).
+    Attributes
+    ----------
+    name : str
+    reflectance : (H, W, 3) ndarray
+        Linear.
+    valid : (H, W) bool ndarray
+        Where the reflectance is reliable.
+    height : (H, W) ndarray
+        Pixels toward the viewer, NaN where unknown.
+    natural_light, laboratory_light : (9, 3) ndarray
+        Log-shading SH coefficients, reference convention (`sirfs.priors.priors`).
+    mask : (H, W) bool ndarray
+        The object.
     """
 
     name: str
@@ -38,9 +48,16 @@ class TrainingObject:
 class ObjectStatistics:
     """One object's share in every prior.
 
-    `curvature`, `grey_smoothness`, `color_smoothness`: differences over neighbouring pixels.
-    `log_reflectance` (n, 3) float32 and `grey_log_reflectance` (n, 1): all valid pixels; grey is
-    the mean of the channels. `outline`: leaning behind the silhouette. The lights are (9, 3).
+    Attributes
+    ----------
+    curvature, grey_smoothness : Magnitudes
+    color_smoothness : ColorCells
+        Differences over neighbouring pixels.
+    log_reflectance : (n, 3) float32 ndarray
+    grey_log_reflectance : (n, 1) float32 ndarray
+        All valid pixels; grey is the mean of the channels.
+    outline : SilhouetteMoments
+    natural_light, laboratory_light : (9, 3) ndarray
     """
 
     curvature: Magnitudes
@@ -53,15 +70,26 @@ class ObjectStatistics:
     laboratory_light: np.ndarray
 
     def second_moment(self) -> np.ndarray:
-        """Mean of a a^T over the log reflectances a, (3, 3)."""
+        """Return the mean of a a^T over the log reflectances a, (3, 3)."""
         a = self.log_reflectance.astype(float)
         return a.T @ a / len(a)
 
 
 def object_statistics(training: TrainingObject) -> ObjectStatistics:
-    """Condenses one object.
+    """Condense one object; pixels with a channel at or below 0 are left out.
 
-    Pixels with a channel at or below 0 are left out. Raises `InputError` where nothing is left.
+    Parameters
+    ----------
+    training : TrainingObject
+
+    Returns
+    -------
+    ObjectStatistics
+
+    Raises
+    ------
+    InputError
+        If there are no neighbouring valid pixels.
     """
     valid = training.valid & (training.reflectance > 0).all(axis=-1)
     positive = np.where(valid[..., None], training.reflectance, 1.0)
@@ -88,7 +116,18 @@ def object_statistics(training: TrainingObject) -> ObjectStatistics:
 def collect_statistics(
     objects: Mapping[str, TrainingObject], monitor: Monitor | None = None
 ) -> dict[str, ObjectStatistics]:
-    """`object_statistics` of each object, under its name."""
+    """Condense each object.
+
+    Parameters
+    ----------
+    objects : mapping of str to TrainingObject
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    dict of str to ObjectStatistics
+        Under the same names.
+    """
     monitor = monitor or Monitor()
     collected = {}
     for count, (name, training) in enumerate(objects.items()):

@@ -15,9 +15,24 @@ from .statistics import TrainingObject
 def read_training_objects(
     root: Path, names: Sequence[str] | None = None, monitor: Monitor | None = None
 ) -> dict[str, TrainingObject]:
-    """Training objects by name, all of `root` or those in `names`.
+    """Read training objects.
 
-    Raises `InputError` like `datasets.mit_berkeley.load_object`.
+    Parameters
+    ----------
+    root : Path
+        Folder of the data set.
+    names : sequence of str, optional
+        By default, all objects of `root`.
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    dict of str to TrainingObject
+
+    Raises
+    ------
+    InputError
+        As `datasets.mit_berkeley.load_object`.
     """
     monitor = monitor or Monitor()
     chosen = list(names) if names is not None else list(list_objects(root, "laboratory"))

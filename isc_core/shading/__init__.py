@@ -1,1 +1,11 @@
-"""Shading: spherical harmonics, environment maps, surface derivatives and lights."""
+"""Shading: how light and surface make radiance.
+
+`spherical_harmonics` and `irradiance_basis` describe a smooth light, `environment_map` one as an
+image, `lights` and `radiance` distant lights; `brdf` holds the reflectance models, `lobe_rendering`
+the specular lobes; `surface_stencils` and `occluding_contour` derive normals from heights and
+masks.
+
+Frames: the camera frame is x right, y up, z toward the viewer; the reference's frame (SIRFS) is
+down, right, toward the viewer. Shading is that of a Lambertian surface of albedo 1; radiance =
+albedo * shading.
+"""

@@ -1,20 +1,21 @@
-"""Environments: the light that arrives from every direction, as a latitude-longitude picture, and
-what it does to matt surfaces.
+"""Environment maps: the light from every direction as a latitude-longitude image, and the shading
+of Lambertian surfaces in it.
 
-A picture (rows, 2 rows, 3) holds linear radiance. Row 0 is straight up (+y). Its first column looks
+An image (rows, 2 rows, 3) holds linear radiance. Row 0 is straight up (+y). Its first column looks
 away from the viewer (-z), a quarter along is right (+x), the middle is toward the viewer (+z),
 three quarters along is left: pixel centres at the polar angle t = (row + .5) pi / rows from +y and
-the turn a = (column + .5) pi / rows look toward (sin t sin a, cos t, -sin t cos a). Mitsuba reads
-this layout as it is; Blender's is the same, rolled by a quarter.
+the azimuth a = (column + .5) pi / rows look toward (sin t sin a, cos t, -sin t cos a). Mitsuba
+reads this layout as it is; Blender's is the same, rolled by a quarter.
 
 Problem: the recovered illumination is log shading, S(n) = exp(SH(n)), for the normals that face the
-viewer; a renderer wants the radiance L(w) that comes from each direction. A Lambertian surface of
-albedo 1 has, without shadows, the shading
+viewer; a renderer needs the radiance L(w) from each direction.
+
+Equation: a Lambertian surface of albedo 1 has, without shadows, the shading
 
     S(n) = 1/pi * integral of L(w) max(n . w, 0) dw = sum_j K(n, w_j) L_j,        L >= 0
 
-Many environments give the same shading. From a uniform one the iteration of Richardson and Lucy
-finds a smooth one, never negative:
+Many environments give the same shading. From a uniform one the Richardson-Lucy iteration finds a
+smooth one, never negative:
 
     L <- L * K'(S / (K L)) / K'(1)
 
@@ -22,23 +23,30 @@ Citation: W. H. Richardson 1972, doi:10.1364/JOSA.62.000055; L. B. Lucy 1974, do
 irradiance as a convolution with the clamped cosine: R. Ramamoorthi, P. Hanrahan 2001,
 doi:10.1145/383259.383317.
 
-Limits: a shading that turns faster than a clamped cosine allows (a strong contrast in the
-logarithm) is matched in the sense of least relative error only; light from behind that no visible
-normal can see is a guess; the object's own shadows come on top.
+Limits: a shading that varies faster than a clamped cosine allows (a strong contrast in the
+logarithm) is matched in the sense of least relative error only; light from behind, which lights no
+visible normal, is a guess; the object's own shadows come on top.
 """
 
 import numpy as np
 
 from .spherical_harmonics import real_sh
 
-# normals at a time: their kernel is a matrix with a column for every pixel of the environment
+# Normals at a time: their kernel is a matrix with a column for every pixel of the environment.
 _CHUNK = 4096
 
 
 def directions(rows: int) -> np.ndarray:
-    """Where each pixel's centre looks:
+    """Return the direction of each pixel's centre.
 
-    (rows, 2 rows, 3) unit vectors, x right, y up, z toward the viewer.
+    Parameters
+    ----------
+    rows : int
+
+    Returns
+    -------
+    (rows, 2 rows, 3) ndarray
+        Unit vectors, camera frame.
     """
     polar, turn = np.meshgrid(
         (np.arange(rows) + 0.5) * np.pi / rows,
@@ -51,7 +59,17 @@ def directions(rows: int) -> np.ndarray:
 
 
 def solid_angles(rows: int) -> np.ndarray:
-    """(rows, 2 rows) steradians of each pixel; they sum to 4 pi."""
+    """Return the solid angle of each pixel.
+
+    Parameters
+    ----------
+    rows : int
+
+    Returns
+    -------
+    (rows, 2 rows) ndarray
+        Steradians; they sum to 4 pi.
+    """
     edges = np.cos(np.arange(rows + 1) * np.pi / rows)
     return np.broadcast_to(
         ((edges[:-1] - edges[1:]) * np.pi / rows)[:, None], (rows, 2 * rows)
@@ -59,8 +77,18 @@ def solid_angles(rows: int) -> np.ndarray:
 
 
 def shading_under(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """The shading, (N, 3), that an environment (rows, 2 rows, 3) gives to unshadowed matt surfaces
-    with the unit normals (N, 3).
+    """Compute the shading of unshadowed Lambertian surfaces in an environment.
+
+    Parameters
+    ----------
+    radiance : (rows, 2 rows, 3) ndarray
+        Linear radiance.
+    normals : (N, 3) ndarray
+        Unit normals, camera frame.
+
+    Returns
+    -------
+    (N, 3) ndarray
     """
     flat = radiance.reshape(-1, 3)
     parts = [
@@ -73,29 +101,46 @@ def shading_under(radiance: np.ndarray, normals: np.ndarray) -> np.ndarray:
 def environment_from_shading(
     illumination: np.ndarray, rows: int = 32, iterations: int = 100
 ) -> np.ndarray:
-    """The environment, (rows, 2 rows, 3) float32 >= 0, linear radiance, under which matt surfaces
-    look as they do in a recovered light.
+    """Find an environment in which Lambertian surfaces look as in a recovered light.
 
-    `illumination`: (9, 3) coefficients of log shading in the camera's frame, as in
-    `scene.decomposition.json`.
+    Parameters
+    ----------
+    illumination : (9, 3) ndarray
+        Log-shading SH coefficients, camera frame, as in `decomposition.json`.
+    rows : int
+    iterations : int
+        Of Richardson-Lucy.
+
+    Returns
+    -------
+    (rows, 2 rows, 3) float32 ndarray
+        Linear radiance, >= 0.
     """
     normals = _facing_normals(24)
     kernel = _kernel(normals, rows)
     wanted = np.exp(real_sh(normals) @ illumination)
-    seen = kernel.sum(0)[:, None]
-    sky = np.broadcast_to(wanted.mean(0), (kernel.shape[1], 3)).copy()
+    reach = kernel.sum(0)[:, None]
+    radiance = np.broadcast_to(wanted.mean(0), (kernel.shape[1], 3)).copy()
     for _ in range(iterations):
-        correction = kernel.T @ (wanted / np.maximum(kernel @ sky, 1e-12))
-        sky *= np.where(seen > 1e-9, correction / np.maximum(seen, 1e-9), 1)
-    return np.ascontiguousarray(sky.reshape(rows, 2 * rows, 3), np.float32)
+        correction = kernel.T @ (wanted / np.maximum(kernel @ radiance, 1e-12))
+        radiance *= np.where(reach > 1e-9, correction / np.maximum(reach, 1e-9), 1)
+    return np.ascontiguousarray(radiance.reshape(rows, 2 * rows, 3), np.float32)
 
 
 def resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
-    """An environment (r, 2 r, 3) with another number of rows: (rows, 2 rows, 3) of the same type of
-    values.
+    """Resample an environment to another number of rows.
 
-    Each pixel gets the mean radiance of the solid angle that it covers, so that no light is lost or
-    won.
+    Each pixel gets the mean radiance of the solid angle it covers, so that light is preserved.
+
+    Parameters
+    ----------
+    radiance : (r, 2 r, 3) ndarray
+    rows : int
+
+    Returns
+    -------
+    (rows, 2 rows, 3) ndarray
+        Of the same type.
     """
     old = len(radiance)
     down = _shares(
@@ -108,8 +153,8 @@ def resampled(radiance: np.ndarray, rows: int) -> np.ndarray:
 
 
 def _shares(old: np.ndarray, new: np.ndarray) -> np.ndarray:
-    """Between falling edges (n + 1,) and (m + 1,): which share of each new interval lies in each
-    old one, (m, n).
+    """Share (m, n) of each new interval that lies in each old one, between falling edges (n + 1,)
+    and (m + 1,).
     """
     overlap = np.minimum(old[:-1], new[:-1, None]) - np.maximum(old[1:], new[1:, None])
     return np.maximum(overlap, 0) / (new[:-1] - new[1:])[:, None]
@@ -125,9 +170,7 @@ def _kernel(normals: np.ndarray, rows: int) -> np.ndarray:
 
 
 def _facing_normals(steps: int) -> np.ndarray:
-    """Normals that face the viewer, (N, 3), spread evenly over what an orthographic camera sees of
-    a sphere.
-    """
+    """Normals (N, 3) that face the viewer, evenly over an orthographic view of a sphere."""
     x, y = np.meshgrid(
         (np.arange(steps) + 0.5) * 2 / steps - 1, (np.arange(steps) + 0.5) * 2 / steps - 1
     )

@@ -14,7 +14,17 @@ C1, C2, C3, C4, C5 = 0.429043, 0.511664, 0.743125, 0.886227, 0.247708
 
 
 def basis(n1: np.ndarray, n2: np.ndarray, n3: np.ndarray) -> np.ndarray:
-    """The nine functions b of the normal's components (any one shape S): (9, *S)."""
+    """Evaluate the nine functions b.
+
+    Parameters
+    ----------
+    n1, n2, n3 : ndarray
+        Components of the unit normal (down, right, toward the viewer), of one shape S.
+
+    Returns
+    -------
+    (9, *S) ndarray
+    """
     t = n1.dtype.type
     return np.stack(
         [
@@ -34,7 +44,20 @@ def basis(n1: np.ndarray, n2: np.ndarray, n3: np.ndarray) -> np.ndarray:
 def basis_adjoint(
     n1: np.ndarray, n2: np.ndarray, n3: np.ndarray, d: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Gradient of the normal's components from the gradient `d` (9, *S) of the nine functions."""
+    """Compute the gradient of the normal from that of the nine functions.
+
+    Parameters
+    ----------
+    n1, n2, n3 : ndarray
+        As for `basis`.
+    d : (9, *S) ndarray
+        Gradient with respect to the nine functions.
+
+    Returns
+    -------
+    d1, d2, d3 : ndarray
+        Gradient with respect to the normal's components.
+    """
     t = n1.dtype.type
     d1 = t(2 * C2) * d[3] + t(2 * C1) * (n2 * d[4] + n3 * d[7] + n1 * d[8])
     d2 = t(2 * C2) * d[1] + t(2 * C1) * (n1 * d[4] + n3 * d[5] - n2 * d[8])

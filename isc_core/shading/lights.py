@@ -1,17 +1,17 @@
-"""The lights that an edit can ask for: one distant light with an ambient rest, recovered light
-turned, an environment.
+"""Lights for editing: one distant light with an ambient part, the recovered light rotated, an
+environment.
 
-Equations, for the unit normal n of a matt surface of reflectance 1: under a distant light with
+Equation: for the unit normal n of a Lambertian surface of albedo 1: under a distant light with
 irradiance E from l and an ambient A, S(n) = E / pi max(0, n . l) + A; under spherical harmonics
 S(n) = exp(sum_k L_k Y_k(n)). A light turned by the rotation R gives S'(n) = S(R^T n); its
-coefficients are L' = Y(d)^+ Y(R^T d) L for any directions d that fix a quadratic on the sphere,
-because the nine functions turn among themselves: exact but for rounding.
+coefficients are L' = Y(d)^+ Y(R^T d) L for any directions d that determine a quadratic on the
+sphere, because the space of the nine functions is closed under rotation: exact up to rounding.
 
 Citation: R. Ramamoorthi, P. Hanrahan, "An efficient representation for irradiance environment
 maps", SIGGRAPH 2001, doi:10.1145/383259.383317 (the space of nine functions).
 
-Limits: no cast shadows. What the recovered light has behind the object was seen by no normal:
-turned to the front, it is a guess.
+Limits: no cast shadows. The recovered light from behind the object lit no visible normal: turned to
+the front, it is a guess.
 """
 
 from dataclasses import dataclass, field
@@ -23,15 +23,30 @@ from .brdf.directions import unit
 from .brdf.model import check_range
 from .spherical_harmonics import real_sh
 
-VIEW = np.array([0.0, 0.0, 1.0])  # toward the viewer
+VIEW = np.array([0.0, 0.0, 1.0])
+"""Unit vector toward the viewer, camera frame."""
+
 _EXACT = 1e-12
 
 
 @dataclass(frozen=True)
 class DirectionalLight:
-    """One distant light. `direction` (3,): unit vector toward it. `irradiance` (3,): across its
-    beam, >= 0; pi gives a white matt surface that faces it the shading 1. `ambient` (3,): shading
-    that everything has, >= 0. Raises `InputError` for anything else.
+    """One distant light with an ambient part.
+
+    Attributes
+    ----------
+    direction : (3,) ndarray
+        Unit vector toward the light, camera frame.
+    irradiance : (3,) ndarray
+        On a plane across its beam, >= 0; pi gives a white Lambertian surface that faces it the
+        shading 1.
+    ambient : (3,) ndarray
+        Shading added everywhere, >= 0.
+
+    Raises
+    ------
+    InputError
+        For other values.
     """
 
     direction: np.ndarray
@@ -51,8 +66,16 @@ class DirectionalLight:
             raise InputError("direction, irradiance and ambient of a light have three numbers each")
 
     def shading(self, normal: np.ndarray) -> np.ndarray:
-        """(..., 3) of a white matt surface with the unit normals (..., 3), shadows of its own side
-        included.
+        """Compute the shading of a white Lambertian surface, attached shadow included.
+
+        Parameters
+        ----------
+        normal : (..., 3) ndarray
+            Unit normals, camera frame.
+
+        Returns
+        -------
+        (..., 3) ndarray
         """
         return (
             np.maximum(np.asarray(normal, float) @ self.direction, 0)[..., None]
@@ -62,26 +85,51 @@ class DirectionalLight:
 
 
 def toward(x: float, y: float, z: float) -> np.ndarray:
-    """The unit vector (3,) along x right, y up, z toward the viewer.
+    """Return the unit vector of a direction.
 
-    Raises `InputError` for no direction at all.
+    Parameters
+    ----------
+    x, y, z : float
+        Right, up, toward the viewer; any length.
+
+    Returns
+    -------
+    (3,) ndarray
+
+    Raises
+    ------
+    InputError
+        If all are 0 or one is not finite.
     """
     vector = np.array([x, y, z], float)
     length = float(np.linalg.norm(vector))
     if not np.isfinite(length) or length < 1e-9:
         raise InputError(
-            f"{x:g} {y:g} {z:g} is no direction: give x (right), y (up), z (toward the viewer), not all 0"
+            f"{x:g} {y:g} {z:g} is no direction:"
+            " give x (right), y (up), z (toward the viewer), not all 0"
         )
     return vector / length
 
 
 def turn(yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> np.ndarray:
-    """The rotation (3, 3) by `roll` about z (toward the viewer), then `pitch` about x (right), then
-    `yaw` about y (up), in degrees.
+    """Return the rotation by `roll` about z, then `pitch` about x, then `yaw` about y.
 
-    A positive yaw moves what is in front to the right, a positive pitch what is above to the front,
-    a positive roll turns the picture's right side up. Raises `InputError` for angles that are not
-    finite.
+    A positive yaw moves the front to the right, a positive pitch the top to the front, a positive
+    roll the right side up.
+
+    Parameters
+    ----------
+    yaw, pitch, roll : float
+        Degrees.
+
+    Returns
+    -------
+    (3, 3) ndarray
+
+    Raises
+    ------
+    InputError
+        If an angle is not finite.
     """
     if not np.isfinite([yaw, pitch, roll]).all():
         raise InputError("the angles of a rotation have to be finite, in degrees")
@@ -93,10 +141,23 @@ def turn(yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0) -> np.ndarray:
 
 
 def turned_light(coefficients: np.ndarray, rotation: np.ndarray) -> np.ndarray:
-    """Coefficients (9, 3) of the light turned by `rotation` (3, 3): what came from d comes from
-    rotation @ d.
+    """Rotate a light: what came from d then comes from rotation @ d.
 
-    The identity gives exactly the same. Raises `InputError` for a matrix that is not a rotation.
+    Parameters
+    ----------
+    coefficients : (9, 3) ndarray
+        Log-shading SH coefficients, camera frame.
+    rotation : (3, 3) ndarray
+        The identity returns exactly the same coefficients.
+
+    Returns
+    -------
+    (9, 3) ndarray
+
+    Raises
+    ------
+    InputError
+        If `rotation` is not a rotation.
     """
     if (
         np.shape(rotation) != (3, 3)
@@ -113,8 +174,8 @@ def turned_light(coefficients: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 
 
 def sphere_directions(count: int) -> np.ndarray:
-    """`count` unit vectors (count, 3), evenly spread over the whole sphere along a spiral, from
-    front to back.
+    """Return `count` unit vectors (count, 3), evenly over the sphere along a spiral, front to
+    back.
     """
     z = 1 - (2 * np.arange(count) + 1) / count
     angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)
@@ -123,7 +184,7 @@ def sphere_directions(count: int) -> np.ndarray:
 
 
 def _plane_turn(degrees: float, first: int, second: int) -> np.ndarray:
-    """Turns the axis `first` toward the axis `second`."""
+    """Rotation of the axis `first` toward the axis `second`."""
     matrix = np.eye(3)
     cosine, sine = _clean(np.cos(np.deg2rad(degrees))), _clean(np.sin(np.deg2rad(degrees)))
     matrix[first, first] = matrix[second, second] = cosine
@@ -132,5 +193,5 @@ def _plane_turn(degrees: float, first: int, second: int) -> np.ndarray:
 
 
 def _clean(value: float) -> float:
-    """Full and quarter turns come out exact."""
+    """Make full and quarter turns exact."""
     return float(np.rint(value)) + 0.0 if abs(value - np.rint(value)) < _EXACT else float(value)

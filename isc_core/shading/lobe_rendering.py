@@ -23,24 +23,32 @@ from .environment_map import directions, solid_angles
 from .lights import VIEW, DirectionalLight
 from .radiance import DistantLights, directional, radiance
 
-USUAL_EXPONENT = 60.0
-
+DEFAULT_EXPONENT = 60.0
 
 _FITTED_ALPHA = 0.5  # the largest alpha of `fitted_exponent`
-
-
 _TABLE = 65  # samples of the stereographic plane along an axis
 
 
 @dataclass(frozen=True)
 class Lobe:
-    """A lobe of strength 1: Blinn-Phong's `exponent` in [1, 1e5], or the `alpha` in [.01, 1] of GGX
-    facets, which then counts, and their `f0`, 1 for mirrors.
+    """A specular lobe of strength 1.
 
-    Raises `InputError` outside these ranges.
+    Attributes
+    ----------
+    exponent : float
+        Blinn-Phong exponent, in [1, 1e5].
+    alpha : float or None
+        Width of GGX facets, in [.01, 1]; if given, it replaces the exponent.
+    f0 : float
+        Reflectance of the facets along the normal, in [0, 1]; 1 for mirrors.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
-    exponent: float = USUAL_EXPONENT
+    exponent: float = DEFAULT_EXPONENT
     alpha: float | None = None
     f0: float = 1.0
 
@@ -57,7 +65,7 @@ class Lobe:
 
     @property
     def nearest_exponent(self) -> float:
-        """The Blinn-Phong exponent, at least 1, whose lobe is about this one's."""
+        """The Blinn-Phong exponent, at least 1, of the most similar lobe."""
         if self.alpha is None:
             return self.exponent
         rule = fitted_exponent if self.alpha <= _FITTED_ALPHA else exponent_from_alpha
@@ -65,31 +73,49 @@ class Lobe:
 
 
 def lobe_under(lobe: Lobe, normal: np.ndarray, light: DirectionalLight) -> np.ndarray:
-    """What the lobe sends to the viewer under one light, without its ambient:
+    """Compute the radiance of the lobe toward the viewer under one light, without its ambient part.
 
-    (..., 3) for unit normals (..., 3).
+    Parameters
+    ----------
+    lobe : Lobe
+    normal : (..., 3) ndarray
+        Unit normals, camera frame.
+    light : DirectionalLight
+
+    Returns
+    -------
+    (..., 3) ndarray
     """
     return radiance(lobe.model, _unit(normal), VIEW, directional(light.direction, light.irradiance))
 
 
-def lobe_in(lobe: Lobe, normal: np.ndarray, sky: np.ndarray) -> np.ndarray:
-    """What the lobe sends to the viewer in an environment (rows, 2 rows, 3), see `environment`:
+def lobe_in_environment(lobe: Lobe, normal: np.ndarray, environment: np.ndarray) -> np.ndarray:
+    """Compute the radiance of the lobe toward the viewer in an environment.
 
-    (N, 3) for unit normals (N, 3).
+    Parameters
+    ----------
+    lobe : Lobe
+    normal : (N, 3) ndarray
+        Unit normals, camera frame.
+    environment : (rows, 2 rows, 3) ndarray
+        Linear radiance, see `environment_map`.
+
+    Returns
+    -------
+    (N, 3) ndarray
     """
-    rows = len(sky)
-    lit = (sky > 0).any(-1).reshape(-1)
+    rows = len(environment)
+    lit = (environment > 0).any(-1).reshape(-1)
     if not lit.any():
         return np.zeros((len(normal), 3))
     lights = DistantLights(
         directions(rows).reshape(-1, 3)[lit],
-        (solid_angles(rows)[..., None] * sky).reshape(-1, 3)[lit],
+        (solid_angles(rows)[..., None] * environment).reshape(-1, 3)[lit],
     )
     axis = np.linspace(-1.0, 1.0, _TABLE)
     u, v = np.meshgrid(axis, axis, indexing="ij")
-    square = np.minimum(
-        u * u + v * v, 1
-    )  # the corners lie behind the horizon: their normals are not asked for
+    # The corners lie behind the horizon, where no normal is looked up.
+    square = np.minimum(u * u + v * v, 1)
     shrink = np.sqrt(square / np.maximum(u * u + v * v, 1e-12))
     table_normals = (
         np.stack([2 * u * shrink, 2 * v * shrink, 1 - square], -1) / (1 + square)[..., None]

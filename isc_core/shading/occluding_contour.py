@@ -1,10 +1,13 @@
 """Where the surface turns away from the viewer: points of the occluding contour and their outward
 normals.
 
-A contour point is a mask pixel with a 4-neighbour inside the image and outside the mask; its normal
-is minus the Gaussian-weighted mean offset of the mask pixels in an 11 x 11 window (Barron & Malik
-2015, doi:10.1109/TPAMI.2014.2377712). Where the photo's frame cuts the object there is no contour,
-and a window that the cut reaches gives no normal.
+Equation: a contour point is a mask pixel with a 4-neighbour inside the image and outside the mask;
+its normal is minus the Gaussian-weighted mean offset of the mask pixels in an 11 x 11 window.
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
+
+Limits: where the photo's frame cuts the object there is no contour, and a window that contains the
+cut gives no normal.
 """
 
 from dataclasses import dataclass
@@ -17,10 +20,14 @@ RADIUS = 5
 
 @dataclass(frozen=True)
 class Contour:
-    """`rows`, `columns`:
+    """Points of an occluding contour.
 
-    (P,) int64 pixels; `down`, `right`: (P,) components of the unit outward normal in the image
-    plane.
+    Attributes
+    ----------
+    rows, columns : (P,) int64 ndarray
+        Pixels.
+    down, right : (P,) ndarray
+        Components of the unit outward normal in the image plane.
     """
 
     rows: np.ndarray
@@ -30,11 +37,19 @@ class Contour:
 
 
 def occluding_contour(mask: np.ndarray, *, drop_near_edge: bool = False) -> Contour:
-    """Contour of `mask` (H, W) bool.
+    """Find the occluding contour of a mask.
 
-    By default points are dropped only where the frame cuts the object within the window, so that
-    empty padding around the photo changes nothing. `drop_near_edge` drops every point nearer than 5
-    pixels to the frame, as the published code does.
+    Parameters
+    ----------
+    mask : (H, W) bool ndarray
+    drop_near_edge : bool
+        Drop every point nearer than 5 pixels to the frame, as the published code does. By default
+        points are dropped only where the frame cuts the object within the window, so that empty
+        padding around the photo changes nothing.
+
+    Returns
+    -------
+    Contour
     """
     padded = np.pad(mask, 1, mode="edge")
     outside = ~padded

@@ -1,17 +1,17 @@
-"""Two conventions for normals and lights, and the exact way between them.
+"""Two conventions for normals and lights, and the exact conversion between them.
 
-Ours: normals (x right, y up, z toward the viewer); log shading of a channel = sum_k L_k Y_k(n), Y
-the orthonormal real spherical harmonics up to degree 2, all with positive constants, in the order
-(0,0) (1,-1) (1,0) (1,1) (2,-2) (2,-1) (2,0) (2,1) (2,2).
+Ours: normals in the camera frame (x right, y up, z toward the viewer); log shading of a channel =
+sum_k L_k Y_k(n), Y the orthonormal real spherical harmonics up to degree 2, all with positive
+constants, in the order (0,0) (1,-1) (1,0) (1,1) (2,-2) (2,-1) (2,0) (2,1) (2,2).
 
 The SIRFS reference's (J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712): normals (down,
 right, toward the viewer); the irradiance quadratic of R. Ramamoorthi, P. Hanrahan (2001), "An
 efficient representation for irradiance environment maps", doi:10.1145/383259.383317, with its
 rounded constants.
 
-Both bases span the quadratics on the sphere, so one 9 x 9 matrix M with b(n) = M Y(n) holds for
-every unit normal; hence L_ours = M^T L_reference. The reference's seventh function is no multiple
-of Y(2,0): its rest goes into the constant term.
+Equation: both bases span the quadratics on the sphere, so one 9 x 9 matrix M with b(n) = M Y(n)
+holds for every unit normal; hence L_ours = M^T L_reference. The reference's seventh function is no
+multiple of Y(2,0): its remainder goes into the constant term.
 """
 
 from functools import cache
@@ -23,7 +23,17 @@ from .irradiance_basis import basis
 
 
 def real_sh(normal: np.ndarray) -> np.ndarray:
-    """Orthonormal real spherical harmonics, (..., 9), of unit vectors (..., 3) in our frame."""
+    """Evaluate the orthonormal real spherical harmonics up to degree 2.
+
+    Parameters
+    ----------
+    normal : (..., 3) ndarray
+        Unit vectors, camera frame.
+
+    Returns
+    -------
+    (..., 9) ndarray
+    """
     x, y, z = _components(normal)
     linear, quadratic, zonal = sqrt(3 / (4 * pi)), sqrt(15 / (4 * pi)), sqrt(5 / (16 * pi))
     return np.stack(
@@ -43,32 +53,42 @@ def real_sh(normal: np.ndarray) -> np.ndarray:
 
 
 def reference_basis(normal: np.ndarray) -> np.ndarray:
-    """The reference's nine basis functions, (..., 9), of unit vectors (..., 3) in OUR frame."""
+    """Evaluate the reference's nine basis functions.
+
+    Parameters
+    ----------
+    normal : (..., 3) ndarray
+        Unit vectors, camera frame (not the reference's).
+
+    Returns
+    -------
+    (..., 9) ndarray
+    """
     return np.moveaxis(basis(*_components(normal_to_reference(normal))), 0, -1)
 
 
 def normal_to_reference(normal: np.ndarray) -> np.ndarray:
-    """(..., 3): from (x right, y up, z toward) to (down, right, toward)."""
+    """Convert vectors (..., 3) from the camera frame to (down, right, toward the viewer)."""
     x, y, z = _components(normal)
     return np.stack([-y, x, z], axis=-1)
 
 
 def normal_from_reference(normal: np.ndarray) -> np.ndarray:
-    """(..., 3): from (down, right, toward) to (x right, y up, z toward)."""
+    """Convert vectors (..., 3) from (down, right, toward the viewer) to the camera frame."""
     down, right, toward = _components(normal)
     return np.stack([right, -down, toward], axis=-1)
 
 
 def light_from_reference(light: np.ndarray) -> np.ndarray:
-    """Coefficients (9, ...) of the reference's basis, as coefficients of `real_sh` that give the
-    same log shading.
+    """Convert coefficients (9, ...) of the reference's basis to those of `real_sh`; same log
+    shading.
     """
     return np.tensordot(_basis_change().T, np.asarray(light, float), axes=1)
 
 
 def light_to_reference(light: np.ndarray) -> np.ndarray:
-    """Coefficients (9, ...) of `real_sh`, as coefficients of the reference's basis that give the
-    same log shading.
+    """Convert coefficients (9, ...) of `real_sh` to those of the reference's basis; same log
+    shading.
     """
     return np.tensordot(np.linalg.inv(_basis_change().T), np.asarray(light, float), axes=1)
 
@@ -82,7 +102,7 @@ def _components(vectors: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 @cache
 def _basis_change() -> np.ndarray:
-    """M of `reference_basis = M real_sh`, found from both bases at nine directions that fix a
+    """M of `reference_basis = M real_sh`, from both bases at nine directions that determine a
     quadratic on the sphere.
     """
     half = sqrt(0.5)

@@ -1,9 +1,10 @@
 """Derivatives of a height map by 3 x 3 stencils with replicated borders, and their adjoints.
 
-Rows grow downward, columns to the right:
+Equation: rows grow downward, columns to the right:
   Zi = [row below - row above] (1,2,1)/8,   Zj = [right - left] (1,2,1)/8,
   Zii = (1,-2,1) (1,2,1)/4,   Zjj likewise,   Zij = [Z(--) + Z(++) - Z(+-) - Z(-+)]/4
-(Barron & Malik 2015, doi:10.1109/TPAMI.2014.2377712).
+
+Citation: J. T. Barron, J. Malik 2015, doi:10.1109/TPAMI.2014.2377712.
 """
 
 import numpy as np
@@ -41,9 +42,18 @@ def _three(padded: np.ndarray, weights: tuple[float, float, float], axis: int) -
 
 
 def derivative(padded: np.ndarray, stencil: Stencil) -> np.ndarray:
-    """The derivative `stencil` of a height map;
+    """Compute a derivative of a height map.
 
-    `padded` is (H + 2, W + 2) with replicated borders, the result (H, W).
+    Parameters
+    ----------
+    padded : (H + 2, W + 2) ndarray
+        Height with replicated borders.
+    stencil : Stencil
+        One of `DERIVATIVES`.
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     axes = (
         (0, 1) if stencil[0][0] != stencil[0][2] or stencil[0][1] < 0 else (1, 0)
@@ -54,9 +64,18 @@ def derivative(padded: np.ndarray, stencil: Stencil) -> np.ndarray:
 
 
 def derivative_adjoint(gradient: np.ndarray, stencil: Stencil) -> np.ndarray:
-    """The adjoint of `derivative` after replicating borders:
+    """Apply the adjoint of `derivative` after replicating borders.
 
-    (H, W) gradient of a derivative to (H, W) gradient of the height.
+    Parameters
+    ----------
+    gradient : (H, W) ndarray
+        With respect to a derivative.
+    stencil : Stencil
+
+    Returns
+    -------
+    (H, W) ndarray
+        With respect to the height.
     """
     full = np.pad(gradient, 2)
     flipped = (stencil[0][::-1], stencil[1][::-1])
@@ -64,9 +83,15 @@ def derivative_adjoint(gradient: np.ndarray, stencil: Stencil) -> np.ndarray:
 
 
 def fold_border(wide: np.ndarray) -> np.ndarray:
-    """The adjoint of replicating the border by one pixel:
+    """Apply the adjoint of replicating the border by one pixel; changes `wide`.
 
-    (H + 2, W + 2) to (H, W). Changes `wide`.
+    Parameters
+    ----------
+    wide : (H + 2, W + 2) ndarray
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     wide[1] += wide[0]
     wide[-2] += wide[-1]
@@ -76,7 +101,18 @@ def fold_border(wide: np.ndarray) -> np.ndarray:
 
 
 def normals(height: np.ndarray) -> np.ndarray:
-    """Unit normals (down, right, toward the viewer), (H, W, 3), of a height map (H, W) in pixels."""
+    """Compute the unit normals of a height map.
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels toward the viewer.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Down, right, toward the viewer.
+    """
     padded = np.pad(height, 1, mode="edge")
     zi, zj = derivative(padded, FIRST_DOWN), derivative(padded, FIRST_RIGHT)
     n3 = 1 / np.sqrt(1 + zi * zi + zj * zj)

@@ -1,4 +1,4 @@
-"""The glossy lobe of the half vector (Blinn 1977).
+"""The specular lobe of the half vector (Blinn 1977).
 
 Problem: highlights stretch at grazing angles, which the mirror direction alone does not give;
 facets that face the half vector do.
@@ -6,16 +6,16 @@ facets that face the half vector do.
 Equation: h is the unit vector midway between view and light, c = max(0, normal . h), p the
 exponent. Three scales: "plain", as published: the RADIANCE is strength c^p per irradiance across
 the beam, so f_r = strength c^p / cos_light. "normalised", the usual factor: f_r = strength (p + 8)
-/ (8 pi) c^p. "conserving": f_r = strength (p + 2) (p + 4) / (8 pi (p + 2^(-p/2))) c^p, exactly
-`strength` of the light seen along the normal.
+/ (8 pi) c^p. "conserving": f_r = strength (p + 2) (p + 4) / (8 pi (p + 2^(-p/2))) c^p, which
+reflects exactly `strength` of the light seen along the normal.
 
 Citation: J. F. Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH
 1977, 192-198, doi:10.1145/563858.563893.
 
-Limits: seen along the normal the usual factor keeps strength (p + 8) (p + 2^(-p/2)) / ((p + 2) (p +
-4)): too MUCH, 1.075 at most (p = 9), 1.018 at p = 100, 1.001 at p = 2000. The conserving factor
-never keeps more than `strength`. "plain" is NOT reciprocal, the others are. No scale grows toward
-grazing angles as real gloss does.
+Limits: seen along the normal the usual factor reflects strength (p + 8) (p + 2^(-p/2)) / ((p + 2)
+(p + 4)): too MUCH, 1.075 at most (p = 9), 1.018 at p = 100, 1.001 at p = 2000. The conserving
+factor never reflects more than `strength`. "plain" is NOT reciprocal, the others are. No scale
+grows toward grazing angles as real gloss does.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,12 @@ Scale = Literal["plain", "normalised", "conserving"]
 
 @dataclass(frozen=True)
 class BlinnPhongGradient:
-    """`strength`, `exponent` (...): the derivatives of f_r by the parameters."""
+    """Derivatives of f_r by the parameters, each (...).
+
+    Attributes
+    ----------
+    strength, exponent : ndarray
+    """
 
     strength: np.ndarray
     exponent: np.ndarray
@@ -40,8 +45,21 @@ class BlinnPhongGradient:
 
 @dataclass(frozen=True)
 class BlinnPhong:
-    """`strength`: factor of the lobe, >= 0. `exponent`: p >= 0, larger is glossier. `scale`: see
-    the module. Raises `InputError` outside these ranges.
+    """The Blinn-Phong model.
+
+    Attributes
+    ----------
+    strength : float or ndarray
+        Factor of the lobe, >= 0.
+    exponent : float or ndarray
+        p >= 0, larger is glossier.
+    scale : str
+        "plain", "normalised" or "conserving", see the module.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     strength: Parameter = 1.0
@@ -57,13 +75,13 @@ class BlinnPhong:
             )
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
         return self.strength * self.gradient(normal, view, light).strength
 
     def gradient(
         self, normal: np.ndarray, view: np.ndarray, light: np.ndarray
     ) -> BlinnPhongGradient:
-        """The derivatives of `value` by strength and exponent."""
+        """Return the derivatives of `value` by strength and exponent."""
         angles = cosines(normal, view, light)
         lobe = np.where(angles.lit, power(angles.half, self.exponent), 0)
         if self.scale == "plain":

@@ -1,17 +1,18 @@
-"""Coloured paint under a clear, white gloss: the dichromatic reflection model (Shafer 1985).
+"""Coloured diffuse reflection under a white interface: the dichromatic reflection model (Shafer
+1985).
 
-Problem: plastic and paint send back light that went into the body and took its colour, and light
-that the interface mirrored unchanged.
+Problem: plastic and coated surfaces reflect light that entered the body and took its colour, and
+light that the interface mirrored unchanged.
 
-Equation: f_r,c = colour_c f_body + f_interface. Each term is a colour, the same from everywhere,
-times a geometric factor. The colour of the light is the light's: in radiance it multiplies both.
+Equation: f_r,c = colour_c f_diffuse + f_specular. Each term is a colour, the same from everywhere,
+times a geometric factor. The light's colour is not in it: in radiance it multiplies both.
 
 Citation: S. A. Shafer, "Using color to separate reflection components", Color Research and
 Application 10(4), 210-218 (1985), doi:10.1002/col.5080100409.
 
 Limits: insulators; metals colour their highlights. The lobes are added as they are: light that the
-interface mirrors is not taken from the body, so the sum can keep more than all the light.
-Reciprocal where both lobes are.
+interface mirrors is not taken from the body, so the sum can exceed the incoming light. Reciprocal
+where both lobes are.
 """
 
 from dataclasses import dataclass, field, fields, replace
@@ -29,25 +30,44 @@ Gradient = TypeVar("Gradient")
 
 @dataclass(frozen=True)
 class DichromaticGradient:
-    """`colour` (...): the derivative of each f_r,c by its own colour_c. `body`: the derivatives of
-    f_r (..., 3) by the body's parameters, each field of the body's gradient with a last axis of
-    channels. `interface`: those by the interface's (...), alike in every channel.
+    """Derivatives of f_r by the parameters.
+
+    Attributes
+    ----------
+    colour : (...) ndarray
+        Derivative of each f_r,c by its own colour_c.
+    diffuse : object
+        Derivatives by the diffuse lobe's parameters; each field of that lobe's gradient, with a
+        last axis of channels.
+    specular : object
+        Derivatives by the specular lobe's parameters (...), alike in every channel.
     """
 
     colour: np.ndarray
-    body: object
-    interface: object
+    diffuse: object
+    specular: object
 
 
 @dataclass(frozen=True)
 class Dichromatic:
-    """`colour`: (3,) or (..., 3), of the body, in [0, 1]. `body`, `interface`: the models of the
-    two lobes, neither with a colour. Raises `InputError` for other colours.
+    """The dichromatic model.
+
+    Attributes
+    ----------
+    colour : (3,) or (..., 3) ndarray
+        Of the diffuse lobe, in [0, 1].
+    diffuse, specular : Lobe
+        Models of the diffuse and of the specular lobe, neither with a colour.
+
+    Raises
+    ------
+    InputError
+        For other colours.
     """
 
     colour: np.ndarray = field(default_factory=lambda: np.ones(3))
-    body: Lobe = field(default_factory=Lambert)
-    interface: Lobe = field(default_factory=BlinnPhong)
+    diffuse: Lobe = field(default_factory=Lambert)
+    specular: Lobe = field(default_factory=BlinnPhong)
 
     def __post_init__(self) -> None:
         check_range("colour", self.colour, 0, 1)
@@ -57,19 +77,21 @@ class Dichromatic:
             )
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (..., 3) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
-        body, interface = (
-            lobe.value(normal, view, light)[..., None] for lobe in (self.body, self.interface)
+        """Return f_r (..., 3) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        diffuse, specular = (
+            lobe.value(normal, view, light)[..., None] for lobe in (self.diffuse, self.specular)
         )
-        return np.asarray(self.colour) * body + interface
+        return np.asarray(self.colour) * diffuse + specular
 
     def gradient(
         self, normal: np.ndarray, view: np.ndarray, light: np.ndarray
     ) -> DichromaticGradient:
-        """The derivatives of `value` by the colour and by both lobes' parameters."""
-        body = _coloured(self.body.gradient(normal, view, light), np.asarray(self.colour))
+        """Return the derivatives of `value` by the colour and by both lobes' parameters."""
+        diffuse = _coloured(self.diffuse.gradient(normal, view, light), np.asarray(self.colour))
         return DichromaticGradient(
-            self.body.value(normal, view, light), body, self.interface.gradient(normal, view, light)
+            self.diffuse.value(normal, view, light),
+            diffuse,
+            self.specular.gradient(normal, view, light),
         )
 
 

@@ -1,6 +1,4 @@
-"""What all reflectance models need of a normal, a view and a light: cosines, the half vector, and
-whether light arrives at all.
-"""
+"""Cosines and half vectors of a normal, a view and a light, for all reflectance models."""
 
 from dataclasses import dataclass
 
@@ -15,10 +13,19 @@ _UNIT_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Cosines:
-    """`view`, `light`, `half` (...): of the angle between the normal and the view, the light, the
-    half vector; in [0, 1], clamped. `deviation` (...): of the angle between view and half vector,
-    in [0, 1]. `between` (...): of view and light, in [-1, 1]. `lit` (...) bool: view and light are
-    both above the horizon. Where it is False, `view` and `light` are 1, to be divided by.
+    """Cosines between directions, each (...).
+
+    Attributes
+    ----------
+    view, light, half : ndarray
+        Of the angle between the normal and the view, the light, the half vector; clamped to [0, 1].
+    deviation : ndarray
+        Of the angle between view and half vector, in [0, 1].
+    between : ndarray
+        Of the angle between view and light, in [-1, 1].
+    lit : bool ndarray
+        Whether view and light are both above the horizon. Where it is False, `view` and `light`
+        are 1, so that they can be divisors.
     """
 
     view: np.ndarray
@@ -30,17 +37,28 @@ class Cosines:
 
 
 def cosines(normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> Cosines:
-    """The cosines between unit vectors (..., 3) that broadcast with each other.
+    """Compute the cosines between unit vectors that broadcast with each other.
 
-    Raises `InputError` for other shapes, for what is not finite and for lengths that are not 1 to
-    1e-3.
+    Parameters
+    ----------
+    normal, view, light : (..., 3) ndarray
+
+    Returns
+    -------
+    Cosines
+
+    Raises
+    ------
+    InputError
+        For other shapes, values that are not finite, and lengths that are not 1 to 1e-3.
     """
     normal, view, light = unit(normal, "normal"), unit(view, "view"), unit(light, "light")
     try:
         np.broadcast_shapes(normal.shape, view.shape, light.shape)
     except ValueError:
         raise InputError(
-            f"normal {normal.shape}, view {view.shape} and light {light.shape} do not broadcast with each other"
+            f"normal {normal.shape}, view {view.shape} and light {light.shape}"
+            " do not broadcast with each other"
         ) from None
     half = half_vector(view, light)
     cos_view, cos_light, cos_half = _dot(normal, view), _dot(normal, light), _dot(normal, half)
@@ -56,8 +74,8 @@ def cosines(normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> Cosines:
 
 
 def half_vector(view: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """The unit vector (..., 3) midway between unit vectors view and light (..., 3); zero where they
-    are opposite, midway is nowhere.
+    """Return the unit vectors (..., 3) midway between `view` and `light`; zero where they are
+    opposite.
     """
     total = np.asarray(view, float) + np.asarray(light, float)
     length = np.sqrt((total * total).sum(axis=-1, keepdims=True))
@@ -65,9 +83,22 @@ def half_vector(view: np.ndarray, light: np.ndarray) -> np.ndarray:
 
 
 def unit(vectors: np.ndarray, name: str) -> np.ndarray:
-    """Vectors (..., 3) with lengths of exactly 1.
+    """Normalise vectors that are nearly of unit length.
 
-    Raises `InputError` where they are not finite or their lengths not 1 to 1e-3.
+    Parameters
+    ----------
+    vectors : (..., 3) ndarray
+    name : str
+        For the error message.
+
+    Returns
+    -------
+    (..., 3) ndarray
+
+    Raises
+    ------
+    InputError
+        If they are not finite or their lengths not 1 to 1e-3.
     """
     vectors = np.asarray(vectors, float)
     if vectors.ndim == 0 or vectors.shape[-1] != 3:

@@ -1,6 +1,6 @@
-"""What a reflectance model keeps of the light, and whether view and light may be exchanged.
+"""The albedo of a reflectance model, and whether it is reciprocal.
 
-Problem: integrals of f_r cos over the hemisphere, for lobes from matt to a thousandth of it.
+Problem: integrals of f_r cos over the hemisphere, for lobes from diffuse to a thousandth of it.
 
 Equation: the half vector h takes the place of the light l, d omega_l = 4 (view . h) d omega_h: h
 stays near the normal where the lobe is narrow, so nodes are dense there. With h at the polar angle
@@ -23,12 +23,28 @@ from .model import Model
 
 
 def directional_albedo(model: Model, cos_view: float, nodes: int = 96) -> np.ndarray:
-    """The share of the light that leaves for all directions when it comes from one, `cos_view` in
-    (0, 1] from the normal: a scalar array, or (3,) for a coloured model. For a reciprocal model
-    also what is seen from there under a white sky of radiance 1.
+    """Compute the share of the light from one direction that leaves in all directions.
 
-    `nodes`: in each of the two angles, >= 2; the cost grows with its square. Raises `InputError`
-    for values outside these ranges.
+    For a reciprocal model this is also the radiance toward that direction in a white environment of
+    radiance 1.
+
+    Parameters
+    ----------
+    model : Model
+    cos_view : float
+        Cosine between the direction and the normal, in (0, 1].
+    nodes : int
+        In each of the two angles, >= 2; the cost grows with its square.
+
+    Returns
+    -------
+    () or (3,) ndarray
+        For a model without or with colour.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
     if not 0 < cos_view <= 1 or nodes < 2:
         raise InputError("cos_view has to be within (0, 1] and nodes at least 2")
@@ -37,14 +53,25 @@ def directional_albedo(model: Model, cos_view: float, nodes: int = 96) -> np.nda
     across = half @ view
     light = 2 * across[:, None] * half - view
     light /= np.sqrt((light * light).sum(axis=1, keepdims=True))
-    # The one that light comes from is `view`: a plain Phong lobe tells the two apart.
+    # The light comes from `view`: for a plain Phong lobe the order matters.
     reflected = model.value(np.array([0.0, 0, 1]), light, view)
     return (weight * 4 * across * np.maximum(light[:, 2], 0)) @ reflected
 
 
 def reciprocity_error(model: Model, count: int = 1000, seed: int = 0) -> float:
-    """The largest |f_r(view, light) - f_r(light, view)| over `count` random pairs, relative to the
-    largest f_r; 0 is reciprocal.
+    """Return the largest |f_r(view, light) - f_r(light, view)| relative to the largest f_r.
+
+    Parameters
+    ----------
+    model : Model
+    count : int
+        Number of random pairs.
+    seed : int
+
+    Returns
+    -------
+    float
+        0 for a reciprocal model.
     """
     directions = np.random.default_rng(seed).normal(size=(2, count, 3))
     directions[..., 2] = np.abs(directions[..., 2])

@@ -1,4 +1,4 @@
-"""The glossy lobe of rough facets with long tails, GGX (Walter et al. 2007).
+"""The specular lobe of rough facets with long tails, GGX (Walter et al. 2007).
 
 Problem: highlights of real materials have a bright core AND a wide haze, and grow toward grazing
 angles.
@@ -6,8 +6,7 @@ angles.
 Equation: h the half vector, c = normal . h, f_r = D G F / (4 cos_view cos_light) with D = alpha^2 /
 (pi (alpha^2 c^2 + 1 - c^2)^2), the density of facets, whose integral over D c is 1; G =
 G1(cos_view) G1(cos_light), G1(x) = 2 x / (x + sqrt(alpha^2 + (1 - alpha^2) x^2)), Smith's share of
-facets that are seen, separable; F = f0 + (1 - f0) (1 - view . h)^5, Schlick's approximation of
-Fresnel.
+visible facets, separable; F = f0 + (1 - f0) (1 - view . h)^5, Schlick's approximation of Fresnel.
 
 Citation: B. Walter, S. R. Marschner, H. Li and K. E. Torrance, "Microfacet models for refraction
 through rough surfaces", EGSR 2007, 195-206, doi:10.2312/EGWR/EGSR07/195-206. B. Smith, "Geometrical
@@ -15,9 +14,9 @@ shadowing of a random rough surface", IEEE Transactions on Antennas and Propagat
 (1967), doi:10.1109/TAP.1967.1138991. C. Schlick, "An inexpensive BRDF model for physically-based
 rendering", Computer Graphics Forum 13(3), 233-246 (1994), doi:10.1111/1467-8659.1330233.
 
-Limits: light between facets is left out: with f0 = 1 a surface seen along the normal keeps 99 % of
-it at alpha = .1, 88 % at .3, 31 % at 1. Isotropic. Schlick's F holds for insulators (f0 .02 to .08)
-and roughly for metals. Reciprocal.
+Limits: no light between facets: with f0 = 1 a surface seen along the normal reflects 99 % of the
+light at alpha = .1, 88 % at .3, 31 % at 1. Isotropic. Schlick's F holds for insulators (f0 .02 to
+.08) and roughly for metals. Reciprocal.
 """
 
 from dataclasses import dataclass
@@ -35,7 +34,12 @@ SMALLEST_ALPHA = 1e-4
 
 @dataclass(frozen=True)
 class GgxGradient:
-    """`alpha`, `f0` (...): the derivatives of f_r by the parameters."""
+    """Derivatives of f_r by the parameters, each (...).
+
+    Attributes
+    ----------
+    alpha, f0 : ndarray
+    """
 
     alpha: np.ndarray
     f0: np.ndarray
@@ -43,8 +47,19 @@ class GgxGradient:
 
 @dataclass(frozen=True)
 class Ggx:
-    """`alpha`: width of the facets' slopes, in [1e-4, 1]. `f0`: reflectance along the normal, in
-    [0, 1]. Raises `InputError` outside these ranges.
+    """The GGX model.
+
+    Attributes
+    ----------
+    alpha : float or ndarray
+        Width of the facets' slopes, in [1e-4, 1].
+    f0 : float or ndarray
+        Reflectance along the normal, in [0, 1].
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     alpha: Parameter = 0.2
@@ -55,12 +70,12 @@ class Ggx:
         check_range("f0", self.f0, 0, 1)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
         angles = cosines(normal, view, light)
         return np.where(angles.lit, self._facets(angles) * self._fresnel(angles), 0)
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> GgxGradient:
-        """The derivatives of `value` by alpha and f0."""
+        """Return the derivatives of `value` by alpha and f0."""
         angles = cosines(normal, view, light)
         facets = np.where(angles.lit, self._facets(angles), 0)
         square = angles.half**2
@@ -78,21 +93,27 @@ class Ggx:
         return self.f0 + (1 - np.asarray(self.f0)) * (1 - angles.deviation) ** 5
 
     def _facets(self, angles: Cosines) -> np.ndarray:
-        """D G / (4 cos_view cos_light); the cosines of G1 and of the denominator cancel, so nothing
-        is divided by 0.
+        """D G / (4 cos_view cos_light); the cosines of G1 and of the denominator cancel, so
+        nothing is divided by 0.
         """
-        seen = [1 / (cosine + _root(self.alpha, cosine)) for cosine in (angles.view, angles.light)]
-        return density(self.alpha, angles.half) * seen[0] * seen[1]
+        view, light = (
+            1 / (cosine + _root(self.alpha, cosine)) for cosine in (angles.view, angles.light)
+        )
+        return density(self.alpha, angles.half) * view * light
 
 
 def density(alpha: Parameter, cos_half: np.ndarray) -> np.ndarray:
-    """D in 1/sr: how densely facets face directions at the cosine `cos_half` from the normal."""
+    """Return D in 1/sr: the density of facets that face directions at `cos_half` from the
+    normal.
+    """
     square = np.square(cos_half)
     return np.square(alpha) / (np.pi * (np.square(alpha) * square + 1 - square) ** 2)
 
 
 def visible(alpha: Parameter, cosine: np.ndarray) -> np.ndarray:
-    """G1 in [0, 1]: the share of facets seen from a direction at `cosine` from the normal."""
+    """Return G1 in [0, 1]: the share of facets visible from a direction at `cosine` from the
+    normal.
+    """
     return 2 * cosine / (cosine + _root(alpha, cosine))
 
 

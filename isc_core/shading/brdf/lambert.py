@@ -1,14 +1,14 @@
-"""The perfectly matt surface (Lambert 1760).
+"""The perfectly diffuse surface (Lambert 1760).
 
 Problem: a surface that looks equally bright from everywhere.
 
-Equation: f_r = albedo / pi. All the light is kept at albedo 1: the integral of f_r cos over the
-hemisphere is the albedo.
+Equation: f_r = albedo / pi. The integral of f_r cos over the hemisphere is the albedo; at 1 all the
+light is reflected.
 
 Citation: J. H. Lambert, "Photometria", Augsburg (1760), which has no DOI.
 
-Limits: real matt surfaces brighten toward grazing angles when rough (`oren_nayar`) and darken there
-under a smooth coat.
+Limits: real diffuse surfaces brighten toward grazing angles when rough (`oren_nayar`) and darken
+there under a smooth coat.
 """
 
 from dataclasses import dataclass
@@ -21,16 +21,30 @@ from .model import Parameter, check_range
 
 @dataclass(frozen=True)
 class LambertGradient:
-    """`albedo` (...): the derivative of f_r by the albedo, in 1/sr."""
+    """Derivative of f_r by the parameter.
+
+    Attributes
+    ----------
+    albedo : (...) ndarray
+        In 1/sr.
+    """
 
     albedo: np.ndarray
 
 
 @dataclass(frozen=True)
 class Lambert:
-    """`albedo`: share of the light that is reflected, in [0, 1].
+    """The Lambertian model; reciprocal.
 
-    Raises `InputError` outside it. Reciprocal.
+    Attributes
+    ----------
+    albedo : float or ndarray
+        Share of the light that is reflected, in [0, 1].
+
+    Raises
+    ------
+    InputError
+        Outside this range.
     """
 
     albedo: Parameter = 1.0
@@ -39,9 +53,9 @@ class Lambert:
         check_range("albedo", self.albedo, 0, 1)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
         return self.albedo * self.gradient(normal, view, light).albedo
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> LambertGradient:
-        """The derivative of `value` by the albedo."""
+        """Return the derivative of `value` by the albedo."""
         return LambertGradient(np.where(cosines(normal, view, light).lit, 1 / np.pi, 0))

@@ -1,4 +1,4 @@
-"""What a reflectance model is, whichever it is, and how its parameters are checked."""
+"""The interface of reflectance models, and the checks of their parameters."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -18,7 +18,9 @@ class Model(Protocol):
     """
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...), or (..., 3) for a coloured model, in 1/sr, >= 0; 0 below the horizon."""
+        """Return f_r (...), or (..., 3) for a coloured model, in 1/sr, >= 0; 0 below the
+        horizon.
+        """
         ...
 
 
@@ -26,14 +28,26 @@ class Lobe(Model, Protocol):
     """A model without colour, whose derivatives are known."""
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> object:
-        """A dataclass with the derivative (...) of f_r by each parameter, under the parameter's
-        name.
-        """
+        """Return a dataclass with the derivative (...) of f_r by each parameter, under its name."""
         ...
 
 
 def check_range(name: str, value: Parameter | Sequence[float], low: float, high: float) -> None:
-    """Raises `InputError` unless every number of `value` is finite and within [low, high]."""
+    """Check the range of a parameter.
+
+    Parameters
+    ----------
+    name : str
+        For the error message.
+    value : float, ndarray or sequence of float
+    low, high : float
+        Smallest and largest value.
+
+    Raises
+    ------
+    InputError
+        Unless every number is finite and within [low, high].
+    """
     numbers = np.asarray(value)
     if (
         numbers.dtype.kind not in "fiu"
@@ -51,13 +65,11 @@ def check_range(name: str, value: Parameter | Sequence[float], low: float, high:
 
 
 def power(base: np.ndarray, exponent: Parameter) -> np.ndarray:
-    """base^exponent, 0 where the base is not above 0, whatever the exponent."""
+    """Return base^exponent, 0 where the base is not above 0, whatever the exponent."""
     above = base > 0
     return np.where(above, np.where(above, base, 1) ** exponent, 0)
 
 
 def log_above_zero(base: np.ndarray) -> np.ndarray:
-    """log(base), and 0 where the base is not above 0: there the power that it is multiplied with is
-    0.
-    """
+    """Return log(base), and 0 where the base is not above 0: there the power it multiplies is 0."""
     return np.log(np.where(base > 0, base, 1))

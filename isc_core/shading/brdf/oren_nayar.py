@@ -1,6 +1,6 @@
-"""The rough matt surface, qualitative model (Oren & Nayar 1994).
+"""The rough diffuse surface, qualitative model (Oren & Nayar 1994).
 
-Problem: clay, cloth or the moon look flatter than a Lambertian sphere and shine back toward the
+Problem: clay, cloth or the moon look flatter than a Lambertian sphere and reflect back toward the
 light.
 
 Equation: with facets whose slopes have the standard deviation s (radians), a the larger and b the
@@ -13,7 +13,7 @@ Citation: M. Oren and S. K. Nayar, "Generalization of Lambert's reflectance mode
 239-246, doi:10.1145/192161.192213.
 
 Limits: a short form of the authors' full model, without light between facets: a white rough surface
-loses light (22 % at s = .5 seen from above), and below s = .3 a grazing view keeps up to 1.5 % too
+loses light (22 % at s = .5 seen from above), and below s = .3 a grazing view gains up to 1.5 % too
 much. s = 0 is Lambert. Reciprocal. Where both angles are grazing f_r grows without bound, but f_r
 cos stays finite.
 """
@@ -28,7 +28,12 @@ from .model import Parameter, check_range
 
 @dataclass(frozen=True)
 class OrenNayarGradient:
-    """`albedo`, `sigma` (...): the derivatives of f_r by the parameters."""
+    """Derivatives of f_r by the parameters, each (...).
+
+    Attributes
+    ----------
+    albedo, sigma : ndarray
+    """
 
     albedo: np.ndarray
     sigma: np.ndarray
@@ -36,8 +41,19 @@ class OrenNayarGradient:
 
 @dataclass(frozen=True)
 class OrenNayar:
-    """`albedo`: of the facets, in [0, 1]. `sigma`: standard deviation of their slope angles in
-    radians, in [0, pi/2]. Raises `InputError` outside these ranges.
+    """The Oren-Nayar model.
+
+    Attributes
+    ----------
+    albedo : float or ndarray
+        Of the facets, in [0, 1].
+    sigma : float or ndarray
+        Standard deviation of their slope angles in radians, in [0, pi/2].
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     albedo: Parameter = 1.0
@@ -48,13 +64,13 @@ class OrenNayar:
         check_range("sigma", self.sigma, 0, np.pi / 2)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
         return self.albedo * self.gradient(normal, view, light).albedo
 
     def gradient(
         self, normal: np.ndarray, view: np.ndarray, light: np.ndarray
     ) -> OrenNayarGradient:
-        """The derivatives of `value` by albedo and sigma."""
+        """Return the derivatives of `value` by albedo and sigma."""
         angles = cosines(normal, view, light)
         term = _azimuth_term(angles)
         square = np.square(self.sigma)

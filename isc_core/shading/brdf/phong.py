@@ -1,4 +1,4 @@
-"""The glossy lobe around the mirror direction (Phong 1975).
+"""The specular lobe around the mirror direction (Phong 1975).
 
 Problem: a highlight that is brightest where the light is mirrored and fades with the angle from
 there.
@@ -6,7 +6,7 @@ there.
 Equation: c is the cosine between the mirrored view and the light, clamped at 0. Plain, as
 published: the RADIANCE is strength c^n per irradiance across the beam, without the cosine of the
 light; so f_r = strength c^n / cos_light. Normalised (Lafortune & Willems 1994): f_r = strength (n +
-2) / (2 pi) c^n, which keeps exactly `strength` of the light seen along the normal and less
+2) / (2 pi) c^n, which reflects exactly `strength` of the light seen along the normal and less
 elsewhere.
 
 Citation: B. T. Phong, "Illumination for computer generated pictures", Communications of the ACM
@@ -14,7 +14,7 @@ Citation: B. T. Phong, "Illumination for computer generated pictures", Communica
 modified Phong reflectance model for physically based rendering", report CW 197, KU Leuven (1994),
 which has no DOI.
 
-Limits: plain Phong is NOT reciprocal and keeps no energy balance; normalised Phong is reciprocal.
+Limits: plain Phong is NOT reciprocal and does not conserve energy; normalised Phong is reciprocal.
 Neither grows toward grazing angles as real gloss does.
 """
 
@@ -28,7 +28,12 @@ from .model import Parameter, check_range, log_above_zero, power
 
 @dataclass(frozen=True)
 class PhongGradient:
-    """`strength`, `exponent` (...): the derivatives of f_r by the parameters."""
+    """Derivatives of f_r by the parameters, each (...).
+
+    Attributes
+    ----------
+    strength, exponent : ndarray
+    """
 
     strength: np.ndarray
     exponent: np.ndarray
@@ -36,9 +41,21 @@ class PhongGradient:
 
 @dataclass(frozen=True)
 class Phong:
-    """`strength`: factor of the lobe, >= 0; normalised, the share of the light that it keeps.
-    `exponent`: >= 0, larger is glossier. `normalised`: see the module. Raises `InputError` outside
-    these ranges.
+    """The Phong model.
+
+    Attributes
+    ----------
+    strength : float or ndarray
+        Factor of the lobe, >= 0; normalised, the share of the light that it reflects.
+    exponent : float or ndarray
+        >= 0, larger is glossier.
+    normalised : bool
+        See the module.
+
+    Raises
+    ------
+    InputError
+        Outside these ranges.
     """
 
     strength: Parameter = 1.0
@@ -50,11 +67,11 @@ class Phong:
         check_range("exponent", self.exponent, 0, np.inf)
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
+        """Return f_r (...) in 1/sr for unit vectors (..., 3); 0 below the horizon."""
         return self.strength * self.gradient(normal, view, light).strength
 
     def gradient(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> PhongGradient:
-        """The derivatives of `value` by strength and exponent."""
+        """Return the derivatives of `value` by strength and exponent."""
         angles = cosines(normal, view, light)
         mirrored = _mirrored(angles)
         lobe = np.where(angles.lit, power(mirrored, self.exponent), 0)
@@ -67,5 +84,5 @@ class Phong:
 
 
 def _mirrored(angles: Cosines) -> np.ndarray:
-    """The cosine between the mirrored view and the light, clamped to [0, 1], where lit."""
+    """Cosine between the mirrored view and the light, clamped to [0, 1], where lit."""
     return np.clip(2 * angles.view * angles.light - angles.between, 0, 1)

@@ -1,7 +1,7 @@
 """Conversions between measures of gloss: Blinn-Phong's exponent p, the alpha of facets (GGX,
 Beckmann), Blender's roughness.
 
-Problem: a lobe fitted with one model is to be shown by a renderer that has another.
+Problem: show a lobe fitted with one model in a renderer that has another.
 
 Equation: Blender's Principled surface has alpha = roughness^2. The usual rule is p = 2 / alpha^2 -
 2. It makes the lobes of Blinn-Phong and of BECKMANN facets alike for small alpha; it is widely used
@@ -9,7 +9,7 @@ for GGX, whose core is sharper for the same alpha while its tails are long. The 
 alpha^2 - b, minimises the integral over the light's solid angle of the squared difference of the
 reflected light f_r cos_light, with the view along the normal, each lobe scaled to the same energy.
 The half angle t then is half the light's angle, and the lobes are cos^p t cos 2t against D(t)
-G1(cos 2t). The exact minimum was searched for at each alpha; the rule follows it.
+G1(cos 2t). The rule follows the exact minima, searched for at each alpha.
 
 Measured error (root of that integral over the integral of the squared lobe of facets;
 `lobe_difference`):
@@ -22,7 +22,7 @@ Measured error (root of that integral over the integral of the squared lobe of f
               fitted            .0001  .0009  .0034  .0119  .0201  .0386
               exact minimum     .0001  .0008  .0030  .0111  .0200  .0219
 
-So no exponent makes a Blinn-Phong lobe of a narrow GGX lobe: a quarter of it is another shape. Away
+No exponent turns a Blinn-Phong lobe into a narrow GGX lobe: a quarter of it has another shape. Away
 from the normal the rule stays near the best exponent while the lobes grow apart: for GGX viewed at
 60 degrees the error is .25 at alpha .05, .39 at .2 and .38 at .5, at most .03 above the best
 exponent's, and from alpha .3 on no better than the usual rule's.
@@ -58,46 +58,71 @@ _TINY = 1e-100
 
 
 def alpha_from_blender(roughness: Parameter) -> np.ndarray:
-    """Alpha in [0, 1] of GGX from the roughness in [0, 1] of Blender's Principled surface.
+    """Return the alpha of GGX from the roughness of Blender's Principled surface, both in [0, 1].
 
-    Raises `InputError` outside it.
+    Raises
+    ------
+    InputError
+        Outside this range.
     """
     check_range("roughness", roughness, 0, 1)
     return np.square(roughness)
 
 
 def blender_from_alpha(alpha: Parameter) -> np.ndarray:
-    """The roughness in [0, 1] of Blender's Principled surface from the alpha in [0, 1] of GGX.
+    """Return the roughness of Blender's Principled surface from the alpha of GGX, both in [0, 1].
 
-    Raises `InputError` outside it.
+    Raises
+    ------
+    InputError
+        Outside this range.
     """
     check_range("alpha", alpha, 0, 1)
     return np.sqrt(alpha)
 
 
 def exponent_from_alpha(alpha: Parameter) -> np.ndarray:
-    """The usual rule: p = 2 / alpha^2 - 2, >= 0, for alpha in (0, 1].
+    """Return p = 2 / alpha^2 - 2, >= 0, for alpha in (0, 1]: the usual rule.
 
-    Raises `InputError` outside it.
+    Raises
+    ------
+    InputError
+        Outside this range.
     """
     check_range("alpha", alpha, _TINY, 1)
     return 2 / np.square(alpha) - 2
 
 
 def alpha_from_exponent(exponent: Parameter) -> np.ndarray:
-    """The usual rule: alpha = sqrt(2 / (p + 2)), in (0, 1], for p >= 0.
+    """Return alpha = sqrt(2 / (p + 2)), in (0, 1], for p >= 0: the usual rule.
 
-    Raises `InputError` outside it.
+    Raises
+    ------
+    InputError
+        Outside this range.
     """
     check_range("exponent", exponent, 0, np.inf)
     return np.sqrt(2 / (np.asarray(exponent, float) + 2))
 
 
 def fitted_exponent(alpha: Parameter, facets: Facets = "ggx") -> np.ndarray:
-    """The exponent whose lobe is nearest to that of facets with `alpha`, in (0, .5] for GGX and (0,
-    .4] for Beckmann.
+    """Return the exponent whose lobe is most similar to that of facets.
 
-    Raises `InputError` outside it, where no exponent gives a similar lobe, and for unknown facets.
+    Parameters
+    ----------
+    alpha : float or ndarray
+        In (0, .5] for GGX and (0, .4] for Beckmann.
+    facets : str
+        "ggx" or "beckmann".
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    InputError
+        Outside these ranges, where no exponent gives a similar lobe, and for unknown facets.
     """
     scale, shift, largest = _rule(facets)
     check_range("alpha", alpha, _TINY, largest)
@@ -105,9 +130,23 @@ def fitted_exponent(alpha: Parameter, facets: Facets = "ggx") -> np.ndarray:
 
 
 def fitted_alpha(exponent: Parameter, facets: Facets = "ggx") -> np.ndarray:
-    """The inverse of `fitted_exponent`.
+    """Invert `fitted_exponent`.
 
-    Raises `InputError` for exponents below those that it gives (3.3 for GGX, 6.5 for Beckmann).
+    Parameters
+    ----------
+    exponent : float or ndarray
+        At least the smallest that `fitted_exponent` returns (3.3 for GGX, 6.5 for Beckmann).
+    facets : str
+        "ggx" or "beckmann".
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    InputError
+        Below this exponent, and for unknown facets.
     """
     scale, shift, largest = _rule(facets)
     # The smallest exponent is passed on to the last digit by rounding, hence the tolerance.
@@ -116,11 +155,27 @@ def fitted_alpha(exponent: Parameter, facets: Facets = "ggx") -> np.ndarray:
 
 
 def lobe_difference(alpha: float, exponent: float, facets: Facets = "ggx") -> float:
-    """How far a Blinn-Phong lobe is from one of facets, 0 being alike: the measured error of the
-    module's docstring.
+    """Return the difference between a Blinn-Phong lobe and one of facets.
 
-    `alpha` in [.001, 1], `exponent` >= 0. Raises `InputError` outside these ranges, and for unknown
-    facets.
+    It is the measured error of the module's docstring; 0 for equal lobes.
+
+    Parameters
+    ----------
+    alpha : float
+        In [.001, 1].
+    exponent : float
+        >= 0.
+    facets : str
+        "ggx" or "beckmann".
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    InputError
+        Outside these ranges, and for unknown facets.
     """
     _rule(facets)
     check_range("alpha", alpha, 1e-3, 1)
@@ -141,9 +196,8 @@ def lobe_difference(alpha: float, exponent: float, facets: Facets = "ggx") -> fl
 
 
 def _beckmann(alpha: float, half: np.ndarray) -> np.ndarray:
-    """D G1 of Beckmann facets at the half angle `half` in (0, pi/4), the view along the normal;
-
-    G1 is Smith's, exact.
+    """D G1 of Beckmann facets at the half angle `half` in (0, pi/4), the view along the normal; G1
+    is Smith's, exact.
     """
     facets = np.exp(-np.square(np.tan(half) / alpha)) / (np.pi * alpha**2 * np.cos(half) ** 4)
     # The tangent is kept from rounding to 0 at the pole, where nothing is hidden.

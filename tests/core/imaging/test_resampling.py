@@ -1,4 +1,4 @@
-"""Resampling keeps constants and ramps, excludes the background, and scales heights with the size."""
+"""Resampling keeps constants and ramps, excludes the background, and scales heights with size."""
 
 import numpy as np
 import pytest

@@ -10,7 +10,7 @@ from isc_core.shading.brdf.lambert import Lambert
 from isc_core.shading.radiance import DistantLights, directional, environment, radiance, sh_shading
 from isc_core.shading.spherical_harmonics import real_sh
 
-from .brdf.directions_at import GLOSSY_PAINT, UP, polar_units, random_units
+from .brdf.directions_at import GLOSSY_PLASTIC, UP, polar_units, random_units
 
 
 def sky(rows: int = 40) -> tuple[np.ndarray, np.ndarray]:
@@ -33,9 +33,9 @@ def test_lights_add_up() -> None:
         random_units(50),
         DistantLights(random_units(3, seed=7), np.random.default_rng(1).uniform(0, 2, (3, 3))),
     )
-    together = radiance(GLOSSY_PAINT, normal, UP, lights)
+    together = radiance(GLOSSY_PLASTIC, normal, UP, lights)
     alone = [
-        radiance(GLOSSY_PAINT, normal, UP, directional(*pair))
+        radiance(GLOSSY_PLASTIC, normal, UP, directional(*pair))
         for pair in zip(lights.directions, lights.irradiance, strict=True)
     ]
     assert together.shape == (50, 3) and together.max() > 0
@@ -46,7 +46,7 @@ def test_a_white_sky_shows_what_a_surface_keeps() -> None:
     directions, weights = sky(28)
     white = environment(directions, weights, np.ones((len(weights), 3)))
     for cos_view in (0.9, 0.5):
-        for model in (Lambert(0.6), Ggx(0.5, 0.8), GLOSSY_PAINT):
+        for model in (Lambert(0.6), Ggx(0.5, 0.8), GLOSSY_PLASTIC):
             seen = radiance(model, UP, polar_units(np.array(cos_view)), white)
             assert np.allclose(seen, directional_albedo(model, cos_view), rtol=5e-3)
 

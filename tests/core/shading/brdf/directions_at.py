@@ -23,7 +23,7 @@ RECIPROCAL: list[Lobe] = [
 ]
 PLAIN: list[Lobe] = [Phong(0.6, 31.0, normalised=False), BlinnPhong(0.6, 47.0, "plain")]
 LOBES = RECIPROCAL + PLAIN
-GLOSSY_PAINT = Dichromatic(np.array([0.7, 0.3, 0.1]), OrenNayar(0.9, 0.3), Ggx(0.2, 0.04))
+GLOSSY_PLASTIC = Dichromatic(np.array([0.7, 0.3, 0.1]), OrenNayar(0.9, 0.3), Ggx(0.2, 0.04))
 
 
 def random_units(*shape: int, seed: int = 0) -> np.ndarray:

@@ -12,7 +12,7 @@ from isc_core.shading.brdf.model import Model
 from isc_core.shading.brdf.oren_nayar import OrenNayar
 from isc_core.shading.brdf.phong import Phong
 
-from .directions_at import GLOSSY_PAINT, UP, polar_units
+from .directions_at import GLOSSY_PLASTIC, UP, polar_units
 
 VIEWS = (1.0, 0.7, 0.3, 0.1)
 EXPONENTS = (5.0, 9.0, 30.0, 200.0, 2000.0)
@@ -134,9 +134,9 @@ def test_the_nodes_are_enough() -> None:
 
 
 def test_coloured_paint_has_a_channel_each() -> None:
-    kept = directional_albedo(GLOSSY_PAINT, 0.8)
+    kept = directional_albedo(GLOSSY_PLASTIC, 0.8)
     body, gloss = (
-        directional_albedo(lobe, 0.8) for lobe in (GLOSSY_PAINT.body, GLOSSY_PAINT.interface)
+        directional_albedo(lobe, 0.8) for lobe in (GLOSSY_PLASTIC.diffuse, GLOSSY_PLASTIC.specular)
     )
     assert np.allclose(kept, np.array([0.7, 0.3, 0.1]) * body + gloss)
 

@@ -19,7 +19,7 @@ from isc_core.shading.brdf.oren_nayar import OrenNayar
 from isc_core.shading.brdf.phong import Phong
 
 from .directions_at import (
-    GLOSSY_PAINT,
+    GLOSSY_PLASTIC,
     LOBES,
     PLAIN,
     RECIPROCAL,
@@ -84,14 +84,14 @@ def test_gradients_are_the_values_derivatives(model: Lobe) -> None:
 
 def test_gradients_of_coloured_paint() -> None:
     geometry = lit_triples(400)
-    gradient = GLOSSY_PAINT.gradient(*geometry)
+    gradient = GLOSSY_PLASTIC.gradient(*geometry)
     for lobe in ("body", "interface"):
-        inner, slopes = getattr(GLOSSY_PAINT, lobe), getattr(gradient, lobe)
+        inner, slopes = getattr(GLOSSY_PLASTIC, lobe), getattr(gradient, lobe)
         for parameter in numbers(slopes):
             here, step = getattr(inner, parameter), 1e-6
             changed = [replace(inner, **{parameter: here + sign * step}) for sign in (1, -1)]
             up, down = (
-                replace(GLOSSY_PAINT, **{lobe: other}).value(*geometry) for other in changed
+                replace(GLOSSY_PLASTIC, **{lobe: other}).value(*geometry) for other in changed
             )  # type: ignore[arg-type]
             expected, found = (up - down) / (2 * step), getattr(slopes, parameter)
             found = found if found.ndim == 2 else found[:, None]
@@ -103,7 +103,7 @@ def test_gradients_of_coloured_paint() -> None:
     for channel in range(3):
         shift = step * np.eye(3)[channel]
         up, down = (
-            replace(GLOSSY_PAINT, colour=GLOSSY_PAINT.colour + sign * shift).value(*geometry)
+            replace(GLOSSY_PLASTIC, colour=GLOSSY_PLASTIC.colour + sign * shift).value(*geometry)
             for sign in (1, -1)
         )
         assert np.allclose(
@@ -112,7 +112,7 @@ def test_gradients_of_coloured_paint() -> None:
         assert not np.delete(up - down, channel, axis=1).any()
 
 
-@pytest.mark.parametrize("model", [*LOBES, GLOSSY_PAINT], ids=name)
+@pytest.mark.parametrize("model", [*LOBES, GLOSSY_PLASTIC], ids=name)
 def test_turning_everything_changes_nothing(model: Model) -> None:
     geometry = lit_triples(300)
     here, there = model.value(*geometry), model.value(*(turned(vectors, 5) for vectors in geometry))
@@ -120,7 +120,7 @@ def test_turning_everything_changes_nothing(model: Model) -> None:
     assert np.allclose(here, there, rtol=1e-9, atol=1e-12 * here.max())
 
 
-@pytest.mark.parametrize("model", [*RECIPROCAL, GLOSSY_PAINT], ids=name)
+@pytest.mark.parametrize("model", [*RECIPROCAL, GLOSSY_PLASTIC], ids=name)
 def test_view_and_light_may_be_exchanged(model: Model) -> None:
     assert reciprocity_error(model) <= 1e-12
 
@@ -130,7 +130,7 @@ def test_plain_lobes_are_not_reciprocal(model: Model) -> None:
     assert reciprocity_error(model) > 0.1
 
 
-@pytest.mark.parametrize("model", [*LOBES, GLOSSY_PAINT], ids=name)
+@pytest.mark.parametrize("model", [*LOBES, GLOSSY_PLASTIC], ids=name)
 def test_below_the_horizon_nothing_leaves(model: Lobe | Dichromatic) -> None:
     cosine = np.array([1, 0.5, 1e-3, 1e-7, 1e-12, 0, -1e-12, -1e-3, -1])
     view, light = (
@@ -141,7 +141,7 @@ def test_below_the_horizon_nothing_leaves(model: Lobe | Dichromatic) -> None:
     above = (cosine > 1e-9)[:, None, None] & (cosine > 1e-9)[None, :, None] & np.ones(3, bool)
     assert np.isfinite(value).all() and (value >= 0).all() and not value[~above].any()
     gradient = model.gradient(UP, view, light)
-    parts = [gradient.body, gradient.interface] if isinstance(model, Dichromatic) else [gradient]  # type: ignore[attr-defined]
+    parts = [gradient.diffuse, gradient.specular] if isinstance(model, Dichromatic) else [gradient]  # type: ignore[attr-defined]
     for part in parts:
         for parameter in numbers(part):
             slope = getattr(part, parameter)
@@ -224,10 +224,12 @@ def test_ggx_is_the_product_of_its_published_factors() -> None:
 
 def test_dichromatic_is_colour_times_body_plus_white() -> None:
     geometry = lit_triples(300)
-    value = GLOSSY_PAINT.value(*geometry)
-    difference = value - GLOSSY_PAINT.interface.value(*geometry)[:, None]
-    assert np.allclose(difference, GLOSSY_PAINT.body.value(*geometry)[:, None] * [0.7, 0.3, 0.1])
-    assert np.allclose(value[:, 0] - value[:, 1], 0.4 * GLOSSY_PAINT.body.value(*geometry))
+    value = GLOSSY_PLASTIC.value(*geometry)
+    difference = value - GLOSSY_PLASTIC.specular.value(*geometry)[:, None]
+    assert np.allclose(
+        difference, GLOSSY_PLASTIC.diffuse.value(*geometry)[:, None] * [0.7, 0.3, 0.1]
+    )
+    assert np.allclose(value[:, 0] - value[:, 1], 0.4 * GLOSSY_PLASTIC.diffuse.value(*geometry))
 
 
 @pytest.mark.parametrize(
