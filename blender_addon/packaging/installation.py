@@ -161,10 +161,9 @@ def extension_module(name: str) -> Any:
 
 def begin_run() -> Any:
     """Start a run as the button does, without a window."""
-    request = part("operators.request").request_from_settings(bpy.data.scenes[0])
-    return part("operators.worker_run").begin(
-        part("operators.decompose").run_of(bpy.context, request)
-    )
+    request = extension_module("operators.request").request_from_settings(bpy.data.scenes[0])
+    run = extension_module("operators.decompose").create_decompose_run(bpy.context, request)
+    return extension_module("operators.worker_run").begin_run(run)
 
 
 def poll_run(run: Any, seconds: float = 600.0, until: float = 2.0) -> list[str]:
@@ -328,7 +327,7 @@ def append(blend: Path) -> None:
 
 
 def uninstall() -> None:
-    """Uninstall, and check that no properties and no files of the extension and its wheels remain."""
+    """Uninstall, and check that no properties, files and wheels of the extension remain."""
     folder = extension_folder()
     wheels = folder.parent.parent / ".local"
     bpy.ops.extensions.package_uninstall(repo_index=_repository(), pkg_id="isc_intrinsic")

@@ -41,7 +41,7 @@ def locked(lock: Path = LOCK) -> dict[str, str]:
         digest, _, name = line.partition("  ")
         if len(digest) != 64 or not name.endswith(".whl"):
             raise InputError(
-                f"{lock.name} has an invalid line (expected HASH, two spaces, NAME.whl): {line[:80]}"
+                f"{lock.name} has an invalid line: {line[:80]!r} (expected `HASH  NAME.whl`)"
             )
         found[name] = digest
     return found

@@ -1,5 +1,5 @@
-"""The photo's camera: orthographic, with the frame of the photo, pixel by pixel where the render has
-the size of the maps.
+"""The photo's camera: orthographic, with the frame of the photo. A render of the maps' size matches
+them pixel by pixel.
 """
 
 import bpy

@@ -1,5 +1,5 @@
-"""A closed mesh from the open front that a photo shows: a flat back, and a wall along the outline and
-around holes.
+"""A closed mesh from the open front that a photo shows: a flat back, and a wall along the outline
+and around holes.
 
 Every edge then has two faces that traverse it in opposite directions, as 3D printing and boolean
 operations require. Where two parts of the front meet in a single vertex, that vertex is split,

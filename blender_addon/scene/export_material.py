@@ -1,5 +1,5 @@
-"""A plain material for export, in place of the group "ISC Dichromatic", for programs without Blender's
-node groups.
+"""A plain material in place of the group "ISC Dichromatic", for export to programs without node
+groups.
 
 Equation: base colour = min(1, g v rotated(rho; hue, saturation)), as the group computes it:
 `rotated` is Blender's Hue/Saturation, v the value, g the diffuse gain. It is baked into an 8-bit

@@ -22,7 +22,7 @@ def result(bump_folder: Path, blender: Any) -> ResultArrays:
     return read_result(bump_folder)
 
 
-def test_what_stands_in_blender_is_what_was_recovered(result: ResultArrays, tmp_path: Path) -> None:
+def test_renders_match_the_recovered_maps(result: ResultArrays, tmp_path: Path) -> None:
     renders = closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES)
     row = closed_loop.loop_row("bump", renders)
     assert row.shading < 0.08
@@ -41,9 +41,7 @@ def test_what_stands_in_blender_is_what_was_recovered(result: ResultArrays, tmp_
 
 
 @pytest.mark.parametrize("light", ["sun", "sky"])
-def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(
-    result: ResultArrays, light: str
-) -> None:
+def test_a_new_light_has_the_given_strength_and_direction(result: ResultArrays, light: str) -> None:
     """A shallow dome has no shadows under light from the front: matt radiance is albedo *
     irradiance / pi.
     """
@@ -81,7 +79,7 @@ def test_a_new_light_is_as_bright_as_it_is_told_and_where_it_is_told(
     )
 
 
-def test_materials_that_shine_by_themselves_are_found(result: ResultArrays) -> None:
+def test_emissive_materials_are_detected(result: ResultArrays) -> None:
     from benchmarks.blender.renders import shining
     from blender_addon.scene import BuildOptions, build_object
 
@@ -90,7 +88,7 @@ def test_materials_that_shine_by_themselves_are_found(result: ResultArrays) -> N
         assert not shining(build_object(result, BuildOptions(specular_from=gloss)).material)  # type: ignore[arg-type]
 
 
-def test_an_object_shadows_itself_only_where_others_stand_around_it(result: ResultArrays) -> None:
+def test_own_shadows_are_on_in_shared_scenes_only(result: ResultArrays) -> None:
     from blender_addon.scene import BuildOptions, build_object
 
     def shadows(**options: Any) -> tuple[bool, bool]:
@@ -104,7 +102,7 @@ def test_an_object_shadows_itself_only_where_others_stand_around_it(result: Resu
     assert shadows(name="among others", own_scene=False, own_shadows=False) == (False, False)
 
 
-def test_only_the_scale_of_a_relit_picture_is_free() -> None:
+def test_only_the_scale_of_a_relit_image_is_free() -> None:
     rng = np.random.default_rng(0)
     truth, mask = rng.uniform(0, 1, (8, 9, 3)), np.ones((8, 9), bool)
     seen = truth + rng.normal(0, 0.05, truth.shape)

@@ -126,7 +126,7 @@ def test_an_import_that_would_fail_once_installed_stops_the_build(source: str) -
         installed_source(source, "a.py")
 
 
-def test_the_zip_holds_the_addon_the_core_and_no_tools() -> None:
+def test_the_zip_contains_the_addon_and_the_core_but_no_tools() -> None:
     names = set(contents(LINUX, []))
     assert {
         "blender_manifest.toml",
@@ -167,7 +167,7 @@ def test_every_module_in_the_zip_is_python_that_names_no_package_of_the_source_t
         ], name
 
 
-def test_the_manifest_says_what_the_zip_is_for() -> None:
+def test_the_manifest_describes_the_target() -> None:
     about = tomllib.loads(
         manifest(LINUX, [Path("x/scipy-1-cp311-cp311-manylinux_2_28_x86_64.whl")])
     )
@@ -208,7 +208,7 @@ def test_a_wheel_that_is_not_the_locked_one_stops_the_build(tmp_path: Path) -> N
 
 
 @needs_bpy
-def test_blender_accepts_the_zip_and_its_refusal_is_reported(tmp_path: Path) -> None:
+def test_blender_validates_the_zip_and_a_rejection_is_reported(tmp_path: Path) -> None:
     path = build(LINUX, tmp_path, None)
     assert validate(path)
     entries = contents(LINUX, [])
@@ -221,7 +221,7 @@ def test_blender_accepts_the_zip_and_its_refusal_is_reported(tmp_path: Path) -> 
         validate(tmp_path / "bad.zip")
 
 
-def test_the_command_says_in_one_line_what_is_wrong(
+def test_the_command_prints_errors_in_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert (

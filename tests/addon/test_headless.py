@@ -38,8 +38,12 @@ runpy.run_path(script, run_name="__main__")
 SCENES = """
 import bpy, json, sys
 bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
-about = {s.name: [s.render.engine, s.cycles.samples, s.render.resolution_x, len(s.objects)] for s in bpy.data.scenes}
-print("ABOUT", json.dumps([about, bpy.context.scene.name, [i.name for i in bpy.data.images if i.size[0] and not i.packed_file]]))
+about = {
+    s.name: [s.render.engine, s.cycles.samples, s.render.resolution_x, len(s.objects)]
+    for s in bpy.data.scenes
+}
+loose = [i.name for i in bpy.data.images if i.size[0] and not i.packed_file]
+print("ABOUT", json.dumps([about, bpy.context.scene.name, loose]))
 """
 
 
@@ -95,7 +99,7 @@ def photo(folder: Path, name: str = "bump.png") -> Path:
     return folder / name
 
 
-def test_a_result_becomes_a_file_and_a_render_that_looks_like_it(tmp_path: Path) -> None:
+def test_a_result_becomes_a_blend_file_and_a_matching_render(tmp_path: Path) -> None:
     write_result(tmp_path / "result")
     blend, picture = tmp_path / "scene" / "out.blend", tmp_path / "scene" / "out.png"
     done = run(
@@ -115,7 +119,7 @@ def test_a_result_becomes_a_file_and_a_render_that_looks_like_it(tmp_path: Path)
     assert sorted(path.name for path in (tmp_path / "scene").iterdir()) == ["out.blend", "out.png"]
 
 
-def test_a_folder_goes_into_one_file_with_a_scene_each_or_into_files_of_its_own(
+def test_a_folder_becomes_one_file_with_several_scenes_or_several_files(
     tmp_path: Path,
 ) -> None:
     for name in ("cup", "jug"):
@@ -140,7 +144,7 @@ def test_a_folder_goes_into_one_file_with_a_scene_each_or_into_files_of_its_own(
     ]
 
 
-def test_a_photo_is_taken_apart_when_blender_runs_the_file_from_the_source_tree(
+def test_a_photo_is_decomposed_when_blender_runs_the_script_from_the_source_tree(
     tmp_path: Path,
 ) -> None:
     blend, kept = tmp_path / "out.blend", tmp_path / "kept"
@@ -157,7 +161,7 @@ def test_a_photo_is_taken_apart_when_blender_runs_the_file_from_the_source_tree(
     assert (kept / "bump" / "arrays.npz").is_file()
 
 
-def test_why_a_result_is_doubtful_is_said(tmp_path: Path) -> None:
+def test_warnings_of_a_photo_are_printed(tmp_path: Path) -> None:
     image, mask = under_lamps((-0.8, 0.4, 0.7), (0.8, 0.3, 0.7), (0.1, -0.8, 0.7))
     np.save(tmp_path / "ball.npy", image)
     cv2.imwrite(str(tmp_path / "mask.png"), np.uint8(255) * mask)
@@ -184,7 +188,7 @@ OLD_STATUS = {  # of schema 1
 }
 
 
-def test_a_results_folder_says_why_it_is_doubtful_too(tmp_path: Path) -> None:
+def test_warnings_of_a_result_folder_are_printed(tmp_path: Path) -> None:
     """What the photo's own run said; a status that is not as it should be says nothing."""
     result, odd = write_result(tmp_path / "all" / "cup"), write_result(tmp_path / "all" / "odd")
     for folder, status in (
@@ -215,7 +219,7 @@ def test_a_results_folder_says_why_it_is_doubtful_too(tmp_path: Path) -> None:
         (["RESULT", "--render", "x.png", "--nonsense"], "unrecognized arguments: --nonsense"),
     ],
 )
-def test_what_cannot_be_done_is_said_in_one_line_before_any_work(
+def test_invalid_arguments_are_refused_in_one_line_before_any_work(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
@@ -231,7 +235,7 @@ def test_what_cannot_be_done_is_said_in_one_line_before_any_work(
     assert [path.name for path in tmp_path.iterdir()] == ["RESULT"]
 
 
-def test_one_that_fails_does_not_hold_up_the_others(tmp_path: Path) -> None:
+def test_a_failed_source_does_not_stop_the_others(tmp_path: Path) -> None:
     for name in ("cup", "jug"):
         write_result(tmp_path / "all" / name)
     (tmp_path / "all" / "cup" / "arrays.npz").write_bytes(b"nothing")
@@ -257,7 +261,7 @@ def test_ctrl_c_ends_the_worker_and_leaves_nothing(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["bump.png"]
 
 
-def test_a_host_that_had_set_signals_itself_is_no_trouble() -> None:
+def test_signal_handlers_set_in_c_are_tolerated() -> None:
     """Blender sets its own in C, which Python knows nothing of and cannot set again."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
     try:
@@ -269,9 +273,10 @@ def test_a_host_that_had_set_signals_itself_is_no_trouble() -> None:
             signal.signal(number, handler)
 
 
-def test_a_fault_is_not_taken_for_success(tmp_path: Path) -> None:
+def test_an_internal_error_has_a_nonzero_exit_code(tmp_path: Path) -> None:
     """Blender itself ends with 0 after a script that raised."""
-    code = "import runpy, sys, blender_addon.headless_command as c; c.main = None; sys.argv = ['headless']; "
+    code = "import runpy, sys, blender_addon.headless_command as c; c.main = None; "
+    code += "sys.argv = ['headless']; "
     code += "runpy.run_module('blender_addon.headless', run_name='__main__')"
     done = subprocess.run(
         [sys.executable, "-c", code],

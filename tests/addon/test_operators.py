@@ -74,7 +74,7 @@ def census(blender: Any) -> dict[str, list[str]]:
 # --- from photo to object -------------------------------------------------------------------------
 
 
-def test_a_photo_becomes_an_object_and_is_made_again_larger(addon: Any) -> None:
+def test_a_photo_becomes_an_object_and_is_decomposed_again_at_another_size(addon: Any) -> None:
     """One real run, of a painted photo with a name that is no file name."""
     addon.data.scenes[0].name = "Mine"
     settings = addon.context.scene.isc
@@ -161,13 +161,13 @@ def test_two_runs_at_once_are_refused(addon: Any, tmp_path: Path) -> None:
 # --- what is asked for ----------------------------------------------------------------------------
 
 
-def test_the_panel_knows_what_the_command_knows() -> None:
+def test_the_panel_offers_all_models_separators_and_illuminations() -> None:
     assert {item[0] for item in properties.MODELS} == set(MODELS)
     assert {item[0] for item in properties.SEPARATORS} == set(METHODS)
     assert {item[0] for item in properties.ILLUMINATIONS} == set(ILLUMINATIONS)
 
 
-def test_every_property_and_operator_explains_itself(addon: Any) -> None:
+def test_every_property_and_operator_has_a_tooltip(addon: Any) -> None:
     kinds: list[Any] = [*properties.CLASSES, preferences.ISC_AP_preferences, *operators.CLASSES]
     for kind in kinds:
         known = kind.bl_rna
@@ -179,7 +179,7 @@ def test_every_property_and_operator_explains_itself(addon: Any) -> None:
                 assert item.description, f"{kind.__name__}.{name}: {item.identifier}"
 
 
-def test_presets_are_what_they_set(addon: Any) -> None:
+def test_presets_set_their_values(addon: Any) -> None:
     settings = addon.context.scene.isc
     assert settings.preset == "STANDARD", "the usual values are a preset"
     for name, preset in presets.PRESETS.items():
@@ -197,7 +197,7 @@ def test_presets_are_what_they_set(addon: Any) -> None:
     assert settings.samples == presets.PRESETS["FULL"].samples + 1
 
 
-def test_choices_survive_the_file(addon: Any, tmp_path: Path) -> None:
+def test_settings_are_saved_with_the_file(addon: Any, tmp_path: Path) -> None:
     settings = addon.context.scene.isc
     settings.image, settings.mask, settings.mask_source = photo(), mask_image(), "IMAGE"
     settings.model, settings.size_metres = "mbp", 0.4
@@ -206,6 +206,16 @@ def test_choices_survive_the_file(addon: Any, tmp_path: Path) -> None:
     addon.ops.wm.open_mainfile(filepath=str(tmp_path / "a.blend"))
     assert request_from_settings(addon.context.scene) == asked
     assert asked.build.size_metres == pytest.approx(0.4) and asked.method.model == "mbp"
+
+
+def test_numbers_of_enumeration_items_never_change() -> None:
+    """Files store them."""
+    for items in (properties.MODELS, properties.SEPARATORS, properties.OWN_SHADOWS_ITEMS):
+        assert [item[3] for item in items] == list(range(len(items)))
+    assert [item[0] for item in properties.OWN_SHADOWS_ITEMS] == ["auto", "on", "off"]
+    assert [item[0] for item in properties.SPECULAR_SOURCES] == ["lobe", "image", "none"]
+    assert [item[0] for item in properties.MODELS][:4] == ["joint", "mdr", "mbp", "sirfs"]
+    assert [item[0] for item in properties.SEPARATORS][:3] == ["isc", "network", "sparse_coding"]
 
 
 def test_a_request_is_kept_as_text() -> None:
@@ -220,7 +230,7 @@ def test_a_request_is_kept_as_text() -> None:
             requests.request_from_json(broken)
 
 
-def test_objects_of_two_photos_are_told_apart(addon: Any, tmp_path: Path) -> None:
+def test_objects_of_two_photos_have_different_keys(addon: Any, tmp_path: Path) -> None:
     first, second = photo("cup.png"), photo("cup.jpg")
     assert requests.object_key(first) == requests.object_key(second) == "cup"
     thing = addon.data.objects.new("cup", None)
@@ -265,7 +275,8 @@ def set_image(settings: Any, values: np.ndarray) -> None:
         ),
         (
             lambda s: masked(s, mask_image(size=(20, 30))),
-            "the mask is 30 x 20 pixels, the photo 88 x 64: choose another mask, or enable Scale Mask",
+            "the mask is 30 x 20 pixels, the photo 88 x 64: "
+            "choose another mask, or enable Scale Mask",
         ),
         (lambda s: masked(s, None), "is the photo itself"),
         (lambda s: set_image(s, np.zeros((32, 32, 3))), "wall: every pixel is black"),
@@ -275,7 +286,7 @@ def set_image(settings: Any, values: np.ndarray) -> None:
         ),
     ],
 )
-def test_what_is_wrong_is_said_and_nothing_changes(
+def test_invalid_input_is_reported_and_changes_nothing(
     addon: Any, prepare: Any, complaint: str
 ) -> None:
     prepare(addon.context.scene.isc)
@@ -286,7 +297,7 @@ def test_what_is_wrong_is_said_and_nothing_changes(
     assert after == before and list(Path(addon.app.tempdir).iterdir()) == folders
 
 
-def test_a_mask_of_another_size_is_taken_where_that_is_wanted(addon: Any) -> None:
+def test_a_mask_of_another_size_is_scaled_if_enabled(addon: Any) -> None:
     settings = addon.context.scene.isc
     settings.image, settings.mask_source, settings.mask = (
         photo(),
@@ -304,13 +315,13 @@ def test_a_mask_of_another_size_is_taken_where_that_is_wanted(addon: Any) -> Non
     run.cancel()
 
 
-def test_a_missing_worker_is_said(addon: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_worker_is_reported(addon: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     addon.context.scene.isc.image = photo()
     assert "the worker is missing" in say(addon.ops.isc.decompose)
 
 
-def test_a_box_that_is_none_is_refused(addon: Any) -> None:
+def test_an_empty_box_is_refused(addon: Any) -> None:
     settings = addon.context.scene.isc
     settings.image = photo()
     assert "the box is less than 8 pixels wide or high" in say(addon.ops.isc.cut_mask)
@@ -359,7 +370,7 @@ def test_shadows_are_as_chosen(
     assert (made.visible_shadow, made.visible_diffuse) == (cast, cast)
 
 
-def test_a_folder_without_arrays_is_given_them(addon: Any, tmp_path: Path) -> None:
+def test_missing_arrays_are_added_to_a_folder(addon: Any, tmp_path: Path) -> None:
     from isc_core.result_files.result_folder import save
 
     save(bump(), tmp_path / "cup")
@@ -369,7 +380,9 @@ def test_a_folder_without_arrays_is_given_them(addon: Any, tmp_path: Path) -> No
     )
 
 
-def test_what_is_no_result_is_refused(addon: Any, tmp_path: Path, bump_folder: Path) -> None:
+def test_a_folder_without_a_result_is_refused(
+    addon: Any, tmp_path: Path, bump_folder: Path
+) -> None:
     before = census(addon)
     assert "is no result: select a folder that isc decompose has written" in say(
         addon.ops.isc.import_result, directory=str(tmp_path)
@@ -387,7 +400,7 @@ def test_the_same_object_is_updated(addon: Any, bump_folder: Path) -> None:
     assert census(addon) == once
 
 
-def test_photos_of_one_name_stand_beside_each_other(
+def test_photos_of_one_name_become_separate_objects(
     addon: Any, bump_folder: Path, tmp_path: Path
 ) -> None:
     """From two folders; what panels remember goes by the name that was given."""
@@ -408,7 +421,7 @@ def test_photos_of_one_name_stand_beside_each_other(
     assert sum(thing.type == "MESH" for thing in addon.data.objects) == 2
 
 
-def test_what_is_built_comes_with_the_object_into_another_file(addon: Any, tmp_path: Path) -> None:
+def test_the_request_is_appended_with_the_object(addon: Any, tmp_path: Path) -> None:
     addon.context.scene.isc.image = photo()
     request = request_from_settings(addon.context.scene)
     addon.ops.isc.build_result(
@@ -453,7 +466,7 @@ def test_notes_are_joined_into_one_line() -> None:
     )
 
 
-def test_lines_fit() -> None:
+def test_text_is_wrapped() -> None:
     assert wrap_text("one two three", 7) == ["one two", "three"]
     assert wrap_text("unbreakable", 3) == ["unbreakable"] and wrap_text("", 5) == [""]
 
@@ -468,7 +481,7 @@ def test_lines_fit() -> None:
         ((1.5, 1.5), (2.0, 2.0), None),
     ],
 )
-def test_a_drawn_box_counts_from_above(
+def test_a_drawn_box_is_measured_from_the_top(
     first: tuple[float, float], second: tuple[float, float], box: Any
 ) -> None:
     assert box_from_corners(first, second, (100, 200)) == box

@@ -1,4 +1,4 @@
-"""Editing what was built: paint, gains, light, files; and what is said where it cannot be edited."""
+"""Edits of a built object: reflectance, gains, light, export; and their errors."""
 
 import colorsys
 import json
@@ -54,7 +54,7 @@ def sun_of(built: BuiltObject) -> Any:
     return next((thing for thing in built.collection.objects if thing.type == "LIGHT"), None)
 
 
-def test_recolouring_sets_the_paint_and_nothing_else(
+def test_recolouring_changes_the_reflectance_only(
     addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path
 ) -> None:
     before = sockets(built)
@@ -70,7 +70,7 @@ def test_recolouring_sets_the_paint_and_nothing_else(
     )
 
 
-def test_gains_reach_paint_and_gloss_wherever_it_comes_from(addon: Any, bump_folder: Path) -> None:
+def test_gains_apply_to_both_sources_of_highlights(addon: Any, bump_folder: Path) -> None:
     addon.context.scene.isc.specular_from = "image"
     addon.ops.isc.import_result(directory=str(bump_folder))
     material = find_built(addon.context.object).material  # type: ignore[union-attr]
@@ -89,7 +89,7 @@ def test_gains_reach_paint_and_gloss_wherever_it_comes_from(addon: Any, bump_fol
     )
 
 
-def test_an_edit_begins_with_what_is_set(addon: Any, built: BuiltObject) -> None:
+def test_an_edit_starts_with_the_current_values(addon: Any, built: BuiltObject) -> None:
     """From a panel: the redo panel shows the object's values, not the usual ones.
 
     Without a window, Blender never asks for that.
@@ -105,7 +105,7 @@ def test_an_edit_begins_with_what_is_set(addon: Any, built: BuiltObject) -> None
         assert {name: getattr(operator, name) for name in wanted} == pytest.approx(wanted)
 
 
-def test_the_sun_stands_where_the_light_was(
+def test_the_sun_has_the_dominant_direction(
     addon: Any, built: BuiltObject, bump_folder: Path
 ) -> None:
     result = read_result(bump_folder)
@@ -120,7 +120,7 @@ def test_the_sun_stands_where_the_light_was(
     )
 
 
-def test_the_sun_goes_where_it_is_told(addon: Any, built: BuiltObject) -> None:
+def test_the_sun_takes_a_custom_direction(addon: Any, built: BuiltObject) -> None:
     """Right, away from the viewer, up: Blender's own axes, as the camera looks along +Y."""
     addon.ops.isc.relight(light="OPTIMAL")
     energy = sun_of(built).data.energy
@@ -132,7 +132,7 @@ def test_the_sun_goes_where_it_is_told(addon: Any, built: BuiltObject) -> None:
     assert "no length" in say(addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0))
 
 
-def test_the_recovered_light_comes_back(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
+def test_the_recovered_light_is_restored(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     before = render(built.scene, tmp_path, samples=4)["Combined"]
     addon.ops.isc.relight(light="CHOSEN", direction=(1, 0, 0), ambient=0)
     lit = render(built.scene, tmp_path, samples=4)["Combined"][..., :3]
@@ -145,7 +145,7 @@ def test_the_recovered_light_comes_back(addon: Any, built: BuiltObject, tmp_path
     assert sun_of(built) is None
 
 
-def test_even_light_is_a_factor(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
+def test_uniform_light_is_scaled(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     addon.ops.isc.relight(light="OPTIMAL", strength=0, ambient=0)
     assert render(built.scene, tmp_path, samples=4)["Combined"][..., :3].max() < 1e-6
     addon.ops.isc.relight(light="OPTIMAL", strength=0, ambient=1)
@@ -160,12 +160,14 @@ def test_other_objects_are_not_edited(addon: Any, built: BuiltObject) -> None:
         assert not getattr(addon.ops.isc, name).poll(), name
 
 
-def test_nodes_that_were_taken_away_are_missed(addon: Any, built: BuiltObject) -> None:
+def test_a_missing_node_group_is_reported(addon: Any, built: BuiltObject) -> None:
     built.material.node_tree.nodes.clear()
     assert "has no node group ISC Dichromatic" in say(addon.ops.isc.recolour, hue=0.1)
 
 
-def test_an_object_of_unknown_origin_is_not_made_again(addon: Any, built: BuiltObject) -> None:
+def test_an_object_without_a_request_is_not_decomposed_again(
+    addon: Any, built: BuiltObject
+) -> None:
     assert "is not in this file: open it, and press Decompose" in say(
         addon.ops.isc.redo, max_size=64
     )
@@ -212,7 +214,7 @@ def test_an_edit_changes_the_active_object_alone(
     assert np.isfinite(shown).all()
 
 
-def test_a_material_that_people_made_single_is_the_copys(addon: Any, built: BuiltObject) -> None:
+def test_a_single_user_material_of_a_copy_is_kept(addon: Any, built: BuiltObject) -> None:
     copy = copied(addon, built)
     copy.object.material_slots[0].material = built.material.copy()
     addon.ops.isc.recolour(hue=0.3)
@@ -220,7 +222,7 @@ def test_a_material_that_people_made_single_is_the_copys(addon: Any, built: Buil
     assert len(addon.data.materials) == 2, "it was its own already"
 
 
-def test_a_copy_is_never_taken_for_the_original_once_it_was_edited(
+def test_an_edited_copy_is_never_taken_for_the_original(
     addon: Any, built: BuiltObject, bump_folder: Path
 ) -> None:
     copy = copied(addon, built)
@@ -261,13 +263,13 @@ def test_a_copy_is_exported_as_it_is(addon: Any, built: BuiltObject, tmp_path: P
     assert (mine < 0.8 * original).all()
 
 
-def test_what_else_a_copy_wears_is_not_edited(addon: Any, built: BuiltObject) -> None:
+def test_a_foreign_material_of_a_copy_is_not_edited(addon: Any, built: BuiltObject) -> None:
     copy = copied(addon, built)
     copy.object.material_slots[0].material = addon.data.materials.new("mine")
     assert find_built(copy.object) is None and not addon.ops.isc.recolour.poll()
 
 
-def test_own_paint_and_gloss_are_given_on_demand(addon: Any, built: BuiltObject) -> None:
+def test_a_material_is_made_single_user_on_demand(addon: Any, built: BuiltObject) -> None:
     """What the panel offers instead of sliders that would change both."""
     copy = copied(addon, built)
     assert objects_sharing_material(copy.object, copy.material) == [built.object]
@@ -283,7 +285,7 @@ def test_own_paint_and_gloss_are_given_on_demand(addon: Any, built: BuiltObject)
 # --- files ----------------------------------------------------------------------------------------
 
 
-def test_the_results_own_files_are_copied(addon: Any, tmp_path: Path) -> None:
+def test_files_of_the_result_folder_are_copied(addon: Any, tmp_path: Path) -> None:
     from isc_core.result_files.arrays_file import write_arrays
     from isc_core.result_files.mesh import build_mesh
     from isc_core.result_files.result_folder import load, save
@@ -309,7 +311,7 @@ def test_the_results_own_files_are_copied(addon: Any, tmp_path: Path) -> None:
     assert (copy / "mesh.glb").read_bytes() == (tmp_path / "result" / "mesh.glb").read_bytes()
 
 
-def test_without_them_the_scene_is_written(
+def test_the_scene_is_exported_without_a_result_folder(
     addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path
 ) -> None:
     import trimesh
@@ -368,7 +370,7 @@ def specular_factor(path: Path) -> float:
     ],
     ids=str,
 )
-def test_the_paint_is_written_as_it_is_shown(
+def test_the_edited_reflectance_is_exported(
     addon: Any, built: BuiltObject, bump_folder: Path, tmp_path: Path, edit: dict[str, float]
 ) -> None:
     """Coded as sRGB, after the edits: what Cycles shows of the paint is what another program will
@@ -390,7 +392,7 @@ def test_the_paint_is_written_as_it_is_shown(
     np.testing.assert_allclose(codes[inside], 255 * linear_to_srgb(np.clip(shown, 0, 1)), atol=1.0)
 
 
-def test_recolouring_is_that_of_hsv() -> None:
+def test_recolouring_matches_hsv() -> None:
     paint = np.random.default_rng(3).uniform(0, 1.2, (300, 3))
     paint[:20] = paint[:20, :1]  # greys
     paint[20] = 0
@@ -406,7 +408,7 @@ def test_recolouring_is_that_of_hsv() -> None:
 
 
 @pytest.mark.parametrize(("source", "level"), [("lobe", 0.3), ("image", 0.3), ("none", 0.0)])
-def test_the_gloss_that_is_written_is_the_fitted_one_unless_it_is_not_wanted(
+def test_the_fitted_level_is_exported_unless_highlights_are_off(
     addon: Any, bump_folder: Path, tmp_path: Path, source: Any, level: float
 ) -> None:
     """The photo's highlights, that Blender may show instead, do not fit into the file."""
@@ -419,7 +421,7 @@ def test_the_gloss_that_is_written_is_the_fitted_one_unless_it_is_not_wanted(
     assert surface(path)["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.35)
 
 
-def test_gloss_that_is_not_known_is_not_written(
+def test_an_unknown_specular_level_is_not_exported(
     addon: Any, bump_folder: Path, tmp_path: Path
 ) -> None:
     export_object(
@@ -432,7 +434,7 @@ def test_gloss_that_is_not_known_is_not_written(
     assert specular_factor(tmp_path / "bump" / "mesh.glb") == 0
 
 
-def test_paint_that_is_one_colour_or_comes_from_other_nodes(
+def test_a_constant_reflectance_is_exported_and_other_nodes_are_refused(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     tree, node = built.material.node_tree, dichromatic_node(built.material)
@@ -446,11 +448,13 @@ def test_paint_that_is_one_colour_or_comes_from_other_nodes(
     tree.links.new(
         tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], node.inputs["Reflectance"]
     )
-    assert "does not come from an image" in say(addon.ops.isc.export, directory=str(tmp_path))
+    assert "is not an image: connect an image texture" in say(
+        addon.ops.isc.export, directory=str(tmp_path)
+    )
     assert "plain" not in addon.data.materials
 
 
-def test_an_object_without_material_slots_is_written(
+def test_an_object_without_material_slots_is_exported(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     built.object.data.materials.clear()
@@ -459,7 +463,7 @@ def test_an_object_without_material_slots_is_written(
     assert not built.object.material_slots
 
 
-def test_every_slot_that_has_the_material_is_written_with_its_paint(
+def test_every_slot_of_the_material_is_exported(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     mine = addon.data.materials.new("mine")
@@ -480,15 +484,15 @@ def places(built: BuiltObject) -> np.ndarray:
     return values.reshape(-1, 3)
 
 
-def test_a_place_that_cannot_be_written_is_said(
+def test_a_folder_that_cannot_be_written_is_reported(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
     assert "choose another folder" in say(addon.ops.isc.export, directory=str(tmp_path / "file"))
-    assert "and a folder to export_object to" in say(addon.ops.isc.export, directory="")
+    assert "and a folder" in say(addon.ops.isc.export, directory="")
 
 
-def test_linked_objects_are_left_alone(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
+def test_linked_objects_are_not_changed(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
     addon.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"))
     addon.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     addon.ops.wm.link(

@@ -87,7 +87,7 @@ def until(true: Callable[[], object], seconds: float = 20.0) -> None:
         time.sleep(0.02)
 
 
-def test_a_run_ends_with_its_result_taken_in(folder: Path) -> None:
+def test_a_run_ends_by_importing_its_result(folder: Path) -> None:
     run = WorkerRun("Decompose cup", script(2, folder), take, folder)
     assert [run.step().state for _ in range(4)] == ["running", "running", "ready", "ready"]
     assert not run.ended
@@ -110,7 +110,9 @@ def test_stage_and_fraction_are_passed_on(folder: Path) -> None:
     ("error", "report"),
     [(InputError("no room"), ""), (WorkerFailed("no room", "the log"), "the log")],
 )
-def test_a_failure_is_told_and_leaves_nothing(folder: Path, error: Exception, report: str) -> None:
+def test_a_failure_is_reported_and_leaves_nothing(
+    folder: Path, error: Exception, report: str
+) -> None:
     run = WorkerRun("Decompose cup", failing(error), take, folder)
     run.step()
     assert run.step().state == "failed"
@@ -131,7 +133,7 @@ def test_a_result_that_cannot_be_built_leaves_nothing(folder: Path) -> None:
     )
 
 
-def test_what_the_worker_says_of_the_result_is_passed_on(folder: Path) -> None:
+def test_notes_on_the_result_are_passed_on(folder: Path) -> None:
     def talkative() -> Generator[WorkerUpdate, None, RunOutput]:
         yield WorkerUpdate("at work")
         return RunOutput(folder, "note: it did not converge")
@@ -143,7 +145,7 @@ def test_what_the_worker_says_of_the_result_is_passed_on(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("where", ["script", "finish"])
-def test_an_unforeseen_error_does_not_block_the_next_run(folder: Path, where: str) -> None:
+def test_an_unexpected_error_does_not_block_the_next_run(folder: Path, where: str) -> None:
     def broken(_context: Any, _result: Path) -> str:
         raise ZeroDivisionError("an error of ours")
 
@@ -162,7 +164,7 @@ def test_an_unforeseen_error_does_not_block_the_next_run(folder: Path, where: st
     assert not folder.exists()
 
 
-def test_cancelling_closes_the_script_and_removes_the_folder(folder: Path) -> None:
+def test_cancelling_closes_the_steps_and_removes_the_folder(folder: Path) -> None:
     closed: list[str] = []
     run = WorkerRun("Decompose cup", script(5, folder, closed), take, folder)
     run.step()
@@ -183,7 +185,7 @@ def test_cancelling_after_the_end_changes_nothing(folder: Path) -> None:
     assert run.cancel().state == "done" and folder.is_dir()
 
 
-def test_calls_are_measured_and_the_import_apart(folder: Path) -> None:
+def test_calls_and_import_are_timed_separately(folder: Path) -> None:
     def slow_script() -> Generator[WorkerUpdate, None, RunOutput]:
         yield WorkerUpdate("quick")
         time.sleep(0.03)
@@ -217,7 +219,7 @@ def test_two_runs_at_once_are_refused(tmp_path: Path, folder: Path) -> None:
     assert active_run() is None and first.status.state == "cancelled"
 
 
-def test_a_folder_that_is_still_written_to_goes_in_the_end(
+def test_a_folder_that_is_still_written_to_is_removed_eventually(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "run").mkdir()
@@ -267,7 +269,7 @@ def test_cancelling_kills_the_worker_and_removes_what_it_wrote(
     assert (tmp_path / "cup.png").is_file(), "the user's own file stays"
 
 
-def test_a_worker_that_is_just_being_started_is_ended_too(
+def test_a_starting_worker_is_ended_too(
     tmp_path: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     environment, workers = fake_core(tmp_path, SLOW), []
@@ -300,7 +302,7 @@ def test_a_crash_is_reported_with_the_logs_tail(tmp_path: Path, folder: Path) ->
     assert not folder.exists()
 
 
-def test_a_worker_that_cannot_be_started_is_said(tmp_path: Path, folder: Path) -> None:
+def test_a_worker_that_cannot_start_is_reported(tmp_path: Path, folder: Path) -> None:
     environment = WorkerEnvironment(tmp_path / "no_python", (), tmp_path / "cache")
     run = WorkerRun(
         "Cut Out", mask_steps(photo_file(tmp_path), (0, 0, 9, 9), folder, environment), take, folder
@@ -312,8 +314,8 @@ def test_a_worker_that_cannot_be_started_is_said(tmp_path: Path, folder: Path) -
 def test_messages_name_images_not_files(tmp_path: Path, folder: Path) -> None:
     code = """
 import json, sys
-print(json.dumps({"event": "failed", "message": f"{sys.argv[2]}: make a mask with `isc mask PHOTO --box x,y,w,h -o MASK` "
-                  "and give it with --mask", "code": 2}), flush=True)
+message = f"{sys.argv[2]}: make a mask with `isc mask PHOTO --box x,y,w,h -o MASK`"
+print(json.dumps({"event": "failed", "message": message, "code": 2}), flush=True)
 sys.exit(2)
 """
     script = decompose_steps(
@@ -361,7 +363,7 @@ def event(kind: str, value: str = "NOTHING") -> Any:
     return SimpleNamespace(type=kind, value=value)
 
 
-def test_the_timer_polls_and_all_else_passes_through(addon: Any, folder: Path) -> None:
+def test_only_timer_events_poll(addon: Any, folder: Path) -> None:
     run = begin_run(WorkerRun("Decompose cup", script(2, folder), take, folder))
     plain, shown = Plain(run), addon.context.window_manager.isc
     assert (
@@ -457,7 +459,7 @@ def test_closing_blender_ends_the_worker(tmp_path: Path) -> None:
         tmp_path,
         SLOW.replace(
             "while True",
-            f"open({str(tmp_path / 'pid')!r}, 'w').write(str(__import__('os').getpid()))\nwhile True",
+            f"import os\nopen({str(tmp_path / 'pid')!r}, 'w').write(str(os.getpid()))\nwhile True",
         ),
     )
     code = f"""
@@ -470,11 +472,13 @@ from blender_addon.operators.request import MethodSettings
 from blender_addon.operators.run_steps import decompose_steps
 from blender_addon.files.image_source import ImageSource
 from blender_addon.worker.commands import WorkerEnvironment
-environment = WorkerEnvironment(Path(sys.executable), (Path({str(environment.search[0])!r}),), Path({str(tmp_path / "cache")!r}))
+search, cache = Path({str(environment.search[0])!r}), Path({str(tmp_path / "cache")!r})
+environment = WorkerEnvironment(Path(sys.executable), (search,), cache)
 folder = Path({str(tmp_path / "run")!r})
 folder.mkdir()
 picture = ImageSource("cup", path=Path({str(tmp_path / "cup.png")!r}))
-run = begin_run(WorkerRun("Decompose cup", decompose_steps(picture, None, None, MethodSettings(), folder, 0, environment), lambda *_: "", folder))
+steps = decompose_steps(picture, None, None, MethodSettings(), folder, 0, environment)
+run = begin_run(WorkerRun("Decompose cup", steps, lambda *_: "", folder))
 end = time.monotonic() + 30
 while run.step().stage != "solving" or not Path({str(tmp_path / "pid")!r}).exists():
     assert time.monotonic() < end

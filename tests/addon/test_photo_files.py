@@ -84,7 +84,7 @@ def known_file(path: Path, kind: type, channels: int = 3) -> np.ndarray:
     return values
 
 
-def test_a_saved_file_is_handed_over_as_it_is(tmp_path: Path) -> None:
+def test_an_unchanged_file_is_used_directly(tmp_path: Path) -> None:
     codes16 = known_file(tmp_path / "deep.png", np.uint16)
     path, transfer = given(bpy.data.images.load(str(tmp_path / "deep.png")), tmp_path)
     assert path == tmp_path / "deep.png" and transfer == "srgb"
@@ -94,7 +94,7 @@ def test_a_saved_file_is_handed_over_as_it_is(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("space", "transfer"), [("sRGB", "srgb"), ("Non-Color", "linear"), ("Linear Rec.709", "linear")]
 )
-def test_the_colour_space_says_how_a_file_is_coded(
+def test_the_colour_space_determines_the_transfer(
     tmp_path: Path, space: str, transfer: str
 ) -> None:
     known_file(tmp_path / "a.png", np.uint8)
@@ -103,7 +103,7 @@ def test_the_colour_space_says_how_a_file_is_coded(
     assert given(image, tmp_path) == (tmp_path / "a.png", transfer)
 
 
-def test_a_packed_file_keeps_its_bits_when_the_file_has_gone(tmp_path: Path) -> None:
+def test_a_packed_file_keeps_its_bits_without_the_file(tmp_path: Path) -> None:
     codes16 = known_file(tmp_path / "deep.png", np.uint16)
     image = bpy.data.images.load(str(tmp_path / "deep.png"))
     image.pack()
@@ -113,7 +113,7 @@ def test_a_packed_file_keeps_its_bits_when_the_file_has_gone(tmp_path: Path) -> 
     np.testing.assert_array_equal(read_raster(path).values, codes16[..., ::-1])
 
 
-def test_paint_on_a_saved_photo_counts(tmp_path: Path) -> None:
+def test_edits_of_a_saved_photo_are_exported(tmp_path: Path) -> None:
     stored = known_file(tmp_path / "a.png", np.uint8)
     image = bpy.data.images.load(str(tmp_path / "a.png"))
     values = pixels_of(image).copy()
@@ -138,7 +138,7 @@ def test_a_generated_byte_image_is_srgb(tmp_path: Path) -> None:
     assert transfer == "srgb"
 
 
-def test_a_generated_float_image_is_light_beyond_one(tmp_path: Path) -> None:
+def test_a_generated_float_image_keeps_values_above_one(tmp_path: Path) -> None:
     image = generated(floats=True)
     values = pixels_of(image).copy()
     values[2, 3, :3] = 7.5
@@ -148,7 +148,7 @@ def test_a_generated_float_image_is_light_beyond_one(tmp_path: Path) -> None:
     np.testing.assert_allclose(read_raster(path).values, values[..., :3], rtol=1e-6)
 
 
-def test_a_painted_deep_file_keeps_its_light(tmp_path: Path) -> None:
+def test_an_edited_16_bit_file_stays_linear(tmp_path: Path) -> None:
     """Blender holds a 16-bit sRGB file as linear floats: they must not be decoded once more."""
     stored = known_file(tmp_path / "deep.png", np.uint16)
     image = bpy.data.images.load(str(tmp_path / "deep.png"))
@@ -163,7 +163,7 @@ def test_a_painted_deep_file_keeps_its_light(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", [np.uint8, np.uint16])
-def test_transparency_arrives_straight(tmp_path: Path, kind: type) -> None:
+def test_alpha_is_exported_straight(tmp_path: Path, kind: type) -> None:
     """Float images hold colours multiplied by alpha, byte images do not: the worker wants neither
     multiplied.
     """
@@ -222,7 +222,7 @@ def test_upright_files_are_upright(tmp_path: Path) -> None:
     )  # a table outside of what was read: not trusted
 
 
-def test_a_wider_working_space_is_brought_to_rec709() -> None:
+def test_a_wider_working_space_is_converted_to_rec709() -> None:
     to_rec709 = np.array([[1.6, -0.5, -0.1], [-0.1, 1.1, 0], [0, -0.1, 1.1]], np.float32)
     picture = ImageSource(
         "a", size=(1, 1), channels=4, is_float=True, associated=True, to_rec709=to_rec709
@@ -240,7 +240,7 @@ def test_a_grey_float_image_has_three_channels() -> None:
     )
 
 
-def test_codes_survive_the_float_that_blender_makes_of_them() -> None:
+def test_codes_survive_conversion_to_float() -> None:
     every = np.arange(256, dtype=np.float32).reshape(16, 16, 1) / 255
     opaque = np.concatenate([every, every, every, np.ones_like(every)], axis=2)
     np.testing.assert_array_equal(
@@ -261,7 +261,7 @@ def test_a_painted_mask_fits_the_photo(tmp_path: Path) -> None:
     np.testing.assert_array_equal(np.load(path), white[..., 0] > 0)
 
 
-def test_a_mask_may_be_transparency() -> None:
+def test_a_mask_may_be_alpha() -> None:
     pixels = np.ones((2, 2, 4), np.float32)
     pixels[0, 0] = 0
     np.testing.assert_array_equal(to_mask(ImageSource("m"), pixels), [[False, True], [True, True]])
@@ -314,7 +314,7 @@ def test_a_single_pixel_is_refused() -> None:
 @pytest.mark.parametrize(
     ("source", "word"), [("MOVIE", "movie"), ("SEQUENCE", "sequence"), ("TILED", "tiles")]
 )
-def test_what_is_no_single_picture_is_refused(source: str, word: str) -> None:
+def test_movies_sequences_and_tiles_are_refused(source: str, word: str) -> None:
     image = generated()
     image.source = source
     with pytest.raises(InputError, match=word):
@@ -328,7 +328,7 @@ def test_a_byte_image_in_an_unknown_space_is_refused() -> None:
         inspect_image(image)
 
 
-def test_an_image_that_is_removed_meanwhile_is_missed(tmp_path: Path) -> None:
+def test_an_image_removed_in_the_meantime_is_reported(tmp_path: Path) -> None:
     image = generated()
     steps = export_image(inspect_image(image), tmp_path / "photo")
     bpy.data.images.remove(image)
@@ -349,7 +349,7 @@ def test_names_of_any_letters_reach_the_worker(tmp_path: Path) -> None:
     assert path == tmp_path / "photo.npy"
 
 
-def test_the_worker_reads_light_and_mask_together(tmp_path: Path) -> None:
+def test_the_worker_reads_image_and_mask(tmp_path: Path) -> None:
     """The reader that the worker uses takes what is handed over, mask and all."""
     image, mask = generated(width=40, height=30), generated("mask", width=40, height=30)
     shape = np.zeros((30, 40, 4), np.float32)

@@ -4,7 +4,7 @@ line.
 
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,9 +15,14 @@ from isc_core.errors import InputError
 from tests.addon.scene_fixture import bump, write_result
 
 Arrays = dict[str, np.ndarray]
+FORMER_NAMES = {"sky"}
 
 
-def test_everything_of_the_file_is_in_the_result(bump_folder: Path) -> None:
+def environment_of(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    return arrays["environment_map" if "environment_map" in arrays else "sky"]
+
+
+def test_all_arrays_are_read(bump_folder: Path) -> None:
     result, d = read_result(bump_folder), bump()
     for name in (
         "image",
@@ -32,9 +37,9 @@ def test_everything_of_the_file_is_in_the_result(bump_folder: Path) -> None:
     ):
         assert np.array_equal(getattr(result, name), getattr(d, name)), name
     with np.load(bump_folder / "arrays.npz") as file:
-        assert {name for name in file.files if not hasattr(result, name)} == set()
+        assert {name for name in file.files if not hasattr(result, name)} <= FORMER_NAMES
         assert np.array_equal(
-            result.environment_map, file["sky"]
+            result.environment_map, environment_of(file)
         ) and result.reflectance_scale == float(file["reflectance_scale"])
     assert (
         result.size == (88, 64)
@@ -44,13 +49,13 @@ def test_everything_of_the_file_is_in_the_result(bump_folder: Path) -> None:
     assert np.isnan(result.roughness) and result.specular_variation is None
 
 
-def test_a_photo_without_a_name_is_called_by_the_folder(tmp_path: Path) -> None:
+def test_a_photo_without_a_name_takes_the_folders(tmp_path: Path) -> None:
     folder = write_result(tmp_path / "my cup")
     (folder / "decomposition.json").write_text("{}", encoding="utf-8")
     assert read_result(folder).name == "my cup"
 
 
-def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
+def test_a_folder_without_a_result_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="decomposition.json"):
         read_result(tmp_path)
     (tmp_path / "decomposition.json").write_text("{}", encoding="utf-8")
@@ -77,7 +82,7 @@ def spoilt(arrays: Arrays, name: str, value: float) -> Arrays:
 
 
 DAMAGES: dict[str, Callable[[Arrays], Arrays]] = {
-    "environment_map is missing": lambda a: without(a, "sky"),
+    "environment_map is missing": lambda a: without(without(a, "sky"), "environment_map"),
     "normal has the shape": lambda a: a | {"normal": a["normal"][:-1]},
     "diffuse is float64": lambda a: a | {"diffuse": a["diffuse"].astype(float)},
     "base_color contains NaN": lambda a: spoilt(a, "base_color", np.nan),
@@ -106,9 +111,7 @@ def test_half_written_arrays_are_refused(tmp_path: Path, bump_folder: Path, keep
         read_result(folder)
 
 
-def test_the_variation_of_the_gloss_is_read_where_there_is_one(
-    tmp_path: Path, bump_folder: Path
-) -> None:
+def test_the_specular_variation_is_read(tmp_path: Path, bump_folder: Path) -> None:
     folder = shutil.copytree(bump_folder, tmp_path / "copy")
     with np.load(folder / "arrays.npz") as file:
         arrays = {name: file[name] for name in file.files}
@@ -119,7 +122,7 @@ def test_the_variation_of_the_gloss_is_read_where_there_is_one(
     )
 
 
-def test_what_decomposition_says_may_be_much(tmp_path: Path, bump_folder: Path) -> None:
+def test_the_description_is_kept_completely(tmp_path: Path, bump_folder: Path) -> None:
     """The description is kept whole, letters of all languages too."""
     folder = shutil.copytree(bump_folder, tmp_path / "copy")
     said = {"input": {"name": "чашка/杯.png"}, "settings": {}, "status": {"text": "收敛"}}
@@ -127,3 +130,16 @@ def test_what_decomposition_says_may_be_much(tmp_path: Path, bump_folder: Path) 
         json.dumps(said, ensure_ascii=False), encoding="utf-8"
     )
     assert read_result(folder).description == said
+
+
+@pytest.mark.parametrize("name", ["sky", "environment_map"])
+def test_former_and_current_names_of_arrays_are_read(
+    tmp_path: Path, bump_folder: Path, name: str
+) -> None:
+    folder = shutil.copytree(bump_folder, tmp_path / "copy")
+    with np.load(folder / "arrays.npz") as file:
+        arrays = {key: file[key] for key in file.files}
+    environment = environment_of(arrays)
+    arrays = without(without(arrays, "sky"), "environment_map") | {name: environment}
+    np.savez(folder / "arrays.npz", **arrays)
+    assert np.array_equal(read_result(folder).environment_map, environment)

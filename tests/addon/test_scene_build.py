@@ -59,7 +59,9 @@ def census(bpy: Any) -> dict[str, list[str]]:
     ],
     ids=str,
 )
-def test_nothing_piles_up(blender: Any, result: ResultArrays, options: dict[str, Any]) -> None:
+def test_building_again_adds_nothing(
+    blender: Any, result: ResultArrays, options: dict[str, Any]
+) -> None:
     build(result, **options)
     once = census(blender)
     build(result, **options)
@@ -69,9 +71,7 @@ def test_nothing_piles_up(blender: Any, result: ResultArrays, options: dict[str,
     ]
 
 
-def test_other_options_leave_nothing_of_the_earlier_ones(
-    blender: Any, result: ResultArrays
-) -> None:
+def test_changed_options_leave_nothing_behind(blender: Any, result: ResultArrays) -> None:
     build(result)
     plain = census(blender)
     build(result, sun=True, displacement=True, specular_from="image", size_metres=0.3)
@@ -98,7 +98,7 @@ def test_another_resolution_updates_the_same_object(
     assert (again.scene.render.resolution_x, again.scene.render.resolution_y) == (130, 100)
 
 
-def test_two_photos_stand_beside_each_other(blender: Any, result: ResultArrays) -> None:
+def test_two_photos_become_two_objects(blender: Any, result: ResultArrays) -> None:
     first, second = build(result, name="one"), build(result, name="two")
     assert (
         first.object != second.object
@@ -134,14 +134,14 @@ def test_photos_of_one_name_do_not_replace_each_other(blender: Any, result: Resu
     ) == once
 
 
-def test_a_photo_of_unknown_origin_is_told_by_its_name(blender: Any, result: ResultArrays) -> None:
+def test_a_photo_without_a_hash_is_identified_by_its_name(
+    blender: Any, result: ResultArrays
+) -> None:
     thing = build(of_photo(result, "a")).object
     assert build(replace(result, description={}), name="bump").object == thing
 
 
-def test_an_image_is_the_same_photo_after_it_was_painted_on(
-    blender: Any, result: ResultArrays
-) -> None:
+def test_an_edited_image_is_the_same_photo(blender: Any, result: ResultArrays) -> None:
     from blender_addon.scene import BuildOptions, build_object
 
     first, second = (blender.data.images.new("bump", 8, 8) for _ in range(2))
@@ -168,7 +168,7 @@ NAMES = [
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_any_name_will_do(blender: Any, result: ResultArrays, name: str) -> None:
+def test_any_name_is_supported(blender: Any, result: ResultArrays, name: str) -> None:
     built = build(result, name=name)
     once = census(blender)
     assert build(result, name=name).object == built.object and census(blender) == once
@@ -260,7 +260,9 @@ CHANGES: dict[str, Callable[[Any, Any], bool]] = {
 
 
 @pytest.mark.parametrize("chosen", CHANGES)
-def test_a_checkbox_changes_what_it_says(blender: Any, result: ResultArrays, chosen: str) -> None:
+def test_each_option_changes_one_setting_of_the_scene(
+    blender: Any, result: ResultArrays, chosen: str
+) -> None:
     scene = user_scene(blender)
     scene.view_settings.view_transform = "AgX"
     built = build(result, own_scene=False, **{chosen: True})
@@ -273,7 +275,7 @@ def test_a_scene_can_be_chosen(blender: Any, result: ResultArrays) -> None:
     assert not blender.context.scene.objects
 
 
-def test_what_it_was_made_of_is_written_down(blender: Any, result: ResultArrays) -> None:
+def test_provenance_is_stored(blender: Any, result: ResultArrays) -> None:
     built = build(result, size_metres=0.25)
     for block in (built.object, built.collection):
         assert (block["isc_photo"], block["isc_model"], block["isc_separator"]) == (
@@ -286,7 +288,7 @@ def test_what_it_was_made_of_is_written_down(blender: Any, result: ResultArrays)
         assert json.loads(block["isc_options"])["size_metres"] == 0.25
 
 
-def test_what_isc_made_is_recognised(blender: Any, result: ResultArrays) -> None:
+def test_datablocks_of_isc_are_recognised(blender: Any, result: ResultArrays) -> None:
     from blender_addon.scene import find_built, is_isc_datablock
 
     built = build(result, sun=True)
@@ -416,7 +418,7 @@ def test_a_linked_scene_is_refused(blender: Any, result: ResultArrays, tmp_path:
 
 
 @pytest.mark.parametrize("size", [0.0, -1.0, float("nan"), float("inf")])
-def test_a_size_that_is_none_is_refused_and_nothing_changes(
+def test_an_invalid_size_is_refused_and_nothing_changes(
     blender: Any, result: ResultArrays, size: float
 ) -> None:
     before = census(blender)
@@ -470,7 +472,7 @@ def test_a_mesh_with_shape_keys_is_filled_anew(blender: Any, result: ResultArray
     assert built.object.data.shape_keys is None and len(built.object.data.polygons) == 100
 
 
-def test_things_that_happen_to_have_its_names_are_left_alone(
+def test_unrelated_datablocks_of_the_same_names_are_not_changed(
     blender: Any, result: ResultArrays
 ) -> None:
     cube = blender.data.objects.new("bump", blender.data.meshes.new("bump"))
@@ -491,9 +493,7 @@ def test_things_that_happen_to_have_its_names_are_left_alone(
     )
 
 
-def test_an_object_shadows_itself_where_it_stands_among_others(
-    blender: Any, result: ResultArrays
-) -> None:
+def test_own_shadows_follow_the_scene(blender: Any, result: ResultArrays) -> None:
     """The recovered shading holds the photo's shadows; in a user's scene people expect an object to
     cast one.
     """
@@ -505,3 +505,14 @@ def test_an_object_shadows_itself_where_it_stands_among_others(
         "what people set stays"
     )
     assert build(result, name="alone", own_shadows=True).object.visible_shadow
+
+
+def test_an_object_of_an_earlier_version_is_updated(blender: Any, result: ResultArrays) -> None:
+    """Its environment map has the former role."""
+    built = build(result)
+    image = next(
+        image for image in blender.data.images if image.get("isc_role") == "environment_map"
+    )
+    image["isc_role"] = "sky"
+    once = census(blender)
+    assert build(result).object == built.object and census(blender) == once

@@ -55,7 +55,7 @@ def test_the_camera_follows_an_object_that_was_moved(
     np.testing.assert_allclose(render(built.scene, tmp_path)["Diffuse Color"], before, atol=0.01)
 
 
-def test_deep_objects_are_not_cut(blender: Any, bump_folder: Path, tmp_path: Path) -> None:
+def test_deep_objects_are_not_clipped(blender: Any, bump_folder: Path, tmp_path: Path) -> None:
     result = read_result(bump_folder)
     deep = replace(result, vertices=result.vertices * np.array([1, 1, 60], np.float32))
     seen = render(build(deep).scene, tmp_path)["Combined"][..., 3]
@@ -63,7 +63,7 @@ def test_deep_objects_are_not_cut(blender: Any, bump_folder: Path, tmp_path: Pat
     assert (seen > 0).sum() == (flat > 0).sum()
 
 
-def test_the_photo_stands_behind(blender: Any, bump_folder: Path) -> None:
+def test_the_photo_is_the_background_image(blender: Any, bump_folder: Path) -> None:
     result = read_result(bump_folder)
     built = build(result)
     (shown,) = built.camera.data.background_images

@@ -53,7 +53,7 @@ def apart(seen: np.ndarray, wanted: np.ndarray) -> float:
 
 
 @pytest.mark.parametrize("axis", range(3))
-def test_light_comes_from_where_it_was(
+def test_light_keeps_its_direction(
     blender: Any, result: ResultArrays, tmp_path: Path, axis: int
 ) -> None:
     """A sky that shines red from one half of an axis and blue from the other."""
@@ -63,7 +63,7 @@ def test_light_comes_from_where_it_was(
     assert apart(seen, shading_under(sky, result.normal[where].astype(float))) < 0.02
 
 
-def test_the_rotation_is_said_and_turns_the_light(
+def test_the_stored_rotation_rotates_the_light(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     from blender_addon.scene.world import MAPPING
@@ -97,7 +97,7 @@ def expected(result: ResultArrays, where: np.ndarray) -> np.ndarray:
     return result.sun_strength / np.pi * facing + result.sun_ambient
 
 
-def test_the_sun_and_the_even_rest_give_the_shading_of_the_optimal_light(
+def test_sun_and_uniform_light_give_the_shading_of_the_dominant_light(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     sunny = sunlit(result)
@@ -112,7 +112,7 @@ def test_the_sun_and_the_even_rest_give_the_shading_of_the_optimal_light(
     )
 
 
-def test_an_object_is_relit_from_what_it_knows(blender: Any, result: ResultArrays) -> None:
+def test_an_object_is_relit_from_its_properties(blender: Any, result: ResultArrays) -> None:
     from blender_addon.scene.sun import relight
     from blender_addon.scene.world import SUN
 

@@ -71,7 +71,7 @@ def test_every_socket_has_a_tooltip_and_a_range(blender: Any, result: ResultArra
         assert inputs[name].min_value == 0 and 1 <= inputs[name].max_value <= 25, name
 
 
-def test_the_paint_is_the_base_color_to_float32(
+def test_the_diffuse_color_is_the_base_color_to_float32(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     built = build(result)
@@ -117,7 +117,9 @@ def lamp(built: Any, direction: np.ndarray) -> None:
     ensure_sun(built.object["isc_key"], built.collection, direction, np.ones(3)).data.angle = 0
 
 
-def test_gloss_is_added_to_the_paint(blender: Any, result: ResultArrays, tmp_path: Path) -> None:
+def test_the_specular_lobe_is_added_to_the_diffuse(
+    blender: Any, result: ResultArrays, tmp_path: Path
+) -> None:
     """Dichromatic: the gloss takes nothing from the paint, and grows with its gain."""
     built = build(result)
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
@@ -210,7 +212,7 @@ def fresnel(degrees: float, f0: float = 0.04) -> float:
 
 
 @pytest.mark.parametrize("degrees", [0, 60, 85])
-def test_the_level_scales_all_of_the_gloss_at_grazing_angles_too(
+def test_the_level_scales_the_whole_lobe_at_grazing_angles_too(
     blender: Any, mirror: Any, tmp_path: Path, degrees: float
 ) -> None:
     """As the fit has it: a weak gloss whose edges mirrored all would lay a veil over the object."""
@@ -222,7 +224,7 @@ def test_the_level_scales_all_of_the_gloss_at_grazing_angles_too(
         )
 
 
-def test_a_level_above_plastic_mirrors_no_more_than_all(
+def test_a_level_above_plastic_reflects_at_most_all_light(
     blender: Any, mirror: Any, tmp_path: Path
 ) -> None:
     mirror["Specular Level"].default_value = 3.0
@@ -265,7 +267,7 @@ def test_the_fit_sets_level_roughness_and_variation(blender: Any, result: Result
     )
 
 
-def test_the_photos_own_highlights_are_seen_and_light_nothing(
+def test_the_photos_highlights_are_visible_and_emit_no_light(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
     from blender_addon.scene.material import set_specular_gain
@@ -294,7 +296,7 @@ def test_the_photos_own_highlights_are_seen_and_light_nothing(
     )
 
 
-def test_what_people_set_stays(blender: Any, result: ResultArrays) -> None:
+def test_edited_values_are_kept(blender: Any, result: ResultArrays) -> None:
     built = build(result)
     node = group_node(built)
     for name, value in (
@@ -314,7 +316,7 @@ def test_what_people_set_stays(blender: Any, result: ResultArrays) -> None:
     assert kept == pytest.approx([0.7, 2.5, 0.2, 1.3, 0.9, 0.3])
 
 
-def test_the_group_is_shared_and_another_versions_is_left_alone(
+def test_the_group_is_shared_and_other_versions_are_not_changed(
     blender: Any, result: ResultArrays
 ) -> None:
     from blender_addon.scene.dichromatic import VERSION
@@ -346,7 +348,7 @@ def test_an_edited_group_is_kept_and_a_broken_one_replaced(
     assert group_node(build(result, name="three")).node_tree != tree
 
 
-def test_the_normal_map_is_used_where_it_says_something(blender: Any, result: ResultArrays) -> None:
+def test_a_flat_normal_map_is_left_out(blender: Any, result: ResultArrays) -> None:
     node = group_node(build(result))
     assert not node.inputs["Normal"].is_linked
     tilted = result.normal_map.copy()

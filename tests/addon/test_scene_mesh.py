@@ -44,9 +44,7 @@ def test_places_normals_uv_and_confidence_are_the_results(blender: Any, bump_fol
 
 
 @pytest.mark.parametrize("size", [0.1, 2.5])
-def test_the_longer_side_has_the_size_asked_for(
-    blender: Any, bump_folder: Path, size: float
-) -> None:
+def test_the_longer_side_has_the_given_size(blender: Any, bump_folder: Path, size: float) -> None:
     result = read_result(bump_folder)
     places = got(build(result, size_metres=size).object.data.vertices, "co", 3)
     pixel = size / result.longest_side

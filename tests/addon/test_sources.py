@@ -56,7 +56,7 @@ def test_masks_come_from_a_file_or_a_folder(tmp_path: Path) -> None:
         find_sources([a], tmp_path / "none.png")
 
 
-def test_names_differ_even_where_capitals_do_not_count(tmp_path: Path) -> None:
+def test_names_differ_on_case_insensitive_file_systems(tmp_path: Path) -> None:
     paths = [
         touch(tmp_path / "x" / "Cup.png"),
         touch(tmp_path / "y" / "cup.jpg"),
@@ -65,14 +65,14 @@ def test_names_differ_even_where_capitals_do_not_count(tmp_path: Path) -> None:
     assert [source.name for source in find_sources(paths, None)] == ["Cup", "cup-2", "cup-3"]
 
 
-def test_what_is_not_there_or_holds_nothing_is_refused(tmp_path: Path) -> None:
+def test_missing_and_empty_inputs_are_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"none.png: no such photo or folder"):
         find_sources([tmp_path / "none.png"], None)
     with pytest.raises(InputError, match="contains no photo .* and no result"):
         find_sources([tmp_path], None)
 
 
-def test_where_the_files_go() -> None:
+def test_output_files() -> None:
     one, two = (
         [Source(Path("a.png"), "a")],
         [Source(Path("a.png"), "a"), Source(Path("b.png"), "b")],
@@ -92,7 +92,7 @@ def test_where_the_files_go() -> None:
         output_files(two, Path("o.png"), (".png", ".exr"), "--render", together=False)
 
 
-def test_another_suffix_is_no_folder_unless_there_is_one(tmp_path: Path) -> None:
+def test_an_unsupported_suffix_is_refused_unless_the_folder_exists(tmp_path: Path) -> None:
     one = [Source(Path("a.png"), "a")]
     for name in ("out.jpg", "out.txt", "v1.2"):
         with pytest.raises(

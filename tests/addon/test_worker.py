@@ -57,7 +57,7 @@ STUBBORN = (
 
 @pytest.fixture(scope="session")
 def bytecode(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where Python keeps its own compiled code, for all tests; kernels are kept by each for itself."""
+    """Folder of Python's byte code for all tests; each test has its own kernels."""
     return tmp_path_factory.mktemp("bytecode")
 
 
@@ -144,7 +144,7 @@ def others(folder: Path, *expected: str) -> list[str]:
 # --- real work ------------------------------------------------------------------------------------
 
 
-def test_arrays_go_in_and_a_result_with_arrays_comes_out(
+def test_arrays_are_decomposed_into_a_result_with_arrays(
     tmp_path: Path, real: WorkerEnvironment
 ) -> None:
     photo, mask = ball_arrays(tmp_path)
@@ -167,7 +167,7 @@ def test_arrays_go_in_and_a_result_with_arrays_comes_out(
     assert worker.poll() == final
 
 
-def test_a_mistake_is_told_in_one_line(tmp_path: Path, real: WorkerEnvironment) -> None:
+def test_invalid_input_is_reported_in_one_line(tmp_path: Path, real: WorkerEnvironment) -> None:
     final = ended(start_decompose(job(tmp_path / "nowhere.png", tmp_path / "result"), real))
     assert (final.state, final.log) == ("failed", "")
     assert final.message == f"{tmp_path / 'nowhere.png'}: there is no such file"
@@ -222,10 +222,12 @@ def test_the_worker_ends_when_its_program_does(tmp_path: Path, cache: Path) -> N
     photo, mask = ball_arrays(tmp_path)
     program = (
         "import os, sys, time\nfrom pathlib import Path\n"
-        "from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment, start_decompose\n"
+        "from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment\n"
+        "from blender_addon.worker.commands import start_decompose\n"
         "photo, mask, output, cache = map(Path, sys.argv[1:])\n"
         f"environment = WorkerEnvironment(Path(sys.executable), (Path({str(ROOT)!r}),), cache)\n"
-        "worker = start_decompose(DecomposeJob(photo, output, mask, 'sirfs', 'none', 'natural', 64), environment)\n"
+        "job = DecomposeJob(photo, output, mask, 'sirfs', 'none', 'natural', 64)\n"
+        "worker = start_decompose(job, environment)\n"
         "while not worker.poll().stage.startswith('preparing the compiled'): time.sleep(0.01)\n"
         "print(worker.pid, flush=True)\nos._exit(9)\n"
     )
@@ -276,7 +278,7 @@ def test_the_core_runs_as_a_part_of_an_extension(tmp_path: Path, cache: Path) ->
 Maker = Callable[[str], WorkerEnvironment]
 
 
-def test_the_environment_is_the_one_that_is_named(
+def test_the_environment_is_explicit(
     tmp_path: Path, fake_core: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in (
@@ -290,7 +292,8 @@ def test_the_environment_is_the_one_that_is_named(
     ):
         monkeypatch.setenv(name, "wrong")
     environment = fake_core(
-        "say('done', output='', lines=[json.dumps([dict(os.environ), sys.path, os.getcwd(), sys.flags.no_user_site])])"
+        "known = [dict(os.environ), sys.path, os.getcwd(), sys.flags.no_user_site]\n"
+        "say('done', output='', lines=[json.dumps(known)])"
     )
     final = ended(
         start_decompose(job(tmp_path / "a.png", tmp_path / "out", threads=3), environment)
@@ -309,7 +312,7 @@ def test_the_environment_is_the_one_that_is_named(
     assert "OMP_NUM_THREADS" not in environment.variables()
 
 
-def test_what_is_asked_for_reaches_the_command(
+def test_the_job_reaches_the_command_line(
     tmp_path: Path, fake_core: Maker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -335,10 +338,13 @@ def test_what_is_asked_for_reaches_the_command(
 
 @posix
 @pytest.mark.parametrize("how", ["cancel", "kill"])
-def test_a_stubborn_worker_is_killed_with_all_its_children(
+def test_an_unresponsive_worker_is_killed_with_its_children(
     tmp_path: Path, fake_core: Maker, how: str
 ) -> None:
-    child = "import subprocess\nchild = subprocess.Popen(['sleep', '300'])\nprint(child.pid, file=sys.stderr, flush=True)\n"
+    child = (
+        "import subprocess\nchild = subprocess.Popen(['sleep', '300'])\n"
+        "print(child.pid, file=sys.stderr, flush=True)\n"
+    )
     worker = start_decompose(
         job(tmp_path / "a.png", tmp_path / "new" / "out"), fake_core(child + STUBBORN)
     )
@@ -356,7 +362,7 @@ def test_a_stubborn_worker_is_killed_with_all_its_children(
 
 
 @posix
-def test_a_worker_that_is_killed_by_others_is_a_failure(tmp_path: Path, fake_core: Maker) -> None:
+def test_a_worker_killed_from_outside_has_failed(tmp_path: Path, fake_core: Maker) -> None:
     earlier = tmp_path / ".out.11111111.partial"
     earlier.mkdir()
     worker = start_decompose(
@@ -371,8 +377,11 @@ def test_a_worker_that_is_killed_by_others_is_a_failure(tmp_path: Path, fake_cor
     assert others(tmp_path) == [earlier.name], "another process may be at work there"
 
 
-def test_a_crash_gives_its_last_words(tmp_path: Path, fake_core: Maker) -> None:
-    lines = "write_half()\nprint('x' * 20000, file=sys.stderr)\nprint('not json\\n[1, 2]\\n{\"half\": ')\nraise RuntimeError('out of ink')"
+def test_a_crash_is_reported_with_the_end_of_its_log(tmp_path: Path, fake_core: Maker) -> None:
+    lines = (
+        "write_half()\nprint('x' * 20000, file=sys.stderr)\n"
+        "print('not json\\n[1, 2]\\n{\"half\": ')\nraise RuntimeError('out of ink')"
+    )
     final = ended(start_decompose(job(tmp_path / "a.png", tmp_path / "out"), fake_core(lines)))
     assert final.state == "failed"
     assert final.message == "the worker ended unexpectedly (exit code 1): RuntimeError: out of ink"
@@ -380,7 +389,7 @@ def test_a_crash_gives_its_last_words(tmp_path: Path, fake_core: Maker) -> None:
     assert others(tmp_path) == []
 
 
-def test_silence_is_a_failure(tmp_path: Path, fake_core: Maker) -> None:
+def test_a_worker_without_output_has_failed(tmp_path: Path, fake_core: Maker) -> None:
     final = ended(start_decompose(job(tmp_path / "a.png", tmp_path / "out"), fake_core("")))
     assert (final.state, final.message) == (
         "failed",
@@ -388,14 +397,14 @@ def test_silence_is_a_failure(tmp_path: Path, fake_core: Maker) -> None:
     )
 
 
-def test_a_missing_worker_is_one_line(tmp_path: Path) -> None:
+def test_a_missing_interpreter_is_reported_in_one_line(tmp_path: Path) -> None:
     away = WorkerEnvironment(tmp_path / "no-python", (ROOT,), tmp_path / "cache")
     with pytest.raises(InputError, match="no-python .*install the extension again") as caught:
         start_decompose(job(tmp_path / "a.png", tmp_path / "out"), away)
     assert "\n" not in str(caught.value)
 
 
-def test_a_core_that_is_missing_is_said_to_be(tmp_path: Path) -> None:
+def test_a_missing_core_is_reported(tmp_path: Path) -> None:
     base = Path(
         getattr(sys, "_base_executable", sys.executable)
     )  # without the packages of the environment that the tests run in
@@ -420,14 +429,17 @@ def test_a_core_that_is_missing_is_said_to_be(tmp_path: Path) -> None:
 
 
 @posix
-def test_a_program_that_kills_and_leaves_at_once_leaves_nothing(
+def test_a_program_that_kills_and_exits_at_once_leaves_nothing(
     tmp_path: Path, fake_core: Maker
 ) -> None:
     environment = fake_core(STUBBORN)
     program = (
-        "import sys, time\nfrom pathlib import Path\nfrom blender_addon.worker.commands import DecomposeJob, WorkerEnvironment, start_decompose\n"
+        "import sys, time\nfrom pathlib import Path\n"
+        "from blender_addon.worker.commands import DecomposeJob, WorkerEnvironment\n"
+        "from blender_addon.worker.commands import start_decompose\n"
         "search, cache, output = map(Path, sys.argv[1:])\n"
-        "worker = start_decompose(DecomposeJob(output, output, None, '', '', '', 0), WorkerEnvironment(Path(sys.executable), (search,), cache))\n"
+        "environment = WorkerEnvironment(Path(sys.executable), (search,), cache)\n"
+        "worker = start_decompose(DecomposeJob(output, output, None, '', '', '', 0), environment)\n"
         "while worker.poll().stage != 'asleep': time.sleep(0.01)\n"
         "worker.kill()\n"
     )
@@ -446,8 +458,8 @@ def test_a_program_that_kills_and_leaves_at_once_leaves_nothing(
     assert others(tmp_path) == []
 
 
-def test_what_a_killed_process_moved_aside_comes_back(tmp_path: Path) -> None:
-    """Killed between the two renames that replace a folder: the earlier result stands there again."""
+def test_an_earlier_result_is_restored_after_a_kill(tmp_path: Path) -> None:
+    """A process killed between the two renames that replace a folder."""
     target = tmp_path / "out"
     (tmp_path / ".out.0000aaaa.old").mkdir()
     (tmp_path / ".out.0000aaaa.old" / "kept").touch()

@@ -165,6 +165,8 @@ def workers() -> list[int]:
 
 def note(acc: Any, measured: list[str], what: str) -> None:
     """Keeps how long the run's calls took."""
-    line = f"{what}: longest call {shown().longest_call_ms:.1f} ms, import {shown().import_ms:.0f} ms; {shown().message}"
+    run = shown()
+    times = f"longest call {run.longest_call_ms:.1f} ms, import {run.import_ms:.0f} ms"
+    line = f"{what}: {times}; {run.message}"
     acc.log(line)
     measured.append(line)
