@@ -1,12 +1,12 @@
-"""Photos whose diffuse and specular layers are known: what separations are measured on.
+"""Photos with known diffuse and specular layers, on which separations are measured.
 
-Shen & Zheng's photographs with their ground truth: H.-L. Shen, Z.-H. Zheng (2013),
-doi:10.1364/AO.52.004483. Their figures, and all that were published since, are made on the stored
-values / 255 as they are, without linearising, over the whole frame. The laboratory objects: R.
-Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman (2009), doi:10.1109/ICCV.2009.5459428: 16 bits,
-linear, inside the mask. Rendered scenes: multilayer EXR files with the channel names of `maps.exr`.
+Shen & Zheng's photographs with ground truth: H.-L. Shen, Z.-H. Zheng (2013),
+doi:10.1364/AO.52.004483. Their figures, and all published since, use the stored values / 255 as
+they are, without linearising, over the whole frame. The laboratory objects: R. Grosse, M. K.
+Johnson, E. H. Adelson, W. T. Freeman (2009), doi:10.1109/ICCV.2009.5459428: 16 bits, linear, inside
+the mask. Rendered scenes: multilayer EXR files with the channel names of `maps.exr`.
 
-Limits: of Shen & Zheng's set the specular layer is the photo less the diffuse one, rounded to 8
+Limits: in Shen & Zheng's set the specular layer is the photo less the diffuse one, rounded to 8
 bits; the laboratory's light is white to about ten per cent.
 """
 
@@ -27,9 +27,19 @@ _MULTILAYER = ("maps.exr", "truth.exr")
 class SeparationTruth:
     """A photo with its true layers.
 
-    `image`, `diffuse`, `specular`: (H, W, 3) float32 >= 0; `mask`, `clipped`: (H, W) bool, the
-    object, and where a code is at its maximum. `coded`: the values are a camera's sRGB codes, not
-    linear light: for showing only, no method is told.
+    Attributes
+    ----------
+    name : str
+        Of the photo.
+    image, diffuse, specular : (H, W, 3) ndarray of float32
+        >= 0.
+    mask : (H, W) ndarray of bool
+        The object.
+    clipped : (H, W) ndarray of bool
+        Some channel is at the coding's maximum.
+    coded : bool
+        The values are a camera's sRGB codes, not linear light. For display only; methods do not
+        know it.
     """
 
     name: str
@@ -42,17 +52,41 @@ class SeparationTruth:
 
 
 def list_shen_zheng(folder: str | Path) -> tuple[str, ...]:
-    """Names of the photos in `folder` that have a ground truth (`NAME.bmp` beside `NAME_gt.bmp`),
-    in alphabetical order.
+    """List the photos that have a ground truth (`NAME.bmp` beside `NAME_gt.bmp`).
+
+    Parameters
+    ----------
+    folder : path
+        Folder of the photos.
+
+    Returns
+    -------
+    tuple of str
+        Names in alphabetical order.
     """
     ends = "_gt.bmp"
     return tuple(sorted(path.name.removesuffix(ends) for path in Path(folder).glob(f"*{ends}")))
 
 
 def load_shen_zheng(folder: str | Path, name: str) -> SeparationTruth:
-    """One of them, the mask being the whole frame.
+    """Read a photo of Shen & Zheng's set; the mask is the whole frame.
 
-    Raises `InputError` for files that are absent, unreadable or differ in size.
+    Parameters
+    ----------
+    folder : path
+        Folder of the photos.
+    name : str
+        One of `list_shen_zheng`.
+
+    Returns
+    -------
+    SeparationTruth
+        The photo and its layers.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, unreadable or of another size.
     """
     image, diffuse = (
         read_linear(Path(folder) / file, "linear") for file in (f"{name}.bmp", f"{name}_gt.bmp")
@@ -71,8 +105,25 @@ def load_shen_zheng(folder: str | Path, name: str) -> SeparationTruth:
 
 
 def load_laboratory(root: str | Path, name: str) -> SeparationTruth:
-    """An object of the MIT-Berkeley set's laboratory folder, the whole frame of `original.png` and
-    its layers. Raises `InputError`.
+    """Read a laboratory object of the MIT-Berkeley set: the whole frame of `original.png` and its
+    layers.
+
+    Parameters
+    ----------
+    root : path
+        Folder of the data set.
+    name : str
+        Of the object.
+
+    Returns
+    -------
+    SeparationTruth
+        The photo and its layers.
+
+    Raises
+    ------
+    InputError
+        If a file is missing, unreadable or of another size.
     """
     folder = Path(root) / "laboratory" / name
     image, diffuse, specular = (
@@ -86,9 +137,23 @@ def load_laboratory(root: str | Path, name: str) -> SeparationTruth:
 
 
 def load_rendered(folder: str | Path) -> SeparationTruth:
-    """A rendered scene: a folder with `maps.exr` or `truth.exr` (channels `image.R`, `diffuse.R`,
-    ..., `photo.grabcut.A`), or with three images named `image`, `diffuse` and `mask` (EXR linear, others
-    sRGB). The specular layer is what is not diffuse. Raises `InputError`.
+    """Read a rendered scene; the specular layer is the image less the diffuse layer.
+
+    Parameters
+    ----------
+    folder : path
+        Contains `maps.exr` or `truth.exr` (channels `image.R`, `diffuse.R`, ..., `mask.A`), or
+        three images named `image`, `diffuse` and `mask` (EXR linear, others sRGB).
+
+    Returns
+    -------
+    SeparationTruth
+        The image and its layers.
+
+    Raises
+    ------
+    InputError
+        If a file or channel is missing, or sizes differ.
     """
     folder = Path(folder)
     multilayer = next((folder / name for name in _MULTILAYER if (folder / name).is_file()), None)

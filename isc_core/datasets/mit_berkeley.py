@@ -7,8 +7,8 @@ algorithms", doi:10.1109/ICCV.2009.5459428. Heights, lights and the renderings u
 J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
 doi:10.1109/TPAMI.2014.2377712.
 
-In natural light `image = shading * reflectance` exactly (it is rendered); in the laboratory only to
-a few per cent.
+Limits: in natural light `image = shading * reflectance` holds exactly (it is rendered), in the
+laboratory only to a few per cent.
 """
 
 from dataclasses import dataclass
@@ -32,14 +32,25 @@ _WHITE = 65535.0
 
 @dataclass(frozen=True)
 class MitBerkeleyObject:
-    """One object under one illumination, cut to the evaluation crop (h, w). Row 0 at the top,
-    linear values, float64.
+    """One object under one illumination, on the evaluation crop (h, w); row 0 at the top, float64.
 
-    `image`: (h, w, 3) the input, in [0, 1]. `valid`: (h, w) bool, all three channels of `image`
-    above 0. `mask`: (h, w) bool, the object. `height`: (h, w) pixels, toward the viewer, NaN where
-    unknown. `shading`, `reflectance`: (h, w, 3), at the scale of the files; laboratory shading may
-    exceed 1. `light`: (9, 3) log-shading coefficients in the reference's convention
-    (`shading.spherical_harmonics.light_from_reference` converts).
+    Attributes
+    ----------
+    name, illumination : str
+        The object.
+    image : (h, w, 3) ndarray
+        The input, linear, in [0, 1].
+    valid : (h, w) ndarray of bool
+        All three channels of `image` are above 0.
+    mask : (h, w) ndarray of bool
+        The object.
+    height : (h, w) ndarray
+        Pixels toward the viewer, NaN where unknown.
+    shading, reflectance : (h, w, 3) ndarray
+        Linear, at the scale of the files; laboratory shading may exceed 1.
+    light : (9, 3) ndarray
+        Log-shading SH coefficients, reference convention
+        (`shading.spherical_harmonics.light_from_reference` converts).
     """
 
     name: str
@@ -54,10 +65,24 @@ class MitBerkeleyObject:
 
 
 def list_objects(root: str | Path, illumination: str) -> tuple[str, ...]:
-    """Names of the objects below `root` under "natural" or "laboratory" light, in alphabetical
-    order.
+    """List the objects under one illumination.
 
-    Raises `InputError` where the folder is absent or holds no object.
+    Parameters
+    ----------
+    root : path
+        Folder of the data set.
+    illumination : str
+        "natural" or "laboratory".
+
+    Returns
+    -------
+    tuple of str
+        Names in alphabetical order.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or has no object.
     """
     folder = _folder(Path(root), illumination)
     names = tuple(
@@ -75,8 +100,17 @@ def list_objects(root: str | Path, illumination: str) -> tuple[str, ...]:
 
 
 def check_request(root: str | Path, name: str, illumination: str, input: str) -> None:
-    """Raises the `InputError` that `load_object` would raise for an unknown name or option, without
-    reading the object.
+    """Check the arguments of `load_object` without reading the object.
+
+    Parameters
+    ----------
+    root, name, illumination, input
+        As for `load_object`.
+
+    Raises
+    ------
+    InputError
+        If a name or option is unknown.
     """
     _check_option("input", input, INPUTS)
     known = list_objects(root, illumination)
@@ -96,11 +130,31 @@ def check_request(root: str | Path, name: str, illumination: str, input: str) ->
 def load_object(
     root: str | Path, name: str, illumination: str = "natural", input: str = "diffuse"
 ) -> MitBerkeleyObject:
-    """One object of the set. `input`: "diffuse" (without highlights) or "original" (as
-    photographed; laboratory light, or the glossy sets of `isc synth glossy-mit`).
+    """Read one object of the set.
 
-    Height, reflectance, mask and crop always come from the laboratory folder. Raises `InputError`
-    for an unknown name or option, and for a missing, damaged or mis-sized file.
+    Height, reflectance, mask and crop always come from the laboratory folder.
+
+    Parameters
+    ----------
+    root : path
+        Folder of the data set.
+    name : str
+        One of `list_objects`.
+    illumination : str, optional
+        "natural" or "laboratory".
+    input : str, optional
+        "diffuse" (without highlights) or "original" (as photographed; laboratory light, or the
+        glossy sets of `isc synth glossy-mit`).
+
+    Returns
+    -------
+    MitBerkeleyObject
+        On the evaluation crop.
+
+    Raises
+    ------
+    InputError
+        If a name or option is unknown, or a file is missing, damaged or of the wrong size.
     """
     check_request(root, name, illumination, input)
     laboratory = _folder(Path(root), "laboratory") / name
@@ -127,9 +181,22 @@ def load_object(
 
 
 def load_natural_lights(root: str | Path) -> np.ndarray:
-    """Lights of real environments, (9, 3, n) in the reference's convention.
+    """Read the lights of real environments.
 
-    Raises `InputError` where the file is absent.
+    Parameters
+    ----------
+    root : path
+        Folder of the data set.
+
+    Returns
+    -------
+    (9, 3, n) ndarray
+        Log-shading SH coefficients, reference convention.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or damaged.
     """
     path = Path(root) / "natural_lights.mat"
     lights = _matrix(path, "Ls")
@@ -185,7 +252,7 @@ def _shading(folder: Path, illumination: str, crop: tuple[np.ndarray, np.ndarray
 
 def _crop(path: Path) -> tuple[np.ndarray, np.ndarray]:
     """The rows and columns of the evaluation crop, from 1-based lists to 0-based ones."""
-    with np.errstate(invalid="ignore"):  # what is no number lies outside of any picture
+    with np.errstate(invalid="ignore"):  # NaN becomes an index outside any image
         rows, columns = (
             np.atleast_1d(_matrix(path, key)).ravel().astype(np.int64) - 1
             for key in ("crop_idx1", "crop_idx2")

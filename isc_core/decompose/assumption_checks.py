@@ -1,4 +1,4 @@
-"""Which assumptions of the models a photo violates: an opaque glossy object, one small lamp beside a
+"""Which assumptions of the models a photo violates: an opaque glossy object, one small lamp and a
 smooth light of about one colour.
 
 Problem: for a mirror, for glass, or under several lamps a model also finds albedo, shape and light

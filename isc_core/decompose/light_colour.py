@@ -1,5 +1,5 @@
-"""The colour of the light, where a photo determines it: the photo is explained as under white light,
-and the colour is put back.
+"""The colour of the light, where a photo determines it: the photo is explained as under white
+light, and the colour is put back.
 
 Problem: separations, and the priors of a lamp's colour, assume white light.
 

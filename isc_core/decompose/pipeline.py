@@ -1,7 +1,7 @@
 """The main job: from one photo of a masked object to its intrinsic scene characteristics.
 
-The photo is brought to the scale of the work, one of the `models` explains it, and its answer
-becomes maps that keep the identities.
+The photo is brought to the working scale, one of the `models` explains it, and its estimate becomes
+maps that satisfy the identities.
 """
 
 import platform
@@ -44,37 +44,60 @@ def decompose(
     photo: Photo,
     settings: Settings | None = None,
     *,
-    evidence: KnownInputs | None = None,
+    known: KnownInputs | None = None,
     prior_set: PriorSet | None = None,
     name: str = "",
     monitor: Monitor | None = None,
 ) -> Decomposition:
-    """Decomposes `photo`; maps are at the working scale (see `Settings.max_size`).
+    """Decompose a photo into its intrinsic scene characteristics.
 
-    `name` of the photo, for people. `prior_set`: the shipped one if None. Raises `InputError`,
-    `Cancelled`.
+    Parameters
+    ----------
+    photo : Photo
+        The photo, linear Rec.709, and the object's mask.
+    settings : Settings, optional
+        Model and options.
+    known : KnownInputs, optional
+        Known shape, light or depth, at the photo's full size.
+    prior_set : PriorSet, optional
+        SIRFS priors; the shipped set by default.
+    name : str, optional
+        Name of the photo in the result.
+    monitor : Monitor, optional
+        Receives progress; can cancel.
+
+    Returns
+    -------
+    Decomposition
+        Maps at the working scale, see `Settings.max_size` and `Settings.full_size`.
+
+    Raises
+    ------
+    InputError
+        If the settings, the photo or the known quantities are unusable.
+    Cancelled
+        If the monitor cancels.
     """
-    settings, evidence, monitor = (
-        settings or Settings(),
-        evidence or KnownInputs(),
-        monitor or Monitor(),
-    )
+    settings, inputs = settings or Settings(), known or KnownInputs()
+    monitor, clock = monitor or Monitor(), Clock()
     settings.check()
-    _check_used(settings, evidence, prior_set)
+    _check_used(settings, inputs, prior_set)
     if not photo.image[photo.mask].any():
         raise InputError(
             "the photo is black inside the mask: there is nothing to recover; use another photo"
         )
-    clock = Clock()
     with clock.stage("prepare"):
         working = photo.resized_to_object(settings.max_size)
         maps = photo if settings.full_size else working
-        known = _at_scale(evidence, photo, working)
+        constraints = _at_scale(inputs, photo, working)
         if not share_in_blocks(maps.mask):
             raise InputError(
-                "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region or use a larger photo"
+                "the mask holds no block of 2 x 2 pixels to build a shape of: mark a larger region "
+                "or use a larger photo"
             )
-    answer = solve(DecompositionTask(working, maps, settings, known, prior_set, monitor, clock))
+    estimate = solve(
+        DecompositionTask(working, maps, settings, constraints, prior_set, monitor, clock)
+    )
     monitor.report("maps", 0.96)
     provenance = Provenance(
         _settings_json(settings),
@@ -82,33 +105,47 @@ def decompose(
         _versions(),
         clock.seconds,
         _input_json(maps, name),
-        answer.diagnostics,
+        estimate.diagnostics,
     )
     with clock.stage("maps"):
-        return assemble(maps, answer, provenance)
+        return assemble(maps, estimate, provenance)
 
 
-def _check_used(settings: Settings, evidence: KnownInputs, prior_set: PriorSet | None) -> None:
-    """Raises `InputError` where something is given that the model does not look at."""
+def _check_used(settings: Settings, inputs: KnownInputs, prior_set: PriorSet | None) -> None:
+    """Raise `InputError` where something is given that the model does not use."""
     if settings.model in SIRFS_MODELS:
         return
-    given = (evidence.height, evidence.light, evidence.depth, prior_set)
-    if settings.shading_only or any(thing is not None for thing in given):
+    given = (inputs.height, inputs.light, inputs.depth, prior_set)
+    if settings.shading_only or any(value is not None for value in given):
         models = " or ".join(SIRFS_MODELS)
         raise InputError(
-            f"--shape, --light, --depth, --priors and --shading-only mean nothing to {settings.model}: use --model {models}"
+            "--shape, --light, --depth, --priors and --shading-only do not apply to "
+            f"{settings.model}: use --model {models}"
         )
 
 
-def assemble(photo: Photo, answer: SceneEstimate, provenance: Provenance) -> Decomposition:
-    """Normals, shading and reflectance that follow from the answer's height and light; `photo` is
-    the one of its maps.
+def assemble(photo: Photo, estimate: SceneEstimate, provenance: Provenance) -> Decomposition:
+    """Compute the maps that follow from an estimate's height and light.
 
-    The identities hold by construction: shading = exp(SH(normal)) and reflectance = diffuse /
-    shading, inside the mask.
+    The identities hold by construction: inside the mask shading = exp(SH(normal)) and reflectance =
+    diffuse / shading.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photo of the maps.
+    estimate : SceneEstimate
+        What a model recovered.
+    provenance : Provenance
+        Origin of the result.
+
+    Returns
+    -------
+    Decomposition
+        The maps.
     """
-    mask, split, height = photo.mask, answer.split, answer.height
-    normal, shading = shaded(height, answer.light, mask)
+    mask, split, height = photo.mask, estimate.split, estimate.height
+    normal, shading = shaded(height, estimate.light, mask)
     reflectance = np.where(
         mask[..., None], split.diffuse / np.where(mask[..., None], shading, 1), 0
     ).astype(np.float32)
@@ -124,52 +161,49 @@ def assemble(photo: Photo, answer: SceneEstimate, provenance: Provenance) -> Dec
         np.where(mask, height - height[mask].min(), 0).astype(np.float32),
         mask,
         _confidence(split, normal, mask),
-        light_from_reference(answer.light),
+        light_from_reference(estimate.light),
         provenance,
-        answer.brdf,
+        estimate.brdf,
     )
 
 
 def _confidence(split: Separation, normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """How far a pixel can be trusted: the separation's own confidence, less where the surface turns
-    away and little is seen of it.
-    """
+    """The confidence of the separation, lower where the surface turns away from the viewer."""
     return np.where(mask, split.confidence * np.sqrt(np.clip(normal[..., 2], 0, 1)), 0).astype(
         np.float32
     )
 
 
-def _at_scale(evidence: KnownInputs, photo: Photo, working: Photo) -> SceneConstraints:
-    """The evidence on the working photo's grid and in its pixels."""
+def _at_scale(inputs: KnownInputs, photo: Photo, working: Photo) -> SceneConstraints:
+    """The known quantities on the working photo's grid and in its pixels."""
     factor = working.scale / photo.scale
-    for what, values in (("shape", evidence.height), ("depth", evidence.depth)):
+    for what, values in (("shape", inputs.height), ("depth", inputs.depth)):
         if values is not None and values.shape != photo.mask.shape:
             (rows, columns), (h, w) = values.shape, photo.mask.shape
             raise InputError(
-                f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the photo's full size"
+                f"the {what} map is {columns} x {rows} but the photo {w} x {h}: give it at the "
+                "photo's full size"
             )
-    light = (
-        None if evidence.light is None else light_to_reference(np.asarray(evidence.light, float))
-    )
+    light = None if inputs.light is None else light_to_reference(np.asarray(inputs.light, float))
     height = (
         None
-        if evidence.height is None
-        else nearest_samples(evidence.height, working.mask.shape, factor) * factor
+        if inputs.height is None
+        else nearest_samples(inputs.height, working.mask.shape, factor) * factor
     )
     if height is not None and not np.isfinite(height[working.mask]).all():
         raise InputError(
             "the known shape has holes inside the mask: give it as --depth, which may have holes"
         )
     height = None if height is None else continued_height(height, working.mask)
-    if evidence.depth is None:
+    if inputs.depth is None:
         return SceneConstraints(height, light)
-    seen = nearest_samples(evidence.depth, working.mask.shape, factor) * factor
+    seen = nearest_samples(inputs.depth, working.mask.shape, factor) * factor
     if not np.isfinite(seen[working.mask]).any():
         raise InputError(
             "the depth map has no value inside the mask, only holes: is it a map of this photo?"
         )
     return SceneConstraints(
-        height, light, DepthObservation(seen, evidence.depth_sigma * factor, evidence.depth_weight)
+        height, light, DepthObservation(seen, inputs.depth_sigma * factor, inputs.depth_weight)
     )
 
 

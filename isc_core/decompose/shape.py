@@ -7,7 +7,7 @@ Equation: such an image is multiplied by a gain that brings it to the brightness
 recovered light is divided by the gain, so that neither shape nor roughness depend on the exposure.
 
 Limits: what the exposure of a photo says about its albedo is then lost: without it the ten training
-objects have 2 % more error (in natural and in laboratory light; at a level of .55 11 %, at .4 20 %).
+objects have 2 % more error, in natural and in laboratory light; at a level of .55 11 %, at .4 20 %.
 """
 
 from dataclasses import dataclass, replace

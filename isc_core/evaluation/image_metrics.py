@@ -1,18 +1,19 @@
-"""How alike two images are in structure, where a photo's highlights are, and whether a confidence
-knows where the errors are.
+"""Structural similarity of images, regions of highlights, and the quality of a confidence.
 
-Structural similarity: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli (2004),
-doi:10.1109/TIP.2003.819861: (2 m_t m_u + C1)(2 v_tu + C2) / ((m_t^2 + m_u^2 + C1)(v_t + v_u + C2)),
-means m and biased (co)variances v under a Gaussian window of sigma 1.5 and 11 taps, C1 = (.01
-peak)^2, C2 = (.03 peak)^2, border values continued, averaged. `ssim` takes each channel by itself;
-`ssim_volume` also runs the window across the channels, as MATLAB's `ssim` does with an H x W x 3
-array, from which published figures of highlight removal come. The two differ by up to .04: never
-mix them.
+Problem: how similar two images are in structure, where a photo's highlights are, and whether a
+confidence is low where the errors are.
 
-Sparsification: pixels are dropped from the least confident on; a confidence that means something
-takes the error with it.
+Equation: structural similarity is (2 m_t m_u + C1)(2 v_tu + C2) / ((m_t^2 + m_u^2 + C1)(v_t + v_u +
+C2)), means m and biased (co)variances v under a Gaussian window of sigma 1.5 and 11 taps, C1 = (.01
+peak)^2, C2 = (.03 peak)^2, border values replicated, averaged. `ssim` treats each channel
+separately; `ssim_volume` also runs the window across the channels, as MATLAB's `ssim` does with an
+H x W x 3 array, from which published figures of highlight removal come. The two differ by up to
+.04: never mix them. Sparsification: pixels are dropped from the least confident on; a meaningful
+confidence drops the error with them.
 
-Limits: none of this is a perceptual distance; all of it needs the truth.
+Citation: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli (2004), doi:10.1109/TIP.2003.819861.
+
+Limits: none of this is a perceptual distance; all of it needs the ground truth.
 """
 
 from dataclasses import dataclass
@@ -32,12 +33,27 @@ _HIGHLIGHT_SHARE, _STRONGEST = 0.1, 99.9
 def ssim(
     truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None, *, peak: float = 1.0
 ) -> float:
-    """Structural similarity of images (H, W, C), each channel by itself, then their mean; 1 for
-    equal images.
+    """Compute the structural similarity of two images: the mean over the channels.
 
-    `mask` (H, W) bool: the map is averaged inside it, and windows see the images as they are given,
-    so set what is outside to the same value in both. `peak`: the range of the values. Raises
-    `ValueError` for shapes that differ and for an empty mask.
+    Parameters
+    ----------
+    truth, estimate : (H, W, C) ndarray
+        The images.
+    mask : (H, W) ndarray of bool, optional
+        The similarity is averaged inside it. Windows read the images as they are, so set the
+        outside to the same value in both.
+    peak : float, optional
+        Range of the values.
+
+    Returns
+    -------
+    float
+        1 for equal images.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ or the mask is empty.
     """
     return _similarity(truth, estimate, mask, peak, axes=(0, 1))
 
@@ -45,16 +61,50 @@ def ssim(
 def ssim_volume(
     truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None, *, peak: float = 1.0
 ) -> float:
-    """As `ssim`, with the window across the channels as well: the images are taken as volumes (H,
-    W, C).
+    """Compute the structural similarity with the window across the channels as well.
+
+    Parameters
+    ----------
+    truth, estimate : (H, W, C) ndarray
+        The images, taken as volumes.
+    mask : (H, W) ndarray of bool, optional
+        As for `ssim`.
+    peak : float, optional
+        Range of the values.
+
+    Returns
+    -------
+    float
+        1 for equal images.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ or the mask is empty.
     """
     return _similarity(truth, estimate, mask, peak, axes=(0, 1, 2))
 
 
 def highlight_region(specular: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Where the highlights are, (H, W) bool: the channels' mean of the true `specular` (H, W, 3) is
-    above a tenth of its 99.9th percentile inside `mask` (H, W) bool. Empty where nothing is
-    specular. Raises `ValueError` for an empty mask.
+    """Find the highlights: where the mean over the channels is above a tenth of its 99.9th
+    percentile.
+
+    Parameters
+    ----------
+    specular : (H, W, 3) ndarray
+        The true specular layer.
+    mask : (H, W) ndarray of bool
+        The object.
+
+    Returns
+    -------
+    (H, W) ndarray of bool
+        Empty where nothing is specular.
+
+    Raises
+    ------
+    ValueError
+        If the mask is empty.
     """
     if not mask.any():
         raise ValueError("the mask is empty")
@@ -66,10 +116,14 @@ def highlight_region(specular: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Sparsification:
-    """How the error leaves with the least confident pixels.
+    """The error that remains as the least confident pixels are dropped.
 
-    `dropped` (n,): shares of the pixels, from 0 to 1. `left` (n,): the share of the total error
-    that the kept pixels hold, from 1 to 0.
+    Attributes
+    ----------
+    dropped : (n,) ndarray
+        Shares of the pixels, from 0 to 1.
+    left : (n,) ndarray
+        Share of the total error in the remaining pixels, from 1 to 0.
     """
 
     dropped: np.ndarray
@@ -77,22 +131,38 @@ class Sparsification:
 
     @property
     def area(self) -> float:
-        """Under the curve: .5 for a confidence that knows nothing, less the better; the least
-        possible depends on the errors.
+        """The area under the curve: .5 for a confidence without information, lower is better; the
+        lower bound depends on the errors.
         """
         return float(((self.left[1:] + self.left[:-1]) / 2 * np.diff(self.dropped)).sum())
 
     def removed(self, share: float) -> float:
-        """The share of the error, in [0, 1], that leaves with the given share of the pixels."""
+        """Return the share of the error, in [0, 1], in the given share of dropped pixels."""
         return 1 - float(np.interp(share, self.dropped, self.left))
 
 
 def sparsification(error: np.ndarray, confidence: np.ndarray) -> Sparsification:
-    """The curve of `error` (n,) >= 0 and `confidence` (n,), any scale, larger is surer.
+    """Compute the sparsification curve.
 
     Pixels of equal confidence leave in no order: each carries their mean error. Without any error
-    the curve is that of a confidence that knows nothing. Raises `ValueError` for arrays that are
-    empty or differ in length.
+    the curve is that of a confidence without information.
+
+    Parameters
+    ----------
+    error : (n,) ndarray
+        >= 0.
+    confidence : (n,) ndarray
+        Any scale, larger is more confident.
+
+    Returns
+    -------
+    Sparsification
+        The curve.
+
+    Raises
+    ------
+    ValueError
+        If the arrays are empty or differ in length.
     """
     _same_length(error, confidence)
     _, group, count = np.unique(confidence, return_inverse=True, return_counts=True)
@@ -104,8 +174,22 @@ def sparsification(error: np.ndarray, confidence: np.ndarray) -> Sparsification:
 
 
 def rank_correlation(a: np.ndarray, b: np.ndarray) -> float:
-    """Spearman's: of the ranks of `a` and `b` (n,), equal values sharing their mean rank; 0 where
-    one of them is constant.
+    """Compute Spearman's rank correlation; equal values share their mean rank.
+
+    Parameters
+    ----------
+    a, b : (n,) ndarray
+        The values.
+
+    Returns
+    -------
+    float
+        In [-1, 1]; 0 where one array is constant.
+
+    Raises
+    ------
+    ValueError
+        If the arrays are empty or differ in length.
     """
     _same_length(a, b)
     ranks = [_ranks(values) for values in (a, b)]
@@ -132,7 +216,8 @@ def _similarity(
         or (mask is not None and mask.shape != truth.shape[:2])
     ):
         raise ValueError(
-            f"cannot compare images of shapes {truth.shape} and {estimate.shape} in a mask of {getattr(mask, 'shape', None)}"
+            f"cannot compare images of shapes {truth.shape} and {estimate.shape} in a mask of "
+            f"{getattr(mask, 'shape', None)}"
         )
     if mask is not None and not mask.any():
         raise ValueError("the mask is empty")

@@ -1,16 +1,19 @@
-"""How far an answer is from the truth: the MIT-Berkeley errors of shape, light, shading and
-reflectance, and image errors.
+"""Errors of shape, light, shading and reflectance on the MIT-Berkeley set, and image errors.
 
-The six errors of one object and their geometric mean `avg` follow J. T. Barron, J. Malik (2015),
-"Shape, illumination, and reflectance from shading", doi:10.1109/TPAMI.2014.2377712: what the image
-cannot tell (the offset of the height, one scale of each of shading, reflectance and light) is free,
-everything else counts. The local error is that of R. Grosse, M. K. Johnson, E. H. Adelson, W. T.
-Freeman (2009), doi:10.1109/ICCV.2009.5459428: sum |t - a_b u|^2 / sum |t|^2 over windows b that
-overlap by half, each with its own best scale a_b. It forgives slow drifts, and an estimate of zero
-scores 1.
+Problem: an estimate is compared with the ground truth up to quantities that an image cannot
+determine: the offset of the height, and one scale each of shading, reflectance and light.
 
-Limits: all errors need the truth; none is a perceptual distance. Images are compared at the scale
-of their stored values.
+Equation: the six errors of one object and their geometric mean `avg` follow Barron and Malik. The
+local error is that of Grosse et al.: sum |t - a_b u|^2 / sum |t|^2 over windows b that overlap by
+half, each with its own best scale a_b. It forgives slow drifts; an estimate of zero has an error of
+1.
+
+Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
+doi:10.1109/TPAMI.2014.2377712; R. Grosse, M. K. Johnson, E. H. Adelson, W. T. Freeman (2009),
+doi:10.1109/ICCV.2009.5459428.
+
+Limits: all errors need the ground truth; none is a perceptual distance. Images are compared at the
+scale of their stored values.
 """
 
 import math
@@ -23,8 +26,8 @@ from ..datasets.mit_berkeley import MitBerkeleyObject
 from ..shading.spherical_harmonics import light_from_reference, normal_from_reference, real_sh
 from ..shading.surface_stencils import normals
 
-# Windows of the local error: 20 pixels; the reference's second tiling begins at the tenth pixel,
-# not the eleventh.
+# Windows of the local error: 20 pixels. The reference's second tiling starts at pixel ten, not
+# the eleventh.
 _WINDOW, _SECOND_TILING = 20, 9
 _LIGHT_PROBE = 256
 _TINY = float(np.finfo(np.float64).eps)
@@ -34,10 +37,18 @@ _TINY = float(np.finfo(np.float64).eps)
 class Scores:
     """The six errors of one object; 0 is perfect.
 
-    `height`: mean absolute, pixels, after the best offset. `normal`: mean angle, radians.
-    `shading`, `reflectance`: mean square after one scale for all channels. `rs_mse`: Grosse's local
-    error, the mean of shading's and reflectance's. `light`: mean square of the rendered light probe
-    after one scale for all channels.
+    Attributes
+    ----------
+    height : float
+        Mean absolute error, pixels, after the best offset.
+    normal : float
+        Mean angle, radians.
+    shading, reflectance : float
+        Mean square error after one scale for all channels.
+    rs_mse : float
+        Grosse's local error, the mean of shading's and reflectance's.
+    light : float
+        Mean square error of the rendered light probe after one scale for all channels.
     """
 
     height: float
@@ -49,7 +60,7 @@ class Scores:
 
     @property
     def average(self) -> float:
-        """The geometric mean of the six."""
+        """The geometric mean of the six errors."""
         return geometric_mean(getattr(self, field.name) for field in fields(self))
 
 
@@ -62,12 +73,30 @@ def score(
     reflectance: np.ndarray,
     light: np.ndarray,
 ) -> Scores:
-    """The errors of an answer for `truth`, on the truth's crop (h, w).
+    """Compute the errors of an estimate.
 
-    `height`: (h, w) pixels toward the viewer. `normal`: (h, w, 3) unit vectors, x right, y up, z
-    toward the viewer. `shading`, `reflectance`: (h, w, 3) linear, read where the truth's input is
-    valid. `light`: (9, 3) coefficients of `shading.spherical_harmonics.real_sh`. Raises `ValueError` for a wrong
-    shape, and where an answer is not finite although it is needed.
+    Parameters
+    ----------
+    truth : MitBerkeleyObject
+        The object, on its crop (h, w).
+    height : (h, w) ndarray
+        Pixels toward the viewer.
+    normal : (h, w, 3) ndarray
+        Unit vectors, camera frame: x right, y up, z toward the viewer.
+    shading, reflectance : (h, w, 3) ndarray
+        Linear, read where the input is valid.
+    light : (9, 3) ndarray
+        Log-shading coefficients of `shading.spherical_harmonics.real_sh`.
+
+    Returns
+    -------
+    Scores
+        The six errors.
+
+    Raises
+    ------
+    ValueError
+        If a shape is wrong, or an estimate is not finite where it is read.
     """
     if light.shape != truth.light.shape or not np.isfinite(light).all():
         raise ValueError(f"{truth.name}: the light must be {truth.light.shape} finite coefficients")
@@ -93,9 +122,18 @@ def score(
 
 
 def truth_normal(height: np.ndarray) -> np.ndarray:
-    """Unit normals (h, w, 3), x right, y up, z toward the viewer, of a height map (h, w) in pixels.
+    """Compute the normals of a height map with holes.
 
-    NaN where any height of the 3 x 3 neighbourhood (replicated at the border) is not finite.
+    Parameters
+    ----------
+    height : (h, w) ndarray
+        Pixels toward the viewer.
+
+    Returns
+    -------
+    (h, w, 3) ndarray
+        Unit normals, camera frame; NaN where any height of the 3 x 3 neighbourhood (replicated at
+        the border) is not finite.
     """
     rows, columns = height.shape
     around = np.pad(np.isfinite(height), 1, mode="edge")
@@ -108,27 +146,47 @@ def truth_normal(height: np.ndarray) -> np.ndarray:
 
 
 def height_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Mean absolute difference, pixels, after the best constant offset, over the finite pixels of
-    `truth`. Its scale counts.
+    """Compute the mean absolute difference of two heights after the best constant offset.
+
+    Parameters
+    ----------
+    truth : (h, w) ndarray
+        Pixels; only finite values count.
+    estimate : (h, w) ndarray
+        Pixels. Its scale counts.
+
+    Returns
+    -------
+    float
+        Pixels.
     """
     difference = (estimate - truth)[np.isfinite(truth)]
     return float(np.abs(difference - np.median(difference)).mean())
 
 
 def angular_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Mean angle, radians, between unit vectors (..., 3)."""
+    """Return the mean angle, radians, between unit vectors (..., 3)."""
     return float(np.arccos(np.clip((truth * estimate).sum(axis=-1), -1, 1)).mean())
 
 
 def scaled_mse(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Mean square difference after the one scale of `estimate` that makes it least."""
+    """Return the mean square difference after the scale of `estimate` that minimises it."""
     scale = (truth * estimate).sum() / max(_TINY, float((estimate * estimate).sum()))
     return float(np.square(scale * estimate - truth).mean())
 
 
 def light_error(truth: np.ndarray, estimate: np.ndarray) -> float:
-    """Mean square difference of two lights (9, C) of our convention, seen on a front hemisphere,
-    after one common scale.
+    """Compare two lights on a rendered front hemisphere, after one common scale.
+
+    Parameters
+    ----------
+    truth, estimate : (9, C) ndarray
+        Log-shading SH coefficients, ISC's convention.
+
+    Returns
+    -------
+    float
+        Mean square difference.
     """
     axis = (np.arange(1, _LIGHT_PROBE + 1) - _LIGHT_PROBE / 2) / (_LIGHT_PROBE / 2)
     down, right = np.meshgrid(axis, axis, indexing="ij")
@@ -140,8 +198,24 @@ def light_error(truth: np.ndarray, estimate: np.ndarray) -> float:
 
 
 def mse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None) -> float:
-    """Mean square difference of two images (h, w[, C]) over all channels, inside `mask` (h, w) if
-    one is given.
+    """Compute the mean square difference of two images over all channels.
+
+    Parameters
+    ----------
+    truth, estimate : (h, w[, C]) ndarray
+        The images.
+    mask : (h, w) ndarray of bool, optional
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        Mean square difference.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ or the mask is empty.
     """
     _same_shape(truth, estimate, mask)
     difference = np.asarray(truth, float) - estimate
@@ -151,20 +225,50 @@ def mse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None)
 def psnr(
     truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None = None, *, peak: float = 1.0
 ) -> float:
-    """10 log10(peak^2 / MSE), dB, values not clipped; infinite for equal images.
+    """Compute the peak signal-to-noise ratio, 10 log10(peak^2 / MSE); values are not clipped.
 
-    Images and mask as in `mse`.
+    Parameters
+    ----------
+    truth, estimate : (h, w[, C]) ndarray
+        The images.
+    mask : (h, w) ndarray of bool, optional
+        Pixels that count.
+    peak : float, optional
+        Range of the values.
+
+    Returns
+    -------
+    float
+        dB; infinite for equal images.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ or the mask is empty.
     """
     error = mse(truth, estimate, mask)
     return math.inf if error == 0 else 10 * math.log10(peak * peak / error)
 
 
 def lmse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray) -> float:
-    """Grosse's local error of images (h, w[, C]) inside `mask` (h, w): each channel by itself, then
-    their mean. 0 is perfect.
+    """Compute Grosse's local error, the mean over the channels.
 
-    An estimate of zero scores 1. NaN outside the mask is never read. Raises `ValueError` where the
-    truth is zero everywhere.
+    Parameters
+    ----------
+    truth, estimate : (h, w[, C]) ndarray
+        The images; NaN is allowed outside the mask.
+    mask : (h, w) ndarray of bool
+        Pixels that count.
+
+    Returns
+    -------
+    float
+        0 is perfect; an estimate of zero has 1.
+
+    Raises
+    ------
+    ValueError
+        If shapes differ, the mask is empty, or a channel of the truth is zero everywhere.
     """
     _same_shape(truth, estimate, mask)
     t, u = (
@@ -184,9 +288,12 @@ def lmse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray) -> float:
 
 
 def geometric_mean(values: Iterable[float]) -> float:
-    """The geometric mean of numbers >= 0; 0 if one of them is 0.
+    """Compute the geometric mean of numbers >= 0; 0 if one of them is 0.
 
-    Raises `ValueError` where there are none, or one is negative.
+    Raises
+    ------
+    ValueError
+        If there are none, or one is negative.
     """
     numbers = list(values)
     if not numbers or min(numbers) < 0:
@@ -195,10 +302,7 @@ def geometric_mean(values: Iterable[float]) -> float:
 
 
 def _window_sums(image: np.ndarray) -> np.ndarray:
-    """Sums over the windows that tile an image (h, w, C), zero beyond its end:
-
-    (windows down, windows right, C).
-    """
+    """Sums over the windows that tile an image (h, w, C), zero beyond its end."""
     down, right = (np.arange(0, size, _WINDOW) for size in image.shape[:2])
     if not (len(down) and len(right)):
         return np.zeros((0, 0, image.shape[2]))
@@ -208,14 +312,15 @@ def _window_sums(image: np.ndarray) -> np.ndarray:
 def _same_shape(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray | None) -> None:
     if truth.shape != estimate.shape or (mask is not None and mask.shape != truth.shape[:2]):
         raise ValueError(
-            f"cannot compare images of shapes {truth.shape} and {estimate.shape} in a mask of {getattr(mask, 'shape', None)}"
+            f"cannot compare images of shapes {truth.shape} and {estimate.shape} in a mask of "
+            f"{getattr(mask, 'shape', None)}"
         )
     if mask is not None and not mask.any():
         raise ValueError("the mask is empty")
 
 
 def _require(truth: MitBerkeleyObject, **answer: np.ndarray) -> None:
-    """Every map of the answer fits the truth and is finite where it will be read."""
+    """Check that every map fits the truth and is finite where it is read."""
     needed = {"shading": truth.valid, "reflectance": truth.valid}
     for name, value in answer.items():
         shape = truth.height.shape if name == "height" else truth.image.shape

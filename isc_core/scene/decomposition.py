@@ -1,8 +1,8 @@
-"""The results of the core, as typed frozen objects, and the identities that they keep.
+"""The results of the core as typed frozen objects, and the identities that they satisfy.
 
-Identities, inside the mask: `image = diffuse + specular + residual`, `diffuse = reflectance *
-shading` (both to 1e-5 of the image's maximum), `shading = exp(SH(normal))` (to 1e-4 relative), unit
-normals. Their files are written and read by `result_folder`.
+Inside the mask `image = diffuse + specular + residual`, `diffuse = reflectance * shading` (both to
+1e-5 of the image's maximum), `shading = exp(SH(normal))` (to 1e-4 relative), and normals have unit
+length. `result_files.result_folder` writes and reads their files.
 """
 
 from dataclasses import dataclass, field
@@ -19,9 +19,14 @@ from .lobe_fit import LobeFit
 class Separation:
     """One photo split into its layers: `image = diffuse + specular + residual` inside the mask.
 
-    `diffuse`, `specular`, `residual`: (H, W, 3) float32, linear, 0 outside the mask; diffuse and
-    specular >= 0. `confidence`: (H, W) float32 in [0, 1], how far the split can be trusted at each
-    pixel; 0 outside the mask.
+    Attributes
+    ----------
+    diffuse, specular : (H, W, 3) ndarray of float32
+        Linear, >= 0, 0 outside the mask.
+    residual : (H, W, 3) ndarray of float32
+        Linear, 0 outside the mask.
+    confidence : (H, W) ndarray of float32
+        Reliability of the split in [0, 1]; 0 outside the mask.
     """
 
     diffuse: np.ndarray
@@ -32,8 +37,22 @@ class Separation:
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a result comes from: everything of `scene.decomposition.json` that is not the scene itself
-    (JSON-ready values).
+    """Origin of a result: everything in decomposition.json except the scene itself.
+
+    Attributes
+    ----------
+    settings : dict
+        The settings, JSON-ready.
+    seed : int
+        Of random numbers.
+    versions : dict of str to str
+        Versions of ISC, Python and the numerical packages.
+    timings : dict of str to float
+        Seconds by stage.
+    input : dict
+        The photo, JSON-ready.
+    diagnostics : Diagnostics
+        How the decomposition ended.
     """
 
     settings: dict[str, Any] = field(default_factory=dict)
@@ -46,10 +65,16 @@ class Provenance:
 
 @dataclass(frozen=True)
 class IdentityErrors:
-    """The worst violation of each identity inside the mask, and what is tolerated.
+    """The largest violation of each identity inside the mask.
 
-    `image`, `shading_product`: largest absolute error over the image's maximum. `sh`: largest
-    relative error of the shading. `normal_length`: largest deviation of a normal's length from 1.
+    Attributes
+    ----------
+    image, shading_product : float
+        Largest absolute error over the image's maximum.
+    sh : float
+        Largest relative error of the shading.
+    normal_length : float
+        Largest deviation of a normal's length from 1.
     """
 
     image: float
@@ -58,7 +83,7 @@ class IdentityErrors:
     normal_length: float
 
     def broken(self) -> tuple[str, ...]:
-        """The identities that do not hold, in words; empty for a sound result."""
+        """Return the violated identities, one text each; empty for a sound result."""
         tests = (
             (self.image, 1e-5, "image = diffuse + specular + residual"),
             (self.shading_product, 1e-5, "diffuse = reflectance * shading"),
@@ -74,15 +99,28 @@ class IdentityErrors:
 
 @dataclass(frozen=True)
 class Decomposition:
-    """The intrinsic scene characteristics of one photo. Maps cover the whole frame at the scale
-    used.
+    """The intrinsic scene characteristics of one photo.
 
-    `image, diffuse, specular, residual, reflectance, shading`: (H, W, 3) float32, linear Rec.709, 0
-    outside the mask. `normal`: (H, W, 3) float32 unit vectors, x right, y up, z toward the viewer;
-    (0, 0, 1) outside the mask. `height`: (H, W) float32, pixels, toward the viewer; 0 outside.
-    `mask`: (H, W) bool. `confidence`: (H, W) in [0, 1]. `illumination`: (9, 3) float64; log
-    shading_c(n) = sum_k illumination[k, c] Y_k(n), orthonormal real spherical harmonics. `brdf`:
-    the lobe fitted to the specular layer; None where no fit was tried.
+    Maps cover the whole frame at the working scale.
+
+    Attributes
+    ----------
+    image, diffuse, specular, residual, reflectance, shading : (H, W, 3) ndarray of float32
+        Linear Rec.709, 0 outside the mask.
+    normal : (H, W, 3) ndarray of float32
+        Unit vectors, camera frame: x right, y up, z toward the viewer; (0, 0, 1) outside the mask.
+    height : (H, W) ndarray of float32
+        Pixels toward the viewer; 0 outside the mask.
+    mask : (H, W) ndarray of bool
+        The object.
+    confidence : (H, W) ndarray
+        In [0, 1].
+    illumination : (9, 3) ndarray of float64
+        log shading_c(n) = sum_k illumination[k, c] Y_k(n), orthonormal real spherical harmonics.
+    provenance : Provenance
+        Origin of the result.
+    brdf : LobeFit or None
+        Lobe fitted to the specular layer; None where no fit was tried.
     """
 
     image: np.ndarray
@@ -100,9 +138,17 @@ class Decomposition:
     brdf: LobeFit | None = None
 
     def identity_errors(self) -> IdentityErrors:
-        """How well the maps fit each other inside the mask.
+        """Measure how well the maps satisfy the identities inside the mask.
 
-        Raises `ValueError` for an empty mask.
+        Returns
+        -------
+        IdentityErrors
+            The largest violations.
+
+        Raises
+        ------
+        ValueError
+            If the mask is empty.
         """
         if not self.mask.any():
             raise ValueError("the mask is empty: there is nothing to check")
@@ -112,9 +158,7 @@ class Decomposition:
         }
         scale = max(float(np.abs(inside["image"]).max()), 1e-6)
         layers = inside["diffuse"] + inside["specular"] + inside["residual"]
-        with np.errstate(
-            over="ignore"
-        ):  # of a light that none of the photos has: then the shading is not that
+        with np.errstate(over="ignore"):  # an absurd light: then the identity is violated anyway
             expected = np.exp(real_sh(inside["normal"]) @ self.illumination)
         return IdentityErrors(
             image=_worst(inside["image"] - layers) / scale,

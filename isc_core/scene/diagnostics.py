@@ -1,5 +1,4 @@
-"""How a decomposition ended: the solver's convergence, what was fitted, and which assumptions of the
-models the photo violates.
+"""How a decomposition ended: the solver's convergence, the fits, and violated assumptions.
 
 Values only: the sentences for people are made where they are shown
 (`result_files.diagnostics_text`).

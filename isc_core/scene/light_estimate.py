@@ -1,9 +1,9 @@
-"""How the light of a photo looks: whether there is a lamp, or several, where the strongest stands,
-and what the light is like as a whole.
+"""The light predicted from a photo: whether there is a lamp or several, the direction of the
+strongest, and the light as a whole.
 
-`PLACES`, where a lamp may stand, are directions evenly over what is before the object and a little
-behind it, on a spiral: R. Swinbank and R. J. Purser 2006, doi:10.1256/qj.05.227. `lamp_network`
-finds all this.
+`PLACES`, possible directions of a lamp, are distributed evenly over the hemisphere in front of the
+object and a little behind it, on a spiral: R. Swinbank and R. J. Purser 2006,
+doi:10.1256/qj.05.227. `networks.light_network` predicts all of it.
 """
 
 from dataclasses import dataclass
@@ -12,10 +12,7 @@ import numpy as np
 
 _COUNT, _BEHIND = 256, -0.2  # directions; the least of their parts toward the viewer
 _HELD = 0.68
-_BLUR, _NARROWEST = (
-    12.1,
-    4.0,
-)  # degrees: what the network's places were blurred over, 68 % of it; a cone, at least
+_BLUR, _NARROWEST = 12.1, 4.0  # degrees: 68 % of the blur of `places`; the narrowest cone
 _WIDEST_CONE, _LIKELY_NONE = 30.0, 0.5
 
 
@@ -32,9 +29,18 @@ PLACES = _spiral()
 
 @dataclass(frozen=True)
 class LightEstimate:
-    """`none`, `one`, `several`: probabilities, together 1; `places` (256,): of `PLACES`, for the
-    strongest lamp, if there is any. `light` (8,): what the log shading is like, see
-    `sirfs.priors.predicted_light`, `deviations` (8,): how uncertain that is.
+    """Predicted light of a photo.
+
+    Attributes
+    ----------
+    none, one, several : float
+        Probabilities of so many lamps; they sum to 1.
+    places : (256,) ndarray
+        Probability of each of `PLACES` for the strongest lamp, if there is one.
+    light : (8,) ndarray
+        Description of the log shading, see `sirfs.priors.predicted_light`.
+    deviations : (8,) ndarray
+        Standard deviations of `light`.
     """
 
     none: float
@@ -46,15 +52,14 @@ class LightEstimate:
 
     @property
     def direction(self) -> np.ndarray:
-        """The unit vector (3,) toward the strongest lamp."""
+        """The unit vector (3,) toward the strongest lamp, camera frame."""
         mean = self.places @ PLACES
         return np.asarray(mean / np.linalg.norm(mean))
 
     @property
     def cone(self) -> float:
-        """Degrees: the lamp lies so near `direction` with a probability of 68 %;
-
-        `places` without what they were blurred over.
+        """Degrees from `direction` within which the lamp lies with a probability of 68 %, without
+        the blur of `places`.
         """
         off = np.degrees(np.arccos(np.clip(PLACES @ self.direction, -1, 1)))
         order = np.argsort(off)
@@ -63,10 +68,10 @@ class LightEstimate:
 
     @property
     def smooth(self) -> bool:
-        """Whether there seems to be no lamp, but a light from all around."""
+        """Whether there seems to be no lamp, only light from all around."""
         return self.none > _LIKELY_NONE
 
     @property
     def determined(self) -> bool:
-        """Whether there is a direction to speak of: a lamp, and a cone that is not half the sky."""
+        """Whether there is a lamp in a cone well below a hemisphere."""
         return not self.smooth and self.cone <= _WIDEST_CONE

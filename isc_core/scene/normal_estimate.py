@@ -7,9 +7,15 @@ import numpy as np
 
 @dataclass(frozen=True)
 class NormalEstimate:
-    """`normal` (H, W, 3): the mean of the unit normals that are likely, so at most 1 long; x right,
-    y up, z toward the viewer. `deviation` (H, W), > 0: of its x and y each. Both 0 outside the
-    object.
+    """Predicted normal map of an object.
+
+    Attributes
+    ----------
+    normal : (H, W, 3) ndarray
+        Mean of the probable unit normals, so at most of length 1; camera frame: x right, y up, z
+        toward the viewer; 0 outside the object.
+    deviation : (H, W) ndarray
+        Standard deviation of its x and of its y, > 0; 0 outside the object.
     """
 
     normal: np.ndarray

@@ -111,7 +111,7 @@ def run(options: argparse.Namespace, monitor: Monitor) -> list[str]:
     result = decompose(
         photo,
         settings,
-        evidence=evidence,
+        known=evidence,
         prior_set=prior_set,
         name=options.photo.name,
         monitor=monitor.part(0.0, 0.8),

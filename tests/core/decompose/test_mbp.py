@@ -61,7 +61,7 @@ def test_the_identities_hold_and_the_layers_are_the_scene_s(model: str, full_siz
     found = decompose(
         photo_of(d, d.image),
         Settings(model=model, max_size=60, full_size=full_size),
-        evidence=truth_of(d),
+        known=truth_of(d),
     )
     assert found.identity_errors().broken() == ()
     assert found.mask.shape == (d.mask.shape if full_size else found.mask.shape)
@@ -75,7 +75,7 @@ def test_the_identities_hold_and_the_layers_are_the_scene_s(model: str, full_siz
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
 def test_the_lobe_of_a_known_shape_is_found(model: str) -> None:
     d = glossy()
-    brdf = decompose(photo_of(d, d.image), Settings(model=model), evidence=truth_of(d)).brdf
+    brdf = decompose(photo_of(d, d.image), Settings(model=model), known=truth_of(d)).brdf
     assert brdf is not None
     assert brdf.determined, brdf.outcome
     assert brdf.alpha == pytest.approx(0.15, rel=0.5)
@@ -96,7 +96,7 @@ def test_the_whole_chain_keeps_the_identities() -> None:
 
 def test_plain_sirfs_has_no_lobe() -> None:
     d = glossy((52, 60), 23.0)
-    found = decompose(photo_of(d, d.image), Settings(model="sirfs"), evidence=truth_of(d))
+    found = decompose(photo_of(d, d.image), Settings(model="sirfs"), known=truth_of(d))
     assert found.brdf is None
     assert not found.specular.any()
 
@@ -104,7 +104,7 @@ def test_plain_sirfs_has_no_lobe() -> None:
 @pytest.mark.parametrize("model", ["mdr", "mbp"])
 def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
     d = glossy()
-    found = decompose(photo_of(d, d.diffuse), Settings(model=model), evidence=truth_of(d))
+    found = decompose(photo_of(d, d.diffuse), Settings(model=model), known=truth_of(d))
     assert found.specular.sum() < 3e-3 * found.image.sum()
     assert found.brdf is not None
     assert not found.brdf.determined
@@ -117,7 +117,7 @@ def test_no_highlight_is_invented_on_a_matt_object(model: str) -> None:
 def test_where_nobody_looked_for_highlights_the_object_is_not_called_matt(model: str) -> None:
     d = glossy((52, 60), 23.0)
     found = decompose(
-        photo_of(d, d.image), Settings(model=model, separator="none"), evidence=truth_of(d)
+        photo_of(d, d.image), Settings(model=model, separator="none"), known=truth_of(d)
     )
     assert found.brdf is None and lobe_status(found) == LobeStatus.NOT_FITTED
 
@@ -130,7 +130,7 @@ def test_an_overexposed_object_is_not_called_matt() -> None:
     found = decompose(
         replace(photo, clipped=d.mask & (photo.image.min(-1) > 0.9)),
         Settings(model="mdr"),
-        evidence=truth_of(d),
+        known=truth_of(d),
     )
     assert lobe_status(found) == LobeStatus.HIDDEN
     kinds = {warning.kind for warning in found.provenance.diagnostics.warnings}

@@ -18,7 +18,7 @@ def found(evidence: KnownInputs | None = None, cut: int = 0, **settings: str) ->
     photo = Photo(
         image, mask, 1e-4, np.zeros_like(mask), PhotoSource("", mask.shape, 32, "linear", "file")
     )
-    return decompose(photo, Settings(model="mdr", threads=1, **settings), evidence=evidence)  # type: ignore[arg-type]
+    return decompose(photo, Settings(model="mdr", threads=1, **settings), known=evidence)  # type: ignore[arg-type]
 
 
 def error(d: Decomposition) -> float:
