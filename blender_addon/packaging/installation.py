@@ -136,10 +136,10 @@ def create_photo() -> Any:
     square = row**2 + column**2
     z = np.sqrt(np.clip(1 - square, 0, 1))
     shade = np.clip(0.25 + 0.6 * (-0.4 * column - 0.5 * row + 0.77 * z), 0, None)
-    gloss = np.exp(-60 * ((row + 0.3) ** 2 + (column + 0.25) ** 2))
+    highlight = np.exp(-60 * ((row + 0.3) ** 2 + (column + 0.25) ** 2))
     pixels = np.ones((SIDE, SIDE, 4), np.float32)
     pixels[..., :3] = np.clip(
-        np.array([0.8, 0.45, 0.3]) * shade[..., None] + 0.4 * gloss[..., None], 0, 1
+        np.array([0.8, 0.45, 0.3]) * shade[..., None] + 0.4 * highlight[..., None], 0, 1
     )
     pixels[..., 3] = square < 1
     image = bpy.data.images.new("photo", SIDE, SIDE, alpha=True)

@@ -1,4 +1,4 @@
-"""What the tests of the add-on share: an empty Blender, and results to build."""
+"""Fixtures of the add-on's tests: an empty Blender, and results to build."""
 
 import importlib.util
 from collections.abc import Iterator

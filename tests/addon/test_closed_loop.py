@@ -1,6 +1,4 @@
-"""The closed loop on an exact result: its white, matt and whole renders are its maps, in its own
-light and in another one.
-"""
+"""The closed loop on an exact result: renders match the maps, under its own light and another."""
 
 from pathlib import Path
 from typing import Any
@@ -42,7 +40,7 @@ def test_renders_match_the_recovered_maps(result: ResultArrays, tmp_path: Path) 
 
 @pytest.mark.parametrize("light", ["sun", "sky"])
 def test_a_new_light_has_the_given_strength_and_direction(result: ResultArrays, light: str) -> None:
-    """A shallow dome has no shadows under light from the front: matt radiance is albedo *
+    """A shallow dome has no shadows under light from the front: diffuse radiance is albedo *
     irradiance / pi.
     """
     from benchmarks.blender.renders import Look, picture

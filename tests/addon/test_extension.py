@@ -1,6 +1,4 @@
-"""The zips: what goes in, that imports still work there, that bytes repeat, and that Blender's own
-validator is asked.
-"""
+"""The zips: contents, rewritten imports, reproducible bytes, and Blender's validation."""
 
 import ast
 import importlib.util

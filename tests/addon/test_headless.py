@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -189,7 +190,7 @@ OLD_STATUS = {  # of schema 1
 
 
 def test_warnings_of_a_result_folder_are_printed(tmp_path: Path) -> None:
-    """What the photo's own run said; a status that is not as it should be says nothing."""
+    """Invalid entries of the status are ignored."""
     result, odd = write_result(tmp_path / "all" / "cup"), write_result(tmp_path / "all" / "odd")
     for folder, status in (
         (result, OLD_STATUS),
@@ -261,16 +262,22 @@ def test_ctrl_c_ends_the_worker_and_leaves_nothing(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["bump.png"]
 
 
-def test_signal_handlers_set_in_c_are_tolerated() -> None:
-    """Blender sets its own in C, which Python knows nothing of and cannot set again."""
+def test_signal_handlers_set_in_c_are_tolerated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For those that Blender has set, `signal.signal` returns None, and cannot restore them."""
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    original = signal.signal
+
+    def replace_unknown(number: signal.Signals, handler: Any) -> None:
+        original(number, handler)
+
     try:
-        with Interrupts() as interrupts:
-            interrupts._before = dict.fromkeys(before)
+        monkeypatch.setattr(signal, "signal", replace_unknown)
+        with Interrupts():
+            assert signal.getsignal(signal.SIGINT) != before[signal.SIGINT]
         assert {signal.getsignal(number) for number in before} == {signal.SIG_DFL}
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler)
+            original(number, handler)
 
 
 def test_an_internal_error_has_a_nonzero_exit_code(tmp_path: Path) -> None:

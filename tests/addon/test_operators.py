@@ -1,6 +1,4 @@
-"""The operators as people press them: one real run from photo to object, and what is said where
-something is wrong.
-"""
+"""The operators as users call them: one real run from photo to object, and their errors."""
 
 import importlib.util
 import json
@@ -48,8 +46,8 @@ def mask_image(name: str = "cup mask", size: tuple[int, int] = (64, 88)) -> Any:
     return picture(name, np.repeat(white[..., None], 3, 2).astype(np.float32))
 
 
-def say(operator: Any, **options: Any) -> str:
-    """What an operator complains about."""
+def error_of(operator: Any, **options: Any) -> str:
+    """The error of an operator."""
     with pytest.raises(RuntimeError) as caught:
         operator(**options)
     return str(caught.value).strip().removeprefix("Error: ")
@@ -158,7 +156,7 @@ def test_two_runs_at_once_are_refused(addon: Any, tmp_path: Path) -> None:
     assert census(addon) == before
 
 
-# --- what is asked for ----------------------------------------------------------------------------
+# --- requests ----------------------------------------------------------------------------
 
 
 def test_the_panel_offers_all_models_separators_and_illuminations() -> None:
@@ -247,7 +245,7 @@ def test_kept_results_go_to_the_cache_folder(addon: Any, tmp_path: Path) -> None
         preferences.create_run_folder(tmp_path / "file" / "x", "cup")
 
 
-# --- what is wrong --------------------------------------------------------------------------------
+# --- errors ---------------------------------------------------------------------------------------
 
 
 def masked(settings: Any, mask: Any) -> None:
@@ -291,7 +289,7 @@ def test_invalid_input_is_reported_and_changes_nothing(
 ) -> None:
     prepare(addon.context.scene.isc)
     before, folders = census(addon), list(Path(addon.app.tempdir).iterdir())
-    assert complaint in say(addon.ops.isc.decompose)
+    assert complaint in error_of(addon.ops.isc.decompose)
     after = census(addon)
     after["texts"].clear()  # a report of the worker may be there
     assert after == before and list(Path(addon.app.tempdir).iterdir()) == folders
@@ -318,21 +316,21 @@ def test_a_mask_of_another_size_is_scaled_if_enabled(addon: Any) -> None:
 def test_a_missing_worker_is_reported(addon: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     addon.context.scene.isc.image = photo()
-    assert "the worker is missing" in say(addon.ops.isc.decompose)
+    assert "the worker is missing" in error_of(addon.ops.isc.decompose)
 
 
 def test_an_empty_box_is_refused(addon: Any) -> None:
     settings = addon.context.scene.isc
     settings.image = photo()
-    assert "the box is less than 8 pixels wide or high" in say(addon.ops.isc.cut_mask)
+    assert "the box is less than 8 pixels wide or high" in error_of(addon.ops.isc.cut_mask)
     settings.box = (0, 0, 88, 64)
-    assert "covers the whole image" in say(addon.ops.isc.cut_mask)
+    assert "covers the whole image" in error_of(addon.ops.isc.cut_mask)
     assert settings.mask is None and len(addon.data.images) == 1
 
 
 def test_a_new_mask_has_the_photos_size(addon: Any) -> None:
     settings = addon.context.scene.isc
-    assert "no photo is selected" in say(addon.ops.isc.new_mask)
+    assert "no photo is selected" in error_of(addon.ops.isc.new_mask)
     settings.image = photo()
     assert addon.ops.isc.new_mask() == {"FINISHED"}
     assert tuple(settings.mask.size) == (88, 64) and settings.mask_source == "IMAGE"
@@ -384,12 +382,12 @@ def test_a_folder_without_a_result_is_refused(
     addon: Any, tmp_path: Path, bump_folder: Path
 ) -> None:
     before = census(addon)
-    assert "is no result: select a folder that isc decompose has written" in say(
+    assert "is no result: select a folder that isc decompose has written" in error_of(
         addon.ops.isc.import_result, directory=str(tmp_path)
     )
     shutil.copytree(bump_folder, tmp_path / "broken")
     (tmp_path / "broken" / "arrays.npz").write_bytes(b"nothing")
-    assert "is damaged" in say(addon.ops.isc.import_result, directory=str(tmp_path / "broken"))
+    assert "is damaged" in error_of(addon.ops.isc.import_result, directory=str(tmp_path / "broken"))
     assert census(addon) == before
 
 
@@ -403,7 +401,7 @@ def test_the_same_object_is_updated(addon: Any, bump_folder: Path) -> None:
 def test_photos_of_one_name_become_separate_objects(
     addon: Any, bump_folder: Path, tmp_path: Path
 ) -> None:
-    """From two folders; what panels remember goes by the name that was given."""
+    """From two folders; stored requests use the name of the object."""
     addon.ops.isc.import_result(directory=str(bump_folder))
     first = addon.context.object
     about = json.loads((bump_folder / "decomposition.json").read_text())
@@ -438,7 +436,7 @@ def test_the_request_is_appended_with_the_object(addon: Any, tmp_path: Path) -> 
         requests.stored_request(thing, addon.context.scene, 99)
 
 
-# --- words ----------------------------------------------------------------------------------------
+# --- messages -------------------------------------------------------------------------------------
 
 
 def test_messages_name_images_and_panel_fields() -> None:

@@ -28,7 +28,7 @@ from tests.addon.scene_render import render  # noqa: E402
 
 @pytest.fixture
 def built(addon: Any, bump_folder: Path) -> BuiltObject:
-    """The bump in its own scene, active; its gloss follows the light."""
+    """The bump in its own scene, active, with the fitted lobe."""
     addon.context.scene.isc.specular_from = "lobe"
     addon.ops.isc.import_result(directory=str(bump_folder))
     found = find_built(addon.context.object)
@@ -43,8 +43,8 @@ def sockets(built: BuiltObject) -> dict[str, float]:
     return {name: node.inputs[name].default_value for name in names}
 
 
-def say(operator: Any, **options: Any) -> str:
-    """What an operator complains about."""
+def error_of(operator: Any, **options: Any) -> str:
+    """The error of an operator."""
     with pytest.raises(RuntimeError) as caught:
         operator(**options)
     return str(caught.value).strip().removeprefix("Error: ")
@@ -90,7 +90,7 @@ def test_gains_apply_to_both_sources_of_highlights(addon: Any, bump_folder: Path
 
 
 def test_an_edit_starts_with_the_current_values(addon: Any, built: BuiltObject) -> None:
-    """From a panel: the redo panel shows the object's values, not the usual ones.
+    """From a panel: the redo panel shows the object's values, not the defaults.
 
     Without a window, Blender never asks for that.
     """
@@ -129,7 +129,7 @@ def test_the_sun_takes_a_custom_direction(addon: Any, built: BuiltObject) -> Non
     toward = sun.rotation_quaternion.to_matrix() @ Vector((0, 0, 1))
     np.testing.assert_allclose(toward, (0, -1, 0), atol=1e-6)
     assert sun.data.energy == pytest.approx(2 * energy)
-    assert "no length" in say(addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0))
+    assert "no length" in error_of(addon.ops.isc.relight, light="CHOSEN", direction=(0, 0, 0))
 
 
 def test_the_recovered_light_is_restored(addon: Any, built: BuiltObject, tmp_path: Path) -> None:
@@ -162,24 +162,24 @@ def test_other_objects_are_not_edited(addon: Any, built: BuiltObject) -> None:
 
 def test_a_missing_node_group_is_reported(addon: Any, built: BuiltObject) -> None:
     built.material.node_tree.nodes.clear()
-    assert "has no node group ISC Dichromatic" in say(addon.ops.isc.recolour, hue=0.1)
+    assert "has no node group ISC Dichromatic" in error_of(addon.ops.isc.recolour, hue=0.1)
 
 
 def test_an_object_without_a_request_is_not_decomposed_again(
     addon: Any, built: BuiltObject
 ) -> None:
-    assert "is not in this file: open it, and press Decompose" in say(
+    assert "is not in this file: open it, and press Decompose" in error_of(
         addon.ops.isc.redo, max_size=64
     )
     del built.object["isc_request"]
-    assert "does not store how it was made" in say(addon.ops.isc.redo, max_size=64)
+    assert "does not store how it was made" in error_of(addon.ops.isc.redo, max_size=64)
 
 
 # --- copies ---------------------------------------------------------------------------------------
 
 
 def copied(bpy: Any, built: BuiltObject, linked: bool = False) -> BuiltObject:
-    """What Shift D makes, or Alt D where `linked`; it is active then."""
+    """The active copy made by Shift D, or by Alt D if `linked`."""
     bpy.ops.object.duplicate(linked=linked)
     copy = find_built(bpy.context.object)
     assert copy is not None and copy.object != built.object, "edits would go to the original"
@@ -240,12 +240,12 @@ def test_an_edited_copy_is_never_taken_for_the_original(
 
 def test_a_copy_is_not_decomposed_again(addon: Any, built: BuiltObject) -> None:
     copied(addon, built)
-    assert "is a copy, and only the original is updated: select bump" in say(
+    assert "is a copy, and only the original is updated: select bump" in error_of(
         addon.ops.isc.redo, max_size=64
     )
     addon.ops.isc.recolour(hue=0.3)
     addon.data.objects.remove(built.object)
-    assert "is a copy, and only the original is updated: press Decompose" in say(
+    assert "is a copy, and only the original is updated: press Decompose" in error_of(
         addon.ops.isc.redo, max_size=64
     )
 
@@ -270,7 +270,7 @@ def test_a_foreign_material_of_a_copy_is_not_edited(addon: Any, built: BuiltObje
 
 
 def test_a_material_is_made_single_user_on_demand(addon: Any, built: BuiltObject) -> None:
-    """What the panel offers instead of sliders that would change both."""
+    """The panel offers this instead of sliders that would change both."""
     copy = copied(addon, built)
     assert objects_sharing_material(copy.object, copy.material) == [built.object]
     assert addon.ops.isc.own_material() == {"FINISHED"}
@@ -335,7 +335,7 @@ def test_the_scene_is_exported_without_a_result_folder(
 
 
 def texture(path: Path) -> np.ndarray:
-    """(H, W, 3) codes of the paint in a mesh.glb, row 0 at the top."""
+    """(H, W, 3) codes of the base colour in a mesh.glb, row 0 at the top."""
     import trimesh
 
     return np.asarray(
@@ -351,7 +351,7 @@ def surface(path: Path) -> dict[str, Any]:
 
 
 def specular_factor(path: Path) -> float:
-    """1, as the extension says, where the file says nothing."""
+    """1, the default of the glTF extension, if absent."""
     return float(
         surface(path)
         .get("extensions", {})
@@ -448,7 +448,7 @@ def test_a_constant_reflectance_is_exported_and_other_nodes_are_refused(
     tree.links.new(
         tree.nodes.new("ShaderNodeTexNoise").outputs["Color"], node.inputs["Reflectance"]
     )
-    assert "is not an image: connect an image texture" in say(
+    assert "is not an image: connect an image texture" in error_of(
         addon.ops.isc.export, directory=str(tmp_path)
     )
     assert "plain" not in addon.data.materials
@@ -488,8 +488,10 @@ def test_a_folder_that_cannot_be_written_is_reported(
     addon: Any, built: BuiltObject, tmp_path: Path
 ) -> None:
     (tmp_path / "file").write_text("")
-    assert "choose another folder" in say(addon.ops.isc.export, directory=str(tmp_path / "file"))
-    assert "and a folder" in say(addon.ops.isc.export, directory="")
+    assert "choose another folder" in error_of(
+        addon.ops.isc.export, directory=str(tmp_path / "file")
+    )
+    assert "and a folder" in error_of(addon.ops.isc.export, directory="")
 
 
 def test_linked_objects_are_not_changed(addon: Any, built: BuiltObject, tmp_path: Path) -> None:

@@ -1,6 +1,4 @@
-"""A run in steps: what it tells, how it ends, and that nothing of it is left where it did not end
-well.
-"""
+"""A run in steps: progress, outcomes, and that nothing remains unless it succeeds."""
 
 import shutil
 import sys
@@ -418,7 +416,7 @@ def test_a_report_is_kept_as_text(addon: Any, folder: Path) -> None:
 
 
 def test_nothing_is_built_while_something_is_edited(addon: Any, folder: Path) -> None:
-    """Undo in Edit Mode knows that mode alone: what is built then would not be one step."""
+    """Undo in Edit Mode covers that mode alone: the result would not be one step."""
     mesh = addon.data.objects.new("cube", addon.data.meshes.new("cube"))
     addon.context.scene.collection.objects.link(mesh)
     addon.context.view_layer.objects.active = mesh

@@ -60,7 +60,7 @@ def pixels_of(image: Any) -> np.ndarray:
 
 
 def last(steps: Any) -> Any:
-    """What a generator returns."""
+    """The return value of a generator."""
     while True:
         try:
             next(steps)
@@ -219,7 +219,7 @@ def test_upright_files_are_upright(tmp_path: Path) -> None:
     ]
     assert (
         exif_orientation(b"\xff\xd8\xff\xe1\0\0Exif\0\0II*\0\xff\xff\0\0") == 0
-    )  # a table outside of what was read: not trusted
+    )  # the table lies beyond the bytes: unknown
 
 
 def test_a_wider_working_space_is_converted_to_rec709() -> None:
@@ -294,7 +294,7 @@ def test_a_mask_of_another_size_is_scaled_on_demand(tmp_path: Path) -> None:
     assert np.load(path).shape == (HEIGHT, WIDTH)
 
 
-# --- what cannot be used --------------------------------------------------------------------------
+# --- invalid images ------------------------------------------------------------------------------
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
@@ -350,7 +350,7 @@ def test_names_of_any_letters_reach_the_worker(tmp_path: Path) -> None:
 
 
 def test_the_worker_reads_image_and_mask(tmp_path: Path) -> None:
-    """The reader that the worker uses takes what is handed over, mask and all."""
+    """The worker's reader accepts the exported files."""
     image, mask = generated(width=40, height=30), generated("mask", width=40, height=30)
     shape = np.zeros((30, 40, 4), np.float32)
     shape[..., 3] = 1

@@ -1,6 +1,4 @@
-"""Reading a result's arrays: what is there is kept as it is, what is not sound is refused in one
-line.
-"""
+"""Reading the arrays of a result: values are unchanged, damaged files are refused in one line."""
 
 import json
 import shutil

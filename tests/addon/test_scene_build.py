@@ -1,6 +1,4 @@
-"""Building is repeatable, keeps its hands off what is not its own, survives files, and refuses in
-one line.
-"""
+"""Building: repeatable, changes only its own datablocks, survives files, refuses in one line."""
 
 import importlib
 import json
@@ -494,8 +492,8 @@ def test_unrelated_datablocks_of_the_same_names_are_not_changed(
 
 
 def test_own_shadows_follow_the_scene(blender: Any, result: ResultArrays) -> None:
-    """The recovered shading holds the photo's shadows; in a user's scene people expect an object to
-    cast one.
+    """The recovered shading holds the photo's shadows; in a shared scene users expect an object
+    to cast one.
     """
     assert not build(result, name="alone").object.visible_shadow
     thing = build(result, name="among others", own_scene=False).object

@@ -1,4 +1,4 @@
-"""The photo's camera: what it renders lies pixel by pixel on the maps."""
+"""The photo's camera: its renders match the maps pixel by pixel."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""World and sun give matt surfaces the recovered shading, from the right side."""
+"""World and sun give diffuse surfaces the recovered shading, from the right side."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -56,7 +56,7 @@ def apart(seen: np.ndarray, wanted: np.ndarray) -> float:
 def test_light_keeps_its_direction(
     blender: Any, result: ResultArrays, tmp_path: Path, axis: int
 ) -> None:
-    """A sky that shines red from one half of an axis and blue from the other."""
+    """An environment map, red in one half of an axis and blue in the other."""
     side = directions(16)[..., axis] > 0
     sky = np.where(side[..., None], [1.0, 0.1, 0.1], [0.1, 0.1, 1.0]).astype(np.float32)
     seen, where = lit(build(replace(result, environment_map=sky)), result, tmp_path, 100)
@@ -128,7 +128,7 @@ def test_an_object_is_relit_from_its_properties(blender: Any, result: ResultArra
     x, y, z = sunlit(result).sun_direction
     assert tuple(toward) == pytest.approx((x, -z, y), abs=1e-6)
     assert built.world.node_tree.nodes[SUN].inputs["Factor"].default_value == 1
-    assert relight(built.object, on=False) is None
+    assert relight(built.object, sun=False) is None
     assert (
         built.world.node_tree.nodes[SUN].inputs["Factor"].default_value == 0
         and not blender.data.lights

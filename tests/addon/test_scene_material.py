@@ -1,6 +1,4 @@
-"""The material is the photo taken apart and put together again: paint exact, gloss added, and
-everything named and explained.
-"""
+"""The material: exact reflectance, an added specular lobe, and documented inputs."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -41,7 +39,7 @@ def group_node(built: Any) -> Any:
 
 
 def inside(result: ResultArrays, rings: int = 2) -> np.ndarray:
-    """Pixels that the mesh covers for sure, away from the edge between the two paints."""
+    """Pixels that the mesh covers for sure, away from the edge between the two reflectances."""
     mask = result.mask.copy()
     for _ in range(rings):
         mask[1:-1, 1:-1] &= mask[:-2, 1:-1] & mask[2:, 1:-1] & mask[1:-1, :-2] & mask[1:-1, 2:]
@@ -111,16 +109,16 @@ def test_recolouring_turns_the_hue(blender: Any, result: ResultArrays, tmp_path:
 def lamp(built: Any, direction: np.ndarray) -> None:
     """No light but a point-like sun of irradiance 1."""
     from blender_addon.scene.sun import ensure_sun
-    from blender_addon.scene.world import mix_sun
+    from blender_addon.scene.world import set_sun_mix
 
-    mix_sun(built.world, np.zeros(3), True)
+    set_sun_mix(built.world, np.zeros(3), True)
     ensure_sun(built.object["isc_key"], built.collection, direction, np.ones(3)).data.angle = 0
 
 
 def test_the_specular_lobe_is_added_to_the_diffuse(
     blender: Any, result: ResultArrays, tmp_path: Path
 ) -> None:
-    """Dichromatic: the gloss takes nothing from the paint, and grows with its gain."""
+    """The specular lobe does not attenuate the diffuse one, and scales with its gain."""
     built = build(result)
     direction = np.array([0.3, 0.3, 0.9]) / np.linalg.norm([0.3, 0.3, 0.9])
     lamp(built, direction)
@@ -200,7 +198,7 @@ def mirrored(blender: Any, folder: Path, degrees: float) -> np.ndarray:
 
 
 def fresnel(degrees: float, f0: float = 0.04) -> float:
-    """What a dielectric of that f0 mirrors of unpolarised light."""
+    """Fresnel reflectance of a dielectric of that f0 for unpolarised light."""
     index = (1 + f0**0.5) / (1 - f0**0.5)
     cosine = np.cos(np.radians(degrees))
     inner = np.sqrt(1 - np.sin(np.radians(degrees)) ** 2 / index**2)
@@ -215,7 +213,7 @@ def fresnel(degrees: float, f0: float = 0.04) -> float:
 def test_the_level_scales_the_whole_lobe_at_grazing_angles_too(
     blender: Any, mirror: Any, tmp_path: Path, degrees: float
 ) -> None:
-    """As the fit has it: a weak gloss whose edges mirrored all would lay a veil over the object."""
+    """As in the fit: a weak lobe with bright grazing angles would veil the object."""
     plastic = fresnel(degrees)
     for level, gain in ((0.0, 1.0), (0.38, 1.0), (0.8, 0.25), (1.0, 1.0)):
         mirror["Specular Level"].default_value, mirror["Specular Gain"].default_value = level, gain
@@ -236,7 +234,7 @@ def test_a_level_above_plastic_reflects_at_most_all_light(
 def test_a_specular_image_is_a_factor_of_the_level(
     blender: Any, mirror: Any, tmp_path: Path
 ) -> None:
-    """A grey one of all of the gloss; a coloured one tints what is mirrored along the normal."""
+    """A grey image scales the lobe; a coloured one tints the reflection along the normal."""
     mirror["Specular Level"].default_value = 0.8
     mirror["Specular Image"].default_value = (0.5, 0.5, 0.5, 1)
     np.testing.assert_allclose(mirrored(blender, tmp_path, 85), 0.4 * fresnel(85), rtol=0.01)

@@ -1,4 +1,4 @@
-"""What a command line names: photos, results, masks, and the files that come of them."""
+"""The inputs of the command line: photos, results, masks; and its output files."""
 
 from pathlib import Path
 

@@ -1,6 +1,4 @@
-"""The worker as Blender holds it: real decompositions, and a stand-in for `isc_core` that
-misbehaves on demand.
-"""
+"""Workers: real decompositions, and a fake `isc_core` that misbehaves on demand."""
 
 import contextlib
 import json
@@ -36,7 +34,7 @@ from tests.core.ball_scene import ball
 ROOT = Path(__file__).resolve().parents[2]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 
-# A package in place of `isc_core`. What it does stands in `behave.py` beside it; its last arguments
+# A package in place of `isc_core`. Its behaviour is in `behave.py` beside it; its last arguments
 # are always `--progress json`.
 STAND_IN = """
 import json, os, sys, time
@@ -98,7 +96,7 @@ def ended(
     seconds: float = 120.0,
     until: Callable[[WorkerUpdate], bool] = lambda update: update.state != "running",
 ) -> WorkerUpdate:
-    """The first update that meets the condition: the worker's end, if nothing else is asked for."""
+    """The first update that meets the condition, by default the worker's end."""
     deadline = time.monotonic() + seconds
     while not until(update := worker.poll()):
         assert time.monotonic() < deadline, update
@@ -114,10 +112,6 @@ def at_stage(worker: WorkerProcess, stage: str) -> None:
         ).state
         == "running"
     )
-
-
-def process_of(worker: WorkerProcess) -> "subprocess.Popen[str]":
-    return worker._process
 
 
 def job(
@@ -137,7 +131,7 @@ def ball_arrays(folder: Path) -> tuple[Path, Path]:
 
 
 def others(folder: Path, *expected: str) -> list[str]:
-    """What is in a folder besides."""
+    """Unexpected entries of a folder."""
     return sorted({entry.name for entry in folder.iterdir()} - {"cache", "fake_core", *expected})
 
 
@@ -162,7 +156,7 @@ def test_arrays_are_decomposed_into_a_result_with_arrays(
     )
     assert (tmp_path / "new" / "result" / "arrays.npz").is_file()
     assert others(tmp_path, "new", "photo.npy", "mask.npy") == []
-    worker.kill()  # and what has ended stays as it is
+    worker.kill()  # does nothing after the end
     worker.cancel()
     assert worker.poll() == final
 
@@ -204,15 +198,15 @@ def test_masks_edits_and_arrays_are_made_by_workers_too(
 
 
 def test_cancelled_while_it_compiles(tmp_path: Path, real: WorkerEnvironment) -> None:
-    """With an empty cache the first solve compiles for long: the worker is told to stop in the
-    midst, and tidies up.
+    """With an empty cache the first solve compiles for long: the worker is cancelled midway and
+    cleans up.
     """
     photo, mask = ball_arrays(tmp_path)
     worker = start_decompose(job(photo, tmp_path / "new" / "result", mask, "sirfs"), real)
     at_stage(worker, "preparing the compiled kernels")
     worker.cancel()
     assert ended(worker, 30).state == "cancelled"
-    assert process_of(worker).returncode in (130, -signal.SIGKILL)
+    assert worker.exit_code in (130, -signal.SIGKILL)
     assert others(tmp_path, "photo.npy", "mask.npy") == []
 
 
@@ -350,13 +344,13 @@ def test_an_unresponsive_worker_is_killed_with_its_children(
     )
     at_stage(worker, "asleep")
     assert (tmp_path / "new" / ".out.0a1b2c3d.partial" / "maps.exr").is_file()
-    assert os.getpriority(os.PRIO_PROCESS, process_of(worker).pid) == min(
+    assert os.getpriority(os.PRIO_PROCESS, worker.pid) == min(
         os.getpriority(os.PRIO_PROCESS, 0) + 5, 19
     )
     getattr(worker, how)()
     assert worker.poll().state == "running", "nobody has waited"
     final = ended(worker, 20)
-    assert (final.state, process_of(worker).returncode) == ("cancelled", -signal.SIGKILL)
+    assert (final.state, worker.exit_code) == ("cancelled", -signal.SIGKILL)
     wait_for_the_end_of(int(final.log))
     assert others(tmp_path) == []
 
@@ -370,7 +364,7 @@ def test_a_worker_killed_from_outside_has_failed(tmp_path: Path, fake_core: Make
         fake_core("print('so far so good', file=sys.stderr, flush=True)\n" + STUBBORN),
     )
     at_stage(worker, "asleep")
-    process_of(worker).kill()
+    os.kill(worker.pid, signal.SIGKILL)
     final = ended(worker, 20)
     assert (final.state, final.fraction, final.log) == ("failed", 0.5, "so far so good")
     assert "killed (SIGKILL)" in final.message and "\n" not in final.message

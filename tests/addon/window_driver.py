@@ -141,7 +141,7 @@ def until(fact: Callable[[], Any], seconds: float) -> Iterator[float]:
 
 
 def shown() -> Any:
-    """What the window shows of the run."""
+    """The state of the run that the window shows."""
     return bpy.context.window_manager.isc
 
 
