@@ -46,62 +46,73 @@ def declare(commands: Commands) -> None:
         metavar="DIR",
         help="output folder; an earlier report is replaced",
     )
-    parser.add_argument("--split", metavar="NAME", help="split to run (default: all)")
-    parser.add_argument(
+    _add_scenes(parser)
+    _add_stages(parser)
+    _add_checks(parser)
+
+
+def _add_scenes(parser: argparse.ArgumentParser) -> None:
+    scenes = parser.add_argument_group("scenes")
+    scenes.add_argument("--split", metavar="NAME", help="split to run (default: all)")
+    scenes.add_argument(
         "--scenes",
         type=count,
         default=0,
         metavar="N",
         help="number of scenes, drawn by --seed (default: all)",
     )
-    stages = "separation, sirfs, gloss (default: all, and the whole chain with its error budget)"
-    parser.add_argument("--stages", type=names, metavar="a,b", help=stages)
+    scenes.add_argument(
+        "--seed", type=count, default=0, metavar="S", help="seed of all random draws (default: 0)"
+    )
+    scenes.add_argument(
+        "--threads",
+        type=count,
+        default=0,
+        metavar="N",
+        help="number of scenes in parallel; 0 for one per core (default: 0)",
+    )
+
+
+def _add_stages(parser: argparse.ArgumentParser) -> None:
+    stages = parser.add_argument_group("stages")
+    known = "separation, sirfs, gloss (default: all, and the chain with its error budget)"
+    stages.add_argument("--stages", type=names, metavar="a,b", help=known)
     models = f"models to compare with plain SIRFS: {', '.join(SEPARATING_MODELS)} (default: none)"
-    parser.add_argument("--models", type=names, metavar="a,b", help=models)
-    parser.add_argument(
+    stages.add_argument("--models", type=names, metavar="a,b", help=models)
+    stages.add_argument(
         "--separator",
         choices=METHODS,
         default=BEST,
         metavar="NAME",
         help="separation method (default: %(default)s)",
     )
-    parser.add_argument(
+    stages.add_argument(
         "--illumination",
         choices=ILLUMINATIONS,
         default=ILLUMINATIONS[0],
         help="light prior of SIRFS (default: %(default)s)",
     )
-    parser.add_argument(
-        "--seed",
-        type=count,
-        default=0,
-        metavar="S",
-        help="seed of all random draws (default: 0)",
-    )
-    parser.add_argument(
+
+
+def _add_checks(parser: argparse.ArgumentParser) -> None:
+    checks = parser.add_argument_group("bounds and checks")
+    checks.add_argument(
         "--bounds",
         metavar="FILE",
         help="regression bounds; none to skip them (default: those of the package)",
     )
-    parser.add_argument(
+    checks.add_argument(
         "--update-bounds",
         type=Path,
         metavar="FILE",
         help="write bounds that this run meets, with a margin",
     )
-    parser.add_argument(
+    checks.add_argument(
         "--renders",
         type=count,
         default=3,
         metavar="N",
         help="number of scenes to render again as a check (default: 3)",
-    )
-    parser.add_argument(
-        "--threads",
-        type=count,
-        default=0,
-        metavar="N",
-        help="number of scenes in parallel; 0 for one per core (default: 0)",
     )
 
 

@@ -66,7 +66,7 @@ def test_what_it_shows_and_keeps() -> None:
     assert [picture.caption for picture in show_lobe(truth, answer)] == [
         "photo",
         "specular, true",
-        "specular, of the fit",
+        "specular, fitted",
     ]
     np.testing.assert_allclose(lobe_maps(answer)["specular.R"], truth.specular[..., 0], atol=1e-6)
     with pytest.raises(ValueError, match="known shape"):
