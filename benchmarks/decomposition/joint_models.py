@@ -1,19 +1,17 @@
-"""What each model makes of glossy photos, against SIRFS on the photo as it is and on the true
-diffuse image.
+"""Compare the models on glossy photos with SIRFS on the photo and on the true diffuse image.
 
-  python -m benchmarks.decomposition.joint_models --data ../shared/data/mit_berkeley_train --glossy DIR -o OUT
-  [--objects a,b] [--sets level-25_natural]
-                                    [--networks FOLDER] [--models plain,joint] [--roundings K]
-                                    [--shape-prior predicted]
+  python -m benchmarks.decomposition.joint_models --data ../shared/data/mit_berkeley_train
+      --glossy DIR -o OUT [--objects a,b] [--sets level-25_natural] [--networks FOLDER]
+      [--models plain,joint] [--roundings K] [--shape-prior PRIOR]
 
-Sets: the laboratory originals, and every folder of DIR, as `isc synth glossy-mit` writes them.
-`--networks`: a network for each object that has not seen it, `OBJECT.npz` of
-`training.networks.layer_network`; without it the shipped one, which has. `--roundings`: each
-photo is measured as often, its values changed by some 1e-7 of themselves but for the first time:
-SIRFS has many minima, and the last digit decides between them. Writes OUT/rows.jsonl, a row a run,
-which is not run again, and OUT/tables.md: geometric means of errors relative to plain SIRFS with
-the interval of resampled objects, and which share of the gain of the true diffuse image a model
-reaches.
+Sets: the laboratory originals, and every folder of DIR, as written by `isc synth glossy-mit`.
+`--networks`: for each object a network fitted without it, `OBJECT.npz` of
+`training.networks.layer_network`; by default the shipped network, which was fitted with all.
+`--roundings`: each photo is measured that often, all but the first time with values perturbed by
+about 1e-7: SIRFS has many minima, and the last digit decides between them. Writes OUT/rows.jsonl,
+one row per run, which is kept, and OUT/tables.md: geometric means of errors relative to plain
+SIRFS, with the interval of resampled objects, and the share of the true diffuse image's gain that a
+model reaches.
 """
 
 import argparse
@@ -42,8 +40,19 @@ METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light", "ave
 
 
 def photo_of(folder: Path, name: str) -> tuple[MitBerkeleyObject, MitBerkeleyObject]:
-    """An object as it is photographed and its diffuse image, with the expectations of lights that
-    its set asks for.
+    """Read an object as photographed and its diffuse image.
+
+    Parameters
+    ----------
+    folder : Path
+        The set; its name says which illumination's priors apply.
+    name : str
+        The object.
+
+    Returns
+    -------
+    photo, diffuse : MitBerkeleyObject
+        Both with the illumination set.
     """
     natural = "natural" in folder.name
     return tuple(  # type: ignore[return-value]
@@ -55,15 +64,34 @@ def photo_of(folder: Path, name: str) -> tuple[MitBerkeleyObject, MitBerkeleyObj
     )
 
 
-def run(
+def run_model(
     model: str,
-    seen: MitBerkeleyObject,
+    photo: MitBerkeleyObject,
     diffuse: MitBerkeleyObject,
     network: LayerNetwork | None,
     shape_prior: str = ShapePrior.SILHOUETTE,
 ) -> tuple[Estimate, float]:
-    """A model's answer and its seconds."""
-    truth = diffuse if model == "true diffuse" else seen
+    """Run a model on a photo.
+
+    Parameters
+    ----------
+    model : str
+        One of `MODELS`.
+    photo, diffuse : MitBerkeleyObject
+        The object as photographed, and its diffuse image.
+    network : LayerNetwork or None
+        Instead of the shipped one.
+    shape_prior : str, optional
+        As for `isc evaluate`.
+
+    Returns
+    -------
+    answer : Estimate
+        The result.
+    seconds : float
+        Time taken.
+    """
+    truth = diffuse if model == "true diffuse" else photo
     options = RunnerOptions(
         "sirfs" if model in ("plain", "true diffuse") else model, shape_prior=shape_prior
     )
@@ -73,7 +101,7 @@ def run(
 
 
 def measure(given: argparse.Namespace) -> list[dict[str, object]]:
-    """All rows: those that are on disk, and new ones."""
+    """Measure what is missing; return all rows, old and new."""
     path = given.output / "rows.jsonl"
     rows = read_rows(path)
     done = {(row["set"], row["object"], row["model"], row.get("rounding", 0)) for row in rows}
@@ -99,23 +127,40 @@ def measure(given: argparse.Namespace) -> list[dict[str, object]]:
             photos = photo_of(folder, name)
             network = LayerNetwork.read(given.networks / f"{name}.npz") if given.networks else None
             for rounding, model in missing:
-                seen, diffuse = (rounded(photo, rounding) for photo in photos)
-                answer, seconds = run(model, seen, diffuse, network, given.shape_prior)
+                photo, diffuse = (rounded(one, rounding) for one in photos)
+                answer, seconds = run_model(model, photo, diffuse, network, given.shape_prior)
                 rows.append(
-                    row_of(label, name, model, seen, answer, seconds) | {"rounding": rounding}
+                    row_of(label, name, model, photo, answer, seconds) | {"rounding": rounding}
                 )
                 append_row(path, rows[-1])
     return rows
 
 
 def row_of(
-    label: str, name: str, model: str, seen: MitBerkeleyObject, answer: Estimate, seconds: float
+    label: str, name: str, model: str, photo: MitBerkeleyObject, answer: Estimate, seconds: float
 ) -> dict[str, object]:
-    """What is kept of an answer, printed."""
+    """Score an answer and print the average.
+
+    Parameters
+    ----------
+    label, name, model : str
+        Set, object and model.
+    photo : MitBerkeleyObject
+        Ground truth.
+    answer : Estimate
+        The result.
+    seconds : float
+        Time taken.
+
+    Returns
+    -------
+    dict of str to object
+        The row.
+    """
     maps = {
         key: getattr(answer, key) for key in ("height", "normal", "shading", "reflectance", "light")
     }
-    scores = score(seen, **maps)
+    scores = score(photo, **maps)
     print(label, name, model, f"{scores.average:.5f}", flush=True)
     return {
         "set": label,
@@ -128,8 +173,19 @@ def row_of(
 
 
 def tables(rows: list[dict[str, object]], models: Sequence[str] = MODELS) -> str:
-    """Markdown: for the laboratory originals and all glossy sets, a row for each of `models` but
-    the first; "plain" and "true diffuse" are among them.
+    """Format the rows.
+
+    Parameters
+    ----------
+    rows : list of dict
+        All rows.
+    models : sequence of str, optional
+        Rows of the tables; the first is the reference. "plain" and "true diffuse" are among them.
+
+    Returns
+    -------
+    str
+        Markdown: a table for all glossy sets, and one per set.
     """
     values: dict[tuple[str, str, int], dict[str, dict[str, float]]] = defaultdict(dict)
     for row in rows:
@@ -177,27 +233,29 @@ def _line(model: str, part: dict[tuple[str, str, int], dict[str, dict[str, float
     return f"| {model} | " + " | ".join(cells) + " |"
 
 
+def _names(text: str) -> list[str]:
+    return text.split(",")
+
+
 def main() -> None:
-    """Runs, prints and writes."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--data", type=Path, required=True, help="the MIT-Berkeley set")
-    parser.add_argument("--glossy", type=Path, help="what isc synth glossy-mit made of it")
-    parser.add_argument(
-        "--networks", type=Path, help="a network for each object that has not seen it"
-    )
-    parser.add_argument("--objects", type=lambda text: text.split(","), default=[])
-    parser.add_argument("--sets", type=lambda text: text.split(","), default=[])
-    parser.add_argument("--models", type=lambda text: text.split(","), default=MODELS)
-    parser.add_argument("--roundings", type=int, default=1)
+    parser.add_argument("--glossy", type=Path, help="a run of isc synth glossy-mit")
+    parser.add_argument("--networks", type=Path, help="networks fitted without each object")
+    parser.add_argument("--objects", type=_names, default=[], help="comma-separated (default: all)")
+    parser.add_argument("--sets", type=_names, default=[], help="comma-separated (default: all)")
+    parser.add_argument("--models", type=_names, default=MODELS, help="comma-separated models")
+    parser.add_argument("--roundings", type=int, default=1, help="perturbations")
     parser.add_argument(
         "--shape-prior",
         choices=SHAPE_PRIORS,
         default=ShapePrior.SILHOUETTE.value,
         help="as for isc evaluate",
     )
-    parser.add_argument("-o", "--output", type=Path, required=True)
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
     given = parser.parse_args()
     given.output.mkdir(parents=True, exist_ok=True)
     text = tables(measure(given))

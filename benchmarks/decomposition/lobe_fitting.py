@@ -1,15 +1,14 @@
-"""How well lobes are found in rendered scenes: with the true normals and specular image, and
-through the whole chain from the photo.
+"""Measure the fit of lobes in rendered scenes, from true layers and through the whole pipeline.
 
   python -m benchmarks.decomposition.lobe_fitting -o FOLDER [--scenes 60] [--size 128]
 
-Scene k is an object of its own (shapes and paints in turn, lights drawn), GGX gloss with alpha
-log-uniform over [.05, .45], ior 1.5; every tenth object is matt. FOLDER keeps what was rendered and
-decomposed, so that a changed fit is measured in seconds.
+Scene k has its own object (shapes and albedos in turn, lights drawn at random) and a GGX lobe with
+alpha log-uniform in [.05, .45] and ior 1.5; every tenth object is diffuse. FOLDER keeps what was
+rendered and decomposed, so that a changed fit is measured in seconds.
 
-Truth of a near light: direction and irradiance where its highlight is highest. The brightest light
-of the fit is held against the nearest true one. Strength x light is compared as it is (image units)
-and, in the chain, over the mean shading, recovered against true.
+The truth of a near light is its direction and irradiance where its highlight peaks. The brightest
+light of the fit is compared with the nearest true one. Strength x light is compared as it is (image
+units) and, in the pipeline, over the mean shading, recovered against true.
 """
 
 import argparse
@@ -22,12 +21,12 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.decompose.pipeline import decompose
-from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
 from isc_core.networks.light_network import predict_light
-from isc_core.photo.photo import Photo, PhotoSource
+from isc_core.photo import Photo, PhotoSource
 from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOptions
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
-from isc_core.sirfs.silhouette import outline_normals
+from isc_core.sirfs.silhouette import silhouette_normals
 from synth.albedos import make_albedo
 from synth.capture.recipe import camera_around
 from synth.capture.truth import exposed, render_truth
@@ -55,10 +54,23 @@ CALIBRATED = 123  # scenes before this one were used to calibrate `brdf.fitting.
 
 
 @dataclass(frozen=True)
-class Case:
-    """One scene: its `light` kind, `alpha` (0: matt) and strength, the `maps` by name (truth, and
-    the chain's under `chain_`), and the true lights where their highlights are: `directions` (K, 3)
-    and strength x light (K, 3).
+class LobeScene:
+    """A rendered scene.
+
+    Attributes
+    ----------
+    number : int
+        Number of the scene.
+    light : str
+        Kind of light.
+    alpha : float
+        Roughness; 0 for a diffuse object.
+    maps : dict of str to ndarray
+        True maps by name; those of the pipeline begin with `chain_`.
+    directions : (K, 3) ndarray
+        Unit vectors to the lights, at their highlights.
+    products : (K, 3) ndarray
+        Strength x light.
     """
 
     number: int
@@ -69,8 +81,23 @@ class Case:
     products: np.ndarray
 
 
-def cases(folder: Path, count: int, size: int) -> Iterator[Case]:
-    """The scenes, rendered and decomposed where the folder does not have them yet."""
+def lobe_scenes(folder: Path, count: int, size: int) -> Iterator[LobeScene]:
+    """Read the scenes; render and decompose what is missing.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they are kept.
+    count : int
+        Number of scenes.
+    size : int
+        Side of the images in pixels.
+
+    Yields
+    ------
+    LobeScene
+        The scenes in order.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     for number in range(count):
         path = folder / f"scene{number:04d}_{size}.npz"
@@ -78,7 +105,7 @@ def cases(folder: Path, count: int, size: int) -> Iterator[Case]:
             np.savez(path, **_made(number, size))
         with np.load(path, allow_pickle=False) as stored:
             maps = {name: stored[name] for name in stored.files}
-        yield Case(
+        yield LobeScene(
             number,
             str(maps["light"]),
             float(maps["alpha"]),
@@ -94,11 +121,11 @@ def _made(number: int, size: int) -> dict[str, np.ndarray]:
     mesh = make_shape(SHAPES[(number * 5 + number // 6) % len(SHAPES)], rng)
     low, high = mesh.vertices[:, :2].min(0), mesh.vertices[:, :2].max(0)
     mesh = replace(mesh, vertices=mesh.vertices - (*(low + high) / 2, 0.0))
-    matt = number % 10 == 9
+    diffuse = number % 10 == 9
     alpha = float(np.exp(rng.uniform(*np.log(ALPHAS))))
     albedo = make_albedo(_ALBEDOS[(number // 2) % len(_ALBEDOS)], rng, 256)
     strength = float(rng.uniform(0.6, 1.5))
-    material = Material(albedo, "lambert") if matt else Material(albedo, "ggx", alpha, strength)
+    material = Material(albedo, "lambert") if diffuse else Material(albedo, "ggx", alpha, strength)
     scene = Scene(mesh, material, _lights(kind, rng), camera_around(mesh, size, 0.88))
     scene, truth = exposed(scene, render_truth(scene, RenderOptions(_SAMPLES, number)), _LEVEL)
     directions, products = _true_lights(scene, truth.normal, truth.height, truth.mask)
@@ -120,9 +147,9 @@ def _made(number: int, size: int) -> dict[str, np.ndarray]:
     maps |= {
         "chain_illumination": result.illumination,
         "directions": directions,
-        "products": products * (0 if matt else strength),
+        "products": products * (0 if diffuse else strength),
     }
-    return maps | {"light": np.array(kind), "alpha": np.array(0.0 if matt else alpha)}
+    return maps | {"light": np.array(kind), "alpha": np.array(0.0 if diffuse else alpha)}
 
 
 def _lights(kind: str, rng: np.random.Generator) -> tuple[Light, ...]:
@@ -138,9 +165,7 @@ def _lights(kind: str, rng: np.random.Generator) -> tuple[Light, ...]:
 def _true_lights(
     scene: Scene, normal: np.ndarray, height: np.ndarray, mask: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (K, 3) and irradiance (K, 3) of the lights that are no environment, where their
-    half vector is nearest the normal.
-    """
+    """Directions and irradiances (K, 3) of the lights, where the half vector meets the normal."""
     origins, _ = scene.camera.rays()
     points = np.dstack([origins[..., :2], height / scene.camera.pixels_per_unit])[mask]
     found = [
@@ -172,13 +197,28 @@ def _arriving(
 
 
 @dataclass(frozen=True)
-class Found:
-    """A fit held against the truth; None where it does not say. `alpha`, `strength`: found over
-    true, `shaded`: strength over the shading, found over true; `direction`: degrees off;
-    `*_inside`: whether the stated interval holds the truth.
+class FitRow:
+    """A fit compared with the truth; None: not determined.
+
+    Attributes
+    ----------
+    scene : LobeScene
+        The scene.
+    fit : LobeFit
+        The fit.
+    seconds : float
+        Time taken.
+    alpha, strength : float or None
+        Estimate over truth.
+    shaded : float or None
+        Strength over the mean shading, estimate over truth.
+    direction : float or None
+        Angular error in degrees.
+    alpha_inside, strength_inside, direction_inside : bool or None
+        Whether the stated interval contains the truth.
     """
 
-    case: Case
+    scene: LobeScene
     fit: LobeFit
     seconds: float
     alpha: float | None = None
@@ -190,23 +230,40 @@ class Found:
     direction_inside: bool | None = None
 
 
-def compare(case: Case, fit: LobeFit, seconds: float, gain: float = 1.0) -> Found:
-    """`gain`: of the shading that the fit was given, over the true one."""
-    if not fit.determined or fit.alpha is None or fit.alpha_interval is None or not case.alpha:
-        return Found(case, fit, seconds)
-    found = Found(
-        case,
+def compare(scene: LobeScene, fit: LobeFit, seconds: float, gain: float = 1.0) -> FitRow:
+    """Compare a fit with the truth.
+
+    Parameters
+    ----------
+    scene : LobeScene
+        The scene.
+    fit : LobeFit
+        The fit.
+    seconds : float
+        Time taken.
+    gain : float, optional
+        Mean of the shading used for the fit, over the true one.
+
+    Returns
+    -------
+    FitRow
+        The errors.
+    """
+    if not fit.determined or fit.alpha is None or fit.alpha_interval is None or not scene.alpha:
+        return FitRow(scene, fit, seconds)
+    found = FitRow(
+        scene,
         fit,
         seconds,
-        fit.alpha / case.alpha,
-        alpha_inside=_within(fit.alpha_interval, case.alpha),
+        fit.alpha / scene.alpha,
+        alpha_inside=_within(fit.alpha_interval, scene.alpha),
     )
-    if not fit.lights or not len(case.directions):
+    if not fit.lights or not len(scene.directions):
         return found
     light = fit.lights[0]
-    nearest = int(np.argmax(case.directions @ light.direction))
-    off = float(np.degrees(np.arccos(np.clip(case.directions[nearest] @ light.direction, -1, 1))))
-    true, mean = case.products[nearest].mean(), light.strength_light.mean()
+    nearest = int(np.argmax(scene.directions @ light.direction))
+    off = float(np.degrees(np.arccos(np.clip(scene.directions[nearest] @ light.direction, -1, 1))))
+    true, mean = scene.products[nearest].mean(), light.strength_light.mean()
     holds = _within(
         Interval(float(np.mean(light.interval.low)), float(np.mean(light.interval.high))),
         true * gain,
@@ -225,51 +282,41 @@ def _within(interval: Interval, value: float) -> bool:
     return bool(interval.low <= value <= interval.high)
 
 
-def truth_fit(case: Case) -> Found:
-    """With true normals, heights and specular image, the light unknown."""
-    m = case.maps
+def truth_fit(scene: LobeScene) -> FitRow:
+    """Fit with true normals, heights and specular layer, and unknown light."""
+    m = scene.maps
     start = time.perf_counter()
-    fit = fit_lobe(m["specular"], m["normal"], m["mask"], height=m["height"])
-    return compare(case, fit, time.perf_counter() - start)
+    fit = fit_lobe(m["specular"], m["normal"], m["mask"], pixels=PixelData(height=m["height"]))
+    return compare(scene, fit, time.perf_counter() - start)
 
 
-def told_fit(case: Case) -> Found:
-    """The same with the light given, as an environment."""
-    m = case.maps
+def known_light_fit(scene: LobeScene) -> FitRow:
+    """Fit with true normals and specular layer, under the true environment map."""
+    m = scene.maps
     start = time.perf_counter()
-    fit = fit_lobe(m["specular"], m["normal"], m["mask"], environment=m["environment"])
-    return compare(case, fit, time.perf_counter() - start)
+    fit = fit_lobe(m["specular"], m["normal"], m["mask"], light=GivenLight(environment=m["environment"]))
+    return compare(scene, fit, time.perf_counter() - start)
 
 
-def chain_fit(case: Case) -> Found:
-    """With what the whole chain made of the photo."""
-    m, mask = case.maps, case.maps["mask"]
+def chain_fit(scene: LobeScene) -> FitRow:
+    """Fit with the results of the pipeline."""
+    m, mask = scene.maps, scene.maps["mask"]
     start = time.perf_counter()
     options = LobeFitOptions(recovered=True)
-    outline = outline_normals(mask, shipped_prior_set().silhouette)
+    outline = silhouette_normals(mask, shipped_prior_set().silhouette)
     light_estimate = predict_light(np.maximum(m["image"], 0), mask)
-    fit = fit_lobe(
-        m["chain_specular"],
-        m["chain_normal"],
-        mask,
-        options=options,
-        shading=m["chain_shading"],
-        outline=outline,
-        light_estimate=light_estimate,
-    )
+    fit = fit_lobe(m["chain_specular"], m["chain_normal"], mask, options=options, recovered=RecoveredScene(m["chain_shading"], silhouette_normals=outline, light_estimate=light_estimate))
     seconds = time.perf_counter() - start
     return compare(
-        case, fit, seconds, float(m["chain_shading"][mask].mean() / m["shading"][mask].mean())
+        scene, fit, seconds, float(m["chain_shading"][mask].mean() / m["shading"][mask].mean())
     )
 
 
-def _wide_enough(case: Case) -> bool:
-    """Whether the lobe is wider than 3 pixels where the highlight is brightest, and the highlight
-    is on the object at all.
-    """
-    normal, mask = case.maps["normal"], case.maps["mask"]
+def _wide_enough(scene: LobeScene) -> bool:
+    """Whether the lobe is wider than 3 pixels at the highlight, and the highlight is visible."""
+    normal, mask = scene.maps["normal"], scene.maps["mask"]
     row, column = np.unravel_index(
-        np.argmax(np.where(mask, case.maps["specular"].mean(-1), -1)), mask.shape
+        np.argmax(np.where(mask, scene.maps["specular"].mean(-1), -1)), mask.shape
     )
     near = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
     turn = np.arccos(
@@ -277,14 +324,27 @@ def _wide_enough(case: Case) -> bool:
     ) / np.sqrt(2)
     seen_halves = [
         (normal[mask] @ (d + (0, 0, 1)) / np.linalg.norm(d + (0, 0, 1))).max()
-        for d in case.directions
+        for d in scene.directions
     ]
-    return 1.29 * case.alpha > 3 * turn and max(seen_halves, default=0) > np.cos(case.alpha)
+    return 1.29 * scene.alpha > 3 * turn and max(seen_halves, default=0) > np.cos(scene.alpha)
 
 
-def report(title: str, found: Sequence[Found], limits: tuple[float, float, float]) -> str:
-    """A row: how many, how many determined, and of these the shares within the limits (alpha as a
-    factor, strength, degrees).
+def report(title: str, found: Sequence[FitRow], limits: tuple[float, float, float]) -> str:
+    """Format a row.
+
+    Parameters
+    ----------
+    title : str
+        First cell.
+    found : sequence of FitRow
+        The fits.
+    limits : tuple of float
+        Tolerances: alpha (factor), strength (relative), direction (degrees).
+
+    Returns
+    -------
+    str
+        Markdown: counts, medians, and shares within the tolerances and the stated intervals.
     """
     known = [f for f in found if f.alpha is not None]
     factor, strength, degrees = limits
@@ -319,13 +379,17 @@ def _share(flags: Sequence[bool | None]) -> str:
     return f"{np.mean([bool(flag) for flag in flags]):.0%}" if flags else "-"
 
 
-_HEAD = """| scenes | number | determined | alpha, median of found / true | within | in interval | strength x light | within | in interval \
-| degrees off, median | within | in cone | seconds |
-|---|---|---|---|---|---|---|---|---|---|---|---|---|"""
+_HEAD = (
+    "| scenes | number | determined | alpha, median of estimate / truth | within | in interval "
+    "| strength x light | within | in interval | median error in degrees | within | in cone "
+    "| seconds |\n" + "|---" * 13 + "|"
+)
 
 
-def tables(found_cases: Sequence[Case]) -> str:
-    """All rows; limits of the truth: 5 %, 5 %, 2 degrees; of the chain: a factor 1.5, 40 % over the
+def tables(found_cases: Sequence[LobeScene]) -> str:
+    """Format all rows.
+
+    Tolerances with true layers: 5 %, 5 %, 2 degrees; of the pipeline: a factor of 1.5, 40 % over the
     shading, 20 degrees.
     """
     exact, loose = (1.05, 0.05, 2.0), (1.5, 0.4, 20.0)
@@ -344,35 +408,37 @@ def tables(found_cases: Sequence[Case]) -> str:
     )
     lines.append(
         report(
-            "truth, light told", [told_fit(c) for c in wide if c.light in ("small", "area")], exact
+            "truth, known light",
+            [known_light_fit(c) for c in wide if c.light in ("small", "area")],
+            exact,
         )
     )
     lines.append(
         report(
-            "truth, sh (want: none determined)",
+            "truth, sh (expected: none determined)",
             [truth_fit(c) for c in found_cases if c.light == "sh" and c.alpha],
             exact,
         )
     )
     middle = [c for c in glossy if 0.1 <= c.alpha <= 0.4]
-    lines.append(report("chain, alpha .1 to .4", [chain_fit(c) for c in middle], loose))
+    lines.append(report("pipeline, alpha .1 to .4", [chain_fit(c) for c in middle], loose))
     lines.append(
         report(
-            f"chain, the same, scenes from {CALIBRATED} on",
+            f"pipeline, the same, scenes from {CALIBRATED} on",
             [chain_fit(c) for c in middle if c.number >= CALIBRATED],
             loose,
         )
     )
     lines.append(
         report(
-            "chain, sh (want: none determined)",
+            "pipeline, sh (expected: none determined)",
             [chain_fit(c) for c in found_cases if c.light == "sh" and c.alpha],
             loose,
         )
     )
     lines.append(
         report(
-            "chain, matt (want: none determined)",
+            "pipeline, diffuse (expected: none determined)",
             [_any(chain_fit(c)) for c in found_cases if not c.alpha],
             loose,
         )
@@ -380,24 +446,24 @@ def tables(found_cases: Sequence[Case]) -> str:
     return "\n".join(lines)
 
 
-def _any(found: Found) -> Found:
-    """A matt object's fit: any alpha counts as found."""
+def _any(found: FitRow) -> FitRow:
+    """A fit to a diffuse object: any alpha counts as determined."""
     return replace(found, alpha=1.0, alpha_inside=False) if found.fit.determined else found
 
 
 def main() -> None:
-    """Reads the command line, measures, prints Markdown."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("-o", "--out", type=Path, required=True)
-    parser.add_argument("--scenes", type=int, default=60)
-    parser.add_argument("--size", type=int, default=128)
+    parser.add_argument("-o", "--out", type=Path, required=True, help="folder to write to")
+    parser.add_argument("--scenes", type=int, default=60, help="number of scenes")
+    parser.add_argument("--size", type=int, default=128, help="side of the images in pixels")
     given = parser.parse_args()
     measured = []
-    for case in cases(given.out, given.scenes, given.size):
-        print(f"\rscene {case.number + 1} of {given.scenes}", end="", file=sys.stderr, flush=True)
-        measured.append(case)
+    for scene in lobe_scenes(given.out, given.scenes, given.size):
+        print(f"\rscene {scene.number + 1} of {given.scenes}", end="", file=sys.stderr, flush=True)
+        measured.append(scene)
     print(file=sys.stderr)
     print(tables(measured))
 

@@ -29,8 +29,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..numerics.jit import compiled
-from ..numerics.thread_pool import Workers
+from ..numerics.jit import jit
+from ..numerics.thread_pool import ThreadPool
 from ..progress import Monitor
 from .walsh_hadamard import PATCH, opponent, project, strongest
 
@@ -195,7 +195,7 @@ class CshSearch:
             forward,
         )
         ends = np.linspace(0, len(target), _PARTS + 1).astype(int)
-        with Workers(self.options.threads) as workers:
+        with ThreadPool(self.options.threads) as workers:
             workers.run(
                 [
                     partial(_sweep, *common, int(a), int(b))
@@ -279,7 +279,7 @@ def _buckets(
     return bins, starts, members
 
 
-@compiled
+@jit
 def _hash(values, width, offset, factors, bits, bins):
     """bins[i]: some `bits` of sum_j factor_j floor((v_ij + b_j) / r), bits that all of the factors'
     40 bits mix in; nothing overflows.
@@ -294,7 +294,7 @@ def _hash(values, width, offset, factors, bits, bins):
         bins[i] = (key >> 16) & ((1 << bits) - 1)
 
 
-@compiled
+@jit
 def _sort_into(bins, starts, members):
     """Counting sort: the patches of bin h become members[starts[h]:starts[h + 1]], in rising order.
 
@@ -310,7 +310,7 @@ def _sort_into(bins, starts, members):
         free[bins[i]] += 1
 
 
-@compiled
+@jit
 def _sweep(source, target, match, distance, before, candidates, salt, forward, low, high):
     """One pass over the target patches [low, high).
 
@@ -367,7 +367,7 @@ def _sweep(source, target, match, distance, before, candidates, salt, forward, l
                     distance[i], match[i] = total, tried[k]
 
 
-@compiled
+@jit
 def _beside(source, target, match, before, low, high, i, down, right):
     """The source patch that continues the match of target patch i's neighbour, (down, right) before
     it; -1 where there is none.
@@ -385,7 +385,7 @@ def _beside(source, target, match, before, low, high, i, down, right):
     return source.places[row, column]
 
 
-@compiled
+@jit
 def _draw(starts, members, bin_, most, turn, drawn, filled):
     """Appends up to `most` members of a bin to `drawn`, from a place in it that varies with `turn`;
     returns the new count.
@@ -397,7 +397,7 @@ def _draw(starts, members, bin_, most, turn, drawn, filled):
     return filled
 
 
-@compiled
+@jit
 def _projected_distance(source, candidate, target, i, enough):
     """Squared distance of the projections of two patches, rows of `source` and `target`, or some
     value above `enough`.
@@ -412,7 +412,7 @@ def _projected_distance(source, candidate, target, i, enough):
     return total
 
 
-@compiled
+@jit
 def _distance(source, row_s, column_s, target, row_t, column_t, enough):
     """Squared distance of two patches by all their values, or some value above `enough`.
 

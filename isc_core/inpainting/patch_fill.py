@@ -72,7 +72,8 @@ def fill_patches(
         raise InputError("iterations must be at least 1, most_iterations no less")
     if not known.any() or (known & wanted).any():
         raise InputError(
-            "a hole needs known pixels around it, and no pixel can be both known and missing: check the mask"
+            "a hole needs known pixels around it, and no pixel can be both known and missing: "
+            "check the mask"
         )
     values = np.where(known[..., None], image, 0).astype(np.float32)
     return _filled(values, known, wanted, options, 0, monitor or Monitor())

@@ -8,7 +8,7 @@ s the upper quartile of all d, l_p a loss that the caller may add. Citation: see
 
 import numpy as np
 
-from ..numerics.jit import compiled
+from ..numerics.jit import jit
 from .coherency_sensitive_hashing import Matches, Patches
 
 # Weights below exp(-60) are as good as none, but must not vanish: where all patches match badly
@@ -45,7 +45,7 @@ def vote(
     return total[..., :-1] / np.where(voted, total[..., -1], 1)[..., None], voted
 
 
-@compiled
+@jit
 def _add_votes(image, rows, columns, source_rows, source_columns, matches, weight, total):
     """total[..., :C] += weight times the matched patch, total[..., C] += weight, over every target
     patch's pixels.

@@ -22,8 +22,8 @@ from functools import partial
 
 import numpy as np
 
-from ..numerics.jit import compiled
-from ..numerics.thread_pool import Workers
+from ..numerics.jit import jit
+from ..numerics.thread_pool import ThreadPool
 
 PATCH = 8
 _CELLS = PATCH * PATCH
@@ -62,7 +62,7 @@ def project(
     """
     out = np.empty((len(rows), len(chosen) + 1), np.float32)
     ends = np.linspace(0, len(rows), 4 * threads + 1).astype(int)
-    with Workers(threads) as workers:
+    with ThreadPool(threads) as workers:
         workers.run(
             [
                 partial(_project, image, rows[a:b], columns[a:b], chosen, out[a:b])
@@ -72,7 +72,7 @@ def project(
     return out
 
 
-@compiled
+@jit
 def _project(image, rows, columns, chosen, out):
     width, channels = image.shape[1], image.shape[2]
     strip = np.empty((8, width), np.float32)
@@ -109,7 +109,7 @@ def _project(image, rows, columns, chosen, out):
         out[n, -1] = np.sqrt(max(rest, np.float32(0))) * np.float32(0.125)
 
 
-@compiled
+@jit
 def _butterflies(work):
     """The Hadamard transform of each column of `work` (8, n), in place."""
     for step in (1, 2, 4):

@@ -20,20 +20,17 @@ Limits: it knows lamps, panels and skies on opaque objects of one piece. What no
 tells (a veil over everything) stays.
 """
 
-import importlib.resources
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
+from ..imaging.area_resize import averaged_object
 from ..imaging.bounding_box import mask_slices
 from ..imaging.smoothing import masked_gaussian
 from ..imaging.upsampling import enlarged
-from ..io.npy import read_arrays
-from ..imaging.area_resize import averaged_object
-from .layers import BLOCK, conv_block, convolved, depth_to_space, encoded, pad_to_stride, weights_in
+from .layers import BLOCK, conv_block, convolved, depth_to_space, encoded, pad_to_stride
+from .loader import Network, Parameters
 
 _MARGIN = 2.0  # of the output: without evidence it says "hardly anything"
 _CHANNELS = 4  # y of three colours, log b
@@ -54,11 +51,14 @@ class NetworkOptions:
 
 
 @dataclass(frozen=True)
-class LayerNetwork:
+class LayerNetwork(Network):
     """`weights`: of each convolution (9, inputs, outputs) float32, rows of the 3 x 3 first;
     `biases` (outputs,). In the order of the data: two for each level down, two for each level up
     from the coarsest, the output.
     """
+
+    title = "layer network"
+    file = "layer_network.npz"
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
@@ -76,6 +76,11 @@ class LayerNetwork:
             or self.weights[-1].shape[2] != _CHANNELS * BLOCK**2
         ):
             raise InputError("these are not the weights of a layer network")
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> "LayerNetwork":
+        """Build the network; raise `InputError` if the parameters do not fit."""
+        return cls(parameters.weights, parameters.biases)
 
     @property
     def encoder(self) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
@@ -128,26 +133,6 @@ def log_ratio(
     whole = np.zeros((*mask.shape, 4), np.float32)
     whole[box] = np.where(mask[box][..., None], _carried(found, inside, mask[box].shape, factor), 0)
     return whole[..., :3], whole[..., 3]
-
-
-@cache
-def shipped_network() -> LayerNetwork:
-    """The network that comes with the package."""
-    resource = importlib.resources.files(__package__) / "data" / "layer_network.npz"
-    with importlib.resources.as_file(resource) as path:
-        return read_network(path)
-
-
-def read_network(path: Path) -> LayerNetwork:
-    """An archive of float16 or float32 arrays `weight00`, `bias00`, ...
-
-    Raises `InputError` for a file that is none.
-    """
-    try:
-        weights, biases = weights_in(read_arrays(path))
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{path} holds no layer network: {error}") from error
-    return LayerNetwork(weights, biases)
 
 
 def _carried(

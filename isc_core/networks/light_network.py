@@ -20,22 +20,20 @@ Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24
 encoder). Weights, training pictures and loss are our own: `python -m
 training.networks.light_network`.
 
-Limits: measured in docs/methods/lamps.md. It learned from rendered paint with a gloss.
+Limits: measured in docs/methods/light_network.md. It learned from rendered paint with a gloss.
 """
 
-import importlib.resources
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..io.npy import read_arrays
 from ..imaging.area_resize import averaged_object
 from ..scene.light_estimate import PLACES, LightEstimate
-from .layers import encoded, is_encoder, pad_to_stride, weights_in
+from .layers import encoded, is_encoder, pad_to_stride
+from .loader import Network, Parameters
 
 LONG_SIDE = 112  # of the object, in pixels, as the network sees it
 CELL = 16
@@ -50,12 +48,15 @@ _MIRROR = np.array([1, 1, -1, -1, 1, 1, -1, 1.0])  # what a look becomes in a mi
 
 
 @dataclass(frozen=True)
-class LampNetwork:
+class LightNetwork(Network):
     """`weights`: of each convolution (9, inputs, outputs) float32, two for each level; `biases`
     (outputs,). `middle`, `scale` (m,): what is taken off the cells' layers, and how much of them
     counts; `layers`: matrix (inputs, outputs) and what is added (outputs,) of each of local, whole,
     lamps, places, light. Raises `InputError` where they do not fit each other.
     """
+
+    title = "light network"
+    file = "light_network.npz"
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
@@ -65,7 +66,7 @@ class LampNetwork:
 
     def __post_init__(self) -> None:
         if not (is_encoder(self.weights, self.biases) and self._layers_fit()):
-            raise InputError("these are not the weights of a lamp network")
+            raise InputError("these are not the weights of a light network")
 
     def _layers_fit(self) -> bool:
         matrices, added = ([self.layers[name][k] for name in _LAYERS] for k in (0, 1))
@@ -87,6 +88,13 @@ class LampNetwork:
             values.shape for values in added
         ] == [shape[1:] for shape in wanted]
         return fits and self.middle.shape == self.scale.shape == (count,)
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> "LightNetwork":
+        """Build the network; raise `InputError` or `KeyError` if the parameters do not fit."""
+        others = parameters.others
+        layers = {name: (others[f"{name}_weight"], others[f"{name}_bias"]) for name in _LAYERS}
+        return cls(parameters.weights, parameters.biases, others["middle"], others["scale"], layers)
 
     def __call__(
         self, image: np.ndarray, mask: np.ndarray
@@ -123,13 +131,13 @@ class LampNetwork:
 
 
 def predict_light(
-    image: np.ndarray, mask: np.ndarray, network: LampNetwork | None = None
+    image: np.ndarray, mask: np.ndarray, network: LightNetwork | None = None
 ) -> LightEstimate:
     """The lamps of a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the shipped
     network if None.
     """
     (light, cover), _ = pad_to_stride(*averaged_object(image, mask, LONG_SIDE)[:2])
-    judge = network or shipped_lamp_network()
+    judge = network or LightNetwork.shipped()
     (counts, places, told), (other, mirrored, reversed_) = (
         judge(light, cover),
         judge(light[:, ::-1], cover[:, ::-1]),
@@ -189,35 +197,3 @@ def _mirror(places: np.ndarray) -> np.ndarray:
 @cache
 def _mirrored_places() -> np.ndarray:
     return np.argmax((PLACES * (-1, 1, 1)) @ PLACES.T, axis=1)
-
-
-@cache
-def shipped_lamp_network() -> LampNetwork:
-    """The network that comes with the package."""
-    with importlib.resources.as_file(
-        importlib.resources.files(__package__) / "data" / "light_network.npz"
-    ) as path:
-        return read_lamp_network(path)
-
-
-def read_lamp_network(path: Path) -> LampNetwork:
-    """An archive of float16 or float32 arrays: `weight00`, `bias00`, ..., `middle`, `scale`, and
-    `local_weight`, `local_bias`, ...
-
-    Raises `InputError` for a file that is none.
-    """
-    try:
-        data = read_arrays(path)
-        convolutions = {name: values for name, values in data.items() if name[-2:].isdigit()}
-        weights, biases = weights_in(convolutions)
-        rest = {
-            name: values.astype(np.float32).astype(float)
-            for name, values in data.items()
-            if name not in convolutions
-        }
-        if not all(np.isfinite(values).all() for values in rest.values()):
-            raise ValueError("some of its numbers are not finite")
-        layers = {name: (rest[f"{name}_weight"], rest[f"{name}_bias"]) for name in _LAYERS}
-        return LampNetwork(weights, biases, rest["middle"], rest["scale"], layers)
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{path} holds no lamp network: {error}") from error

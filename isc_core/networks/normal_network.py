@@ -20,25 +20,22 @@ network); O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28 (encoder and decoder). Weights, training pictures and loss are our
 own: `python -m training.networks.normal_network`.
 
-Limits: measured in docs/methods/first_shape.md. It learned from rendered paint with a gloss, and
+Limits: measured in docs/methods/normal_network.md. It learned from rendered paint with a gloss, and
 sees nothing finer than a thirtieth of the object.
 """
 
-import importlib.resources
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
+from ..imaging.area_resize import averaged_object
 from ..imaging.bounding_box import mask_slices
 from ..imaging.upsampling import enlarged
-from ..io.npy import read_arrays
-from ..imaging.area_resize import averaged_object
 from ..scene.normal_estimate import NormalEstimate
-from .layers import conv_block, convolved, encoded, is_encoder, pad_to_stride, weights_in
+from .layers import conv_block, convolved, encoded, is_encoder, pad_to_stride
+from .loader import Network, Parameters
 
 LONG_SIDE = 112  # of the object, in pixels, as the network sees it
 CELL = 4
@@ -48,18 +45,21 @@ _COVERED = 0.02  # of a cell that says something
 
 
 @dataclass(frozen=True)
-class ShapeNetwork:
+class NormalNetwork(Network):
     """`weights`: of each convolution (9, inputs, outputs) float32; `biases` (outputs,). In the
     order of the data: two for each of D levels down, two for each of D - 2 levels up from the
     coarsest, the answer. Raises `InputError` where they do not fit each other.
     """
+
+    title = "normal network"
+    file = "normal_network.npz"
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
 
     def __post_init__(self) -> None:
         if len(self.weights) % 4 != 1 or len(self.weights) < 9 or not self._fits():
-            raise InputError("these are not the weights of a shape network")
+            raise InputError("these are not the weights of a normal network")
 
     @property
     def _depth(self) -> int:
@@ -79,6 +79,11 @@ class ShapeNetwork:
             b.shape for b in self.biases[down:]
         ] == [s[2:] for s in shapes]
 
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> "NormalNetwork":
+        """Build the network; raise `InputError` if the parameters do not fit."""
+        return cls(parameters.weights, parameters.biases)
+
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         """m and log s, (H / 4, W / 4, 4) float32;
 
@@ -95,7 +100,7 @@ class ShapeNetwork:
 
 
 def predict_normals(
-    image: np.ndarray, mask: np.ndarray, network: ShapeNetwork | None = None
+    image: np.ndarray, mask: np.ndarray, network: NormalNetwork | None = None
 ) -> NormalEstimate:
     """The normals of a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the
     shipped network if None.
@@ -103,7 +108,7 @@ def predict_normals(
     box = mask_slices(mask)
     small, inside, factor = averaged_object(image, mask, LONG_SIDE)
     (light, cover), place = pad_to_stride(small, inside)
-    judge = network or shipped_shape_network()
+    judge = network or NormalNetwork.shipped()
     found = 0.5 * (
         judge(light, cover)
         + judge(light[:, ::-1], cover[:, ::-1])[:, ::-1] * np.array([-1, 1, 1, 1], np.float32)
@@ -125,24 +130,3 @@ def _carried_on(found: np.ndarray, mask: np.ndarray) -> np.ndarray:
     known = mask.reshape(rows, CELL, columns, CELL).mean(axis=(1, 3)) > _COVERED
     nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
     return np.asarray(found[tuple(nearest)])
-
-
-@cache
-def shipped_shape_network() -> ShapeNetwork:
-    """The network that comes with the package."""
-    with importlib.resources.as_file(
-        importlib.resources.files(__package__) / "data" / "normal_network.npz"
-    ) as path:
-        return read_shape_network(path)
-
-
-def read_shape_network(path: Path) -> ShapeNetwork:
-    """An archive of float16 or float32 arrays `weight00`, `bias00`, ...
-
-    Raises `InputError` for a file that is none.
-    """
-    try:
-        weights, biases = weights_in(read_arrays(path))
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{path} holds no shape network: {error}") from error
-    return ShapeNetwork(weights, biases)

@@ -18,35 +18,35 @@ doi:10.1007/978-3-319-24574-4_28 (the encoder); pooled moments: A. Babenko, V. L
 "Aggregating local deep features for image retrieval", ICCV 2015, doi:10.1109/ICCV.2015.150.
 Weights, training scenes and loss are our own: `python -m training.networks.scene_classifier`.
 
-Limits: measured in docs/methods/doubts.md. A mirror of surroundings without detail looks like
+Limits: measured in docs/methods/assumption_checks.md. A mirror of surroundings without detail looks like
 paint, and two lamps may look like two bumps.
 """
 
-import importlib.resources
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from ..errors import InputError
-from ..io.npy import read_arrays
 from ..imaging.area_resize import averaged_object
-from .layers import average_pool, encoded, is_encoder, pad_to_stride, weights_in
+from .layers import average_pool, encoded, is_encoder, pad_to_stride
+from .loader import Network, Parameters
 
 ORDINARY, MIRROR, GLASS, LAMPS = KINDS = ("ordinary", "mirror", "glass", "lamps")
 LONG_SIDE = 144  # of the object, in pixels, as the network sees it
 _MOMENTS = 3
 _LEAST, _MOST = 1e-6, 1e4
-_NONE = "these are not the weights of an appearance network"
+_NONE = "these are not the weights of a scene classifier"
 
 
 @dataclass(frozen=True)
-class AppearanceNetwork:
+class SceneClassifier(Network):
     """`weights`: of each convolution (9, inputs, outputs) float32, two for each level; `biases`
     (outputs,). `middle`, `scale` (n,), `head` (n, 4), `odds` (4,): the m, s, W and b of the module.
     Raises `InputError` where they do not fit each other.
     """
+
+    title = "scene classifier"
+    file = "scene_classifier.npz"
 
     weights: tuple[np.ndarray, ...]
     biases: tuple[np.ndarray, ...]
@@ -63,6 +63,12 @@ class AppearanceNetwork:
         fits = [part.shape for part in (self.middle, self.scale, self.head, self.odds)] == wanted
         if not (fits and (self.scale > 0).all()):
             raise InputError(_NONE)
+
+    @classmethod
+    def from_parameters(cls, parameters: Parameters) -> "SceneClassifier":
+        """Build the network; raise `InputError` or `KeyError` if the parameters do not fit."""
+        head = (parameters.others[name] for name in ("middle", "scale", "head", "odds"))
+        return cls(parameters.weights, parameters.biases, *head)
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
         """The probabilities (4,) of `KINDS`;
@@ -92,41 +98,12 @@ class AppearanceNetwork:
 
 
 def classify_scene(
-    image: np.ndarray, mask: np.ndarray, network: AppearanceNetwork | None = None
+    image: np.ndarray, mask: np.ndarray, network: SceneClassifier | None = None
 ) -> dict[str, float]:
     """The probability of each of `KINDS` for a photo, `image` (H, W, 3) linear >= 0 within `mask`
     (H, W) bool; by the shipped network if None.
     """
     (light, cover), _ = pad_to_stride(*averaged_object(image, mask, LONG_SIDE)[:2])
-    judge = network or shipped_appearance()
+    judge = network or SceneClassifier.shipped()
     found = 0.5 * (judge(light, cover) + judge(light[:, ::-1], cover[:, ::-1]))
     return {kind: float(share) for kind, share in zip(KINDS, found, strict=True)}
-
-
-@cache
-def shipped_appearance() -> AppearanceNetwork:
-    """The network that comes with the package."""
-    with importlib.resources.as_file(
-        importlib.resources.files(__package__) / "data" / "scene_classifier.npz"
-    ) as path:
-        return read_appearance(path)
-
-
-def read_appearance(path: Path) -> AppearanceNetwork:
-    """An archive of float16 or float32 arrays: `weight00`, `bias00`, ... and those of
-    `AppearanceNetwork` by their names.
-
-    Raises `InputError` for a file that is none.
-    """
-    try:
-        data = read_arrays(path)
-        weights, biases = weights_in(data)
-        judge = [
-            data[name].astype(np.float32).astype(float)
-            for name in ("middle", "scale", "head", "odds")
-        ]
-        if not all(np.isfinite(values).all() for values in judge):
-            raise ValueError("some of its numbers are not finite")
-        return AppearanceNetwork(weights, biases, *judge)
-    except (ValueError, KeyError) as error:
-        raise InputError(f"{path} holds no appearance network: {error}") from error

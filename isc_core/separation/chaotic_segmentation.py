@@ -170,7 +170,8 @@ def _check_options(options: ChaoticSegmentationOptions) -> None:
         raise InputError("rim must lie between 0 and 1: it is a share of the object's size")
     if options.threshold is not None and not 0 < options.threshold < 1:
         raise InputError(
-            f"threshold must lie between 0 and 1, a share of the brightest value, not {options.threshold}"
+            "threshold must lie between 0 and 1, a share of the brightest value, not "
+            f"{options.threshold}"
         )
 
 

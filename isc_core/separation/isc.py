@@ -262,7 +262,8 @@ def _check(options: IscOptions, prior: np.ndarray | None, mask: np.ndarray) -> N
         or not 0 <= options.borrowed < np.inf
     ):
         raise InputError(
-            "hues must be at least 6, cell within (0, 1], low_quantile within (0, 1), borrowed at least 0"
+            "hues must be at least 6, cell within (0, 1], low_quantile within (0, 1), borrowed at "
+            "least 0"
         )
     if not (0 <= options.scatter < np.inf and 0 <= options.scatter_here < np.inf):
         raise InputError("scatter and scatter_here must be numbers from 0 on")

@@ -21,7 +21,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
-from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio, shipped_network
+from ..networks.layer_network import LayerNetwork, NetworkOptions, log_ratio
 from ..networks.layers import STRIDE
 from ..progress import Monitor
 from ..scene.decomposition import Separation
@@ -52,11 +52,12 @@ def separate(
     options, monitor = options or NetworkOptions(), monitor or Monitor()
     if options.long_side < STRIDE or options.doubt < 0 or not options.tint >= 1:
         raise InputError(
-            f"the network needs a long side of {STRIDE} pixels or more, a doubt of 0 or more, and a tint of 1 or more"
+            f"the network needs a long side of {STRIDE} pixels or more, a doubt of 0 or more, and "
+            "a tint of 1 or more"
         )
     check_arrays(image, mask, clipped)
     monitor.report("separating (network)", 0.0)
-    excess, error = log_ratio(image, mask, network or shipped_network(), options)
+    excess, error = log_ratio(image, mask, network or LayerNetwork.shipped(), options)
     seen = np.where(mask[..., None], image, 0)
     diffuse = held_to_light(seen, seen * np.exp(-excess), options.tint)
     split = diffuse_layers(image, mask, diffuse, clipped)

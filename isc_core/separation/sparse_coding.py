@@ -40,7 +40,7 @@ from scipy import ndimage
 
 from ..errors import InputError
 from ..imaging.smoothing import masked_gaussian
-from ..numerics.jit import compiled
+from ..numerics.jit import jit
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from .support.checks import check_arrays, require_colour
@@ -368,7 +368,7 @@ def _ramp(value: np.ndarray, none: float, full: float) -> np.ndarray:
     return np.clip((value - none) / (full - none), 0, 1)
 
 
-@compiled
+@jit
 def _change(colour, watched, y, x, v, u):
     """Between two pixels: the change of the specular-free images in units of beta, the step of
     beta, and the larger beta.
@@ -386,7 +386,7 @@ def _change(colour, watched, y, x, v, u):
     return min(one[3], two[3]) * np.sqrt(square), abs(one[4] - two[4]), max(one[4], two[4])
 
 
-@compiled
+@jit
 def _root(parent, pixel):
     while parent[pixel] != pixel:
         parent[pixel] = parent[parent[pixel]]
@@ -394,7 +394,7 @@ def _root(parent, pixel):
     return pixel
 
 
-@compiled
+@jit
 def _groups(colour, active, watched, edge, floor):
     """Of each pixel (H, W) the first one, as row * W + column, of the region that it is connected
     with; edges and inactive pixels part.
@@ -414,7 +414,7 @@ def _groups(colour, active, watched, edge, floor):
     return parent.reshape(height, width)
 
 
-@compiled
+@jit
 def _evidence(colour, group, mask, watched, edge, floor, count):
     """Sums (5, count) over the neighbours of each group: changes of beta that speak for light and
     for paint, steps of beta at the border, how many neighbours the border has, and the largest

@@ -42,7 +42,8 @@ def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarr
     x = np.asarray(start, np.float64)
     if not ((x > 0) & (x < 1)).all() or (rate == 4 and np.isin(x, DEGENERATE).any()):
         raise InputError(
-            f"an orbit must start within (0, 1), at rate 4 at none of {DEGENERATE}: it would stand still"
+            f"an orbit must start within (0, 1), at rate 4 at none of {DEGENERATE}: it would stand "
+            "still"
         )
     values = np.empty((length, *x.shape))
     for k in range(length):
@@ -86,7 +87,8 @@ class ChaoticNumbers:
         """
         if seed < 0 or orbits < 1 or stride < 1:
             raise InputError(
-                "chaotic numbers need a seed >= 0, and at least one orbit and a stride of at least one step"
+                "chaotic numbers need a seed >= 0, and at least one orbit and a stride of at least "
+                "one step"
             )
         self._stride = stride
         self._restarts = 0

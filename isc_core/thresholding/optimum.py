@@ -38,7 +38,8 @@ class Account:
         """
         if budget < least:
             raise InputError(
-                f"the search needs at least {least} evaluations, not {budget}: raise the budget or make the population smaller"
+                f"the search needs at least {least} evaluations, not {budget}: raise the budget or "
+                "make the population smaller"
             )
         self._objective = objective
         self.left = budget

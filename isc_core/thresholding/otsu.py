@@ -34,7 +34,8 @@ def quantise(values: np.ndarray, peak: float) -> np.ndarray:
     """
     if not (peak > 0 and np.isfinite(peak) and np.isfinite(values).all()):
         raise InputError(
-            "thresholds need finite values and a peak above 0: check that the photo is not black or broken"
+            "thresholds need finite values and a peak above 0: check that the photo is not black "
+            "or broken"
         )
     return np.clip(
         np.rint(np.asarray(values, np.float64) * ((LEVELS - 1) / peak)), 0, LEVELS - 1
@@ -61,7 +62,8 @@ class OtsuObjective:
             or counts.sum() <= 0
         ):
             raise InputError(
-                f"a histogram needs {LEVELS} finite counts >= 0 that are not all zero: check that the mask is not empty"
+                f"a histogram needs {LEVELS} finite counts >= 0 that are not all zero: check that "
+                "the mask is not empty"
             )
         share = counts / counts.sum()
         self.counts = counts
@@ -78,7 +80,8 @@ class OtsuObjective:
             or np.max(levels) >= LEVELS
         ):
             raise InputError(
-                f"levels must be integers from 0 to {LEVELS - 1}, at least one: quantise the values first"
+                f"levels must be integers from 0 to {LEVELS - 1}, at least one: quantise the "
+                "values first"
             )
         return cls(np.bincount(np.ravel(levels), minlength=LEVELS))
 

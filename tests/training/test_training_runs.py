@@ -13,11 +13,11 @@ pytest.importorskip("torch")
 
 import torch
 
-from isc_core.networks.layer_network import read_network, shipped_network
+from isc_core.networks.layer_network import LayerNetwork
 from isc_core.networks.layers import inputs_of
-from isc_core.networks.light_network import read_lamp_network
-from isc_core.networks.normal_network import read_shape_network
-from isc_core.networks.scene_classifier import read_appearance
+from isc_core.networks.light_network import LightNetwork
+from isc_core.networks.normal_network import NormalNetwork
+from isc_core.networks.scene_classifier import SceneClassifier
 from training.data import labelled_photos, layered_objects
 from training.data.labelled_photos import LabelledObject
 from training.data.layered_objects import LayeredObject
@@ -66,21 +66,21 @@ def accepted(path: Path, read: Callable[[Path], object]) -> None:
 
 def test_the_scene_classifier(tmp_path: Path) -> None:
     rows = [labelled("rig", "", 3), labelled("mirror", "mirror", 1), labelled("synth", "either", 1)]
-    path, network = tmp_path / "out.npz", scene_classifier.Network(shipped_network())
+    path, network = tmp_path / "out.npz", scene_classifier.Network(LayerNetwork.shipped())
     fit(network, scene_classifier.Batches(rows, 4), scene_classifier.SCHEDULE, options(path))
-    accepted(path, read_appearance)
+    accepted(path, SceneClassifier.read)
 
 
 def test_the_layer_network(tmp_path: Path) -> None:
     rows, path = [layered("", 0), layered("cup", 1)], tmp_path / "out.npz"
     draw = layer_network.Batches(rows, 2)
     fit(layer_network.Network(), draw, layer_network.SCHEDULE, options(path))
-    accepted(path, read_network)
+    accepted(path, LayerNetwork.read)
 
 
 @pytest.mark.parametrize(
     ("program", "read"),
-    [(light_network, read_lamp_network), (normal_network, read_shape_network)],
+    [(light_network, LightNetwork.read), (normal_network, NormalNetwork.read)],
     ids=["light", "normals"],
 )
 def test_the_programs_for_relit_objects(

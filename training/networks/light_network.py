@@ -28,7 +28,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from isc_core.networks.layer_network import shipped_network
+from isc_core.networks.layer_network import LayerNetwork
 from isc_core.networks.light_network import CELL, LONG_SIDE, SURE, UNSURE
 from isc_core.scene.light_estimate import PLACES
 from isc_core.shading.spherical_harmonics import real_sh
@@ -56,7 +56,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__()
-        self.convolutions = encoder_from(*shipped_network().encoder)
+        self.convolutions = encoder_from(*LayerNetwork.shipped().encoder)
         count = sum(one.out_channels for one in list(self.convolutions)[1::2])
         self.scaled = nn.BatchNorm1d(count, momentum=0.02)
         self.local = nn.Linear(count + 5, _LOCAL)

@@ -28,7 +28,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from isc_core.networks.light_network import shipped_lamp_network
+from isc_core.networks.light_network import LightNetwork
 from isc_core.networks.normal_network import CELL, LONG_SIDE, SURE, UNSURE
 
 from ..data.random_draws import log_uniform
@@ -59,7 +59,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__()
-        start = shipped_lamp_network()
+        start = LightNetwork.shipped()
         self.down = encoder_from(start.weights, start.biases)
         widths = [one.out_channels for one in list(self.down)[1::2]]
         steps = zip(widths[1:-1], widths[2:], strict=True)

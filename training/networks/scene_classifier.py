@@ -28,7 +28,7 @@ import torch
 from torch import nn
 from torch.nn import functional
 
-from isc_core.networks.layer_network import LayerNetwork, read_network, shipped_network
+from isc_core.networks.layer_network import LayerNetwork
 from isc_core.networks.scene_classifier import KINDS
 
 from ..data.labelled_photos import (
@@ -165,7 +165,7 @@ def main() -> None:
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     path = arguments.encoder
-    network = Network(shipped_network() if path is None else read_network(path))
+    network = Network(LayerNetwork.shipped() if path is None else LayerNetwork.read(path))
     training, held_out = split(objects, lambda one: one.family, options)
     validation = Batches(held_out, options.batch) if held_out else None
     fit(network, Batches(training, options.batch), SCHEDULE, options, validation)

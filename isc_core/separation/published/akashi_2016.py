@@ -36,7 +36,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...imaging.channels import largest
-from ...numerics.jit import compiled
+from ...numerics.jit import jit
 from ...progress import Monitor
 from ...scene.decomposition import Separation
 from ..support.checks import check_arrays, require_colour
@@ -317,7 +317,7 @@ def _all_codes(
     return codes
 
 
-@compiled
+@jit
 def _descend(like, own, sparsity, codes):
     """Minimises 1/2 h' own h - (like - sparsity)' h over h >= 0 for each column of `like` (m, n),
     starting from `codes` (m, n).

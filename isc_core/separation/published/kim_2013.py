@@ -39,7 +39,7 @@ from scipy import ndimage
 
 from ...errors import InputError
 from ...imaging.channels import smallest
-from ...numerics.jit import compiled
+from ...numerics.jit import jit
 from ...progress import Monitor
 from ...scene.decomposition import Separation
 from ..support.checks import check_arrays, require_colour
@@ -261,7 +261,7 @@ def _weights(steps: np.ndarray, both: np.ndarray, options: Kim2013Options) -> np
     return np.where(both, options.smoothness / np.hypot(steps / options.gradient, 1), 0)
 
 
-@compiled
+@jit
 def _relax(s, target, pull, across, down, bound, parity):
     height, width = s.shape
     for y in range(height):

@@ -37,7 +37,7 @@ from scipy import ndimage
 from ...errors import InputError
 from ...imaging.bounding_box import mask_slices
 from ...inpainting.pull_push import pull, push
-from ...numerics.jit import compiled
+from ...numerics.jit import jit
 from ...progress import Monitor
 from ...scene.decomposition import Separation
 from ..support.checks import check_arrays, require_colour
@@ -211,7 +211,7 @@ def _flow(
     return speed, across, down
 
 
-@compiled
+@jit
 def _measure_flow(own_rho, u, v, mask, edge, chroma, texture, speed, across, down):
     for y in range(1, u.shape[0] - 1):
         for x in range(1, u.shape[1] - 1):
@@ -254,7 +254,7 @@ def _evolved(
     return here
 
 
-@compiled
+@jit
 def _erode(phi, speed, across, down, step, result):
     for y in range(1, phi.shape[0] - 1):
         for x in range(1, phi.shape[1] - 1):
@@ -272,7 +272,7 @@ def _erode(phi, speed, across, down, step, result):
             result[y, x] = here - step * speed[y, x] * fall
 
 
-@compiled
+@jit
 def _sampled(values, x, y):
     column, row = min(int(x), values.shape[1] - 2), min(int(y), values.shape[0] - 2)
     right, below = x - column, y - row

@@ -123,7 +123,8 @@ def _check_options(options: Shen2013Options) -> None:
         or not all(0 <= share <= 1 for share in shares)
     ):
         raise InputError(
-            "cluster_radius must be above 0, fade at least 0, ratio_quantile and bright_saturation within [0, 1]"
+            "cluster_radius must be above 0, fade at least 0, ratio_quantile and bright_saturation "
+            "within [0, 1]"
         )
 
 

@@ -32,7 +32,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...imaging.channels import largest
-from ...numerics.jit import compiled
+from ...numerics.jit import jit
 from ...progress import Monitor
 from ...scene.decomposition import Separation
 from ..support.checks import check_arrays, require_colour
@@ -173,7 +173,8 @@ def _check_options(options: Tan2005Options) -> None:
         or options.window % 2 == 0
     ):
         raise InputError(
-            "quantile must lie within 0 and 1, cells within 1 and 1000, and window be an odd number of pixels"
+            "quantile must lie within 0 and 1, cells within 1 and 1000, and window be an odd "
+            "number of pixels"
         )
 
 
@@ -268,7 +269,7 @@ def _sweep_until_settled(pixels: _Pixels, factor: float, options: Tan2005Options
             break
 
 
-@compiled
+@jit
 def _mark(total, free, neighbour, label, factor, log_of_difference):
     """Labels every open pixel as specular towards one of its next neighbours, or diffuse; the
     number of specular ones.
@@ -303,7 +304,7 @@ def _mark(total, free, neighbour, label, factor, log_of_difference):
     return found
 
 
-@compiled
+@jit
 def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by_colour):
     """Gives, pair by pair, the pixel with the smaller c the other one's as its diffuse
     chromaticity, as far as its limit.
@@ -335,7 +336,7 @@ def _move(colours, peak, red, green, limit, label, stale, noise, colour_step, by
             label[other_y, other_x] = _DIFFUSE
 
 
-@compiled
+@jit
 def _refresh(colours, total, peak, red, green, stale, shares):
     """Brings totals and chromaticities up to the changed colours;
 

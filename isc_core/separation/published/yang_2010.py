@@ -32,7 +32,7 @@ from scipy import ndimage
 
 from ...errors import InputError
 from ...imaging.channels import largest, smallest
-from ...numerics.jit import compiled
+from ...numerics.jit import jit
 from ...progress import Monitor
 from ...scene.decomposition import Separation
 from ..support.checks import check_arrays, require_colour
@@ -135,7 +135,8 @@ def _check_options(options: Yang2010Options) -> None:
         or not math.isfinite(options.spatial_sigma + options.range_sigma)
     ):
         raise InputError(
-            "spatial_sigma and tolerance must be above 0, range_sigma at least .001, rounds at least 1, dark at least 0"
+            "spatial_sigma and tolerance must be above 0, range_sigma at least .001, rounds at "
+            "least 1, dark at least 0"
         )
 
 
@@ -204,7 +205,7 @@ def _filtered(values: np.ndarray, grid: _Grid) -> np.ndarray:
     return smooth
 
 
-@compiled
+@jit
 def _scatter(values, at, sums, counts):
     """Adds every value to the cell that is nearest to it, and one to the cell's count."""
     for i in range(len(values)):
@@ -213,7 +214,7 @@ def _scatter(values, at, sums, counts):
         counts[r, c, g] += 1.0
 
 
-@compiled
+@jit
 def _interpolate(cells, at, out):
     """Trilinear interpolation of `cells` at every place of `at` (n, 3)."""
     for i in range(len(out)):

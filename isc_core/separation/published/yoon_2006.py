@@ -30,7 +30,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...imaging.channels import largest, smallest
-from ...numerics.jit import compiled
+from ...numerics.jit import jit
 from ...progress import Monitor
 from ...scene.decomposition import Separation
 from ..support.checks import check_arrays, require_colour
@@ -237,7 +237,7 @@ def _column_pairs(pixels: _TwoBand, colour_step: float) -> tuple[np.ndarray, np.
     return first[kept], second[kept]
 
 
-@compiled
+@jit
 def _sweep(first, second, ratio, band, tolerance):
     """Lowers the larger t of each pair to the smaller one, in order, where more than `tolerance` of
     light moves; how often it did.
@@ -255,7 +255,7 @@ def _sweep(first, second, ratio, band, tolerance):
     return moved
 
 
-@compiled
+@jit
 def _unite(first, second, parent):
     """Joins the trees of every pair, halving the paths on the way; the root is the tree's smallest
     index.
@@ -274,7 +274,7 @@ def _unite(first, second, parent):
             parent[p] = q
 
 
-@compiled
+@jit
 def _flatten(parent):
     """Lets every node point at its root: a node's parent never comes after it."""
     for i in range(len(parent)):

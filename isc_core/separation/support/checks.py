@@ -16,19 +16,22 @@ def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None
     """
     if image.ndim != 3 or image.shape[2] != 3:
         raise InputError(
-            f"separation needs a colour image of shape (H, W, 3), not {image.shape}: convert it to RGB"
+            f"separation needs a colour image of shape (H, W, 3), not {image.shape}: convert it to "
+            "RGB"
         )
     for name, array in (("mask", mask), ("clipped map", clipped)):
         if array is not None and (array.shape != image.shape[:2] or array.dtype != bool):
             raise InputError(
-                f"the {name} must be boolean and {image.shape[:2]} like the image, not {array.dtype} {array.shape}"
+                f"the {name} must be boolean and {image.shape[:2]} like the image, not "
+                f"{array.dtype} {array.shape}"
             )
     if not mask.any():
         raise InputError("the mask is empty: mark at least the object's pixels")
     inside = image[mask]
     if not np.isfinite(inside).all() or inside.min() < 0:
         raise InputError(
-            "the image has negative or non-finite values inside the mask: repair or mask out those pixels"
+            "the image has negative or non-finite values inside the mask: repair or mask out those "
+            "pixels"
         )
 
 
@@ -46,5 +49,6 @@ def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:
     """
     if not has_colour(image, mask):
         raise InputError(
-            f"the photo has no colour, and {method} tells highlights by colour alone: use --method isc, or a colour photo"
+            f"the photo has no colour, and {method} tells highlights by colour alone: use --method "
+            "isc, or a colour photo"
         )

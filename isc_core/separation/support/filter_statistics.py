@@ -117,7 +117,8 @@ def _read(data: bytes, name: str) -> FilterTable:
             )
     except (ValueError, KeyError) as error:
         raise InputError(
-            f"{name} is no table of filter statistics: fit one with benchmarks.separation.filter_statistics"
+            f"{name} is no table of filter statistics: fit one with "
+            "benchmarks.separation.filter_statistics"
         ) from error
     shape = (len(FILTERS), BINS)
     fit = (
@@ -131,7 +132,8 @@ def _read(data: bytes, name: str) -> FilterTable:
         for values in (spread, without, highlight, temperature)
     ):
         raise InputError(
-            f"{name} holds other filters than this version has: fit it anew with benchmarks.separation.filter_statistics"
+            f"{name} holds other filters than this version has: fit it anew with "
+            "benchmarks.separation.filter_statistics"
         )
     return FilterTable(spread, without, highlight, float(temperature))
 

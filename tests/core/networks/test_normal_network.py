@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
-from isc_core.networks.normal_network import ShapeNetwork, predict_normals, read_shape_network
+from isc_core.networks.normal_network import NormalNetwork, predict_normals
 from tests.core.lit_balls import ball, under_lamps
 
 SHAPES = [
@@ -25,13 +25,13 @@ SHAPES = [
 ]  # three levels down, one up, the answer
 
 
-def small_network(rng: np.random.Generator) -> ShapeNetwork:
+def small_network(rng: np.random.Generator) -> NormalNetwork:
     """Random weights."""
     weights = tuple(
         rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32)
         for inputs, outputs in SHAPES
     )
-    return ShapeNetwork(
+    return NormalNetwork(
         weights, tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in SHAPES)
     )
 
@@ -108,8 +108,8 @@ def test_a_painted_ball_is_round(lamps: list[tuple[float, float, float]]) -> Non
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"bad\.npz holds no shape network"):
-        read_shape_network(bad)
+    with pytest.raises(InputError, match=r"bad\.npz holds no normal network"):
+        NormalNetwork.read(bad)
     network = small_network(np.random.default_rng(3))
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}
     parts |= {f"bias{k:02d}": values for k, values in enumerate(network.biases)}
@@ -119,10 +119,10 @@ def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
         {"weight09": np.ones((9, 4, 4)), "bias09": np.ones(4)},
     ):
         np.savez(bad, **(parts | wrong))
-        with pytest.raises(InputError, match="not the weights of a shape network"):
-            read_shape_network(bad)
+        with pytest.raises(InputError, match="not the weights of a normal network"):
+            NormalNetwork.read(bad)
     np.savez(bad, **(parts | {"bias03": np.full(6, np.nan)}))
     with pytest.raises(InputError, match="not finite"):
-        read_shape_network(bad)
+        NormalNetwork.read(bad)
     np.savez(bad, **parts)
-    assert len(read_shape_network(bad).weights) == 9
+    assert len(NormalNetwork.read(bad).weights) == 9

@@ -9,7 +9,7 @@ import pytest
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from isc_core.errors import InputError
-from isc_core.networks.light_network import LampNetwork, predict_light, read_lamp_network
+from isc_core.networks.light_network import LightNetwork, predict_light
 from isc_core.scene.light_estimate import PLACES, LightEstimate
 from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.lit_balls import SIDE, ball, under_lamps
@@ -24,7 +24,7 @@ LAYERS = {
 }
 
 
-def small_network(rng: np.random.Generator) -> LampNetwork:
+def small_network(rng: np.random.Generator) -> LightNetwork:
     """Two levels, random weights."""
     weights = tuple(
         rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32)
@@ -35,7 +35,7 @@ def small_network(rng: np.random.Generator) -> LampNetwork:
         name: (rng.normal(0, shape[0] ** -0.5, shape), rng.normal(0, 0.1, shape[1]))
         for name, shape in LAYERS.items()
     }
-    return LampNetwork(weights, biases, rng.normal(size=10), rng.uniform(0.5, 1, 10), layers)
+    return LightNetwork(weights, biases, rng.normal(size=10), rng.uniform(0.5, 1, 10), layers)
 
 
 def photo(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -172,8 +172,8 @@ def test_three_lamps_are_several_and_smooth_light_is_none() -> None:
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"bad\.npz holds no lamp network"):
-        read_lamp_network(bad)
+    with pytest.raises(InputError, match=r"bad\.npz holds no light network"):
+        LightNetwork.read(bad)
     network = small_network(np.random.default_rng(2))
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}
     parts |= {f"bias{k:02d}": values for k, values in enumerate(network.biases)}
@@ -188,12 +188,12 @@ def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     ):
         np.savez(bad, **(parts | wrong))
         with pytest.raises(InputError, match="not the weights"):
-            read_lamp_network(bad)
+            LightNetwork.read(bad)
     np.savez(bad, **{name: values for name, values in parts.items() if name != "places_bias"})
     with pytest.raises(InputError, match="places_bias"):
-        read_lamp_network(bad)
+        LightNetwork.read(bad)
     np.savez(bad, **(parts | {"scale": np.full(10, np.nan)}))
     with pytest.raises(InputError, match="not finite"):
-        read_lamp_network(bad)
+        LightNetwork.read(bad)
     np.savez(bad, **parts)
-    assert len(read_lamp_network(bad).weights) == 4
+    assert len(LightNetwork.read(bad).weights) == 4

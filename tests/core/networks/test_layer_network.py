@@ -7,13 +7,7 @@ import pytest
 from scipy import ndimage
 
 from isc_core.errors import InputError
-from isc_core.networks.layer_network import (
-    LayerNetwork,
-    NetworkOptions,
-    log_ratio,
-    read_network,
-    shipped_network,
-)
+from isc_core.networks.layer_network import LayerNetwork, NetworkOptions, log_ratio
 from isc_core.networks.layers import convolved, depth_to_space, space_to_depth
 from isc_core.separation import separate
 from isc_core.separation.support.light_tint import held_to_light
@@ -179,13 +173,13 @@ def test_options_and_files_that_mean_nothing_are_refused(tmp_path):
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
     with pytest.raises(InputError, match=r"bad\.npz holds no layer network"):
-        read_network(bad)
+        LayerNetwork.read(bad)
     np.savez(bad, weight00=np.zeros((9, 2, 2)), bias00=np.zeros(2))
     with pytest.raises(InputError, match="not the weights"):
-        read_network(bad)
+        LayerNetwork.read(bad)
 
 
 def test_the_shipped_network_is_small_and_finite():
-    network = shipped_network()
+    network = LayerNetwork.shipped()
     assert all(np.isfinite(w).all() for w in (*network.weights, *network.biases))
     assert sum(w.size for w in network.weights) < 2_000_000

@@ -15,9 +15,8 @@ from isc_core.networks.scene_classifier import (
     LAMPS,
     MIRROR,
     ORDINARY,
-    AppearanceNetwork,
+    SceneClassifier,
     classify_scene,
-    read_appearance,
 )
 from tests.core.lit_balls import mirror_ball, under_lamps
 from training.data.environments import ENVIRONMENTS, make_environment
@@ -25,14 +24,14 @@ from training.data.environments import ENVIRONMENTS, make_environment
 SHAPES = [(16, 4), (4, 4), (4, 6), (6, 6)]
 
 
-def small_network(rng: np.random.Generator) -> AppearanceNetwork:
+def small_network(rng: np.random.Generator) -> SceneClassifier:
     """Two levels, random weights."""
     weights = tuple(
         rng.normal(0, (2 / (9 * inputs)) ** 0.5, (9, inputs, outputs)).astype(np.float32)
         for inputs, outputs in SHAPES
     )
     biases = tuple(rng.normal(0, 0.1, outputs).astype(np.float32) for _, outputs in SHAPES)
-    return AppearanceNetwork(
+    return SceneClassifier(
         weights,
         biases,
         rng.normal(size=30),
@@ -106,8 +105,8 @@ def test_paint_under_one_lamp_is_ordinary_and_under_three_it_is_not() -> None:
 def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     bad = tmp_path / "bad.npz"
     bad.write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r"bad\.npz holds no appearance network"):
-        read_appearance(bad)
+    with pytest.raises(InputError, match=r"bad\.npz holds no scene classifier"):
+        SceneClassifier.read(bad)
     network = small_network(np.random.default_rng(2))
     parts = {f"weight{k:02d}": values for k, values in enumerate(network.weights)}
     parts |= {f"bias{k:02d}": values for k, values in enumerate(network.biases)}
@@ -120,9 +119,9 @@ def test_files_that_hold_no_network_are_refused(tmp_path: Path) -> None:
     ):
         np.savez(bad, **(parts | wrong))
         with pytest.raises(InputError, match="not the weights"):
-            read_appearance(bad)
+            SceneClassifier.read(bad)
     np.savez(bad, **{name: values for name, values in parts.items() if name != "odds"})
     with pytest.raises(InputError, match="odds"):
-        read_appearance(bad)
+        SceneClassifier.read(bad)
     np.savez(bad, **parts)
-    assert len(read_appearance(bad).weights) == 4
+    assert len(SceneClassifier.read(bad).weights) == 4
