@@ -18,7 +18,7 @@ from isc_core.progress import Monitor
 from isc_core.scene.decomposition import Separation
 from isc_core.separation import BEST, METHODS, isc, separate
 from isc_core.separation.isc import VARIANTS, IscOptions
-from tests.core.separation.scenes import PAINTS, assert_layers_hold, error_ratio
+from tests.core.separation.scenes import ALBEDOS, assert_layers_hold, error_ratio
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ SPOTS = [(0.5 * np.cos(t), 0.5 * np.sin(t)) for t in (-2 * np.pi / 3, 0.0, 2 * n
 
 
 def sectors(
-    paints: np.ndarray = PAINTS, height: int = 192, width: int = 240, glossy: bool = True
+    paints: np.ndarray = ALBEDOS, height: int = 192, width: int = 240, glossy: bool = True
 ) -> Scene:
     """Three paints in sectors, each with a highlight."""
     x, y, mask, shading = disc(height, width)
@@ -89,7 +89,7 @@ def printed(
         )
     share = letters[..., None] / 255
     return lit(
-        ((1 - share) * PAINTS[0] + share * np.array(white)) * shading[..., None], mask, spots
+        ((1 - share) * ALBEDOS[0] + share * np.array(white)) * shading[..., None], mask, spots
     ), mask & (letters > 0)
 
 

@@ -1,8 +1,5 @@
-"""What the tests of separation methods share: a made scene, real photos with their truth, and what
-holds for every split.
-"""
+"""Scenes, photos with ground truth and assertions that the tests of separation methods share."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -11,21 +8,61 @@ import numpy as np
 from isc_core.imaging.bounding_box import mask_slices
 from isc_core.scene.decomposition import Separation
 
-PAINTS = np.array([[0.7, 0.2, 0.1], [0.15, 0.55, 0.2], [0.1, 0.25, 0.6]])
+ALBEDOS = np.array([[0.7, 0.2, 0.1], [0.15, 0.55, 0.2], [0.1, 0.25, 0.6]])
 
 
-def glossy_disc(height: float = 0.5) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Image, true diffuse (both (H, W, 3)) and mask of a shaded disc in sectors of three paints; a
-    white highlight on each paint.
-    """
+Scene = tuple[np.ndarray, np.ndarray, np.ndarray]  # image, true diffuse (H, W, 3), mask (H, W)
+
+
+def glossy_disc(height: float = 0.5) -> Scene:
+    """A shaded disc in sectors of three albedos; a white highlight on each."""
     y, x = np.mgrid[-1:1:96j, -1:1:120j]
     mask = x**2 + y**2 < 0.9
     angle = np.arctan2(y, x)
     shading = 0.35 + 0.65 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
-    diffuse = PAINTS[np.digitize(angle, [-np.pi / 3, np.pi / 3])] * (shading * mask)[..., None]
+    diffuse = ALBEDOS[np.digitize(angle, [-np.pi / 3, np.pi / 3])] * (shading * mask)[..., None]
     centres = [(0.5 * np.cos(t), 0.5 * np.sin(t)) for t in (-2 * np.pi / 3, 0.0, 2 * np.pi / 3)]
     specular = sum(height * np.exp(-((x - cx) ** 2 + (y - cy) ** 2) / 0.015) for cx, cy in centres)
     return diffuse + (specular * mask)[..., None], diffuse, mask
+
+
+def disc_of_two() -> Scene:
+    """A shaded disc of two albedos with one white highlight."""
+    y, x = np.mgrid[-1:1:80j, -1:1:100j]
+    mask = x**2 + y**2 < 0.9
+    shading = 0.4 + 0.6 * np.sqrt(np.clip(1 - x**2 - y**2, 0, 1))
+    specular = 0.5 * np.exp(-((x - 0.4) ** 2 + (y + 0.2) ** 2) / 0.02)
+    albedo = np.where((x > 0)[..., None], [0.7, 0.25, 0.15], [0.2, 0.6, 0.15])
+    diffuse = albedo * (shading * mask)[..., None]
+    return diffuse + (specular * mask)[..., None], diffuse, mask
+
+
+def gaussian_plate() -> Scene:
+    """Two shaded albedos side by side, a smooth white highlight on each."""
+    y, x = np.mgrid[:60, :100].astype(float)
+    specular = sum(0.4 * np.exp(-((x - at) ** 2 + (y - 30) ** 2) / 60) for at in (25, 75))
+    albedo = np.where((x < 50)[..., None], [0.7, 0.3, 0.1], [0.2, 0.3, 0.6])
+    diffuse = albedo * (0.5 + 0.5 * y / 60)[..., None]
+    return diffuse + specular[..., None], diffuse, np.ones(y.shape, bool)
+
+
+def conical_plate(radius: float = 5) -> Scene:
+    """Two shaded albedos side by side, a conical white highlight on each."""
+    y, x = np.mgrid[:50, :90].astype(float)
+    specular = sum(0.4 * np.clip(1 - np.hypot(x - at, y - 25) / radius, 0, 1) for at in (22, 67))
+    albedo = np.where((x < 45)[..., None], [0.7, 0.3, 0.1], [0.2, 0.3, 0.6])
+    diffuse = albedo * (0.6 + 0.4 * y / 50)[..., None]
+    return diffuse + specular[..., None], diffuse, np.ones(y.shape, bool)
+
+
+def spots(heights: tuple[float, ...] = (0.3, 0.4)) -> Scene:
+    """An even orange plate with conical white highlights in a row."""
+    y, x = np.mgrid[:60, : 60 * len(heights)].astype(float)
+    specular = sum(
+        h * np.clip(1 - np.hypot(x - 30 - 60 * k, y - 30) / 12, 0, 1) for k, h in enumerate(heights)
+    )
+    diffuse = np.broadcast_to([0.6, 0.3, 0.1], (*y.shape, 3))
+    return diffuse + specular[..., None], diffuse, np.ones(y.shape, bool)
 
 
 def read(path: Path) -> np.ndarray:
@@ -34,15 +71,14 @@ def read(path: Path) -> np.ndarray:
     return stored / np.iinfo(stored.dtype).max
 
 
-def highlight_photo(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def highlight_photo(shared: Path, name: str) -> Scene:
     """Image, true diffuse and the full mask of one of the photos with published figures."""
-    image, truth = (
-        read(shared / "data/highlight" / file) for file in (f"{name}.bmp", f"{name}_gt.bmp")
-    )
+    folder = shared / "data/highlight"
+    image, truth = (read(folder / file) for file in (f"{name}.bmp", f"{name}_gt.bmp"))
     return image, truth, np.ones(image.shape[:2], bool)
 
 
-def laboratory_photo(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def laboratory_photo(shared: Path, name: str) -> Scene:
     """Image, true diffuse and mask of an object of the laboratory set, cut to the mask's box."""
     folder = shared / "data/mit_berkeley_train/laboratory" / name
     mask = cv2.imread(str(folder / "mask.png"), cv2.IMREAD_GRAYSCALE) > 0
@@ -51,21 +87,21 @@ def laboratory_photo(shared: Path, name: str) -> tuple[np.ndarray, np.ndarray, n
 
 
 def psnr(split: Separation, truth: np.ndarray) -> float:
-    """Of the diffuse image over all pixels, dB, for values in [0, 1]."""
+    """PSNR of the diffuse image over all pixels in dB, for values in [0, 1]."""
     return float(-10 * np.log10(np.mean((split.diffuse - truth) ** 2)))
 
 
 def error_ratio(split: Separation, image: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
-    """Squared error of the diffuse image inside the mask over that of leaving the photo as it is."""
+    """Squared error of the diffuse image inside the mask over that of the unchanged photo."""
     return float(np.mean((split.diffuse - truth)[mask] ** 2) / np.mean((image - truth)[mask] ** 2))
 
 
 def assert_layers_hold(
     split: Separation, image: np.ndarray, mask: np.ndarray, *, tinted: bool = False
 ) -> None:
-    """The identities and ranges of every split;
+    """Assert the identities and ranges of a separation inside the mask.
 
-    `image` may be anything outside the mask. `tinted`: specular light need not be white.
+    `tinted`: specular light need not be white.
     """
     total = split.diffuse + split.specular + split.residual
     assert np.abs(total[mask] - image[mask]).max() <= 1e-6 * image[mask].max()
@@ -74,50 +110,3 @@ def assert_layers_hold(
     for layer in (split.diffuse, split.specular, split.residual, split.confidence):
         assert layer.dtype == np.float32 and np.isfinite(layer).all() and not layer[~mask].any()
     assert (split.confidence >= 0).all() and (split.confidence <= 1).all()
-
-
-def assert_scale_and_surroundings_do_not_matter(
-    separate: Callable[..., Separation], options: object, scale: float, least: float
-) -> None:
-    """A wider frame, unknown outside the mask, and another exposure give the same specular layer,
-    of at least `least` on the disc.
-    """
-    image, _, mask = glossy_disc()
-    split = separate(image, mask, options)
-    assert split.specular.max() > least
-    padded = np.pad(image, [(13, 5), (7, 11), (0, 0)], constant_values=np.nan)
-    wide = separate(scale * padded, np.pad(mask, [(13, 5), (7, 11)]), options)
-    assert np.allclose(wide.specular[13:-5, 7:-11] / scale, split.specular, atol=2e-6)
-
-
-def assert_any_mask_and_noise_keep_the_layers_sound(
-    separate: Callable[..., Separation], options: object
-) -> None:
-    """Noise with grey and black stripes under a scattered mask, and under a mask of one pixel."""
-    random = np.random.default_rng(3)
-    image = random.random((40, 50, 3)) ** 3
-    image[20:24] = image[20:24, :, :1]  # grey
-    image[30:33] = 0
-    single = np.zeros((40, 50), bool)
-    single[3, 4] = True
-    for mask in (random.random((40, 50)) > 0.4, single):
-        split = separate(np.where(mask[..., None], image, np.nan), mask, options)
-        assert_layers_hold(split, image, mask)
-
-
-def assert_clipped_cores_are_filled_and_inform_nobody(
-    separate: Callable[..., Separation], at_most: float
-) -> None:
-    """Clipped pixels get a diffuse layer with at most this error ratio, no confidence, and have no
-    influence on others.
-    """
-    scene, diffuse, mask = glossy_disc(0.9)
-    image = np.minimum(scene, 0.95)
-    clipped = (scene > 0.95).any(axis=2)
-    assert clipped.sum() > 20
-    split = separate(image, mask, clipped=clipped)
-    assert_layers_hold(split, image, mask)
-    assert not split.confidence[clipped].any()
-    wild = separate(np.where(clipped[..., None], [0.9, 0.0, 0.0], image), mask, clipped=clipped)
-    assert np.array_equal(wild.specular[mask & ~clipped], split.specular[mask & ~clipped])
-    assert error_ratio(split, scene, diffuse, clipped) < at_most
