@@ -35,7 +35,7 @@ SCHEMA_VERSION = 1
 KIND = "isc synth data set"
 _LOOKING = 0.02  # of the progress, for checking existing scenes
 # Scenes after which compiled kernels are released; Dr.Jit reloads those it needs from its files.
-_KERNELS_KEPT = 50
+KERNELS_KEPT = 50
 _LITTER = (".DS_Store", "Thumbs.db", "desktop.ini")
 
 
@@ -146,7 +146,7 @@ def _tidy(index: int) -> None:
     kernel that it compiled.
     """
     gc.collect()
-    if index % _KERNELS_KEPT == _KERNELS_KEPT - 1 and has_llvm():
+    if index % KERNELS_KEPT == KERNELS_KEPT - 1 and has_llvm():
         drjit = load_drjit()
         drjit.flush_kernel_cache()
         drjit.flush_malloc_cache()

@@ -27,8 +27,8 @@ from .direct_light import Paths, Sums, add_exactly, draw_paths, trace_paths, uns
 from .light_sampling import Sampler, sampler_of
 from .reflection import Points, Reflection
 
-_CHUNK = 1 << 15  # samples at a time: their arrays fit into the cache
-_THREADS = 4  # more would wait for the rays, which a single thread traces
+CHUNK = 1 << 15  # samples at a time: their arrays fit into the cache
+THREADS = 4  # more would wait for the rays, which a single thread traces
 
 
 def light_surface(
@@ -83,7 +83,7 @@ def light_surface(
     total = Sums(len(points))
     for light in lights:
         add_exactly(total, points, world.reflection, light, tracer)
-    with ThreadPoolExecutor(min(_THREADS, os.cpu_count() or 1)) as pool:
+    with ThreadPoolExecutor(min(THREADS, os.cpu_count() or 1)) as pool:
         for number, (light, sampler) in enumerate(sampled):
             part = monitor.part(number / parts, (number + 1) / parts)
             _add_direct(
@@ -145,8 +145,8 @@ def _add_bounced(
 
 
 def _chunks(count: int, samples: int) -> list[slice]:
-    """Split `count` points into pieces of about `_CHUNK` samples."""
-    step = max(1, _CHUNK // samples)
+    """Split `count` points into pieces of about `CHUNK` samples."""
+    step = max(1, CHUNK // samples)
     return [slice(start, min(start + step, count)) for start in range(0, count, step)]
 
 
@@ -157,7 +157,7 @@ def _ahead(
     waiting: deque[tuple[slice, Future[Paths]]] = deque()
     for chunk in chunks:
         waiting.append((chunk, pool.submit(work, chunk)))
-        if len(waiting) > _THREADS:
+        if len(waiting) > THREADS:
             done, future = waiting.popleft()
             yield done, future.result()
     for done, future in waiting:

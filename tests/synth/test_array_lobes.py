@@ -349,7 +349,7 @@ def test_the_seed_decides_and_threads_do_not(
     first, again, other = (
         lit(waisted, material, *both, samples=8, seed=seed) for seed in (1, 1, 2)
     )
-    monkeypatch.setattr(array_lobes, "_THREADS", 1)
+    monkeypatch.setattr(array_lobes, "THREADS", 1)
     alone = lit(waisted, material, *both, samples=8, seed=1)
     for result in (again, alone):
         np.testing.assert_array_equal(result.shading, first.shading)
@@ -392,7 +392,7 @@ def test_bounced_light_takes_the_colour_of_what_it_met(waisted: Seen) -> None:
 
 
 def test_progress_rises_and_cancel_stops(waisted: Seen, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(array_lobes, "_CHUNK", 512)
+    monkeypatch.setattr(array_lobes, "CHUNK", 512)
     shown: list[float] = []
     options = RenderOptions(samples=8, renderer="arrays", bounces=1)
     surface, material, both = (

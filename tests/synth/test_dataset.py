@@ -215,7 +215,7 @@ def test_the_same_seed_gives_the_same_bytes(
     made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Also if the renderer's kernels were released in between."""
-    monkeypatch.setattr(run_module, "_KERNELS_KEPT", 1)
+    monkeypatch.setattr(run_module, "KERNELS_KEPT", 1)
     make_dataset(replace(RUN, count=2), tmp_path / "again")
     ours, theirs = contents(tmp_path / "again"), contents(made)
     scenes = [name for name in ours if name.endswith(("scene.json", "maps.exr"))]
