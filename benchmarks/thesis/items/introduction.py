@@ -30,7 +30,7 @@ from ..measuring.decompositions import decompose_subject
 from ..report.item import ItemContent, ItemTable, ThesisItem
 
 LIGHT = toward(-0.4, 0.5, 1.0)
-_ALBEDO, _DARKEST = 0.8, 1e-3
+ALBEDO, _DARKEST = 0.8, 1e-3
 _NAMES = {
     "sfs-tsai-shah": "Tsai & Shah 1994",
     "sfs-ikeuchi-horn": "Ikeuchi & Horn 1981",
@@ -92,7 +92,7 @@ def vase(size: int) -> ShadedObject:
 def _lit(name: str, normal: np.ndarray, mask: np.ndarray, height: np.ndarray) -> ShadedObject:
     shade = np.where(mask, np.maximum(normal @ LIGHT, 0), 0)
     return ShadedObject(
-        name, _ALBEDO * np.repeat(shade[..., None], 3, axis=2), mask, np.where(mask, height, np.nan)
+        name, ALBEDO * np.repeat(shade[..., None], 3, axis=2), mask, np.where(mask, height, np.nan)
     )
 
 

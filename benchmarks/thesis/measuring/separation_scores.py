@@ -135,7 +135,7 @@ def score_separations(
     list of SeparationScores
         One entry per run.
     """
-    key = f"separation-{subject.kind}-{subject.name}-{setting.key}-{runs}"
+    key = f"separation-scores-{subject.kind}-{subject.name}-{setting.key}-{runs}"
     rows: list[dict[str, Any]] = context.rows(
         key, lambda: [asdict(_run(context, subject, setting, run)) for run in range(runs)]
     )

@@ -290,7 +290,7 @@ def speed_table(
     return ItemTable(
         header,
         tuple(rows),
-        "Geometric means over the subjects of the mean run times, after a warm-up run",
+        "Geometric means over the subjects of the run times, after a warm-up run",
     )
 
 

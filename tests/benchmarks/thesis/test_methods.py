@@ -195,8 +195,8 @@ def test_a_photo_that_a_method_refuses_is_a_row_that_says_so(context: Context) -
         (Ratio(0.95, 0.93, 0.97), "partly"),
         (Ratio(0.99, 0.95, 1.03), "no"),
         (Ratio(1.2, 1.1, 1.3), "no"),
-        (Ratio(0.8, 0.6, 1.1), "cannot be told"),
-        (None, "cannot be told"),
+        (Ratio(0.8, 0.6, 1.1), "undetermined"),
+        (None, "undetermined"),
     ],
 )
 def test_a_claim_of_ten_per_cent_holds_only_where_the_interval_says_so(

@@ -11,7 +11,8 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
-from benchmarks.thesis.images.library import KINDS, QUICK_SIZE, Subject, SubjectLibrary
+from benchmarks.thesis.images.library import KINDS, SubjectLibrary
+from benchmarks.thesis.images.subject import QUICK_SIZE, Subject, downsample_subject
 from benchmarks.thesis.measuring.context import Context
 from isc_core.datasets.mit_berkeley import MitBerkeleyObject
 from isc_core.errors import Cancelled, InputError
