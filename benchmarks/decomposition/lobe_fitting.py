@@ -24,7 +24,7 @@ from isc_core.decompose.pipeline import decompose
 from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
 from isc_core.networks.light_network import predict_light
 from isc_core.photo import Photo, PhotoSource
-from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOptions
+from isc_core.scene.lobe_fit import Interval, LobeFit
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.silhouette import silhouette_normals
 from synth.albedos import make_albedo
@@ -294,7 +294,9 @@ def known_light_fit(scene: LobeScene) -> FitRow:
     """Fit with true normals and specular layer, under the true environment map."""
     m = scene.maps
     start = time.perf_counter()
-    fit = fit_lobe(m["specular"], m["normal"], m["mask"], light=GivenLight(environment=m["environment"]))
+    fit = fit_lobe(
+        m["specular"], m["normal"], m["mask"], light=GivenLight(environment=m["environment"])
+    )
     return compare(scene, fit, time.perf_counter() - start)
 
 
@@ -302,10 +304,16 @@ def chain_fit(scene: LobeScene) -> FitRow:
     """Fit with the results of the pipeline."""
     m, mask = scene.maps, scene.maps["mask"]
     start = time.perf_counter()
-    options = LobeFitOptions(recovered=True)
     outline = silhouette_normals(mask, shipped_prior_set().silhouette)
     light_estimate = predict_light(np.maximum(m["image"], 0), mask)
-    fit = fit_lobe(m["chain_specular"], m["chain_normal"], mask, options=options, recovered=RecoveredScene(m["chain_shading"], silhouette_normals=outline, light_estimate=light_estimate))
+    fit = fit_lobe(
+        m["chain_specular"],
+        m["chain_normal"],
+        mask,
+        recovered=RecoveredScene(
+            m["chain_shading"], silhouette_normals=outline, light_estimate=light_estimate
+        ),
+    )
     seconds = time.perf_counter() - start
     return compare(
         scene, fit, seconds, float(m["chain_shading"][mask].mean() / m["shading"][mask].mean())
@@ -389,8 +397,8 @@ _HEAD = (
 def tables(found_cases: Sequence[LobeScene]) -> str:
     """Format all rows.
 
-    Tolerances with true layers: 5 %, 5 %, 2 degrees; of the pipeline: a factor of 1.5, 40 % over the
-    shading, 20 degrees.
+    Tolerances with true layers: 5 %, 5 %, 2 degrees; of the pipeline: a factor of 1.5, 40 % over
+    the shading, 20 degrees.
     """
     exact, loose = (1.05, 0.05, 2.0), (1.5, 0.4, 20.0)
     glossy = [c for c in found_cases if c.alpha and c.light != "sh"]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..lobe_fitting import fit_lobe
+from ..lobe_fitting import PixelData, RecoveredScene, fit_lobe
 from ..progress import Monitor
 from ..scene.decomposition import Separation
 from ..scene.diagnostics import LobeDiagnostics, LobeStatus
@@ -107,20 +107,22 @@ def fit_specular(
     with task.clock.stage("fit lobe"):
         normal, shading = shaded(shape.height, shape.light, photo.mask)
         white = float(np.percentile(photo.image[photo.mask].max(axis=1), 99.5))
-        options = LobeFitOptions(
-            model, darkest=_NOTHING * white, thresholded=True, recovered=task.known.height is None
-        )
-        profile = (task.prior_set or shipped_prior_set()).silhouette
+        options = LobeFitOptions(model, darkest=_NOTHING * white, thresholded=True)
         fit = fit_lobe(
             split.specular,
             normal,
             photo.mask,
             options=options,
-            clipped=photo.clipped,
-            height=shape.height,
-            shading=shading,
-            outline=silhouette_normals(photo.mask, profile) if options.recovered else None,
-            light_estimate=task.light_estimate,
+            pixels=PixelData(clipped=photo.clipped, height=shape.height),
+            recovered=_recovered(shading, task),
             monitor=monitor,
         )
         return FittedLobe(fit, float(photo.clipped[photo.mask].mean()))
+
+
+def _recovered(shading: np.ndarray, task: DecompositionTask) -> RecoveredScene | None:
+    if task.known.height is not None:
+        return None
+    profile = (task.prior_set or shipped_prior_set()).silhouette
+    normals = silhouette_normals(task.maps.mask, profile)
+    return RecoveredScene(shading, normals, task.light_estimate)

@@ -1,8 +1,27 @@
-"""Lobes from specular images: how rough an object is, how strong its gloss, where its lights stand,
-and how sure that is.
+"""Lobes from specular images: the roughness of an object, the strength of its highlights, and the
+direction of its lights, with intervals.
+
+Four modules estimate directions of light, for different inputs: `starts` proposes directions from
+the peaks of a specular image, as starts of the least squares in `lamps`; `recovered` takes one
+direction from a highlight on blurred recovered normals; `light_direction` explains a finished
+decomposition by one distant light, for editing; `baselines.light_direction` is the published
+estimate of the shape-from-shading baselines, from the gradients of a photo without normals.
+`networks.light_network` predicts the direction from the photo alone. The half-vector geometry that
+they share is `starts.light_of_half_vector`.
 """
 
-from ..scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeLight
+from ..scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeFitOutcome, LobeLight
 from .fit import fit_lobe
+from .observed import GivenLight, PixelData, RecoveredScene
 
-__all__ = ["Interval", "LobeFit", "LobeFitOptions", "LobeLight", "fit_lobe"]
+__all__ = [
+    "GivenLight",
+    "Interval",
+    "LobeFit",
+    "LobeFitOptions",
+    "LobeFitOutcome",
+    "LobeLight",
+    "PixelData",
+    "RecoveredScene",
+    "fit_lobe",
+]

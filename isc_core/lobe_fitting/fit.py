@@ -25,7 +25,6 @@ from scipy.optimize import nnls
 
 from ..errors import InputError
 from ..progress import Monitor
-from ..scene.light_estimate import LightEstimate
 from ..scene.lobe_fit import (
     CONVENTION,
     Interval,
@@ -37,7 +36,7 @@ from ..scene.lobe_fit import (
 from ..shading.brdf.directions import unit
 from .environment_fit import fit_under
 from .lamps import ALPHAS, Fitted, Lamps, Problem, contributions, minimise, predicted
-from .observed import Observed, observe
+from .observed import GivenLight, Observed, PixelData, RecoveredScene, observe
 from .pixels import Pixels, choose_pixels
 from .recovered import fit_recovered
 from .smooth_light import smooth_loss
@@ -46,7 +45,7 @@ from .uncertainty import covariance, naive_variance
 
 _START_ALPHAS = (0.06, 0.2, 0.45)
 _FEW_STEPS = 7
-_PIXELS_UNDER_SKY = 600  # each has to look at the whole environment
+_PIXELS_UNDER_MAP = 600  # each reads the whole environment map
 _LADDER = (2.0, 4.0)
 _WIDEST = 0.7  # an alpha as large as that is a light as smooth as shading
 _WIDE = 0.35  # an alpha as large as that may be a smooth light
@@ -63,74 +62,100 @@ def fit_lobe(
     specular: np.ndarray,
     normal: np.ndarray,
     mask: np.ndarray,
-    confidence: np.ndarray | None = None,
     *,
     options: LobeFitOptions | None = None,
-    light_direction: np.ndarray | None = None,
-    environment: np.ndarray | None = None,
-    clipped: np.ndarray | None = None,
-    height: np.ndarray | None = None,
-    shading: np.ndarray | None = None,
-    outline: np.ndarray | None = None,
-    light_estimate: LightEstimate | None = None,
+    pixels: PixelData | None = None,
+    light: GivenLight | None = None,
+    recovered: RecoveredScene | None = None,
     monitor: Monitor | None = None,
 ) -> LobeFit:
-    """Fits a lobe to `specular` (H, W, 3), linear, >= 0, seen from (0, 0, 1), on the unit normals
-    (H, W, 3), inside `mask` (H, W) bool.
+    """Fit a lobe, and its lights unless they are given, to a specular image.
 
-    `confidence` (H, W) in [0, 1]: how far each pixel is believed. `clipped` (H, W) bool: where the
-    light is a lower bound. `height` (H, W) in pixels toward the viewer: with it lights may be near,
-    else they are taken to be infinitely far. `shading` (H, W, 3), of a white matt surface: needed
-    where `options.recovered`, for all this then is from one photo. `outline` (H, W, 3), unit
-    normals that the outline alone suggests, and `light_estimate`, how the photo's light looks, help there,
-    else they are not looked at. Either the light is found, or it is given: `light_direction` (3,),
-    a unit vector, or `environment` (rows, 2 rows, 3), see `isc_core.shading.environment_map`. What cannot be
-    known is said in the result. Raises `InputError` for arrays that do not fit together,
-    `Cancelled`.
+    Parameters
+    ----------
+    specular : (H, W, 3) ndarray
+        Linear, >= 0, seen from (0, 0, 1).
+    normal : (H, W, 3) ndarray
+        Unit normals, camera frame.
+    mask : (H, W) ndarray of bool
+        The object.
+    options : LobeFitOptions, optional
+        The lobe, and how it is fitted.
+    pixels : PixelData, optional
+        Confidence, clipping and height.
+    light : GivenLight, optional
+        The light, where it is known.
+    recovered : RecoveredScene, optional
+        Given where normals and shading were recovered from the same photo: the fit then relies on
+        the brightness of the highlight more than on its width, see `recovered`.
+    monitor : Monitor, optional
+        Receives progress.
+
+    Returns
+    -------
+    LobeFit
+        Its outcome says how far the roughness is determined.
+
+    Raises
+    ------
+    InputError
+        If the arrays do not fit together.
+    Cancelled
+        If the monitor cancels.
     """
-    options, monitor = options or LobeFitOptions(), monitor or Monitor()
-    seen = observe(specular, normal, mask, confidence, clipped, height, outline)
-    if light_direction is not None and environment is not None:
-        raise InputError("give light_direction or environment, not both")
-    fixed = None if light_direction is None else unit(light_direction, "light_direction")
-    if fixed is not None and fixed.shape != (3,):
-        raise InputError(f"light_direction has shape {fixed.shape}: give one unit vector (3,)")
-    monitor.report("fitting the gloss", 0.0)
-    if seen.peak <= options.darkest:
-        return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, seen.specular.shape)
-    most = (
-        options.most_pixels if environment is None else min(options.most_pixels, _PIXELS_UNDER_SKY)
+    options, monitor, light = (
+        options or LobeFitOptions(),
+        monitor or Monitor(),
+        light or GivenLight(),
     )
-    pixels = choose_pixels(seen, (options.floor, options.relative), most)
-    if environment is not None:
-        return fit_under(np.asarray(environment, float), seen, pixels, options)
-    if options.recovered:
-        return fit_recovered(
-            seen, pixels, _checked_shading(shading, seen), fixed, light_estimate, options
+    silhouette_normals = None if recovered is None else recovered.silhouette_normals
+    observed = observe(specular, normal, mask, pixels, silhouette_normals)
+    fixed = _direction(light)
+    monitor.report("fitting the gloss", 0.0)
+    if observed.peak <= options.darkest:
+        return LobeFit.without_lobe(
+            options.model, LobeFitOutcome.NO_SPECULAR, observed.specular.shape
         )
+    known = light.environment
+    most = options.most_pixels if known is None else min(options.most_pixels, _PIXELS_UNDER_MAP)
+    chosen = choose_pixels(observed, (options.floor, options.relative), most)
+    if known is not None:
+        return fit_under(np.asarray(known, float), observed, chosen, options)
+    if recovered is not None:
+        shading = _checked_shading(recovered.shading, observed)
+        return fit_recovered(observed, chosen, shading, fixed, recovered.light_estimate, options)
     problem = Problem(
-        pixels,
+        chosen,
         options.model,
         options.thresholded,
         directions=fixed is None,
-        nearness=seen.place is not None,
+        nearness=observed.place is not None,
     )
     fitted = _search(problem, options, fixed, monitor)
     monitor.report("how sure the gloss is", 0.7)
-    return _answer(seen, problem, fitted, options)
+    return _result(observed, problem, fitted, options)
 
 
-def _checked_shading(shading: np.ndarray | None, seen: Observed) -> np.ndarray:
-    if shading is None:
+def _direction(light: GivenLight) -> np.ndarray | None:
+    """The given direction, checked."""
+    if light.direction is not None and light.environment is not None:
+        raise InputError("give the light's direction or its environment map, not both")
+    fixed = None if light.direction is None else unit(light.direction, "direction")
+    if fixed is not None and fixed.shape != (3,):
         raise InputError(
-            "a recovered specular image is held against the shading: give shading, or recovered=False"
+            f"the light's direction has shape {fixed.shape}: give one unit vector (3,)"
         )
+    return fixed
+
+
+def _checked_shading(shading: np.ndarray, seen: Observed) -> np.ndarray:
     shading = np.asarray(shading, float)
     if shading.shape != seen.specular.shape or not (
         np.isfinite(shading[seen.mask]).all() and (shading[seen.mask] >= 0).all()
     ):
         raise InputError(
-            f"shading has shape {shading.shape}: give (H, W, 3) as the specular image is, finite and 0 or more inside the mask"
+            f"shading has shape {shading.shape}: give (H, W, 3) like the specular image, finite and "
+            ">= 0 inside the mask"
         )
     return shading
 
@@ -215,7 +240,7 @@ def _worth(less: Fitted, more: Fitted, pixels: Pixels) -> bool:
     )
 
 
-def _answer(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOptions) -> LobeFit:
+def _result(seen: Observed, problem: Problem, fitted: Fitted, options: LobeFitOptions) -> LobeFit:
     pixels = problem.pixels
     spread = covariance(fitted.jacobian, fitted.residual, fitted.weight, pixels)
     image, gains, explained = _coloured(seen, problem, fitted)
@@ -337,10 +362,10 @@ def _coloured(
     if problem.thresholded:
         root, colour = np.where(pixels.value > pixels.dark, root, 0), pixels.colour + lamps.base[0]
     else:
-        sky = lamps.base @ problem.basis(pixels.normal)
+        mirrored = lamps.base @ problem.basis(pixels.normal)
         # The sky's colour is taken to be the lamps' on the average: it is too weak to have one of
         # its own.
-        colour = pixels.colour - sky[:, None] * _mean_colour(pixels)
+        colour = pixels.colour - mirrored[:, None] * _mean_colour(pixels)
     gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
     place = np.zeros((int(seen.mask.sum()), 3)) if seen.place is None else seen.place[seen.mask]
     inside = seen.normal[seen.mask]

@@ -5,7 +5,62 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..scene.light_estimate import LightEstimate
 from ..shading.brdf.directions import unit
+
+
+@dataclass(frozen=True)
+class PixelData:
+    """What else is known of the pixels of a specular image.
+
+    Attributes
+    ----------
+    confidence : (H, W) ndarray or None
+        Reliability in [0, 1]; None for 1.
+    clipped : (H, W) ndarray of bool or None
+        Where the light is a lower bound.
+    height : (H, W) ndarray or None
+        Pixels toward the viewer. With it lights may be near; otherwise they are infinitely far.
+    """
+
+    confidence: np.ndarray | None = None
+    clipped: np.ndarray | None = None
+    height: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class GivenLight:
+    """Known light: at most one of the two.
+
+    Attributes
+    ----------
+    direction : (3,) ndarray or None
+        Unit vector toward the light, camera frame.
+    environment : (rows, 2 rows, 3) ndarray or None
+        Environment map, see `shading.environment_map`.
+    """
+
+    direction: np.ndarray | None = None
+    environment: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class RecoveredScene:
+    """What was recovered from the same photo as the specular image, see `recovered`.
+
+    Attributes
+    ----------
+    shading : (H, W, 3) ndarray
+        Of a white Lambertian surface, >= 0.
+    silhouette_normals : (H, W, 3) ndarray or None
+        Unit normals that the silhouette alone suggests.
+    light_estimate : LightEstimate or None
+        The predicted light.
+    """
+
+    shading: np.ndarray
+    silhouette_normals: np.ndarray | None = None
+    light_estimate: LightEstimate | None = None
 
 
 @dataclass(frozen=True)
@@ -24,7 +79,7 @@ class Observed:
     clipped: np.ndarray
     inside: np.ndarray
     place: np.ndarray | None
-    outline: np.ndarray | None = None
+    silhouette_normals: np.ndarray | None = None
 
     @property
     def peak(self) -> float:
@@ -36,10 +91,8 @@ def observe(
     specular: np.ndarray,
     normal: np.ndarray,
     mask: np.ndarray,
-    confidence: np.ndarray | None,
-    clipped: np.ndarray | None,
-    height: np.ndarray | None,
-    outline: np.ndarray | None = None,
+    pixels: PixelData | None = None,
+    silhouette_normals: np.ndarray | None = None,
 ) -> Observed:
     """Checks what was given, see `fit.fit_lobe`. Raises `InputError`."""
     specular, normal, mask = (
@@ -56,10 +109,13 @@ def observe(
     ):
         shapes = f"specular {specular.shape}, normal {normal.shape} and mask {shape} {mask.dtype}"
         raise InputError(f"{shapes} have to be (H, W, 3), (H, W, 3) and (H, W) bool")
-    confidence = np.ones(shape) if confidence is None else np.asarray(confidence, float)
-    clipped = np.zeros(shape, bool) if clipped is None else np.asarray(clipped)
+    pixels = pixels or PixelData()
+    confidence = (
+        np.ones(shape) if pixels.confidence is None else np.asarray(pixels.confidence, float)
+    )
+    clipped = np.zeros(shape, bool) if pixels.clipped is None else np.asarray(pixels.clipped)
     if confidence.shape != shape or clipped.shape != shape or clipped.dtype != bool:
-        raise InputError("confidence and clipped have to be (H, W) as the mask is, clipped of bool")
+        raise InputError("confidence and clipped have to be (H, W) like the mask, clipped of bool")
     if not (np.isfinite(specular[mask]).all() and (specular[mask] >= 0).all()):
         raise InputError("the specular image has to be finite and 0 or more inside the mask")
     if not (
@@ -69,17 +125,17 @@ def observe(
     ):
         raise InputError("the confidence has to be within [0, 1] inside the mask")
     unit(normal[mask], "normal")
-    if outline is not None:
-        outline = np.asarray(outline, float)
-        if outline.shape != normal.shape:
+    if silhouette_normals is not None:
+        silhouette_normals = np.asarray(silhouette_normals, float)
+        if silhouette_normals.shape != normal.shape:
             raise InputError(
-                f"the outline's normals have shape {outline.shape}: give (H, W, 3) as the normals are"
+                f"silhouette_normals has shape {silhouette_normals.shape}: give (H, W, 3) like the "
+                "normals"
             )
-        unit(outline[mask], "outline")
+        unit(silhouette_normals[mask], "silhouette_normals")
     inside = mask & (confidence > 0) & (normal[..., 2] > 0)
-    return Observed(
-        specular, normal, mask, confidence, clipped, inside, _places(height, mask), outline
-    )
+    places = _places(pixels.height, mask)
+    return Observed(specular, normal, mask, confidence, clipped, inside, places, silhouette_normals)
 
 
 def _places(height: np.ndarray | None, mask: np.ndarray) -> np.ndarray | None:
@@ -88,7 +144,7 @@ def _places(height: np.ndarray | None, mask: np.ndarray) -> np.ndarray | None:
     height = np.asarray(height, float)
     if height.shape != mask.shape or not np.isfinite(height[mask]).all():
         raise InputError(
-            f"height has shape {height.shape}: give (H, W) as the mask is, finite inside it, in pixels"
+            f"height has shape {height.shape}: give (H, W) like the mask, finite inside it, in pixels"
         )
     rows, columns = np.nonzero(mask)
     low, high = np.array([rows.min(), columns.min()]), np.array([rows.max(), columns.max()])

@@ -190,8 +190,8 @@ def _light_direction(seen: Observed, normal: np.ndarray) -> np.ndarray:
     """
     weight = np.square(seen.specular[seen.inside].mean(axis=1)) * seen.confidence[seen.inside]
     half = _unit(weight @ normal[seen.inside])
-    if seen.outline is not None:
-        half = _unit(half + _unit(weight @ seen.outline[seen.inside]))
+    if seen.silhouette_normals is not None:
+        half = _unit(half + _unit(weight @ seen.silhouette_normals[seen.inside]))
     return light_of_half_vector(half)
 
 

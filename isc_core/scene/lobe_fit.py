@@ -51,8 +51,6 @@ class LobeFitOptions:
         Radiance >= 0 up to which nothing is a highlight.
     thresholded : bool
         The specular image is a separator's, which shows only light above an unknown level.
-    recovered : bool
-        Normals and shading were recovered from the same photo, see `lobe_fitting.recovered`.
 
     Raises
     ------
@@ -68,7 +66,6 @@ class LobeFitOptions:
     relative: float = 0.1
     darkest: float = 1e-6
     thresholded: bool = False
-    recovered: bool = False
 
     def __post_init__(self) -> None:
         if self.model not in CONVENTION:

@@ -13,7 +13,7 @@ from PIL import Image
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.imaging.srgb import srgb_to_linear
-from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting import GivenLight, fit_lobe
 from isc_core.progress import Monitor
 from isc_core.result_files.result_folder import (
     DECOMPOSITION_FILES,
@@ -164,7 +164,7 @@ def test_a_fit_under_an_environment_is_read_back(tmp_path: Path) -> None:
     d = ball((48, 60), 20.0, (22, 33))
     sky = np.full((8, 16, 3), 0.02)
     sky[2, 9] = (40.0, 38.0, 35.0)
-    fit = fit_lobe(d.specular, d.normal, d.mask, environment=sky)
+    fit = fit_lobe(d.specular, d.normal, d.mask, light=GivenLight(environment=sky))
     assert fit.strength is not None
     save(replace(d, brdf=fit), tmp_path / "out")
     back = load(tmp_path / "out").brdf

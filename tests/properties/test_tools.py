@@ -21,7 +21,7 @@ from isc_core.imaging.area_resize import averaged
 from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.inpainting.patch_fill import fill_patches
 from isc_core.inpainting.pull_push import fill
-from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting import PixelData, RecoveredScene, fit_lobe
 from isc_core.lobe_fitting.light_direction import explain_shading, explain_specular, share_explained
 from isc_core.photo import tidy_mask
 from isc_core.scene.decomposition import Decomposition, Provenance
@@ -161,11 +161,16 @@ def test_light_directions_and_colour(made: MadePhoto) -> None:
 @law(with_options(photos(8, 20)), seconds=0.5)
 def test_lobe_is_finite_or_has_a_reason(case: OptionsCase) -> None:
     d = bump(case.made)
-    options = LobeFitOptions(
-        most_pixels=200, most_lights=1, recovered=case.a > 0.5, normal_error=15 * case.b
-    )
+    options = LobeFitOptions(most_pixels=200, most_lights=1, normal_error=15 * case.b)
     normal = d.normal.astype(float)
-    fit = fit_lobe(d.specular, normal, d.mask, d.confidence, options=options, shading=d.shading)
+    fit = fit_lobe(
+        d.specular,
+        normal,
+        d.mask,
+        options=options,
+        pixels=PixelData(confidence=d.confidence),
+        recovered=RecoveredScene(d.shading) if case.a > 0.5 else None,
+    )
     finite(predicted=fit.predicted)
     assert (fit.predicted >= 0).all() and not fit.predicted[~d.mask].any()
     between(0, 1, explained=fit.explained)

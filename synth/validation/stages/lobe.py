@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from isc_core.imaging.framing import continued_height
-from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting import PixelData, fit_lobe
 from isc_core.progress import Monitor
 from isc_core.scene.lobe_fit import LobeFit, LobeFitOptions
 from isc_core.shading.brdf.roughness import alpha_from_exponent
@@ -91,9 +91,8 @@ def run_lobe(inputs: StageInputs, options: StageOptions, monitor: Monitor) -> Fi
         normal,
         inputs.mask,
         options=LobeFitOptions(),
-        clipped=inputs.clipped,
-        height=inputs.height,
         monitor=monitor,
+        pixels=PixelData(clipped=inputs.clipped, height=inputs.height),
     )
     return FittedLobe(fit, specular)
 

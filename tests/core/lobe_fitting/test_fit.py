@@ -10,7 +10,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 from isc_core.errors import Cancelled, InputError
-from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
 from isc_core.lobe_fitting.environment_response import respond_to, surroundings
 from isc_core.lobe_fitting.lamps import Lamps, Problem, _measured, _moved
 from isc_core.lobe_fitting.observed import observe
@@ -124,7 +124,7 @@ def test_several_lights_are_counted(count: int) -> None:
 
 
 def test_a_known_direction_is_kept() -> None:
-    fit = fit_lobe(*seen(Ggx(0.2), directional(KEY, COLOUR)), light_direction=KEY)
+    fit = fit_lobe(*seen(Ggx(0.2), directional(KEY, COLOUR)), light=GivenLight(direction=KEY))
     np.testing.assert_array_equal(fit.direction, KEY)
     assert fit.lights[0].cone == 0
     assert fit.alpha == pytest.approx(0.2, rel=1e-3)
@@ -168,11 +168,13 @@ def test_pixels_without_confidence_and_clipped_ones_do_not_spoil_the_fit() -> No
     specular, normal, mask = seen(Ggx(0.15), directional(KEY, COLOUR))
     clip = 0.3 * specular.max()
     clipped = (specular > clip).any(-1)
-    fit = fit_lobe(np.minimum(specular, clip), normal, mask, clipped=clipped)
+    fit = fit_lobe(np.minimum(specular, clip), normal, mask, pixels=PixelData(clipped=clipped))
     assert fit.alpha == pytest.approx(0.15, rel=0.02)
     spoilt, confidence = specular.copy(), np.ones(mask.shape)
     spoilt[60:80, 50:70], confidence[60:80, 50:70] = specular.max(), 0
-    assert fit_lobe(spoilt, normal, mask, confidence).alpha == pytest.approx(0.15, rel=0.01)
+    assert fit_lobe(
+        spoilt, normal, mask, pixels=PixelData(confidence=confidence)
+    ).alpha == pytest.approx(0.15, rel=0.01)
 
 
 def test_without_specular_light_nothing_is_invented() -> None:
@@ -224,7 +226,7 @@ def test_under_a_known_environment_strength_and_alpha_are_found() -> None:
     lights = environment(towards.reshape(-1, 3), solid.ravel(), sky.reshape(-1, 3))
     specular = np.zeros(normal.shape)
     specular[mask] = 0.7 * radiance(Ggx(0.2), normal[mask], VIEW, lights)
-    fit = fit_lobe(specular, normal, mask, environment=sky)
+    fit = fit_lobe(specular, normal, mask, light=GivenLight(environment=sky))
     assert fit.determined
     assert fit.alpha == pytest.approx(0.2, rel=0.05)
     np.testing.assert_allclose(fit.strength, 0.7, rtol=0.05)
@@ -240,7 +242,7 @@ def test_under_an_even_environment_alpha_is_undetermined() -> None:
     specular = np.zeros(normal.shape)
     specular[mask] = respond_to(surroundings(sky), "ggx", normal[mask], 0.3)
     specular *= np.random.default_rng(0).uniform(0.7, 1.3, mask.shape)[..., None]
-    fit = fit_lobe(specular, normal, mask, environment=sky)
+    fit = fit_lobe(specular, normal, mask, light=GivenLight(environment=sky))
     assert fit.outcome == LobeFitOutcome.SMOOTH_LIGHT and fit.alpha is None
 
 
@@ -272,11 +274,11 @@ def test_what_does_not_fit_together_is_refused() -> None:
         ((broken, normal, mask), {}),
         ((-specular, normal, mask), {}),
         ((specular, normal, mask.astype(float)), {}),
-        ((specular, normal, mask, np.full(mask.shape, 2.0)), {}),
-        ((specular, normal, mask), {"light_direction": np.array([1.0, 1, 1])}),
-        ((specular, normal, mask), {"light_direction": KEY, "environment": sky}),
-        ((specular, normal, mask), {"environment": sky[:, :-1]}),
-        ((specular, normal, mask), {"environment": -sky}),
+        ((specular, normal, mask), {"pixels": PixelData(confidence=np.full(mask.shape, 2.0))}),
+        ((specular, normal, mask), {"light": GivenLight(direction=np.array([1.0, 1, 1]))}),
+        ((specular, normal, mask), {"light": GivenLight(KEY, sky)}),
+        ((specular, normal, mask), {"light": GivenLight(environment=sky[:, :-1])}),
+        ((specular, normal, mask), {"light": GivenLight(environment=-sky)}),
     ):
         with pytest.raises(InputError):
             fit_lobe(*arguments, **keywords)  # type: ignore[arg-type]
@@ -317,7 +319,7 @@ def test_what_was_recovered_from_one_photo_gives_alpha_by_the_brightness_of_the_
     alpha: float,
 ) -> None:
     specular, normal, mask, shading = whole_chain(alpha)
-    fit = fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=shading)
+    fit = fit_lobe(specular, normal, mask, recovered=RecoveredScene(shading))
     assert fit.determined and fit.alpha is not None
     assert abs(np.log(fit.alpha / alpha)) < np.log(1.5)
     assert fit.strength_light is not None
@@ -330,14 +332,23 @@ def test_what_the_outline_says_helps_where_the_normals_are_wrong() -> None:
     flat = normal * (0.4, 0.4, 1)
     flat /= np.linalg.norm(flat, axis=-1, keepdims=True)
     true = seen(Ggx(0.2), directional(KEY, np.pi))[1]
-    options = LobeFitOptions(recovered=True)
     without, helped = (
-        fit_lobe(specular, flat, mask, options=options, shading=shading, outline=outline)
+        fit_lobe(
+            specular,
+            flat,
+            mask,
+            recovered=RecoveredScene(shading, silhouette_normals=outline),
+        )
         for outline in (None, true)
     )
     assert angle(helped.direction, KEY) < angle(without.direction, KEY) - 5
-    with pytest.raises(InputError, match="outline"):
-        fit_lobe(specular, flat, mask, options=options, shading=shading, outline=true[1:])
+    with pytest.raises(InputError, match="silhouette"):
+        fit_lobe(
+            specular,
+            flat,
+            mask,
+            recovered=RecoveredScene(shading, silhouette_normals=true[1:]),
+        )
 
 
 def seen_at_first_sight(toward: np.ndarray, none: float = 0.1) -> LightEstimate:
@@ -348,10 +359,15 @@ def seen_at_first_sight(toward: np.ndarray, none: float = 0.1) -> LightEstimate:
 
 def test_where_the_lamp_seems_to_stand_is_believed_and_the_picture_stays() -> None:
     specular, normal, mask, shading = whole_chain(0.2)
-    options, toward = LobeFitOptions(recovered=True), np.array([0.6, -0.1, np.sqrt(1 - 0.37)])
+    toward = np.array([0.6, -0.1, np.sqrt(1 - 0.37)])
     light_estimate = seen_at_first_sight(toward)
     without, told = (
-        fit_lobe(specular, normal, mask, options=options, shading=shading, light_estimate=seen)
+        fit_lobe(
+            specular,
+            normal,
+            mask,
+            recovered=RecoveredScene(shading, light_estimate=seen),
+        )
         for seen in (None, light_estimate)
     )
     assert angle(told.direction, toward) < 1 and told.lights[0].cone == pytest.approx(
@@ -363,10 +379,8 @@ def test_where_the_lamp_seems_to_stand_is_believed_and_the_picture_stays() -> No
         specular,
         normal,
         mask,
-        options=options,
-        shading=shading,
-        light_estimate=light_estimate,
-        light_direction=KEY,
+        recovered=RecoveredScene(shading, light_estimate=light_estimate),
+        light=GivenLight(direction=KEY),
     )
     assert angle(known.direction, KEY) < 1e-4 and known.lights[0].cone == 0
 
@@ -377,18 +391,15 @@ def test_a_light_that_looks_smooth_leaves_the_roughness_open() -> None:
         specular,
         normal,
         mask,
-        options=LobeFitOptions(recovered=True),
-        shading=shading,
-        light_estimate=seen_at_first_sight(KEY, 0.7),
+        recovered=RecoveredScene(shading, light_estimate=seen_at_first_sight(KEY, 0.7)),
     )
     assert not fit.determined and fit.alpha is None and fit.outcome == LobeFitOutcome.SMOOTH_LIGHT
 
 
 def test_the_recovered_fit_does_not_depend_on_the_exposure() -> None:
     specular, normal, mask, shading = whole_chain(0.2)
-    options = LobeFitOptions(recovered=True)
-    dim = fit_lobe(specular, normal, mask, options=options, shading=shading)
-    bright = fit_lobe(50 * specular, normal, mask, options=options, shading=50 * shading)
+    dim = fit_lobe(specular, normal, mask, recovered=RecoveredScene(shading))
+    bright = fit_lobe(50 * specular, normal, mask, recovered=RecoveredScene(50 * shading))
     assert bright.alpha == pytest.approx(dim.alpha, rel=1e-9)
     np.testing.assert_allclose(
         bright.strength_light, 50 * np.asarray(dim.strength_light), rtol=1e-9
@@ -404,7 +415,7 @@ def test_a_highlight_brighter_than_the_photo_could_show_gives_an_upper_bound(
     white = shown * specular.max()
     cut, clipped = np.minimum(specular, white), (specular >= white).any(-1)
     fit = fit_lobe(
-        cut, normal, mask, options=LobeFitOptions(recovered=True), shading=shading, clipped=clipped
+        cut, normal, mask, recovered=RecoveredScene(shading), pixels=PixelData(clipped=clipped)
     )
     assert (
         (fit.determined, fit.outcome) == (False, LobeFitOutcome.CLIPPED)
@@ -416,12 +427,7 @@ def test_a_highlight_brighter_than_the_photo_could_show_gives_an_upper_bound(
     one_hot = np.zeros_like(mask)
     one_hot[np.unravel_index(specular.sum(-1).argmax(), mask.shape)] = True
     assert fit_lobe(
-        specular,
-        normal,
-        mask,
-        options=LobeFitOptions(recovered=True),
-        shading=shading,
-        clipped=one_hot,
+        specular, normal, mask, recovered=RecoveredScene(shading), pixels=PixelData(clipped=one_hot)
     ).determined
 
 
@@ -446,7 +452,7 @@ def test_what_a_separator_leaves_on_a_matt_object_is_no_gloss() -> None:
     _, normal, mask, shading = whole_chain(0.2)
     crumbs = np.zeros_like(shading)
     crumbs[40:44, 50:53] = 0.05
-    fit = fit_lobe(crumbs, normal, mask, options=LobeFitOptions(recovered=True), shading=shading)
+    fit = fit_lobe(crumbs, normal, mask, recovered=RecoveredScene(shading))
     assert fit.outcome == LobeFitOutcome.NO_SPECULAR and fit.alpha is None and fit.lights == ()
 
 
@@ -474,9 +480,9 @@ def test_normals_are_blurred_by_blocks_as_by_pixels(size: int) -> None:
 
 def test_recovered_images_need_their_shading() -> None:
     specular, normal, mask, shading = whole_chain(0.2)
-    for given in (None, shading[:-1], -shading):
+    for given in (shading[:-1], -shading):
         with pytest.raises(InputError):
-            fit_lobe(specular, normal, mask, options=LobeFitOptions(recovered=True), shading=given)
+            fit_lobe(specular, normal, mask, recovered=RecoveredScene(given))
 
 
 def test_a_separators_level_is_found() -> None:
@@ -514,7 +520,7 @@ def test_a_near_light_is_told_from_a_far_one() -> None:
     )
     specular = np.where(mask, value, 0)[..., None] * np.ones(3)
     far = fit_lobe(specular, round_normal, mask)
-    near = fit_lobe(specular, round_normal, mask, height=depth * radius)
+    near = fit_lobe(specular, round_normal, mask, pixels=PixelData(height=depth * radius))
     assert far.alpha is not None and near.alpha is not None
     assert abs(near.alpha / 0.15 - 1) < 0.05 < abs(far.alpha / 0.15 - 1)
 
@@ -523,7 +529,7 @@ def test_a_near_light_is_told_from_a_far_one() -> None:
 def test_the_jacobian_of_the_whole_model_is_that_of_differences(thresholded: bool) -> None:
     specular, normal, mask = seen(Ggx(0.2), directional(KEY, COLOUR), 32)
     height = 8 * normal[..., 2]
-    picture = observe(np.maximum(specular - 0.1, 0), normal, mask, None, None, height)
+    picture = observe(np.maximum(specular - 0.1, 0), normal, mask, PixelData(height=height))
     problem = Problem(choose_pixels(picture, (0.02, 0.1), 400), "ggx", thresholded, nearness=True)
     base = np.array([0.3]) if thresholded else np.array([0.1, -0.05, 0.2, 0.03])
     towards = np.array([KEY, [0.6, 0.0, 0.8]])
@@ -561,7 +567,7 @@ def test_a_rendered_highlight_is_found() -> None:
         Camera(64, 64, 28),
     )
     truth = render_truth(scene, RenderOptions(samples=8))
-    fit = fit_lobe(truth.specular, truth.normal, truth.mask, height=truth.height)
+    fit = fit_lobe(truth.specular, truth.normal, truth.mask, pixels=PixelData(height=truth.height))
     assert fit.determined
     assert fit.alpha == pytest.approx(0.18, rel=0.05)
     np.testing.assert_allclose(fit.strength_light, 0.8 * COLOUR, rtol=0.05)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from isc_core.lobe_fitting import fit_lobe
+from isc_core.lobe_fitting import RecoveredScene, fit_lobe
 from isc_core.lobe_fitting.specular_level import (
     BOUND,
     FITTED,
@@ -88,8 +88,8 @@ def test_both_lobes_of_a_recovered_scene_have_the_same_level() -> None:
             d.specular,
             d.normal,
             d.mask,
-            options=LobeFitOptions(model, recovered=True),
-            shading=d.shading,
+            options=LobeFitOptions(model),
+            recovered=RecoveredScene(d.shading),
         )
         for model in models
     ]
