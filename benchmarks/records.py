@@ -1,6 +1,4 @@
-"""Rows of a long measurement, kept as lines of JSON while it runs, so that it goes on where it was
-interrupted.
-"""
+"""Rows of a long measurement, appended as JSON lines, so that an interrupted run continues."""
 
 import json
 from collections.abc import Mapping
@@ -9,8 +7,19 @@ from typing import Any
 
 
 def read_rows(path: Path) -> list[dict[str, Any]]:
-    """The rows kept in `path`, none where there is no such file; a last line that was cut short is
-    taken out of the file, too.
+    """Read the rows of an earlier run.
+
+    A last line that was cut short is removed from the file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    list of dict
+        Empty if the file does not exist.
     """
     if not path.is_file():
         return []
@@ -22,6 +31,6 @@ def read_rows(path: Path) -> list[dict[str, Any]]:
 
 
 def append_row(path: Path, row: Mapping[str, object]) -> None:
-    """One row more."""
+    """Append one row to the file."""
     with path.open("a", encoding="utf-8") as file:
         file.write(json.dumps(row) + "\n")

@@ -1,18 +1,17 @@
-"""Does a batch that is killed lose or spoil anything? Kills at random moments, a check after each,
-the same command again until it is done.
+"""Kill batches at random moments and check that nothing is lost or damaged.
 
   python -m benchmarks.batch.interruptions -o FOLDER [--kills 100] [--images 10]
 
-Four kinds, in turn: worker processes, several while a run goes on; the run, whose workers are left
-to themselves; the run and its workers at once; the scheduler of a cluster that stands by itself.
-After each kill every folder of the output is compared with a reference that a plain loop has
-written: all files byte by byte, of decomposition.json all but the seconds and the two entries that
-only a batch writes. The campaign stops at the first that is wrong or incomplete. Every other time
-the next run begins while orphans of the last may still be at work. A run that comes to its end has
-to have made everything, with exit code 0; then the output begins anew.
+After each kill the output is checked, and the same command runs again until it is done. Four kinds,
+in turn: worker processes, several during one run; the run, whose workers survive; the run and its
+workers at once; the scheduler of an external cluster. After each kill every folder of the output is
+compared with a reference written by a plain loop: all files byte by byte, decomposition.json except
+the timings and the two entries that only a batch writes. The campaign stops at the first difference
+or missing file. Every other time the next run starts while orphans of the last may still be at
+work. A run that ends must have produced everything, with exit code 0; then the output is deleted.
 
-The rows of FOLDER/kills.jsonl are kept: given again, the command goes on. Images of 36 pixels and
-no shape solver: the writing is what is tested. Some 10 s a kill on two quiet cores.
+The rows of FOLDER/kills.jsonl are kept: repeating the command continues the campaign. Images of 36
+pixels and no shape solver: the writing is what is tested. About 10 s per kill on two idle cores.
 """
 
 import argparse
@@ -38,7 +37,7 @@ from isc_core.photo import read_photo
 from isc_core.result_files.result_folder import save
 
 from ..records import append_row, read_rows
-from .photos import made_photos
+from .photos import synthetic_photos
 
 KINDS = ("worker", "run", "run and workers", "run", "scheduler")
 _WORKERS_A_RUN = 4
@@ -49,15 +48,19 @@ _ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THR
 _OWN = ("thumbnails", "summary-pages")
 
 
-class Spoilt(Exception):
-    """The output holds what no undisturbed run would have written, or a run did not end as it
-    should.
-    """
+class DamagedOutput(Exception):
+    """The output differs from that of an undisturbed run, or a run did not end as it should."""
 
 
 @dataclass(frozen=True)
-class Place:
-    """The folders of a campaign."""
+class CampaignFolders:
+    """The folders of a campaign.
+
+    Attributes
+    ----------
+    root : Path
+        Folder of all files.
+    """
 
     root: Path
 
@@ -68,27 +71,27 @@ class Place:
 
     @property
     def reference(self) -> Path:
-        """What a plain loop made of them."""
+        """The results of a plain loop."""
         return self.root / "reference"
 
     @property
     def output(self) -> Path:
-        """What is killed."""
+        """The output of the killed runs."""
         return self.root / "output"
 
 
 def main() -> None:
-    """Runs the campaign and prints what it found."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--kills", type=int, default=100)
-    parser.add_argument("--images", type=int, default=10)
-    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder of the campaign")
+    parser.add_argument("--kills", type=int, default=100, help="kills of the campaign")
+    parser.add_argument("--images", type=int, default=10, help="photos per run")
+    parser.add_argument("--seed", type=int, default=0, help="seed of the moments")
     parser.add_argument("--reference", action="store_true", help=argparse.SUPPRESS)
     options = parser.parse_args()
-    place = Place(options.output)
+    place = CampaignFolders(options.output)
     if options.reference:
         make_reference(place, options.images)
         return
@@ -103,16 +106,24 @@ def main() -> None:
         rows.append(row)
         append_row(log, row)
         print(f"{kills + row['struck']:4d}  {row}", flush=True)
-    with running(place, cluster=False) as (run, _):  # what the last kill has left is completed, too
-        ended_well(place, run, lost=False)
+    with running(place, cluster=False) as (run, _):  # completes what the last kill left
+        check_end(place, run, lost=False)
     print(table(rows))
 
 
-def make_reference(place: Place, count: int) -> None:
-    """The inputs, and a plain loop over them; in a process with one thread, since sums in other
-    orders end in other last digits.
+def make_reference(place: CampaignFolders, count: int) -> None:
+    """Write the inputs and the results of a plain loop.
+
+    Must run with one thread: sums in another order differ in the last digits.
+
+    Parameters
+    ----------
+    place : CampaignFolders
+        The folders.
+    count : int
+        Number of photos.
     """
-    for photo in made_photos(place.photos, count, _SIZE):
+    for photo in synthetic_photos(place.photos, count, _SIZE):
         if not (place.reference / photo.stem).is_dir():
             save(
                 decompose(read_photo(photo), _SETTINGS, name=photo.name),
@@ -120,43 +131,72 @@ def make_reference(place: Place, count: int) -> None:
             )
 
 
-# --- kills ----------------------------------------------------------------------------------------
-
-
-def one_run(place: Place, kind: str, rng: random.Random) -> dict[str, object]:
-    """Starts or goes on, kills at random moments, checks after each.
+def one_run(place: CampaignFolders, kind: str, rng: random.Random) -> dict[str, object]:
+    """Start or continue a run, kill at random moments, check after each kill.
 
     A run that ends before its kill is checked as a whole.
+
+    Parameters
+    ----------
+    place : CampaignFolders
+        The folders.
+    kind : str
+        One of `KINDS`.
+    rng : random.Random
+        Draws the moments.
+
+    Returns
+    -------
+    dict of str to object
+        The row.
+
+    Raises
+    ------
+    DamagedOutput
+        If a check fails.
     """
-    begun, start, struck, complete = len(results(place.output)), time.monotonic(), 0, []
+    begun, start, struck, checked = len(results(place.output)), time.monotonic(), 0, []
     with running(place, kind == "scheduler") as (run, scheduler):
         for _ in range(_WORKERS_A_RUN if kind == "worker" else 1):
-            if not struck_now(place, run, rng):
+            if not wait_for_kill(place, run, rng):
                 break
             family = [run, *run.children(recursive=True)]
             struck += strike(kind, family, scheduler, rng)
-            complete.append(check(place))
+            checked.append(check(place))
         if struck and kind in ("run", "run and workers"):
             if rng.random() < 0.5:
-                psutil.wait_procs(family, timeout=60)  # else the next run meets those who are left
+                psutil.wait_procs(family, timeout=60)  # else the next run meets orphans
         else:
-            ended_well(place, run, lost=kind == "scheduler" and struck > 0)
+            check_end(place, run, lost=kind == "scheduler" and struck > 0)
         check(place)
     seconds = round(time.monotonic() - start, 1)
     return {
         "kind": kind,
         "struck": struck,
         "found": begun,
-        "complete": complete,
+        "complete": checked,
         "seconds": seconds,
     }
 
 
-def struck_now(place: Place, run: psutil.Process, rng: random.Random) -> bool:
-    """Waits until so many more results are there as chance says, and a little longer; false where
-    the run ends before.
+def wait_for_kill(place: CampaignFolders, run: psutil.Process, rng: random.Random) -> bool:
+    """Wait until a random number of further results exist, and a little longer.
 
-    Some kills come during the start, some during the end.
+    Some kills fall into the start, some into the end.
+
+    Parameters
+    ----------
+    place : CampaignFolders
+        The folders.
+    run : psutil.Process
+        The run.
+    rng : random.Random
+        Draws the moment.
+
+    Returns
+    -------
+    bool
+        Whether the run is still alive.
     """
     goal = len(results(place.output)) + rng.choice([0, 1, 2, rng.randrange(0, 8)])
     most = len(results(place.reference))
@@ -167,16 +207,30 @@ def struck_now(place: Place, run: psutil.Process, rng: random.Random) -> bool:
 
 
 def alive(process: psutil.Process) -> bool:
-    """Whether it still works."""
+    """Return whether a process is running."""
     return bool(process.is_running() and process.status() != psutil.STATUS_ZOMBIE)
 
 
 def strike(
     kind: str, family: list[psutil.Process], scheduler: psutil.Process | None, rng: random.Random
 ) -> bool:
-    """Kills by force, so that nothing can be tidied up.
+    """Kill processes (SIGKILL), so that nothing can be cleaned up.
 
-    False where there is nobody to kill yet, or any more.
+    Parameters
+    ----------
+    kind : str
+        One of `KINDS`.
+    family : list of psutil.Process
+        The run and its children.
+    scheduler : psutil.Process or None
+        Of an external cluster.
+    rng : random.Random
+        Chooses a worker.
+
+    Returns
+    -------
+    bool
+        Whether there was a process to kill.
     """
     workers = [process for process in family[1:] if "spawn_main" in " ".join(command_of(process))]
     victims = {
@@ -192,35 +246,65 @@ def strike(
 
 
 def command_of(process: psutil.Process) -> list[str]:
-    """Its command line, nothing where it has ended."""
+    """Return the command line of a process; empty if it has ended."""
     with contextlib.suppress(psutil.NoSuchProcess, psutil.ZombieProcess):
         return list(process.cmdline())
     return []
 
 
-def ended_well(place: Place, run: psutil.Process, lost: bool) -> None:
-    """Waits for the end of a run that was left alone, or lost a worker, or its scheduler, which it
-    has to say with exit code 2.
+def check_end(place: CampaignFolders, run: psutil.Process, lost: bool) -> None:
+    """Wait for the end of a run and check its result.
+
+    Parameters
+    ----------
+    place : CampaignFolders
+        The folders.
+    run : psutil.Process
+        The run.
+    lost : bool
+        Its scheduler was killed: exit code 2 is right.
+
+    Raises
+    ------
+    DamagedOutput
+        If it hangs, fails or leaves something out.
     """
     try:
         code = run.wait(timeout=_LONGEST)
     except psutil.TimeoutExpired as error:
         run.kill()
-        raise Spoilt(f"a run hangs: {_LONGEST} s") from error
+        raise DamagedOutput(f"a run did not end within {_LONGEST} s") from error
     if lost and code == 2:
         return
     if code != 0:
-        raise Spoilt(f"a run ended with {code}: {(place.root / 'stderr').read_text()}")
+        raise DamagedOutput(
+            f"a run ended with exit code {code}: {(place.root / 'stderr').read_text()}"
+        )
     check(place)
-    if not whole(place):
-        raise Spoilt("a run ended well, but not everything is there")
+    if not complete(place):
+        raise DamagedOutput("a run ended with exit code 0, but results are missing")
     shutil.rmtree(place.output)
 
 
 @contextmanager
-def running(place: Place, cluster: bool) -> Iterator[tuple[psutil.Process, psutil.Process | None]]:
-    """A run of `isc batch`; with a scheduler and two workers of its own where `cluster`, which are
-    ended afterwards.
+def running(
+    place: CampaignFolders, cluster: bool
+) -> Iterator[tuple[psutil.Process, psutil.Process | None]]:
+    """Start `isc batch`; with `cluster`, on a scheduler and two workers of its own.
+
+    Parameters
+    ----------
+    place : CampaignFolders
+        The folders.
+    cluster : bool
+        Start an external cluster; it is ended afterwards.
+
+    Yields
+    ------
+    run : psutil.Process
+        The run.
+    scheduler : psutil.Process or None
+        Of the cluster.
     """
     command = [
         sys.executable,
@@ -272,23 +356,20 @@ def running(place: Place, cluster: bool) -> Iterator[tuple[psutil.Process, psuti
                 process.kill()
 
 
-def _started(command: list[str], place: Place) -> psutil.Process:
-    """A process in a session of its own, so that no signal for this one reaches it."""
-    with (place.root / "stderr").open("w") as told:
+def _started(command: list[str], place: CampaignFolders) -> psutil.Process:
+    """A process in a session of its own, out of reach of signals to this one."""
+    with (place.root / "stderr").open("w") as errors:
         return psutil.Popen(
             command,
             stdout=subprocess.DEVNULL,
-            stderr=told,
+            stderr=errors,
             stdin=subprocess.DEVNULL,
             start_new_session=True,
         )
 
 
-# --- what the output holds ------------------------------------------------------------------------
-
-
 def results(output: Path) -> list[Path]:
-    """The results that stand under their final names."""
+    """List the results under their final names."""
     if not output.is_dir():
         return []
     return [
@@ -298,26 +379,51 @@ def results(output: Path) -> list[Path]:
     ]
 
 
-def check(place: Place) -> int:
-    """Compares every result with the reference and looks at the other files; returns how many
-    results there are. Raises `Spoilt`.
+def check(place: CampaignFolders) -> int:
+    """Compare every result with the reference and check the other files.
+
+    Parameters
+    ----------
+    place : CampaignFolders
+        The folders.
+
+    Returns
+    -------
+    int
+        Number of results.
+
+    Raises
+    ------
+    DamagedOutput
+        If something differs or is incomplete.
     """
     found = results(place.output)
     for folder in found:
         if content(folder) != content(place.reference / folder.name):
-            raise Spoilt(f"{folder} differs from the reference")
+            raise DamagedOutput(f"{folder} differs from the reference")
     for picture in (place.output / "thumbnails").glob("[!.]*"):
         if not picture.read_bytes().endswith(b"\xff\xd9"):
-            raise Spoilt(f"{picture} is not whole")
+            raise DamagedOutput(f"{picture} is incomplete")
     for name in ("summary.html", "summary.csv", "summary.jsonl"):
         text = (place.output / name).read_text() if (place.output / name).exists() else ""
         if text and not text.endswith("\n"):
-            raise Spoilt(f"{name} is not whole")
+            raise DamagedOutput(f"{name} is incomplete")
     return len(found)
 
 
 def content(folder: Path) -> dict[str, bytes | str]:
-    """All files; of the description what does not depend on when and by whom it was made."""
+    """Read all files of a result.
+
+    Parameters
+    ----------
+    folder : Path
+        The result.
+
+    Returns
+    -------
+    dict
+        Content by name; of the description, what does not depend on time and program.
+    """
     files: dict[str, bytes | str] = {
         p.relative_to(folder).as_posix(): p.read_bytes() for p in folder.rglob("*") if p.is_file()
     }
@@ -331,15 +437,15 @@ def content(folder: Path) -> dict[str, bytes | str]:
     return {**files, "description": json.dumps({**description, "input": source}, sort_keys=True)}
 
 
-def whole(place: Place) -> bool:
-    """Whether the output holds a result of every photo."""
+def complete(place: CampaignFolders) -> bool:
+    """Return whether the output holds a result of every photo."""
     return {path.name for path in results(place.output)} == {
         path.name for path in results(place.reference)
     }
 
 
 def table(rows: list[dict[str, object]]) -> str:
-    """Markdown: kills of each kind, and what was found."""
+    """Format the campaign as Markdown."""
     struck = [row for row in rows if row["struck"]]
     kinds: Counter[str] = Counter()
     for row in struck:
@@ -355,7 +461,8 @@ def table(rows: list[dict[str, object]]) -> str:
         [
             *lines,
             "",
-            f"{compared} results compared after kills; wrong or incomplete: 0; runs that did not complete: 0",
+            f"{compared} results compared after kills; wrong or incomplete: 0; "
+            "runs that did not complete: 0",
         ]
     )
 

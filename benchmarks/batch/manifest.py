@@ -1,12 +1,11 @@
-"""How soon does a batch of a million lines start, and how much memory does its list take?
+"""Measure how soon a batch of a million lines starts, and how much memory its list takes.
 
   python -m benchmarks.batch.manifest -o FOLDER [--lines 1000000]
 
-Writes a manifest of so many lines, of each kind, and starts `isc batch` on it in a process of its
-own, with one worker process whose task does nothing. Measured: seconds from the process's start to
-the first outcome; how fast outcomes come; and the process's memory when the first outcome is there
-and after 500 of them, against a manifest of 1000 lines. Then the run is ended. About a minute on
-two quiet cores.
+Writes a manifest of that many lines, of each kind, and starts `isc batch` on it in a process of its
+own, with one worker whose task does nothing. Measured: seconds from the start of the process to the
+first outcome; outcomes per second; and memory at the first outcome and after 500, against a
+manifest of 1000 lines. Then the run is ended. About a minute on two idle cores.
 """
 
 import argparse
@@ -30,12 +29,12 @@ _OUTCOMES = 500
 
 
 def main() -> None:
-    """Prints the table."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--lines", type=int, default=1_000_000)
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
+    parser.add_argument("--lines", type=int, default=1_000_000, help="lines of a manifest")
     parser.add_argument("--one", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.one:
@@ -43,11 +42,12 @@ def main() -> None:
         return
     options.output.mkdir(parents=True, exist_ok=True)
     print(
-        "| manifest | lines | first outcome (asked for: 20 s) | memory then | outcomes a second | peak memory |\n|---|---|---|---|---|---|"
+        "| manifest | lines | first outcome (target: 20 s) | memory then | outcomes per second "
+        "| peak memory |\n|---|---|---|---|---|---|"
     )
     for suffix in (".csv", ".jsonl"):
         for lines in (1000, options.lines):
-            path = written(options.output / f"{lines}{suffix}", lines)
+            path = write_manifest(options.output / f"{lines}{suffix}", lines)
             again = [
                 sys.executable,
                 "-m",
@@ -61,8 +61,21 @@ def main() -> None:
             print(f"| {suffix} | {lines} | {done.stdout.strip()} |", flush=True)
 
 
-def written(path: Path, lines: int) -> Path:
-    """A manifest in which every folder has a `front.jpg`, so that most names are wanted by many."""
+def write_manifest(path: Path, lines: int) -> Path:
+    """Write a manifest in which every folder has a `front.jpg`: names clash often.
+
+    Parameters
+    ----------
+    path : Path
+        The file, .csv or .jsonl; kept if it exists.
+    lines : int
+        Number of images.
+
+    Returns
+    -------
+    Path
+        The file.
+    """
     if not path.exists():
         with path.open("w", encoding="utf-8") as file:
             if path.suffix == ".csv":
@@ -75,47 +88,56 @@ def written(path: Path, lines: int) -> Path:
                 if path.suffix == ".csv":
                     file.write(f"{image},{mask},256\n")
                 else:
-                    file.write(
-                        f'{{"image": "{image}", "mask": "{mask}", "options": {{"max_size": 256}}}}\n'
-                    )
+                    options = '{"max_size": 256}'
+                    file.write(f'{{"image": "{image}", "mask": "{mask}", "options": {options}}}\n')
     return path
 
 
 def start(manifest: Path, output: Path) -> None:
-    """One run, in this process; prints the cells of its row."""
-    process, told = psutil.Process(), Told()
+    """Run a batch in this process and print the cells of its row."""
+    process, observer = psutil.Process(), RunObserver()
     with contextlib.suppress(Cancelled):
         run_batch(
             Batch([str(manifest)], output, crew=Crew(1, 1, "0")),
-            Monitor(told.progress, told.enough),
-            task=nothing,
+            Monitor(observer.progress, observer.enough),
+            task=no_task,
         )
-    rate = told.count / (time.time() - told.first) if told.first else 0.0
-    first = told.first - process.create_time()
-    print(f"{first:.1f} s | {told.memory:.0f} MB | {rate:.0f} | {_peak_mb():.0f} MB")
+    rate = observer.count / (time.time() - observer.first) if observer.first else 0.0
+    first = observer.first - process.create_time()
+    print(f"{first:.1f} s | {observer.memory:.0f} MB | {rate:.0f} | {_peak_mb():.0f} MB")
 
 
-class Told:
-    """What a run has reported."""
+class RunObserver:
+    """Counts the outcomes of a run.
+
+    Attributes
+    ----------
+    first : float
+        Time of the first outcome; 0 before.
+    memory : float
+        Peak memory then, MB.
+    count : int
+        Outcomes so far.
+    """
 
     def __init__(self) -> None:
         self.first = self.memory = 0.0
         self.count = 0
 
     def progress(self, event: ProgressEvent) -> None:
-        """Takes the report of a run."""
+        """Take a progress event."""
         found = re.match(r"done (\d+)", event.detail)
         self.count = int(found.group(1)) if found else 0
         if self.count and not self.first:
             self.first, self.memory = time.time(), _peak_mb()
 
     def enough(self) -> bool:
-        """Whether the run may end."""
+        """Return whether the run may end."""
         return self.count >= _OUTCOMES
 
 
-def nothing(job: ImageJob) -> ImageOutcome:
-    """The task of these runs."""
+def no_task(job: ImageJob) -> ImageOutcome:
+    """Do nothing."""
     del job
     return ImageOutcome(DONE)
 

@@ -1,17 +1,15 @@
-"""What does `isc batch` cost beside a plain loop, and does its memory stay flat?
+"""Measure the cost of `isc batch` beside a plain loop, and whether its memory stays flat.
 
   python -m benchmarks.batch.throughput -o FOLDER [--images 200] [--size 256] [--model joint]
 
-The same photos, made here: a plain loop over them (read, decompose, write) with one thread, the
-loop with two, and `isc batch` with two workers of one thread each; each in processes of its own.
-Then `isc batch` once more, which finds everything done, and for one photo alone: their difference
-is what the runner costs for an image (scheduling, checksums, looking whether it is done, journal,
-summary), to which the drawing of a thumbnail comes. Memory: of the workers' peaks at each image, as
-the system counts them, the greatest of the last 50 images against that of the first 50.
+The same synthetic photos: a plain loop over them (read, decompose, write) with one thread, the loop
+with two, and `isc batch` with two workers of one thread; each in processes of its own. Then `isc
+batch` again, which finds everything done, and for one photo: their difference is the runner's cost
+per image (scheduling, checksums, status check, journal, summary), plus the thumbnail. Memory: the
+largest of the workers' peaks over the last 50 images against that over the first 50.
 
-What is measured is kept in FOLDER: given again, the command goes on with what is missing, also in
-the middle of a loop. 200 images of 256 x 256 with the model joint take about 35 minutes on two
-quiet cores.
+Measurements are kept in FOLDER: repeating the command continues, also within a loop. 200 images of
+256 x 256 with the model joint take about 35 minutes on two idle cores.
 """
 
 import argparse
@@ -33,24 +31,28 @@ from isc_core.result_files.contact_sheet import thumbnail
 from isc_core.result_files.result_folder import save
 
 from ..records import append_row, read_rows
-from .photos import made_photos
+from .photos import synthetic_photos
 
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 _WARM = 50  # images of which a peak is taken, at each end
 
 
 def main() -> None:
-    """Measures what is missing and prints the table."""
+    """Run the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("-o", "--output", type=Path, required=True)
-    parser.add_argument("--images", type=int, default=200)
-    parser.add_argument("--size", type=int, default=256)
-    parser.add_argument("--model", default="joint")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, help="folder of the measurements"
+    )
+    parser.add_argument("--images", type=int, default=200, help="number of photos")
+    parser.add_argument("--size", type=int, default=256, help="side in pixels")
+    parser.add_argument("--model", default="joint", help="model of isc decompose")
     parser.add_argument("--loop", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
-    photos = made_photos(options.output / f"photos-{options.size}", options.images, options.size)
+    photos = synthetic_photos(
+        options.output / f"photos-{options.size}", options.images, options.size
+    )
     if options.loop:
         plain_loop(options.output, photos, options.model, options.loop)
         return
@@ -74,12 +76,21 @@ def main() -> None:
     print(table(options.output, first, again, alone))
 
 
-# --- the loop -------------------------------------------------------------------------------------
-
-
 def plain_loop(place: Path, photos: list[Path], model: str, threads: int) -> None:
-    """Seconds of each photo, without what the first of a process takes to load; those that are
-    known are left out.
+    """Measure the seconds per photo of a plain loop; known photos are skipped.
+
+    The first photo of a process is run twice: loading and compilation do not count.
+
+    Parameters
+    ----------
+    place : Path
+        Folder of the measurements.
+    photos : list of Path
+        The inputs.
+    model : str
+        Model of `isc decompose`.
+    threads : int
+        Threads.
     """
     log = place / f"loop-{threads}.jsonl"
     known = {row["photo"] for row in read_rows(log)}
@@ -95,13 +106,18 @@ def plain_loop(place: Path, photos: list[Path], model: str, threads: int) -> Non
             append_row(log, {"photo": photo.name, "seconds": time.perf_counter() - start})
 
 
-# --- the batch ------------------------------------------------------------------------------------
-
-
 @dataclass(frozen=True)
-class Run:
-    """One run of `isc batch`: its seconds as a whole, and those and the peak memory in MB of each
-    image, in the inputs' order.
+class BatchRun:
+    """One run of `isc batch`.
+
+    Attributes
+    ----------
+    whole : float
+        Seconds from start to end.
+    seconds : list of float
+        Per image, in the order of the inputs.
+    peaks : list of float
+        Peak memory per image, MB.
     """
 
     whole: float
@@ -109,13 +125,28 @@ class Run:
     peaks: list[float]
 
 
-def batch(place: Path, photos: Path, model: str, which: str) -> Run:
-    """Runs `isc batch` with two workers, unless that is known: the `first` time, or one that finds
-    everything done.
+def batch(place: Path, photos: Path, model: str, which: str) -> BatchRun:
+    """Run `isc batch` with two workers, unless the measurement exists.
+
+    Parameters
+    ----------
+    place : Path
+        Folder of the measurements.
+    photos : Path
+        The inputs.
+    model : str
+        Model of `isc decompose`.
+    which : {"first", "again", "alone"}
+        Name of the run.
+
+    Returns
+    -------
+    BatchRun
+        The measurement.
     """
     log, output = place / f"batch-{which}.json", place / "batch"
     if not log.exists():
-        if which == "first":  # one that was broken off would go on, and take too few seconds
+        if which == "first":  # an interrupted run would continue, and take too little time
             shutil.rmtree(output, ignore_errors=True)
         command = [
             sys.executable,
@@ -135,15 +166,18 @@ def batch(place: Path, photos: Path, model: str, which: str) -> Run:
         images = read_rows(output / "summary.jsonl")
         if {row["status"] for row in images} != {"done" if which == "first" else "skipped"}:
             raise SystemExit(
-                f"{output}: not what was expected of the run `{which}`: delete it and {log.name}, and begin again"
+                f"unexpected status in `{output}` after the run `{which}`; "
+                f"delete it and `{log.name}`, then repeat the command"
             )
-        found = Run(whole, [row["seconds"] for row in images], [row["peak_mb"] for row in images])
+        found = BatchRun(
+            whole, [row["seconds"] for row in images], [row["peak_mb"] for row in images]
+        )
         log.write_text(json.dumps(asdict(found)))
-    return Run(**json.loads(log.read_text()))
+    return BatchRun(**json.loads(log.read_text()))
 
 
 def thumbnail_seconds(place: Path) -> float:
-    """Of one, the median of ten."""
+    """Return the median seconds of a thumbnail, over ten."""
     sheets = sorted((place / "batch").glob("*/preview.png"))[:10]
     taken = []
     for sheet in sheets:
@@ -153,8 +187,21 @@ def thumbnail_seconds(place: Path) -> float:
     return median(taken)
 
 
-def table(place: Path, first: Run, again: Run, alone: Run) -> str:
-    """Markdown: what was measured beside what is asked for."""
+def table(place: Path, first: BatchRun, again: BatchRun, alone: BatchRun) -> str:
+    """Format the measurements beside the targets.
+
+    Parameters
+    ----------
+    place : Path
+        Folder of the measurements.
+    first, again, alone : BatchRun
+        The runs.
+
+    Returns
+    -------
+    str
+        Markdown.
+    """
     loops = [
         sum(row["seconds"] for row in read_rows(place / f"loop-{threads}.jsonl"))
         for threads in (1, 2)
@@ -164,18 +211,20 @@ def table(place: Path, first: Run, again: Run, alone: Run) -> str:
     start, end = (max(peaks) for peaks in (first.peaks[:_WARM], first.peaks[-_WARM:]))
     growth = f"{start:.0f} MB, {end:.0f} MB: {100 * (end / start - 1):+.1f} %"
     lines = [
-        f"{count} photos, {platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}",
+        f"{count} photos, {platform.machine()}, {os.cpu_count()} cores, "
+        f"Python {platform.python_version()}",
         "",
-        "| what | measured | asked for |",
+        "| quantity | measured | target |",
         "|---|---|---|",
-        f"| loop, one thread | {loops[0]:.1f} s, {loops[0] / count:.2f} s an image | |",
-        f"| loop, two threads | {loops[1]:.1f} s, {loops[1] / count:.2f} s an image | |",
-        f"| isc batch, two workers, with its start and end | {first.whole:.1f} s | |",
-        f"| of that start and end | {alone.whole:.1f} s | |",
+        f"| loop, one thread | {loops[0]:.1f} s, {loops[0] / count:.2f} s per image | |",
+        f"| loop, two threads | {loops[1]:.1f} s, {loops[1] / count:.2f} s per image | |",
+        f"| isc batch, two workers, start to end | {first.whole:.1f} s | |",
+        f"| of that, start and end | {alone.whole:.1f} s | |",
         f"| against the loop with one thread | {loops[0] / first.whole:.2f} x | 1.8 x |",
         f"| against the loop with two threads | {loops[1] / first.whole:.2f} x | 1.0 x |",
-        f"| the runner, for an image | {1e3 * runner:.1f} ms, and {1e3 * small:.1f} ms for its thumbnail | 50 ms |",
-        f"| everything done already | {again.whole:.1f} s | |",
+        f"| the runner, per image | {1e3 * runner:.1f} ms, plus {1e3 * small:.1f} ms for the "
+        "thumbnail | 50 ms |",
+        f"| everything already done | {again.whole:.1f} s | |",
         f"| peak memory of a worker, first and last {_WARM} images | {growth} | 5 % |",
     ]
     return "\n".join(lines)

@@ -1,23 +1,24 @@
-"""The closed loop: does what stands in Blender look like the photo, and does it stay right under
-another light?
+"""Compare renders of imported results with the photo, and relit renders with ground truth.
 
-  python -m benchmarks.blender.closed_loop -o FOLDER --photos ../shared/data/photos          five photos and
-  three rendered objects python -m benchmarks.blender.closed_loop -o FOLDER
-  the rendered objects alone python -m benchmarks.blender.closed_loop -o FOLDER --names gourd --size 64
-  --samples 16    a quick look
+  python -m benchmarks.blender.closed_loop -o FOLDER --photos ../shared/data/photos
+  python -m benchmarks.blender.closed_loop -o FOLDER
+  python -m benchmarks.blender.closed_loop -o FOLDER --names gourd --size 64 --samples 16
 
-Each object is decomposed, built in Blender by the add-on's own `scene.build`, and rendered with
-Cycles from the scene's camera, linear, view transform Standard. Judged inside the mask; peak: the
-99.9th percentile of the photo there.
+The first form measures five photos and three rendered objects, the second the rendered objects
+alone, the third one object at low quality.
 
-Equations: relative RMS = sqrt(sum (k W - S)^2 / sum S^2), W the render in white matt, S the
-shading, k that of the base colour; PSNR = 10 log10(peak^2 / mean square). Under a new light the
-render may take one gain g = <x, t> / <x, x>, as the scale between reflectance and light cannot be
-known from one photo; g is the same for all colours, and the peak is the truth's. An object made of
-the true maps has no such freedom.
+Each object is decomposed, built in Blender by the add-on's own scene builder, and rendered with
+Cycles from the scene's camera: linear, view transform Standard. Measured inside the mask; the peak
+is the 99.9th percentile of the photo there.
 
-Writes tables.md, rows.json and sheets of pictures to FOLDER; renders are kept in FOLDER/renders and
-not made again (--fresh: they are).
+Equation: relative RMS = sqrt(sum (k W - S)^2 / sum S^2), where W is the render in white, S the
+shading, k the scale of the base colour; PSNR = 10 log10(peak^2 / mean squared error). Under a new
+light, the render is scaled by one gain g = <x, t> / <x, x>, as the scale between reflectance and
+light cannot be known from one photo; g is the same for all channels, and the peak is that of the
+truth. An object with the true maps is not scaled.
+
+Limits: renders are kept in FOLDER/renders and reused unless `--fresh` is given. Also writes
+tables.md, rows.json and comparison sheets.
 """
 
 import argparse
@@ -31,17 +32,17 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from blender_addon.files.result_arrays import Result, read_result
+from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.errors import InputError
 from isc_core.evaluation.metrics import psnr
 from isc_core.result_files.contact_sheet import Shown, edit_sheet
 from isc_core.shading.environment_map import shading_under
 
-from .closed_loop_cases import PHOTOS, RENDERED, Case, Making, Relit, cases
-from .renders import Look, picture
+from .closed_loop_cases import PHOTOS, RENDERED, CaseOptions, LoopCase, RelitTruth, loop_cases
+from .renders import RenderVariant, render
 
-USUAL_FILTER = 1.5  # Blender's, pixels
-_RING = 2  # pixels of the outline that "inner" leaves out
+USUAL_FILTER = 1.5  # pixels: Blender's default
+_RING = 2  # pixels of the outline that "inner" excludes
 _SHEET_WIDTH, _SHEET_ROWS = 1000, 3
 
 
@@ -49,11 +50,22 @@ _SHEET_WIDTH, _SHEET_ROWS = 1000, 3
 class LoopRow:
     """One object in its own light.
 
-    Relative RMS: `shading`, without its outline (`inner`), with the object's own shadows
-    (`shadowed`), of the sky without any geometry (`sky`). PSNR in dB of the diffuse render:
-    `diffuse`, `diffuse_inner`, `diffuse_shadowed`, and by Blender's usual pixel filter
-    (`diffuse_usual`). PSNR of whole images against the photo: renders `matt`, `lobe`, `image` (with
-    the specular image), and, for comparison, of the maps diffuse + lobe (`maps_lobe`).
+    Attributes
+    ----------
+    name : str
+        The object.
+    shading, inner, shadowed : float
+        Relative RMS of the white render: everywhere, without the outline, with own shadows.
+    sky : float
+        Relative RMS of the environment map's shading without geometry.
+    diffuse, diffuse_inner, diffuse_shadowed : float
+        PSNR of the diffuse render against the diffuse layer, dB; as above.
+    diffuse_usual : float
+        The same with Blender's default pixel filter.
+    matt, lobe, image : float
+        PSNR against the photo of renders without gloss, with the lobe, with the specular image, dB.
+    maps_lobe : float
+        PSNR against the photo of the maps diffuse + lobe, dB.
     """
 
     name: str
@@ -73,12 +85,24 @@ class LoopRow:
 
 @dataclass(frozen=True)
 class RelitRow:
-    """One object in a new light.
+    """One object in a new light; PSNR in dB against the true image.
 
-    PSNR in dB against the true picture: the `photo` as it is, the matt object without and with its
-    own shadows (`matt`, `shadowed`), with the lobe and shadows (`lobe`). Of diffuse light alone:
-    the imported object (`diffuse`), and an object made of the true maps (`true_maps`), which is
-    what the way through Blender costs. `gain`: g of `shadowed`.
+    Attributes
+    ----------
+    name, light : str
+        The object and the light.
+    photo : float
+        Of the unchanged photo.
+    matt, shadowed : float
+        Of the diffuse object without and with its own shadows.
+    lobe : float
+        With the lobe and own shadows.
+    diffuse : float
+        Of the diffuse object against the true diffuse light.
+    true_maps : float
+        The same of an object with the true maps: the cost of the way through Blender.
+    gain : float
+        Of `shadowed`.
     """
 
     name: str
@@ -94,9 +118,21 @@ class RelitRow:
 
 @dataclass
 class Renders:
-    """The pictures of one result, made when asked for and kept in `path`."""
+    """The renders of one result, made on demand and kept in a file.
 
-    result: Result
+    Attributes
+    ----------
+    result : ResultArrays
+        The result.
+    path : Path
+        File of the renders.
+    samples : int
+        Samples per pixel.
+    kept : dict of str to ndarray
+        Renders by name.
+    """
+
+    result: ResultArrays
     path: Path
     samples: int
     kept: dict[str, np.ndarray] = field(default_factory=dict)
@@ -106,25 +142,31 @@ class Renders:
             with np.load(self.path, allow_pickle=False) as stored:
                 self.kept = {name: stored[name] for name in stored.files}
 
-    def __call__(self, look: Look) -> np.ndarray:
-        """(H, W, 3) linear."""
-        light = look.relit.light if look.relit is not None else "own"
-        name = f"{light} {look.gloss} white={look.white} shadows={look.own_shadows} filter={look.filter_width} {self.samples}"
+    def __call__(self, variant: RenderVariant) -> np.ndarray:
+        """Return the render (H, W, 3), linear."""
+        light = variant.relit.light if variant.relit is not None else "own"
+        name = (
+            f"{light} {variant.gloss} white={variant.white} shadows={variant.own_shadows} "
+            f"filter={variant.filter_width} {self.samples}"
+        )
         if name not in self.kept:
-            self.kept[name] = picture(self.result, look, self.samples)[0].astype(np.float32)
+            self.kept[name] = render(self.result, variant, self.samples)[0].astype(np.float32)
             self.path.parent.mkdir(parents=True, exist_ok=True)
             np.savez(self.path, **self.kept)
         return self.kept[name]
 
 
 def loop_row(name: str, renders: Renders) -> LoopRow:
-    """Measures an object in its own light."""
+    """Measure an object in its own light."""
     r = renders.result
     mask, inner, peak, k = r.mask, _inner(r.mask), white(r.image, r.mask), r.reflectance_scale
     sky = np.zeros_like(r.shading)
-    sky[mask] = k * shading_under(r.sky.astype(float), r.normal[mask].astype(float))
-    own, shadowed = k * renders(Look(white=True)), k * renders(Look(white=True, own_shadows=True))
-    matt = renders(Look())
+    sky[mask] = k * shading_under(r.environment_map.astype(float), r.normal[mask].astype(float))
+    own, shadowed = (
+        k * renders(RenderVariant(white=True)),
+        k * renders(RenderVariant(white=True, own_shadows=True)),
+    )
+    matt = renders(RenderVariant())
     return LoopRow(
         name=name,
         shading=relative_rms(own, r.shading, mask),
@@ -133,27 +175,44 @@ def loop_row(name: str, renders: Renders) -> LoopRow:
         sky=relative_rms(sky, r.shading, mask),
         diffuse=psnr(r.diffuse, matt, mask, peak=peak),
         diffuse_inner=psnr(r.diffuse, matt, inner, peak=peak),
-        diffuse_shadowed=psnr(r.diffuse, renders(Look(own_shadows=True)), mask, peak=peak),
-        diffuse_usual=psnr(r.diffuse, renders(Look(filter_width=USUAL_FILTER)), mask, peak=peak),
+        diffuse_shadowed=psnr(r.diffuse, renders(RenderVariant(own_shadows=True)), mask, peak=peak),
+        diffuse_usual=psnr(
+            r.diffuse, renders(RenderVariant(filter_width=USUAL_FILTER)), mask, peak=peak
+        ),
         matt=psnr(r.image, matt, mask, peak=peak),
-        lobe=psnr(r.image, renders(Look("lobe")), mask, peak=peak),
-        image=psnr(r.image, renders(Look("image")), mask, peak=peak),
+        lobe=psnr(r.image, renders(RenderVariant("lobe")), mask, peak=peak),
+        image=psnr(r.image, renders(RenderVariant("image")), mask, peak=peak),
         maps_lobe=psnr(r.image, r.diffuse + r.lobe, mask, peak=peak),
     )
 
 
-def relit_row(name: str, new: Relit, renders: Renders, ideal: Renders) -> RelitRow:
-    """Measures an object in a new light. `ideal`: of the true maps; both on the truth's grid."""
+def relit_row(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -> RelitRow:
+    """Measure an object in a new light.
+
+    Parameters
+    ----------
+    name : str
+        The object.
+    new : RelitTruth
+        The new light and its ground truth.
+    renders, ideal : Renders
+        Of the result, and of the true maps, on the grid of the truth.
+
+    Returns
+    -------
+    RelitRow
+        The figures.
+    """
     mask = renders.result.mask & ideal.result.mask
-    shadowed = renders(Look(own_shadows=True, relit=new))
-    judged = {
+    shadowed = renders(RenderVariant(own_shadows=True, relit=new))
+    measured = {
         "photo": renders.result.image,
-        "matt": renders(Look(own_shadows=False, relit=new)),
+        "matt": renders(RenderVariant(own_shadows=False, relit=new)),
         "shadowed": shadowed,
-        "lobe": renders(Look("lobe", own_shadows=True, relit=new)),
+        "lobe": renders(RenderVariant("lobe", own_shadows=True, relit=new)),
     }
-    figures = {what: scaled_psnr(new.image, seen, mask) for what, seen in judged.items()}
-    perfect = ideal(Look(own_shadows=True, relit=new)) / ideal.result.reflectance_scale
+    figures = {what: scaled_psnr(new.image, found, mask) for what, found in measured.items()}
+    perfect = ideal(RenderVariant(own_shadows=True, relit=new)) / ideal.result.reflectance_scale
     diffuse, true_maps = (
         scaled_psnr(new.diffuse, shadowed, mask),
         psnr(new.diffuse, perfect, mask, peak=white(new.diffuse, mask)),
@@ -169,26 +228,26 @@ def relit_row(name: str, new: Relit, renders: Renders, ideal: Renders) -> RelitR
 
 
 def white(image: np.ndarray, mask: np.ndarray) -> float:
-    """The peak of PSNR: the 99.9th percentile of the values (H, W, 3) inside the mask."""
+    """Return the peak of PSNR: the 99.9th percentile of an image (H, W, 3) inside the mask."""
     return float(np.percentile(image[mask], 99.9))
 
 
-def relative_rms(seen: np.ndarray, wanted: np.ndarray, mask: np.ndarray) -> float:
-    """RMS of the difference of (H, W, 3) over the RMS of `wanted`, inside the mask."""
+def relative_rms(found: np.ndarray, truth: np.ndarray, mask: np.ndarray) -> float:
+    """Return the RMS error of an image (H, W, 3) over the RMS of the truth, inside the mask."""
     return float(
-        np.sqrt(np.square(seen[mask] - wanted[mask]).mean() / np.square(wanted[mask]).mean())
+        np.sqrt(np.square(found[mask] - truth[mask]).mean() / np.square(truth[mask]).mean())
     )
 
 
-def gain(truth: np.ndarray, seen: np.ndarray, mask: np.ndarray) -> float:
-    """The factor of `seen` that leaves the least squares."""
-    inside = seen[mask].astype(float)
+def gain(truth: np.ndarray, found: np.ndarray, mask: np.ndarray) -> float:
+    """Return the factor of `found` with the least squared error."""
+    inside = found[mask].astype(float)
     return float((inside * truth[mask]).sum() / max(float(np.square(inside).sum()), 1e-30))
 
 
-def scaled_psnr(truth: np.ndarray, seen: np.ndarray, mask: np.ndarray) -> float:
-    """PSNR of `seen` after the best gain, peak the truth's white."""
-    return psnr(truth, gain(truth, seen, mask) * seen, mask, peak=white(truth, mask))
+def scaled_psnr(truth: np.ndarray, found: np.ndarray, mask: np.ndarray) -> float:
+    """Return the PSNR of `found` after the best gain; the peak is the truth's."""
+    return psnr(truth, gain(truth, found, mask) * found, mask, peak=white(truth, mask))
 
 
 def _inner(mask: np.ndarray) -> np.ndarray:
@@ -197,10 +256,12 @@ def _inner(mask: np.ndarray) -> np.ndarray:
 
 
 def loop_table(rows: Sequence[LoopRow]) -> str:
-    """Markdown."""
+    """Format the rows of objects in their own light as Markdown."""
     lines = [
-        "| object | (i) white render against shading | without the outline | own shadows on | sky alone | (ii) diffuse "
-        "| without the outline | own shadows on | usual filter | (iii) fitted lobe | no gloss | specular image | maps: diffuse + lobe |",
+        "| object | (i) white render against shading | without the outline | with own shadows "
+        "| environment map alone | (ii) diffuse | without the outline | with own shadows "
+        "| default filter | (iii) fitted lobe | no gloss | specular image "
+        "| maps: diffuse + lobe |",
         "|---" * 13 + "|",
     ]
     for r in rows:
@@ -222,10 +283,10 @@ def loop_table(rows: Sequence[LoopRow]) -> str:
 
 
 def relit_table(rows: Sequence[RelitRow]) -> str:
-    """Markdown."""
+    """Format the rows of relit objects as Markdown."""
     lines = [
-        "| object | new light | photo as it is | matt, no shadows | matt, own shadows | lobe, own shadows | diffuse light alone "
-        "| true maps, diffuse light | gain |",
+        "| object | new light | unchanged photo | diffuse, no shadows | diffuse, own shadows "
+        "| lobe, own shadows | diffuse light alone | true maps, diffuse light | gain |",
         "|---" * 9 + "|",
     ]
     for r in rows:
@@ -239,35 +300,48 @@ def relit_table(rows: Sequence[RelitRow]) -> str:
 
 
 def loop_panels(name: str, renders: Renders) -> list[Shown]:
-    """Photo, its diffuse layer, the renders of both, and the shading beside the white render."""
+    """Show the photo, its maps and their renders."""
     r, peak = renders.result, white(renders.result.image, renders.result.mask)
     level = white(r.shading, r.mask)
     shown = (
         (r.image / peak, f"{name}: photo"),
-        (renders(Look("image")) / peak, "Blender, specular image"),
-        (renders(Look("lobe")) / peak, "Blender, fitted lobe"),
+        (renders(RenderVariant("image")) / peak, "Blender, specular image"),
+        (renders(RenderVariant("lobe")) / peak, "Blender, fitted lobe"),
         (r.diffuse / peak, "Diffuse map"),
-        (renders(Look()) / peak, "Blender, matt"),
+        (renders(RenderVariant()) / peak, "Blender, diffuse"),
         (r.shading / level, "Shading map"),
-        (r.reflectance_scale * renders(Look(white=True)) / level, "Blender, white"),
+        (r.reflectance_scale * renders(RenderVariant(white=True)) / level, "Blender, white"),
     )
     return [Shown(values, r.mask, label) for values, label in shown]
 
 
-def relit_panels(name: str, new: Relit, renders: Renders, ideal: Renders) -> list[Shown]:
-    """The photo, the truth in the new light, and what Blender makes of the recovered and of the
-    true maps.
+def relit_panels(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -> list[Shown]:
+    """Show the photo, the truth in a new light, and the renders of recovered and true maps.
+
+    Parameters
+    ----------
+    name : str
+        The object.
+    new : RelitTruth
+        The new light and its ground truth.
+    renders, ideal : Renders
+        Of the result, and of the true maps.
+
+    Returns
+    -------
+    list of Shown
+        The panels.
     """
     mask, peak = ideal.result.mask, white(new.image, ideal.result.mask)
-    matt, glossy = (
-        renders(Look(own_shadows=True, relit=new)),
-        renders(Look("lobe", own_shadows=True, relit=new)),
+    diffuse, glossy = (
+        renders(RenderVariant(own_shadows=True, relit=new)),
+        renders(RenderVariant("lobe", own_shadows=True, relit=new)),
     )
-    perfect = ideal(Look(own_shadows=True, relit=new)) / ideal.result.reflectance_scale
+    perfect = ideal(RenderVariant(own_shadows=True, relit=new)) / ideal.result.reflectance_scale
     shown = [(renders.result.image, f"{name}: photo"), (new.image, f"Truth, new {new.light}")]
     shown += [
-        (gain(new.image, seen, mask) * seen, f"Blender, {label}")
-        for seen, label in ((matt, "matt"), (glossy, "lobe"))
+        (gain(new.image, one, mask) * one, f"Blender, {label}")
+        for one, label in ((diffuse, "diffuse"), (glossy, "lobe"))
     ]
     shown += [(new.diffuse, "Truth, diffuse"), (perfect, "Blender, true maps")]
     return [Shown(values / peak, mask, label) for values, label in shown]
@@ -276,7 +350,19 @@ def relit_panels(name: str, new: Relit, renders: Renders, ideal: Renders) -> lis
 def save_sheet(
     path: Path, title: str, subtitle: str, panels: Sequence[Shown], columns: int
 ) -> None:
-    """Writes a sheet small enough for a page."""
+    """Write a comparison sheet, reduced to page width.
+
+    Parameters
+    ----------
+    path : Path
+        The PNG file.
+    title, subtitle : str
+        Above the panels.
+    panels : sequence of Shown
+        Images.
+    columns : int
+        Panels per row.
+    """
     sheet = edit_sheet(title, subtitle, panels, columns=columns)
     sheet = sheet.resize(
         (_SHEET_WIDTH, round(sheet.height * _SHEET_WIDTH / sheet.width)), Image.Resampling.LANCZOS
@@ -286,14 +372,23 @@ def save_sheet(
 
 
 def measure(given: argparse.Namespace) -> None:
-    """Does everything that the command line asks for; tables and sheets are rewritten after each
-    object.
+    """Measure all objects; tables and sheets are rewritten after each.
+
+    Parameters
+    ----------
+    given : argparse.Namespace
+        The command's options.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a missing photo, or a failed run.
     """
-    making = Making(given.output, given.photos, given.size, max(16, 4 * given.samples))
+    options = CaseOptions(given.output, given.photos, given.size, max(16, 4 * given.samples))
     loops: list[LoopRow] = []
     relits: list[RelitRow] = []
     panels: dict[str, list[Shown]] = {"rendered": [], "photos": [], "relit": []}
-    for case in cases(making, given.names or (RENDERED + (PHOTOS if given.photos else ()))):
+    for case in loop_cases(options, given.names or (RENDERED + (PHOTOS if given.photos else ()))):
         renders = _renders(given, case.name, case.result)
         loops.append(loop_row(case.name, renders))
         panels["photos" if case.truth is None else "rendered"] += loop_panels(case.name, renders)
@@ -310,7 +405,7 @@ def _renders(given: argparse.Namespace, name: str, result: Path) -> Renders:
 
 
 def _relit(
-    given: argparse.Namespace, case: Case, renders: Renders, panels: list[Shown]
+    given: argparse.Namespace, case: LoopCase, renders: Renders, panels: list[Shown]
 ) -> list[RelitRow]:
     rows = []
     if case.truth is not None:
@@ -350,16 +445,27 @@ _TITLES = {
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command. Returns 0, or 2 after one line about what was wrong."""
+    """Run the command line.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        By default those of the process.
+
+    Returns
+    -------
+    int
+        0, or 2 after an error message.
+    """
     parser = argparse.ArgumentParser(
         prog="python -m benchmarks.blender.closed_loop",
-        description="Render imported results and hold them to the photo.",
+        description="Compare renders of imported results with the photo.",
     )
+    parser.add_argument("-o", "--output", type=Path, required=True, help="folder to write to")
+    parser.add_argument("--photos", type=Path, help="folder of the real photos")
     parser.add_argument(
-        "-o", "--output", type=Path, required=True, help="folder for everything that is made"
+        "--names", nargs="+", help=f"objects to measure: {', '.join(RENDERED + PHOTOS)}"
     )
-    parser.add_argument("--photos", type=Path, help="folder with the real photos")
-    parser.add_argument("--names", nargs="+", help=f"of {', '.join(RENDERED + PHOTOS)}")
     parser.add_argument(
         "--size",
         type=int,
@@ -367,13 +473,13 @@ def main(arguments: list[str] | None = None) -> int:
         help="long side of the objects in pixels (default: %(default)s)",
     )
     parser.add_argument(
-        "--samples", type=int, default=64, help="of Cycles, a pixel (default: %(default)s)"
+        "--samples", type=int, default=64, help="samples of Cycles per pixel (default: %(default)s)"
     )
-    parser.add_argument("--fresh", action="store_true", help="render anew what is there")
+    parser.add_argument("--fresh", action="store_true", help="render again what exists")
     try:
         measure(parser.parse_args(arguments))
     except InputError as error:
-        print(f"closed loop: {error}", file=sys.stderr)
+        print(f"error: {error}", file=sys.stderr)
         return 2
     return 0
 

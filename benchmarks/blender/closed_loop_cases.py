@@ -1,15 +1,14 @@
-"""The objects of the closed loop: masked photos, and rendered scenes whose truth under another
-light is known.
+"""Objects of the closed loop: masked photos, and rendered scenes with known truth when relit.
 
-Every case is decomposed once, by the command that users run, into FOLDER/results/NAME; for rendered
-scenes the photo lies in FOLDER/photos, the truth under new lights in FOLDER/truth, and the true
-maps, as a result of their own, in FOLDER/results/NAME_true. What is there is not made again.
+Every object is decomposed once, by the users' command, into FOLDER/results/NAME. Of a rendered
+scene, the photo is in FOLDER/photos, the truth under new lights in FOLDER/truth, and the true maps,
+as a result of their own, in FOLDER/results/NAME_true. Existing files are kept.
 
-Equation: a new light is made as bright as the old one, E' = E mean(S) / mean(S'), S and S' being
-the true shadings: relit pictures are then judged on the photo's own scale.
+Equation: a new light is made as bright as the old one, E' = E mean(S) / mean(S'), where S and S'
+are the true shadings: relit images are then measured at the photo's own scale.
 
-Limits: the scale between reflectance and light cannot be known from one photo, so that a relit
-picture is right up to one gain at best.
+Limits: the scale between reflectance and light cannot be known from one photo; a relit image is
+right up to one gain at best.
 """
 
 from collections.abc import Iterable, Iterator
@@ -23,7 +22,7 @@ from isc_core.errors import InputError
 from isc_core.result_files.arrays_file import ARRAYS, write_arrays
 from isc_core.result_files.result_folder import save
 from isc_core.scene.decomposition import Decomposition, Provenance
-from synth.capture.recipe import Part, Picture, Recipe, photograph
+from synth.capture.recipe import FamilyMember, PictureSettings, Recipe, photograph
 from synth.capture.sensor import write_photo
 from synth.capture.truth import GroundTruth, exposed, render_truth
 from synth.demo_scene import demo_scene
@@ -39,22 +38,30 @@ NEW_LIGHTS = ("sun", "sky")
 _MEMBERS = {
     "vase": ("lathe", "print", "area"),
     "blob": ("blobby", "patches", "sh"),
-}  # shape, paint and light, see `synth.capture.recipe`
-_LEVEL, _FILL = (
-    0.9,
-    0.91,
-    # the gourd's brightest value; share of the picture's side that no object exceeds, so that none
-    # is scaled
-)
+}  # shape, albedo and light, see `synth.capture.recipe`
+# The gourd's brightest value; share of the image's side that no object exceeds, so that none is
+# scaled.
+_LEVEL, _FILL = 0.9, 0.91
 _SKY_ROWS = 32
 _PARTS = ("sky", "sun_direction", "sun_irradiance", "image", "diffuse")
 
 
 @dataclass(frozen=True)
-class Relit:
-    """A rendered scene under a new light. `light`: its name, of `NEW_LIGHTS`. `sky`: (rows, 2 rows,
-    3) radiance, what is not the sun; `sun_direction` (3,) unit, toward it, camera frame;
-    `sun_irradiance` (3,), 0 for none. `image`, `diffuse`: (H, W, 3) Mitsuba's truth.
+class RelitTruth:
+    """A rendered scene under a new light.
+
+    Attributes
+    ----------
+    light : str
+        One of `NEW_LIGHTS`.
+    sky : (rows, 2 rows, 3) ndarray
+        Environment map without the sun.
+    sun_direction : (3,) ndarray
+        Unit vector to the sun, camera frame.
+    sun_irradiance : (3,) ndarray
+        0 without a sun.
+    image, diffuse : (H, W, 3) ndarray
+        Mitsuba's ground truth.
     """
 
     light: str
@@ -66,22 +73,41 @@ class Relit:
 
 
 @dataclass(frozen=True)
-class Case:
-    """One object. `result`: folder of its decomposition. `truth`: folder of the true maps as if
-    they had been recovered, None for photos. `relit`: truths under new lights, none for photos.
+class LoopCase:
+    """One object.
+
+    Attributes
+    ----------
+    name : str
+        Of `PHOTOS` or `RENDERED`.
+    result : Path
+        Folder of its decomposition.
+    truth : Path or None
+        Folder of the true maps; None for photos.
+    relit : tuple of RelitTruth
+        Ground truth under new lights; empty for photos.
     """
 
     name: str
     result: Path
     truth: Path | None = None
-    relit: tuple[Relit, ...] = ()
+    relit: tuple[RelitTruth, ...] = ()
 
 
 @dataclass(frozen=True)
-class Making:
-    """How cases are made. `folder`: for all files. `photos`: of the real photos, None without.
-    `size`: the object's long side in pixels of the maps. `samples`: light paths a pixel of
-    Mitsuba's pictures.
+class CaseOptions:
+    """How objects are made.
+
+    Attributes
+    ----------
+    folder : Path
+        For all files.
+    photos : Path or None
+        Folder of the real photos.
+    size : int
+        Long side of the object, in pixels of the maps.
+    samples : int
+        Mitsuba's samples per pixel.
     """
 
     folder: Path
@@ -90,26 +116,39 @@ class Making:
     samples: int = 256
 
 
-def cases(making: Making, names: Iterable[str]) -> Iterator[Case]:
-    """The cases of these names, of `PHOTOS` and `RENDERED`.
+def loop_cases(options: CaseOptions, names: Iterable[str]) -> Iterator[LoopCase]:
+    """Make the objects of these names.
 
-    Raises `InputError` for other names, photos not given, and failed runs.
+    Parameters
+    ----------
+    options : CaseOptions
+        Folders and sizes.
+    names : iterable of str
+        Of `PHOTOS` and `RENDERED`.
+
+    Yields
+    ------
+    LoopCase
+        In the order of the names.
+
+    Raises
+    ------
+    InputError
+        For an unknown name, a missing photo, or a failed run.
     """
     for name in names:
         if name in RENDERED:
-            yield _rendered(making, name)
-        elif making.photos is not None and (path := making.photos / f"{name}.png").is_file():
-            yield Case(name, _decomposed(making, name, path))
+            yield _rendered(options, name)
+        elif options.photos is not None and (path := options.photos / f"{name}.png").is_file():
+            yield LoopCase(name, _decomposed(options, name, path))
         else:
-            raise InputError(
-                f"{name}: there is no such photo; rendered objects are {', '.join(RENDERED)}"
-            )
+            raise InputError(f"no photo named `{name}`; rendered objects are {', '.join(RENDERED)}")
 
 
-def _decomposed(making: Making, name: str, photo: Path) -> Path:
-    result = making.folder / "results" / f"{name}_{making.size}"
+def _decomposed(options: CaseOptions, name: str, photo: Path) -> Path:
+    result = options.folder / "results" / f"{name}_{options.size}"
     if not (result / ARRAYS).is_file():
-        size = str(making.size)
+        size = str(options.size)
         if (
             isc(
                 [
@@ -125,49 +164,56 @@ def _decomposed(making: Making, name: str, photo: Path) -> Path:
             )
             != 0
         ):
-            raise InputError(f"{photo} could not be decomposed")
+            raise InputError(f"cannot decompose `{photo}`")
     return result
 
 
-def _rendered(making: Making, name: str) -> Case:
+def _rendered(options: CaseOptions, name: str) -> LoopCase:
     photo, relit = (
-        making.folder / "photos" / f"{name}_{making.size}.png",
-        making.folder / "truth" / f"{name}_{making.size}.npz",
+        options.folder / "photos" / f"{name}_{options.size}.png",
+        options.folder / "truth" / f"{name}_{options.size}.npz",
     )
-    truth = making.folder / "results" / f"{name}_true_{making.size}"
+    truth = options.folder / "results" / f"{name}_true_{options.size}"
     if not (relit.is_file() and photo.is_file() and (truth / ARRAYS).is_file()):
-        scene, seen = _photographed(making, name)
+        scene, seen = _photographed(options, name)
         for path in (photo, relit):
             path.parent.mkdir(parents=True, exist_ok=True)
         write_photo(photo, seen)
-        np.savez(relit, **_new_truths(making, scene, seen))
+        np.savez(relit, **_new_truths(options, scene, seen))
         _save_truth(seen, truth)
     with np.load(relit, allow_pickle=False) as stored:
         lights = tuple(
-            Relit(light, *(stored[f"{light}_{part}"] for part in _PARTS)) for light in NEW_LIGHTS
+            RelitTruth(light, *(stored[f"{light}_{part}"] for part in _PARTS))
+            for light in NEW_LIGHTS
         )
-    return Case(name, _decomposed(making, name, photo), truth, lights)
+    return LoopCase(name, _decomposed(options, name, photo), truth, lights)
 
 
-def _photographed(making: Making, name: str) -> tuple[Scene, GroundTruth]:
-    """The scene under its own lights, exposed as a photographer does."""
-    side = round(making.size / _FILL)
+def _photographed(options: CaseOptions, name: str) -> tuple[Scene, GroundTruth]:
+    """The scene under its own lights, exposed near white."""
+    side = round(options.size / _FILL)
     if name == "gourd":
         scene = demo_scene(side)
         return exposed(
-            scene, render_truth(scene, RenderOptions(making.samples)), level=_LEVEL, layer="image"
+            scene, render_truth(scene, RenderOptions(options.samples)), level=_LEVEL, layer="image"
         )
     shape, albedo, light = _MEMBERS[name]
-    picture = Picture(size=side, samples=making.samples)
+    picture = PictureSettings(size=side, samples=options.samples)
     return photograph(
-        Recipe(7, Part(shape, 3), Part("ggx", 2), "ggx", albedo, Part(light, 1), picture)
+        Recipe(
+            7,
+            FamilyMember(shape, 3),
+            FamilyMember("ggx", 2),
+            "ggx",
+            albedo,
+            FamilyMember(light, 1),
+            picture,
+        )
     )
 
 
 def _save_truth(truth: GroundTruth, folder: Path) -> None:
-    """The true maps as the result of a decomposition that makes no mistake; its light is the smooth
-    one that fits best.
-    """
+    """Save the true maps as a perfect decomposition; its light is the best smooth fit."""
     layers = (
         truth.image,
         truth.diffuse,
@@ -185,11 +231,11 @@ def _save_truth(truth: GroundTruth, folder: Path) -> None:
     write_arrays(d, folder / ARRAYS)
 
 
-def _new_truths(making: Making, scene: Scene, seen: GroundTruth) -> dict[str, np.ndarray]:
+def _new_truths(options: CaseOptions, scene: Scene, seen: GroundTruth) -> dict[str, np.ndarray]:
     made: dict[str, np.ndarray] = {}
     for name in NEW_LIGHTS:
         lights = _new_lights(name)
-        truth = render_truth(replace(scene, lights=lights), RenderOptions(making.samples))
+        truth = render_truth(replace(scene, lights=lights), RenderOptions(options.samples))
         gain = float(seen.shading[seen.mask].mean() / truth.shading[truth.mask].mean())
         truth = truth.brightened(gain)
         sky = lights_as_environment(
@@ -207,9 +253,7 @@ def _new_truths(making: Making, scene: Scene, seen: GroundTruth) -> dict[str, np
 
 
 def _new_lights(name: str) -> tuple[Light, ...]:
-    """A low sun from the right with a little blue sky, or a smooth sky alone: both unlike the
-    lights of the photos.
-    """
+    """A low sun from the right with a little sky, or a smooth sky alone."""
     if name == "sky":
         return make_lights("sh", np.random.default_rng(11))
     fill = np.broadcast_to(np.array([0.10, 0.13, 0.18]), (_SKY_ROWS, 2 * _SKY_ROWS, 3)).copy()

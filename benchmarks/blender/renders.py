@@ -1,11 +1,10 @@
-"""Pictures that Blender makes of an imported result, as linear arrays, through the scene's own
-camera.
+"""Renders of an imported result as linear arrays, through the scene's own camera.
 
-Cycles on the processor, no denoising, a fixed seed, a float OpenEXR read back; pixels are divided
-by their coverage. The scene is the one that people get; what a measurement needs to be otherwise
-(`Look`) is set on it afterwards.
+Cycles on the CPU, no denoising, a fixed seed, a float OpenEXR read back; pixels are divided by
+their coverage. The scene is the users' scene; what a measurement changes (`RenderVariant`) is set
+on it afterwards.
 
-Limits: the render has the size of the maps.
+Limits: a render has the size of the maps.
 """
 
 import tempfile
@@ -17,60 +16,95 @@ from typing import Any, Literal
 import bpy
 import numpy as np
 
-from blender_addon.files.result_arrays import Result
-from blender_addon.scene import BuildOptions, Built, build
+from blender_addon.files.result_arrays import ResultArrays
+from blender_addon.scene import BuildOptions, BuiltObject, build_object
 from blender_addon.scene.images import COLOR, ensure_image
 from blender_addon.scene.sun import ensure_sun
 from isc_core.io.exr import read_channels
 
-from .closed_loop_cases import Relit
+from .closed_loop_cases import RelitTruth
 
 Gloss = Literal["none", "lobe", "image"]
-LIT = (
-    "photo",
-    "image",
-    "diffuse",
-    "specular",
-    "residual",
-    "lobe",
-)  # roles of images that are light already
+# Roles of images that hold light.
+LIT = ("photo", "image", "diffuse", "specular", "residual", "lobe")
 
 
 @dataclass(frozen=True)
-class Look:
-    """What a picture shows. `gloss`: as `BuildOptions.specular_from`. `white`: a white matt surface
-    instead of the material. `own_shadows`: as in `BuildOptions`. `filter_width`: Blender's, pixels;
-    the scene's own if None. `relit`: another light, direct only.
+class RenderVariant:
+    """What a render shows.
+
+    Attributes
+    ----------
+    gloss : {"none", "lobe", "image"}
+        As `BuildOptions.specular_from`.
+    white : bool
+        A white Lambertian surface instead of the material.
+    own_shadows : bool or None
+        As in `BuildOptions`.
+    filter_width : float or None
+        Pixel filter, in pixels; None: that of the scene.
+    relit : RelitTruth or None
+        Another light, direct only.
     """
 
     gloss: Gloss = "none"
     white: bool = False
     own_shadows: bool | None = None
     filter_width: float | None = None
-    relit: Relit | None = None
+    relit: RelitTruth | None = None
 
 
-def picture(result: Result, look: Look, samples: int) -> tuple[np.ndarray, np.ndarray]:
-    """The picture (H, W, 3), linear, 0 where nothing is, and the coverage (H, W) in [0, 1].
-    Blender's file is emptied first.
+def render(
+    result: ResultArrays, variant: RenderVariant, samples: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Render a result. Blender's file is emptied first.
 
-    Raises `RuntimeError` if a material that should do without shines by itself or shows the photo's
-    specular image.
+    Parameters
+    ----------
+    result : ResultArrays
+        The result.
+    variant : RenderVariant
+        What to show.
+    samples : int
+        Samples per pixel.
+
+    Returns
+    -------
+    image : (H, W, 3) ndarray
+        Linear, 0 outside the object.
+    coverage : (H, W) ndarray
+        In [0, 1].
+
+    Raises
+    ------
+    RuntimeError
+        If the material emits light or shows the photo's specular layer although it should not.
     """
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    built = build(result, BuildOptions(specular_from=look.gloss, own_shadows=look.own_shadows))
-    if look.gloss != "image" and (cheats := shining(built.material)):
-        raise RuntimeError(f"the material shines by {', '.join(cheats)}")
-    if look.white:
+    built = build_object(
+        result, BuildOptions(specular_from=variant.gloss, own_shadows=variant.own_shadows)
+    )
+    if variant.gloss != "image" and (emitting := emitting_nodes(built.material)):
+        raise RuntimeError(f"the material emits light: {', '.join(emitting)}")
+    if variant.white:
         built.scene.view_layers[0].material_override = _white()
-    if look.relit is not None:
-        _relight(built, look.relit)
-    return _rendered(built.scene, look.filter_width, samples)
+    if variant.relit is not None:
+        _relight(built, variant.relit)
+    return _rendered(built.scene, variant.filter_width, samples)
 
 
-def shining(material: bpy.types.Material) -> list[str]:
-    """Names of the nodes that a material, with the groups in it, shines by: emission, and images
-    that hold the photo's light.
+def emitting_nodes(material: bpy.types.Material) -> list[str]:
+    """List the nodes by which a material, with its groups, emits light.
+
+    Parameters
+    ----------
+    material : bpy.types.Material
+        The material.
+
+    Returns
+    -------
+    list of str
+        Names of emission nodes and of images that hold the photo's light.
     """
     found = []
     for node in _nodes(material.node_tree):
@@ -106,19 +140,19 @@ def _white() -> bpy.types.Material:
         material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
-    matt, output = (
+    diffuse, output = (
         tree.nodes.new("ShaderNodeBsdfDiffuse"),
         tree.nodes.new("ShaderNodeOutputMaterial"),
     )
-    matt.inputs["Color"].default_value = (1, 1, 1, 1)
-    tree.links.new(matt.outputs["BSDF"], output.inputs["Surface"])
+    diffuse.inputs["Color"].default_value = (1, 1, 1, 1)
+    tree.links.new(diffuse.outputs["BSDF"], output.inputs["Surface"])
     return material
 
 
-def _relight(built: Built, new: Relit) -> None:
-    """Another sky in the scene's world, and a sun lamp: direct light only, as in the truth."""
+def _relight(built: BuiltObject, new: RelitTruth) -> None:
+    """Set another environment map and a sun; direct light only, as in the ground truth."""
     key = built.object["isc_key"]
-    ensure_image(key, "sky", np.asarray(new.sky, np.float32), COLOR)
+    ensure_image(key, "environment_map", np.asarray(new.sky, np.float32), COLOR)
     if new.sun_irradiance.any():
         sun = ensure_sun(key, built.collection, new.sun_direction, new.sun_irradiance)
         sun.data.angle = 0.0

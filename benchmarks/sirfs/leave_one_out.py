@@ -1,17 +1,18 @@
-"""How good are the priors on objects they have not seen? Each training object is solved with priors
-and lights fitted to the other nine.
+"""Measure the priors on unseen objects: solve each training object with priors fitted to the rest.
 
-  python -m benchmarks.sirfs.leave_one_out --json loo.json        baseline B (the published recipe and
-  weights) and ours, both lights python -m benchmarks.sirfs.leave_one_out --in-sample            the same
-  with priors fitted to all ten python -m benchmarks.sirfs.leave_one_out --grey                 the photos
-  without their colours; for grey ones in natural light no weights are
-                                                            published: those for laboratory light
-                                                            stand in
+  python -m benchmarks.sirfs.leave_one_out --json loo.json
+  python -m benchmarks.sirfs.leave_one_out --in-sample
+  python -m benchmarks.sirfs.leave_one_out --grey
 
-Both lights of the object are left out, so its shape, paint and lights are unknown to the priors.
-The statistics of the ten objects are condensed once; a fold is a fit to nine of them. The
+The first form compares baseline B (the published recipe and weights) with ours, under both lights;
+`--in-sample` fits the priors to all ten objects; `--grey` removes the colours of the photos (for
+grey photos in natural light no weights are published; those for laboratory light are used).
+
+Both lights of the object are left out: the priors know neither its shape nor its albedo nor its
+lights. The statistics of the ten objects are condensed once; a fold is a fit to nine of them. The
 comparison is paired: the ratio of geometric means with a 95 % bootstrap interval over objects. Each
-is a family of its own: of the cups, frogs, papers and teabags these ten have one member each.
+object is a family of its own: these ten have one member each of the cups, frogs, papers and
+teabags.
 """
 
 from concurrent.futures import ProcessPoolExecutor
@@ -38,9 +39,21 @@ METRICS = ("height", "normal", "shading", "reflectance", "rs_mse", "light")
 
 
 @dataclass(frozen=True)
-class Task:
-    """One solve: a method's priors without `name` (or with it) on `name` under `light`, in colour
-    or `grey`.
+class SolveJob:
+    """One solve.
+
+    Attributes
+    ----------
+    method : str
+        One of `METHODS`.
+    name, light : str
+        The object and its illumination.
+    priors : PriorSet
+        The fold's priors.
+    shared : Path
+        Folder with data/.
+    grey : bool
+        Remove the colours.
     """
 
     method: str
@@ -52,45 +65,80 @@ class Task:
 
 
 def fit_options(method: str) -> FitOptions:
-    """How a method's priors are fitted. "B, lights scaled": the recipe with the natural lights'
-    contrast fitted to the objects'.
+    """Return how the priors of a method are fitted.
+
+    "B, lights scaled" is the recipe with the contrast of the natural lights fitted to the objects.
     """
     return {"B": RECIPE, "B, lights scaled": RECIPE.with_fitted_contrast(), "ours": FitOptions()}[
         method
     ]
 
 
-def run(task: Task) -> tuple[str, str, str, list[float], float]:
-    """Six errors and the loss."""
-    channels = 1 if task.grey else 3
+def run_job(job: SolveJob) -> tuple[str, str, str, list[float], float]:
+    """Solve one object.
+
+    Parameters
+    ----------
+    job : SolveJob
+        The solve.
+
+    Returns
+    -------
+    method, light, name : str
+        From the job.
+    errors : list of float
+        In the order of `METRICS`.
+    loss : float
+        Final loss.
+    """
+    channels = 1 if job.grey else 3
     weights = (
-        isc_weights(task.light, channels)
-        if task.method == "ours"
-        else published_weights(task.light, channels)
+        isc_weights(job.light, channels)
+        if job.method == "ours"
+        else published_weights(job.light, channels)
     )
-    truth = training_object(task.shared, task.name, task.light)
-    truth = greyed(truth) if task.grey else truth
-    priors = task.priors.priors(task.light, channels)
-    if task.method != "ours":
+    truth = training_object(job.shared, job.name, job.light)
+    truth = greyed(truth) if job.grey else truth
+    priors = job.priors.priors(job.light, channels)
+    if job.method != "ours":
         priors = priors.without_silhouette()
     options = (
         SolverOptions(threads=1)
-        if task.method == "ours"
+        if job.method == "ours"
         else SolverOptions(threads=1, lbfgs=LbfgsOptions())
     )  # the published rule
     result = solve(problem(truth, priors, weights), options)
     errors = scores(truth, result)
     return (
-        task.method,
-        task.light,
-        task.name,
+        job.method,
+        job.light,
+        job.name,
         [getattr(errors, metric) for metric in METRICS],
         result.terms.total,
     )
 
 
-def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool, grey: bool) -> list[Task]:
-    """All solves; fits the folds."""
+def solve_jobs(
+    shared: Path, methods: tuple[str, ...], in_sample: bool, grey: bool
+) -> list[SolveJob]:
+    """Fit the folds and list all solves.
+
+    Parameters
+    ----------
+    shared : Path
+        Folder with data/.
+    methods : tuple of str
+        Of `METHODS`.
+    in_sample : bool
+        Fit the priors to all objects.
+    grey : bool
+        Remove the colours.
+
+    Returns
+    -------
+    list of SolveJob
+        By method, object and light.
+    """
     root = shared / "data" / "mit_berkeley_train"
     statistics = collect_statistics(read_training_objects(root))
     lights = load_natural_lights(root)
@@ -99,38 +147,39 @@ def tasks(shared: Path, methods: tuple[str, ...], in_sample: bool, grey: bool) -
         whole = fit_priors(statistics, lights, fit_options(method)) if in_sample else None
         for name in statistics:
             fold = whole or fit_priors(without(statistics, name), lights, fit_options(method))
-            made += [Task(method, name, light, fold, shared, grey) for light in LIGHTS]
+            made += [SolveJob(method, name, light, fold, shared, grey) for light in LIGHTS]
     return made
 
 
 def without(statistics: dict[str, ObjectStatistics], name: str) -> dict[str, ObjectStatistics]:
-    """The other objects: what the priors of a fold are fitted to."""
+    """Return the statistics of the other objects."""
     return {key: value for key, value in statistics.items() if key != name}
 
 
 def main() -> None:
-    """Runs and prints."""
+    """Run the command line."""
     options = parser(__doc__)
     options.add_argument(
-        "--in-sample", action="store_true", help="priors fitted to all ten objects"
+        "--in-sample", action="store_true", help="fit the priors to all ten objects"
     )
-    options.add_argument("--grey", action="store_true", help="the photos without their colours")
+    options.add_argument("--grey", action="store_true", help="remove the colours of the photos")
     options.add_argument(
         "--methods",
         default=",".join(METHODS).replace("B, lights scaled", "scaled"),
-        help="of B, scaled, ours",
+        help="comma-separated: B, scaled, ours",
     )
-    options.add_argument("--processes", type=int, default=2)
+    options.add_argument("--processes", type=int, default=2, help="parallel processes")
     given = options.parse_args()
     methods = tuple("B, lights scaled" if m == "scaled" else m for m in given.methods.split(","))
     results: dict[tuple[str, str], dict[str, list[float]]] = {}
     with ProcessPoolExecutor(given.processes) as pool:
         for method, light, name, errors, loss in pool.map(
-            run, tasks(given.shared, methods, given.in_sample, given.grey)
+            run_job, solve_jobs(given.shared, methods, given.in_sample, given.grey)
         ):
             results.setdefault((method, light), {})[name] = errors
             print(
-                f"{method:18s} {light:10s} {name:9s} avg {geometric_mean(errors):.5f}  loss {loss:.3f}",
+                f"{method:18s} {light:10s} {name:9s} "
+                f"avg {geometric_mean(errors):.5f}  loss {loss:.3f}",
                 flush=True,
             )
     report(results)
@@ -138,9 +187,11 @@ def main() -> None:
 
 
 def report(results: dict[tuple[str, str], dict[str, list[float]]]) -> None:
-    """Geometric means a method and light, and each method against B."""
+    """Print the geometric means by method and light, and the ratios to B."""
     print(
-        "\n| light | priors | Z px | N rad | S-MSE | R-MSE | RS-MSE | L-MSE | avg |\n|---|---|---|---|---|---|---|---|---|"
+        "\n| light | priors | Z px | N rad | S-MSE | R-MSE | RS-MSE | L-MSE | avg |\n"
+        + "|---" * 9
+        + "|"
     )
     for (method, light), found in sorted(results.items(), key=lambda item: item[0][1]):
         means = np.exp(np.mean([np.log(errors) for errors in found.values()], axis=0))
@@ -161,7 +212,8 @@ def report(results: dict[tuple[str, str], dict[str, list[float]]]) -> None:
                 ]
                 ratio = paired_bootstrap(logs[0], logs[1], seed=0)
                 print(
-                    f"{light}: ours / {baseline} = {ratio.ratio:.3f}, 95 % interval {ratio.low:.3f} to {ratio.high:.3f}"
+                    f"{light}: ours / {baseline} = {ratio.ratio:.3f}, "
+                    f"95 % interval {ratio.low:.3f} to {ratio.high:.3f}"
                 )
 
 

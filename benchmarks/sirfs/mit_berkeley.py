@@ -1,6 +1,4 @@
-"""What the benchmarks on MIT-Berkeley share: where the data is, a SIRFS problem in the reference's
-protocol, its scores.
-"""
+"""Data, SIRFS problems and scores shared by the benchmarks on MIT-Berkeley."""
 
 import argparse
 import json
@@ -29,27 +27,51 @@ _LAST_DIGIT = 1e-7
 
 
 def parser(text: str | None) -> argparse.ArgumentParser:
-    """The options that every benchmark has."""
+    """Build a command-line parser with the options of every benchmark.
+
+    Parameters
+    ----------
+    text : str or None
+        Description.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        With `--shared` and `--json`.
+    """
     options = argparse.ArgumentParser(description=text)
     options.add_argument(
         "--shared", type=Path, default=Path("../shared"), help="folder with data/ and anchors/"
     )
-    options.add_argument("--json", type=Path, help="write the figures here")
+    options.add_argument("--json", type=Path, help="JSON file to write")
     return options
 
 
 def training_object(shared: Path, name: str, illumination: str) -> MitBerkeleyObject:
-    """One training object with its diffuse image."""
+    """Read a training object with its diffuse image."""
     return load_object(shared / "data" / "mit_berkeley_train", name, illumination, "diffuse")
 
 
 def rounded(photo: MitBerkeleyObject, number: int) -> MitBerkeleyObject:
-    """The photo with its last digits changed, another way for each `number`; as it is for 0."""
+    """Perturb the last digits of a photo.
+
+    Parameters
+    ----------
+    photo : MitBerkeleyObject
+        The photo.
+    number : int
+        Chooses the perturbation; 0: none.
+
+    Returns
+    -------
+    MitBerkeleyObject
+        The perturbed photo.
+    """
     return replace(photo, image=rounded_image(photo.image, number))
 
 
 def rounded_image(image: np.ndarray, number: int) -> np.ndarray:
-    """The same of linear light (H, W, 3)."""
+    """Perturb the last digits of linear light (H, W, 3); `number` 0: not at all."""
     return (
         image * (1 + _LAST_DIGIT * np.random.default_rng(number).standard_normal(image.shape))
         if number
@@ -58,8 +80,17 @@ def rounded_image(image: np.ndarray, number: int) -> np.ndarray:
 
 
 def greyed(photo: MitBerkeleyObject) -> MitBerkeleyObject:
-    """The photo as a camera without colours takes it, three equal channels everywhere: the
-    channels' mean, of shading and log light too.
+    """Remove the colours of a photo: all channels become their mean.
+
+    Parameters
+    ----------
+    photo : MitBerkeleyObject
+        The photo.
+
+    Returns
+    -------
+    MitBerkeleyObject
+        With grey image, shading and log light, and the matching reflectance.
     """
     image, shading, light = (
         np.repeat(part.mean(axis=-1, keepdims=True), 3, axis=-1)
@@ -80,7 +111,7 @@ def greyed(photo: MitBerkeleyObject) -> MitBerkeleyObject:
 
 
 def reference_results(shared: Path, illumination: str) -> dict[str, dict[str, float]]:
-    """The reference program's measured results by object, diffuse input."""
+    """Read the reference program's scores by object, for diffuse input."""
     results: dict[str, dict[str, float]] = json.loads(
         (shared / "anchors" / "sirfs_reference.json").read_text()
     )["results"][f"{illumination}/diffuse"]
@@ -88,18 +119,48 @@ def reference_results(shared: Path, illumination: str) -> dict[str, dict[str, fl
 
 
 def problem(truth: MitBerkeleyObject, priors: Priors, weights: Weights) -> Problem:
-    """The problem as the reference program poses it: the data set's crop, contour points near its
-    edge dropped. Of as many channels of the photo as the priors have.
+    """Pose the problem of the reference program.
+
+    The crop is that of the data set; contour points near its edge are dropped.
+
+    Parameters
+    ----------
+    truth : MitBerkeleyObject
+        The object.
+    priors : Priors
+        Their number of channels is that of the problem.
+    weights : Weights
+        Of the loss.
+
+    Returns
+    -------
+    Problem
+        The problem.
     """
     image = truth.image[..., : priors.channels]
     log_image = np.where(truth.valid[..., None], np.log(np.where(image > 0, image, 1)), 0.0)
     contour = occluding_contour(truth.mask, drop_near_edge=True)
     expected = expected_normals(truth.mask, priors.silhouette, None)
-    return Problem(log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=expected)
+    return Problem(
+        log_image, truth.valid, truth.mask, contour, priors, weights, silhouette=expected
+    )
 
 
 def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:
-    """The six errors of a solve."""
+    """Score a solution.
+
+    Parameters
+    ----------
+    truth : MitBerkeleyObject
+        Ground truth.
+    result : SirfsResult
+        The solution.
+
+    Returns
+    -------
+    Scores
+        The six errors.
+    """
     normal = normal_from_reference(normals(result.height))
     light = light_from_reference(result.light)
     light = np.broadcast_to(light, (len(light), 3))
@@ -115,6 +176,6 @@ def scores(truth: MitBerkeleyObject, result: SirfsResult) -> Scores:
 
 
 def write_json(path: Path | None, figures: object) -> None:
-    """Writes the figures if a path was given."""
+    """Write the figures, if a path is given."""
     if path is not None:
         path.write_text(json.dumps(figures, indent=1) + "\n")

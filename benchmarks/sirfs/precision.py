@@ -1,9 +1,11 @@
-"""Production (float32, compiled) against double precision and against the plain NumPy engine, with
-the shipped priors and weights.
+"""Compare production (float32, compiled) with double precision and with the NumPy engine.
 
-python -m benchmarks.sirfs.precision               production against float64: losses and scores of the
-ten objects, both lights python -m benchmarks.sirfs.precision --numpy       ten fixed states and whole
-solves in both engines, with the ratio of their times
+  python -m benchmarks.sirfs.precision
+  python -m benchmarks.sirfs.precision --numpy
+
+The first form compares losses and scores of the ten objects under both lights; `--numpy` compares
+ten fixed states and whole solves in both engines, with the ratio of their times. Priors and weights
+are the shipped ones.
 """
 
 import time
@@ -14,7 +16,7 @@ import numpy as np
 
 from isc_core.datasets.mit_berkeley import list_objects
 from isc_core.evaluation.metrics import geometric_mean
-from isc_core.numerics.thread_pool import Workers
+from isc_core.numerics.thread_pool import ThreadPool
 from isc_core.sirfs.numba_engine import NumbaEngine
 from isc_core.sirfs.numpy_engine import NumpyEngine
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
@@ -26,13 +28,13 @@ from .mit_berkeley import LIGHTS, parser, problem, scores, training_object
 
 
 def timed(function: Callable[[], SirfsResult]) -> tuple[SirfsResult, float]:
-    """What the function returns and the seconds it took."""
+    """Return the result of a function and the seconds it took."""
     start = time.perf_counter()
     return function(), time.perf_counter() - start
 
 
 def against_double(shared: Path, names: list[str]) -> None:
-    """Final losses and scores in both precisions."""
+    """Print final losses and scores in both precisions."""
     for light in LIGHTS:
         priors, weights = shipped_prior_set().priors(light, 3), isc_weights(light, 3)
         averages: dict[bool, list[float]] = {True: [], False: []}
@@ -53,20 +55,23 @@ def against_double(shared: Path, names: list[str]) -> None:
                     seconds.append(took)
                     evaluations.append(result.evaluations)
             print(
-                f"{light:10s} {name:9s} loss {losses[True]:.4f}, float64 {losses[False]:.4f}, ratio {losses[True] / losses[False]:.5f}; "
-                f"avg {averages[True][-1]:.5f} / {averages[False][-1]:.5f}; {seconds[-1]:.2f} s, {evaluations[-1]} evaluations of "
+                f"{light:10s} {name:9s} loss {losses[True]:.4f}, float64 {losses[False]:.4f}, "
+                f"ratio {losses[True] / losses[False]:.5f}; "
+                f"avg {averages[True][-1]:.5f} / {averages[False][-1]:.5f}; "
+                f"{seconds[-1]:.2f} s, {evaluations[-1]} evaluations of "
                 f"{1e3 * seconds[-1] / evaluations[-1]:.2f} ms",
                 flush=True,
             )
         both = geometric_mean(averages[True]), geometric_mean(averages[False])
         print(
-            f"{light:10s} geometric means: avg {both[0]:.5f} / {both[1]:.5f}, ratio {both[0] / both[1]:.4f}; "
-            f"{geometric_mean(seconds):.2f} s, {geometric_mean([float(e) for e in evaluations]):.0f} evaluations"
+            f"{light:10s} geometric means: avg {both[0]:.5f} / {both[1]:.5f}, "
+            f"ratio {both[0] / both[1]:.4f}; {geometric_mean(seconds):.2f} s, "
+            f"{geometric_mean([float(e) for e in evaluations]):.0f} evaluations"
         )
 
 
 def states(made: Problem) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Ten heights and lights, from flat to steep."""
+    """Return ten heights and lights, from flat to steep."""
     rng = np.random.default_rng(0)
     i, j = np.mgrid[: made.valid.shape[0], : made.valid.shape[1]]
     found = []
@@ -82,14 +87,14 @@ def states(made: Problem) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def against_numpy(shared: Path, names: list[str]) -> None:
-    """Both engines at ten states and in whole solves."""
+    """Print the differences of both engines, at ten states and in whole solves."""
     for light in LIGHTS:
         priors, weights = shipped_prior_set().priors(light, 3), isc_weights(light, 3)
         for name in names:
             made = problem(training_object(shared, name, light), priors, weights)
             for dtype in (np.float64, np.float32):
                 worst = np.zeros(3)
-                with Workers(2) as workers:
+                with ThreadPool(2) as workers:
                     compiled, plain = NumbaEngine(made, dtype, workers), NumpyEngine(made, dtype)
                     for height, lit in states(made):
                         a, b = (
@@ -107,24 +112,27 @@ def against_numpy(shared: Path, names: list[str]) -> None:
                             worst, np.array([abs(a.terms.total / b.terms.total - 1), *differences])
                         )
                 print(
-                    f"{light:10s} {name:9s} {dtype.__name__}: loss {worst[0]:.1e}, dZ {worst[1]:.1e}, dL {worst[2]:.1e}",
+                    f"{light:10s} {name:9s} {dtype.__name__}: loss {worst[0]:.1e}, "
+                    f"dZ {worst[1]:.1e}, dL {worst[2]:.1e}",
                     flush=True,
                 )
             fast, fast_s = timed(lambda made=made: solve(made, SolverOptions(engine="numba")))  # type: ignore[misc]
             slow, slow_s = timed(lambda made=made: solve(made, SolverOptions(engine="numpy")))  # type: ignore[misc]
             each = (slow_s / slow.evaluations) / (fast_s / fast.evaluations)
             print(
-                f"{light:10s} {name:9s} whole solve: loss ratio {slow.terms.total / fast.terms.total:.5f}, "
-                f"time {slow_s:.1f} / {fast_s:.2f} s = {slow_s / fast_s:.1f}, an evaluation {each:.1f}",
+                f"{light:10s} {name:9s} whole solve: "
+                f"loss ratio {slow.terms.total / fast.terms.total:.5f}, "
+                f"time {slow_s:.1f} / {fast_s:.2f} s = {slow_s / fast_s:.1f}, "
+                f"per evaluation {each:.1f}",
                 flush=True,
             )
 
 
 def main() -> None:
-    """Prints the figures."""
+    """Run the command line."""
     options = parser(__doc__)
-    options.add_argument("--numpy", action="store_true")
-    options.add_argument("--objects", help="comma-separated; all training objects without it")
+    options.add_argument("--numpy", action="store_true", help="compare the engines")
+    options.add_argument("--objects", help="comma-separated (default: all)")
     given = options.parse_args()
     names = (
         given.objects.split(",")

@@ -1,5 +1,4 @@
-"""Reads the SIRFS reference release's trained constants (`sirfs_reference_priors.npz`), for
-comparison only.
+"""Read the trained constants of the SIRFS reference release, for comparison only.
 
 They are under research terms and never ship with the project.
 """
@@ -13,7 +12,22 @@ from isc_core.sirfs.priors.tabulated_potential import TabulatedPotential
 
 
 def reference_priors(path: Path, illumination: str, channels: int = 3) -> Priors:
-    """The reference's priors; `illumination` is "natural" or "laboratory", `channels` 3 or 1."""
+    """Read the priors of the reference release.
+
+    Parameters
+    ----------
+    path : Path
+        `sirfs_reference_priors.npz`.
+    illumination : {"natural", "laboratory"}
+        Which lights.
+    channels : {3, 1}, optional
+        Colour or grey.
+
+    Returns
+    -------
+    Priors
+        The priors.
+    """
     with np.load(path, allow_pickle=False) as f:
         d = {k: f[k] for k in f.files}
     kind = f"light_{'color' if channels == 3 else 'gray'}_{illumination}_"

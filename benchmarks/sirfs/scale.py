@@ -1,12 +1,11 @@
-"""Does the answer depend on the photo's scale or on empty space around the object? And what does a
-larger photo cost?
+"""Measure how the result depends on the photo's scale and padding, and what a larger photo costs.
 
   python -m benchmarks.sirfs.scale [--photos DIR] [--cost]
 
-For each photo (enlarged, where its object is shorter than 512 pixels): normals at --max-size 192,
-256 and 384 against those at 512, compared on the smaller grid, and the ratio of relative heights;
+For each photo (enlarged if its object is shorter than 512 pixels): normals at --max-size 192, 256
+and 384 against those at 512, compared on the smaller grid, and the ratio of relative heights;
 normals with 16 and 64 pixels of padding against none. `--cost`: time and peak memory of the solve
-at full scale from 0.1 to 4 megapixels of valid pixels.
+at full scale, from 0.1 to 4 megapixels of valid pixels.
 """
 
 import argparse
@@ -20,9 +19,10 @@ from pathlib import Path
 import numpy as np
 
 from isc_core.decompose.pipeline import Settings, decompose
+from isc_core.imaging.bounding_box import mask_box
 from isc_core.imaging.resampling import resample_inside
 from isc_core.numerics.lbfgs import LbfgsOptions
-from isc_core.photo.photo import Photo, mask_box, read_photo
+from isc_core.photo import Photo, read_photo
 from isc_core.sirfs.priors.prior_file import shipped_prior_set
 from isc_core.sirfs.recover import RecoverOptions, recover
 from isc_core.sirfs.settings import isc_weights
@@ -32,12 +32,12 @@ SIZES = (192, 256, 384, 512)
 
 
 def angle(a: np.ndarray, b: np.ndarray, mask: np.ndarray) -> float:
-    """Median angle in degrees between two normal maps inside `mask`."""
+    """Return the median angle in degrees between two normal maps inside `mask`."""
     return float(np.degrees(np.median(np.arccos(np.clip((a * b).sum(-1)[mask], -1, 1)))))
 
 
 def magnified(photo: Photo, least: int) -> Photo:
-    """The photo, smoothly enlarged where its object is smaller than `least` pixels."""
+    """Enlarge the photo if its object is smaller than `least` pixels."""
     long = max(photo.box[2:])
     if long >= least:
         return photo
@@ -50,7 +50,7 @@ def magnified(photo: Photo, least: int) -> Photo:
 
 
 def padded(photo: Photo, by: int) -> Photo:
-    """The photo with black space around it."""
+    """Add black space around the photo."""
     sides = [(by, by), (by, by)]
     return replace(
         photo,
@@ -61,8 +61,17 @@ def padded(photo: Photo, by: int) -> Photo:
 
 
 def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
-    """For each size: median normal change against 512 on the smaller grid, and the ratio of height
-    ranges for their sizes.
+    """Compare sizes with 512 pixels.
+
+    Parameters
+    ----------
+    photo : Photo
+        The photo.
+
+    Returns
+    -------
+    list of tuple
+        Size, median change of the normals in degrees, ratio of the relative height ranges.
     """
     results = {size: decompose(photo, Settings(max_size=size)) for size in SIZES}
     largest = results[SIZES[-1]]
@@ -89,7 +98,7 @@ def scale_figures(photo: Photo) -> list[tuple[int, float, float]]:
 
 
 def padding_figures(photo: Photo) -> list[tuple[int, float]]:
-    """Median normal change against the photo as it is, for each padding."""
+    """Return, for each padding, the median change of the normals in degrees."""
     plain = decompose(photo)
     figures = []
     for by in (16, 64):
@@ -99,17 +108,15 @@ def padding_figures(photo: Photo) -> list[tuple[int, float]]:
 
 
 def cost_of(megapixels: float) -> None:
-    """One solve of a synthetic ball at full scale, in a process of its own; prints seconds and peak
-    memory.
-    """
+    """Solve a synthetic ball at full scale and print seconds and peak memory."""
     radius = int(np.sqrt(megapixels * 1e6 / np.pi))
     i, j = np.mgrid[-radius - 2 : radius + 3, -radius - 2 : radius + 3] / radius
     mask = i**2 + j**2 < 1
     n3 = np.sqrt(np.maximum(1 - i**2 - j**2, 0))
-    paint = np.where(((5 * i).astype(int) + (5 * j).astype(int)) % 2 == 0, 0.6, 0.3)
+    albedo = np.where(((5 * i).astype(int) + (5 * j).astype(int)) % 2 == 0, 0.6, 0.3)
     image = np.stack(
         [
-            paint * c * (0.2 + 0.8 * np.maximum(0.3 * -i - 0.4 * j + 0.85 * n3, 0))
+            albedo * c * (0.2 + 0.8 * np.maximum(0.3 * -i - 0.4 * j + 0.85 * n3, 0))
             for c in (1, 0.8, 0.6)
         ],
         -1,
@@ -133,23 +140,26 @@ def cost_of(megapixels: float) -> None:
     seconds, peak = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     pixels = int(mask.sum())
     print(
-        f"{pixels / 1e6:6.2f} megapixels: {result.evaluations:4d} evaluations of {1e3 * seconds / result.evaluations:8.2f} ms, "
-        f"{seconds:7.1f} s, "
-        f"{1e9 * seconds / result.evaluations / pixels:5.1f} ns a pixel and evaluation; peak {peak / 1024:.0f} MB, "
-        f"{(peak - before) * 1024 / pixels:.0f} bytes a pixel above what importing and a small solve take",
+        f"{pixels / 1e6:6.2f} megapixels: {result.evaluations:4d} evaluations "
+        f"of {1e3 * seconds / result.evaluations:8.2f} ms, {seconds:7.1f} s, "
+        f"{1e9 * seconds / result.evaluations / pixels:5.1f} ns per pixel and evaluation; "
+        f"peak {peak / 1024:.0f} MB, {(peak - before) * 1024 / pixels:.0f} bytes per pixel "
+        "more than a small solve",
         flush=True,
     )
 
 
 def main() -> None:
-    """Prints the figures."""
-    options = argparse.ArgumentParser(
+    """Run the command line."""
+    parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    options.add_argument("--photos", type=Path, default=Path("../shared/data/photos"))
-    options.add_argument("--cost", action="store_true")
-    options.add_argument("--one", type=float, help=argparse.SUPPRESS)
-    given = options.parse_args()
+    parser.add_argument(
+        "--photos", type=Path, default=Path("../shared/data/photos"), help="photos with masks"
+    )
+    parser.add_argument("--cost", action="store_true", help="measure time and memory")
+    parser.add_argument("--one", type=float, help=argparse.SUPPRESS)
+    given = parser.parse_args()
     if given.one:
         cost_of(given.one)
         return

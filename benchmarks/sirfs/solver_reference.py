@@ -1,4 +1,4 @@
-"""Our solver with the reference's priors against the reference program: losses, scores, time.
+"""Compare our solver, with the reference's priors, with the reference program: loss, scores, time.
 
 python -m benchmarks.sirfs.solver_reference [--float64] [--engine numpy]
 """
@@ -24,14 +24,12 @@ from .reference_priors import reference_priors
 
 
 def main() -> None:
-    """Runs the ten training objects under both lights and prints a table."""
+    """Run the command line."""
     options = parser(__doc__)
-    options.add_argument(
-        "--float64", action="store_true", help="double precision instead of the production setting"
-    )
-    options.add_argument("--engine", default="auto")
-    options.add_argument("--threads", type=int, default=0)
-    options.add_argument("--objects", help="comma-separated; all training objects without it")
+    options.add_argument("--float64", action="store_true", help="use double precision")
+    options.add_argument("--engine", default="auto", help="engine of the solver")
+    options.add_argument("--threads", type=int, default=0, help="threads (default: all)")
+    options.add_argument("--objects", help="comma-separated (default: all)")
     given = options.parse_args()
     solver = SolverOptions(
         engine=given.engine, single=not given.float64, threads=given.threads, lbfgs=LbfgsOptions()
@@ -66,7 +64,8 @@ def main() -> None:
             print(
                 f"{light:10s} {name:9s} loss {result.terms.total:8.4f}  / reference {ratio:.5f}"
                 f"  avg {average:.5f} ({theirs[name]['avg']:.5f})"
-                f"  {result.evaluations:4d} evaluations of {per:.2f} ms  {took:.2f} s  {result.reason}",
+                f"  {result.evaluations:4d} evaluations of {per:.2f} ms  {took:.2f} s"
+                f"  {result.reason}",
                 flush=True,
             )
             figures[f"{light}/{name}"] = {
@@ -77,8 +76,8 @@ def main() -> None:
                 "seconds": took,
             }
         print(
-            f"{light:10s} geometric means: avg {geometric_mean(averages):.5f} ({geometric_mean(reference):.5f}), "
-            f"time {geometric_mean(seconds):.2f} s"
+            f"{light:10s} geometric means: avg {geometric_mean(averages):.5f} "
+            f"({geometric_mean(reference):.5f}), time {geometric_mean(seconds):.2f} s"
         )
     write_json(given.json, figures)
 

@@ -1,19 +1,20 @@
-"""Where should SIRFS begin? Its objective has many minima, and the start decides into which it
-goes: several, on objects not seen.
+"""Compare starting points of SIRFS, whose objective has many minima, on unseen objects.
 
-  python -m benchmarks.sirfs.starts                                     the MIT-Berkeley objects as they
-  are python -m benchmarks.sirfs.starts --others 0,2,4,6                    each under four of the other
-  objects' lights python -m benchmarks.sirfs.starts --scenes FOLDER                     rendered scenes of
-  `isc synth`
+  python -m benchmarks.sirfs.starts
+  python -m benchmarks.sirfs.starts --others 0,2,4,6
+  python -m benchmarks.sirfs.starts --scenes FOLDER
 
-A start is "dome:light", how much of the outline's dome and of the expected light
-(`sirfs.settings.Start`); "1:0.5+0:0.5" tries two. MIT-Berkeley objects are solved with priors
-fitted to the other nine; under another's light the picture is their paint times the shading of
-their shape. Of a rendered scene the true diffuse layer is solved with the priors that ship, at 256
-pixels and as bright as photos are; its light is not compared. Errors are over the first start's,
-geometric means; a rounding changes the picture's last digits. Cases in which the starts' avg
-differs by more than half are printed, with each start's avg over the best and its final loss:
-whether the loss tells which minimum is the worse.
+The first form solves the MIT-Berkeley objects; `--others` relights each by four of the other
+objects' lights; `--scenes` solves rendered scenes of `isc synth`.
+
+A start is "dome:light", the shares of the silhouette's dome and of the expected light
+(`isc_core.sirfs.settings.Start`); "1:0.5+0:0.5" tries two. MIT-Berkeley objects are solved with
+priors fitted to the other nine; a relit image is the reflectance times the shading of the shape. Of
+a rendered scene, the true diffuse layer is solved with the shipped priors at 256 pixels, exposed
+like a photo; its light is not compared. Errors are geometric means relative to the first start; a
+rounding perturbs the last digits of the image. Cases in which the average errors of the starts
+differ by more than half are printed, with each start's error over the best and its final loss:
+whether the loss identifies the worse minimum.
 """
 
 import argparse
@@ -62,9 +63,25 @@ _APART = 1.5
 
 
 @dataclass(frozen=True)
-class Task:
-    """One solve: of an object under its own light or, with `other`, under that object's, or of a
-    scene's folder (`priors` then None).
+class StartJob:
+    """One solve.
+
+    Attributes
+    ----------
+    case : str
+        Name of the object, or folder of the scene.
+    starts : tuple of Start
+        Starting points.
+    rounding : int
+        Number of the perturbation.
+    light : str
+        Illumination.
+    shared : Path
+        Folder with data/.
+    other : str or None
+        Object that lends its light.
+    priors : PriorSet or None
+        The fold's priors; None for a scene.
     """
 
     case: str
@@ -77,40 +94,46 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Found:
-    """Six errors (five of a scene, NaN last) and the final loss."""
+class StartResult:
+    """Result of a solve.
 
-    task: Task
+    Attributes
+    ----------
+    job : StartJob
+        The solve.
+    errors : tuple of float
+        In the order of `METRICS`; of a scene, the light's is NaN.
+    loss : float
+        Final loss.
+    """
+
+    job: StartJob
     errors: tuple[float, ...]
     loss: float
 
     @property
     def average(self) -> float:
-        """The geometric mean of the errors."""
+        """Geometric mean of the errors."""
         return float(np.exp(np.nanmean(np.log(self.errors))))
 
 
-def run(task: Task) -> Found:
-    """Solves from the task's start."""
-    weights = replace(isc_weights(task.light, 3), starts=task.starts)
-    return (
-        _of_scene(task, weights) if task.priors is None else _of_object(task, task.priors, weights)
-    )
+def run_job(job: StartJob) -> StartResult:
+    """Solve from the starts of a job."""
+    weights = replace(isc_weights(job.light, 3), starts=job.starts)
+    return _of_scene(job, weights) if job.priors is None else _of_object(job, job.priors, weights)
 
 
-def _of_object(task: Task, priors: PriorSet, weights: Weights) -> Found:
-    truth = training_object(task.shared, task.case, task.light)
-    if task.other is not None:
-        truth = _lit(truth, training_object(task.shared, task.other, task.light).light)
-    truth = rounded(truth, task.rounding)
-    result = solve(problem(truth, priors.priors(task.light, 3), weights), SolverOptions(threads=1))
-    return _found(task, scores(truth, result), result.terms.total)
+def _of_object(job: StartJob, priors: PriorSet, weights: Weights) -> StartResult:
+    truth = training_object(job.shared, job.case, job.light)
+    if job.other is not None:
+        truth = _lit(truth, training_object(job.shared, job.other, job.light).light)
+    truth = rounded(truth, job.rounding)
+    result = solve(problem(truth, priors.priors(job.light, 3), weights), SolverOptions(threads=1))
+    return _found(job, scores(truth, result), result.terms.total)
 
 
 def _lit(truth: MitBerkeleyObject, light: np.ndarray) -> MitBerkeleyObject:
-    """The object under `light` (9, 3), reference convention: its paint times the shading of its
-    shape.
-    """
+    """The object under `light` (9, 3), reference convention: reflectance times shading."""
     normal = truth_normal(truth.height)
     known = np.isfinite(normal).all(axis=-1, keepdims=True) & truth.valid[..., None]
     shading = np.where(
@@ -120,33 +143,46 @@ def _lit(truth: MitBerkeleyObject, light: np.ndarray) -> MitBerkeleyObject:
     return replace(truth, image=image, valid=(image > 0).all(axis=-1), shading=shading, light=light)
 
 
-def _of_scene(task: Task, weights: Weights) -> Found:
-    truth = read_truth(task.case)
-    diffuse = rounded_image(np.maximum(truth.diffuse, 0).astype(float), task.rounding)
+def _of_scene(job: StartJob, weights: Weights) -> StartResult:
+    truth = read_truth(job.case)
+    diffuse = rounded_image(np.maximum(truth.diffuse, 0).astype(float), job.rounding)
     gain = exposure_normalisation(diffuse, truth.mask)
     options = RecoverOptions(solver=SolverOptions(threads=1))
     result = recover(
         diffuse * gain,
         truth.mask,
         BLACK,
-        shipped_prior_set().priors(task.light, 3),
+        shipped_prior_set().priors(job.light, 3),
         weights,
         options,
     )
     normal = normal_from_reference(normals(result.height))
-    seen = StageInputs(truth.image, truth.mask, np.zeros_like(truth.mask), diffuse)
+    inputs = StageInputs(truth.image, truth.mask, np.zeros_like(truth.mask), diffuse)
     errors = score_sirfs(
-        truth, with_normals(seen, result.height, normal, light_from_reference(result.light))
+        truth, with_normals(inputs, result.height, normal, light_from_reference(result.light))
     )
-    return _found(task, replace(errors, light=np.nan), result.terms.total)
+    return _found(job, replace(errors, light=np.nan), result.terms.total)
 
 
-def _found(task: Task, errors: Scores, loss: float) -> Found:
-    return Found(task, tuple(float(getattr(errors, metric)) for metric in METRICS), loss)
+def _found(job: StartJob, errors: Scores, loss: float) -> StartResult:
+    return StartResult(job, tuple(float(getattr(errors, metric)) for metric in METRICS), loss)
 
 
-def object_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[Task]:
-    """All solves of MIT-Berkeley objects; fits the folds."""
+def object_jobs(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[StartJob]:
+    """Fit the folds and list all solves of the MIT-Berkeley objects.
+
+    Parameters
+    ----------
+    ways : sequence of tuple of Start
+        Starts to compare.
+    given : argparse.Namespace
+        The command's options.
+
+    Yields
+    ------
+    StartJob
+        The solves.
+    """
     root = given.shared / "data" / "mit_berkeley_train"
     statistics, lights = collect_statistics(read_training_objects(root)), load_natural_lights(root)
     for name in list_objects(root, given.light):
@@ -155,27 +191,39 @@ def object_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[
         for other in [names[k] for k in given.others] or [None]:
             for rounding in range(given.roundings):
                 yield from (
-                    Task(name, starts, rounding, given.light, given.shared, other, fold)
+                    StartJob(name, starts, rounding, given.light, given.shared, other, fold)
                     for starts in ways
                 )
 
 
-def scene_tasks(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[Task]:
-    """All solves of rendered scenes."""
+def scene_jobs(ways: Sequence[Starts], given: argparse.Namespace) -> Iterator[StartJob]:
+    """List all solves of rendered scenes.
+
+    Parameters
+    ----------
+    ways : sequence of tuple of Start
+        Starts to compare.
+    given : argparse.Namespace
+        The command's options.
+
+    Yields
+    ------
+    StartJob
+        The solves.
+    """
     for folder in list_scenes(given.scenes):
         for rounding in range(given.roundings):
             yield from (
-                Task(str(folder), starts, rounding, given.light, given.shared) for starts in ways
+                StartJob(str(folder), starts, rounding, given.light, given.shared)
+                for starts in ways
             )
 
 
-def report(found: Sequence[Found], ways: Sequence[Starts]) -> None:
-    """A row a start, and the cases in which the starts are far apart."""
-    cases: dict[tuple[str, str | None, int], dict[Starts, Found]] = {}
+def report(found: Sequence[StartResult], ways: Sequence[Starts]) -> None:
+    """Print one row per start, and the cases in which the starts differ much."""
+    cases: dict[tuple[str, str | None, int], dict[Starts, StartResult]] = {}
     for one in found:
-        cases.setdefault((one.task.case, one.task.other, one.task.rounding), {})[
-            one.task.starts
-        ] = one
+        cases.setdefault((one.job.case, one.job.other, one.job.rounding), {})[one.job.starts] = one
     print(
         f"\n{len(cases)} cases\n\n| start | "
         + " | ".join(METRICS)
@@ -190,56 +238,57 @@ def report(found: Sequence[Found], ways: Sequence[Starts]) -> None:
             "-" if np.isnan(value) else f"{value:.3f}" for value in np.exp(ratios.mean(axis=0))
         ]
         print(
-            f"| {_words(starts)} | {' | '.join(cells)} | {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |"
+            f"| {_start_text(starts)} | {' | '.join(cells)} "
+            f"| {ratios[:, -1].std() / np.sqrt(len(cases)):.3f} |"
         )
     for (case, other, rounding), by in cases.items():
         best = min(one.average for one in by.values())
         if max(one.average for one in by.values()) > _APART * best:
             each = (
-                f"{_words(starts)} {one.average / best:.2f} at {one.loss:.2f}"
+                f"{_start_text(starts)} {one.average / best:.2f} at {one.loss:.2f}"
                 for starts, one in by.items()
             )
             print(
-                f"{Path(case).name}{f' under the light of {other}' if other else ''}, rounding {rounding}: "
-                + ", ".join(each)
+                f"{Path(case).name}{f' under the light of {other}' if other else ''}, "
+                f"rounding {rounding}: " + ", ".join(each)
             )
 
 
 def main() -> None:
-    """Runs and prints."""
+    """Run the command line."""
     options = parser(__doc__)
     options.add_argument(
         "--starts",
         type=_ways,
         default=_ways("0:0,1:0,0:0.5,1:0.5,1:1,1:0.5+0:0.5"),
-        help="dome:light, ...",
+        help="comma-separated starts, dome:light each",
     )
-    options.add_argument("--light", choices=LIGHTS, default=LIGHTS[0])
+    options.add_argument("--light", choices=LIGHTS, default=LIGHTS[0], help="illumination")
     options.add_argument(
         "--others",
         type=lambda text: [int(k) for k in text.split(",")],
         default=[],
-        help="of the nine other lights",
+        help="comma-separated indices of the nine other lights",
     )
-    options.add_argument("--scenes", type=Path, help="a folder of isc synth")
-    options.add_argument("--roundings", type=int, default=1)
-    options.add_argument("--processes", type=int, default=2)
+    options.add_argument("--scenes", type=Path, help="a run of isc synth")
+    options.add_argument("--roundings", type=int, default=1, help="perturbations")
+    options.add_argument("--processes", type=int, default=2, help="parallel processes")
     given = options.parse_args()
-    tasks = (
-        object_tasks(given.starts, given)
+    jobs = (
+        object_jobs(given.starts, given)
         if given.scenes is None
-        else scene_tasks(given.starts, given)
+        else scene_jobs(given.starts, given)
     )
     with ProcessPoolExecutor(given.processes) as pool:
-        found = list(pool.map(run, tasks))
+        found = list(pool.map(run_job, jobs))
     report(found, given.starts)
     write_json(given.json, [_row(one) for one in found])
 
 
-def _row(found: Found) -> tuple[object, ...]:
-    """A case, its start, what was compared and the loss, JSON-ready."""
-    task, errors = found.task, [None if np.isnan(error) else error for error in found.errors]
-    return task.case, task.other, task.rounding, _words(task.starts), errors, found.loss
+def _row(found: StartResult) -> tuple[object, ...]:
+    """A case, its start, errors and loss, ready for JSON."""
+    job, errors = found.job, [None if np.isnan(error) else error for error in found.errors]
+    return job.case, job.other, job.rounding, _start_text(job.starts), errors, found.loss
 
 
 def _ways(text: str) -> list[Starts]:
@@ -249,7 +298,7 @@ def _ways(text: str) -> list[Starts]:
     ]
 
 
-def _words(starts: Starts) -> str:
+def _start_text(starts: Starts) -> str:
     return "+".join(f"{start.dome:g}:{start.light:g}" for start in starts)
 
 

@@ -1,7 +1,8 @@
-"""The smoothness of the tables of absolute reflectance, cross-validated: log likelihood of each
-object under the others' table.
+"""Cross-validate the smoothness of the tables of absolute reflectance.
 
-python -m benchmarks.sirfs.table_smoothness [--grey]
+  python -m benchmarks.sirfs.table_smoothness [--grey]
+
+Prints the log likelihood of each object under the table of the others.
 """
 
 from dataclasses import replace
@@ -15,9 +16,9 @@ from .mit_berkeley import parser
 
 
 def main() -> None:
-    """Prints a row a constant."""
+    """Run the command line."""
     options = parser(__doc__)
-    options.add_argument("--grey", action="store_true")
+    options.add_argument("--grey", action="store_true", help="use the grey tables")
     given = options.parse_args()
     statistics = collect_statistics(
         read_training_objects(given.shared / "data" / "mit_berkeley_train")

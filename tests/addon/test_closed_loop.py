@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from benchmarks.blender import closed_loop
-from benchmarks.blender.closed_loop_cases import Relit
+from benchmarks.blender.closed_loop_cases import RelitTruth
 from blender_addon.files.result_arrays import ResultArrays, read_result
 from isc_core.evaluation.metrics import psnr
 from isc_core.shading.environment_map import directions, shading_under
@@ -43,7 +43,7 @@ def test_a_new_light_has_the_given_strength_and_direction(result: ResultArrays, 
     """A shallow dome has no shadows under light from the front: diffuse radiance is albedo *
     irradiance / pi.
     """
-    from benchmarks.blender.renders import Look, picture
+    from benchmarks.blender.renders import RenderVariant, render
 
     toward, irradiance, height = (
         np.array([0.48, -0.36, 0.8]),
@@ -60,8 +60,10 @@ def test_a_new_light_has_the_given_strength_and_direction(result: ResultArrays, 
     truth = np.zeros_like(result.diffuse)
     shading = shading_under(sky, normal) + sun / np.pi * np.maximum(normal @ toward, 0)[:, None]
     truth[result.mask] = result.reflectance[result.mask] * shading
-    got, _ = picture(
-        result, Look(own_shadows=False, relit=Relit(light, sky, toward, sun, truth, truth)), SAMPLES
+    got, _ = render(
+        result,
+        RenderVariant(own_shadows=False, relit=RelitTruth(light, sky, toward, sun, truth, truth)),
+        SAMPLES,
     )
     assert (
         psnr(
@@ -78,12 +80,12 @@ def test_a_new_light_has_the_given_strength_and_direction(result: ResultArrays, 
 
 
 def test_emissive_materials_are_detected(result: ResultArrays) -> None:
-    from benchmarks.blender.renders import shining
+    from benchmarks.blender.renders import emitting_nodes
     from blender_addon.scene import BuildOptions, build_object
 
-    assert shining(build_object(result, BuildOptions(specular_from="image")).material)
+    assert emitting_nodes(build_object(result, BuildOptions(specular_from="image")).material)
     for gloss in ("lobe", "none"):
-        assert not shining(build_object(result, BuildOptions(specular_from=gloss)).material)  # type: ignore[arg-type]
+        assert not emitting_nodes(build_object(result, BuildOptions(specular_from=gloss)).material)  # type: ignore[arg-type]
 
 
 def test_own_shadows_are_on_in_shared_scenes_only(result: ResultArrays) -> None:

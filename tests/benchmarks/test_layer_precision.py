@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from benchmarks.decomposition.layer_precision import TAKEN, mirrored
+from benchmarks.decomposition.layer_precision import APPROXIMATIONS, mirrored
 from isc_core.evaluation.evaluate import Estimate
 from isc_core.shading.environment_map import environment_from_shading
 from synth.glossy_mit.gloss import environment_gloss
@@ -40,11 +40,12 @@ def test_the_mirrored_light_is_what_the_set_mirrors() -> None:
 def test_as_much_light_is_taken_as_is_said(name: str, share: float) -> None:
     plain, mask = answer()
     layer = np.where(mask[..., None], np.random.default_rng(0).random((*mask.shape, 3)), 0)
-    assert TAKEN[name](layer, mask, plain)[mask].sum() == pytest.approx(share * layer.sum())
+    approximate = APPROXIMATIONS[name](layer, mask, plain)
+    assert approximate[mask].sum() == pytest.approx(share * layer.sum())
 
 
 @pytest.mark.parametrize("name", ["blurred 2 %", "blurred 5 %"])
 def test_a_blurred_layer_keeps_what_is_even(name: str) -> None:
     plain, mask = answer()
     even = np.where(mask[..., None], 0.3, 0) * np.ones(3)
-    np.testing.assert_allclose(TAKEN[name](even, mask, plain)[mask], 0.3, rtol=1e-5)
+    np.testing.assert_allclose(APPROXIMATIONS[name](even, mask, plain)[mask], 0.3, rtol=1e-5)
