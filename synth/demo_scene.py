@@ -1,6 +1,5 @@
 """The demo's photo: `python -m synth.demo_scene -o DIR` renders a glazed gourd under a soft
-environment
-and two softboxes.
+environment and two softboxes.
 
 Writes `photo.png` (sRGB, 16 bits, with alpha: the photo) and `truth.exr` (the ground truth of its
 decomposition).

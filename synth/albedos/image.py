@@ -2,8 +2,7 @@
 
 Limits: an image contains light, not reflectance: values above `BRIGHTEST` are clipped to it, each
 channel separately, before any reduction in size; nothing is scaled. Its left and right sides meet
-in
-a seam unless the image is periodic.
+in a seam unless the image is periodic.
 """
 
 from pathlib import Path

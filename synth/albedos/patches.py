@@ -30,8 +30,7 @@ def texture(rng: np.random.Generator, size: int) -> np.ndarray:
 
 def _stripes(rng: np.random.Generator, size: int, count: int) -> np.ndarray:
     """Indices (size, size) of rings, upright stripes or screws of uneven width; an integer number
-    around
-    keeps the seam closed.
+    around keeps the seam closed.
     """
     u, v = grid(size)
     repeats = int(rng.integers(1, 4))

@@ -1,6 +1,5 @@
 """Prints and drawings on paper, packaging and crockery: labels, pages of text, a band of large
-letters,
-brush strokes.
+letters, brush strokes.
 """
 
 from collections.abc import Callable

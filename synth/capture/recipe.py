@@ -1,12 +1,9 @@
 """The recipe of a scene: a few names and numbers, and how they become that scene.
 
 Objects, materials and lights are members of families: "lathe03" is the fourth lathe object, the
-same
-in every scene, with any material and light. Each member therefore has its own random numbers,
-seeded
-by its name; what belongs to a single scene (framing, exposure, samples, noise) is drawn from
-streams
-of the scene's seed.
+same in every scene, with any material and light. Each member therefore has its own random numbers,
+seeded by its name; what belongs to a single scene (framing, exposure, samples, noise) is drawn from
+streams of the scene's seed.
 
 Equation: member (aspect, family, number): SeedSequence((crc32 aspect, crc32 family, number));
 scene: SeedSequence(seed, spawn_key=(k,)). The camera: pixels_per_unit = fill * size / extent, the
@@ -137,8 +134,7 @@ class PictureSettings:
         A pinhole instead of an orthographic camera.
     exposure : float or None
         The 99.5th percentile of the diffuse layer, > 0. None draws it for each scene from .5 to
-        .75, and
-        reduces it if more than a tenth of the image would be above 1.
+        .75, and reduces it if more than a tenth of the image would be above 1.
     sensor : Sensor
         The sensor.
 

@@ -89,8 +89,8 @@ def observe(truth: GroundTruth, sensor: Sensor, rng: np.random.Generator) -> Gro
     -------
     GroundTruth
         With the sensor's image, non-negative and 0 outside the mask, and its residual. image =
-        diffuse
-        + specular + residual in float32, exactly where clipped, elsewhere to 1e-7 of the light.
+        diffuse + specular + residual in float32, exactly where clipped, elsewhere to 1e-7 of the
+        light.
     """
     light = truth.image.astype(float)
     if sensor.noise:

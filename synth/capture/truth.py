@@ -3,13 +3,11 @@
 Equation, at each pixel inside the mask: image = diffuse + specular + residual, diffuse =
 reflectance * shading. Position, normal and reflectance come from one ray through the pixel's centre
 (`scene.surface`), radiance from one render with separate lobes (`rendering`). The sensor's effect
-on
-the image (clipping, noise, quantisation) is the residual (`sensor`).
+on the image (clipping, noise, quantisation) is the residual (`sensor`).
 
 Rendered shading is not exp(SH(normal)): `illumination` is the best-fitting light of that form, and
 `light_fit_residual` the misfit. The fit maximises sum(shading log(model) - model), Poisson
-regression
-with a logarithmic link, which tolerates black shadows.
+regression with a logarithmic link, which tolerates black shadows.
 
 Citation: P. McCullagh, J. A. Nelder, "Generalized linear models", 2nd edition (1989),
 doi:10.1201/9780203753736 (the fit).

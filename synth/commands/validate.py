@@ -1,6 +1,5 @@
 """`isc validate`: the errors of every stage on rendered scenes, their causes, and whether they meet
-the
-bounds.
+the bounds.
 """
 
 import argparse

@@ -142,8 +142,7 @@ def _make(missing: list[PlannedScene], total: int, out: Path, monitor: Monitor) 
 
 def _tidy(index: int) -> None:
     """Limit the memory of a long run: renderers keep buffers in reference cycles, and Dr.Jit keeps
-    every
-    kernel that it compiled.
+    every kernel that it compiled.
     """
     gc.collect()
     if index % KERNELS_KEPT == KERNELS_KEPT - 1 and has_llvm():

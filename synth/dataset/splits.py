@@ -4,10 +4,9 @@ scene's seed combines.
 Equation: of each family every fifth member (number mod 5 = 4) is held out; of materials every fifth
 round through the albedos, number = round * albedos + albedo. A scene of "train" has only members
 that are not held out; of "test_objects", "test_materials", "test_lights" one held-out member in
-that
-aspect alone; of "test" three. The split follows from the scene's seed, so that a longer run begins
-with the shorter one; the rule is the same for all runs, so that no run trains on what another one
-holds out.
+that aspect alone; of "test" three. The split follows from the scene's seed, so that a longer run
+begins with the shorter one; the rule is the same for all runs, so that no run trains on what
+another one holds out.
 
 Citation: S. Kaufman et al., "Leakage in data mining: formulation, detection, and avoidance", ACM
 Transactions on Knowledge Discovery from Data 6(4) (2012), doi:10.1145/2382577.2382579.
@@ -72,8 +71,7 @@ class Choices:
     ----------
     shapes, materials, albedos, lights : tuple of str
         "mesh", "height" and "image" are the user's files ("mesh" among the albedos: its own
-        colours);
-        materials are models.
+        colours); materials are models.
     splits : tuple of str
         The splits; empty for all possible ones.
 

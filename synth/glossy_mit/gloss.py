@@ -1,16 +1,13 @@
 """The specular layer without shadows under an environment or a panel, at points seen by an
-orthographic
-camera along -z.
+orthographic camera along -z.
 
 Problem: a Monte Carlo render leaves noise of a few per cent in the specular layer, and methods that
 remove highlights take noise for texture. Without shadows nothing has to be traced: the integral
-over
-the light is a sum over the pixels of the environment.
+over the light is a sum over the pixels of the environment.
 
 Equation: radiance(n) = sum_j (p + 8) / (8 pi) (n . h_j)^p max(0, n . w_j) E_j, h_j halfway between
 w_j and the viewer, E_j the irradiance of a piece of the light perpendicular to its beam. Normals
-are
-processed in small groups; a group omits pieces for which (n . h)^p is below 1e-7.
+are processed in small groups; a group omits pieces for which (n . h)^p is below 1e-7.
 
 Citation: J. F. Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH
 1977, doi:10.1145/563858.563893.

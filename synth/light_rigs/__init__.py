@@ -3,8 +3,7 @@
 Directions and lengths are those of `synth.scene.lights`: the object is about 2 wide, around the
 origin, the viewer toward +z. Every draw reaches the visible side. The overall brightness is left to
 the caller (`synth.capture.truth.exposed`): the strongest light, or the mean of an environment,
-gives
-a white diffuse surface a radiance of about 1.
+gives a white diffuse surface a radiance of about 1.
 
 Limits: colours of generated lights are within a few per cent of white; those of files are
 unchanged.

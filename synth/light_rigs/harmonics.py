@@ -3,8 +3,7 @@
 Equation: with P_l the Legendre polynomials and u_k random axes, sum_k g_k P_l(d . u_k) is an
 isotropic random spherical harmonic of degree l (addition theorem: P_l(d . u) is a sum over the Y_lm
 of the degree). Radiance = max(0, 1 + sum over l = 1..degree of such sums), each scaled to a
-standard
-deviation that decreases with l, as in photographed environments.
+standard deviation that decreases with l, as in photographed environments.
 
 Citation: R. O. Dror, A. S. Willsky, E. H. Adelson, "Statistical characterization of real-world
 illumination", Journal of Vision 4(9) (2004), doi:10.1167/4.9.11 (power decreases with the degree).

@@ -2,8 +2,7 @@
 light that fills shadows.
 
 Equation: a place is given by its tilt from the viewing axis and its turn from straight up,
-clockwise
-as seen by the viewer: d = (sin tilt sin turn, sin tilt cos turn, cos tilt).
+clockwise as seen by the viewer: d = (sin tilt sin turn, sin tilt cos turn, cos tilt).
 
 Limits: only lights on the viewer's side, with a tilt below 90 degrees, reach the visible side.
 """

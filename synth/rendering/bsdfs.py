@@ -7,9 +7,8 @@ numbers or arrays with one entry per lane; all may carry gradients. No code is s
 `isc_core.shading.brdf`, so that each tests the other.
 
 Equation: values are f_r cos_light. A specular lobe is sampled by half vectors: with the density
-p(h)
-per solid angle of h, the light's is p(h) / (4 view . h); p is proportional to cos^p of the normal
-for Blinn-Phong, and to the visible facets for GGX.
+p(h) per solid angle of h, the light's is p(h) / (4 view . h); p is proportional to cos^p of the
+normal for Blinn-Phong, and to the visible facets for GGX.
 
 Citation: E. Heitz, "Sampling the GGX distribution of visible normals", Journal of Computer Graphics
 Techniques 7(4), 2018 (no DOI), as implemented in Mitsuba; for the models see
@@ -259,8 +258,7 @@ class PlasticLobes:
         The plugin.
     drawn : MaterialLobes
         Similar lobes that directions are sampled from: the plugin would sample few directions from
-        the
-        specular lobe, which is weak but narrow.
+        the specular lobe, which is weak but narrow.
     """
 
     plugin: Lanes

@@ -5,8 +5,7 @@ directions w to a light L, with V = 0 where the object itself blocks the light.
 
 Equation: point and directional lights are one direction each, without noise. For panels and
 environments each sample takes one direction toward the light and one from the specular lobe
-(diffuse
-materials: by the cosine); with n_k directions of density p_k each adds
+(diffuse materials: by the cosine); with n_k directions of density p_k each adds
 
     f V L cos / sum_k n_k p_k          (the balance heuristic)
 
@@ -247,8 +246,7 @@ def unshadowed(
 
 def _clear_share(paths: Paths, clear: np.ndarray, count: int) -> np.ndarray:
     """Share of the light that reaches each point, (2, count), as estimated by either half of the
-    samples;
-    1 without samples.
+    samples; 1 without samples.
     """
     cell, light = paths.half * count + paths.point, paths.light.sum(1)
     reached, all_of_it = (
@@ -263,8 +261,7 @@ def _sum_and_variance(
     """Sums (count,) of samples over groups of equal distribution, and their variances.
 
     `cell`: group * count + point; `sizes`: samples of each group per point; those without light
-    need not
-    be listed.
+    need not be listed.
     """
     sums, squares = (
         np.bincount(cell, values**power, len(sizes) * count).reshape(len(sizes), count)

@@ -9,9 +9,8 @@ matrix has an entry for every normal and pixel.
 Equation: with the pixel's moment v = integral of w dw (closed form), a pixel entirely above the
 horizon of n contributes n . v and one below contributes 0. A pixel on the horizon is treated as
 flat: over it n . w is the mean m plus two independent uniform numbers in [-a, a] and [-b, b], so
-the
-mean of the part above 0 is (F(m + a + b) - F(m + a - b) - F(m - a + b) + F(m - a - b)) / (4 a b),
-F(x) = max(x, 0)^3 / 6. Normals are processed in small groups: the pixels above the horizon of a
+the mean of the part above 0 is (F(m + a + b) - F(m + a - b) - F(m - a + b) + F(m - a - b)) / (4 a
+b), F(x) = max(x, 0)^3 / 6. Normals are processed in small groups: the pixels above the horizon of a
 whole group are one 3 x 3 matrix, and only a band around the horizon is summed.
 
 A panel: S = L / (2 pi) sum over its edges, clipped at the horizon, of the angle that the edge

@@ -3,9 +3,8 @@
 Equation: at each point a direction is sampled from the lobes, with the density q; it contributes
 f_r cos / q times the radiance that leaves the part of the object which it hits: direct light there
 by one sample of each light, albedo * diffuse + specular, and, while bounces remain, the
-contribution
-of a direction sampled there in the same way. Directions that miss the object contribute nothing:
-that light is direct.
+contribution of a direction sampled there in the same way. Directions that miss the object
+contribute nothing: that light is direct.
 
 Citation: J. T. Kajiya, "The rendering equation", SIGGRAPH 1986, doi:10.1145/15922.15902.
 

@@ -3,8 +3,7 @@ directions.
 
 Equation: an environment is constant on each pixel; a pixel is sampled by its light, radiance times
 solid angle, and a direction uniformly within it, so the density is share / solid angle. A point on
-a
-panel is sampled uniformly: distance^2 / (area cos) per steradian. Beams (directional and point
+a panel is sampled uniformly: distance^2 / (area cos) per steradian. Beams (directional and point
 lights) are not sampled: they arrive from one direction.
 
 Citation: P. Shirley, C. Wang, K. Zimmerman, "Monte Carlo techniques for direct lighting
@@ -213,8 +212,7 @@ def kernel_light(light: Light) -> Any:
 
 def _first_above(heap: Lanes, start: Lanes, count: Lanes, value: Lanes) -> Lanes:
     """The first index of [start, start + count) whose entry in `heap`, ascending there, is above
-    `value`;
-    the last one without any.
+    `value`; the last one without any.
     """
     dr, mi = load_drjit(), load_mitsuba()
 

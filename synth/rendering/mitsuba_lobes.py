@@ -1,14 +1,12 @@
 """Lighting of a surface by Mitsuba's kernels: diffuse and specular lobes from the same light paths,
-for
-all points at once.
+for all points at once.
 
 Problem: the radiance that each visible point sends to the camera, the two lobes separate, and the
 variance of the estimate.
 
 Equation: directional and point lights are evaluated exactly. For extended lights each sample takes
 two directions, one toward the light with the density p and one from the lobes with q, and both
-count
-as
+count as
 
     V f_r L cos / (p + q)        the balance heuristic; V: visibility
 
@@ -17,8 +15,7 @@ of shadows is sampled: a k S + (V f_r - a k / pi) L cos / (p + q), k = pi f_r wi
 the normal, a the unshadowed share of the light. That share is estimated by the other half of the
 samples, so the mean is unbiased. A convex Lambertian object has no variance, nor has full shadow.
 Samples are independent: the variance of a mean is their sum of squares / (n (n - 1)), accumulated
-by
-Welford's updates.
+by Welford's updates.
 
 Citation: E. Veach, L. J. Guibas, "Optimally combining sampling techniques for Monte Carlo
 rendering", SIGGRAPH 1995, doi:10.1145/218380.218498. B. P. Welford, "Note on a method for
@@ -26,8 +23,7 @@ calculating corrected sums of squares and products", Technometrics 4(3), 419-420
 doi:10.1080/00401706.1962.10490022. W. Jakob et al., Dr.Jit, 2022, doi:10.1145/3528223.3530099.
 
 Limits: LLVM variants only; float32. If no sample hits a rare shadow or glint, both mean and
-variance
-are wrong: compare renders with similar numbers of samples, or take many.
+variance are wrong: compare renders with similar numbers of samples, or take many.
 """
 
 import math
@@ -301,8 +297,7 @@ class _Gathered:
 
     def add(self, estimate: Callable[[Lanes], tuple[Lanes, ...]], samples: int) -> None:
         """Add samples of the colours that `estimate` computes from random numbers, in one kernel,
-        which does
-        not depend on their number.
+        which does not depend on their number.
         """
         dr, mi = load_drjit(), load_mitsuba()
         end = dr.opaque(mi.UInt32, self.count + samples)

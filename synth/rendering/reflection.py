@@ -241,8 +241,7 @@ def _visible_facets(
     """Half vectors (N, count, 3) in the frame of each normal, for views (N, 3) there.
 
     On facets stretched to a sphere the visible part is a cap whose directions, halved with the
-    view,
-    are uniform.
+    view, are uniform.
     """
     stretch = np.stack([alpha, alpha, np.ones_like(alpha)], -1)
     seen = view * stretch

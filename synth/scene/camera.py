@@ -7,8 +7,7 @@ centre is at (column + .5, row + .5), row 0 at the top.
 
 Equation: orthographic, x = (column + .5 - width / 2) / pixels_per_unit, y = (height / 2 - row - .5)
 / pixels_per_unit, along -z. Perspective: a pinhole at z = `distance`, scaled so that the plane z =
-0
-appears at the same size.
+0 appears at the same size.
 
 Citation: R. Hartley and A. Zisserman, "Multiple view geometry in computer vision", 2nd edition
 (2004), doi:10.1017/CBO9780511811685.
@@ -105,8 +104,8 @@ class Camera:
         -------
         dict
             4 x 4 matrices: "opencv" (x right, y down, z away from the viewer) and "blender" (x
-            right, y up,
-            z toward the viewer, the camera at the origin). An orthographic camera is at z = `FAR`.
+            right, y up, z toward the viewer, the camera at the origin). An orthographic camera is
+            at z = `FAR`.
         """
         back = self.distance if self.perspective else FAR
         blender = np.eye(4)

@@ -182,8 +182,7 @@ def lights_as_environment(lights: Lights, rows: int) -> np.ndarray:
     """Render all lights as seen from the origin.
 
     Point and directional lights fill one pixel. Panels fill the pixels whose centres they cover,
-    which
-    keeps their radiance; one that covers none keeps its irradiance.
+    which keeps their radiance; one that covers none keeps its irradiance.
 
     Parameters
     ----------

@@ -1,10 +1,8 @@
 """The visible surface of an object: a point, a normal and a reflectance for each pixel.
 
 Position and normal come from the single ray through each pixel's centre, so that nothing is
-averaged
-over an edge and the ground truth is exact. Reflectance is averaged over the pixel's footprint, as
-in
-a camera, so that prints are antialiased.
+averaged over an edge and the ground truth is exact. Reflectance is averaged over the pixel's
+footprint, as in a camera, so that prints are antialiased.
 
 Limits: visibility is decided at the centre alone: silhouettes are not antialiased.
 """

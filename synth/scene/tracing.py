@@ -173,8 +173,7 @@ def lanes(values: np.ndarray) -> Any:
     """Convert numbers (N,) to a Dr.Jit array, in an LLVM variant.
 
     Dr.Jit reads the numbers in place, and its kernels depend on whether their address is a multiple
-    of
-    the vector length: here it always is, so that no kernel is compiled twice.
+    of the vector length: here it always is, so that no kernel is compiled twice.
     """
     room = np.empty(values.size + _VECTOR // 4, np.float32)
     start = -room.ctypes.data % _VECTOR // 4

@@ -3,9 +3,8 @@
 Equation: sum_i exp(B (1 - q_i(p))) = 1 with q_i(p) = |A_i (p - c_i)|^2, the squared distance from
 the i-th centre in units of its radius. Each ellipsoid contains the origin (q_i(0) < 1). Along a ray
 from the origin every term is above 1 until the ray leaves its ellipsoid and decreases from there,
-so
-that the sum is 1 exactly once: the surface is star-shaped. Newton's method on the logarithm solves
-for it.
+so that the sum is 1 exactly once: the surface is star-shaped. Newton's method on the logarithm
+solves for it.
 
 Citation: J. F. Blinn, "A generalization of algebraic surface drawing", ACM Transactions on Graphics
 1(3) (1982), doi:10.1145/357306.357310.

@@ -1,20 +1,17 @@
 """A height map as a mesh that the camera sees pixel by pixel as it was measured or drawn.
 
-Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s,
-y = (H / 2 - r - 1/2) / s and z = (height - offset) / s, with s pixels per unit: the mapping of
+Equation: pixel (r, c) of a map of W x H pixels has its centre at x = (c + 1/2 - W / 2) / s, y = (H
+/ 2 - r - 1/2) / s and z = (height - offset) / s, with s pixels per unit: the mapping of
 `synth.scene.camera.Camera(W, H, s)`, to the last bit. There is a vertex at each centre, with the
 normal (-dh/dx, -dh/dy, 1) of central differences (one-sided at the rim), and one at each corner of
-a
-pixel, at the mean of the linear extrapolations from the pixels around it; so the mesh covers
-exactly
-the pixels that have a height.
+a pixel, at the mean of the linear extrapolations from the pixels around it; so the mesh covers
+exactly the pixels that have a height.
 
 Citation: J. T. Barron, J. Malik (2015), "Shape, illumination, and reflectance from shading",
 doi:10.1109/TPAMI.2014.2377712 (the heights of the MIT-Berkeley objects, `Z.mat`).
 
 Limits: one side only, open at the rim and behind. Discontinuities between neighbouring pixels
-become
-steep walls, not gaps.
+become steep walls, not gaps.
 """
 
 from dataclasses import dataclass
@@ -244,8 +241,7 @@ def _fans(known: np.ndarray, corner: np.ndarray) -> np.ndarray:
 
 def _coordinates(where: np.ndarray, known: np.ndarray, half: float) -> np.ndarray:
     """Texture coordinates of centres (`half` 0.5) or corners (0): the bounding box of the object,
-    centred,
-    its larger side filling [0, 1].
+    centred, its larger side filling [0, 1].
     """
     row, column = np.nonzero(known)
     middle = np.array([column.min() + column.max() + 1, row.min() + row.max() + 1]) / 2

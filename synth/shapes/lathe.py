@@ -231,8 +231,7 @@ def hollow(outer: np.ndarray, wall: float) -> np.ndarray:
     -------
     (m, 2) ndarray
         The outline from the inner floor over the rim to the lower pole; solid, closed at the top,
-        if
-        even the rim is too narrow for a wall.
+        if even the rim is too narrow for a wall.
     """
     side = outer[:-1]
     floor = side[-1, 1] + 2 * wall

@@ -9,8 +9,8 @@ Citation: M. Dawson-Haggerty et al., trimesh (2019), https://trimesh.org; glTF 2
 12113:2022) for the meaning of its colours.
 
 Limits: the file's own normals, transparency and other maps are ignored. The frame is kept: y must
-be
-up, +z toward the viewer, as in glTF. Only files in the mesh's own folder, or below it, are opened.
+be up, +z toward the viewer, as in glTF. Only files in the mesh's own folder, or below it, are
+opened.
 """
 
 import io
@@ -88,8 +88,7 @@ class MeshFile:
 @dataclass(frozen=True)
 class _Part:
     """One piece of a file: `vertices` (N, 3), `faces` (M, 3), `uv` (N, 2) as in `Mesh` or None,
-    `texture`
-    (h, w, 3) or None, `colours` (N, 3) or None; linear.
+    `texture` (h, w, 3) or None, `colours` (N, 3) or None; linear.
     """
 
     vertices: np.ndarray
@@ -153,10 +152,8 @@ def read_mesh_file(path: str | Path, texture_size: int = TEXTURE_SIZE) -> MeshFi
     ------
     InputError
         If the file is missing, unreadable, empty, huge, or refers to a file that is missing or
-        outside
-        its folder; if the mesh is open, inconsistently oriented, without volume, or has vertices
-        that
-        are not finite.
+        outside its folder; if the mesh is open, inconsistently oriented, without volume, or has
+        vertices that are not finite.
     """
     path = Path(path)
     parts = _read_parts(path)
@@ -451,8 +448,7 @@ def _projected(
     parts: list[_Part], vertices: np.ndarray, front: np.ndarray, side: int
 ) -> np.ndarray | None:
     """The colours of all parts on one texture, at the coordinates `front` of the vertices; the
-    frontmost
-    part is visible.
+    frontmost part is visible.
     """
     if all(part.texture is None and part.colours is None for part in parts):
         return None

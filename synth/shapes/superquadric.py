@@ -2,8 +2,8 @@
 between.
 
 Equation: F(p) = (|x/a|^(2/e) + |z/c|^(2/e))^(e/n) + |y/b|^(2/n) = 1. F is homogeneous of degree
-2/n,
-so that the surface lies at d F(d)^(-n/2) in the direction d; its normal is along the gradient of F.
+2/n, so that the surface lies at d F(d)^(-n/2) in the direction d; its normal is along the gradient
+of F.
 
 Citation: A. H. Barr, "Superquadrics and angle-preserving transformations", IEEE Computer Graphics
 and Applications 1(1) (1981), doi:10.1109/MCG.1981.1673799.

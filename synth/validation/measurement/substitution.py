@@ -2,14 +2,14 @@
 its ground truth.
 
 Problem: the chain is photo -> separation -> shape and light -> shading and reflectance. Three
-ground
-truths can be substituted: the diffuse image, the shape, the light; all eight combinations are run.
+ground truths can be substituted: the diffuse image, the shape, the light; all eight combinations
+are run.
 
 Equation: with E(S) the error (geometric mean over scenes) under the ground truths S, a stage's
-share
-is the reduction of the error by its truth, averaged over the orders in which truths can be added,
-divided by E(nothing). The shares and the error that remains with all truths sum to 1. A negative
-share means that the chain does better with the error than without it: stages compensate each other.
+share is the reduction of the error by its truth, averaged over the orders in which truths can be
+added, divided by E(nothing). The shares and the error that remains with all truths sum to 1. A
+negative share means that the chain does better with the error than without it: stages compensate
+each other.
 
 Citation: L. S. Shapley (1953), "A value for n-person games", doi:10.1515/9781400881970-018 (the
 average over orders).
@@ -181,8 +181,7 @@ def chain_value(scores: Scores, metric: str) -> float:
         All errors.
     metric : str
         A name in `METRICS`; "images" is the geometric mean of the errors of shading, reflectance
-        and
-        both locally.
+        and both locally.
 
     Returns
     -------

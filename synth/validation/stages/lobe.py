@@ -42,8 +42,7 @@ class LobeScores:
     ----------
     alpha_factor : float or None
         Ratio of estimated and true alpha, or its inverse, >= 1. Only if alpha was determined and
-        the
-        material has one.
+        the material has one.
     explained : float or None
         Share of the squared specular image that the fit explains.
     determined : float or None
