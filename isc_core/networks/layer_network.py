@@ -1,23 +1,22 @@
-"""The network that tells the diffuse layer of a photo from experience: what rendered glossy objects
-look like with and without gloss.
+"""Prediction of the diffuse layer of a photo from its appearance.
 
 Problem: a highlight on grey paint has the paint's own colour; what gives it away is its form, how
-it lies on the shape, and what the paint is around it. No local cue is proof; a network that has
-seen many objects weighs them all, near and far.
+it lies on the shape, and the reflectance around it. No local cue is proof; a network trained on
+many objects weighs them all, near and far.
 
 Equation: y_c(x) = log(I_c / D_c) >= 0 and log b(x), the scale of y's error, from log(I / mean I +
-.03) and the mask. An encoder of five levels, each of two 3 x 3 convolutions with max(0, .), average_pool
-by averages of 2 x 2; a decoder that goes back up with the encoder's layers beside it. Pixels go in
-and come out in blocks of 2 x 2 (space to depth), and y = log(1 + exp(o - 2)). The answers for the
-photo and its mirror image are averaged. How coloured the light may be that is taken off so: see
-`light_tint`.
+.03) and the mask. An encoder of five levels, each of two 3 x 3 convolutions with max(0, .) and
+average pooling over 2 x 2; a decoder with the encoder's feature maps beside it. Pixels go in and
+come out in blocks of 2 x 2 (space to depth), and y = log(1 + exp(o - 2)). The outputs for the photo
+and its mirror image are averaged. `separation.support.light_tint` limits how coloured the removed
+light may be.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
 Weights, training scenes and loss are our own: `python -m training.networks.layer_network`.
 
-Limits: it knows lamps, panels and skies on opaque objects of one piece. What no colour and no form
-tells (a veil over everything) stays.
+Limits: it was trained on lamps, panels and environment maps with opaque objects of one piece. What
+neither colour nor form shows (a veil over everything) stays.
 """
 
 from dataclasses import dataclass
@@ -25,12 +24,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..imaging.area_resize import averaged_object
 from ..imaging.bounding_box import mask_slices
 from ..imaging.smoothing import masked_gaussian
 from ..imaging.upsampling import enlarged
-from .layers import BLOCK, conv_block, convolved, depth_to_space, encoded, pad_to_stride
+from .layers import BLOCK, conv_block, convolved, depth_to_space, encoded
 from .loader import Network, Parameters
+from .network_input import standardise_input
 
 _MARGIN = 2.0  # of the output: without evidence it says "hardly anything"
 _CHANNELS = 4  # y of three colours, log b
@@ -38,10 +37,18 @@ _CHANNELS = 4  # y of three colours, log b
 
 @dataclass(frozen=True)
 class NetworkOptions:
-    """`long_side`: of the object, in pixels, as the network sees it, >= 32. `doubt` >= 0: how many
-    scales of error y has to exceed. `tint` >= 1: how coloured the light may be that is taken off,
-    see `light_tint`. `mirrored`: whether the answer is the mean of those for the photo and its
-    mirror image, in twice the time.
+    """How the network is applied.
+
+    Attributes
+    ----------
+    long_side : int
+        Of the object, in pixels, as the network sees it; at least 32.
+    doubt : float
+        Number of error scales that y has to exceed; not negative.
+    tint : float
+        How coloured the removed light may be, see `separation.support.light_tint`; at least 1.
+    mirrored : bool
+        Average the predictions for the photo and its mirror image, in twice the time.
     """
 
     long_side: int = 176
@@ -52,9 +59,14 @@ class NetworkOptions:
 
 @dataclass(frozen=True)
 class LayerNetwork(Network):
-    """`weights`: of each convolution (9, inputs, outputs) float32, rows of the 3 x 3 first;
-    `biases` (outputs,). In the order of the data: two for each level down, two for each level up
-    from the coarsest, the output.
+    """A network for specular layers. Raises `InputError` where parts do not fit each other.
+
+    Attributes
+    ----------
+    weights : tuple of (9, inputs, outputs) float32 ndarray
+        Rows of the 3 x 3 kernel first. In the order of the data: two for each level down, two for
+        each level up from the coarsest, the output.
+    biases : tuple of (outputs,) float32 ndarray
     """
 
     title = "layer network"
@@ -84,7 +96,7 @@ class LayerNetwork(Network):
 
     @property
     def encoder(self) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-        """The weights and biases of its levels down."""
+        """The weights and biases of the levels down."""
         return self.weights[: 2 * self._levels], self.biases[: 2 * self._levels]
 
     @property
@@ -94,10 +106,21 @@ class LayerNetwork(Network):
     def __call__(
         self, image: np.ndarray, mask: np.ndarray, mirrored: bool = True
     ) -> tuple[np.ndarray, np.ndarray]:
-        """y (H, W, 3) >= 0 and log b (H, W), float32, of `image` (H, W, 3) linear >= 0 and `mask`
-        (H, W) bool; H, W multiples of 32.
+        """Predict the log ratio of image and diffuse layer.
 
-        `mirrored`: see `NetworkOptions`.
+        Parameters
+        ----------
+        image : (H, W, 3) ndarray
+            Linear, not negative; H and W are multiples of 32.
+        mask : (H, W) bool ndarray
+        mirrored : bool
+            See `NetworkOptions`.
+
+        Returns
+        -------
+        y : (H, W, 3) float32 ndarray
+            Not negative.
+        log_error : (H, W) float32 ndarray
         """
         raw = self._run(image, mask)
         if mirrored:
@@ -120,18 +143,32 @@ class LayerNetwork(Network):
 def log_ratio(
     image: np.ndarray, mask: np.ndarray, network: LayerNetwork, options: NetworkOptions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """y (H, W, 3) >= 0 and b (H, W) > 0, float32, 0 outside `mask` (H, W) bool, of `image` (H, W,
-    3).
+    """Predict the log ratio of a photo and its diffuse layer.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    network : LayerNetwork
+    options : NetworkOptions
+
+    Returns
+    -------
+    y : (H, W, 3) float32 ndarray
+        Not negative, 0 outside the mask.
+    b : (H, W) float32 ndarray
+        Its error, greater than 0; 0 outside the mask.
     """
     box = mask_slices(mask)
-    small, inside, factor = averaged_object(image, mask, options.long_side)
-    (light, cover), place = pad_to_stride(small, inside)
-    raw, log_error = network(light, cover, options.mirrored)
+    seen = standardise_input(image, mask, options.long_side)
+    raw, log_error = network(seen.image, seen.mask, options.mirrored)
     error = np.exp(log_error)
     excess = np.maximum(raw - options.doubt * error[..., None], 0)
-    found = np.concatenate([excess, error[..., None]], axis=2)[place]
+    found = np.concatenate([excess, error[..., None]], axis=2)[seen.place]
     whole = np.zeros((*mask.shape, 4), np.float32)
-    whole[box] = np.where(mask[box][..., None], _carried(found, inside, mask[box].shape, factor), 0)
+    whole[box] = np.where(
+        mask[box][..., None], _carried(found, seen.inside, mask[box].shape, seen.factor), 0
+    )
     return whole[..., :3], whole[..., 3]
 
 

@@ -1,14 +1,15 @@
-"""What the project's networks are made of: convolutions on photos of objects, the same to the bit
-on any number of threads.
+"""The layers of the networks: convolutions whose results are identical on any number of threads.
 
-Equation: a photo goes in as log(I / mean I + .03) and its mask, in blocks of 2 x 2 pixels (space to
-depth); each level of an encoder is two 3 x 3 convolutions with max(0, .), zeros around, and half as
-fine as the one before.
+Equation: the input is log(I / mean I + .03) and the mask, in blocks of 2 x 2 pixels (space to
+depth); each level of an encoder is two 3 x 3 convolutions with max(0, .) and zero padding, and half
+as fine as the one before.
 
 Citation: O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28; blocks of pixels: W. Shi et al. 2016, doi:10.1109/CVPR.2016.207.
 
-Limits: one matrix product of doubles a layer: made for networks of some hundred thousand weights.
+Limits: one matrix product of doubles a layer: made for networks of some hundred thousand weights. A
+library such as onnxruntime would be faster, but cannot be shipped in a Blender extension that runs
+on every version, and sums in an order of its own.
 """
 
 from collections.abc import Iterator, Mapping
@@ -29,8 +30,22 @@ Steps = Iterator[
 
 
 def encoded(image: np.ndarray, mask: np.ndarray, steps: Steps, depth: int) -> list[np.ndarray]:
-    """The layers (H / 2^(k+1), W / 2^(k+1), channels) of an encoder of `depth` levels, the finest
-    first; image and mask as `pad_to_stride`.
+    """Run an encoder.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+        Both as `pad_to_stride` returns them.
+    steps : Steps
+        Weights and biases of the remaining convolutions.
+    depth : int
+        Number of levels.
+
+    Returns
+    -------
+    list of ndarray
+        Layers (H / 2^(k+1), W / 2^(k+1), channels), the finest first.
     """
     layer, kept = space_to_depth(inputs_of(image, mask)), []
     for level in range(depth):
@@ -42,8 +57,22 @@ def encoded(image: np.ndarray, mask: np.ndarray, steps: Steps, depth: int) -> li
 def weights_in(
     data: Mapping[str, np.ndarray],
 ) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-    """Weights and biases, float32, of an archive's arrays `weight00`, `bias00`, ... Raises
-    `KeyError` where one is missing, `ValueError` where their numbers are not finite.
+    """Return the weights and biases, float32, of the arrays `weight00`, `bias00`, ...
+
+    Parameters
+    ----------
+    data : mapping of str to ndarray
+
+    Returns
+    -------
+    weights, biases : tuple of ndarray
+
+    Raises
+    ------
+    KeyError
+        If one is missing.
+    ValueError
+        If a number is not finite.
     """
     count = sum(name.startswith("weight") for name in data)
     weights, biases = (
@@ -56,8 +85,15 @@ def weights_in(
 
 
 def is_encoder(weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...]) -> bool:
-    """Whether these are convolutions of an encoder, two for each level, each taking what the one
-    before gives.
+    """Return whether these are the convolutions of an encoder: two a level, each fitting the next.
+
+    Parameters
+    ----------
+    weights, biases : tuple of ndarray
+
+    Returns
+    -------
+    bool
     """
     shapes = [w.shape for w in weights]
     chained = all(a[2:] == b[1:2] for a, b in zip(shapes, shapes[1:], strict=False)) and all(
@@ -74,7 +110,18 @@ def is_encoder(weights: tuple[np.ndarray, ...], biases: tuple[np.ndarray, ...]) 
 
 
 def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """(H, W, 4) float32: log light over the object's mean, 0 outside, and the mask."""
+    """Return the channels of the first layer: log light over the object's mean, and the mask.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (H, W, 4) float32 ndarray
+        Log light is 0 outside the mask.
+    """
     light = np.where(mask[..., None], image, 0).astype(np.float32)
     mean = max(float(light.sum(dtype=float)) / (3 * max(int(mask.sum()), 1)), 1e-9)
     log_light = np.log(light / np.float32(mean) + np.float32(_DARK)) * mask[..., None]
@@ -82,7 +129,7 @@ def inputs_of(image: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def space_to_depth(layer: np.ndarray) -> np.ndarray:
-    """(H, W, C) as (H / 2, W / 2, 4 C), channels first in each block's order."""
+    """Rearrange (H, W, C) to (H / 2, W / 2, 4 C), channels first in each block's order."""
     rows, columns, channels = layer.shape
     blocks = layer.reshape(rows // 2, 2, columns // 2, 2, channels)
     return np.ascontiguousarray(blocks.transpose(0, 2, 4, 1, 3)).reshape(
@@ -91,7 +138,7 @@ def space_to_depth(layer: np.ndarray) -> np.ndarray:
 
 
 def depth_to_space(layer: np.ndarray) -> np.ndarray:
-    """The inverse of `space_to_depth`."""
+    """Rearrange (H, W, 4 C) to (2 H, 2 W, C); the inverse of `space_to_depth`."""
     rows, columns, channels = layer.shape
     blocks = layer.reshape(rows, columns, channels // 4, 2, 2)
     return np.ascontiguousarray(blocks.transpose(0, 3, 1, 4, 2)).reshape(
@@ -100,24 +147,34 @@ def depth_to_space(layer: np.ndarray) -> np.ndarray:
 
 
 def average_pool(layer: np.ndarray) -> np.ndarray:
-    """Means of 2 x 2 pixels: (H / 2, W / 2, C) of (H, W, C)."""
+    """Average 2 x 2 pixels: (H / 2, W / 2, C) of (H, W, C)."""
     rows, columns, channels = layer.shape
     return layer.reshape(rows // 2, 2, columns // 2, 2, channels).mean(axis=(1, 3))
 
 
 def conv_block(layer: np.ndarray, steps: Steps) -> np.ndarray:
-    """The next two convolutions of `steps`, each with max(0, .)."""
+    """Apply the next two convolutions of `steps`, each followed by max(0, .)."""
     for _ in range(2):
         layer = np.maximum(convolved(layer, *next(steps)), 0)
     return layer
 
 
 def convolved(layer: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> np.ndarray:
-    """3 x 3, zeros around: one matrix product of all neighbourhoods.
+    """Convolve with a 3 x 3 kernel and zero padding, as one matrix product of all neighbourhoods.
 
-    Both factors are rounded to whole multiples of a power of two, so small that doubles hold every
-    sum of their products exactly: the order of summing, which libraries choose by the number of
-    threads, does not change a bit.
+    Both factors are rounded to whole multiples of a power of two, small enough for doubles to hold
+    every sum of their products exactly: the order of summation, which libraries choose by the
+    number of threads, does not change a bit.
+
+    Parameters
+    ----------
+    layer : (H, W, C) ndarray
+    weight : (9, C, D) ndarray
+    bias : (D,) ndarray
+
+    Returns
+    -------
+    (H, W, D) float32 ndarray
     """
     rows, columns, channels = layer.shape
     (seen, of_layer), (kernel, of_kernel) = _in_steps(layer), _in_steps(weight)
@@ -141,8 +198,19 @@ def _in_steps(values: np.ndarray) -> tuple[np.ndarray, float]:
 def pad_to_stride(
     image: np.ndarray, mask: np.ndarray
 ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[slice, slice]]:
-    """Image and mask in the middle of a picture whose sides the network can halve, and where they
-    are in it.
+    """Centre image and mask in arrays whose sides are multiples of the network's stride.
+
+    Parameters
+    ----------
+    image : (h, w, 3) ndarray
+        Divided by its mean over the mask.
+    mask : (h, w) bool ndarray
+
+    Returns
+    -------
+    (image, mask) : tuple of ndarray
+    place : tuple of slice
+        Rows and columns of the original.
     """
     sides = [-(-(n + 2 * _FRAME) // STRIDE) * STRIDE for n in mask.shape]
     place = tuple(

@@ -1,18 +1,17 @@
-"""Where the lamps of a photo stand, and whether there are none, one, or several, as a network sees
-it.
+"""Prediction of a photo's light: the number of its sources, and the direction of the strongest.
 
 Problem: highlights and shadows tell people where the light comes from before they know the shape. A
-model that recovers the shape first has the light only as well as its normals, which are 10 to 20
+model that recovers the shape first knows the light only as well as its normals, which are 10 to 20
 degrees off, so a mirrored direction twice that.
 
-Equation: an encoder of convolutions (`networks.layers`) makes layers of the photo; their
-roots, averaged in cells of 16 x 16 pixels, and where the cell lies on the object, make h = max(0, A
-f + a) (n,) of each cell. Mean, deviation and most of h over the object make g = max(0, B . + b),
+Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo; their
+roots, averaged in cells of 16 x 16 pixels, and the cell's position on the object, make h = max(0, A
+f + a) (n,) of each cell. Mean, deviation and maximum of h over the object make g = max(0, B . + b),
 and
 
-    P(lamps) = softmax(C g + c),    P(place) = softmax(D g + d),    light, log deviations = E g + e,
+    P(sources) = softmax(C g + c),  P(place) = softmax(D g + d),  light, log deviations = E g + e,
 
-averaged over the photo and its mirror image: `light_estimate`.
+averaged over the photo and its mirror image.
 
 Citation: M.-A. Gardner et al., "Learning to predict indoor illumination from a single image", ACM
 Trans. Graph. 36(6) (2017), doi:10.1145/3130800.3130891 (a light's direction as a class); O.
@@ -20,7 +19,7 @@ Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015, doi:10.1007/978-3-319-24
 encoder). Weights, training pictures and loss are our own: `python -m
 training.networks.light_network`.
 
-Limits: measured in docs/methods/light_network.md. It learned from rendered paint with a gloss.
+Limits: measured in docs/methods/light_network.md. It was trained on rendered glossy paint.
 """
 
 from collections.abc import Mapping
@@ -30,10 +29,10 @@ from functools import cache
 import numpy as np
 
 from ..errors import InputError
-from ..imaging.area_resize import averaged_object
 from ..scene.light_estimate import PLACES, LightEstimate
-from .layers import encoded, is_encoder, pad_to_stride
+from .layers import encoded, is_encoder
 from .loader import Network, Parameters
+from .network_input import standardise_input
 
 LONG_SIDE = 112  # of the object, in pixels, as the network sees it
 CELL = 16
@@ -49,10 +48,17 @@ _MIRROR = np.array([1, 1, -1, -1, 1, 1, -1, 1.0])  # what a look becomes in a mi
 
 @dataclass(frozen=True)
 class LightNetwork(Network):
-    """`weights`: of each convolution (9, inputs, outputs) float32, two for each level; `biases`
-    (outputs,). `middle`, `scale` (m,): what is taken off the cells' layers, and how much of them
-    counts; `layers`: matrix (inputs, outputs) and what is added (outputs,) of each of local, whole,
-    lamps, places, light. Raises `InputError` where they do not fit each other.
+    """A network for the light. Raises `InputError` where parts do not fit each other.
+
+    Attributes
+    ----------
+    weights : tuple of (9, inputs, outputs) float32 ndarray
+        Of the convolutions, two for each level.
+    biases : tuple of (outputs,) float32 ndarray
+    middle, scale : (m,) ndarray
+        Offset and factor of the cells' features.
+    layers : mapping
+        Matrix (inputs, outputs) and offset (outputs,) of local, whole, lamps, places and light.
     """
 
     title = "light network"
@@ -99,9 +105,21 @@ class LightNetwork(Network):
     def __call__(
         self, image: np.ndarray, mask: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The probabilities of none, one and several lamps (3,) and of `PLACES` (256,), and the
-        light and its deviations (16,); `image` (H, W, 3) and `mask` (H, W) as
-        `networks.layers.pad_to_stride` makes them.
+        """Predict the light for an input of `standardise_input`.
+
+        Parameters
+        ----------
+        image : (H, W, 3) ndarray
+        mask : (H, W) bool ndarray
+
+        Returns
+        -------
+        counts : (3,) ndarray
+            Probabilities of no, one and several sources.
+        places : (256,) ndarray
+            Probabilities of `PLACES`.
+        light : (16,) ndarray
+            Log shading and its deviations.
         """
         cover = _cells(mask.astype(float)[..., None], CELL)[..., 0]
         steps = iter(zip(self.weights, self.biases, strict=True))
@@ -133,23 +151,35 @@ class LightNetwork(Network):
 def predict_light(
     image: np.ndarray, mask: np.ndarray, network: LightNetwork | None = None
 ) -> LightEstimate:
-    """The lamps of a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the shipped
-    network if None.
+    """Predict the light of a photo: number and direction of its sources, and the log shading.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, not negative inside the mask.
+    mask : (H, W) bool ndarray
+    network : LightNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    LightEstimate
     """
-    (light, cover), _ = pad_to_stride(*averaged_object(image, mask, LONG_SIDE)[:2])
+    seen = standardise_input(image, mask, LONG_SIDE)
+    light, cover = seen.image, seen.mask
     judge = network or LightNetwork.shipped()
     (counts, places, told), (other, mirrored, reversed_) = (
         judge(light, cover),
         judge(light[:, ::-1], cover[:, ::-1]),
     )
     none, one, several = (float(share) for share in (counts + other) / 2)
-    seen = (told[:_LOOK] + _MIRROR * reversed_[:_LOOK]) / 2
+    shading = (told[:_LOOK] + _MIRROR * reversed_[:_LOOK]) / 2
     return LightEstimate(
         none,
         one,
         several,
         (places + _mirror(mirrored)) / 2,
-        seen,
+        shading,
         (told[_LOOK:] + reversed_[_LOOK:]) / 2,
     )
 

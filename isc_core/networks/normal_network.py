@@ -1,18 +1,17 @@
-"""Which way the surface of an object faces, as a network sees it in the photo before the light is
-known.
+"""Prediction of an object's normal map, before the light is known.
 
-Problem: shading alone does not tell a hollow from a bump, nor how deep either is; outlines,
+Problem: shading alone does not tell concave from convex, nor the depth of either; silhouettes,
 highlights and shadows help people, and so does having seen many objects. SIRFS knows the shading
-and the outline only.
+and the silhouette only.
 
-Equation: an encoder of convolutions (`networks.layers`) makes layers of the photo, each
+Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo, each
 half as fine as the one before; a decoder goes back up to cells of 4 x 4 pixels with the encoder's
-layers beside it; one convolution more gives, for each cell,
+maps beside it; one more convolution gives, for each cell,
 
-    m (3,), the mean of the unit normals that are likely there,    log s, the logarithm of the
-    deviation of n_x and n_y from it,
+    m (3,), the mean of the unit normals that are likely there,
+    log s, the logarithm of the deviation of n_x and n_y from it,
 
-averaged over the photo and its mirror image: `predict_normals`. What becomes of it: `sirfs.normal_prior`.
+averaged over the photo and its mirror image. `sirfs.normal_prior` turns them into a prior.
 
 Citation: D. Eigen and R. Fergus, "Predicting depth, surface normals and semantic labels with a
 common multi-scale convolutional architecture", ICCV 2015, doi:10.1109/ICCV.2015.304 (normals of a
@@ -20,8 +19,8 @@ network); O. Ronneberger, P. Fischer, T. Brox, "U-Net", MICCAI 2015,
 doi:10.1007/978-3-319-24574-4_28 (encoder and decoder). Weights, training pictures and loss are our
 own: `python -m training.networks.normal_network`.
 
-Limits: measured in docs/methods/normal_network.md. It learned from rendered paint with a gloss, and
-sees nothing finer than a thirtieth of the object.
+Limits: measured in docs/methods/normal_network.md. It was trained on rendered glossy paint, and
+resolves nothing finer than a thirtieth of the object.
 """
 
 from dataclasses import dataclass
@@ -30,12 +29,12 @@ import numpy as np
 from scipy import ndimage
 
 from ..errors import InputError
-from ..imaging.area_resize import averaged_object
 from ..imaging.bounding_box import mask_slices
 from ..imaging.upsampling import enlarged
 from ..scene.normal_estimate import NormalEstimate
-from .layers import conv_block, convolved, encoded, is_encoder, pad_to_stride
+from .layers import conv_block, convolved, encoded, is_encoder
 from .loader import Network, Parameters
+from .network_input import standardise_input
 
 LONG_SIDE = 112  # of the object, in pixels, as the network sees it
 CELL = 4
@@ -46,9 +45,14 @@ _COVERED = 0.02  # of a cell that says something
 
 @dataclass(frozen=True)
 class NormalNetwork(Network):
-    """`weights`: of each convolution (9, inputs, outputs) float32; `biases` (outputs,). In the
-    order of the data: two for each of D levels down, two for each of D - 2 levels up from the
-    coarsest, the answer. Raises `InputError` where they do not fit each other.
+    """A network for normals. Raises `InputError` where parts do not fit each other.
+
+    Attributes
+    ----------
+    weights : tuple of (9, inputs, outputs) float32 ndarray
+        In the order of the data: two for each of D levels down, two for each of D - 2 levels up
+        from the coarsest, the output.
+    biases : tuple of (outputs,) float32 ndarray
     """
 
     title = "normal network"
@@ -85,10 +89,7 @@ class NormalNetwork(Network):
         return cls(parameters.weights, parameters.biases)
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """m and log s, (H / 4, W / 4, 4) float32;
-
-        `image` (H, W, 3) and `mask` (H, W) as `networks.layers.pad_to_stride` makes them.
-        """
+        """Return m and log s, (H / 4, W / 4, 4) float32, for an input of `standardise_input`."""
         steps = iter(zip(self.weights, self.biases, strict=True))
         kept = encoded(image, mask, steps, self._depth)
         layer = kept[-1]
@@ -102,20 +103,31 @@ class NormalNetwork(Network):
 def predict_normals(
     image: np.ndarray, mask: np.ndarray, network: NormalNetwork | None = None
 ) -> NormalEstimate:
-    """The normals of a photo, `image` (H, W, 3) linear >= 0 within `mask` (H, W) bool; by the
-    shipped network if None.
+    """Predict the normal map of a photo.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, not negative inside the mask.
+    mask : (H, W) bool ndarray
+    network : NormalNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    NormalEstimate
     """
     box = mask_slices(mask)
-    small, inside, factor = averaged_object(image, mask, LONG_SIDE)
-    (light, cover), place = pad_to_stride(small, inside)
+    seen = standardise_input(image, mask, LONG_SIDE)
+    light, cover = seen.image, seen.mask
     judge = network or NormalNetwork.shipped()
     found = 0.5 * (
         judge(light, cover)
         + judge(light[:, ::-1], cover[:, ::-1])[:, ::-1] * np.array([-1, 1, 1, 1], np.float32)
     )
-    near = enlarged(_carried_on(found, cover), cover.shape, CELL)[place]
+    near = enlarged(_carried_on(found, cover), cover.shape, CELL)[seen.place]
     whole = np.zeros((*mask.shape, _CHANNELS), np.float32)
-    whole[box] = near if factor == 1 else enlarged(near, mask[box].shape, 1 / factor)
+    whole[box] = near if seen.factor == 1 else enlarged(near, mask[box].shape, 1 / seen.factor)
     deviation = np.exp(np.clip(whole[..., 3], SURE, UNSURE))
     return NormalEstimate(
         np.where(mask[..., None], whole[..., :3], 0), np.where(mask, deviation, 0)

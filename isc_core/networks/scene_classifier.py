@@ -1,13 +1,12 @@
-"""What a photo seems to show: opaque paint under one lamp and a smooth light, or what such a model
-does not hold for.
+"""Classification of a photo's scene: opaque paint under one light source, or a violated assumption.
 
-Problem: a mirror, glass, and paint under several lamps also have a shape, a paint and a light that
-add up to the photo: wrong ones. What gives them away is how they look: surroundings bent along the
-outline, highlights of one form beside each other.
+Problem: a mirror, glass, and paint under several sources also have a shape, a reflectance and a
+light that add up to the photo: wrong ones. Their appearance gives them away: an environment bent
+along the silhouette, highlights of one form beside each other.
 
-Equation: an encoder of convolutions (`networks.layers`) makes layers of the photo. Mean,
-deviation and fourth moment of each of their channels over the object make f (n,), and the
-probability of each kind is
+Equation: an encoder of convolutions (`networks.layers`) computes feature maps of the photo. Mean,
+deviation and fourth moment of each channel over the object make f (n,), and the probability of each
+kind is
 
     P = softmax(W' ((sqrt f - m) / s) + b),
 
@@ -18,8 +17,8 @@ doi:10.1007/978-3-319-24574-4_28 (the encoder); pooled moments: A. Babenko, V. L
 "Aggregating local deep features for image retrieval", ICCV 2015, doi:10.1109/ICCV.2015.150.
 Weights, training scenes and loss are our own: `python -m training.networks.scene_classifier`.
 
-Limits: measured in docs/methods/assumption_checks.md. A mirror of surroundings without detail looks like
-paint, and two lamps may look like two bumps.
+Limits: measured in docs/methods/scene_classification.md. A mirror of an environment without detail
+looks like paint, and two sources may look like two bumps.
 """
 
 from dataclasses import dataclass
@@ -27,9 +26,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..imaging.area_resize import averaged_object
-from .layers import average_pool, encoded, is_encoder, pad_to_stride
+from .layers import average_pool, encoded, is_encoder
 from .loader import Network, Parameters
+from .network_input import standardise_input
 
 ORDINARY, MIRROR, GLASS, LAMPS = KINDS = ("ordinary", "mirror", "glass", "lamps")
 LONG_SIDE = 144  # of the object, in pixels, as the network sees it
@@ -40,9 +39,19 @@ _NONE = "these are not the weights of a scene classifier"
 
 @dataclass(frozen=True)
 class SceneClassifier(Network):
-    """`weights`: of each convolution (9, inputs, outputs) float32, two for each level; `biases`
-    (outputs,). `middle`, `scale` (n,), `head` (n, 4), `odds` (4,): the m, s, W and b of the module.
-    Raises `InputError` where they do not fit each other.
+    """The classifier of a photo's scene. Raises `InputError` where parts do not fit each other.
+
+    Attributes
+    ----------
+    weights : tuple of (9, inputs, outputs) float32 ndarray
+        Of the convolutions, two for each level.
+    biases : tuple of (outputs,) float32 ndarray
+    middle, scale : (n,) ndarray
+        m and s of the module.
+    head : (n, 4) ndarray
+        W of the module.
+    odds : (4,) ndarray
+        b of the module.
     """
 
     title = "scene classifier"
@@ -71,10 +80,7 @@ class SceneClassifier(Network):
         return cls(parameters.weights, parameters.biases, *head)
 
     def __call__(self, image: np.ndarray, mask: np.ndarray) -> np.ndarray:
-        """The probabilities (4,) of `KINDS`;
-
-        `image` (H, W, 3) and `mask` (H, W) as `networks.layers.pad_to_stride` makes them.
-        """
+        """Return the probabilities (4,) of `KINDS` for an input of `standardise_input`."""
         found = (np.sqrt(self._moments(image, mask)) - self.middle) / self.scale
         score = np.einsum("n,nk->k", found, self.head) + self.odds
         shares = np.exp(score - score.max())
@@ -100,10 +106,23 @@ class SceneClassifier(Network):
 def classify_scene(
     image: np.ndarray, mask: np.ndarray, network: SceneClassifier | None = None
 ) -> dict[str, float]:
-    """The probability of each of `KINDS` for a photo, `image` (H, W, 3) linear >= 0 within `mask`
-    (H, W) bool; by the shipped network if None.
+    """Return the probability of each kind of scene.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, not negative inside the mask.
+    mask : (H, W) bool ndarray
+    network : SceneClassifier, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    dict of str to float
+        By `KINDS`; they sum to 1.
     """
-    (light, cover), _ = pad_to_stride(*averaged_object(image, mask, LONG_SIDE)[:2])
+    seen = standardise_input(image, mask, LONG_SIDE)
+    light, cover = seen.image, seen.mask
     judge = network or SceneClassifier.shipped()
     found = 0.5 * (judge(light, cover) + judge(light[:, ::-1], cover[:, ::-1]))
     return {kind: float(share) for kind, share in zip(KINDS, found, strict=True)}
