@@ -56,13 +56,13 @@ class LoopRow:
         The object.
     shading, inner, shadowed : float
         Relative RMS of the white render: everywhere, without the outline, with own shadows.
-    sky : float
+    environment : float
         Relative RMS of the environment map's shading without geometry.
     diffuse, diffuse_inner, diffuse_shadowed : float
         PSNR of the diffuse render against the diffuse layer, dB; as above.
     diffuse_usual : float
         The same with Blender's default pixel filter.
-    matt, lobe, image : float
+    no_gloss, lobe, image : float
         PSNR against the photo of renders without gloss, with the lobe, with the specular image, dB.
     maps_lobe : float
         PSNR against the photo of the maps diffuse + lobe, dB.
@@ -72,12 +72,12 @@ class LoopRow:
     shading: float
     inner: float
     shadowed: float
-    sky: float
+    environment: float
     diffuse: float
     diffuse_inner: float
     diffuse_shadowed: float
     diffuse_usual: float
-    matt: float
+    no_gloss: float
     lobe: float
     image: float
     maps_lobe: float
@@ -93,7 +93,7 @@ class RelitRow:
         The object and the light.
     photo : float
         Of the unchanged photo.
-    matt, shadowed : float
+    unshadowed, shadowed : float
         Of the diffuse object without and with its own shadows.
     lobe : float
         With the lobe and own shadows.
@@ -108,7 +108,7 @@ class RelitRow:
     name: str
     light: str
     photo: float
-    matt: float
+    unshadowed: float
     shadowed: float
     lobe: float
     diffuse: float
@@ -160,26 +160,28 @@ def loop_row(name: str, renders: Renders) -> LoopRow:
     """Measure an object in its own light."""
     r = renders.result
     mask, inner, peak, k = r.mask, _inner(r.mask), white(r.image, r.mask), r.reflectance_scale
-    sky = np.zeros_like(r.shading)
-    sky[mask] = k * shading_under(r.environment_map.astype(float), r.normal[mask].astype(float))
+    environment = np.zeros_like(r.shading)
+    environment[mask] = k * shading_under(
+        r.environment_map.astype(float), r.normal[mask].astype(float)
+    )
     own, shadowed = (
         k * renders(RenderVariant(white=True)),
         k * renders(RenderVariant(white=True, own_shadows=True)),
     )
-    matt = renders(RenderVariant())
+    no_gloss = renders(RenderVariant())
     return LoopRow(
         name=name,
         shading=relative_rms(own, r.shading, mask),
         inner=relative_rms(own, r.shading, inner),
         shadowed=relative_rms(shadowed, r.shading, mask),
-        sky=relative_rms(sky, r.shading, mask),
-        diffuse=psnr(r.diffuse, matt, mask, peak=peak),
-        diffuse_inner=psnr(r.diffuse, matt, inner, peak=peak),
+        environment=relative_rms(environment, r.shading, mask),
+        diffuse=psnr(r.diffuse, no_gloss, mask, peak=peak),
+        diffuse_inner=psnr(r.diffuse, no_gloss, inner, peak=peak),
         diffuse_shadowed=psnr(r.diffuse, renders(RenderVariant(own_shadows=True)), mask, peak=peak),
         diffuse_usual=psnr(
             r.diffuse, renders(RenderVariant(filter_width=USUAL_FILTER)), mask, peak=peak
         ),
-        matt=psnr(r.image, matt, mask, peak=peak),
+        no_gloss=psnr(r.image, no_gloss, mask, peak=peak),
         lobe=psnr(r.image, renders(RenderVariant("lobe")), mask, peak=peak),
         image=psnr(r.image, renders(RenderVariant("image")), mask, peak=peak),
         maps_lobe=psnr(r.image, r.diffuse + r.lobe, mask, peak=peak),
@@ -207,7 +209,7 @@ def relit_row(name: str, new: RelitTruth, renders: Renders, ideal: Renders) -> R
     shadowed = renders(RenderVariant(own_shadows=True, relit=new))
     measured = {
         "photo": renders.result.image,
-        "matt": renders(RenderVariant(own_shadows=False, relit=new)),
+        "unshadowed": renders(RenderVariant(own_shadows=False, relit=new)),
         "shadowed": shadowed,
         "lobe": renders(RenderVariant("lobe", own_shadows=True, relit=new)),
     }
@@ -265,14 +267,16 @@ def loop_table(rows: Sequence[LoopRow]) -> str:
         "|---" * 13 + "|",
     ]
     for r in rows:
-        shares = [f"{100 * value:.1f} %" for value in (r.shading, r.inner, r.shadowed, r.sky)]
+        shares = [
+            f"{100 * value:.1f} %" for value in (r.shading, r.inner, r.shadowed, r.environment)
+        ]
         ratios = (
             r.diffuse,
             r.diffuse_inner,
             r.diffuse_shadowed,
             r.diffuse_usual,
             r.lobe,
-            r.matt,
+            r.no_gloss,
             r.image,
             r.maps_lobe,
         )
@@ -290,7 +294,7 @@ def relit_table(rows: Sequence[RelitRow]) -> str:
         "|---" * 9 + "|",
     ]
     for r in rows:
-        ratios = (r.photo, r.matt, r.shadowed, r.lobe, r.diffuse, r.true_maps)
+        ratios = (r.photo, r.unshadowed, r.shadowed, r.lobe, r.diffuse, r.true_maps)
         lines.append(
             f"| {r.name} | {r.light} | "
             + " | ".join(f"{value:.1f} dB" for value in ratios)

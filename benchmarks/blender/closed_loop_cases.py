@@ -175,12 +175,12 @@ def _rendered(options: CaseOptions, name: str) -> LoopCase:
     )
     truth = options.folder / "results" / f"{name}_true_{options.size}"
     if not (relit.is_file() and photo.is_file() and (truth / ARRAYS).is_file()):
-        scene, seen = _photographed(options, name)
+        scene, truth_maps = _photographed(options, name)
         for path in (photo, relit):
             path.parent.mkdir(parents=True, exist_ok=True)
-        write_photo(photo, seen)
-        np.savez(relit, **_new_truths(options, scene, seen))
-        _save_truth(seen, truth)
+        write_photo(photo, truth_maps)
+        np.savez(relit, **_new_truths(options, scene, truth_maps))
+        _save_truth(truth_maps, truth)
     with np.load(relit, allow_pickle=False) as stored:
         lights = tuple(
             RelitTruth(light, *(stored[f"{light}_{part}"] for part in _PARTS))
@@ -231,12 +231,16 @@ def _save_truth(truth: GroundTruth, folder: Path) -> None:
     write_arrays(d, folder / ARRAYS)
 
 
-def _new_truths(options: CaseOptions, scene: Scene, seen: GroundTruth) -> dict[str, np.ndarray]:
+def _new_truths(
+    options: CaseOptions, scene: Scene, photographed: GroundTruth
+) -> dict[str, np.ndarray]:
     made: dict[str, np.ndarray] = {}
     for name in NEW_LIGHTS:
         lights = _new_lights(name)
         truth = render_truth(replace(scene, lights=lights), RenderOptions(options.samples))
-        gain = float(seen.shading[seen.mask].mean() / truth.shading[truth.mask].mean())
+        gain = float(
+            photographed.shading[photographed.mask].mean() / truth.shading[truth.mask].mean()
+        )
         truth = truth.brightened(gain)
         sky = lights_as_environment(
             [one for one in lights if isinstance(one, EnvironmentLight)], _SKY_ROWS

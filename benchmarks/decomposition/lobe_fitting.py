@@ -330,11 +330,11 @@ def _wide_enough(scene: LobeScene) -> bool:
     turn = np.arccos(
         np.clip((normal[near] @ normal[row, column])[mask[near]].min(), -1, 1)
     ) / np.sqrt(2)
-    seen_halves = [
+    half_cosines = [
         (normal[mask] @ (d + (0, 0, 1)) / np.linalg.norm(d + (0, 0, 1))).max()
         for d in scene.directions
     ]
-    return 1.29 * scene.alpha > 3 * turn and max(seen_halves, default=0) > np.cos(scene.alpha)
+    return 1.29 * scene.alpha > 3 * turn and max(half_cosines, default=0) > np.cos(scene.alpha)
 
 
 def report(title: str, found: Sequence[FitRow], limits: tuple[float, float, float]) -> str:

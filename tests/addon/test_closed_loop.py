@@ -30,7 +30,7 @@ def test_renders_match_the_recovered_maps(result: ResultArrays, tmp_path: Path) 
         "Blender's usual filter smooths what the photo's camera has smoothed already"
     )
     assert row.image > 30
-    assert row.image > row.matt + 3, "the photo has a highlight, the matt object has none"
+    assert row.image > row.no_gloss + 3, "the photo has a highlight, the diffuse object has none"
     assert (
         closed_loop.Renders(result, tmp_path / "renders.npz", SAMPLES).kept.keys()
         == renders.kept.keys()
