@@ -20,6 +20,7 @@ import argparse
 import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -82,20 +83,17 @@ def photo_cases(data: Path, rendered: Path | None) -> Iterator[PhotoCase]:
     """
     highlight, objects = data / "highlight", data / "mit_berkeley_train"
     for name in list_shen_zheng(highlight):
-        yield PhotoCase("shen_zheng", name, lambda name=name: load_shen_zheng(highlight, name))  # type: ignore[misc]
+        yield PhotoCase("shen_zheng", name, partial(load_shen_zheng, highlight, name))
     for name in list_objects(objects, "laboratory"):
-        yield PhotoCase("laboratory", name, lambda name=name: load_laboratory(objects, name))  # type: ignore[misc]
+        yield PhotoCase("laboratory", name, partial(load_laboratory, objects, name))
     for folder in (
         sorted(path for path in rendered.iterdir() if path.is_dir()) if rendered is not None else ()
     ):
-        yield PhotoCase("rendered", folder.name, lambda folder=folder: load_rendered(folder))  # type: ignore[misc]
+        yield PhotoCase("rendered", folder.name, partial(load_rendered, folder))
     for light in ("laboratory", "natural"):
         for name in list_objects(objects, light):
-            yield PhotoCase(
-                "clean",
-                f"{light} {name}",
-                lambda light=light, name=name: _without_highlights(objects, light, name),
-            )  # type: ignore[misc]
+            load = partial(_without_highlights, objects, light, name)
+            yield PhotoCase("clean", f"{light} {name}", load)
 
 
 def _without_highlights(objects: Path, light: str, name: str) -> SeparationTruth:

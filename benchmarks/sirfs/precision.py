@@ -10,6 +10,7 @@ are the shipped ones.
 
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -46,9 +47,7 @@ def against_double(shared: Path, names: list[str]) -> None:
                 solve(made)  # compiles
             losses = {}
             for single in (True, False):
-                result, took = timed(
-                    lambda single=single, made=made: solve(made, SolverOptions(single=single))
-                )  # type: ignore[misc]
+                result, took = timed(partial(solve, made, SolverOptions(single=single)))
                 losses[single] = result.terms.total
                 averages[single].append(scores(truth, result).average)
                 if single:
@@ -116,8 +115,8 @@ def against_numpy(shared: Path, names: list[str]) -> None:
                     f"dZ {worst[1]:.1e}, dL {worst[2]:.1e}",
                     flush=True,
                 )
-            fast, fast_s = timed(lambda made=made: solve(made, SolverOptions(engine="numba")))  # type: ignore[misc]
-            slow, slow_s = timed(lambda made=made: solve(made, SolverOptions(engine="numpy")))  # type: ignore[misc]
+            fast, fast_s = timed(partial(solve, made, SolverOptions(engine="numba")))
+            slow, slow_s = timed(partial(solve, made, SolverOptions(engine="numpy")))
             each = (slow_s / slow.evaluations) / (fast_s / fast.evaluations)
             print(
                 f"{light:10s} {name:9s} whole solve: "

@@ -212,8 +212,8 @@ def _rendered(
             parts = {"type": "scene", "object": shape, **_camera(pixels_per_unit), **light}
             pictures.append(np.array(mi.render(mi.load_dict(parts), seed=8 * seed + k)))
     mask = pictures[0][..., -1] > FAR - 5
-    light = [np.where(mask[..., None], np.maximum(one[..., :3], 0), 0) for one in pictures]
-    return np.stack(light).astype(np.float32), mask
+    images = [np.where(mask[..., None], np.maximum(one[..., :3], 0), 0) for one in pictures]
+    return np.stack(images).astype(np.float32), mask
 
 
 def _camera(pixels_per_unit: float) -> dict[str, Any]:
