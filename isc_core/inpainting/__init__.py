@@ -1,3 +1,1 @@
-"""Filling holes of an image from its other pixels: smoothly (pull-push), or by patches found
-through hashing.
-"""
+"""Filling holes of an image: smoothly (pull-push), or with matched patches."""

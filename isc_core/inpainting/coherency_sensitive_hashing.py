@@ -1,6 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Finds for patches of one image their nearest patches of another by hashing and coherence (Korman
-& Avidan 2011).
+"""Nearest patches by hashing and coherence (Korman & Avidan 2011).
 
 Problem: for each target patch the source patch with the smallest Euclidean distance. Comparing all
 pairs is exact and takes minutes to hours; hashing alone misses many neighbours; images are
@@ -9,17 +8,17 @@ coherent, so that the neighbour of a good match is often a good match.
 Equation: each table hashes a patch v by the bins floor((a_j . v + b_j) / r) of its strongest
 Walsh-Hadamard coefficients a_j . v, with random offsets b_j. Candidates of a target patch are (1)
 source patches in its bin, (2) the matches of target patches in its bin, (3) the matches of its two
-neighbours that were visited before, moved by one pixel, and (4) source patches in the bin of those.
-A candidate is dropped as soon as the distance of its projections, a lower bound, exceeds the best
-distance; what survives is compared in full. Tables follow each other, with a new offset, another
-width r and the opposite scan direction each.
+neighbours visited before, moved by one pixel, and (4) source patches in the bin of those. A
+candidate is dropped as soon as the distance of its projections, a lower bound, exceeds the best
+distance; the others are compared in full. Tables follow each other, each with a new offset, another
+width r and the opposite scan direction.
 
 Citation: S. Korman and S. Avidan, "Coherency sensitive hashing", ICCV 2011, 1607-1614,
 doi:10.1109/ICCV.2011.6126421; IEEE TPAMI 38(6), 1099-1112 (2016), doi:10.1109/TPAMI.2015.2477814.
 Ours: widths from the data, and distances that are exact in the end.
 
-Limits: approximate; patches are 8 x 8 pixels, neither turned nor scaled. A patch without a likeness
-gets some source patch, with a large distance.
+Limits: approximate; patches are 8 x 8 pixels, neither rotated nor scaled. A patch without a similar
+one gets some source patch, with a large distance.
 """
 
 from dataclasses import dataclass
@@ -37,13 +36,24 @@ from .walsh_hadamard import PATCH, opponent, project, strongest
 
 @dataclass(frozen=True)
 class CshOptions:
-    """`tables`: how many hash tables are tried one after the other, >= 1; more find better matches.
-    `projections`: Walsh-Hadamard coefficients kept of each patch, 1 to 64 C (8 pixels squared, C
-    channels). `hashed`: how many of them, the strongest, a hash looks at, 1 to `projections`.
-    `candidates`: how many patches of one bin are tried, >= 1. `occupancy`: how many source patches
-    share a patch's bin where bins are narrowest, in the median; > 0. `seed`: of the random offsets,
-    >= 0; the same seed gives the same matches. `threads`: how many work at a time, >= 1; the
-    matches do not depend on it.
+    """Options of the search.
+
+    Attributes
+    ----------
+    tables : int
+        Number of hash tables, at least 1; more find better matches.
+    projections : int
+        Walsh-Hadamard coefficients kept of each patch, 1 to 64 C (8 pixels squared, C channels).
+    hashed : int
+        How many of them, the strongest, enter a hash, 1 to `projections`.
+    candidates : int
+        Patches of one bin that are tried, at least 1.
+    occupancy : float
+        Median number of source patches in a patch's bin where bins are narrowest, greater than 0.
+    seed : int
+        Of the random offsets, not negative; the same seed gives the same matches.
+    threads : int
+        At least 1; the matches do not depend on it.
     """
 
     tables: int = 8
@@ -59,8 +69,13 @@ class CshOptions:
 class Patches:
     """Patches of one image, by their upper left corners in raster order.
 
-    `image` (H, W, C) contiguous float32; `rows`, `columns` (n,) intp; `index` (H, W) int32, a
-    corner's place in the list, else -1.
+    Attributes
+    ----------
+    image : (H, W, C) float32 ndarray
+        Contiguous.
+    rows, columns : (n,) intp ndarray
+    index : (H, W) int32 ndarray
+        A corner's position in the list, else -1.
     """
 
     image: np.ndarray
@@ -74,8 +89,14 @@ class Patches:
 
 @dataclass(frozen=True)
 class Matches:
-    """For target patch i, `source[i]` (n,) int32 is its place in the list of source patches,
-    `distance[i]` (n,) float32 the sum of squared differences of all values of the two patches.
+    """The matches of target patches.
+
+    Attributes
+    ----------
+    source : (n,) int32 ndarray
+        Position in the list of source patches.
+    distance : (n,) float32 ndarray
+        Sum of squared differences of all values of the two patches.
     """
 
     source: np.ndarray
@@ -83,14 +104,12 @@ class Matches:
 
 
 def patches_within(image: np.ndarray, usable: np.ndarray) -> Patches:
-    """The patches of `image` (H, W, C) whose pixels all lie in `usable` (H, W) bool; possibly none."""
+    """Return the patches of an image whose pixels all lie in `usable` (H, W) bool."""
     return _listed(image, _windows(usable) == PATCH * PATCH)
 
 
 def patches_touching(image: np.ndarray, wanted: np.ndarray) -> Patches:
-    """The patches of `image` (H, W, C), wholly in the frame, that have a pixel in `wanted` (H, W)
-    bool; possibly none.
-    """
+    """Return the patches of an image that have a pixel in `wanted` (H, W) bool."""
     return _listed(image, _windows(wanted) > 0)
 
 
@@ -121,8 +140,9 @@ def _windows(flags: np.ndarray) -> np.ndarray:
 
 
 class CshSearch:
-    """Matches between target patches and a fixed set of source patches: the sources' projections
-    are computed once.
+    """Matches between target patches and a fixed set of source patches.
+
+    The sources' projections are computed once.
     """
 
     def __init__(self, source: Patches, options: CshOptions | None = None) -> None:
@@ -141,11 +161,24 @@ class CshSearch:
     def match(
         self, target: Patches, start: np.ndarray | None = None, monitor: Monitor | None = None
     ) -> Matches:
-        """The nearest source patch of each patch of `target`, whose image has as many channels as
-        the sources'.
+        """Find the nearest source patch of each target patch.
 
-        `start` (n,) int: matches to begin with, places in the list of sources; else random ones.
-        None gets worse than its start. `monitor` hears of each table. Raises `Cancelled`.
+        Parameters
+        ----------
+        target : Patches
+            Of an image with as many channels as the sources'.
+        start : (n,) int ndarray, optional
+            Initial matches; no match gets worse. Random by default.
+        monitor : Monitor, optional
+
+        Returns
+        -------
+        Matches
+
+        Raises
+        ------
+        Cancelled
+            If the user asked to stop.
         """
         rng = np.random.default_rng(self.options.seed)
         projected = project(

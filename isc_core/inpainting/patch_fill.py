@@ -1,22 +1,20 @@
-"""Fills a hole with texture from the rest of the image, coarse to fine (Wexler, Shechtman & Irani
-2007).
+"""Filling holes with texture from the rest of the image (Wexler, Shechtman & Irani 2007).
 
 Problem: pixels whose values are missing, in an image with texture: every patch that touches the
 hole should look like some patch outside it.
 
-Equation: alternate until settled: each patch p that touches the hole finds its nearest source patch
-(`coherency_sensitive_hashing`), at squared distance d_p; each missing pixel becomes the mean of
-what the matches say of it, with weights g^-e_p exp(-d_p / (2 s)): s is the upper quartile of the
-distances, e_p how deep the patch's centre lies in the hole, g = 1.3 (`voting`). A pyramid starts
-this where the hole is small; its top is filled smoothly (`pull_push`), and each level starts from
-the one above.
+Equation: alternate until convergence: each patch p that touches the hole finds its nearest source
+patch (`coherency_sensitive_hashing`), at squared distance d_p; each missing pixel becomes the mean
+of its votes, with weights g^-e_p exp(-d_p / (2 s)): s is the upper quartile of the distances, e_p
+the depth of the patch's centre in the hole, g = 1.3 (`voting`). A pyramid starts this where the
+hole is small; its top is filled smoothly (`pull_push`), and each level starts from the one above.
 
 Citation: Y. Wexler, E. Shechtman and M. Irani, "Space-time completion of video", IEEE TPAMI 29(3),
 463-476 (2007), doi:10.1109/TPAMI.2007.60.
 
-Limits: it invents what is plausible, not what was there. Patches of 8 x 8 pixels are copied without
-change of brightness, so that a shading that occurs nowhere else is not continued. Where no source
-patch exists, the fill is smooth.
+Limits: the fill is plausible, not true. Patches of 8 x 8 pixels are copied without change of
+brightness, so that a shading that occurs nowhere else is not continued. Where no source patch
+exists, the fill is smooth.
 """
 
 from dataclasses import dataclass, field
@@ -43,9 +41,16 @@ _DEPTH_LOSS = 1.3
 
 @dataclass(frozen=True)
 class PatchFillOptions:
-    """`iterations`: matching and voting on the finest level, >= 1; each coarser level has one more.
-    `most_iterations`: the limit of that, >= `iterations`.
-    `matching`: how patches are found; its seed decides everything that is random.
+    """Options of the fill.
+
+    Attributes
+    ----------
+    iterations : int
+        Matching and voting on the finest level, at least 1; each coarser level has one more.
+    most_iterations : int
+        The limit of that, at least `iterations`.
+    matching : CshOptions
+        Its seed decides everything that is random.
     """
 
     iterations: int = 2
@@ -60,12 +65,27 @@ def fill_patches(
     options: PatchFillOptions | None = None,
     monitor: Monitor | None = None,
 ) -> np.ndarray:
-    """`image` (H, W, C) with the pixels of `wanted` (H, W) bool filled from those of `known` (H, W)
-    bool: (H, W, C) float32.
+    """Fill the wanted pixels from the known ones.
 
-    Known pixels stay; those that are neither known nor wanted (their values are never read) hold
-    some guess. Reports its progress to `monitor`. Raises `InputError` where nothing is known, a
-    pixel is both, or options are out of range.
+    Parameters
+    ----------
+    image : (H, W, C) ndarray
+        Values that are neither known nor wanted are never read.
+    known, wanted : (H, W) bool ndarray
+    options : PatchFillOptions, optional
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    (H, W, C) float32 ndarray
+        Known pixels stay; the others hold a guess.
+
+    Raises
+    ------
+    InputError
+        If nothing is known, a pixel is both, or options are out of range.
+    Cancelled
+        If the user asked to stop.
     """
     options = options or PatchFillOptions()
     if not 1 <= options.iterations <= options.most_iterations:

@@ -1,9 +1,10 @@
-"""Fills an image's unknown pixels smoothly from its known ones (the pull-push interpolation of
-Gortler et al. 1996).
+"""Smooth interpolation of unknown pixels by pull-push (Gortler et al. 1996).
 
-Problem: values known at some pixels, everywhere wanted. Equation: known pixels are averaged over 2
-x 2 blocks down a pyramid (pull); from the top, holes take the bilinear interpolation of the finest
-level that knows anything (push). It is linear in the pixels.
+Problem: values known at some pixels are wanted at all of them.
+
+Equation: known pixels are averaged over 2 x 2 blocks down a pyramid (pull); from the top, holes
+take the bilinear interpolation of the finest level that is known (push). It is linear in the
+pixels.
 
 Citation: S. J. Gortler, R. Grzeszczuk, R. Szeliski and M. F. Cohen, "The Lumigraph", SIGGRAPH 1996,
 43-54, doi:10.1145/237170.237200.
@@ -15,8 +16,17 @@ import numpy as np
 
 
 def fill(values: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """`values` (H, W, C) with all pixels that are not `known` (H, W) bool interpolated, as float32;
-    at least one must be known.
+    """Interpolate all pixels that are not known.
+
+    Parameters
+    ----------
+    values : (H, W, C) ndarray
+    known : (H, W) bool ndarray
+        At least one pixel.
+
+    Returns
+    -------
+    (H, W, C) float32 ndarray
     """
     return _pull_push(
         np.where(known[..., None], values, 0).astype(np.float32), known.astype(np.float32)
@@ -30,7 +40,18 @@ def _pull_push(values: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def pull(values: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Averages of 2 x 2 blocks over their known pixels; a block is known if any of its pixels is."""
+    """Average 2 x 2 blocks over their known pixels.
+
+    Parameters
+    ----------
+    values : (H, W, C) ndarray
+    weight : (H, W) ndarray
+
+    Returns
+    -------
+    values, weight
+        Half as wide and high; a block is known if any of its pixels is.
+    """
     total = _sum_of_blocks(weight)
     mean = _sum_of_blocks(values * weight[..., None]) / np.maximum(total, 1)[..., None]
     return mean, (total > 0).astype(np.float32)
@@ -44,11 +65,21 @@ def _sum_of_blocks(values: np.ndarray) -> np.ndarray:
 
 
 def push(values: np.ndarray, known: np.ndarray, coarse: np.ndarray) -> np.ndarray:
-    """`values` (H, W, C) where `known` (H, W) bool; elsewhere `coarse`, half as wide and high,
-    doubled bilinearly.
+    """Fill the unknown pixels from a coarser level, upsampled bilinearly.
 
     Pixel centres are aligned: each fine pixel is 3/4 of its block's value and 1/4 of the next
     one's, along both axes.
+
+    Parameters
+    ----------
+    values : (H, W, C) ndarray
+    known : (H, W) bool ndarray
+    coarse : (h, w, C) ndarray
+        Half as wide and high.
+
+    Returns
+    -------
+    (H, W, C) ndarray
     """
     at = np.nonzero(~known)
     (row, next_row), (column, next_column) = (

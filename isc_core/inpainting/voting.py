@@ -1,9 +1,11 @@
 # mypy: disable-error-code="no-untyped-def"
-"""What matched patches say about the pixels under them: the weighted mean of their votes.
+"""Votes of matched patches for the pixels under them: a weighted mean.
 
-Equation: a pixel under the target patches p becomes sum_p w_p v_p / sum_p w_p, v_p the value at its
-place in p's match and w_p = exp(-d_p / (2 s) - l_p): d_p is the squared distance of p to its match,
-s the upper quartile of all d, l_p a loss that the caller may add. Citation: see `patch_fill`.
+Equation: a pixel under the target patches p becomes sum_p w_p v_p / sum_p w_p, with v_p the value
+at its place in p's match and w_p = exp(-d_p / (2 s) - l_p): d_p is the squared distance of p to its
+match, s the upper quartile of all d, l_p a loss that the caller may add.
+
+Citation: see `patch_fill`.
 """
 
 import numpy as np
@@ -23,9 +25,22 @@ def vote(
     matches: Matches,
     loss: np.ndarray | float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Means (H, W, C) float64 of what `values` (h, w, C), on the sources' grid, hold at the places
-    that match, and which pixels (H, W) bool have any vote; the others are 0. `loss`: l_p >= 0, (n,)
-    or one number.
+    """Average what the matches hold at each pixel.
+
+    Parameters
+    ----------
+    values : (h, w, C) ndarray
+        On the sources' grid.
+    target, source : Patches
+    matches : Matches
+    loss : (n,) ndarray or float
+        l_p, not negative.
+
+    Returns
+    -------
+    values : (H, W, C) float64 ndarray
+        0 without votes.
+    voted : (H, W) bool ndarray
     """
     height, width = target.index.shape
     scale = 2 * max(float(np.quantile(matches.distance, 0.75)), 1e-12) if len(target) else 1.0

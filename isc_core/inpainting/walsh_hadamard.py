@@ -1,5 +1,5 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Projects image patches on the Walsh-Hadamard basis: few numbers that hold nearly all of a patch.
+"""Projection of image patches on the Walsh-Hadamard basis.
 
 Problem: comparing two patches of 8 x 8 pixels costs 64 products a channel. Natural images put most
 of a patch's energy into a few coefficients of an orthonormal basis, and any subset of them gives a
@@ -12,10 +12,10 @@ beforehand by an orthonormal matrix with rows grey, red-green, yellow-blue, so t
 which carries most of the energy, is one channel.
 
 Citation: Y. Hel-Or and H. Hel-Or, "Real-time pattern matching using projection kernels", IEEE TPAMI
-27(9), 1430-1445 (2005), doi:10.1109/TPAMI.2005.184. Which coefficients are kept is decided by their
-energy in the image itself, not by a fixed order.
+27(9), 1430-1445 (2005), doi:10.1109/TPAMI.2005.184. The kept coefficients are those with the most
+energy in the image itself, not a fixed order.
 
-Limits: patches are 8 x 8 pixels, a fixed size.
+Limits: patches are 8 x 8 pixels.
 """
 
 from functools import partial
@@ -33,19 +33,35 @@ _SAMPLE = 4096
 
 
 def opponent(image: np.ndarray) -> np.ndarray:
-    """`image` (H, W, C) as contiguous float32, three channels turned to grey, red-green and
-    yellow-blue; distances stay the same.
+    """Convert three channels to grey, red-green and yellow-blue; distances stay the same.
+
+    Parameters
+    ----------
+    image : (H, W, C) ndarray
+
+    Returns
+    -------
+    (H, W, C) float32 ndarray
+        Contiguous.
     """
     turned = image @ _OPPONENT.T if image.shape[2] == 3 else image
     return np.ascontiguousarray(turned, np.float32)
 
 
 def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: int) -> np.ndarray:
-    """The `count` coefficients (as indices below 64 C) with the largest variance over the patches
-    whose corners are given.
+    """Return the coefficients with the largest variance over patches, the strongest first.
 
-    `image` (H, W, C) float32; `rows`, `columns` (n,) of the patches' upper left corners. The
-    strongest comes first.
+    Parameters
+    ----------
+    image : (H, W, C) float32 ndarray
+    rows, columns : (n,) ndarray
+        Upper left corners.
+    count : int
+
+    Returns
+    -------
+    (count,) ndarray
+        Indices below 64 C.
     """
     step = max(1, len(rows) // _SAMPLE)
     everything = np.arange(_CELLS * image.shape[2])
@@ -56,9 +72,23 @@ def strongest(image: np.ndarray, rows: np.ndarray, columns: np.ndarray, count: i
 def project(
     image: np.ndarray, rows: np.ndarray, columns: np.ndarray, chosen: np.ndarray, threads: int = 1
 ) -> np.ndarray:
-    """The coefficients `chosen` (k,) of the patches at `rows`, `columns` (n,), of an orthonormal
-    basis, and in a last column the length of the rest: (n, k + 1) float32. The squared distance of
-    two rows never exceeds that of their patches. Fast in raster order.
+    """Project patches.
+
+    The squared distance of two rows never exceeds that of their patches. Fast in raster order.
+
+    Parameters
+    ----------
+    image : (H, W, C) float32 ndarray
+    rows, columns : (n,) ndarray
+        Upper left corners.
+    chosen : (k,) ndarray
+        Coefficients.
+    threads : int
+
+    Returns
+    -------
+    (n, k + 1) float32 ndarray
+        In the last column the length of the rest.
     """
     out = np.empty((len(rows), len(chosen) + 1), np.float32)
     ends = np.linspace(0, len(rows), 4 * threads + 1).astype(int)

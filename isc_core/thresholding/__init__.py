@@ -1,8 +1,7 @@
-"""Multilevel thresholds of an image's levels: Otsu's objective, its exact maximum, and the
-optimisers that the thesis compares.
+"""Multilevel thresholds: Otsu's objective, its exact maximum, and the optimisers of the thesis.
 
 Each optimiser is a module with `maximise(objective, count, evaluations, seed, options) -> Optimum`;
-`exact` needs no search at all.
+`exact` needs no search.
 """
 
 from ..errors import InputError
@@ -23,11 +22,28 @@ def maximise(
     evaluations: int = 20_000,
     seed: int = 0,
 ) -> Optimum:
-    """The `count` thresholds that the named optimiser finds within a budget of `evaluations`; the
-    same ones for the same `seed` >= 0.
+    """Find thresholds with a named optimiser, within a budget of evaluations.
 
-    `exact` ignores budget and seed. Raises `InputError` for an unknown name, a count outside
-    1..254, a negative seed or a budget below one generation.
+    Parameters
+    ----------
+    optimiser : str
+        "exact" ignores budget and seed.
+    objective : OtsuObjective
+    count : int
+        Number of thresholds, 1 to 254.
+    evaluations : int
+        Budget.
+    seed : int
+        Not negative; the same seed gives the same thresholds.
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    InputError
+        If the name is unknown or a number is out of range.
     """
     if not 1 <= count < LEVELS - 1:
         raise InputError(

@@ -1,7 +1,7 @@
 """Clonal selection with chaotic numbers (chaotic ClonalG; Akbar, Suryana & Sahib 2015).
 
-Problem: as in `clonal_selection`. The claim is that chaotic numbers in the place of pseudo-random
-ones find better thresholds.
+Problem: as in `clonal_selection`. The claim is that chaotic numbers in place of pseudo-random ones
+find better thresholds.
 
 Equation: the logistic map x <- 4x (1 - x), made uniform by u = (2 / pi) asin(sqrt(x)), supplies the
 numbers in three places: the first population, the affinity maturation (the mutation of clones) and
@@ -11,9 +11,9 @@ Citation: H. Akbar, N. Suryana and S. Sahib, "Chaotic clonal selection optimisat
 multi-threshold segmentation", International Journal of Signal and Imaging Systems Engineering 8(5),
 298-315 (2015), doi:10.1504/IJSISE.2015.071953.
 
-Limits: consecutive values of one orbit depend on each other (see `logistic_map`). Here consecutive
-numbers come from different orbits, and an orbit gives each eighth of its values: then the numbers
-are as good as independent, and so the search is as good as with any others.
+Limits: consecutive values of one orbit are dependent (see `logistic_map`). Here consecutive numbers
+come from different orbits, and an orbit gives every eighth of its values: the numbers are then
+practically independent, and the search is as good as with any others.
 """
 
 from .clonal_selection import ClonalOptions, search
@@ -29,9 +29,26 @@ def maximise(
     seed: int = 0,
     options: ClonalOptions | None = None,
 ) -> Optimum:
-    """The best `count` thresholds that chaotic ClonalG finds with at most `evaluations`, its
-    orbits' starts chosen by `seed` >= 0.
+    """Maximise by chaotic ClonalG.
 
-    Raises `InputError` for unfit options, or a budget below the first population.
+    Parameters
+    ----------
+    objective : OtsuObjective
+    count : int
+        Number of thresholds.
+    evaluations : int
+        Budget.
+    seed : int
+        Of the orbits' starts; not negative.
+    options : ClonalOptions, optional
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    InputError
+        If options are invalid, or the budget is below the first population.
     """
     return search(objective, count, evaluations, ChaoticNumbers(seed), options or ClonalOptions())

@@ -1,5 +1,4 @@
-"""Clonal selection: candidates are cloned, mutated the less the better they are, and the worst are
-replaced (ClonalG).
+"""Clonal selection (ClonalG): cloning, affinity-dependent mutation, replacement of the worst.
 
 Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
 
@@ -11,16 +10,15 @@ ones.
 Citation: L. N. de Castro and F. J. Von Zuben, "Learning and optimization using the clonal selection
 principle", IEEE Trans. Evolutionary Computation 6(3), 239-251 (2002),
 doi:10.1109/TEVC.2002.1011539. All antibodies are selected and have equally many clones, as they
-propose for optimisation; N, beta, rho and d are usual values of theirs. Ours are two choices, and
-the search succeeds by them:
-- the affinity is the rank, scaled to [0, 1]: scaled values are nearly 1 for all but the newest
-  antibodies, and nothing would move far;
-- a clone moves a run of neighbouring thresholds by one common step of at least one level, then
-  sorts them. Good sets of thresholds lie on ridges along which neighbours move together;
-  independent steps rarely follow them, and end one level short of the maximum.
+propose for optimisation; N, beta, rho and d are usual values of theirs. Two choices are ours, and
+the search succeeds because of them. The affinity is the rank, scaled to [0, 1]: scaled values are
+nearly 1 for all but the newest antibodies, and nothing would move far. A clone moves a run of
+neighbouring thresholds by one common step of at least one level, then sorts them: good sets of
+thresholds lie on ridges along which neighbours move together; independent steps rarely follow them,
+and end one level short of the maximum.
 
-Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of chance,
-so that another source can be tried with nothing else changed: see `chaotic_clonal`.
+Limits: no proof of optimality; budgets are in evaluations. `numbers` is the only source of
+randomness, so that another source can be tried with nothing else changed: see `chaotic_clonal`.
 """
 
 from dataclasses import dataclass
@@ -37,9 +35,18 @@ _TOP = LEVELS - 2  # the highest threshold that leaves a level above it
 
 @dataclass(frozen=True)
 class ClonalOptions:
-    """`population`: how many antibodies N are kept, >= 2. `clone_share`: clones of each as a share
-    beta of N, > 0. `decay`: rho, how fast mutations shrink with affinity, > 0. `replaced_share`:
-    share d / N of the antibodies, the worst, that each generation replaces, in [0, 1).
+    """Options of ClonalG.
+
+    Attributes
+    ----------
+    population : int
+        Number of antibodies N, at least 2.
+    clone_share : float
+        Clones of each as a share beta of N, greater than 0.
+    decay : float
+        rho, how fast mutations shrink with affinity, greater than 0.
+    replaced_share : float
+        Share d / N of the worst antibodies that each generation replaces, in [0, 1).
     """
 
     population: int = 50
@@ -49,10 +56,10 @@ class ClonalOptions:
 
 
 class Numbers(Protocol):
-    """Where an optimiser takes its chances from."""
+    """A source of random numbers for an optimiser."""
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """The next numbers, of `shape`, uniform within [0, 1)."""
+        """Return the next numbers, of `shape`, uniform in [0, 1)."""
 
 
 class PseudoRandomNumbers:
@@ -62,7 +69,7 @@ class PseudoRandomNumbers:
         self._generator = np.random.default_rng(seed)
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """The next numbers, of `shape`, uniform within [0, 1)."""
+        """Return the next numbers, of `shape`, uniform in [0, 1)."""
         return self._generator.random(shape)
 
 
@@ -73,10 +80,27 @@ def maximise(
     seed: int = 0,
     options: ClonalOptions | None = None,
 ) -> Optimum:
-    """The best `count` thresholds that ClonalG finds with at most `evaluations`, with pseudo-random
-    numbers from `seed` >= 0.
+    """Maximise by ClonalG with pseudo-random numbers.
 
-    Raises `InputError` for unfit options, or a budget below the first population.
+    Parameters
+    ----------
+    objective : OtsuObjective
+    count : int
+        Number of thresholds.
+    evaluations : int
+        Budget.
+    seed : int
+        Not negative.
+    options : ClonalOptions, optional
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    InputError
+        If options are invalid, or the budget is below the first population.
     """
     return search(
         objective, count, evaluations, PseudoRandomNumbers(seed), options or ClonalOptions()
@@ -86,7 +110,24 @@ def maximise(
 def search(
     objective: OtsuObjective, count: int, evaluations: int, numbers: Numbers, options: ClonalOptions
 ) -> Optimum:
-    """`maximise` with any source of numbers."""
+    """Maximise by ClonalG with any source of numbers.
+
+    Parameters
+    ----------
+    objective : OtsuObjective
+    count, evaluations : int
+    numbers : Numbers
+    options : ClonalOptions
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    InputError
+        If the budget is below the first population.
+    """
     _check(options)
     clones = max(1, round(options.clone_share * options.population))
     replaced = round(options.replaced_share * options.population)
@@ -112,7 +153,7 @@ def search(
 
 
 def mutation_rate(affinity: np.ndarray, decay: float) -> np.ndarray:
-    """exp(-rho f), within (0, 1], of affinities f within [0, 1]."""
+    """Return exp(-rho f) in (0, 1], for affinities f in [0, 1]."""
     return np.exp(-decay * affinity)
 
 

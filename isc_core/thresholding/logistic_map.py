@@ -1,14 +1,14 @@
-"""The logistic map x <- r x (1 - x): its orbits, its bifurcation, and uniform numbers made from it.
+"""The logistic map x <- r x (1 - x): orbits, bifurcation, and uniform numbers from it.
 
-Problem: a chaotic sequence is to stand in for pseudo-random numbers, which have to be uniform on
-[0, 1) and independent.
+Problem: a chaotic sequence is to replace pseudo-random numbers, which must be uniform on [0, 1) and
+independent.
 
 Equation: at r = 4 the map is chaotic on [0, 1] and its orbits have the density 1 / (pi sqrt(x (1 -
 x))), which is U-shaped. The arcsine u = (2 / pi) asin(sqrt(x)) makes it uniform. In u the map is
 the tent u <- 1 - |1 - 2u|: the next number is a function of the last one, so consecutive numbers
-fill a line of the unit square. After `stride` steps that line has 2^stride branches: taking each
-stride-th value of an orbit, and consecutive values from different orbits, leaves nothing of it at
-the resolution of the numbers' use.
+fill a line of the unit square. After `stride` steps that line has 2^stride branches: taking every
+stride-th value of an orbit, and consecutive values from different orbits, leaves no trace of it at
+the resolution at which the numbers are used.
 
 Citation: S. M. Ulam and J. von Neumann, "On combination of stochastic and deterministic processes",
 Bulletin of the American Mathematical Society 53(11), 1120 (1947) (the density). R. M. May, "Simple
@@ -16,8 +16,7 @@ mathematical models with very complicated dynamics", Nature 261, 459-467 (1976),
 doi:10.1038/261459a0 (the bifurcation).
 
 Limits: 0 and .75 are fixed points at r = 4; .25, .5 and 1 lead into them. An orbit in floating
-point can round onto 1 and thence to 0 (about once in 10^8 steps): orbits that reach such a point
-are started again.
+point can round to 1 and then to 0 (about once in 10^8 steps): such orbits are restarted.
 """
 
 import numpy as np
@@ -29,11 +28,24 @@ _FORGET = 64  # steps after which rounding has replaced every digit of a start
 
 
 def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarray:
-    """The values (length, ...) of the map from `start` (...) on, which comes first; `rate` within
-    (0, 4].
+    """Iterate the map.
 
-    Raises `InputError` for starts outside (0, 1) or, at rate 4, among the degenerate ones, and for
-    other rates.
+    Parameters
+    ----------
+    start : ndarray or float
+        In (0, 1); the first value.
+    length : int
+    rate : float
+        r, in (0, 4].
+
+    Returns
+    -------
+    (length, ...) ndarray
+
+    Raises
+    ------
+    InputError
+        If a start is outside (0, 1) or, at rate 4, degenerate; or the rate is out of range.
     """
     if not 0 < rate <= 4:
         raise InputError(
@@ -53,8 +65,20 @@ def orbit(start: np.ndarray | float, length: int, rate: float = 4.0) -> np.ndarr
 
 
 def bifurcation(rates: np.ndarray, settle: int = 1000, keep: int = 200) -> np.ndarray:
-    """Where the map ends at each of `rates` (n,) in (0, 4]: values (keep, n) of its orbit from .3
-    on, after `settle` steps.
+    """Return where orbits end at each rate.
+
+    Parameters
+    ----------
+    rates : (n,) ndarray
+        In (0, 4].
+    settle : int
+        Steps to discard.
+    keep : int
+        Steps to return.
+
+    Returns
+    -------
+    (keep, n) ndarray
     """
     x = np.full(np.shape(rates), 0.3)
     values = np.empty((keep, len(rates)))
@@ -66,19 +90,17 @@ def bifurcation(rates: np.ndarray, settle: int = 1000, keep: int = 200) -> np.nd
 
 
 def density(x: np.ndarray) -> np.ndarray:
-    """The density of the orbits at rate 4, at `x` within (0, 1)."""
+    """Return the density of the orbits at rate 4, for `x` in (0, 1)."""
     return 1 / (np.pi * np.sqrt(x * (1 - x)))
 
 
 def uniformised(x: np.ndarray) -> np.ndarray:
-    """Numbers within [0, 1], uniform where `x` within [0, 1] has the map's density at rate 4."""
+    """Map values with the density of rate 4 to uniform ones; both in [0, 1]."""
     return (2 / np.pi) * np.arcsin(np.sqrt(x))
 
 
 class ChaoticNumbers:
-    """A source of uniform numbers within [0, 1) from many orbits of the map at rate 4, advanced
-    side by side.
-    """
+    """A source of uniform numbers in [0, 1) from many orbits of the map at rate 4."""
 
     def __init__(self, seed: int, orbits: int = 1024, stride: int = 8) -> None:
         """`seed` >= 0 chooses where the `orbits` start;
@@ -98,7 +120,7 @@ class ChaoticNumbers:
         self._block = np.empty(0)
 
     def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
-        """The next numbers, of `shape`."""
+        """Return the next numbers, of `shape`."""
         wanted = int(np.prod(shape))
         blocks, held = [self._block], len(self._block)
         while held < wanted:

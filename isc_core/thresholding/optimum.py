@@ -1,4 +1,4 @@
-"""What an optimiser of thresholds returns, and the account that it keeps on the way."""
+"""The result of a threshold optimiser, and the account of its budget."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,12 +10,19 @@ from ..errors import InputError
 
 @dataclass(frozen=True)
 class Optimum:
-    """The best thresholds that were found.
+    """The best thresholds found.
 
-    `thresholds` (K,) integer levels, ascending; class 0 is everything <= the first; equal ones
-    leave the class between them empty. `value`: the objective there. `evaluations`: how many
-    candidates were evaluated. `history` (m, 2): after each batch of candidates, the evaluations
-    used so far and the best value so far.
+    Attributes
+    ----------
+    thresholds : (K,) ndarray
+        Integer levels, ascending; class 0 is everything up to the first; equal ones leave the class
+        between them empty.
+    value : float
+        The objective.
+    evaluations : int
+        Number of candidates evaluated.
+    history : (m, 2) ndarray
+        After each batch of candidates, the evaluations so far and the best value so far.
     """
 
     thresholds: np.ndarray
@@ -25,9 +32,7 @@ class Optimum:
 
 
 class Account:
-    """Evaluates candidates for an optimiser within a budget, and remembers the best one and how the
-    search went.
-    """
+    """Evaluates candidates within a budget and records the best one and the history."""
 
     def __init__(
         self, objective: Callable[[np.ndarray], np.ndarray], budget: int, least: int
@@ -49,9 +54,7 @@ class Account:
         self._history: list[tuple[int, float]] = []
 
     def evaluate(self, thresholds: np.ndarray) -> np.ndarray:
-        """Values (n,) of `thresholds` (n, K), integer and ascending in each row; n must not exceed
-        what is `left`.
-        """
+        """Return the values (n,) of candidates (n, K), ascending integers, n at most `left`."""
         values = self._objective(thresholds)
         self.left -= len(values)
         self._used += len(values)
@@ -62,6 +65,6 @@ class Account:
         return values
 
     def close(self) -> Optimum:
-        """The best of everything that was evaluated; something must have been."""
+        """Return the best candidate; at least one must have been evaluated."""
         assert self._best is not None
         return Optimum(self._best, self._value, self._used, np.array(self._history))

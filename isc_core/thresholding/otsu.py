@@ -1,8 +1,7 @@
-"""Multilevel Otsu thresholds: the between-class variance, and its exact maximum (Otsu 1979; Liao,
-Chen & Chung 2001).
+"""Multilevel Otsu thresholds: the between-class variance, and its exact maximum (Otsu 1979).
 
 Problem: K thresholds t_1 <= ... <= t_K split the levels 0..255 of an image into K + 1 classes,
-class 0 being all levels <= t_1. Find those whose classes lie furthest apart.
+class 0 being all levels <= t_1. Find those whose classes are furthest apart.
 
 Equation: with w_k the share of pixels in class k and m_k its mean, maximise sum_k w_k (m_k - m)^2.
 Each class adds a term that depends on its two ends alone, so a table of 257 x 257 terms holds every
@@ -15,7 +14,7 @@ P.-C. Chung, "A fast algorithm for multilevel thresholding", Journal of Informat
 Engineering 17(5), 713-727 (2001) (the table of terms).
 
 Limits: several sets of thresholds share the maximum where levels are empty; the exact search
-returns the lowest ones. The objective knows nothing of where pixels lie. Few bright pixels move
+returns the lowest ones. The objective ignores the positions of pixels. Few bright pixels move
 thresholds little: a class of 1 % of the pixels weighs 1 %.
 """
 
@@ -28,9 +27,21 @@ LEVELS = 256
 
 
 def quantise(values: np.ndarray, peak: float) -> np.ndarray:
-    """Levels 0..255 (uint8), of the shape of `values`: `values` / `peak` * 255 rounded, clamped.
+    """Quantise values to levels 0..255: `values` / `peak` * 255, rounded and clamped.
 
-    Raises `InputError` for a peak that is not positive and values that are not finite.
+    Parameters
+    ----------
+    values : ndarray
+    peak : float
+
+    Returns
+    -------
+    uint8 ndarray
+
+    Raises
+    ------
+    InputError
+        If the peak is not positive or a value is not finite.
     """
     if not (peak > 0 and np.isfinite(peak) and np.isfinite(values).all()):
         raise InputError(
@@ -43,10 +54,9 @@ def quantise(values: np.ndarray, peak: float) -> np.ndarray:
 
 
 class OtsuObjective:
-    """The between-class variance of one histogram, in squared levels, for many candidates at a
-    time.
+    """The between-class variance of one histogram, in squared levels, for many candidates at once.
 
-    `evaluations` counts the candidates that were asked about; nothing is remembered between calls.
+    `evaluations` counts the candidates; nothing is cached.
     """
 
     def __init__(self, counts: np.ndarray) -> None:
@@ -72,7 +82,7 @@ class OtsuObjective:
 
     @classmethod
     def of(cls, levels: np.ndarray) -> "OtsuObjective":
-        """The objective of an image's `levels`, integers 0..255 of any shape (see `quantise`)."""
+        """Return the objective of an image's levels, integers 0..255 of any shape (see `quantise`)."""
         if (
             not np.issubdtype(np.asarray(levels).dtype, np.integer)
             or np.size(levels) == 0
@@ -95,8 +105,17 @@ class OtsuObjective:
 
 
 def exact(objective: OtsuObjective, count: int) -> Optimum:
-    """The maximum with `count` thresholds >= 1, by dynamic programming; the lowest thresholds where
-    several sets share it.
+    """Return the maximum by dynamic programming; of several, the lowest thresholds.
+
+    Parameters
+    ----------
+    objective : OtsuObjective
+    count : int
+        At least 1.
+
+    Returns
+    -------
+    Optimum
     """
     best = objective.terms[0].copy()  # of the first class alone, by its end
     best[0] = -np.inf  # it holds level 0 at least: thresholds are levels

@@ -1,10 +1,9 @@
-"""Particle swarm: candidates fly, drawn to their own best place and to the best of all (Kennedy &
-Eberhart 1995).
+"""Particle swarm optimisation (Kennedy & Eberhart 1995).
 
 Problem: maximise a function of K ascending integer thresholds within a budget of evaluations.
 
 Equation: v <- w v + c u_1 (p - x) + c u_2 (g - x), x <- x + v, with p a particle's best place, g
-the best of all, u uniform within [0, 1) for each coordinate, and the constriction w = .7298, c =
+the best of all, u uniform in [0, 1) for each coordinate, and the constriction w = .7298, c =
 1.49618. Places are real; thresholds are their rounded, sorted values.
 
 Citation: J. Kennedy and R. Eberhart, "Particle swarm optimization", Proc. ICNN'95 4, 1942-1948
@@ -13,9 +12,9 @@ stability, and convergence in a multidimensional complex space", IEEE Trans. Evo
 Computation 6(1), 58-73 (2002), doi:10.1109/4235.985692 (the constriction).
 
 An inertia that falls from .9 to .4 with c = 2 is the other usual setting: `FALLING`. It searches
-longer before it gathers.
+longer before it converges.
 
-Limits: a swarm that has gathered at a lesser maximum stays there; the rest of its budget is lost.
+Limits: a swarm that has converged to a lesser maximum stays there; the rest of its budget is lost.
 """
 
 from dataclasses import dataclass
@@ -31,9 +30,19 @@ _TOP = LEVELS - 2  # the highest threshold that leaves a level above it
 
 @dataclass(frozen=True)
 class SwarmOptions:
-    """`particles`: how many, >= 2. `attraction`: c, both pulls' strength, > 0. `inertia`,
-    `last_inertia`: share w of a velocity that is kept, at the start and at the end of the budget,
-    linear between; in [0, 1). `top_speed`: largest move of a threshold in one step, in levels, > 0.
+    """Options of the swarm.
+
+    Attributes
+    ----------
+    particles : int
+        At least 2.
+    inertia, last_inertia : float
+        Share w of a velocity that is kept, at the start and at the end of the budget, linear
+        between; in [0, 1).
+    attraction : float
+        c, the strength of both pulls, greater than 0.
+    top_speed : float
+        Largest move of a threshold in one step, in levels, greater than 0.
     """
 
     particles: int = 40
@@ -53,10 +62,27 @@ def maximise(
     seed: int = 0,
     options: SwarmOptions | None = None,
 ) -> Optimum:
-    """The best `count` thresholds that the swarm finds with at most `evaluations`, with
-    pseudo-random numbers from `seed` >= 0.
+    """Maximise by a particle swarm with pseudo-random numbers.
 
-    Raises `InputError` for unfit options, or a budget below one step of the swarm.
+    Parameters
+    ----------
+    objective : OtsuObjective
+    count : int
+        Number of thresholds.
+    evaluations : int
+        Budget.
+    seed : int
+        Not negative.
+    options : SwarmOptions, optional
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    InputError
+        If options are invalid, or the budget is below one step of the swarm.
     """
     options = options or SwarmOptions()
     _check(options)
