@@ -73,7 +73,7 @@ def jit(
             nogil=True,
             error_model="numpy",
             fastmath=set(math),
-            **({"forceinline": True} if inline else {}),
+            forceinline=inline,
         )(function)
         drop_broken(Path(str(dispatcher.stats.cache_path)))
         return cast(Loop, dispatcher)

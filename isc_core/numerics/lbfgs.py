@@ -129,67 +129,86 @@ Function = Callable[[np.ndarray, np.ndarray], float]
 _LEAST_COSINE = 1e-10
 
 
-class _Memory:
+class PairMemory:
     """Steps and gradient changes, with the inner products between all of them.
 
-    Rows: m steps, m changes, the gradient.
+    Attributes
+    ----------
+    vectors : (2 m + 1, N) ndarray
+        Rows: m steps, m changes, the gradient.
+    order : list of int
+        Slots that hold a pair, oldest first.
+
+    Parameters
+    ----------
+    size : int
+        m.
+    length : int
+        N.
+    dtype : dtype
+    algebra : Algebra
     """
 
     def __init__(self, size: int, length: int, dtype: np.dtype, algebra: Algebra) -> None:  # type: ignore[type-arg]
         self.size = size
         self.vectors = np.zeros((2 * size + 1, length), dtype)
         self._gram = np.zeros((2 * size + 1, 2 * size + 1))
-        self._order: list[int] = []
+        self.order: list[int] = []
         self._algebra = algebra
 
     @property
     def gradient(self) -> np.ndarray:
+        """Row of the gradient."""
         return self.vectors[-1]
 
     def next_slot(self) -> int:
-        """A row without a pair, else that of the oldest pair.
+        """Return a slot without a pair, else that of the oldest pair.
 
         (A skipped pair can leave a gap anywhere.)
         """
         return next(
-            (k for k in range(self.size) if k not in self._order),
-            self._order[0] if self._order else 0,
+            (k for k in range(self.size) if k not in self.order),
+            self.order[0] if self.order else 0,
         )
 
     def refresh(self, slot: int | None) -> None:
-        """Take the rows of `slot` as the newest pair (None: only the gradient has changed)."""
+        """Take the rows of `slot` as the newest pair; None if only the gradient has changed.
+
+        A pair without positive curvature is skipped.
+        """
         rows = [2 * self.size] if slot is None else [slot, self.size + slot, 2 * self.size]
         products = self._algebra.products(self.vectors, self.vectors[rows])
         self._gram[:, rows] = products
         self._gram[rows, :] = products.T
         if slot is None:
             return
-        self._order = [k for k in self._order if k != slot]
+        self.order = [k for k in self.order if k != slot]
         change = self.size + slot
         if self._gram[slot, change] > _LEAST_COSINE * np.sqrt(
             self._gram[slot, slot] * self._gram[change, change]
         ):
-            self._order.append(slot)
+            self.order.append(slot)
 
     def direction(self, out: np.ndarray) -> float:
-        """Write the descent direction into `out`; return its product with the gradient."""
+        """Write the descent direction into `out` (N,); return its product with the gradient."""
         m, g = self.size, self._gram
         c = np.zeros(2 * m + 1)
         c[-1] = -1
         alpha = {}
-        for k in reversed(self._order):
+        for k in reversed(self.order):
             alpha[k] = float(c @ g[:, k]) / g[k, m + k]
             c[m + k] -= alpha[k]
-        if self._order:
-            newest = self._order[-1]
+        if self.order:
+            newest = self.order[-1]
             c *= g[newest, m + newest] / g[m + newest, m + newest]
-        for k in self._order:
+        for k in self.order:
             c[k] += alpha[k] - float(c @ g[:, m + k]) / g[k, m + k]
         self._algebra.combine(c, self.vectors, out)
         return float(c @ g[:, -1])
 
     def forget(self) -> None:
-        self._order = []
+        """Drop all pairs."""
+        self.order = []
 
 
 def minimise(
@@ -243,7 +262,7 @@ class Minimisation:
         self, function: Function, x: np.ndarray, options: LbfgsOptions, algebra: Algebra
     ) -> None:
         self.x, self._function, self._options = x, function, options
-        self._memory = _Memory(options.memory, x.size, x.dtype, algebra)
+        self._memory = PairMemory(options.memory, x.size, x.dtype, algebra)
         self._direction, self._start, self._old_gradient = (
             np.empty_like(x),
             np.empty_like(x),

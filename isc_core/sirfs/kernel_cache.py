@@ -2,6 +2,7 @@
 
 import sys
 from pathlib import Path
+from typing import Any
 
 from ..numerics.jit import drop_broken, ensure_cache_folder, numba_available
 from ..progress import Monitor
@@ -31,8 +32,8 @@ def kernels_compiled() -> bool:
     """Return whether the kernels, in their current version, were compiled before. Needs Numba."""
     from . import kernels
 
-    kernel = kernels.forward_rows
-    code = kernel.py_func.__code__
+    dispatcher: Any = kernels.forward_rows
+    code = dispatcher.py_func.__code__
     source = Path(code.co_filename)
     python = f"py{sys.version_info[0]}{sys.version_info[1]}"
     pattern = f"{source.stem}.{code.co_name}-{code.co_firstlineno}.{python}*.nbi"
@@ -44,4 +45,5 @@ def _folder() -> Path:
     """Folder of the compiled kernels."""
     from . import kernels
 
-    return Path(str(kernels.forward_rows.stats.cache_path))
+    dispatcher: Any = kernels.forward_rows
+    return Path(str(dispatcher.stats.cache_path))

@@ -120,13 +120,13 @@ class Cells(NamedTuple):
 
     Attributes
     ----------
-    index : (H, W) int32 ndarray
+    node : (H, W) int32 ndarray
         Flat index of the cell's first node.
     side : (H, 3, W) ndarray
         Position in the cell, in [0, 1].
     """
 
-    index: np.ndarray
+    node: np.ndarray
     side: np.ndarray
 
 
@@ -516,7 +516,7 @@ def locate_color(palette, spans, grid, bounds, cells):
         Output.
     """
     low, inverse_step, nodes = grid.low, grid.inverse_step, grid.nodes
-    cell, side = cells.index, cells.side
+    cell, side = cells.node, cells.side
     sizes = bounds[:, 1] - bounds[:, 0]
     strides = (sizes[1] * sizes[2], sizes[2], 1)
     t = side.dtype.type
@@ -547,7 +547,7 @@ def splat_color(photo, cells, counts):
         Changed in place.
     """
     weight, spans = photo.weight, photo.spans
-    cell, side = cells.index, cells.side
+    cell, side = cells.node, cells.side
     right, down = counts.shape[2], counts.shape[1] * counts.shape[2]
     flat = counts.reshape(counts.size)
     for i in range(weight.shape[0]):
@@ -586,7 +586,7 @@ def gather_color(palette, photo, grid, cells, node_gradient, gradient):
     """
     weight, spans = photo.weight, photo.spans
     low, high = grid.low, grid.high
-    cell, side = cells.index, cells.side
+    cell, side = cells.node, cells.side
     t = gradient.dtype.type
     inv = t(grid.inverse_step)
     right, down = node_gradient.shape[2], node_gradient.shape[1] * node_gradient.shape[2]

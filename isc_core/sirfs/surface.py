@@ -188,7 +188,7 @@ def slant_cost(n3: np.ndarray, weight: float) -> tuple[float, np.ndarray]:
 
 def contour_cost(
     n1: np.ndarray, n2: np.ndarray, contour: Contour, weight: float, power: float, pixels: int
-):  # type: ignore[no-untyped-def]
+) -> tuple[float, np.ndarray, np.ndarray]:
     """Compute the contour term.
 
     Parameters

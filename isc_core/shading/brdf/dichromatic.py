@@ -97,7 +97,6 @@ class Dichromatic:
 
 def _coloured(gradient: Gradient, colour: np.ndarray) -> Gradient:
     """A lobe's gradient with each derivative (...) times the colour (..., 3)."""
-    changes = {
-        part.name: getattr(gradient, part.name)[..., None] * colour for part in fields(gradient)
-    }  # type: ignore[arg-type]
+    names = [part.name for part in fields(gradient)]  # type: ignore[arg-type]
+    changes = {name: getattr(gradient, name)[..., None] * colour for name in names}
     return replace(gradient, **changes)  # type: ignore[type-var]

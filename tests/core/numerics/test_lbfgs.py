@@ -11,7 +11,7 @@ from isc_core.numerics.lbfgs import (
     LbfgsOptions,
     Minimisation,
     NumpyAlgebra,
-    _Memory,
+    PairMemory,
     minimise,
 )
 from isc_core.numerics.thread_pool import ThreadPool
@@ -152,7 +152,7 @@ def test_survives_a_wall_of_infinite_loss() -> None:
 def test_a_skipped_pair_costs_no_other_pair() -> None:
     """Pairs without positive curvature are left out; the kept ones are the newest good ones."""
     rng = np.random.default_rng(0)
-    memory = _Memory(3, 8, np.dtype(float), NumpyAlgebra())
+    memory = PairMemory(3, 8, np.dtype(float), NumpyAlgebra())
     memory.vectors[-1] = rng.normal(size=8)
     good: list[np.ndarray] = []
     for k in range(12):
@@ -162,11 +162,11 @@ def test_a_skipped_pair_costs_no_other_pair() -> None:
         memory.refresh(slot)
         if k not in (5, 6, 9):
             good.append(step)
-        kept = [memory.vectors[s] for s in memory._order]
+        kept = [memory.vectors[s] for s in memory.order]
         assert len(kept) >= min(len(good), 2)
         for have, want in zip(kept[::-1], good[::-1], strict=False):
             np.testing.assert_array_equal(have, want)
-    assert len(memory._order) == 3
+    assert len(memory.order) == 3
 
 
 @pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 1e-13), (np.float32, 1e-5)])

@@ -47,8 +47,9 @@ def assert_derivatives(model: Lobe, gradient: object, geometry: tuple[np.ndarray
         here = getattr(model, parameter)
         step = 1e-5 * max(abs(here), 1e-2)
         up, down = (
-            replace(model, **{parameter: here + sign * step}).value(*geometry) for sign in (1, -1)
-        )  # type: ignore[type-var]
+            replace(model, **{parameter: here + sign * step}).value(*geometry)  # type: ignore[type-var]
+            for sign in (1, -1)
+        )
         found, expected = getattr(gradient, parameter), (up - down) / (2 * step)
         assert np.abs(expected).max() > 0
         assert np.abs(found - expected).max() <= 1e-5 * np.abs(expected).max(), parameter
