@@ -1,17 +1,17 @@
-"""Is there white among an object's colours, as there is under any lamp? Where not, the light is
-strongly coloured, or all of the paint is.
+"""Whether white is among an object's colours, as under any lamp. Otherwise the light, or all of the
+albedo, has a strong colour.
 
-Problem: a separation takes the light for white. Under red light everything is red, its highlights
-too; no constraint on one highlight shows that, if its colour is looked for near white only.
+Problem: a separation assumes white light. Under red light everything is red, the highlights too; no
+constraint on a single highlight shows that, if its colour is searched near white only.
 
 Equation: the colours c of an object under light of the colour l are c = l r, r those under white
 light, so that the whole gamut moves with l (Forsyth 1990). With chromaticities p(c) of all but the
-darkest, in the plane of colours of mean 1 with white at 0, white's distance from their hull, but
+darkest, in the plane of colours of mean 1 with white at 0, white's distance from their hull, except
 for a twentieth of them, is
 
     max over unit u of the 5 % quantile of u . p.
 
-A gamut may also lie off white because paint does. Then highlights bring it back: their flanks'
+A gamut may also lie off white because of the albedo. Then highlights bring it back: their flanks'
 chromaticities move on lines toward the light's (Lehmann & Palm 2001), here toward white: a change
 dI of a colour I counts by its |I x dI|, and by how well white, or the best of the colours near it,
 lies in its plane and ahead of it.
@@ -19,40 +19,43 @@ lies in its plane and ahead of it.
 Citation: D. A. Forsyth 1990, doi:10.1007/BF00056770; T. M. Lehmann, C. Palm 2001,
 doi:10.1364/JOSAA.18.002679.
 
-Limits: matt paint of one strong colour cannot be told from grey paint under light of that colour,
-and is called the same. Light that takes grey no farther than .3 from white, such as (1.2, 1, .8),
-is not told; nor is stronger light on paint of many strong colours, or of one that makes up for it.
+Limits: diffuse albedo of one strong colour cannot be distinguished from grey albedo under light of
+that colour, and counts as the same. Light that moves grey at most .3 from white, such as (1.2, 1,
+.8), is not detected; nor is stronger light on albedo of many strong colours, or of one that
+compensates for it.
 """
 
 import numpy as np
 
 # An orthonormal basis of the colours with sum 0, (3, 2).
 PLANE = np.array([[1, -1, 0], [1, 1, -2]]).T / np.sqrt([2.0, 6.0])
-_DARK, _STRAY = (
-    0.3,
-    0.05,
-)  # quantiles: of the intensity, below which colours do not count; of those beyond the hull
+# Quantiles: of the intensity, below which colours do not count; of those beyond the hull.
+_DARK, _STRAY = 0.3, 0.05
 _FARTHEST = 0.3  # of white from the hull
 _DIRECTIONS = 72  # a multiple of 12 makes the channels alike
-_RISE, _TURN = (
-    0.03,
-    0.05,
-)  # of a flank: of the intensity, over the bright pixels'; of the chromaticity
+# Of a flank: of the intensity, over the bright pixels'; of the chromaticity.
+_RISE, _TURN = 0.03, 0.05
 _TOWARD, _TOLERANCE = 0.7, 0.04  # the cosine of the turn's direction to the light; n . L / |n|
 _NEAR, _STEP = 0.25, 0.1  # the colours that count as white, and their grid
-_FEW, _FAINT = (
-    20,
-    1e-4,
-)  # flanks, and their mean weight over all changes, below which they say nothing
-_ENOUGH = 20_000  # colours or flanks: more say the same
+# Flanks, and their mean weight over all changes, below which they carry no information.
+_FEW, _FAINT = 20, 1e-4
+_ENOUGH = 20_000  # colours or flanks: more add nothing
 _SHARE = 0.2  # of the flanks that move toward white
 
 
 def without_white(colour: np.ndarray, change: np.ndarray) -> bool:
-    """Whether white is neither among the colours nor where highlights lead. `colour`, `change` (N,
-    3) >= 0 in units of the bright pixels'.
+    """Check whether white is neither among the colours nor where highlights lead.
 
-    `change` is that of the colour over a short way, upward.
+    Parameters
+    ----------
+    colour, change : (N, 3) ndarray
+        Colours and their upward changes over a short distance, >= 0, in units of the bright pixels'
+        intensity.
+
+    Returns
+    -------
+    bool
+        Whether white is missing.
     """
     if len(colour) < _FEW:
         return False
@@ -60,7 +63,9 @@ def without_white(colour: np.ndarray, change: np.ndarray) -> bool:
 
 
 def distance_of_white(colour: np.ndarray) -> float:
-    """Of the hull of the chromaticities of colours (N, 3) >= 0; negative inside."""
+    """Return the distance of white from the hull of chromaticities of colours (N, 3) >= 0; negative
+    inside.
+    """
     intensity = colour.sum(axis=1, dtype=float)
     bright = intensity >= max(float(np.quantile(intensity, _DARK)), 1e-12)
     if not bright.any():
@@ -74,8 +79,17 @@ def distance_of_white(colour: np.ndarray) -> float:
 
 
 def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
-    """How much of what may be highlights' flanks leads to a colour near white, in [0, 1]; 0 where
-    there is nothing.
+    """Compute the share of apparent flanks of highlights that lead to a colour near white.
+
+    Parameters
+    ----------
+    colour, change : (N, 3) ndarray
+        As for `without_white`.
+
+    Returns
+    -------
+    float
+        In [0, 1]; 0 where there is nothing.
     """
     here, turn, rising = turns(colour, change)
     flanks = np.flatnonzero(rising)
@@ -98,10 +112,19 @@ def share_toward_white(colour: np.ndarray, change: np.ndarray) -> float:
 
 
 def turns(colour: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of colours and their changes (N, 3): the chromaticity, the way from it to the change's, and
-    (N,) which may be highlights' flanks.
+    """Find changes that may be flanks of highlights: all channels rise, and the chromaticity turns.
 
-    Those rise in all channels, and their chromaticity turns.
+    Parameters
+    ----------
+    colour, change : (N, 3) ndarray
+        As for `without_white`.
+
+    Returns
+    -------
+    here, turn : (N, 3) ndarray
+        The chromaticity, and the difference from it to the change's.
+    rising : (N,) ndarray of bool
+        Which may be flanks.
     """
     rise = change.sum(axis=1)
     here = colour / np.maximum(colour.sum(axis=1), 1e-12)[:, None]
@@ -114,9 +137,19 @@ def turns(colour: np.ndarray, change: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def leads_to(light: np.ndarray, here: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Which turns (N, 3) of chromaticities `here` (N, 3) go toward that of `light` (3,):
+    """Check which turns of chromaticity go toward a light's.
 
-    (N,) bool.
+    Parameters
+    ----------
+    light : (3,) ndarray
+        Colour of the light.
+    here, turn : (N, 3) ndarray
+        As `turns` returns them.
+
+    Returns
+    -------
+    (N,) ndarray of bool
+        Which do.
     """
     way = light / light.sum() - here
     cosine = (turn * way).sum(axis=1) / np.maximum(
@@ -139,9 +172,8 @@ def _whites() -> np.ndarray:
 def _agreement(
     white: np.ndarray, normal: np.ndarray, here: np.ndarray, end: np.ndarray, turn: np.ndarray
 ) -> np.ndarray:
-    """How well that light (3,) explains flanks (N, 3): in [0, 1], (N,).
-
-    `end`: the chromaticity to which they have come.
+    """How well that light (3,) explains flanks (N, 3), in [0, 1], (N,); `end`: the chromaticity
+    there.
     """
     off = normal @ (white / np.linalg.norm(white))
     ahead = ((white / white.sum() - end) * turn).sum(axis=1) > 0

@@ -1,38 +1,37 @@
-"""The colour of the light, from highlights: what a separation under white light needs to know
-first.
+"""The colour of the light, from highlights, as a separation under white light needs it.
 
-Problem: separations take the light for white. Where it is not, its colour shows in the highlights
-alone; paint may have any.
+Problem: separations assume white light. Otherwise only the highlights show the light's colour;
+albedo may have any.
 
-Equation: of one paint under one light every pixel is I = m B + s L, diffuse colour B and light
+Equation: of one albedo under one light every pixel is I = m B + s L, diffuse colour B and light
 colour L, and so is every change of I. Both lie in the plane of B and L (Lee 1986), whose normal is
-at right angles to L whatever B is:
+perpendicular to L whatever B is:
 
     n = I x dI,    n . L = 0.
 
-One paint is one plane and says one thing of two; several paints meet in L alone. So L = 1 + d, sum
-d = 0, minimises
+One albedo gives one plane, which determines one of two unknowns; several albedos meet in L alone.
+So L = 1 + d, sum d = 0, minimises
 
     sum w (n . (1 + d))^2 / |n|^2   and   |d|^2 / 2 usual^2,
 
-weighed by the precision of the first, which comes from the disagreement of the normals, summed over
-blocks of the photo because neighbours err alike. Of the two kinds of ignorance, noise and a missing
-second plane, the second term so takes care by itself: what the planes do not say stays white.
+weighted by the precision of the first, which comes from the disagreement of the normals, summed
+over blocks of the photo because neighbours have similar errors. The second term thus covers both
+kinds of ignorance, noise and a missing second plane: what the planes do not determine stays white.
 Confidence is the share of the data's precision in its weakest direction.
 
 Only changes count that look like a highlight's flank: all channels rise, and the chromaticity moves
 toward the light's (the highlight's end of the lines that R. T. Tan, K. Nishino and K. Ikeuchi draw
-over inverse intensity). What does not agree has Cauchy's weight, and the square of the share that
-agrees lessens the precision: where half of the flanks are paint's, the other half is less to be
-believed.
+over inverse intensity). Changes that disagree have Cauchy's weight, and the square of the share
+that agrees reduces the precision: where half of the flanks are texture, the other half is less
+reliable.
 
 Citation: H.-C. Lee 1986, doi:10.1364/JOSAA.3.001694; R. T. Tan, K. Nishino, K. Ikeuchi 2004,
 doi:10.1364/JOSAA.21.000321. The blocks: K.-Y. Liang and S. L. Zeger 1986,
 doi:10.1093/biomet/73.1.13.
 
-Limits: one colour of light, tinted by a quarter at most; `light_gamut` looks whether it is
-stronger. Metals tint their highlights themselves. Paint that pales toward a common colour looks
-like a highlight; grey paint says nothing.
+Limits: one colour of light, tinted by a quarter at most; `gamut` checks for stronger colours.
+Metals tint their highlights themselves. Albedo that fades toward a common colour looks like a
+highlight; grey albedo carries no information.
 """
 
 from dataclasses import dataclass
@@ -47,20 +46,24 @@ from .gamut import PLANE, leads_to, turns, without_white
 _FINE = 0.006  # of the object's diagonal: changes are taken over twice this
 _LOOSE, _TOLERANCE = 0.2, 0.02  # of n . L / |n|, in the first round and in the last
 _ROUNDS, _GATES = 15, 3
-_OPEN = (
-    2.0  # how much farther from white than usual the rounds may look, before the answer is weighed
-)
+_OPEN = 2.0  # factor of the prior's deviation in the rounds, before the result is weighted
 _BLOCKS = 8
-_FEW = 20  # changes, below which nothing is said
-_FARTHEST = 0.25  # d beyond this is no light's, but paint's
+_FEW = 20  # changes; fewer carry no information
+_FARTHEST = 0.25  # d beyond this is albedo, not light
 
 
 @dataclass(frozen=True)
 class IlluminantOptions:
-    """`usual`: the standard deviation of a light's colour from white, of mean 1, before any photo
-    is seen; > 0. `doubt`: the standard deviation of what planes of normals say that is common to
-    all of a photo's, >= 0. `enough`: the confidence from which the colour counts as determined, in
-    [0, 1].
+    """Priors and thresholds of the estimate.
+
+    Attributes
+    ----------
+    usual : float
+        Prior standard deviation of a light's colour from white, of mean 1; > 0.
+    doubt : float
+        Standard deviation of the error that all planes of normals of a photo share; >= 0.
+    enough : float
+        Confidence from which on the colour is determined, in [0, 1].
     """
 
     usual: float = 0.1
@@ -103,7 +106,6 @@ class Illuminant:
 @dataclass(frozen=True)
 class _Changes:
     """`colour` and `change` (N, 3) in units of the bright pixels' intensity, the change upward;
-
     `block` (N,).
     """
 
@@ -118,10 +120,28 @@ def estimate_illuminant(
     clipped: np.ndarray | None = None,
     options: IlluminantOptions | None = None,
 ) -> Illuminant:
-    """The light's colour in `image` (H, W, 3), linear, >= 0 inside `mask` (H, W) bool; `clipped`
-    (H, W) bool pixels are left out.
+    """Estimate the colour of the light.
 
-    Raises `InputError` for arrays that do not fit, an empty mask, or options out of range.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, >= 0 inside the mask.
+    mask : (H, W) ndarray of bool
+        The object.
+    clipped : (H, W) ndarray of bool, optional
+        Pixels to leave out.
+    options : IlluminantOptions, optional
+        Priors and thresholds.
+
+    Returns
+    -------
+    Illuminant
+        White where the photo does not determine the colour.
+
+    Raises
+    ------
+    InputError
+        If the arrays do not fit, the mask is empty, or an option is out of range.
     """
     options = options or IlluminantOptions()
     if image.ndim != 3 or image.shape[2] != 3 or mask.shape != image.shape[:2] or not mask.any():
@@ -154,16 +174,47 @@ def _white(outcome: IlluminantOutcome) -> Illuminant:
 
 
 def whitened(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """`image` (..., 3) as it would be under white light of the same mean.
+    """Divide an image by the light's colour.
 
-    `colour` (3,) > 0. Raises `InputError`.
+    Parameters
+    ----------
+    image : (..., 3) ndarray
+        Linear.
+    colour : (3,) ndarray
+        > 0.
+
+    Returns
+    -------
+    (..., 3) ndarray
+        The image under white light.
+
+    Raises
+    ------
+    InputError
+        If the colour is unusable.
     """
     return image / _checked(colour).astype(image.dtype)
 
 
 def tinted(image: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """`image` (..., 3), a photo or any layer of one, back under the light: the inverse of
-    `whitened`. Raises `InputError`.
+    """Multiply an image, or a layer, by the light's colour: the inverse of `whitened`.
+
+    Parameters
+    ----------
+    image : (..., 3) ndarray
+        Linear.
+    colour : (3,) ndarray
+        > 0.
+
+    Returns
+    -------
+    (..., 3) ndarray
+        The image under the light.
+
+    Raises
+    ------
+    InputError
+        If the colour is unusable.
     """
     return image * _checked(colour).astype(image.dtype)
 
@@ -180,12 +231,12 @@ def _colour(shift: np.ndarray) -> np.ndarray:
 
 
 def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
-    """All changes over a short way whose ends and middle are in the mask."""
+    """All changes over a short distance whose ends and middle are in the mask."""
     rows, columns = np.nonzero(mask)
     if len(rows) == 0:
         return _Changes(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, int))
     box = np.s_[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
-    image, mask = image[box], mask[box]  # what is around the object does not count
+    image, mask = image[box], mask[box]  # the background does not count
     diagonal = float(np.hypot(mask.shape[0], mask.shape[1]))
     sigma = max(_FINE * diagonal, 0.6)
     smooth = masked_gaussian(np.where(mask[..., None], image, 0).astype(float), mask, sigma)
@@ -206,7 +257,7 @@ def _changes(image: np.ndarray, mask: np.ndarray) -> _Changes:
 
 
 def _slices(axis: int, start: int, length: int) -> tuple[slice, ...]:
-    """Of an axis all but `length`, from `start` on."""
+    """All but `length` of an axis, starting at `start`."""
     part = slice(start, start - length or None)
     return (part,) if axis == 0 else (slice(None), part)
 
@@ -220,7 +271,7 @@ def _flanks(changes: _Changes, light: np.ndarray) -> np.ndarray:
 def _planes(
     changes: _Changes, flanks: np.ndarray, shift: np.ndarray, options: IlluminantOptions
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The shift (2,) along `PLANE` and the precision (2, 2) of what the planes say of it."""
+    """The shift (2,) along `PLANE` and the planes' precision (2, 2) of it."""
     normals = np.cross(changes.colour[flanks], changes.change[flanks])
     length = np.linalg.norm(normals, axis=1)
     units = normals / length[:, None]

@@ -1,13 +1,13 @@
-"""The lobe under an environment that is known: its strength and its alpha.
+"""The lobe under a known environment map: its strength and its alpha.
 
-Equation: s(n) = strength * y(n; alpha), y of `environment_response`: alpha is searched for on a
-ladder, then between rungs, its strength is found by re-weighted least squares (Charbonnier's loss,
-as in `lamps`).
+Equation: s(n) = strength * y(n; alpha), y of `environment_response`: alpha is searched on a ladder,
+then between rungs; its strength follows from re-weighted least squares (Charbonnier's loss, as in
+`lamps`).
 
 Citation: A. Ngan, F. Durand, W. Matusik, EGSR 2005, doi:10.2312/EGWR/EGSR05/117-126 (fits of lobes
 under known light).
 
-Limits: where the environment is smooth, all alphas on the ladder explain the picture alike:
+Limits: where the environment map is smooth, all alphas on the ladder explain the image alike:
 undetermined.
 """
 
@@ -55,9 +55,28 @@ class _Try:
 def fit_under(
     radiance: np.ndarray, seen: Observed, pixels: Pixels, options: LobeFitOptions
 ) -> LobeFit:
-    """The fit under `radiance` (rows, 2 rows, 3) to the picture and the pixels chosen of it.
+    """Fit a lobe under an environment map.
 
-    Raises `InputError`.
+    Parameters
+    ----------
+    radiance : (rows, 2 rows, 3) ndarray
+        The environment map.
+    seen : Observed
+        The specular image.
+    pixels : Pixels
+        The fitted pixels.
+    options : LobeFitOptions
+        The lobe.
+
+    Returns
+    -------
+    LobeFit
+        With the lobe's strength, without lights.
+
+    Raises
+    ------
+    InputError
+        If the environment map is unusable.
     """
     specular, normal, mask = seen.specular, seen.normal, seen.mask
     sky = _checked(radiance)
@@ -115,7 +134,7 @@ def fit_under(
 
 
 def _alike(one: _Try, other: _Try, pixels: Pixels) -> bool:
-    """Whether the predictions differ by less than models can be trusted."""
+    """Whether two predictions differ by less than the models' accuracy."""
     apart = pixels.weight @ np.square((one.residual - other.residual) * pixels.sigma)
     return bool(apart < _ALIKE**2 * (pixels.weight @ np.square(pixels.value)))
 
@@ -152,7 +171,7 @@ def _try(sky: Surroundings, pixels: Pixels, options: LobeFitOptions, log_alpha: 
 def _deviations(
     sky: Surroundings, pixels: Pixels, best: _Try, options: LobeFitOptions
 ) -> tuple[float, float, float]:
-    """Deviations of log alpha and of log strength, and how much the loss may rise within one of the
+    """Deviations of log alpha and of log strength, and the rise of the loss within one of the
     first.
     """
     here, there = (

@@ -1,14 +1,14 @@
-"""What a lobe answers to a whole environment.
+"""The response of a lobe to a whole environment map.
 
-Equation: integral of L(l) f_r(n, v, l) (n . l) dl with v = (0, 0, 1). The environment is cut in two
-at a radiance. What is brighter counts as small far lights, a pixel each. The rest is smooth: it is
-looked up in directions whose half vectors are spread as the lobe is, for GGX tan^2 t = alpha^2 u /
-(1 - u) with the weight F G (v . h) / ((n . v) (n . h)), for Blinn-Phong cos t = u^(1 / (p + 1))
-with the weight (p + 8) / (p + 1) (v . h) (n . l), u at even steps.
+Equation: integral of L(l) f_r(n, v, l) (n . l) dl with v = (0, 0, 1). The map is split at a
+radiance. Brighter pixels are small far lights. The rest is smooth: it is sampled in directions
+whose half vectors are distributed like the lobe, for GGX tan^2 t = alpha^2 u / (1 - u) with the
+weight F G (v . h) / ((n . v) (n . h)), for Blinn-Phong cos t = u^(1 / (p + 1)) with the weight (p +
+8) / (p + 1) (v . h) (n . l), u at even steps.
 
 Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206 (sampling of facets).
 
-Limits: no shadows. A lobe much narrower than the environment's pixels shows them.
+Limits: no shadows. A lobe much narrower than the map's pixels shows them.
 """
 
 from dataclasses import dataclass
@@ -28,10 +28,16 @@ _GRID = 81  # table of normals on a disc
 
 @dataclass(frozen=True)
 class Surroundings:
-    """An environment:
+    """A split environment map.
 
-    `bright` (M, 3) unit directions of its brightest pixels with `irradiance` (M, 3), `rest` (rows,
-    2 rows, 3).
+    Attributes
+    ----------
+    bright : (M, 3) ndarray
+        Unit directions of its brightest pixels.
+    irradiance : (M, 3) ndarray
+        Of these.
+    rest : (rows, 2 rows, 3) ndarray
+        Radiance of the smooth rest.
     """
 
     bright: np.ndarray
@@ -40,7 +46,7 @@ class Surroundings:
 
 
 def surroundings(radiance: np.ndarray) -> Surroundings:
-    """Cuts an environment (rows, 2 rows, 3) in two."""
+    """Split an environment map (rows, 2 rows, 3) into bright pixels and a smooth rest."""
     rows = len(radiance)
     mean = radiance.mean(axis=2).ravel()
     level = np.sort(mean)[-min(_MOST_BRIGHT, mean.size)]
@@ -52,7 +58,24 @@ def surroundings(radiance: np.ndarray) -> Surroundings:
 
 
 def respond_to(sky: Surroundings, model: LobeModel, normal: np.ndarray, alpha: float) -> np.ndarray:
-    """(N, 3) for unit normals (N, 3), strength 1."""
+    """Compute the response of a lobe of strength 1.
+
+    Parameters
+    ----------
+    sky : Surroundings
+        The environment map.
+    model : {"ggx", "blinn_phong"}
+        The lobe.
+    normal : (N, 3) ndarray
+        Unit normals.
+    alpha : float
+        Roughness.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        Radiance toward the viewer.
+    """
     total = _smooth(sky.rest, model, normal, alpha)
     for direction, irradiance in zip(sky.bright, sky.irradiance, strict=True):
         total += respond(model, normal, direction, alpha).value[:, None] * irradiance
@@ -60,8 +83,17 @@ def respond_to(sky: Surroundings, model: LobeModel, normal: np.ndarray, alpha: f
 
 
 def table_of(sky: Surroundings, model: LobeModel, alpha: float, normal: np.ndarray) -> np.ndarray:
-    """`respond_to` for many normals (N, 3), interpolated in a table over the equal-area disc of
-    normals.
+    """Compute `respond_to` for many normals, by interpolation on the equal-area disc of normals.
+
+    Parameters
+    ----------
+    sky, model, alpha, normal
+        As for `respond_to`.
+
+    Returns
+    -------
+    (N, 3) ndarray
+        Radiance toward the viewer.
     """
     steps = np.linspace(-1, 1, _GRID)
     x, y = np.meshgrid(steps, steps, indexing="ij")

@@ -1,21 +1,21 @@
 """From a specular image and normals to a lobe and its lights.
 
-Problem: how rough a glossy object is, and where its lights stand, from the specular layer of one
+Problem: how rough a glossy object is, and where its lights are, from the specular layer of one
 photo.
 
 Method: the specular light as a function of the normal has a peak for each light (`starts`). From
 there, several widths are tried and the best is refined (`lamps`); another light is added where the
-residual has another peak, as long as an information criterion asks for it: n log(loss) + p log n, n
-being the number of independent pieces of the highlight. The alpha that comes out is held against
+residual has another peak, as long as an information criterion requires it: n log(loss) + p log n, n
+being the number of independent pieces of the highlight. The resulting alpha is compared with
 others, each with everything else fitted anew (profile likelihood); where the loss hardly rises,
 alpha is undetermined. Intervals: `uncertainty`.
 
 Citation: G. Schwarz, "Estimating the dimension of a model", Annals of Statistics 6(2) (1978),
 doi:10.1214/aos/1176344136. The lobes: see `isc_core.shading.brdf`.
 
-Limits: lights are far and small. A light of some width widens the lobe: seen from the object under
-2 w radians, w is added to 2 alpha about as squares are. White gloss, one roughness for the whole
-object, no shadows cast on the highlight.
+Limits: lights are far and small. A light of some width widens the lobe: subtending 2 w radians, it
+adds w to 2 alpha about as squares add. White highlights, one roughness for the whole object, no
+shadows cast on the highlight.
 """
 
 from dataclasses import replace
@@ -50,8 +50,8 @@ _LADDER = (2.0, 4.0)
 _WIDEST = 0.7  # an alpha as large as that is a light as smooth as shading
 _WIDE = 0.35  # an alpha as large as that may be a smooth light
 _CONE = 1.515  # deviations, each way, that hold 68 % in two dimensions
-# What even exact images leave, the sky being modelled roughly: of log alpha, of log strength, of
-# directions in radians.
+# Errors that remain on exact images, since the environment map is modelled roughly: of log alpha,
+# of log strength, of directions in radians.
 _MODEL_ALPHA, _MODEL_STRENGTH, _MODEL_TURN = 0.003, 0.01, 0.003
 _NARROWEST_PIXELS = 6  # within half of the peak
 _GAIN = 0.15  # of the loss: less, and another light explains nothing
@@ -154,8 +154,8 @@ def _checked_shading(shading: np.ndarray, seen: Observed) -> np.ndarray:
         np.isfinite(shading[seen.mask]).all() and (shading[seen.mask] >= 0).all()
     ):
         raise InputError(
-            f"shading has shape {shading.shape}: give (H, W, 3) like the specular image, finite and "
-            ">= 0 inside the mask"
+            f"shading has shape {shading.shape}: give (H, W, 3) like the specular image, finite "
+            "and >= 0 inside the mask"
         )
     return shading
 
@@ -225,12 +225,12 @@ def _with_another(lamps: Lamps, half: np.ndarray, peak: float) -> Lamps:
 
 
 def _amplitude(alpha: float, peak: float) -> float:
-    """Log of the amplitude whose GGX lobe is as high as `peak` where normal, view and light agree."""
+    """Log of the amplitude whose GGX lobe has the height `peak` for equal normal, view, light."""
     return float(np.log(4 * np.pi * alpha**2 * peak / 0.04))
 
 
 def _worth(less: Fitted, more: Fitted, pixels: Pixels) -> bool:
-    """Schwarz' criterion over independent pieces, and a gain that can be seen."""
+    """Schwarz' criterion over independent pieces, and a minimum gain."""
     pieces = min(200.0, max(10.0, len(pixels.value) / max(1.0, np.sqrt(pixels.bright))))
     gain = np.log(max(less.loss, 1e-300) / max(more.loss, 1e-300))
     return bool(
@@ -307,8 +307,8 @@ def _lights(
 
 
 def _step(seen: Observed, pixels: Pixels) -> float:
-    """How far the normal turns from the highlight's peak to a neighbouring pixel, radians: what the
-    picture can resolve.
+    """How far the normal turns from the highlight's peak to a neighbouring pixel, radians: the
+    resolution of the image.
     """
     row, column = pixels.cell[int(np.argmax(pixels.value))]
     near = (slice(max(row - 1, 0), row + 2), slice(max(column - 1, 0), column + 2))
@@ -353,8 +353,8 @@ def _wider_does(problem: Problem, fitted: Fitted, sd: float) -> bool:
 def _coloured(
     seen: Observed, problem: Problem, fitted: Fitted
 ) -> tuple[np.ndarray, np.ndarray, float]:
-    """The predicted image, the gains (K, 3) of the channels of each light, its shape kept, and how
-    much of the image is explained.
+    """The predicted image, the gains (K, 3) of each light's channels, its shape kept, and the share
+    explained.
     """
     pixels, lamps = problem.pixels, fitted.lamps
     shapes = contributions(problem.model, lamps, pixels.normal, pixels.place)
@@ -363,8 +363,7 @@ def _coloured(
         root, colour = np.where(pixels.value > pixels.dark, root, 0), pixels.colour + lamps.base[0]
     else:
         mirrored = lamps.base @ problem.basis(pixels.normal)
-        # The sky's colour is taken to be the lamps' on the average: it is too weak to have one of
-        # its own.
+        # The environment map is too weak for a colour of its own: it gets the lamps' mean colour.
         colour = pixels.colour - mirrored[:, None] * _mean_colour(pixels)
     gains = np.stack([nnls((shapes * root).T, colour[:, c] * root)[0] for c in range(3)], axis=1)
     place = np.zeros((int(seen.mask.sum()), 3)) if seen.place is None else seen.place[seen.mask]

@@ -3,20 +3,20 @@
 Equation: the specular light, mean over the channels, at the place p (in radii of the object from
 its middle) is
 
-    s(n, p) = sum_k a_k y(n; l, alpha) / |v|^2 + b,        v = l_k - q_k p,  l = v / |v|,  y of
-    `response`,
+    s(n, p) = sum_k a_k y(n; l, alpha) / |v|^2 + b,    v = l_k - q_k p,  l = v / |v|,
 
-over log a_k, log alpha, the base b, the directions l_k, which move in their tangent planes, and the
-nearness q_k >= 0 (0: infinitely far; 1 / q radii from the middle). The base is a mirrored smooth
-sky, sum_j c_j B_j(n), see `sky_basis`; or, where a separator made the image, -c: it sees a
-highlight only above an unknown level, so its image is max(0, s). The loss is Charbonnier's, sum_i
-w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s - s_i) / sigma_i: quadratic for small errors, linear for large
-ones. Steps are Levenberg-Marquardt's with re-weighting; gradients are exact.
+y of `response`, over log a_k, log alpha, the base b, the directions l_k, which move in their
+tangent planes, and the nearness q_k >= 0 (0: infinitely far; 1 / q radii from the middle). The base
+is a mirrored smooth environment map, sum_j c_j B_j(n), see `sky_basis`; or, where a separator made
+the image, -c: it shows highlights only above an unknown level, so its image is max(0, s). The loss
+is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s - s_i) / sigma_i: quadratic for small
+errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting; gradients are
+exact.
 
 Citation: D. W. Marquardt, SIAM J. Appl. Math. 11(2) (1963), doi:10.1137/0111030; P. Charbonnier, L.
 Blanc-Feraud, G. Aubert, M. Barlaud, IEEE TIP 6(2) (1997), doi:10.1109/83.551699.
 
-Limits: a local search; where it starts matters.
+Limits: a local search; its start matters.
 """
 
 from dataclasses import dataclass, replace
@@ -29,7 +29,7 @@ from .response import respond, sky_basis
 
 ALPHAS = (0.004, 0.98)
 _NEAREST = 0.6
-# least z of the half vector: farther behind the object no light reaches what the viewer sees
+# Least z of the half vector: light from farther behind reaches no visible surface.
 _LOWEST_TILT = 0.2
 _USUAL_LEVEL, _LEVEL_SPREAD, _LEVEL_WEIGHT = (
     0.15,
@@ -45,8 +45,20 @@ _USUAL_NEARNESS, _NEARNESS_WEIGHT = (
 
 @dataclass(frozen=True)
 class Lamps:
-    """K lights: unit `directions` (K, 3), `nearness` (K,), log of `amplitudes` (K,) and of `alpha`,
-    `base` (B,): c.
+    """K lights and a lobe.
+
+    Attributes
+    ----------
+    directions : (K, 3) ndarray
+        Unit vectors toward the lights.
+    nearness : (K,) ndarray
+        q.
+    log_amplitudes : (K,) ndarray
+        log a.
+    base : (B,) ndarray
+        c.
+    log_alpha : float
+        Log of the lobe's roughness.
     """
 
     directions: np.ndarray
@@ -57,7 +69,7 @@ class Lamps:
 
     @property
     def alpha(self) -> float:
-        """Of the lobe, the same under all lights."""
+        """The lobe's roughness, the same under all lights."""
         return float(np.exp(self.log_alpha))
 
     @property
@@ -68,9 +80,18 @@ class Lamps:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is fitted to, and what may move: the `directions`, their `nearness`, `alpha`.
+    """The data of a fit, and its free parameters.
 
-    `thresholded`: the base is a separator's level.
+    Attributes
+    ----------
+    pixels : Pixels
+        The fitted pixels.
+    model : {"ggx", "blinn_phong"}
+        The lobe.
+    thresholded : bool
+        The base is a separator's level.
+    directions, nearness, alpha : bool
+        Which parameters are free.
     """
 
     pixels: Pixels
@@ -81,15 +102,27 @@ class Problem:
     alpha: bool = True
 
     def basis(self, normal: np.ndarray) -> np.ndarray:
-        """(B, N): what the base is made of, on unit normals (N, 3)."""
+        """Return the basis (B, N) of the base on unit normals (N, 3)."""
         return -np.ones((1, len(normal))) if self.thresholded else sky_basis(normal)
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """`lamps` at the minimum, its `loss`, the `residual` (N,) in sigmas, the `jacobian` (N, P) of
-    it and the weights (N,) in force there. Columns: log amplitudes (K), base (B), log alpha if
-    free, two of each direction if free (`tangents`), nearness (K) if free.
+    """A minimum.
+
+    Attributes
+    ----------
+    lamps : Lamps
+        Parameters there.
+    loss : float
+        The loss there.
+    residual : (N,) ndarray
+        In sigmas.
+    jacobian : (N, P) ndarray
+        Of the residual. Columns: log amplitudes (K), base (B), log alpha if free, two of each
+        direction if free (`tangents`), nearness (K) if free.
+    weight : (N,) ndarray
+        Weights in effect there.
     """
 
     lamps: Lamps
@@ -100,7 +133,22 @@ class Fitted:
 
 
 def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
-    """The minimum near `start`; deterministic."""
+    """Find the minimum near a start; deterministic.
+
+    Parameters
+    ----------
+    problem : Problem
+        Data and free parameters.
+    start : Lamps
+        The start.
+    steps : int, optional
+        At most so many.
+
+    Returns
+    -------
+    Fitted
+        The minimum.
+    """
     best = _measured(problem, start)
     damping = 1e-2
     for _ in range(steps):
@@ -125,7 +173,7 @@ def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
 def contributions(
     model: LobeModel, lamps: Lamps, normal: np.ndarray, place: np.ndarray
 ) -> np.ndarray:
-    """(K, N): each light's part of the specular light on normals (N, 3) at the places (N, 3)."""
+    """Return each light's part (K, N) of the specular light on normals (N, 3) at places (N, 3)."""
     parts = []
     for direction, near, log_amplitude in zip(
         lamps.directions, lamps.nearness, lamps.log_amplitudes, strict=True
@@ -138,7 +186,7 @@ def contributions(
 
 
 def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndarray) -> np.ndarray:
-    """(N,): the specular light, mean over the channels."""
+    """Return the mean specular light (N,) of the channels on normals (N, 3) at places (N, 3)."""
     total = contributions(problem.model, lamps, normal, place).sum(
         axis=0
     ) + lamps.base @ problem.basis(normal)
@@ -148,8 +196,23 @@ def predicted(problem: Problem, lamps: Lamps, normal: np.ndarray, place: np.ndar
 def arriving(
     direction: np.ndarray, nearness: float, place: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray | float]:
-    """The unit directions toward a light, (3,) if far, else (N, 3), and its distance over that from
-    the middle.
+    """Compute the directions toward a light.
+
+    Parameters
+    ----------
+    direction : (3,) ndarray
+        Unit direction from the middle of the object.
+    nearness : float
+        q; 0 for a far light.
+    place : (N, 3) ndarray
+        Positions.
+
+    Returns
+    -------
+    light : (3,) or (N, 3) ndarray
+        Unit directions toward the light.
+    length : float or (N,) ndarray
+        Its distance over that from the middle.
     """
     if nearness == 0:
         return direction, 1.0
@@ -159,8 +222,8 @@ def arriving(
 
 
 def tangents(direction: np.ndarray) -> np.ndarray:
-    """Two unit vectors (2, 3) across a unit direction and each other (Duff et al. 2017, JCGT 6(1),
-    no DOI).
+    """Return two unit vectors (2, 3) perpendicular to a unit direction and to each other (Duff et
+    al. 2017, JCGT 6(1), no DOI).
     """
     x, y, z = direction
     # Divided by 1 + |z|, which is never near 0.
@@ -207,8 +270,8 @@ def _measured(problem: Problem, lamps: Lamps) -> Fitted:
 
 
 def _hints(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.ndarray]:
-    """What is known beforehand: losses, and as for the columns of the jacobian, halves of gradients
-    and curvatures (P,).
+    """Weak priors: their losses, and, by the columns of the Jacobian, halves of gradients and
+    curvatures.
     """
     count = lamps.count
     turning = 2 * count if problem.directions else 0
@@ -243,9 +306,8 @@ def _normal_equations(problem: Problem, fitted: Fitted) -> tuple[np.ndarray, np.
 
 
 def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """sum_n left_ni weight_n right_nj, (P, Q).
-
-    Not by BLAS, whose threads take longer to wake than a few columns need.
+    """Compute sum_n left_ni weight_n right_nj, (P, Q), without BLAS, whose threads take longer to
+    start than a few columns need.
     """
     return np.einsum("ni,nj->ij", left * weight[:, None], right)
 

@@ -1,8 +1,7 @@
 """The optimal light direction: the one distant light that best explains a decomposition (thesis,
 figure 4.49).
 
-Problem: the recovered light comes from everywhere; an artist, or a renderer, wants to know where
-THE light is.
+Problem: the recovered light comes from everywhere; an artist, or a renderer, needs one direction.
 
 Equations, summed over the pixels' normals n and the channels c, with a robust rho(r) = 2 s^2
 (sqrt(1 + (r / s)^2) - 1): shading      min over l, E, A of  rho(S_c(n) - E_c / pi max(0, n . l) -
@@ -13,14 +12,14 @@ closed form; the best are refined by least squares.
 The cone: the 68 % standard error of the direction where it is largest, from the sandwich H^-1
 (sum_b g_b g_b^T) H^-1 with H the curvature and g_b the gradient summed over a block of neighbouring
 pixels: errors of shape and separation are alike within a block, so that counting single pixels
-would promise far too much. The share explained: 1 - (remaining sum of squares) / (that of no
+would be far too optimistic. The share explained: 1 - (remaining sum of squares) / (that of no
 direction at all, which is a constant for the shading and nothing for the highlight).
 
 Citation: J. F. Blinn 1977, doi:10.1145/563858.563893; the sandwich of clustered errors: K.-Y.
 Liang, S. L. Zeger, Biometrika 73 (1986), doi:10.1093/biomet/73.1.13. H. Akbar 2016.
 
-Limits: the cone says how well THIS model's direction is fixed, not whether shape and separation are
-right. One light; a window and a lamp give something between them, and a low share.
+Limits: the cone is the uncertainty of THIS model's direction, and does not include errors of shape
+and separation. One light; a window and a lamp give something between them, and a low share.
 """
 
 from collections.abc import Callable
@@ -40,8 +39,7 @@ _SAMPLES, _GRID, _BLOCKS = 3000, 600, 8
 _EXPONENTS = (6.0, 25.0, 100.0, 400.0)
 _STARTS = 3
 _SHARPEST = 2000.0
-# the outline's normals are the least certain, and what the separation finds there is mostly
-# background
+# Normals at the silhouette are the least certain, and separated light there is mostly background.
 _RIM = 0.25
 _ROBUST = 0.2  # of the white: errors from here on count linearly
 _LEAST_SHARE, _WIDEST_CONE = 0.2, 30.0
@@ -49,8 +47,18 @@ _LEAST_SHARE, _WIDEST_CONE = 0.2, 30.0
 
 @dataclass(frozen=True)
 class DirectionEstimate:
-    """`light`: the best one. `explained`: share in [0, 1]. `cone`: degrees, of the direction's 68 %
-    interval. `exponent`: of the lobe, for the specular light.
+    """The distant light that best explains a decomposition.
+
+    Attributes
+    ----------
+    light : DirectionalLight
+        The light.
+    explained : float
+        Share explained, in [0, 1].
+    cone : float
+        Degrees, of the direction's 68 % interval.
+    exponent : float or None
+        Of the Blinn-Phong lobe, for the specular light.
     """
 
     light: DirectionalLight
@@ -60,18 +68,14 @@ class DirectionEstimate:
 
     @property
     def determined(self) -> bool:
-        """Whether there is a direction to speak of: enough is explained, and the cone is not half
-        the sky.
-        """
+        """Whether enough is explained, and the cone is well below a hemisphere."""
         return self.explained >= _LEAST_SHARE and self.cone <= _WIDEST_CONE
 
 
 @dataclass(frozen=True)
 class _Samples:
-    """Pixels of the object:
-
-    `normal`, `values` (N, 3), the `block` (N,) each is in, and `scale`, where errors begin to count
-    less.
+    """Pixels of the object: `normal`, `values` (N, 3), the `block` (N,) of each, and `scale`, the
+    error from which on errors count less.
     """
 
     normal: np.ndarray
@@ -81,7 +85,18 @@ class _Samples:
 
 
 def explain_shading(d: Decomposition) -> DirectionEstimate:
-    """The distant light, with an ambient rest, that best explains the shading."""
+    """Find the distant light with ambient light that best explains the shading.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+
+    Returns
+    -------
+    DirectionEstimate
+        Without an exponent.
+    """
     samples = _samples(d, d.shading)
     start = _best_lambert(samples)
 
@@ -102,8 +117,21 @@ def explain_shading(d: Decomposition) -> DirectionEstimate:
 
 
 def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[DirectionalLight, float]:
-    """The light from the unit vector `direction` (3,) that fits the shading best, and the share of
-    it that it explains, in [0, 1].
+    """Fit the shading under a light of known direction.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+    direction : (3,) ndarray
+        Unit vector toward the light.
+
+    Returns
+    -------
+    light : DirectionalLight
+        The best light from there.
+    explained : float
+        Share of the shading that it explains, in [0, 1].
     """
     samples = _samples(d, d.shading)
     facing = np.maximum(samples.normal @ direction, 0)
@@ -119,10 +147,20 @@ def share_explained(d: Decomposition, direction: np.ndarray) -> tuple[Directiona
 
 
 def explain_specular(d: Decomposition) -> DirectionEstimate:
-    """The distant light, and the exponent of the lobe, that best explain the specular layer.
+    """Find the distant light and the Blinn-Phong exponent that best explain the specular layer.
 
-    Where there is none, or next to none by the fit of the lobe, nothing is explained: some light
-    goes through any two faint specks.
+    Without specular light, or with next to none by the lobe fit, nothing is explained: some light
+    fits any two faint specks.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+
+    Returns
+    -------
+    DirectionEstimate
+        With the exponent.
     """
     samples = _samples(d, d.specular, _RIM)
     if not samples.values.any() or (
@@ -156,9 +194,21 @@ def explain_specular(d: Decomposition) -> DirectionEstimate:
 
 
 def lobe_light(normal: np.ndarray, light: np.ndarray, exponent: float) -> np.ndarray:
-    """What a lobe of strength 1 sends to the viewer, (...), under a light of irradiance 1;
+    """Compute the radiance of a lobe of strength 1 toward the viewer under a light of irradiance 1.
 
-    `normal` (..., 3), `light` (3,) of length 1.
+    Parameters
+    ----------
+    normal : (..., 3) ndarray
+        Unit normals.
+    light : (3,) ndarray
+        Unit vector toward the light.
+    exponent : float
+        Blinn-Phong exponent.
+
+    Returns
+    -------
+    (...) ndarray
+        Radiance.
     """
     return radiance(BlinnPhong(1.0, exponent), normal, VIEW, directional(light, 1.0))[..., 0]
 
@@ -185,7 +235,7 @@ def _samples(d: Decomposition, layer: np.ndarray, rim: float = 0.0) -> _Samples:
 
 
 def _best_lambert(samples: _Samples) -> np.ndarray:
-    """The direction of the grid that leaves the least of the luminance, irradiance and ambient in
+    """The grid direction with the smallest residual of the luminance, irradiance and ambient in
     closed form.
     """
     grid = sphere_directions(_GRID)
@@ -198,8 +248,8 @@ def _best_lambert(samples: _Samples) -> np.ndarray:
 
 
 def _best_lobes(samples: _Samples) -> list[tuple[np.ndarray, float]]:
-    """The lights and exponents that leave the least of the luminance, one for each exponent of the
-    grid, strength in closed form.
+    """The lights and exponents with the smallest residual of the luminance, one for each exponent
+    of the grid, strength in closed form.
     """
     half = sphere_directions(2 * _GRID)[:_GRID]
     lights = 2 * half[:, 2:] * half - VIEW

@@ -1,4 +1,4 @@
-"""The picture that a lobe is fitted to, checked."""
+"""The image that a lobe is fitted to, and everything else that is given, validated."""
 
 from dataclasses import dataclass
 
@@ -65,11 +65,25 @@ class RecoveredScene:
 
 @dataclass(frozen=True)
 class Observed:
-    """`specular` (H, W, 3), `normal` (H, W, 3), `mask` (H, W) bool, `confidence` (H, W), `clipped`
-    (H, W) bool. `inside` (H, W): what counts. `place` (H, W, 3): where each pixel's surface is, in
-    radii of the object (half of the longer side of the mask's box) from the middle of that box;
-    None where the height is not known. `outline` (H, W, 3): unit normals that the outline alone
-    suggests, or None.
+    """A validated specular image.
+
+    Attributes
+    ----------
+    specular, normal : (H, W, 3) ndarray
+        Specular light and unit normals.
+    mask : (H, W) ndarray of bool
+        The object.
+    confidence : (H, W) ndarray
+        In [0, 1].
+    clipped : (H, W) ndarray of bool
+        Where the light is a lower bound.
+    inside : (H, W) ndarray of bool
+        Pixels that count.
+    place : (H, W, 3) ndarray or None
+        Position of each pixel's surface in radii of the object (half of the longer side of the
+        mask's box) from the middle of that box; None where the height is unknown.
+    silhouette_normals : (H, W, 3) ndarray or None
+        Unit normals that the silhouette alone suggests.
     """
 
     specular: np.ndarray
@@ -83,7 +97,7 @@ class Observed:
 
     @property
     def peak(self) -> float:
-        """The brightest mean over the channels."""
+        """The largest mean over the channels."""
         return float(self.specular[self.inside].mean(axis=1).max()) if self.inside.any() else 0.0
 
 
@@ -94,7 +108,29 @@ def observe(
     pixels: PixelData | None = None,
     silhouette_normals: np.ndarray | None = None,
 ) -> Observed:
-    """Checks what was given, see `fit.fit_lobe`. Raises `InputError`."""
+    """Validate the arrays of a fit.
+
+    Parameters
+    ----------
+    specular, normal : (H, W, 3) ndarray
+        Specular light and unit normals.
+    mask : (H, W) ndarray of bool
+        The object.
+    pixels : PixelData, optional
+        Confidence, clipping and height.
+    silhouette_normals : (H, W, 3) ndarray, optional
+        Unit normals that the silhouette alone suggests.
+
+    Returns
+    -------
+    Observed
+        As arrays of float.
+
+    Raises
+    ------
+    InputError
+        If the arrays do not fit together.
+    """
     specular, normal, mask = (
         np.asarray(specular, float),
         np.asarray(normal, float),
@@ -144,7 +180,7 @@ def _places(height: np.ndarray | None, mask: np.ndarray) -> np.ndarray | None:
     height = np.asarray(height, float)
     if height.shape != mask.shape or not np.isfinite(height[mask]).all():
         raise InputError(
-            f"height has shape {height.shape}: give (H, W) like the mask, finite inside it, in pixels"
+            f"height has shape {height.shape}: give finite (H, W) pixels like the mask"
         )
     rows, columns = np.nonzero(mask)
     low, high = np.array([rows.min(), columns.min()]), np.array([rows.max(), columns.max()])

@@ -1,14 +1,13 @@
-"""The pixels that a lobe is fitted to: all bright ones, some of the dark ones, and how far each is
-believed.
+"""The pixels that a lobe is fitted to: all bright ones and some of the dark ones, with weights.
 
 Equation: the deviation of a pixel of specular light s is sigma = sqrt(floor^2 + (relative s)^2),
 floor being a share of the peak; its weight is its confidence times the number of pixels that it
-stands for. Pixels are taken at even steps along their order in brightness, the same for the same
-picture.
+represents. Pixels are taken at even steps in their order of brightness, so that the same image
+gives the same pixels.
 
 Citation: W. G. Cochran, "Sampling techniques", 3rd edition (1977) (systematic sampling; no DOI).
 
-Limits: a clipped pixel tells a lower bound only; it counts where the model is darker.
+Limits: a clipped pixel is a lower bound only; it counts where the model is darker.
 """
 
 from dataclasses import dataclass
@@ -23,11 +22,32 @@ _PEAK_PIXELS = 5  # the peak is the mean of that many: one hot pixel is no highl
 
 @dataclass(frozen=True)
 class Pixels:
-    """N pixels: `normal` (N, 3), `place` (N, 3) (zeros where not known), `colour` (N, 3) and its
-    mean `value` (N,), `sigma` and `weight` (N,), `clipped` (N,) bool, `cell` (N, 2): rows and
-    columns. `peak` of the highlight; `dark`: as good as no light; `bright`: how many pixels of the
-    picture reach half of the peak; `peak_clipped`: the share of the pixels of the peak that are
-    clipped.
+    """N pixels.
+
+    Attributes
+    ----------
+    normal : (N, 3) ndarray
+        Unit normals.
+    place : (N, 3) ndarray
+        See `Observed.place`; 0 where unknown.
+    colour : (N, 3) ndarray
+        Specular light.
+    value : (N,) ndarray
+        Its mean over the channels.
+    sigma, weight : (N,) ndarray
+        Deviation and weight.
+    clipped : (N,) ndarray of bool
+        Where the light is a lower bound.
+    cell : (N, 2) ndarray
+        Row and column.
+    peak : float
+        Of the highlight.
+    dark : float
+        Light that counts as none.
+    bright : int
+        Number of pixels of the image that reach half of the peak.
+    peak_clipped : float
+        Share of the peak's pixels that are clipped.
     """
 
     normal: np.ndarray
@@ -45,9 +65,21 @@ class Pixels:
 
 
 def choose_pixels(seen: Observed, noise: tuple[float, float], most: int) -> Pixels:
-    """At most about `most` of the pixels inside.
+    """Choose pixels to fit to.
 
-    `noise`: the floor as a share of the peak, and the relative part.
+    Parameters
+    ----------
+    seen : Observed
+        The specular image.
+    noise : tuple of float
+        The floor as a share of the peak, and the relative part.
+    most : int
+        At most about so many.
+
+    Returns
+    -------
+    Pixels
+        The same for the same image.
     """
     inside = seen.inside
     value = seen.specular[inside].mean(axis=1)

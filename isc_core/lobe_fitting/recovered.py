@@ -1,42 +1,43 @@
-"""The lobe of an object of which one photo is all there is: normals, shading and specular light are
-themselves recovered.
+"""The lobe of an object known from one photo only: normals, shading and specular light are
+recovered.
 
-Problem: recovered normals are wrong by 10 to 20 degrees, most of all where a highlight was, so the
-WIDTH of the highlight among them tells next to nothing (alpha came out with a deviation of a factor
-1.9, the light 30 to 60 degrees off). Its brightness tells more: an insulator mirrors about f0 = 4 %
-of the light along the normal, and how bright that light is, the shading shows. So does how much of
-the OBJECT it covers, whatever the normals there: all directions toward the viewer are on it
-somewhere.
+Problem: recovered normals are wrong by 10 to 20 degrees, most of all in highlights, so the WIDTH of
+the highlight among them carries hardly any information (alpha had a deviation of a factor 1.9, the
+light was 30 to 60 degrees off). Its brightness carries more: an insulator mirrors about f0 = 4 % of
+the light along the normal, and the shading shows how bright that light is. So does the share of the
+OBJECT that the highlight covers, whatever the normals there: all directions toward the viewer occur
+somewhere on it.
 
-Equation: with A the brightest shading (97th percentile), a light across whose beam the irradiance
-is E = pi A, and the highlight's peak P, the lobe's height D F G / (4 cos) at n = h gives
+Equation: with A the brightest shading (97th percentile), a light with irradiance E = pi A across
+its beam, and the highlight's peak P, the lobe's height D F G / (4 cos) at n = h gives
 
-    alpha_P = sqrt(f0 A / (4 cos P)),    f = sum of max(s - .2 P, 0) over the object / (P times its
-    pixels), log alpha = a + b log alpha_P + c log sqrt(f),    strength E = pi A,
+    alpha_P = sqrt(f0 A / (4 cos P)),
+    f = sum of max(s - .2 P, 0) over the object / (P times its pixels),
+    log alpha = a + b log alpha_P + c log sqrt(f),    strength E = pi A,
 
-s the specular light (what is darker a separator may have left or not), cos = .85 the usual tilt of
+s the specular light (a separator may have left darker parts or not), cos = .85 the typical tilt of
 h. h is the mean of the normals, weighted by the squared specular light, after the normals were
-blurred over .3 of the object's size (the root of its area): what is left is where on the object the
-highlight sits. Where the caller knows what the outline alone says of the normals, h is the mean of
-both. Where somebody looked at the photo's light (`light_estimate`), that says where the light stands, and h
-only where its highlight is on these normals.
+blurred over .3 of the object's size (the root of its area): what remains is the position of the
+highlight on the object. Where the silhouette's normals are given, h is the mean of both. Where the
+light was predicted (`light_estimate`), the prediction is the light's direction, and h only
+positions the highlight on these normals.
 
 a, b and c were fitted to 44 rendered GGX objects (alpha .05 to .45, strength .6 to 1.5, ior 1.5)
 that went through the whole chain; each left out in turn, alpha was within a factor 1.5 on 83 % of
 those from .1 to .4 (70 % without f), strength over shading within 40 % on 77 %, and the light 22
-degrees off in the median (28 without the outline). The widths of the intervals hold 68 % of 30 of
-them since SIRFS looks at shape and light. `benchmarks/decomposition/lobe_fitting.py` measures other ones.
+degrees off in the median (28 without the silhouette). The widths of the intervals hold 68 % of 30
+of them since SIRFS uses predicted shape and light. `benchmarks/decomposition/lobe_fitting.py`
+measures others.
 
 Citation: the brightness of highlights as a measure of gloss: J. A. Ferwerda, F. Pellacini, D. P.
 Greenberg, "A psychophysically-based model of surface gloss perception", SPIE 4299 (2001),
 doi:10.1117/12.429501. Facets: B. Walter et al., doi:10.2312/EGWR/EGSR07/195-206.
 
-A clipped highlight was brighter than P: alpha_P then is too wide, and what is said is an upper
-bound.
+A clipped highlight was brighter than P: alpha_P then is too wide, and the result an upper bound.
 
 Limits: insulators (metals mirror ten times as much) under lights that are small beside the
-highlight; one light, the strongest. Strength is relative to the shading that was given: how dark a
-paint is, one photo does not tell, so the shading's own scale may be off by two.
+highlight; one light, the strongest. Strength is relative to the given shading: one photo does not
+determine how dark an albedo is, so the shading's own scale may be off by two.
 """
 
 from dataclasses import replace
@@ -72,7 +73,7 @@ _ALPHA_SPREAD, _STRENGTH_SPREAD, _CONE = (
     0.34,
     30.0,
 )  # hold 68 %: factors as logarithms, degrees
-_LEAST_SHARE = 1e-3  # of specular light over shading: a separator leaves less on matt objects
+_LEAST_SHARE = 1e-3  # of specular light over shading: separators leave less on diffuse objects
 _WIDEST = 0.6
 _NARROWEST_PIXELS = 6
 _FLATTEST = 0.05
@@ -87,8 +88,27 @@ def fit_recovered(
     light_estimate: LightEstimate | None,
     options: LobeFitOptions,
 ) -> LobeFit:
-    """The fit to a picture whose `shading` (H, W, 3), that of a white matt surface, is given;
-    `direction` (3,) where the light is known, `light_estimate` where somebody looked at it.
+    """Fit a lobe where normals and shading are recovered.
+
+    Parameters
+    ----------
+    seen : Observed
+        The specular image.
+    pixels : Pixels
+        The fitted pixels.
+    shading : (H, W, 3) ndarray
+        Of a white Lambertian surface.
+    direction : (3,) ndarray or None
+        Known direction of the light.
+    light_estimate : LightEstimate or None
+        The predicted light.
+    options : LobeFitOptions
+        The lobe.
+
+    Returns
+    -------
+    LobeFit
+        With one light.
     """
     convention, inside = CONVENTION[options.model], seen.inside
     light_there = shading[inside].mean(axis=1)
@@ -140,7 +160,7 @@ def fit_recovered(
 
 def _outcome(alpha: float, pixels: Pixels, light_estimate: LightEstimate | None) -> LobeFitOutcome:
     if pixels.peak_clipped > _MOST_CLIPPED:
-        # also where the bound is so wide that it says little: that the light is smooth it does not
+        # Even where the bound is wide: clipping is no sign of a smooth light.
         return LobeFitOutcome.CLIPPED
     if alpha > _WIDEST or (light_estimate is not None and light_estimate.smooth):
         return LobeFitOutcome.SMOOTH_LIGHT
@@ -148,11 +168,22 @@ def _outcome(alpha: float, pixels: Pixels, light_estimate: LightEstimate | None)
 
 
 def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """Unit normals (H, W, 3) without their detail: means over .3 of the object's size, within the
-    mask; (0, 0, 1) outside it.
+    """Blur normals over .3 of the object's size.
 
-    Blurred as sums over blocks, a sixteenth of the blur's width each, for the time that a blur
-    takes grows with its width.
+    The blur works on sums over blocks, a sixteenth of its width each, since its time grows with its
+    width.
+
+    Parameters
+    ----------
+    normal : (H, W, 3) ndarray
+        Unit normals.
+    mask : (H, W) ndarray of bool
+        The object.
+
+    Returns
+    -------
+    (H, W, 3) ndarray
+        Unit normals; (0, 0, 1) outside the mask.
     """
     box = mask_slices(mask)
     inside = mask[box]
@@ -175,19 +206,14 @@ def blurred_normals(normal: np.ndarray, mask: np.ndarray) -> np.ndarray:
 
 
 def _block_sums(layers: np.ndarray, step: int) -> np.ndarray:
-    """Layers (H, W, C) as sums over blocks of `step` x `step` pixels:
-
-    (C, h, w), zeros added where a block is cut.
-    """
+    """Sums (C, h, w) of layers (H, W, C) over blocks of `step` x `step` pixels, zero-padded."""
     padded = np.pad(layers, [(0, -n % step) for n in layers.shape[:2]] + [(0, 0)])
     rows, columns = (n // step for n in padded.shape[:2])
     return padded.reshape(rows, step, columns, step, -1).sum(axis=(1, 3)).transpose(2, 0, 1)
 
 
 def _light_direction(seen: Observed, normal: np.ndarray) -> np.ndarray:
-    """From the mean normal of the highlight; where the outline says something, from the mean of
-    both.
-    """
+    """From the highlight's mean normal, or the mean of it and the silhouette's."""
     weight = np.square(seen.specular[seen.inside].mean(axis=1)) * seen.confidence[seen.inside]
     half = _unit(weight @ normal[seen.inside])
     if seen.silhouette_normals is not None:
@@ -202,9 +228,7 @@ def _unit(vector: np.ndarray) -> np.ndarray:
 def _predicted(
     seen: Observed, normal: np.ndarray, light: LobeLight, alpha: float, options: LobeFitOptions
 ) -> tuple[np.ndarray, float]:
-    """The specular image of the answer on the blurred normals, and the share of the given one that
-    it explains.
-    """
+    """The fit's specular image on the blurred normals, and the share that it explains."""
     lamps = Lamps(
         light.direction[None], np.zeros(1), np.zeros(1), np.zeros(1), float(np.log(alpha))
     )

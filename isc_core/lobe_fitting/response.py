@@ -1,14 +1,15 @@
-"""What a lobe answers to one far light, with its derivatives by alpha and by the light's direction.
+"""The response of a lobe to one far light, with its derivatives by alpha and by the light's
+direction.
 
-Equation: y(n) = f_r(n, v, l) max(0, n . l) with v = (0, 0, 1) and the lobes of `shading.brdf.ggx` and
-`shading.brdf.blinn_phong` ("normalised", exponent by the usual rule p = 2 / alpha^2 - 2). h = (l + v) / m,
-m = |l + v|, so d(n . h) / dl = (n - (n . h) h) / m.
+Equation: y(n) = f_r(n, v, l) max(0, n . l) with v = (0, 0, 1) and the lobes of `shading.brdf.ggx`
+and `shading.brdf.blinn_phong` ("normalised", exponent p = 2 / alpha^2 - 2). h = (l + v) / m, m =
+|l + v|, so d(n . h) / dl = (n - (n . h) h) / m.
 
 Citation: B. Walter et al., EGSR 2007, doi:10.2312/EGWR/EGSR07/195-206; J. F. Blinn, SIGGRAPH 1977,
 doi:10.1145/563858.563893.
 
-Limits: one view, orthographic. Behind the light's or the viewer's horizon all is 0, derivatives
-too.
+Limits: one view, orthographic. Below the light's or the viewer's horizon the response and its
+derivatives are 0.
 """
 
 from dataclasses import dataclass
@@ -23,10 +24,16 @@ _LEAST = 1e-6  # cosines below are below the horizon
 
 @dataclass(frozen=True)
 class Response:
-    """`value` (N,) in 1/sr;
+    """The response of a lobe, with derivatives.
 
-    `by_log_alpha` (N,); `by_light` (N, 3): only the part across the light's direction means
-    something.
+    Attributes
+    ----------
+    value : (N,) ndarray
+        1/sr.
+    by_log_alpha : (N,) ndarray
+        Derivative by log alpha.
+    by_light : (N, 3) ndarray
+        Derivative by the light's direction; only the part perpendicular to it is meaningful.
     """
 
     value: np.ndarray
@@ -35,8 +42,23 @@ class Response:
 
 
 def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: float) -> Response:
-    """The answer of surfaces with unit normals (N, 3) to light from the unit direction (3,) or (N,
-    3); `alpha` in (0, 1).
+    """Compute the response of surfaces to a light.
+
+    Parameters
+    ----------
+    model : {"ggx", "blinn_phong"}
+        The lobe.
+    normal : (N, 3) ndarray
+        Unit normals.
+    light : (3,) or (N, 3) ndarray
+        Unit directions toward the light.
+    alpha : float
+        Roughness in (0, 1).
+
+    Returns
+    -------
+    Response
+        Of each normal.
     """
     view_cos, light_cos = normal[:, 2], (normal * light).sum(axis=1)
     lit = (view_cos > _LEAST) & (light_cos > _LEAST)
@@ -62,17 +84,36 @@ def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: floa
 
 
 def sky_response(normal: np.ndarray) -> np.ndarray:
-    """What the gloss mirrors of a uniform sky of radiance 1, (N,):
+    """Compute the mirrored light of a uniform environment map of radiance 1: Schlick's F at the
+    view, roughness neglected.
 
-    Schlick's F at the view, roughness left out.
+    Parameters
+    ----------
+    normal : (N, 3) ndarray
+        Unit normals.
+
+    Returns
+    -------
+    (N,) ndarray
+        The response.
     """
     return F0 + (1 - F0) * (1 - np.clip(normal[:, 2], 0, 1)) ** 5
 
 
 def sky_basis(normal: np.ndarray) -> np.ndarray:
-    """(4, N): what the gloss mirrors of a smooth sky is about a mix of these: even light, what
-    Fresnel adds toward grazing angles, slow and fast, and light that grows upward in the mirrored
+    """Evaluate a basis of the mirrored light of a smooth environment map: uniform light, Fresnel's
+    increase toward grazing angles, slow and fast, and light that increases upward in the mirrored
     view.
+
+    Parameters
+    ----------
+    normal : (N, 3) ndarray
+        Unit normals.
+
+    Returns
+    -------
+    (4, N) ndarray
+        The basis.
     """
     grazing = 1 - np.clip(normal[:, 2], 0, 1)
     return np.stack([np.ones(len(normal)), grazing**2, grazing**5, 2 * normal[:, 2] * normal[:, 1]])

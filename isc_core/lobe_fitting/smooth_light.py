@@ -1,13 +1,13 @@
-"""Whether a light without any peak explains a specular image as well as lamps do.
+"""Whether a light without peaks explains a specular image as well as lamps do.
 
-Equation: a mirror-like gloss under the radiance sum_j c_j p_j(r) of degree 4 in the mirrored view r
-= 2 n_z n - v shows F(n) times it; the c_j are found by re-weighted least squares with the loss of
+Equation: mirror-like reflection of the radiance sum_j c_j p_j(r) of degree 4 in the mirrored view r
+= 2 n_z n - v gives F(n) times it; the c_j are found by re-weighted least squares with the loss of
 `lamps`. p_j: the monomials x^a y^b z^c, c <= 1, 25 of them, which span the spherical harmonics to
-that degree. A rough gloss under a smooth light is such a picture too: roughness only makes it
+that degree. A rough lobe under a smooth light gives such an image too: roughness only makes it
 smoother.
 
 Citation: R. Ramamoorthi, P. Hanrahan, "A signal-processing framework for inverse rendering",
-SIGGRAPH 2001, doi:10.1145/383259.383271 (what a light's frequencies leave of the lobe).
+SIGGRAPH 2001, doi:10.1145/383259.383271 (the effect of a lobe on a light's frequencies).
 
 Limits: lobes with an alpha above about .35 are nearly that smooth themselves.
 """
@@ -24,7 +24,18 @@ _RIDGE = 1e-7
 
 
 def smooth_loss(pixels: Pixels) -> float:
-    """The loss that is left, comparable with that of `lamps.Fitted`."""
+    """Compute the remaining loss of the smooth light.
+
+    Parameters
+    ----------
+    pixels : Pixels
+        The fitted pixels.
+
+    Returns
+    -------
+    float
+        Comparable with `lamps.Fitted.loss`.
+    """
     normal = pixels.normal
     mirrored = 2 * normal[:, 2:] * normal - np.array([0.0, 0, 1])
     x, y, z = mirrored.T

@@ -1,29 +1,30 @@
-"""The fitted lobe as renderers want it: roughness, specular level, and where the level varies.
+"""Roughness and specular level of the fitted lobe as renderers use them, and where the level
+varies.
 
-Problem: a photo tells the product of a lobe's strength and its light. The diffuse shading has the
-same lamp in it: what it gives to the shading tells how bright it is, and the strength remains.
+Problem: a photo determines the product of a lobe's strength and its light. The diffuse shading has
+the same lamp in it: the lamp's share of the shading gives its irradiance, and the strength remains.
 
 Equation: S(n) = a max(0, n . l) + b is fitted to the shading, l being the fit's brightest light, a,
-b >= 0. A lamp of irradiance E gives matt white E / pi max(0, n . l): E = pi a, level = strength x
-light / E, for a base colour equal to the reflectance. 1 is the gloss of plastic, f0 = .04;
-Blinn-Phong's strength, which has f0 in it, is divided by .04. Where a is less than a third of the
-brightest shading, the lamp is not to be seen in it (recovered lights are smooth, and directions
-wrong by tens of degrees): that brightest shading stands for a.
+b >= 0. A lamp of irradiance E gives white Lambertian reflection E / pi max(0, n . l): E = pi a,
+level = strength x light / E, for a base colour equal to the reflectance. 1 is the specular
+reflection of plastic, f0 = .04; Blinn-Phong's strength, which contains f0, is divided by .04. Where
+a is less than a third of the brightest shading, the lamp is not visible in it (recovered lights are
+smooth, and directions wrong by tens of degrees): that brightest shading then replaces a.
 
 Variation: t(x) = sum w p s / sum w p^2 around x, s the specular image, p the predicted one. It is
-believed where the fit explains most of the specular image, p is bright on a quarter of the object,
-and t found on every second block of pixels explains the other ones clearly better than one level
-does.
+used where the fit explains most of the specular image, p is bright on a quarter of the object, and
+t from every second block of pixels explains the other blocks clearly better than one level does.
 
 Citation: glTF's extension KHR_materials_specular, Khronos Group 2021 (no DOI). M. Stone,
 "Cross-validatory choice and assessment of statistical predictions", JRSS B 36 (1974),
 doi:10.1111/j.2517-6161.1974.tb00994.x.
 
 Limits: a lamp that the shading does not show leaves the level uncertain by a factor of 3. A lobe of
-the wrong form, or wrong normals, varies too.
+the wrong form, or wrong normals, causes variation too.
 """
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from scipy import ndimage
@@ -33,8 +34,6 @@ from ..scene.decomposition import Decomposition
 from ..scene.lobe_fit import LobeFit, LobeFitOutcome
 from ..shading.brdf.ggx import F0
 
-FITTED, BOUND, NONE_FOUND, NOT_FITTED = "fitted", "upper bound", "no highlights found", "not fitted"
-LOWERED = "fitted, lowered to what the photo has room for"
 _BRIGHTEST_SHADING = 97.0  # percentile
 _LEAST_LAMP = 1 / 3  # of it: a weaker lamp cannot be told from none
 _MOST = 1 / F0  # a level that mirrors all light
@@ -43,47 +42,98 @@ _COVERED, _BRIGHT, _EXPLAINED, _GAIN = 0.25, 0.1, 0.6, 0.3
 _EVEN = 0.01  # of the specular light's squares: what one level leaves less of is even
 
 
+class SpecularSource(StrEnum):
+    """Where a roughness or a specular level comes from.
+
+    Attributes
+    ----------
+    FITTED
+        The fit.
+    LOWERED
+        The fit, lowered to the upper bound that the photo implies.
+    UPPER_BOUND
+        The fit gives an upper bound only.
+    NO_HIGHLIGHTS
+        There are no highlights.
+    NOT_FITTED
+        Unknown.
+    """
+
+    FITTED = "fitted"
+    LOWERED = "lowered to the upper bound"
+    UPPER_BOUND = "upper bound"
+    NO_HIGHLIGHTS = "no highlights"
+    NOT_FITTED = "not fitted"
+
+
 @dataclass(frozen=True)
-class Gloss:
-    """`roughness` of glTF and Blender in [0, 1], `specular` >= 0 the level for a base colour equal
-    to the reflectance, 1 is plastic; None where it is not known. `source`: of each, in words:
-    `FITTED`, `LOWERED`, `BOUND`, `NONE_FOUND`, `NOT_FITTED`. `variation`: (H, W) >= 0, a factor of
-    `specular`; None where one level explains the photo as well.
+class SpecularFit:
+    """Specular reflection in a renderer's terms; None where unknown.
+
+    Attributes
+    ----------
+    roughness : float or None
+        Of glTF and of Blender's Principled BSDF, in [0, 1].
+    specular : float or None
+        Level >= 0 for a base colour equal to the reflectance; 1 is plastic.
+    roughness_source, specular_source : SpecularSource
+        Where they come from.
+    variation : (H, W) ndarray or None
+        Factor >= 0 of `specular`; None where one level explains the photo as well.
     """
 
     roughness: float | None = None
     specular: float | None = None
-    roughness_source: str = NOT_FITTED
-    specular_source: str = NOT_FITTED
+    roughness_source: SpecularSource = SpecularSource.NOT_FITTED
+    specular_source: SpecularSource = SpecularSource.NOT_FITTED
     variation: np.ndarray | None = None
 
 
-def gloss_of(d: Decomposition) -> Gloss:
-    """What the result's fit says; nothing where it has none."""
+def fitted_specular(d: Decomposition) -> SpecularFit:
+    """Convert a decomposition's lobe fit to a renderer's terms.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+
+    Returns
+    -------
+    SpecularFit
+        Unknown where there is no fit.
+    """
     fit = d.brdf
     if fit is None:
-        return Gloss()
+        return SpecularFit()
     if fit.outcome == LobeFitOutcome.NO_SPECULAR:
-        return Gloss(specular=0.0, specular_source=NONE_FOUND)
+        return SpecularFit(specular=0.0, specular_source=SpecularSource.NO_HIGHLIGHTS)
     if fit.blender_roughness is None:
-        return Gloss()
+        return SpecularFit()
     level = _level(d, fit)
-    source = NOT_FITTED if level is None else FITTED
+    source = SpecularSource.NOT_FITTED if level is None else SpecularSource.FITTED
     if not fit.determined:
-        return Gloss(fit.blender_roughness, level, BOUND, source)
-    return Gloss(
+        return SpecularFit(fit.blender_roughness, level, SpecularSource.UPPER_BOUND, source)
+    return SpecularFit(
         fit.blender_roughness,
         level,
-        FITTED,
+        SpecularSource.FITTED,
         source,
         None if level is None else specular_variation(d),
     )
 
 
 def specular_variation(d: Decomposition) -> np.ndarray | None:
-    """t (H, W) >= 0, 1 where nothing is known;
+    """Estimate where the specular level varies.
 
-    None where the data do not ask for it, see the module.
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+
+    Returns
+    -------
+    (H, W) ndarray or None
+        t >= 0, 1 where nothing is known; None where one level explains the photo as well.
     """
     if d.brdf is None or d.brdf.explained < _EXPLAINED:
         return None
@@ -123,10 +173,10 @@ def _constant(seen: np.ndarray, predicted: np.ndarray, known: np.ndarray) -> flo
 
 
 def _ratio(seen: np.ndarray, predicted: np.ndarray, known: np.ndarray, block: int) -> np.ndarray:
-    """t (H, W) from the `known` pixels around, drawn toward 1 where they say little."""
+    """t (H, W) from the `known` pixels nearby, drawn toward 1 where they are weak."""
     common, square = (
         ndimage.gaussian_filter(np.where(known, part, 0.0), 0.5 * block, mode="constant")
         for part in (seen * predicted, predicted**2)
     )
-    doubt = 0.02 * float(square.max())
-    return (common + doubt) / (square + doubt) if doubt > 0 else np.ones(seen.shape)
+    ridge = 0.02 * float(square.max())
+    return (common + ridge) / (square + ridge) if ridge > 0 else np.ones(seen.shape)

@@ -1,17 +1,18 @@
-"""How glossy an object can be at most, given what its photo shows of the sky.
+"""The upper bound of an object's specular level that its photo implies under the recovered light.
 
-Problem: a fitted lobe's level is uncertain (see `gloss`), yet a renderer takes it at its word:
-under the recovered sky it mirrors that sky all over the object, as a sheen that the photo need not
-have. `shown_gloss` is the gloss that every file of a result carries.
+Problem: a fitted lobe's level is uncertain (see `specular_level`), yet a renderer uses it as it is:
+under the recovered environment map the whole object mirrors that map, with specular light that the
+photo need not contain. Every file of a result carries the level of `bounded_specular`.
 
-Equation: sheen(x) = level s(n(x)), s what the lobe of plastic mirrors of the sky toward the viewer.
-The photo is at least as bright, so that level <= min over c of I_c(x) / s_c(n(x)) at every pixel x.
-The 5th percentile is taken: normals and outlines are uncertain.
+Equation: the specular layer under the environment map is level s(n(x)), s being what the lobe of
+plastic mirrors of the map toward the viewer. The photo is at least as bright, so that level <= min
+over c of I_c(x) / s_c(n(x)) at every pixel x. The 5th percentile is taken: normals and silhouettes
+are uncertain.
 
 Citation: B. Walter et al. 2007, doi:10.2312/EGWR/EGSR07/195-206 (the lobe, see `shading.brdf.ggx`).
 
-Limits: a bound, no estimate: pale paint has room for nearly any gloss. Renderers mirror no more
-than all: above a level of 1 their sheen grows less toward grazing angles than the equation says.
+Limits: a bound, no estimate: pale albedo allows nearly any level. Renderers conserve energy: above
+a level of 1 their specular layer grows less toward grazing angles than the equation predicts.
 """
 
 from dataclasses import replace
@@ -23,37 +24,61 @@ from ..shading.brdf.ggx import F0
 from ..shading.brdf.roughness import alpha_from_blender
 from ..shading.environment_map import environment_from_shading, resampled
 from ..shading.lobe_rendering import Lobe, lobe_in_environment
-from .specular_level import LOWERED, Gloss, gloss_of
+from .specular_level import SpecularFit, SpecularSource, fitted_specular
 
-_ROWS = 16  # of the sky: a lobe of a smooth one is smooth
+_ROWS = 16  # of the environment map: the lobe of a smooth map is smooth
 _SHARE = 5.0  # percentile
-_NARROWEST = 0.05  # alpha: what is narrower mirrors a smooth sky alike
+_NARROWEST = 0.05  # alpha: narrower lobes mirror a smooth map alike
 
 
-def shown_gloss(d: Decomposition) -> Gloss:
-    """The fitted gloss, its level lowered to what the photo has room for under the recovered light."""
-    gloss = gloss_of(d)
+def bounded_specular(d: Decomposition) -> SpecularFit:
+    """Convert a lobe fit to a renderer's terms, with the level limited to its upper bound.
+
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition; its light is the environment map.
+
+    Returns
+    -------
+    SpecularFit
+        As `fitted_specular`, with the level lowered where necessary.
+    """
+    gloss = fitted_specular(d)
     if not gloss.specular or gloss.roughness is None:
         return gloss
     most = specular_upper_bound(d, gloss.roughness, environment_from_shading(d.illumination, _ROWS))
     return (
-        gloss if gloss.specular <= most else replace(gloss, specular=most, specular_source=LOWERED)
+        gloss
+        if gloss.specular <= most
+        else replace(gloss, specular=most, specular_source=SpecularSource.LOWERED)
     )
 
 
-def specular_upper_bound(d: Decomposition, roughness: float, sky: np.ndarray) -> float:
-    """The largest specular level, 1 being plastic, whose sheen the photo has room for; infinite
-    under a black sky.
+def specular_upper_bound(d: Decomposition, roughness: float, environment: np.ndarray) -> float:
+    """Compute the largest specular level that the photo allows.
 
-    `roughness`: Blender's, in [0, 1]. `sky`: (rows, 2 rows, 3) radiance as the object is lit by it,
-    rows >= 16.
+    Parameters
+    ----------
+    d : Decomposition
+        The decomposition.
+    roughness : float
+        Blender's, in [0, 1].
+    environment : (rows, 2 rows, 3) ndarray
+        Radiance that lights the object, rows >= 16.
+
+    Returns
+    -------
+    float
+        1 is plastic; infinite under a black environment map.
     """
     lobe = Lobe(alpha=max(float(alpha_from_blender(roughness)), _NARROWEST), f0=F0)
-    sheen = lobe_in_environment(lobe, d.normal[d.mask].astype(float), resampled(sky, _ROWS))
+    normal = d.normal[d.mask].astype(float)
+    layer = lobe_in_environment(lobe, normal, resampled(environment, _ROWS))
     seen = d.image[d.mask]
-    # A channel of zero tells nothing: cameras cut there what their colours cannot hold.
+    # A channel of zero carries no information: cameras clip colours outside their gamut there.
     room = np.divide(
-        seen, sheen, out=np.full(sheen.shape, np.inf), where=(sheen > 1e-9) & (seen > 0)
+        seen, layer, out=np.full(layer.shape, np.inf), where=(layer > 1e-9) & (seen > 0)
     )
     return float(
         np.percentile(room.min(-1), _SHARE, method="lower")

@@ -1,4 +1,4 @@
-"""Where to look for lights: the peaks of the specular light as a function of the normal.
+"""Starting directions of the lights: the peaks of the specular light as a function of the normal.
 
 Problem: the least squares need a start near the light. For an orthographic view and a far light the
 lobe is highest near the normal that equals the half vector, l = 2 (v . h) h - v.
@@ -22,9 +22,23 @@ _BLUR, _APART = 1.0, 5.0  # cells
 def bright_half_vectors(
     normal: np.ndarray, value: np.ndarray, weight: np.ndarray, count: int
 ) -> list[np.ndarray]:
-    """Unit normals (3,) around which `value` (N,), which may be negative, is highest on the
-    average, the highest first; the last is that of the brightest pixel. `normal` (N, 3), `weight`
-    (N,).
+    """Find the unit normals around which a value is highest on average.
+
+    Parameters
+    ----------
+    normal : (N, 3) ndarray
+        Unit normals.
+    value : (N,) ndarray
+        May be negative.
+    weight : (N,) ndarray
+        Of each pixel, >= 0.
+    count : int
+        Number of peaks.
+
+    Returns
+    -------
+    list of (3,) ndarray
+        The highest first; the last is that of the brightest pixel.
     """
     flat = normal[:, :2] / np.sqrt(1 + np.clip(normal[:, 2], 0, 1))[:, None]
     cell = np.clip(np.floor((flat + 1) / 2 * _CELLS).astype(int), 0, _CELLS - 1)
@@ -51,7 +65,16 @@ def bright_half_vectors(
 
 
 def light_of_half_vector(half: np.ndarray) -> np.ndarray:
-    """The direction (3,) of the light whose half vector with the view (0, 0, 1) is the unit vector
-    `half` (3,).
+    """Compute the direction of the light whose half vector with the view (0, 0, 1) is given.
+
+    Parameters
+    ----------
+    half : (3,) ndarray
+        Unit half vector.
+
+    Returns
+    -------
+    (3,) ndarray
+        Unit vector toward the light.
     """
     return 2 * half[2] * half - np.array([0.0, 0, 1])

@@ -1,4 +1,4 @@
-"""How sure a least squares fit is whose errors are not independent.
+"""Uncertainty of a least-squares fit whose errors are not independent.
 
 Equation: with the scores g_i = w_i r_i J_i summed over blocks B of neighbouring pixels, and H = sum
 w_i J_i J_i^T,
@@ -6,12 +6,13 @@ w_i J_i J_i^T,
     covariance = H^-1 (sum_B g_B g_B^T) H^-1 b / (b - p),      b blocks that count, p parameters.
 
 Errors within a block may depend on each other in any way; a block is about as wide as a highlight,
-since what is wrong there (normals, the separation, the lobe's form) is wrong all over it.
+since errors of normals, of the separation or of the lobe's form affect all of it.
 
 Citation: K.-Y. Liang and S. L. Zeger, "Longitudinal data analysis using generalized linear models",
 Biometrika 73(1) (1986), 13-22, doi:10.1093/biomet/73.1.13 (the sandwich over clusters).
 
-Limits: a fit that errs alike everywhere does not know of it: `normal_error` has to tell.
+Limits: an error that is the same everywhere does not show in the fit; `normal_error` accounts for
+it.
 """
 
 import numpy as np
@@ -25,8 +26,23 @@ _FEWEST = 4.0  # blocks; a highlight is at least cut in four
 def covariance(
     jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray, pixels: Pixels
 ) -> np.ndarray:
-    """(P, P), of the columns of the jacobian (N, P) of the residual (N,), both in sigmas, with
-    weights (N,).
+    """Estimate the covariance of the parameters.
+
+    Parameters
+    ----------
+    jacobian : (N, P) ndarray
+        Of the residual, in sigmas.
+    residual : (N,) ndarray
+        In sigmas.
+    weight : (N,) ndarray
+        Of each pixel.
+    pixels : Pixels
+        The fitted pixels.
+
+    Returns
+    -------
+    (P, P) ndarray
+        The covariance.
     """
     bread = _inverse(product(jacobian, weight, jacobian))
     side = max(3.0, float(np.sqrt(pixels.bright / np.pi)))
@@ -41,14 +57,12 @@ def covariance(
 
 
 def naive_variance(jacobian: np.ndarray, weight: np.ndarray, column: int) -> float:
-    """Of one column, were all errors independent and of their stated size."""
+    """Return one parameter's variance, as if all errors were independent."""
     return float(_inverse(product(jacobian, weight, jacobian))[column, column])
 
 
 def _inverse(matrix: np.ndarray) -> np.ndarray:
-    """Of a symmetric matrix that may be singular: columns without any effect get no variance, not
-    an infinite one.
-    """
+    """Inverse of a symmetric, maybe singular matrix: columns without effect get no variance."""
     scale = np.sqrt(np.maximum(np.diag(matrix), 0))
     scale = np.where(scale > 1e-12 * max(float(scale.max()), 1e-300), scale, np.inf)
     return np.asarray(

@@ -39,7 +39,7 @@ from pathlib import Path
 import numpy as np
 
 from ..lobe_fitting.light_direction import explain_shading
-from ..lobe_fitting.specular_upper_bound import shown_gloss
+from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..scene.decomposition import COLOR_MAPS, Decomposition
 from ..shading.environment_map import environment_from_shading
 from .mesh import MeshResult, build_mesh
@@ -56,7 +56,7 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
     written.
     """
     arrays = arrays_of(
-        d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, shown_gloss(d))
+        d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, bounded_specular(d))
     )
     with path.open("wb") as file:  # given a name, NumPy would add a suffix to it
         np.savez(file, **arrays)

@@ -21,7 +21,7 @@ channel becomes 0.9; the light that belongs to it is the recovered one divided b
 shading - log k. Beyond the mask the texture repeats the nearest colour inside, so that filtering
 draws no dark fringe.
 
-Gloss: roughness and specular level are those given (see `lobe_fitting.specular_upper_bound.shown_gloss`), the level times k, as
+Gloss: roughness and specular level are those given (see `lobe_fitting.specular_upper_bound.bounded_specular`), the level times k, as
 the base colour is. A level up to 1, and its variation over the object in a texture's alpha, are
 KHR_materials_specular's factor; what lies above 1 is its colour. Where no level is known the factor
 is 0: what is not known is not shown as gloss, which a file without the extension would be, as shiny
@@ -45,8 +45,8 @@ from PIL import Image
 from scipy import ndimage
 
 from ..errors import InputError
-from ..lobe_fitting.specular_level import NOT_FITTED, Gloss
 from ..imaging.srgb import linear_to_srgb
+from ..lobe_fitting.specular_level import SpecularFit, SpecularSource
 
 _BRIGHT = 0.9  # linear base colour that the 99.5th percentile of the reflectance is given
 _LEAST_DEPTH = (
@@ -94,7 +94,7 @@ class MeshResult:
     base_color: np.ndarray
     detail: np.ndarray
     options: MeshOptions = field(default_factory=MeshOptions)
-    gloss: Gloss = field(default_factory=Gloss)
+    gloss: SpecularFit = field(default_factory=SpecularFit)
 
     @property
     def specular(self) -> float:
@@ -159,7 +159,7 @@ class MeshResult:
                 "texture": self.gloss.variation is not None,
                 "convention": "factor of the reflectance along the normal, 1 is .04; KHR_materials_specular",
             },
-            "metallic": {"value": self.options.metallic, "source": NOT_FITTED},
+            "metallic": {"value": self.options.metallic, "source": SpecularSource.NOT_FITTED},
         }
 
 
@@ -169,7 +169,7 @@ def build_mesh(
     mask: np.ndarray,
     reflectance: np.ndarray,
     options: MeshOptions | None = None,
-    gloss: Gloss | None = None,
+    gloss: SpecularFit | None = None,
 ) -> MeshResult:
     """Builds the mesh of the pixels inside the mask.
 
@@ -178,7 +178,7 @@ def build_mesh(
     surface; where it says nothing, the usual roughness and no gloss. Raises `InputError` if the
     mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
     """
-    options, gloss = options or MeshOptions(), gloss or Gloss()
+    options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _require_sound(height, normal, mask, reflectance, options)
     stride, cells = _grid_cells(mask, options.max_faces)
     limited = limit_rim(height, mask, options.rim)
@@ -274,11 +274,13 @@ def _require_sound(
     for name, values in (("height", height), ("normal", normal), ("reflectance", reflectance)):
         if values.shape[:2] != mask.shape:
             raise InputError(
-                f"the {name} map is {values.shape[:2]}, the mask {mask.shape}: give maps of one size"
+                f"the {name} map is {values.shape[:2]}, the mask {mask.shape}: give maps of one "
+                "size"
             )
         if not np.isfinite(values[mask]).all():
             raise InputError(
-                f"the {name} map holds NaN or infinite values inside the mask: repair it or exclude them from the mask"
+                f"the {name} map holds NaN or infinite values inside the mask: repair it or "
+                "exclude them from the mask"
             )
     if not (
         options.longest_side > 0
@@ -297,7 +299,8 @@ def _grid_cells(mask: np.ndarray, max_faces: int) -> tuple[int, np.ndarray]:
     cells = _cells_inside(mask, 1)
     if not cells.any():
         raise InputError(
-            "the mask holds no block of 2 x 2 pixels to build a mesh of: mark a larger region or use a larger photo"
+            "the mask holds no block of 2 x 2 pixels to build a mesh of: mark a larger region or "
+            "use a larger photo"
         )
     stride = max(1, ceil(sqrt(2 * int(cells.sum()) / max_faces)))
     while stride > 1 and not (cells := _cells_inside(mask, stride)).any():
@@ -409,7 +412,7 @@ def _interpolated(grid: np.ndarray, shape: tuple[int, ...], stride: int) -> np.n
     return np.where(right >= down, upper, lower).astype(np.float32)
 
 
-def _roughness(options: MeshOptions, gloss: Gloss) -> float:
+def _roughness(options: MeshOptions, gloss: SpecularFit) -> float:
     return options.roughness if gloss.roughness is None else gloss.roughness
 
 
@@ -425,7 +428,7 @@ def _alpha_png(values: np.ndarray) -> bytes:
 
 
 def _material(
-    color: np.ndarray, detail: np.ndarray, options: MeshOptions, gloss: Gloss
+    color: np.ndarray, detail: np.ndarray, options: MeshOptions, gloss: SpecularFit
 ) -> trimesh.visual.material.PBRMaterial:
     return trimesh.visual.material.PBRMaterial(
         name="recovered",

@@ -24,7 +24,7 @@ from ..io.atomic import new_folder, require_writable
 from ..io.exr import read_channels, write_channels
 from ..io.json_files import numbers, read_json
 from ..io.printable_names import readable
-from ..lobe_fitting.specular_upper_bound import shown_gloss
+from ..lobe_fitting.specular_upper_bound import bounded_specular
 from ..progress import Monitor
 from ..scene.decomposition import COLOR_MAPS, Decomposition, Provenance, Separation
 from ..scene.lobe_fit import LobeFit
@@ -94,7 +94,7 @@ def save(
             write_channels(partial / "maps" / f"{name}.exr", _planes(values, list(letters)))
         monitor.report("building the mesh", 0.4)
         d = decomposition
-        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, shown_gloss(d))
+        built = build_mesh(d.height, d.normal, d.mask, d.reflectance, mesh, bounded_specular(d))
         (partial / "mesh.glb").write_bytes(built.glb())
         if arrays:
             monitor.report("writing arrays", 0.6)

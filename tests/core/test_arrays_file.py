@@ -15,7 +15,7 @@ import trimesh
 from isc_core.cli.main import main
 from isc_core.errors import InputError
 from isc_core.lobe_fitting import fit_lobe
-from isc_core.lobe_fitting.specular_level import gloss_of
+from isc_core.lobe_fitting.specular_level import fitted_specular
 from isc_core.result_files.arrays_file import ARRAYS, arrays_of
 from isc_core.result_files.mesh import MeshOptions, MeshResult, build_mesh
 from isc_core.result_files.result_folder import load, require_room, save
@@ -157,7 +157,7 @@ def glossy() -> Decomposition:
 def test_the_gloss_is_the_fitted_one(tmp_path: Path, arrays: Arrays) -> None:
     d = glossy()
     save(d, tmp_path / "out", arrays=True)
-    found, gloss = read(tmp_path / "out" / ARRAYS), gloss_of(d)
+    found, gloss = read(tmp_path / "out" / ARRAYS), fitted_specular(d)
     assert found["roughness"] == pytest.approx(gloss.roughness) == pytest.approx(0.2**0.5, rel=0.05)
     assert gloss.specular is not None and d.brdf is not None
     assert found["specular_level"] == pytest.approx(

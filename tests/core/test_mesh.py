@@ -15,8 +15,8 @@ from PIL import Image
 from scipy import ndimage
 
 from isc_core.errors import InputError
-from isc_core.lobe_fitting.specular_level import BOUND, FITTED, NOT_FITTED, Gloss
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
 from isc_core.result_files.mesh import (
     MeshOptions,
     MeshResult,
@@ -321,7 +321,9 @@ def glossy(
     """The ball's mesh with a fitted gloss whose level for the base colour is `specular`."""
     d = ball()
     k = built(d).reflectance_scale
-    gloss = Gloss(roughness, specular / k, FITTED, FITTED, variation)
+    gloss = SpecularFit(
+        roughness, specular / k, SpecularSource.FITTED, SpecularSource.FITTED, variation
+    )
     return build_mesh(d.height, d.normal, d.mask, d.reflectance, gloss=gloss)
 
 
@@ -361,12 +363,12 @@ def test_a_gloss_that_varies_is_a_texture_in_the_alpha_channel() -> None:
     assert len(reopened(glossy(0.4, variation)).faces) > 100
 
 
-@pytest.mark.parametrize("source", [NOT_FITTED, BOUND])
+@pytest.mark.parametrize("source", [SpecularSource.NOT_FITTED, SpecularSource.UPPER_BOUND])
 def test_an_unknown_gloss_is_not_shown(source: str) -> None:
     """Without the extension viewers would show plastic."""
     d = ball()
     result = build_mesh(
-        d.height, d.normal, d.mask, d.reflectance, gloss=Gloss(0.3, None, source, source)
+        d.height, d.normal, d.mask, d.reflectance, gloss=SpecularFit(0.3, None, source, source)
     )
     tree = gltf(result.glb())
     assert tree["extensionsUsed"] == ["KHR_materials_specular"]

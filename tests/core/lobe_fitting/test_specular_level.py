@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from isc_core.lobe_fitting import RecoveredScene, fit_lobe
-from isc_core.lobe_fitting.specular_level import (
-    BOUND,
-    FITTED,
-    NONE_FOUND,
-    NOT_FITTED,
-    gloss_of,
-    specular_variation,
-)
+from isc_core.lobe_fitting.specular_level import SpecularSource, fitted_specular, specular_variation
 from isc_core.scene.decomposition import Decomposition
 from isc_core.scene.lobe_fit import Interval, LobeFit, LobeFitOptions, LobeFitOutcome, LobeModel
 from isc_core.shading.brdf.ggx import Ggx
@@ -54,28 +47,33 @@ def lit(
 
 @pytest.mark.parametrize("strength", [0.3, 1.0, 4.0])
 def test_roughness_and_level_are_the_scene_s(strength: float) -> None:
-    gloss = gloss_of(lit(0.2, strength))
+    gloss = fitted_specular(lit(0.2, strength))
     assert gloss.roughness == pytest.approx(0.2**0.5, rel=0.02)
     assert gloss.specular == pytest.approx(strength, rel=0.05)
-    assert (gloss.roughness_source, gloss.specular_source) == (FITTED, FITTED)
+    assert (gloss.roughness_source, gloss.specular_source) == (
+        SpecularSource.FITTED,
+        SpecularSource.FITTED,
+    )
     assert gloss.variation is None
 
 
 def test_the_lamp_s_brightness_does_not_matter() -> None:
     dim, bright = (
-        gloss_of(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((1.0, 0.4), (8.0, 0.1))
+        fitted_specular(lit(0.2, 0.6, lamp, sky)).specular for lamp, sky in ((1.0, 0.4), (8.0, 0.1))
     )
     assert dim == pytest.approx(bright, rel=0.03)
 
 
 def test_a_lobe_of_blinn_and_phong_has_about_the_same_level() -> None:
     """Their shapes differ by a quarter; a factor of f0 would be 25."""
-    assert gloss_of(lit(0.2, 1.0, model="blinn_phong")).specular == pytest.approx(1.0, rel=0.5)
+    assert fitted_specular(lit(0.2, 1.0, model="blinn_phong")).specular == pytest.approx(
+        1.0, rel=0.5
+    )
 
 
 def test_a_lamp_that_the_shading_does_not_show_is_taken_to_be_all_of_it() -> None:
     d = lit(0.2, 1.0)
-    gloss = gloss_of(replace(d, shading=3 * np.ones_like(d.shading)))
+    gloss = fitted_specular(replace(d, shading=3 * np.ones_like(d.shading)))
     assert gloss.specular == pytest.approx(2 / (3 * np.pi), rel=0.05)
 
 
@@ -96,20 +94,23 @@ def test_both_lobes_of_a_recovered_scene_have_the_same_level() -> None:
     assert fits[0].predicted.max() == pytest.approx(
         fits[1].predicted.max(), rel=0.25
     )  # the two forms differ where lobes are wide
-    levels = [gloss_of(replace(d, brdf=fit)).specular for fit in fits]
+    levels = [fitted_specular(replace(d, brdf=fit)).specular for fit in fits]
     assert levels[0] == pytest.approx(levels[1])
     assert levels[0] == pytest.approx(1.0, rel=0.7)
 
 
 def test_a_matt_object_has_no_gloss() -> None:
     d = ball()
-    gloss = gloss_of(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))
+    gloss = fitted_specular(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))
     assert (gloss.roughness, gloss.specular) == (None, 0.0)
-    assert (gloss.roughness_source, gloss.specular_source) == (NOT_FITTED, NONE_FOUND)
+    assert (gloss.roughness_source, gloss.specular_source) == (
+        SpecularSource.NOT_FITTED,
+        SpecularSource.NO_HIGHLIGHTS,
+    )
 
 
 def test_without_a_fit_nothing_is_said() -> None:
-    assert (gloss_of(ball()).roughness, gloss_of(ball()).specular) == (None, None)
+    assert (fitted_specular(ball()).roughness, fitted_specular(ball()).specular) == (None, None)
 
 
 def test_an_upper_bound_is_called_one() -> None:
@@ -118,11 +119,14 @@ def test_an_upper_bound_is_called_one() -> None:
     narrow = replace(
         d.brdf, outcome=LobeFitOutcome.NARROW, alpha=0.01, alpha_interval=Interval(0.004, 0.01)
     )
-    gloss = gloss_of(replace(d, brdf=narrow))
+    gloss = fitted_specular(replace(d, brdf=narrow))
     assert gloss.roughness == pytest.approx(0.1)
-    assert (gloss.roughness_source, gloss.specular) == (BOUND, gloss_of(d).specular)
+    assert (gloss.roughness_source, gloss.specular) == (
+        SpecularSource.UPPER_BOUND,
+        fitted_specular(d).specular,
+    )
     unknown: LobeFit = replace(narrow, alpha=None, alpha_interval=None)
-    assert gloss_of(replace(d, brdf=unknown)).roughness_source == NOT_FITTED
+    assert fitted_specular(replace(d, brdf=unknown)).roughness_source == SpecularSource.NOT_FITTED
 
 
 def test_gloss_that_differs_between_paints_becomes_a_texture() -> None:

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.lobe_fitting.specular_level import FITTED, LOWERED, gloss_of
-from isc_core.lobe_fitting.specular_upper_bound import shown_gloss, specular_upper_bound
+from isc_core.lobe_fitting.specular_level import SpecularSource, fitted_specular
+from isc_core.lobe_fitting.specular_upper_bound import bounded_specular, specular_upper_bound
 from isc_core.result_files.arrays_file import ARRAYS
 from isc_core.result_files.result_folder import save
 from isc_core.scene.decomposition import Decomposition
@@ -32,14 +32,14 @@ def test_plastic_mirrors_a_25th_of_an_even_sky_in_front() -> None:
 
 def test_a_level_that_the_photo_has_no_room_for_is_lowered_and_others_stay() -> None:
     d = glossy()
-    gloss = gloss_of(d)
+    gloss = fitted_specular(d)
     assert gloss.specular is not None and gloss.roughness is not None
-    assert shown_gloss(d) == gloss
+    assert bounded_specular(d) == gloss
     room = specular_upper_bound(d, gloss.roughness, environment_from_shading(d.illumination, 16))
-    shown = shown_gloss(stronger(d, 100.0))
+    shown = bounded_specular(stronger(d, 100.0))
     assert gloss.specular < room < 100 * gloss.specular
     assert shown.specular == pytest.approx(room)
-    assert (shown.specular_source, shown.roughness) == (LOWERED, gloss.roughness)
+    assert (shown.specular_source, shown.roughness) == (SpecularSource.LOWERED, gloss.roughness)
 
 
 def test_channels_of_zero_tell_nothing_of_the_room() -> None:
@@ -68,7 +68,7 @@ def test_every_file_of_a_result_has_the_same_level(tmp_path: Path, factor: float
         "KHR_materials_specular"
     ]
     written = extension["specularFactor"] * max(extension.get("specularColorFactor", [1]))
-    assert described["source"] == (FITTED if factor == 1 else LOWERED)
+    assert described["source"] == (SpecularSource.FITTED if factor == 1 else SpecularSource.LOWERED)
     assert level == pytest.approx(described["value"], rel=1e-6) == pytest.approx(written, rel=1e-6)
 
 
