@@ -63,7 +63,11 @@ EVERY = StageOptions(models=("mbp", "joint", "mdr"))
 @pytest.fixture(autouse=True)
 def small_solves(monkeypatch: pytest.MonkeyPatch) -> None:
     """SIRFS at 24 pixels instead of 256, and not converged: irrelevant to these tests."""
-    monkeypatch.setattr(shape, "RecoverOptions", partial(RecoverOptions, solve_size=24, margin=6))
+
+    def small(*values: Any) -> RecoverOptions:
+        return replace(RecoverOptions(*values), solve_size=24, margin=6)
+
+    monkeypatch.setattr(shape, "RecoverOptions", small)
     monkeypatch.setattr(
         shape, "SolverOptions", partial(SolverOptions, lbfgs=LbfgsOptions(evaluations=25))
     )
@@ -273,9 +277,9 @@ def test_means_and_shares_follow_from_the_scenes() -> None:
 
 
 def test_no_share_of_a_gain_that_is_not_there_and_no_interval_of_one_that_is_not_sure() -> None:
-    matt = tuple(scene(f"m{k}", 1.0, 1.0, model="lambert") for k in range(2))
+    diffuse = tuple(scene(f"m{k}", 1.0, 1.0, model="lambert") for k in range(2))
     mixed = (scene("a", 0.2, 0.5, model="ggx"), scene("b", 1.3, 1.2, model="ggx"))
-    shares = {g.group.value: g.share for g in all_gains(matt + mixed, 0) if g.error == "average"}
+    shares = {g.group.value: g.share for g in all_gains(diffuse + mixed, 0) if g.error == "average"}
     assert "lambert" not in shares
     assert shares["ggx"].value == pytest.approx((1 - (0.5 * 1.2) ** 0.5) / (1 - (0.2 * 1.3) ** 0.5))
     assert shares["ggx"].low is None and shares["ggx"].high is None
