@@ -1,11 +1,12 @@
-"""Splitting a photo into diffuse and specular: one method a file, and one function that knows their
-names.
+"""Separation of a photo into diffuse and specular light: one method a file, found by its name.
 
 A method's module is imported when the method is first used, so that a program starts fast and
-without what only one of them needs. Each has `separate`, a dataclass of options, and `VARIANTS`:
-the settings that have a name. "improved", the first, is what we recommend: statistics inside the
-mask alone, guards relative to the object's brightness. "paper" is the method as published, and
-"sihr" as the public toolbox of that name behaves, from which most published comparisons come.
+without the dependencies of other methods. Each module has `separate`, a dataclass of options, and
+`VARIANTS`, named settings. "improved", the first, is recommended: statistics inside the mask alone,
+guards relative to the object's brightness. "paper" is the method as published, and "sihr" as the
+public toolbox of that name behaves, from which most published comparisons come.
+
+To add a method, write its module here (or in `published`) and add its name to `METHODS`.
 """
 
 import dataclasses
@@ -57,14 +58,35 @@ def separate(
     prior: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits `image` (H, W, 3), linear, under white light, inside `mask` (H, W) bool, by a method.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `clipped` (H, W) bool marks pixels whose true value lies above the recorded one. `variant`: one
-    of `variants(method)`; `changes`: options of the method that differ from it. `prior` (H, W) in
-    [0, 1]: for "isc" alone, how probable a visible highlight is, .5 where nothing is known. Nothing
-    outside the mask's box is looked at, but by "sihr", which ignores `clipped`. Raises `InputError`
-    for unknown names, unfit options and arrays, a photo that the method can do nothing with;
-    `Cancelled`.
+    Parameters
+    ----------
+    method : str
+        One of `METHODS`.
+    image : (H, W, 3) ndarray
+        Linear light. Only the mask's box is used, except by "sihr".
+    mask : (H, W) bool ndarray
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one; "sihr" ignores it.
+    variant : str
+        One of `variants(method)`.
+    changes : mapping, optional
+        Options of the method that differ from the variant.
+    prior : (H, W) ndarray, optional
+        For "isc" alone: probability of a visible highlight, in [0, 1]; 0.5 where unknown.
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    Separation
+
+    Raises
+    ------
+    InputError
+        If a name, an option or an array is invalid, or the method cannot handle the photo.
+    Cancelled
+        If the user asked to stop.
     """
     options = method_options(method, variant, changes)
     check_arrays(image, mask, clipped)
@@ -91,9 +113,20 @@ def separate(
 
 
 def variants(method: str) -> tuple[str, ...]:
-    """The names of a method's settings, the recommended one first.
+    """Return the names of a method's settings, the recommended one first.
 
-    Raises `InputError` for a name that is not one of `METHODS`.
+    Parameters
+    ----------
+    method : str
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    InputError
+        If the name is not one of `METHODS`.
     """
     return tuple(getattr(_module(method), "VARIANTS", (IMPROVED,)))
 
@@ -101,11 +134,24 @@ def variants(method: str) -> tuple[str, ...]:
 def method_options(
     method: str, variant: str = IMPROVED, changes: Mapping[str, object] | None = None
 ) -> object | None:
-    """A method's options: those of the variant, with changes by field name; None for a method that
-    has none.
+    """Return a method's options: those of the variant, with changes.
 
-    Raises `InputError` for a method, variant or option that does not exist; whether values make
-    sense the method checks itself.
+    Parameters
+    ----------
+    method : str
+    variant : str
+    changes : mapping, optional
+        Values by field name; the method itself checks them.
+
+    Returns
+    -------
+    dataclass or None
+        None for a method without options.
+
+    Raises
+    ------
+    InputError
+        If the method, variant or option does not exist.
     """
     known = getattr(_module(method), "VARIANTS", {IMPROVED: None})
     if variant not in known:

@@ -1,20 +1,18 @@
-"""Removes highlights by finding them with chaotic multilevel thresholds and repainting them (Akbar
-2016; Akbar, Suryana & Sahib 2015).
+"""Highlight removal by chaotic multilevel thresholds and inpainting (CS; Akbar 2016).
 
 Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Find the pixels with s > 0,
-and say what lies beneath.
+and what lies beneath.
 
-Equation: 1. Otsu's K thresholds of the smallest channel min I, in which white light stands out and
-strong paint does not, found by the clonal selection whose random numbers come from a logistic map
-(`thresholding`); the pixels above the highest one are specular.
-2. They are a hole that is filled from the other pixels of the object by patches matched with
-   Coherency Sensitive Hashing (`inpainting`). As published ("colour"): D = min(I, fill), K = 3.
-   Ours ("ratio", K = 1): highlights are white, so F = I - min I is known under them. The patches
-   match in the colour of F, F / (sum F + e), and hand over what the highlight hides alone, the
-   ratio q = min D / (max D - min D) of their paint, which shading does not change: s = min I - q
-   (max I - min I), nowhere below 0. Around each hole a rim is treated as well; pixels without a
-   highlight, whose q agrees, stay as they are. The whole s fades out on objects of grey paint
-   (`evidence`).
+Equation: first, Otsu's K thresholds of the smallest channel min I, in which white light stands out
+and saturated reflectance does not, found by the clonal selection whose random numbers come from a
+logistic map (`thresholding`); the pixels above the highest one are specular. Second, they are a
+hole that is filled from the other pixels of the object by patches matched with Coherency Sensitive
+Hashing (`inpainting`). As published ("colour"): D = min(I, fill), K = 3. Ours ("ratio", K = 1):
+highlights are white, so F = I - min I is known under them. The patches match in the colour of F, F
+/ (sum F + e), and transfer only what the highlight hides, the ratio q = min D / (max D - min D) of
+their reflectance, which shading does not change: s = min I - q (max I - min I), nowhere below 0.
+Around each hole a rim is processed as well; pixels without a highlight, whose q agrees, stay
+unchanged. The whole s fades out on grey objects (`saturation_gate`).
 
 Citation: H. Akbar, "3D intrinsic scene characteristics extraction framework for a single image",
 PhD thesis (2016). H. Akbar, N. Suryana and S. Sahib, IJSISE 8(5) (2015), on the chaotic clonal
@@ -22,8 +20,8 @@ selection. Matching: S. Korman and S. Avidan (2011), doi:10.1109/ICCV.2011.61264
 Wexler, E. Shechtman and M. Irani (2007), doi:10.1109/TPAMI.2007.60.
 
 Limits: the light must be white. Otsu's brightest class exists in every photo, with or without
-highlights: as published, the method repaints bright paint too. Paint that occurs under highlights
-only gets the ratio of the paint most like it.
+highlights: as published, the method repaints bright reflectance too. A reflectance that occurs only
+under highlights gets the ratio of the most similar one.
 """
 
 from dataclasses import dataclass
@@ -53,13 +51,28 @@ from .support.saturation_gate import saturation_gate
 
 @dataclass(frozen=True)
 class ChaoticSegmentationOptions:
-    """`levels`: how many thresholds K split the smallest channel, 1 to 16; pixels above the highest
-    are specular. `optimiser`: what searches them: chaotic_clonal, clonal_selection, particle_swarm,
-    or exact. `evaluations`: the search's budget; `seed`: of the search and of the matching, >= 0.
-    `threshold`: instead of searching, a share of the largest value of the smallest channel, between
-    0 and 1. `repaint`: "ratio" removes white light only, "colour" replaces the whole pixel, as
-    published. `rim`: how far around them pixels are treated as well, a share of the square root of
-    the object's area, 0 to 1. `guard`: leave objects of grey paint alone.
+    """Options of chaotic segmentation.
+
+    Attributes
+    ----------
+    levels : int
+        Number K of thresholds that split the smallest channel, 1 to 16; pixels above the highest
+        are specular.
+    optimiser : Literal['chaotic_clonal', 'clonal_selection', 'particle_swarm', 'exact']
+        Their optimiser: chaotic_clonal, clonal_selection, particle_swarm, or exact.
+    evaluations : int
+        The search's budget.
+    seed : int
+        Of the search and of the matching, >= 0.
+    threshold : float or None
+        Instead of searching, a share of the largest value of the smallest channel, between 0 and 1.
+    repaint : Literal['ratio', 'colour']
+        "ratio" removes white light only, "colour" replaces the whole pixel, as published.
+    rim : float
+        Width of the rim around them that is processed too, a share of the square root of the
+        object's area, 0 to 1.
+    guard : bool
+        Leave grey objects unchanged.
     """
 
     levels: int = 1
@@ -91,13 +104,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
-    pixels whose true value lies above what was recorded: they are never a source. Inside the mask 0
-    <= diffuse <= image; the specular layer has equal channels unless colours are repainted.
-    Progress goes to `monitor`. Raises `InputError` for unfit arrays or options, and where the ratio
-    is asked of a photo without colour; `Cancelled`.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure.
+    mask : (H, W) bool ndarray
+    options : ChaoticSegmentationOptions, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they are never a source.
+    monitor : Monitor, optional
+
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels unless
+        colours are repainted.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options = options or ChaoticSegmentationOptions()
     monitor = monitor or Monitor()
@@ -131,11 +163,23 @@ def separate(
 def find_specular(
     image: np.ndarray, mask: np.ndarray, options: ChaoticSegmentationOptions
 ) -> np.ndarray:
-    """Which pixels (H, W) bool of `mask` are specular: those above the highest threshold of the
-    smallest channel.
+    """Return the specular pixels: those above the highest threshold of the smallest channel.
 
-    None, where the brightest and the darkest pixel have the same level. Raises `InputError` where
-    the search cannot be done.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    options : ChaoticSegmentationOptions
+
+    Returns
+    -------
+    (H, W) bool ndarray
+        None are set if the brightest and the darkest pixel have the same level.
+
+    Raises
+    ------
+    InputError
+        If the search is not possible.
     """
     low = smallest(np.where(mask[..., None], image, 0))
     peak = float(low.max())

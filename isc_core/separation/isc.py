@@ -1,39 +1,38 @@
-"""Removes highlights where a photo shows that they are highlights, and leaves everything else alone
-(the separator of this project).
+"""The separator of this project: it removes only highlights that a photo proves to be highlights.
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Colour alone takes pale paint
-for a highlight; the harm is then far greater than all highlights are worth. So a candidate s is
-found by colour, and then has to prove itself.
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). By colour alone pale
+reflectance passes for a highlight; the harm then far exceeds what all highlights are worth. So a
+candidate s is found by colour, and then has to pass tests.
 
-Equation: with C = max I - min I, which white light leaves alone, and the paint's diffuse ratio q =
-min D / (max D - min D),
+Equation: with C = max I - min I, which white light leaves unchanged, and the diffuse ratio q = min
+D / (max D - min D) of the reflectance,
 
     s = min I - q C.
 
-q is looked for twice. By hue: a low quantile of min I / max I over the pixels of like hue nearby
-(`hue_grid`), which finds highlights that cover whole patches of paint. By place: what most pixels
-agree on that can be reached without crossing a border of paint (`edge_aware`), which tells paints
-of one hue apart. The first is believed for objects of strong colours only, the second wherever its
-candidate is clear of the scatter of its own paint. Both must not run against C as white paint does
-(`highlight_cues`), and must be smooth, or, what is found by place, be found by the groups of
-`sparse_coding` as well. Beside borders of paint, where mixed pixels look like highlights, s comes
-from around. The layer is the larger of the two.
+q is estimated twice. By hue: a low quantile of min I / max I over nearby pixels of similar hue
+(`hue_grid`), which finds highlights that cover whole patches of one reflectance. By place: the mode
+over pixels that can be reached without crossing a reflectance edge (`edge_aware`), which
+distinguishes reflectances of one hue. The first is used for saturated objects only, the second
+wherever its candidate exceeds the scatter of its own region. Both must not run against C as white
+reflectance does (`highlight_cues`), and must be smooth, or, by place, be found by the groups of
+`sparse_coding` as well. Beside reflectance edges, where mixed pixels look like highlights, s is
+interpolated from around. The layer is the larger of the two.
 
-All statistics are of the mask's pixels. Objects longer than 640 pixels are judged on averages of
-square blocks: q's tables and the gains are carried over, s itself is computed from the full photo.
-Where nothing can be proven the pixel stays as it is, and so does a photo whose whole layer no
+All statistics are of the mask's pixels. Objects longer than 640 pixels are analysed on averages of
+square blocks: the tables of q and the gains are upsampled, s itself is computed from the full
+photo. Where nothing is proven the pixel stays unchanged, and so does a photo whose whole layer no
 display would show.
 
-`prior` is the door for what shape and light say: the probability that a highlight can be seen at
-each pixel. It multiplies the odds of the gain there: .5 says nothing, 0 forbids a highlight, 1
-takes all of a candidate that has any gain. What colour refuses stays refused.
+`prior` is the interface for shape and light: the probability of a visible highlight at each pixel.
+It multiplies the odds of the gain there: 0.5 is neutral, 0 forbids a highlight, 1 accepts all of a
+candidate that has any gain. What colour rejects stays rejected.
 
-Citation: the cues and how they are combined are ours; the diffuse ratio is that of H.-L. Shen and
-Z.-H. Zheng (2013), doi:10.1364/AO.52.004483. See also the modules named above.
+Citation: the cues and their combination are ours; the diffuse ratio is that of H.-L. Shen and Z.-H.
+Zheng (2013), doi:10.1364/AO.52.004483. See also the modules named above.
 
-Limits: the light must be white. Near-grey paint keeps its highlights, because its q is unknown; so
-does a photo without colour, and so do objects with a fine pattern all over. Pale paint that fades
-in smoothly on a coloured object passes for a highlight.
+Limits: the light must be white. Near-grey reflectance keeps its highlights, because its q is
+unknown; so does a photo without colour, and so do objects with a fine pattern all over. Pale
+reflectance that fades in smoothly on a coloured object passes for a highlight.
 """
 
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -87,21 +86,49 @@ _NEARBY = 0.02
 
 @dataclass(frozen=True)
 class IscOptions:
-    """Ramps are pairs: no evidence up to the first number, full from the second on (falling ones
-    the other way round).
+    """Options of the separator.
 
-    `hues`: cells around the circle of hues, >= 6. `cell`: side of the grid's cells as a share of
-    the object's longer side, in (0, 1]. `low_quantile`: which quantile of min / max over like
-    pixels is the paint's, in (0, 1); lower removes more. `borrowed`: how many votes the pixels of
-    like hue everywhere have in a cell; >= 0. `colourful`: of the bright pixels' colour, sum C / sum
-    max I. `smooth`: of the roughness of the whole candidate, and `smooth_here` of the local one,
-    falling. `unmixed`: of the paint mixing of the whole candidate, falling. `bright`: of min I over
-    its mean. `clear`: of s over `scatter` times what stays, by hue. `scatter_here`: the least
-    relative scatter of a paint's q by place. `coloured`: of 1 - min / max of the paint, by place.
-    `present`: of C over that of like pixels. `unmixed_here`, `smooth_by_place`: as above, by place.
-    `proven`: of the gain of pixels whose surroundings are judged more mildly, by `faint`: of s over
-    what it may be in error by. `filters`: whether the filter statistics have a say as well, see
-    `filter_statistics`: fewer false highlights, fewer true ones.
+    Ramps are pairs: 0 up to the first number, 1 from the second on (descending ones reversed).
+
+    Attributes
+    ----------
+    hues : int
+        Cells around the circle of hues, >= 6.
+    cell : float
+        Side of the grid's cells as a share of the object's longer side, in (0, 1].
+    low_quantile : float
+        Which quantile of min / max over like pixels is the paint's, in (0, 1); lower removes more.
+    borrowed : float
+        Votes of the pixels of similar hue everywhere in a cell; >= 0.
+    colourful : tuple[float, float]
+        Ramp of the bright pixels' saturation, sum C / sum max I.
+    smooth : tuple[float, float]
+        Ramp of the roughness of the whole candidate, descending.
+    smooth_here : tuple[float, float]
+        Ramp of the local roughness, descending.
+    unmixed : tuple[float, float]
+        Ramp of the reflectance mixing of the whole candidate, falling.
+    bright : tuple[float, float]
+        Ramp of min I over its mean.
+    clear : tuple[float, float]
+        Ramp of s over `scatter` times the remainder, by hue.
+    scatter : float
+        See `clear`.
+    scatter_here : float
+        Least relative scatter of q by place.
+    coloured : tuple[float, float]
+        Ramp of 1 - min / max of the reflectance, by place.
+    present : tuple[float, float]
+        Ramp of C over that of similar pixels.
+    unmixed_here, smooth_by_place : tuple[float, float]
+        As above, by place.
+    proven : tuple[float, float]
+        Ramp of the gain around which `faint` applies.
+    faint : tuple[float, float]
+        Ramp of s over its error, near proven highlights.
+    filters : bool
+        Whether to use the filter statistics too, see `filter_statistics`: fewer false highlights,
+        fewer true ones.
     """
 
     hues: int = 48
@@ -200,18 +227,34 @@ def separate(
     monitor: Monitor | None = None,
     prior: np.ndarray | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear Rec.709, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool
-    marks pixels whose true value lies above what was recorded: they shape no statistic. `prior` (H,
-    W) in [0, 1] or None: the probability that a highlight can be seen, .5 if nothing is known.
-    Inside the mask 0 <= diffuse <= image; what is outside has no influence.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure.
+    mask : (H, W) bool ndarray
+        Pixels outside have no influence.
+    options : IscOptions, optional
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they shape no statistic.
+    monitor : Monitor, optional
+    prior : (H, W) ndarray, optional
+        Probability of a visible highlight, in [0, 1]; 0.5 where unknown.
 
-    Confidence falls with the error to be expected, see `_confidence`. A photo without colour is
-    left as it is, with little confidence.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image. The confidence falls with the expected error. A photo
+        without colour is left unchanged, with low confidence.
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are
-    negative or not finite; `Cancelled` when the monitor says so.
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, or values inside it are negative or not
+        finite.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or VARIANTS["improved"], monitor or Monitor()
     check_arrays(image, mask, clipped)

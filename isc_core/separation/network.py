@@ -1,19 +1,18 @@
-"""Separation by what rendered objects have taught: the layers of `layer_network`, brought to a
-photo of any size.
+"""Separation by the layer network, for photos of any size.
 
-Problem: the network sees an object at the size it was fitted to; photos are larger, and their
+Problem: the network sees an object at the size it was trained at; photos are larger, and their
 highlights have sharp edges.
 
 Equation: the photo, averaged so that the object is `long_side` pixels long, gives y = log(I / D)
-and the scale b of its error; y is carried to the photo's pixels linearly, and D = I exp(-y). What
-is below the network's own error says nothing: y is taken as max(y - d b, 0) of d = `doubt`. What is
-taken off so is held to the colours of light, see `light_tint`. Confidence is 1 / (1 + e / u): e = D
-b, the error to be expected, u a tenth of the mean light.
+and the scale b of its error; y is upsampled linearly to the photo's pixels, and D = I exp(-y). What
+is below the network's own error is ignored: y becomes max(y - d b, 0) with d = `doubt`.
+`light_tint` limits the colour of the removed light. Confidence is 1 / (1 + e / u) with e = D b, the
+expected error, and u a tenth of the mean light.
 
-Citation: see `layer_network`.
+Citation: see `networks.layer_network`.
 
-Limits: those of the network; an object of few pixels is seen as it is. Clipped pixels: see
-`clipped`.
+Limits: those of the network; an object of few pixels is not enlarged. Clipped pixels: see
+`support.clipped`.
 """
 
 from dataclasses import replace
@@ -44,10 +43,29 @@ def separate(
     monitor: Monitor | None = None,
     network: LayerNetwork | None = None,
 ) -> Separation:
-    """Splits `image` (H, W, 3), linear, inside `mask` (H, W) bool; `clipped` (H, W) bool.
-    `network`: the shipped one if None.
+    """Separate a photo into its diffuse and specular layer.
 
-    Raises `InputError` for unfit options and arrays, `Cancelled`.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear light.
+    mask : (H, W) bool ndarray
+    options : NetworkOptions, optional
+    clipped : (H, W) bool ndarray, optional
+    monitor : Monitor, optional
+    network : LayerNetwork, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    Separation
+
+    Raises
+    ------
+    InputError
+        If options or arrays are invalid.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or NetworkOptions(), monitor or Monitor()
     if options.long_side < STRIDE or options.doubt < 0 or not options.tint >= 1:

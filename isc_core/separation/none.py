@@ -1,4 +1,4 @@
-"""The row that every table of separations needs: nothing is removed, diffuse = image."""
+"""Doing nothing, diffuse = image: the baseline of every table of separations."""
 
 import numpy as np
 
@@ -7,11 +7,22 @@ from .support.checks import check_arrays
 
 
 def separate(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None = None) -> Separation:
-    """`image` (H, W, 3) and `mask` (H, W) bool as everywhere. Confidence is 1 in the mask, 0 where
-    `clipped`.
+    """Return the image as the diffuse layer; the confidence is 1 in the mask, 0 where clipped.
 
-    Raises `InputError` for unfit shapes, an empty mask, or values inside the mask that are negative
-    or not finite.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    clipped : (H, W) bool ndarray, optional
+
+    Returns
+    -------
+    Separation
+
+    Raises
+    ------
+    InputError
+        If shapes are invalid, the mask is empty, or values inside it are negative or not finite.
     """
     check_arrays(image, mask, clipped)
     trusted = mask if clipped is None else mask & ~clipped

@@ -1,6 +1,4 @@
-"""Options of a separation method as people write them, `name=value`, typed as the method's
-dataclass says.
-"""
+"""Options of a separation method as text, `name=value`, parsed by the method's dataclass."""
 
 import math
 import types
@@ -17,11 +15,22 @@ _KINDS = {bool: "yes or no", int: "a whole number", float: "a number", str: "a w
 def parse_changes(
     method: str, variant: str = IMPROVED, words: Iterable[str] = ()
 ) -> dict[str, object]:
-    """`separate`'s `changes` from words like `levels=3`; of two for the same option the last
-    counts.
+    """Parse words like `levels=3`; of two for the same option the last counts.
 
-    Raises `InputError` for an unknown method, variant or option, and a value that is not of the
-    option's type.
+    Parameters
+    ----------
+    method, variant : str
+    words : iterable of str
+
+    Returns
+    -------
+    dict
+        The `changes` of `separate`.
+
+    Raises
+    ------
+    InputError
+        If the method, variant, option or value is invalid.
     """
     usual = method_options(method, variant)
     kinds = {} if usual is None else typing.get_type_hints(type(usual))

@@ -1,23 +1,23 @@
-"""Removes highlights by sparse coding over a dictionary learnt from specular-free images (the
-method SC of Akbar 2016).
+"""Highlight removal by sparse coding over a dictionary from specular-free images (SC; Akbar 2016).
 
 Problem: a pixel is diffuse plus white specular. Write it as a code over one diffuse atom, the
-paint's colour, and the highlight atom.
+colour of the reflectance, and the highlight atom.
 
 Equation: in CIE XYZ, y = M I, the highlight atom is h = M (1, 1, 1) / |M (1, 1, 1)|. A
-specular-free image takes white off until what is left does not depend on the specular light: SF1
-until the largest chromaticity has a fixed value (Tan & Ikeuchi), which leaves the hue, SF2 until
-the smallest channel is 0 (two-band), which leaves the magnitude too. All have the same part F
+specular-free image removes white until the rest does not depend on the specular light: SF1 until
+the largest chromaticity has a fixed value (Tan & Ikeuchi), which keeps the hue, SF2 until the
+smallest channel is 0 (two-band), which keeps the magnitude too. All have the same component F
 across h as the photo; alpha = |F|, t = h.y. The dictionary has an atom a_k = F / |F| + R_k h for
-every hue k, R_k being a quantile of t / alpha over its pixels: what the paint shows alone. So
+every hue k, with R_k a quantile of t / alpha over its pixels: the value of the reflectance alone.
+So
 
     y = alpha a_k + beta h,     beta = max(0, t - R_k alpha),     diffuse = y - beta h.
 
-The code is sparse: beta is 0 but where beta > lambda t, and a group switches it on as a whole or
+The code is sparse: beta is 0 except where beta > lambda t, and a group switches it on as a whole or
 not at all. A group is a connected region of active pixels without an edge of the specular-free
-images in it. White paint raises beta as well, but F changes with it; a highlight has its own edges
-of which F takes no notice, and F has edges of which beta takes none. A group's code is kept by the
-product of six ramps, see `_keep`: what cannot be identified is left alone.
+images in it. White reflectance raises beta as well, but F changes with it; a highlight has edges
+that F does not show, and F has edges that beta does not show. A group's code is weighted by the
+product of six ramps, see `_keep`: what cannot be identified is left unchanged.
 docs/methods/sparse_coding.md derives all of it.
 
 Citation: H. Akbar, "3D Intrinsic Scene Characteristics Extraction Framework for a Single Image",
@@ -27,8 +27,8 @@ and K. Ikeuchi, IEEE TPAMI 27(2), 178-193 (2005), doi:10.1109/TPAMI.2005.36. SF2
 Choi and I. S. Kweon, ICIP 2006, doi:10.1109/ICIP.2006.312650. Groups: M. Yuan and Y. Lin, J. R.
 Statist. Soc. B 68(1), 49-67 (2006), doi:10.1111/j.1467-9868.2005.00532.x.
 
-Limits: the light must be white. Near-grey paint keeps its highlights. Broad sheen over most of a
-paint shifts R_k and stays.
+Limits: the light must be white. Near-grey reflectance keeps its highlights. A broad highlight over
+most of a reflectance shifts R_k and stays.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -71,15 +71,29 @@ _LOWER = 0.16  # this quantile lies one standard deviation below the median
 
 @dataclass(frozen=True)
 class SparseCodingOptions:
-    """`specular_free`: whose edges part the groups and count as evidence, those of "sf1" (hue),
-    "sf2" (magnitude) or "both". `hues`: how many atoms, equal angles of hue; >= 3.
-    `ratio_quantile`: which quantile of t / alpha is R_k, in (0, 1). `grouped`: whether groups of
-    pixels switch the highlight atom on together, or every pixel for itself by an L1 penalty.
-    `sparsity`: lambda; the least share of its brightness that a pixel of a group has as highlight,
-    or, not grouped, the L1 weight as a share of the brightest pixels; in [0, 1). `edge`: least
-    change, as a share of the highlight, that counts as an edge; in (0, 1). `noise`: changes below
-    this share of the brightest pixels are no edges; in [0, 1). `blur`: standard deviation, in
-    pixels, of the smoothing before codes are made; >= 0.
+    """Options of sparse coding.
+
+    Attributes
+    ----------
+    specular_free : str
+        The specular-free images whose edges separate the groups: those of "sf1" (hue), "sf2"
+        (magnitude) or "both".
+    hues : int
+        Number of atoms, equal angles of hue; >= 3.
+    ratio_quantile : float
+        Which quantile of t / alpha is R_k, in (0, 1).
+    grouped : bool
+        Whether groups of pixels switch the highlight atom on together, or every pixel for itself by
+        an L1 penalty.
+    sparsity : float
+        lambda; the least share of its brightness that a pixel of a group has as highlight, or, not
+        grouped, the L1 weight as a share of the brightest pixels; in [0, 1).
+    edge : float
+        Least change, as a share of the highlight, that counts as an edge; in (0, 1).
+    noise : float
+        Changes below this share of the brightest pixels are no edges; in [0, 1).
+    blur : float
+        Standard deviation, in pixels, of the smoothing before codes are made; >= 0.
     """
 
     specular_free: str = "both"
@@ -132,11 +146,22 @@ class _Dictionary:
 
 @dataclass(frozen=True)
 class Stages:
-    """What the grouped code sees on its way, (H, W) each, 0 outside the mask. `hue`, in turns, and
-    `alpha`: what highlights leave as it is; `brightness`: t, the part along the highlight atom.
-    `beta`: what each pixel by itself has too much of it for its paint's atom. `group`: the number
-    of the group that switches the highlight atom on, -1 for none. `code`: beta times what is kept
-    of its group.
+    """Intermediate maps of the grouped code, (H, W) each, 0 outside the mask.
+
+    Attributes
+    ----------
+    hue : ndarray
+        In turns; invariant to highlights.
+    alpha : ndarray
+        Invariant to highlights.
+    brightness : ndarray
+        t, the part along the highlight atom.
+    beta : ndarray
+        Excess of `brightness` over the diffuse atom, for each pixel by itself.
+    group : ndarray
+        Number of the group that switches the highlight atom on, -1 for none.
+    code : ndarray
+        `beta` times the kept share of its group.
     """
 
     hue: np.ndarray
@@ -148,7 +173,7 @@ class Stages:
 
     @property
     def specular(self) -> np.ndarray:
-        """The specular light (H, W), the same in all channels, in the image's unit."""
+        """The specular light (H, W), equal in all channels, in the image's unit."""
         return self.code / _WHITE
 
 
@@ -159,14 +184,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear Rec.709, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool
-    marks pixels whose true value lies above what was recorded: they shape no atom. Inside the mask
-    0 <= diffuse <= image; what is outside has no influence.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure.
+    mask : (H, W) bool ndarray
+    options : SparseCodingOptions, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they shape no statistic.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are
-    negative or not finite, and a photo without colour; `Cancelled` when the monitor says so.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options = options or VARIANTS["improved"]
     monitor = monitor or Monitor()
@@ -188,19 +231,26 @@ def separate(
 
 
 def grouped_specular(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> np.ndarray:
-    """The specular light (H, W), the same in all channels, that the improved variant finds in
-    groups of pixels, before it is clamped.
+    """Return the specular light of the improved variant, before it is clamped.
 
-    `image` (H, W, 3), zero outside `mask` (H, W) bool; `telling` (H, W) bool, some of the mask: the
-    pixels that shape the atoms.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        0 outside the mask.
+    mask : (H, W) bool ndarray
+    telling : (H, W) bool ndarray
+        Pixels of the mask that shape the atoms.
+
+    Returns
+    -------
+    (H, W) ndarray
+        Equal in all channels.
     """
     return stages(image, mask, telling).specular
 
 
 def stages(image: np.ndarray, mask: np.ndarray, telling: np.ndarray) -> Stages:
-    """What the improved variant makes of an image on its way to `grouped_specular`; the same
-    arguments.
-    """
+    """Return the intermediate maps of the improved variant; arguments as `grouped_specular`."""
     options = VARIANTS["improved"]
     free = _specular_free(image, mask, options.blur)
     return _grouped(free, _learn(free, telling, options), options)

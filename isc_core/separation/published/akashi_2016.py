@@ -1,4 +1,4 @@
-"""Removes highlights by sparse non-negative matrix factorisation (Akashi & Okatani 2016).
+"""Highlight removal by sparse non-negative matrix factorisation (Akashi & Okatani 2016).
 
 Problem: a pixel is a mix of few surface colours plus the light's own colour, white. Find the
 colours and the mix of every pixel.
@@ -7,9 +7,10 @@ Equation: with the pixels as columns of I (3, n), I ~ W H, all entries >= 0; col
 (1, 1, 1) / sqrt 3, the others are k unit surface colours W_d. Minimise 1/2 ||I - W H||^2 + lambda
 sum H: the sum makes each pixel use few colours. One iteration is
 
-    H <- H * (W'I) / (W'W H + lambda)                            V = max(0, I - w_0 h_0) W_d <- W_d
-    * (V H_d' + W_d [W_d . W_d H_d H_d']) / (W_d H_d H_d' + W_d [W_d . V H_d'])     then unit
-    columns,
+    H <- H * (W'I) / (W'W H + lambda)
+    V = max(0, I - w_0 h_0)
+    W_d <- W_d * (V H_d' + W_d [W_d . W_d H_d H_d']) / (W_d H_d H_d' + W_d [W_d . V H_d'])
+    then unit columns,
 
 where [A . B] is the sum of A * B over each column. W needs only the sums V H_d' and H H', gathered
 over blocks of pixels together with I H', from which the objective follows without another pass.
@@ -19,13 +20,13 @@ matrix factorization", Computer Vision and Image Understanding 146, 77-85 (2016)
 doi:10.1016/j.cviu.2015.09.001. Ours in the improved variant: the colours start from the peaks of
 the hue histogram; they are fitted to a sample of the pixels, and every pixel's mix then follows by
 coordinate descent, which reaches the exact minimum for given colours; diffuse is I - w_0 h_0, so
-that what the fit leaves over is not called a highlight; and all that is removed fades out on
-objects of grey paint (`evidence`).
+that the residual of the fit is not called a highlight; and all that is removed fades out on grey
+objects (`saturation_gate`).
 
 Limits: the light must be white. The objective has many minima: random starts differ by 3 dB. White
-and grey paint on an object that is coloured otherwise is taken for a highlight; a colour between
-another one and white (a pale print on a dark one of the same hue) too. There is no spatial term.
-SIHR's variant runs for minutes.
+and grey reflectance on an otherwise coloured object passes for a highlight; so does a colour
+between another one and white (a pale print on a dark one of the same hue). There is no spatial
+term. SIHR's variant runs for minutes.
 """
 
 # mypy: disable-error-code="no-untyped-def"
@@ -49,17 +50,35 @@ _TINY = 1e-30
 
 @dataclass(frozen=True)
 class Akashi2016Options:
-    """`surface_colours`: k, how many surface colours are fitted; >= 1. `sparsity`: lambda, in units
-    where white is 255; >= 0. `start`: first surface colours, "hue" (peaks of the hue histogram) or
-    "random" (uniform, codes too). `starts`: how many starts are made, the one with the least
-    objective is kept; >= 1. `seed`: of samples and random starts; >= 0. `sample`: at most so many
-    pixels fit the colours, the others get codes only; 0: all pixels fit. `tolerance`: relative
-    change of the objective that ends the fit; > 0. `iterations`: at most; >= 1. `squared`: whether
-    the objective that is watched has the squared norm, as the paper says, or the plain norm, as
-    SIHR computes it. `own_scale`: whether the brightest value in the mask is taken for 255, or the
-    image's value 1. `rest_is_diffuse`: whether diffuse is image - highlight, or W_d H_d alone: the
-    rest then counts as specular. `weigh_evidence`: remove less, down to nothing, the less colour
-    the object has.
+    """Options of Akashi & Okatani (2016).
+
+    Attributes
+    ----------
+    surface_colours : int
+        Number k of surface colours; >= 1.
+    sparsity : float
+        lambda, in units where white is 255; >= 0.
+    start : str
+        First surface colours, "hue" (peaks of the hue histogram) or "random" (uniform, codes too).
+    starts : int
+        Number of starts; the one with the least objective is kept; >= 1.
+    seed : int
+        Of samples and random starts; >= 0.
+    sample : int
+        Largest number of pixels that fit the colours; the others get codes only. 0: all pixels.
+    tolerance : float
+        Relative change of the objective that ends the fit; > 0.
+    iterations : int
+        Largest number of iterations; >= 1.
+    squared : bool
+        Whether the stopping rule uses the squared norm, as in the paper, or the plain norm, as in
+        SIHR.
+    own_scale : bool
+        Whether the brightest value in the mask is taken for 255, or the image's value 1.
+    rest_is_diffuse : bool
+        Whether diffuse is image - highlight, or W_d H_d alone: the rest then counts as specular.
+    weigh_evidence : bool
+        Remove less, down to nothing, the less saturated the object is, see `saturation_gate`.
     """
 
     surface_colours: int = 6
@@ -117,14 +136,31 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0; any scale, but values in [0, 1] where the options say so;
-    `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above what was
-    recorded: they fit no colours. Inside the mask 0 <= diffuse <= image.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure (in [0, 1] unless `own_scale`).
+    mask : (H, W) bool ndarray
+    options : Akashi2016Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they fit no colours.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside the mask that are
-    negative or not finite, and a photo without colour; `Cancelled` when the monitor says so.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options = options or VARIANTS["improved"]
     monitor = monitor or Monitor()

@@ -1,35 +1,37 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by the dark channel and a maximum a posteriori refinement (Kim et al. 2013).
+"""Highlight removal by the dark channel and maximum a posteriori estimation (Kim et al. 2013).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Separate every pixel of one
 photo.
 
-Equation: among the pixels of a patch of diffuse paints some have a channel near zero, so the dark
+Equation: among the pixels of a patch of diffuse colours some have a channel near zero, so the dark
 channel, the least value of all channels in a patch, is close to s, and I less the dark channel is
 nearly free of it: s_0 = max(dark - b u, 0), u = mean(min I). With a the unit vector of the diffuse
 colour, s minimises over 0 <= s <= min I
+
     E = sum_x min_m |I - s 1 - m a|^2 + lambda (s - s_0)^2 + alpha sum_xy psi(s_x - s_y),
     psi(d) = 2 eps^2 (sqrt(1 + (d / eps)^2) - 1) over neighbours x, y:
-diffuse colours are known ones, s keeps near the dark channel, and its gradients are few. a is
-constant but for edges of hue, which s does not move: a(x) is the mean colour of D over pixels of
-like hue near x, weighed by exp(-s / (t u)), so that what shines least says which colour the paint
-has. Both steps alternate. The first term is k (s - s_a)^2 with k = 3 - (1'a)^2 = 1'P1 and s_a =
-1'PI / k, P = 1 - aa': it vanishes by itself where paint is grey, and there the other terms carry s
-in from around. Scheme: a by a bilateral grid (position, hue) of Gaussian means; s by weights 1 /
-sqrt(1 + (d / eps)^2) from the last step (half-quadratic) and over-relaxed red-black Gauss-Seidel
-sweeps, clamped to the bounds.
+
+diffuse colours are known, s stays near the dark channel, and its gradients are sparse. a is
+constant except at edges of hue, which s does not move: a(x) is the mean colour of D over pixels of
+similar hue near x, weighted by exp(-s / (t u)), so that the pixels with the least highlight
+determine it. Both steps alternate. The first term is k (s - s_a)^2 with k = 3 - (1'a)^2 = 1'P1 and
+s_a = 1'PI / k, P = 1 - aa': it vanishes on grey, and there the other terms interpolate s from
+around. Scheme: a by a bilateral grid (position, hue) of Gaussian means; s by weights 1 / sqrt(1 +
+(d / eps)^2) from the last step (half-quadratic) and over-relaxed red-black Gauss-Seidel sweeps,
+clamped to the bounds.
 
 Citation: H. Kim, H. Jin, S. Hadap and I. Kweon, "Specular reflection separation using dark channel
 prior", CVPR 2013, 1460-1467, doi:10.1109/CVPR.2013.192. The paper's: the dark channel as the first
 specular image, and a maximum a posteriori estimate of specular and chromaticity together. Ours:
 this energy, its weights and its solution (the "paper" settings are our reading of the idea, not its
-code); and as options b > 0, as few paints are as dark as the dark channel has it; only pixels whose
-smallest channel is above u lose specular; and nothing is removed where all of these together show
-too little colour to be told from white paint.
+code); and as options b > 0, since few colours are as dark as the dark channel assumes; only pixels
+whose smallest channel is above u lose specular; and nothing is removed where all of these together
+are too little saturated to be distinguished from white reflectance.
 
-Limits: the light must be white. A paint that is seen nowhere without highlight, near and in the
-same hue, keeps it in part; two paints of one hue and different saturation are told apart by their
-distance alone. Grey paint is left to its neighbours.
+Limits: the light must be white. A colour that is never seen without highlight, nearby and in the
+same hue, keeps it in part; two colours of one hue and different saturation are distinguished by
+their distance alone. Grey pixels depend on their neighbours.
 """
 
 from dataclasses import dataclass
@@ -49,21 +51,42 @@ from ..support.specular_free import dark_channel
 
 @dataclass(frozen=True)
 class Kim2013Options:
-    """`patch`: side, in pixels, of the square in which the dark channel is the least value; >= 1.
-    `base`: b, how many times the mean of the smallest channel counts as diffuse in the dark
-    channel; >= 0. Zero is the published idea. `rounds`: how often diffuse colours and specular are
-    found in turn; >= 0. Zero leaves the dark channel. `reach`: how far colours are averaged, as a
-    share of the mask's box (of the root of its area); >= .05. `hue`: which hues are alike, as a
-    distance in the disc of unit chroma; in [.02, 1]. `purity`: the chroma, as a share of the mask's
-    largest value, below which a hue says little; > 0. `trust`: t, the specular light, in units of
-    u, at which a pixel's say in its paint's colour falls to 1 / e; > 0. `prior`: lambda, the weight
-    of the dark channel; > 0. `smoothness`: alpha, that of the gradients; >= 0. `gradient`: eps,
-    above which a step of s is an edge, as a share of the mask's largest value; > 0. `sweeps`:
-    Gauss-Seidel sweeps a round; >= 0. `bright_saturation`: nothing is removed if the colour
-    (largest minus smallest channel) of the pixels whose smallest channel is above u is less than
-    this share of their largest channel, in [0, 1]. Zero always removes. `fade`: s grows from none
-    where the smallest channel is u to all of it at (1 + fade) u; > 0, or None for all of it
-    everywhere.
+    """Options of Kim et al. (2013).
+
+    Attributes
+    ----------
+    patch : int
+        Side, in pixels, of the square in which the dark channel is the least value; >= 1.
+    base : float
+        b, how many times the mean of the smallest channel counts as diffuse in the dark channel; >=
+        0. Zero is the published idea.
+    rounds : int
+        Alternations of diffuse colours and specular layer; >= 0. Zero leaves the dark channel.
+    reach : float
+        How far colours are averaged, as a share of the mask's box (of the root of its area); >=
+        .05.
+    hue : float
+        Which hues are alike, as a distance in the disc of unit chroma; in [.02, 1].
+    purity : float
+        The chroma, as a share of the mask's largest value, below which a hue says little; > 0.
+    trust : float
+        t, the specular light, in units of u, at which a pixel's weight in the diffuse colour falls
+        to 1 / e; > 0.
+    prior : float
+        lambda, the weight of the dark channel; > 0.
+    smoothness : float
+        alpha, the weight of the gradients; >= 0.
+    gradient : float
+        eps, above which a step of s is an edge, as a share of the mask's largest value; > 0.
+    sweeps : int
+        Gauss-Seidel sweeps a round; >= 0.
+    bright_saturation : float
+        Nothing is removed if the colour (largest minus smallest channel) of the pixels whose
+        smallest channel is above u is less than this share of their largest channel, in [0, 1].
+        Zero always removes.
+    fade : float or None
+        s grows from none where the smallest channel is u to all of it at (1 + fade) u; > 0, or None
+        for all of it everywhere.
     """
 
     patch: int = 7
@@ -118,16 +141,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
-    pixels whose true value lies above what was recorded: they say nothing about others. Inside the
-    mask 0 <= diffuse <= image; specular has three equal channels; the residual is zero but where
-    clipped. Confidence as in `layers`. `options` None: the improved variant. `monitor` hears of
-    every round.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure.
+    mask : (H, W) bool ndarray
+    options : Kim2013Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they do not influence others.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
-    negative or not finite, or no colour at all; `Cancelled`.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or Kim2013Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)

@@ -1,14 +1,16 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by eroding the angle between colour and white along surfaces of one hue
-(Mallick et al. 2006).
+"""Highlight removal by eroding the angle between colour and white (Mallick et al. 2006).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Separate every pixel of one
 photo.
 
 Equation: in axes S, U, V with S along white, s changes S alone. With rho = hypot(U, V), hue theta =
 atan2(V, U) and phi = atan2(S, rho), a highlight is a hill of phi on a plain, as phi of diffuse
 pixels of one colour is constant. The hill is eroded,
-    phi_t = -g sqrt(grad phi' M grad phi),   g = tanh(rho / 2 rho_0) / (1 + exp(|grad rho| - tau)),
+
+    phi_t = -g sqrt(grad phi' M grad phi),
+    g = tanh(rho / 2 rho_0) / (1 + exp(|grad rho| - tau)),
+
 with rho in 8-bit levels; M = 1 where the hue is constant, else the projection on the line of
 constant hue, along which alone a textured surface has one colour. At the end S_D = rho tan(phi) and
 s = (S - S_D) / sqrt(3). Scheme: upwind differences (Rouy & Tourin 1992) and explicit steps; along
@@ -16,16 +18,16 @@ lines of constant hue by bilinear samples one pixel apart.
 
 Citation: S. P. Mallick, T. Zickler, P. N. Belhumeur and D. J. Kriegman, "Specularity removal in
 images and videos: a PDE approach", ECCV 2006, LNCS 3951, 550-563, doi:10.1007/11744023_43. Ours, as
-options: hue and rho are smoothed before they are differentiated; part of the erosion is taken back
-by a dilation with the same g (an opening), which restores what never was a hill; and only pixels
-whose smallest channel is above its mean lose specular, unless all of these together show too little
-colour to be told from white paint. And on large photos s is found on averages over 2 x 2 pixels,
-repeatedly, and interpolated, so that highlights that grow with the photo still go.
+options: hue and rho are smoothed before they are differentiated; part of the erosion is reversed by
+a dilation with the same g (an opening), which restores what never was a hill; and only pixels whose
+smallest channel is above its mean lose specular, unless all of these together are too little
+saturated to be distinguished from white reflectance. On large photos s is found on averages over 2
+x 2 pixels, repeatedly, and interpolated, so that highlights that grow with the photo still vanish.
 
-Limits: the light must be white. Erosion has no steady state but the minimum of every region: steps
-* step is the radius, in pixels, of the highlights that it removes, and noise and paler patches of
-that size go with them. A highlight that touches no diffuse pixel of its colour, or lies on grey,
-stays.
+Limits: the light must be white. Erosion has no steady state except the minimum of every region:
+steps * step is the radius, in pixels, of the highlights that it removes, and noise and paler
+patches of that size go with them. A highlight that touches no diffuse pixel of its colour, or lies
+on grey, stays.
 """
 
 import math
@@ -46,20 +48,35 @@ from ..support.layers import bright_layers
 
 @dataclass(frozen=True)
 class Mallick2006Options:
-    """`steps`, `step`: how many erosion steps, >= 0, of which length in pixels, in (0, .7]; their
-    product is about the radius of the highlights that go. `longest`: objects with a longer side, in
-    pixels, are averaged over blocks down to this, and those blocks are the pixels that all lengths
-    here mean; >= 16, or None for the published method. `restoring_steps`: steps of dilation that
-    follow, >= 0. Zero is the published erosion, `steps` an opening. `smoothing`: standard
-    deviation, in pixels, of the Gaussian that hue and rho get before they are differentiated; >= 0.
-    `edge`: tau, where |grad rho| stops the erosion, in 1/255 of the mask's largest value a pixel;
-    >= 0. `chroma`: rho_0, the rho below which it slows down, in the same levels; > 0. `texture`:
-    |grad theta|, in radians a pixel, above which it runs along lines of constant hue alone; > 0.
-    `bright_saturation`: nothing is removed if the colour (largest minus smallest channel) of the
-    pixels whose smallest channel is above the mean is less than this share of their largest
-    channel, in [0, 1]. Zero is the published method. `fade`: s grows from none where the smallest
-    channel is at its mean to all of it at 1 + fade times the mean; > 0, or None for the published
-    method, which takes all of it everywhere.
+    """Options of Mallick et al. (2006).
+
+    Attributes
+    ----------
+    steps, step : int or float
+        Number of erosion steps, >= 0, and their length in pixels, in (0, .7]; their product is
+        about the radius of the highlights that go.
+    longest : int or None
+        Objects with a longer side, in pixels, are averaged over blocks down to this, and those
+        blocks are the pixels that all lengths here mean; >= 16, or None for the published method.
+    restoring_steps : int
+        Steps of dilation that follow, >= 0. Zero is the published erosion, `steps` an opening.
+    smoothing : float
+        Standard deviation, in pixels, of the Gaussian that hue and rho get before they are
+        differentiated; >= 0.
+    edge : float
+        tau, where |grad rho| stops the erosion, in 1/255 of the mask's largest value a pixel; >= 0.
+    chroma : float
+        rho_0, the rho below which it slows down, in the same levels; > 0.
+    texture : float
+        |grad theta|, in radians a pixel, above which it runs along lines of constant hue alone; >
+        0.
+    bright_saturation : float
+        Nothing is removed if the colour (largest minus smallest channel) of the pixels whose
+        smallest channel is above the mean is less than this share of their largest channel, in [0,
+        1]. Zero is the published method.
+    fade : float or None
+        s grows from none where the smallest channel is at its mean to all of it at 1 + fade times
+        the mean; > 0, or None for the published method, which takes all of it everywhere.
     """
 
     steps: int = 30
@@ -101,16 +118,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
-    pixels whose true value lies above what was recorded: the erosion goes around them. Inside the
-    mask 0 <= diffuse <= image; specular has three equal channels; the residual is zero but where
-    clipped. Confidence as in `layers`. `options` None: the improved variant. `monitor` hears of
-    every step.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure.
+    mask : (H, W) bool ndarray
+    options : Mallick2006Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: the erosion goes around them.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
-    negative or not finite, or no colour at all; `Cancelled`.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or Mallick2006Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)

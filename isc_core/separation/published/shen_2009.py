@@ -1,23 +1,24 @@
-"""Removes highlights by one gain for the modified specular-free image (Shen & Cai 2009).
+"""Highlight removal by one gain for the modified specular-free image (Shen & Cai 2009).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Separate every pixel of one
 photo.
 
 Equation: the smallest channel exceeds a threshold T = mean(min I) + eta std(min I) mostly in
-highlights, so b = max(min I - T, 0) is the specular image but for a gain, s = k b. Across the rim
-of a highlight the diffuse colour goes on unchanged: with Omega the largest region of b and R a thin
-ring around it, k = min over channels of (mean I in Omega - mean I in R) / (mean b in Omega - mean b
-in R).
+highlights, so b = max(min I - T, 0) is the specular image up to a gain, s = k b. The diffuse colour
+is continuous across the rim of a highlight: with Omega the largest region of b and R a thin ring
+around it,
+
+    k = min over channels of (mean I in Omega - mean I in R) / (mean b in Omega - mean b in R).
 
 Citation: H.-L. Shen and Q.-Y. Cai, "Simple and efficient method for specularity removal in an
 image", Applied Optics 48(14), 2711-2719 (2009), doi:10.1364/AO.48.002711. Ours, as options that the
-published method lacks: every region has its own gain and, in the place of T, its own level, the
-smallest channel of its ring's mean colour; and nothing is removed where the bright pixels show too
-little colour to be told from white paint.
+published method lacks: every region has its own gain and, in place of T, its own level, the
+smallest channel of its ring's mean colour; and nothing is removed where the bright pixels are too
+little saturated to be distinguished from white reflectance.
 
-Limits: the light must be white. "Bright and pale" is all that this method knows of a highlight:
-white and grey paint is one to it, which is why the improved variant leaves pale objects alone, also
-where they do have highlights. Each region is one level and one gain.
+Limits: the light must be white. A highlight is anything bright and pale: white and grey reflectance
+is one too, which is why the improved variant leaves pale objects unchanged, even where they do have
+highlights. Each region has one level and one gain.
 """
 
 from dataclasses import dataclass
@@ -35,15 +36,27 @@ from ..support.layers import white_layers
 
 @dataclass(frozen=True)
 class Shen2009Options:
-    """`deviations`: eta, how many standard deviations the threshold T lies above the mean of the
-    smallest channel; finite. `region_share`: a region is where b exceeds this share of its largest
-    value, in [0, 1). `ring_width`: side of the square, in pixels, by which a region is widened to
-    find its ring; odd, >= 3. `every_region`: each region has its own gain and level. Else one gain,
-    the largest region's, and one level, T, hold everywhere. `bright_saturation`: nothing is removed
-    if the colour (largest minus smallest channel) of the pixels whose smallest channel is above the
-    mean is less than this share of their largest channel, in [0, 1]. Zero always removes, like the
-    published method. `whole_frame`: statistics and regions of the whole frame, as the mask-less
-    public implementations have them, not of the mask.
+    """Options of Shen & Cai (2009).
+
+    Attributes
+    ----------
+    deviations : float
+        eta, how many standard deviations the threshold T lies above the mean of the smallest
+        channel; finite.
+    region_share : float
+        A region is where b exceeds this share of its largest value, in [0, 1).
+    ring_width : int
+        Side of the square, in pixels, by which a region is widened to find its ring; odd, >= 3.
+    every_region : bool
+        Each region has its own gain and level. Else one gain, the largest region's, and one level,
+        T, hold everywhere.
+    bright_saturation : float
+        Nothing is removed if the colour (largest minus smallest channel) of the pixels whose
+        smallest channel is above the mean is less than this share of their largest channel, in [0,
+        1]. Zero always removes, like the published method.
+    whole_frame : bool
+        Statistics and regions of the whole frame, as the mask-less public implementations have
+        them, not of the mask.
     """
 
     deviations: float = 0.5
@@ -73,16 +86,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
-    pixels whose true value lies above what was recorded: they stay out of the regions' means.
-    Inside the mask 0 <= diffuse <= image; specular has three equal channels; the residual is zero
-    but where clipped. Confidence as in `layers`. `options` None: the improved variant. The work is
-    too short to report.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure.
+    mask : (H, W) bool ndarray
+    options : Shen2009Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
-    negative or not finite, or no colour at all.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     del monitor
     options = options or Shen2009Options()

@@ -1,21 +1,22 @@
-"""Removes highlights by the intensity ratio of clustered pixels (Shen & Zheng 2013).
+"""Highlight removal by the intensity ratio of clustered pixels (Shen & Zheng 2013).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Separate every pixel of one
 photo.
 
-Equation: adding s leaves max I - min I alone, so the ratio r = max I / (max I - min I) is smallest,
-r_D, where a surface colour shows no highlight, and s = max I - r_D (max I - min I). Pixels with
-like colours (in the smallest and largest chromaticity of I - min I + u, which hardly depends on s)
-form a cluster; r_D is the median ratio of the cluster.
+Equation: adding s leaves max I - min I unchanged, so the ratio r = max I / (max I - min I) is
+smallest, r_D, where a surface colour shows no highlight, and s = max I - r_D (max I - min I).
+Pixels of similar colour (in the smallest and largest chromaticity of I - min I + u, which hardly
+depends on s) form a cluster; r_D is the median ratio of the cluster.
 
 Citation: H.-L. Shen and Z.-H. Zheng, "Real-time highlight removal using intensity ratio", Applied
 Optics 52(19), 4483-4493 (2013), doi:10.1364/AO.52.004483. u = mean(min I). Ours, as options:
-statistics of the mask instead of the frame; nothing is removed where the pixels with min I > u show
-too little colour to be told from white paint; and s fades in above u, where the published s jumps.
+statistics of the mask instead of the frame; nothing is removed where the pixels with min I > u are
+too little saturated to be distinguished from white reflectance; and s fades in above u, where the
+published s jumps.
 
 Limits: the light must be white. The median assumes that highlights cover less than half of a
-cluster's bright coloured pixels. A grey surface cannot be told from a highlight by colour: pale
-objects are left as they are; grey paint in the cluster of a stronger colour is darkened. There is
+cluster's bright coloured pixels. A grey surface cannot be distinguished from a highlight by colour:
+pale objects stay unchanged; grey pixels in the cluster of a stronger colour are darkened. There is
 no spatial term, so borders of highlights can show.
 """
 
@@ -34,16 +35,29 @@ from ..support.layers import DOUBT
 
 @dataclass(frozen=True)
 class Shen2013Options:
-    """`cluster_radius`: L1 distance in the chromaticity plane (values in [0, 1]) within which
-    pixels found one cluster; > 0. `ratio_quantile`: which quantile of a cluster's ratios is taken
-    as the diffuse ratio, in [0, 1]; lower removes more. `bright_saturation`: nothing is removed if
-    the colour (largest minus smallest channel) of the pixels with min I > u is less than this share
-    of their largest channel, in [0, 1]. Zero is the published method, which takes pale objects for
-    one large highlight. `fade`: s grows from none at min I = u to all of it at (1 + fade) u; >= 0.
-    Zero is the published method, with a jump at u. `whole_frame`: statistics of the whole frame, as
-    the mask-less public implementations have them, not of the mask. `label_slip`: a pixel's cluster
-    is the nearest but the first, and the second counts as the first: the slip of a public
-    implementation, kept so that its figures can be found again.
+    """Options of Shen & Zheng (2013).
+
+    Attributes
+    ----------
+    cluster_radius : float
+        L1 distance in the chromaticity plane (values in [0, 1]) within which pixels form one
+        cluster; > 0.
+    ratio_quantile : float
+        Which quantile of a cluster's ratios is taken as the diffuse ratio, in [0, 1]; lower removes
+        more.
+    bright_saturation : float
+        Nothing is removed if the colour (largest minus smallest channel) of the pixels with min I >
+        u is less than this share of their largest channel, in [0, 1]. Zero is the published method,
+        which takes pale objects for one large highlight.
+    fade : float
+        s grows from none at min I = u to all of it at (1 + fade) u; >= 0. Zero is the published
+        method, with a jump at u.
+    whole_frame : bool
+        Statistics of the whole frame, as the mask-less public implementations have them, not of the
+        mask.
+    label_slip : bool
+        Reproduce the labels of a public implementation: a pixel's cluster is the nearest one except
+        the first, and the second counts as the first.
     """
 
     cluster_radius: float = 0.3
@@ -86,21 +100,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale; `mask` (H, W) bool; `clipped` (H, W) bool marks
-    pixels whose true value lies above what was recorded. Inside the mask 0 <= diffuse <= image and
-    specular has three equal channels. `options` None: the improved variant. The work is too short
-    to report to `monitor`.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure.
+    mask : (H, W) bool ndarray
+    options : Shen2013Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one.
+    monitor : Monitor, optional
 
-    The residual is zero but where clipped: the method's equation does not hold there, so such
-    pixels stay out of the statistics and `clipped` explains them.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
 
-    Confidence is exp(-e / u), e being the specular error to be expected: what was removed plus .3
-    min I, all of min I where the object or a cluster was too grey to judge; 0 where clipped.
-
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
-    negative or not finite, or no colour at all.
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     del monitor
     options = options or Shen2013Options()

@@ -1,28 +1,27 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by comparing the photo's derivatives with those of a specular-free image (Tan
-& Ikeuchi 2005): the iterative method.
+"""Highlight removal by comparing derivatives with a specular-free image (Tan & Ikeuchi 2005).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Separate every pixel of one
 photo.
 
 Equation: if the diffuse largest chromaticity L = max D / sum D were known, s = (max I - L sum I) /
-(1 - 3 L). With one and the same L = .6 for all pixels this gives an image that is free of specular
-but for its colours; call its total e. Two neighbours of one paint are both diffuse if their totals
-t = sum I vary as e does: |log |dt| - log |de|| <= epsilon, or, as published, |d log t - d log e| <=
-epsilon. Where they do not, the one with the smaller c = max I / sum I has more specular, and is
-given the other's c as its L. This is repeated until the number of such pairs no longer falls; then
-epsilon is lowered.
+(1 - 3 L). With one and the same L = .6 for all pixels this gives an image without specular light,
+except for its colours; call its total e. Two neighbours of one reflectance are both diffuse if
+their totals t = sum I vary as e does: |log |dt| - log |de|| <= epsilon, or, as published, |d log t
+- d log e| <= epsilon. Where they do not, the one with the smaller c = max I / sum I has more
+specular, and is given the other's c as its L. This is repeated until the number of such pairs no
+longer falls; then epsilon is lowered.
 
 Citation: R. T. Tan and K. Ikeuchi, "Separating reflection components of textured surfaces using a
 single image", IEEE TPAMI 27(2), 178-193 (2005), doi:10.1109/TPAMI.2005.36. Ours, as options: no
-pixel's L exceeds a quantile of c over all pixels of its colour, since else the noisiest strong
-colour spreads over the whole surface; paints are told by what no highlight changes
-(`colour_groups`); the dark guard is relative to the object's brightness; and the object's
-colourfulness is weighed (`evidence`).
+pixel's L exceeds a quantile of c over all pixels of its colour, since otherwise the noisiest strong
+colour spreads over the whole surface; reflectances are distinguished by highlight-invariant colour
+(`colour_groups`); the dark guard is relative to the object's brightness; and the result is weighted
+by the object's saturation (`saturation_gate`).
 
 Limits: the light must be white. Every step of texture that is no clear change of hue is a highlight
-to this method. White paint beside a like-hued coloured one is too; the improved variant therefore
-leaves pale objects alone, also where they do have highlights.
+to this method. So is white reflectance beside a coloured one of similar hue; the improved variant
+therefore leaves pale objects unchanged, even where they do have highlights.
 """
 
 import math
@@ -44,19 +43,39 @@ from ..support.specular_free import fixed_chromaticity
 
 @dataclass(frozen=True)
 class Tan2005Options:
-    """`start`, `step`: epsilon runs from `start` to 0 in steps of `step`; start >= 0, step > 0 and
-    at least start / 1000. `log_of_difference`: compare the logarithms of the differences, as the
-    authors' program does, not the differences of the logarithms. `noise`: neighbours whose c
-    differs less are left as they are; > 0. `colour_step`: neighbours are of different paint if both
-    their red and their green shares of the total differ by more than this; where `by_colour`, if
-    either share of the two-band image does; > 0. `by_colour`: L never exceeds the `quantile`, in
-    [0, 1], of c over the object's pixels in the same cell of the plane of red and green shares of
-    the two-band image with `cells` cells a side (1 to 1000); `window`, odd, is the side in pixels
-    over which they are averaged. `dark`: pixels whose channels are all less are left as they are; a
-    share of the object's brightness (the 99.9 % quantile of the largest channel) where
-    `relative_dark`; >= 0. `weigh_evidence`: remove less, down to nothing, the less colour the
-    object has. `whole_frame`: use the whole frame, its last row and column only as neighbours, and
-    dark pixels as neighbours, as the mask-less public implementations do.
+    """Options of Tan & Ikeuchi (2005).
+
+    Attributes
+    ----------
+    start, step : float
+        epsilon runs from `start` to 0 in steps of `step`; start >= 0, step > 0 and at least start /
+        1000.
+    log_of_difference : bool
+        Compare the logarithms of the differences, as the authors' program does, not the differences
+        of the logarithms.
+    noise : float
+        Neighbours whose c differs less are left as they are; > 0.
+    colour_step : float
+        Neighbours have different reflectance if both their red and their green shares of the total
+        differ by more than this; where `by_colour`, if either share of the two-band image does; >
+        0.
+    by_colour : bool
+        L never exceeds the `quantile`, in [0, 1], of c over the object's pixels in the same cell of
+        the plane of red and green shares of the two-band image with `cells` cells a side (1 to
+        1000); `window`, odd, is the side in pixels over which they are averaged.
+    quantile : float
+        See `by_colour`; in [0, 1].
+    cells, window : int
+        See `by_colour`.
+    dark : float
+        Pixels whose channels are all less are left unchanged; >= 0.
+    relative_dark : bool
+        `dark` is a share of the object's brightness (the 99.9 % quantile of the largest channel).
+    weigh_evidence : bool
+        Remove less, down to nothing, the less saturated the object is, see `saturation_gate`.
+    whole_frame : bool
+        Use the whole frame, its last row and column only as neighbours, and dark pixels as
+        neighbours, as the mask-less public implementations do.
     """
 
     start: float = 0.5
@@ -128,16 +147,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale (but [0, 1] where `dark` is absolute); `mask` (H, W)
-    bool; `clipped` (H, W) bool marks pixels whose true value lies above what was recorded: they are
-    compared with no other. Inside the mask 0 <= diffuse <= image; specular has three equal
-    channels; the residual is zero but where clipped. Confidence as in `layers`. `options` None: the
-    improved variant.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure (in [0, 1] where `dark` is absolute).
+    mask : (H, W) bool ndarray
+    options : Tan2005Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they are compared with no other.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
-    negative or not finite, or no colour at all; `Cancelled`.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or Tan2005Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)

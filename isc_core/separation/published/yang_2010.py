@@ -1,27 +1,26 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by smoothing the largest chromaticity along the specular-free one (Yang, Wang
-& Ahuja 2010).
+"""Highlight removal by smoothing the largest chromaticity (Yang, Wang & Ahuja 2010).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Separate every pixel of one
 photo.
 
 Equation: if a pixel's diffuse largest chromaticity L = max D / sum D were known, s = (max I - L sum
 I) / (1 - 3 L). A highlight lowers the observed one, c = max I / sum I, but not the guide g = (max I
 - min I) / (sum I - 3 min I). So c is smoothed by a joint bilateral filter, which averages over
-pixels that are near in the photo and in g; c rises to the average where that is higher; and again,
-until the average exceeds it nowhere by more than a tolerance. What has come out is L. The filter
+pixels that are near in the photo and in g; c rises to the average where that is higher; this is
+repeated until the average exceeds it nowhere by more than a tolerance. The result is L. The filter
 runs on a coarse grid over row, column and g.
 
 Citation: Q. Yang, S. Wang and N. Ahuja, "Real-time specular highlight removal using bilateral
 filtering", ECCV 2010, LNCS 6314, 87-100, doi:10.1007/978-3-642-15561-1_7. The grid is that of J.
 Chen, S. Paris and F. Durand, "Real-time edge-aware image processing with the bilateral grid",
 SIGGRAPH 2007, doi:10.1145/1276377.1276506. Ours, as options: the dark guard relative to the
-object's brightness, nothing removed where L says grey, and the weighing of the object's
-colourfulness (`evidence`).
+object's brightness, nothing removed where L is grey, and the weight by the object's saturation
+(`saturation_gate`).
 
-Limits: the light must be white. Paints of like g but different strength are averaged within a
+Limits: the light must be white. Colours of similar g but different strength are averaged within a
 quarter of the image, and the weaker, paler one is darkened; the improved variant therefore leaves
-pale objects alone, also where they do have highlights.
+pale objects unchanged, even where they do have highlights.
 """
 
 import math
@@ -42,14 +41,29 @@ from ..support.saturation_gate import saturation_gate
 
 @dataclass(frozen=True)
 class Yang2010Options:
-    """`spatial_sigma`: of the filter, as a share of the object's (or frame's) shorter side, > 0.
-    `range_sigma`: of the filter in the guide, which lies in [1/3, 1], >= .001. `tolerance`: the
-    filter is repeated while it lies this much above the largest chromaticity somewhere, > 0.
-    `rounds`: at most so many times, >= 1. `dark`: pixels whose largest channel is less than this
-    are left as they are and inform no other, >= 0. `relative_dark`: `dark` is a share of the
-    object's brightness (the 99.9 % quantile of the largest channel), else an absolute value.
-    `weigh_evidence`: remove less, down to nothing, the less colour the object has. `whole_frame`:
-    filter the whole frame, as the mask-less public implementations do, not the mask.
+    """Options of Yang, Wang & Ahuja (2010).
+
+    Attributes
+    ----------
+    spatial_sigma : float
+        Of the filter, as a share of the object's (or frame's) shorter side, > 0.
+    range_sigma : float
+        Of the filter in the guide, which lies in [1/3, 1], >= .001.
+    tolerance : float
+        The filter is repeated while it lies this much above the largest chromaticity somewhere, >
+        0.
+    rounds : int
+        Largest number of repetitions, >= 1.
+    dark : float
+        Pixels whose largest channel is less than this are left as they are and inform no other, >=
+        0.
+    relative_dark : bool
+        `dark` is a share of the object's brightness (the 99.9 % quantile of the largest channel),
+        else an absolute value.
+    weigh_evidence : bool
+        Remove less, down to nothing, the less saturated the object is, see `saturation_gate`.
+    whole_frame : bool
+        Filter the whole frame, as the mask-less public implementations do, not the mask.
     """
 
     spatial_sigma: float = 0.25
@@ -94,16 +108,32 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale (but [0, 1] where `dark` is absolute); `mask` (H, W)
-    bool; `clipped` (H, W) bool marks pixels whose true value lies above what was recorded: they
-    inform no other. Inside the mask 0 <= diffuse <= image; specular has three equal channels; the
-    residual is zero but where clipped. Confidence as in `layers`. `options` None: the improved
-    variant.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure (in [0, 1] where `dark` is absolute).
+    mask : (H, W) bool ndarray
+    options : Yang2010Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they do not influence others.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
-    negative or not finite, or no colour at all; `Cancelled`.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or Yang2010Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)

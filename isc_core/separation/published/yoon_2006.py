@@ -1,26 +1,25 @@
 # mypy: disable-error-code="no-untyped-def"
-"""Removes highlights by comparing ratios of neighbours in the photo and in its two-band image
-(Yoon, Choi & Kweon 2006).
+"""Highlight removal by ratios of neighbours in the two-band image (Yoon, Choi & Kweon 2006).
 
-Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Split every pixel of one
+Problem: a pixel is diffuse plus white specular, I = D + s (1, 1, 1). Separate every pixel of one
 photo.
 
-Equation: the two-band image F = I - min I, f = sum F, knows no highlights. Where neighbours p, q
-have one surface colour, i.e. nearly the same F / f, the diffuse totals relate as f(p) / f(q); so if
+Equation: the two-band image F = I - min I, f = sum F, has no highlights. Where neighbours p, q have
+one surface colour, that is nearly the same F / f, the diffuse totals relate as f(p) / f(q); so if
 sum I(p) / f(p) exceeds sum I(q) / f(q), then p has more specular, and s(p) grows until the two are
-equal. Over and over along all pairs, this gives every pixel the smallest t = sum I / f of the
-region that it hangs together with by pairs of like colour: s = (sum I - t f) / 3.
+equal. Repeated along all pairs, this gives every pixel the smallest t = sum I / f of the region
+that it is connected to by pairs of similar colour: s = (sum I - t f) / 3.
 
 Citation: K.-J. Yoon, Y. Choi and I. S. Kweon, "Fast separation of reflection components using a
 specularity-invariant image representation", ICIP 2006, 973-976, doi:10.1109/ICIP.2006.312650. Ours,
 as options: the regions are found at once, by union-find, instead of by sweeps; t is a quantile over
-the region's pixels of like colour, since the smallest of all is noise's; F is averaged over a few
+the region's pixels of similar colour, since the smallest of all is noise; F is averaged over a few
 pixels before colours are compared; the dark guard is relative to the object's brightness; and the
-object's colourfulness is weighed (`evidence`).
+result is weighted by the object's saturation (`saturation_gate`).
 
-Limits: the light must be white. A region may leak where one paint fades into another. White paint
-beside a like-hued coloured one is a highlight to this method; the improved variant therefore leaves
-pale objects alone, also where they do have highlights.
+Limits: the light must be white. A region may leak where one colour fades into another. White
+reflectance beside a coloured one of similar hue is a highlight to this method; the improved variant
+therefore leaves pale objects unchanged, even where they do have highlights.
 """
 
 import math
@@ -41,18 +40,39 @@ from ..support.saturation_gate import saturation_gate
 
 @dataclass(frozen=True)
 class Yoon2006Options:
-    """`colour_step`: neighbours are of one colour if red and green shares of F, in [0, 1], both
-    differ by no more than this; > 0. `dark`: a pair is compared if the smallest channel of its
-    first pixel is at least this; >= 0. Where `relative_dark`: if the largest channels of both are
-    at least this share of the object's brightness (the 99.9 % quantile of the largest channel).
-    `regions`: solve by regions; then `quantile` in [0, 1] of t is taken over a region's pixels that
-    share a cell of the (red, green) plane of F's shares with `cells` cells a side (1 to 1000), and
-    `window`, odd, is the side in pixels of the square over which F is averaged before. Else sweep
-    along the pairs at most `sweeps` times, until nothing of more than `tolerance` (absolute) is
-    moved; >= 0. `toolbox_order`: pairs only along columns, with the end of a column mistaken and
-    pairs joining columns, as a public toolbox has it. `weigh_evidence`: remove less, down to
-    nothing, the less colour the object has. `whole_frame`: use the whole frame, as the mask-less
-    public implementations do, not the mask.
+    """Options of Yoon, Choi & Kweon (2006).
+
+    Attributes
+    ----------
+    colour_step : float
+        Neighbours are of one colour if red and green shares of F, in [0, 1], both differ by no more
+        than this; > 0.
+    dark : float
+        A pair is compared if the smallest channel of its first pixel is at least this; >= 0.
+    relative_dark : bool
+        Compare a pair if the largest channels of both pixels are at least `dark` times the object's
+        brightness (the 99.9 % quantile of the largest channel).
+    regions : bool
+        Solve by regions; then `quantile` in [0, 1] of t is taken over a region's pixels that share
+        a cell of the (red, green) plane of F's shares with `cells` cells a side (1 to 1000), and
+        `window`, odd, is the side in pixels of the square over which F is averaged before. Else
+        sweep along the pairs at most `sweeps` times, until nothing of more than `tolerance`
+        (absolute) is moved; >= 0.
+    quantile : float
+        See `regions`.
+    cells, window : int
+        See `regions`.
+    sweeps : int
+        See `regions`.
+    tolerance : float
+        See `regions`; >= 0.
+    toolbox_order : bool
+        Pairs only along columns, with an off-by-one at the end of a column and pairs that join
+        columns, to reproduce a public toolbox.
+    weigh_evidence : bool
+        Remove less, down to nothing, the less saturated the object is, see `saturation_gate`.
+    whole_frame : bool
+        Use the whole frame, as the mask-less public implementations do, not the mask.
     """
 
     colour_step: float = 0.1
@@ -119,16 +139,33 @@ def separate(
     clipped: np.ndarray | None = None,
     monitor: Monitor | None = None,
 ) -> Separation:
-    """Splits a photo under white light into diffuse and specular.
+    """Separate a photo under white light into its diffuse and specular layer.
 
-    `image` (H, W, 3), linear, >= 0, any scale (but [0, 1] where `dark` and `tolerance` are
-    absolute); `mask` (H, W) bool; `clipped` (H, W) bool marks pixels whose true value lies above
-    what was recorded: they are compared with no other. Inside the mask 0 <= diffuse <= image;
-    specular has three equal channels; the residual is zero but where clipped. Confidence as in
-    `layers`. `options` None: the improved variant.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear Rec.709, not negative, of any exposure (in [0, 1] where `dark` and `tolerance` are
+        absolute).
+    mask : (H, W) bool ndarray
+    options : Yoon2006Options, optional
+        By default the improved variant.
+    clipped : (H, W) bool ndarray, optional
+        Pixels whose true value lies above the recorded one: they are compared with no other.
+    monitor : Monitor, optional
 
-    Raises `InputError` for unfit shapes or options, an empty mask, values inside it that are
-    negative or not finite, or no colour at all; `Cancelled`.
+    Returns
+    -------
+    Separation
+        Inside the mask 0 <= diffuse <= image; the specular layer has three equal channels; the
+        residual is 0 except where clipped.
+
+    Raises
+    ------
+    InputError
+        If shapes or options are invalid, the mask is empty, values inside it are negative or not
+        finite, or the photo has no colour.
+    Cancelled
+        If the user asked to stop.
     """
     options, monitor = options or Yoon2006Options(), monitor or Monitor()
     check_arrays(image, mask, clipped)

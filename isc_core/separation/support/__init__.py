@@ -1,1 +1,1 @@
-"""What several separation methods share."""
+"""What several separation methods share: checks, guards, statistics, and the resulting layers."""

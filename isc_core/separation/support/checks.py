@@ -1,4 +1,4 @@
-"""What every separation asks of its arrays."""
+"""Checks of the arrays of every separation."""
 
 import numpy as np
 
@@ -11,8 +11,15 @@ _GREY = 1e-4
 
 
 def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None) -> None:
-    """Raises `InputError` unless `image` is (H, W, 3), finite and >= 0 in a non-empty `mask` (H, W)
-    bool, as is `clipped` or None.
+    """Raise `InputError` for arrays that cannot be separated.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Must be finite and not negative in the mask.
+    mask : (H, W) bool ndarray
+        Must not be empty.
+    clipped : (H, W) bool ndarray or None
     """
     if image.ndim != 3 or image.shape[2] != 3:
         raise InputError(
@@ -36,17 +43,24 @@ def check_arrays(image: np.ndarray, mask: np.ndarray, clipped: np.ndarray | None
 
 
 def has_colour(image: np.ndarray, mask: np.ndarray) -> bool:
-    """Whether any pixel of `image` (H, W, 3) inside `mask` (H, W) bool, not empty, differs between
-    its channels by more than rounding.
+    """Return whether any pixel of the mask has channels that differ by more than rounding.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+        Not empty.
+
+    Returns
+    -------
+    bool
     """
     inside = image[mask]
     return bool((largest(inside) - smallest(inside)).max() > _GREY * inside.max())
 
 
 def require_colour(image: np.ndarray, mask: np.ndarray, method: str) -> None:
-    """Raises `InputError` where no pixel of `image` (H, W, 3) inside `mask` (H, W) bool has colour
-    that the method could judge by.
-    """
+    """Raise `InputError`, naming the method, unless some pixel of the mask has colour."""
     if not has_colour(image, mask):
         raise InputError(
             f"the photo has no colour, and {method} tells highlights by colour alone: use --method "

@@ -1,17 +1,17 @@
-"""What a separation says about clipped pixels, whose true value lies above the recorded one.
+"""The layers of clipped pixels, whose true value lies above the recorded one.
 
-Problem: where the sensor is full, image = diffuse + white specular no longer holds, and equations
-that rely on colour differences turn highlights' cores into black holes. Yet a full channel alone is
-no highlight: strong paint in good light fills it too.
+Problem: where the sensor saturates, image = diffuse + white specular no longer holds, and equations
+that rely on colour differences turn the cores of highlights into black holes. Yet a saturated
+channel alone is no highlight: saturated reflectance in strong light fills it too.
 
-Equation: A is the diffuse layer carried in from around the clipped region by pull-push
-interpolation (`inpainting.pull_push`). Channels that are not full are still diffuse plus white: s
-is the least I_c - A_c among them, or with all channels full the most that any shows over A. It is
-believed as far as the pixel itself is nearly white, or as what the method removed there or just
-around is a fair share of the brightness. Elsewhere the pixel stays as it is. A full channel's
-diffuse is A_c, but within [I_c - s, I_c]; what it lost is the residual, <= 0.
+Equation: A is the diffuse layer interpolated from around the clipped region by pull-push
+(`inpainting.pull_push`). Channels that are not clipped are still diffuse plus white: s is the least
+I_c - A_c among them, or with all channels clipped the largest excess of any over A. It counts as
+far as the pixel itself is nearly white, or as what the method removed there or just around is a
+fair share of the brightness. Elsewhere the pixel stays unchanged. The diffuse value of a clipped
+channel is A_c, but within [I_c - s, I_c]; what it lost is the residual, <= 0.
 
-Limits: texture under a clipped highlight is lost; the fill is smooth. White paint that is full is
+Limits: texture under a clipped highlight is lost; the fill is smooth. Clipped white reflectance is
 refilled like a highlight.
 """
 
@@ -31,10 +31,20 @@ _LIT = (0.03, 0.1)
 
 
 def explain_clipped(split: Separation, clipped: np.ndarray, mask: np.ndarray) -> Separation:
-    """The same split with clipped pixels explained anew; `clipped` and `mask` (H, W) bool.
+    """Recompute the layers of clipped pixels.
 
-    There 0 <= diffuse <= image, specular is white, the residual is <= 0, and 0 in channels that are
-    not full; confidence is 0. A mask without any unclipped pixel keeps its split.
+    There 0 <= diffuse <= image, the specular layer is white, the residual is not positive, and 0 in
+    channels that are not clipped; the confidence is 0. A mask without any unclipped pixel keeps its
+    layers.
+
+    Parameters
+    ----------
+    split : Separation
+    clipped, mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    Separation
     """
     known = mask & ~clipped
     if not clipped.any() or not known.any():

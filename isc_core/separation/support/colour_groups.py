@@ -1,11 +1,13 @@
-"""Groups of pixels of one paint, told by what a white highlight does not change, and robust
-statistics of them.
+"""Groups of pixels of one reflectance, by highlight-invariant colour, and their robust statistics.
 
-Problem: which pixels show the same paint, highlight or not? Equation: white light leaves the
-two-band image F = I - min I as it is, hence also the shares of red and green in it, F_R / sum F and
-F_G / sum F, which depend on the paint alone. Pixels in one cell of that plane form a group. Limits:
-a paint and its paler relation have like shares; where F is small the shares are noise, which an
-average of F over a few pixels tames.
+Problem: which pixels show the same reflectance, highlight or not?
+
+Equation: white light leaves the two-band image F = I - min I unchanged, hence also its shares of
+red and green, F_R / sum F and F_G / sum F, which depend on the reflectance alone. Pixels in one
+cell of that plane form a group.
+
+Limits: a colour and a paler version of it have similar shares; where F is small the shares are
+noise, which an average of F over a few pixels reduces.
 """
 
 import numpy as np
@@ -17,10 +19,19 @@ from ...imaging.channels import smallest
 def two_band_shares(
     image: np.ndarray, known: np.ndarray, window: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shares of red and green (H, W), in [0, 1], in F averaged over the `known` (H, W) pixels of a
-    square of `window` pixels a side.
+    """Return the shares of red and green in the averaged two-band image.
 
-    `image` (H, W, 3); `window` odd. 0 where not known, or without any colour.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    known : (H, W) bool ndarray
+    window : int
+        Side of the averaging square in pixels; odd.
+
+    Returns
+    -------
+    red, green : (H, W) ndarray
+        In [0, 1]; 0 where not known, or without any colour.
     """
     low = smallest(image)
     band = image[..., 0] + image[..., 1] + image[..., 2] - 3 * low
@@ -36,16 +47,24 @@ def two_band_shares(
 
 
 def colour_cells(red: np.ndarray, green: np.ndarray, cells: int) -> np.ndarray:
-    """The cell, from 0 to `cells`**2 - 1, of shares (n,) of red and green: the plane has `cells` of
-    them a side.
-    """
+    """Return the cell, 0 to `cells`**2 - 1, of shares (n,) of red and green."""
     row, column = (np.clip(share * cells, 0, cells - 1).astype(np.int64) for share in (red, green))
     return row * cells + column
 
 
 def group_quantile(group: np.ndarray, values: np.ndarray, quantile: float) -> np.ndarray:
-    """For each of `values` (n,) the lower `quantile` of all those with the same whole number >= 0
-    in `group` (n,).
+    """Return for each value the lower quantile of its group.
+
+    Parameters
+    ----------
+    group : (n,) int ndarray
+        Not negative.
+    values : (n,) ndarray
+    quantile : float
+
+    Returns
+    -------
+    (n,) ndarray
     """
     order = np.argsort(values)
     order = order[np.argsort(group[order], kind="stable")]

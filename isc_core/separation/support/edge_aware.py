@@ -1,13 +1,14 @@
-"""Averages that do not cross borders of paint, in a time that does not grow with their reach.
+"""Edge-aware averages, in a time independent of their extent.
 
-Problem: a statistic over the pixels that a pixel can be joined to without crossing an edge.
+Problem: a statistic over the pixels that can be reached from a pixel without crossing an edge.
+
 Equation: along a row (then a column) the recursive filter y_j = x_j + a^d_j (y_(j-1) - x_j),
-forward and back, with a = exp(-sqrt 2 / sigma) and d_j the distance to the neighbour: one pixel
+forward and backward, with a = exp(-sqrt 2 / sigma) and d_j the distance to the neighbour: one pixel
 plus what an edge adds. Passes over rows and columns alternate, the later ones with smaller sigma.
 
-The lower mode is what most pixels agree on when those above are with_warnings: the fixed point of a
-weighted average whose weight is 1 below it and falls as exp(-(t - mode) / tau) above. Highlights,
-which only ever raise t, hardly move it.
+The lower mode is the value that most pixels agree on when higher ones count less: the fixed point
+of a weighted average whose weight is 1 below it and falls as exp(-(t - mode) / tau) above.
+Highlights, which only ever raise t, hardly move it.
 
 Citation: E. S. L. Gastal and M. M. Oliveira, "Domain transform for edge-aware image and video
 processing", ACM Trans. Graph. 30(4), 69 (2011), doi:10.1145/2010324.1964964.
@@ -22,9 +23,14 @@ _PASSES = 2
 
 @dataclass(frozen=True)
 class Paths:
-    """How far each pixel (H, W) is from its left (`across`) and upper (`down`) neighbour, >= 1;
+    """Distances between neighbouring pixels.
 
-    `reach`: sigma, in the same unit.
+    Attributes
+    ----------
+    across, down : (H, W) ndarray
+        To the left and the upper neighbour, at least 1.
+    reach : float
+        sigma, in the same unit.
     """
 
     across: np.ndarray
@@ -32,7 +38,7 @@ class Paths:
     reach: float
 
     def average(self, layers: np.ndarray) -> np.ndarray:
-        """`layers` (n, H, W), smoothed along the paths."""
+        """Return `layers` (n, H, W), smoothed along the paths."""
         found = np.ascontiguousarray(
             layers.transpose(2, 0, 1)
         )  # the axis that is walked along comes first
@@ -46,14 +52,27 @@ class Paths:
         return found.transpose(1, 2, 0)
 
     def weighted(self, value: np.ndarray, weight: np.ndarray) -> np.ndarray:
-        """The average (H, W) of `value` with `weight` >= 0, both (H, W)."""
+        """Return the average (H, W) of `value` with `weight` >= 0, both (H, W)."""
         total, weights = self.average(np.stack([weight * value, weight]))
         return total / np.maximum(weights, 1e-12)
 
     def lower_mode(
         self, value: np.ndarray, weight: np.ndarray, tau: float, rounds: int
     ) -> np.ndarray:
-        """The lower mode (H, W) of `value` (H, W), `tau` in its unit, by `rounds` of re-weighting."""
+        """Return the lower mode of a map.
+
+        Parameters
+        ----------
+        value, weight : (H, W) ndarray
+        tau : float
+            In the unit of `value`.
+        rounds : int
+            Of re-weighting.
+
+        Returns
+        -------
+        (H, W) ndarray
+        """
         mode = self.weighted(value, weight)
         for _ in range(rounds):
             mode = self.weighted(value, weight * np.exp(-np.maximum(value - mode, 0) / tau))

@@ -1,9 +1,9 @@
-"""How probable a highlight is by the statistics of filter outputs: a prior for the separator `isc`.
+"""A prior for highlights from the statistics of filter outputs, for the separator `isc`.
 
-Problem: highlights are compact and bounded by steep flanks, shading is smooth, paint has steps and
-little else. So the outputs of small filters are distributed differently on diffuse and on specular
-light (thesis, section 3.6.5.1, figure 3.12), and the outputs around a pixel say something of which
-of the two made them, whatever the colours are.
+Problem: highlights are compact and bounded by steep flanks, shading is smooth, reflectance is
+piecewise constant. So the outputs of small filters are distributed differently on diffuse and on
+specular light (thesis, section 3.6.5.1, figure 3.12), and the outputs around a pixel are
+informative whatever the colours are.
 
 Equation: L = log of the smoothed intensity over the object's; at widths w, shares of the object's
 diagonal, the outputs r_f are the slope w dL, the curvature w^2 ddL (along both axes, one histogram)
@@ -13,17 +13,17 @@ the mean over the neighbourhood,
 
     p = 1 / (1 + exp(-Lambda / T)),    Lambda = G sum_f log(h_f(r_f | highlight) / h_f(r_f | none)).
 
-Neighbouring outputs are far from independent, so Lambda promises too much: the temperature T,
-chosen on scenes left out, takes that back. Both kinds count the same: .5 says nothing, which is
-what the `prior` of `isc` means by it. `python -m benchmarks.separation.filter_statistics fit` fits histograms
-and T to rendered scenes.
+Neighbouring outputs are far from independent, so Lambda is overconfident: the temperature T, chosen
+on held-out scenes, corrects that. Both classes have equal weight: 0.5 is neutral, as in the `prior`
+of `isc`. `python -m benchmarks.separation.filter_statistics fit` fits histograms and T to rendered
+scenes.
 
 Citation: H. Akbar 2016; heavy-tailed outputs of derivative filters: B. A. Olshausen and D. J. Field
 1996, doi:10.1038/381607a0, J. Huang and D. Mumford 1999, doi:10.1109/CVPR.1999.786990; the
 temperature: C. Guo et al. 2017, arXiv:1706.04599.
 
-Limits: round shapes under a near lamp look like broad highlights and the other way round; how much
-it is worth is measured in docs/methods/filter_statistics.md.
+Limits: round shapes under a near lamp look like broad highlights and vice versa;
+docs/methods/filter_statistics.md measures the benefit.
 """
 
 import importlib.resources
@@ -55,8 +55,16 @@ _ARRAYS = ("spread", "without", "highlight", "temperature")
 
 @dataclass(frozen=True)
 class FilterTable:
-    """`spread` (F,) > 0: the unit of each filter's outputs. `without`, `highlight` (F, BINS) > 0:
-    the histograms, each of sum 1. `temperature` > 0. F = len(FILTERS).
+    """Histograms of filter outputs. F = len(FILTERS).
+
+    Attributes
+    ----------
+    spread : (F,) ndarray
+        Unit of each filter's outputs, greater than 0.
+    without, highlight : (F, BINS) ndarray
+        Histograms, greater than 0, each of sum 1.
+    temperature : float
+        Greater than 0.
     """
 
     spread: np.ndarray
@@ -65,8 +73,16 @@ class FilterTable:
     temperature: float
 
     def evidence(self, outputs: np.ndarray) -> np.ndarray:
-        """The log-likelihood ratios (N,) of outputs (N, F, 2), summed over filters; an axis that is
-        not finite says nothing.
+        """Return log-likelihood ratios, summed over filters.
+
+        Parameters
+        ----------
+        outputs : (N, F, 2) ndarray
+            An axis that is not finite is neutral.
+
+        Returns
+        -------
+        (N,) ndarray
         """
         ratio = np.log(self.highlight / self.without)
         total = np.zeros(outputs.shape[0])
@@ -79,27 +95,38 @@ class FilterTable:
 
 
 def bins(values: np.ndarray, spread: float) -> np.ndarray:
-    """The bin of each value, in [0, BINS), of a filter's outputs."""
+    """Return the bin, in [0, BINS), of each value of a filter's outputs."""
     place = (np.arcsinh(values / spread) / _REACH + 1) * (BINS / 2)
     return np.clip(place, 0, BINS - 1).astype(np.int64)
 
 
 def bin_edges() -> np.ndarray:
-    """The histograms' edges (BINS + 1,), in units of asinh(output / spread)."""
+    """Return the edges (BINS + 1,) of the histograms, in units of asinh(output / spread)."""
     return np.linspace(-_REACH, _REACH, BINS + 1)
 
 
 @cache
 def shipped_table() -> FilterTable:
-    """The table that comes with the package."""
+    """Return the table that ships with the package."""
     resource = importlib.resources.files(__package__) / "data" / "filter_statistics.npz"
     return _read(resource.read_bytes(), "the shipped table")
 
 
 def read_table(path: str | Path) -> FilterTable:
-    """A table that `benchmarks.separation.filter_statistics fit` wrote.
+    """Read a table of `benchmarks.separation.filter_statistics fit`.
 
-    Raises `InputError` for a file that is none.
+    Parameters
+    ----------
+    path : str or Path
+
+    Returns
+    -------
+    FilterTable
+
+    Raises
+    ------
+    InputError
+        If the file holds none.
     """
     try:
         data = Path(path).read_bytes()
@@ -141,11 +168,25 @@ def _read(data: bytes, name: str) -> FilterTable:
 def highlight_prior(
     image: np.ndarray, mask: np.ndarray, table: FilterTable | None = None
 ) -> np.ndarray:
-    """The probability (H, W) float32 in [.02, .98] that a highlight is seen at each pixel of `mask`
-    (H, W) bool; .5 outside.
+    """Return the probability of a visible highlight at each pixel.
 
-    `image` (H, W, 3) linear, >= 0 inside the mask, at any exposure. Raises `InputError` for an
-    empty mask.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Linear, not negative inside the mask, of any exposure.
+    mask : (H, W) bool ndarray
+    table : FilterTable, optional
+        By default the shipped one.
+
+    Returns
+    -------
+    (H, W) float32 ndarray
+        In [0.02, 0.98]; 0.5 outside the mask.
+
+    Raises
+    ------
+    InputError
+        If the mask is empty.
     """
     if not mask.any():
         raise InputError("the mask is empty: mark at least the object's pixels")
@@ -167,8 +208,18 @@ def highlight_prior(
 
 
 def reduced(intensity: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Intensity and mask (h, w), averaged over blocks of the mask's pixels, and the blocks' side:
-    at most 192 are left a side.
+    """Average intensity and mask over blocks of the mask's pixels, to at most 192 a side.
+
+    Parameters
+    ----------
+    intensity : (H, W) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    intensity, mask : (h, w) ndarray
+    side : int
+        Of the blocks.
     """
     factor = -(-max(mask.shape) // _LONGEST)
     if factor == 1:
@@ -195,18 +246,25 @@ def reduced(intensity: np.ndarray, mask: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def pooled_evidence(intensity: np.ndarray, mask: np.ndarray, table: FilterTable) -> np.ndarray:
-    """Lambda (H, W) of `intensity` (H, W) >= 0 inside `mask`; 0 outside."""
+    """Return Lambda (H, W) of an intensity >= 0 inside `mask`; 0 outside."""
     found = np.zeros(mask.shape)
     found[mask] = table.evidence(filter_outputs(intensity, mask))
     return np.where(mask, masked_gaussian(found, mask, _POOLED * _diagonal(mask)), 0)
 
 
 def filter_outputs(intensity: np.ndarray, mask: np.ndarray) -> np.ndarray:
-    """The filters' outputs (N, F, 2) at the mask's N pixels, in the order of `FILTERS`; of each the
-    two axes, or the one value and NaN.
+    """Return the filters' outputs at the pixels of a mask, in the order of `FILTERS`.
 
-    NaN where a neighbour is outside the mask: the background says nothing of the object.
-    `intensity` (H, W) >= 0.
+    Parameters
+    ----------
+    intensity : (H, W) ndarray
+        Not negative.
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    (N, F, 2) ndarray
+        The two axes, or one value and NaN; NaN where a neighbour is outside the mask.
     """
     mean = max(float(intensity[mask].mean(dtype=float)), 1e-30)
     logarithm = np.where(mask, np.log(np.maximum(intensity, 0) / mean + _DARK), 0)

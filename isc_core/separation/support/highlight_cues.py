@@ -1,20 +1,18 @@
-"""What tells a highlight from pale paint: borders, texture, and which way the colour goes.
+"""Cues that distinguish a highlight from pale reflectance: edges, texture, and chroma.
 
-White light raises all channels alike, so it leaves the chroma C = max I - min I as it is. White
-paint, printed or mixed in, looks like it to a single pixel, but C falls where such paint begins.
-Four cues follow, each a number or a map of a photo's candidate specular layer s:
+White light raises all channels equally, so it leaves the chroma C = max I - min I unchanged. White
+reflectance, printed or mixed in, looks the same to a single pixel, but C falls where it begins.
+Four cues follow, each a number or a map of a photo's candidate specular layer s. A reflectance edge
+is where log C steps; what s does beside it proves nothing. A highlight is smooth: s has little
+detail finer than a few pixels, reflectance has texture. Reflectance mixes: where white reflectance
+begins, s rises by (1 + q) times the fall of C, q = min / (max - min) of the reflectance; light does
+not. Objects whose bright pixels are grey on the whole offer no colour to decide by.
 
-- a border of paint is where log C steps; what s does beside it proves nothing;
-- a highlight is smooth: s has little in it that is finer than a few pixels, paint has texture;
-- paint mixes: where white paint begins, s rises by (1 + q) times what C falls by, q = min / (max -
-  min) of the paint; light does not;
-- objects whose bright pixels are grey, taken together, offer no colour to judge by.
-
-The cues and their combination are ours. That a highlight leaves C alone is the two-band image of
-K.-J. Yoon, Y. Choi and I. S. Kweon (ICIP 2006, doi:10.1109/ICIP.2006.312650); for the chroma and
+The cues and their combination are ours. That a highlight leaves C unchanged is the two-band image
+of K.-J. Yoon, Y. Choi and I. S. Kweon (ICIP 2006, doi:10.1109/ICIP.2006.312650); for the chroma and
 the diffuse ratio see H.-L. Shen and Z.-H. Zheng (2013), doi:10.1364/AO.52.004483.
 
-Limits: pale paint without borders and without texture, on a coloured object, passes for a broad
+Limits: pale reflectance without edges and without texture, on a coloured object, passes for a broad
 highlight.
 """
 
@@ -29,8 +27,17 @@ _TINY = 1e-12
 
 
 def ramp(value: np.ndarray | float, ends: tuple[float, float]) -> np.ndarray:
-    """0 up to the first end, 1 from the second on, a cubic between; the ends may fall, then it
-    does.
+    """Return a smooth step: 0 up to the first end, 1 from the second on, a cubic between.
+
+    Parameters
+    ----------
+    value : ndarray or float
+    ends : tuple of float
+        May descend; then the step does.
+
+    Returns
+    -------
+    ndarray
     """
     low, high = ends
     t = np.clip((np.asarray(value) - low) / (high - low), 0, 1)
@@ -38,9 +45,18 @@ def ramp(value: np.ndarray | float, ends: tuple[float, float]) -> np.ndarray:
 
 
 def noise_level(image: np.ndarray, mask: np.ndarray) -> float:
-    """The standard deviation of the noise in `image` (H, W, 3), from differences that smooth
-    shading does not have (Immerkaer 1996, doi:10.1006/cviu.1996.0060), robustly: by their median
-    over `mask` (H, W) bool, the mean of the channels.
+    """Estimate the standard deviation of the noise, robustly (Immerkaer 1996,
+    doi:10.1006/cviu.1996.0060).
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+
+    Returns
+    -------
+    float
+        Mean over the channels.
     """
     kernel = np.array([[1, -2, 1], [-2, 4, -2], [1, -2, 1]]) / 6
     return float(
@@ -55,15 +71,19 @@ def noise_level(image: np.ndarray, mask: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Steps:
-    """How much a photo changes from each pixel's left (`across`) and upper (`down`) neighbour, (H,
-    W) >= 0, in units of what counts as a border; 0 where one of the two is not in the mask.
+    """Differences of a photo between neighbouring pixels, in units of an edge.
+
+    Attributes
+    ----------
+    across, down : (H, W) ndarray
+        To the left and the upper neighbour; 0 where one of the two is not in the mask.
     """
 
     across: np.ndarray
     down: np.ndarray
 
     def around(self) -> np.ndarray:
-        """The larger of both sides, summed over the two directions (H, W)."""
+        """Return the larger difference of both sides, summed over the two directions (H, W)."""
         across, down = self.across.copy(), self.down.copy()
         across[:, :-1] = np.maximum(across[:, :-1], self.across[:, 1:])
         down[:-1] = np.maximum(down[:-1], self.down[1:])
@@ -73,9 +93,19 @@ class Steps:
 def steps_of(
     change: list[tuple[np.ndarray, float]], mask: np.ndarray, floor: np.ndarray | float
 ) -> Steps:
-    """Steps of several maps (H, W) or (H, W, C), each with the step that counts as a border;
+    """Return the steps of several maps.
 
-    `floor` (H, W): what noise does to them.
+    Parameters
+    ----------
+    change : list of (ndarray, float)
+        Maps (H, W) or (H, W, C), each with the step that counts as an edge.
+    mask : (H, W) bool ndarray
+    floor : (H, W) ndarray or float
+        The effect of noise.
+
+    Returns
+    -------
+    Steps
     """
 
     def along(axis: int) -> np.ndarray:
@@ -94,8 +124,18 @@ def steps_of(
 
 
 def far_from_borders(steps: Steps, mask: np.ndarray, blur: float, unit: float) -> np.ndarray:
-    """Trust (H, W) in [0, 1]: near 0 on borders and beside them, within `blur` pixels; 0 outside
-    the mask.
+    """Return a weight in [0, 1], near 0 on edges and within `blur` pixels of them.
+
+    Parameters
+    ----------
+    steps : Steps
+    mask : (H, W) bool ndarray
+    blur, unit : float
+
+    Returns
+    -------
+    (H, W) ndarray
+        0 outside the mask.
     """
     border = masked_gaussian(np.minimum(steps.around(), 1), mask, blur)
     return np.where(mask, np.exp(-np.square(border / unit)), 0).astype(np.float32)
@@ -104,11 +144,21 @@ def far_from_borders(steps: Steps, mask: np.ndarray, blur: float, unit: float) -
 def roughness(
     specular: np.ndarray, trust: np.ndarray, mask: np.ndarray, scale: float, fine: float
 ) -> tuple[float, np.ndarray]:
-    """Which part of what stands out from its surroundings of `scale` pixels is finer than `fine`
-    pixels: over all, and (H, W) locally.
+    """Return the share of fine detail in what exceeds its surroundings.
 
-    0 for a smooth highlight, near 1 for texture and noise; both from pixels far from borders, the
-    first from raised ones only.
+    Parameters
+    ----------
+    specular, trust : (H, W) ndarray
+        The layer, and the weight of its pixels.
+    mask : (H, W) bool ndarray
+    scale, fine : float
+        Extents in pixels of the surroundings and of fine detail.
+
+    Returns
+    -------
+    whole : float
+        Over all raised pixels; 0 for a smooth highlight, near 1 for texture and noise.
+    local : (H, W) ndarray
     """
     raised = np.where(mask, specular - weighted_gaussian(specular, trust, scale, 1e-6), 0)
     detail = np.square(raised - ndimage.gaussian_filter(raised, fine))
@@ -124,11 +174,21 @@ def roughness(
 def paint_mixing(
     specular: np.ndarray, chroma: np.ndarray, ratio: np.ndarray, mask: np.ndarray, scale: float
 ) -> np.ndarray:
-    """How far a rise of `specular` is white paint mixed in, within `scale` pixels (H, W): 1 for
-    paint, about 0 for light.
+    """Return how much of the layer's rise is white reflectance: 1 for reflectance, about 0 for light.
 
-    It is the share of grad s that runs against grad C, times 1 + q; `chroma` C, `ratio` q, all (H,
-    W).
+    It is the share of grad s that runs against grad C, times 1 + q.
+
+    Parameters
+    ----------
+    specular, chroma, ratio : (H, W) ndarray
+        s, C and q.
+    mask : (H, W) bool ndarray
+    scale : float
+        In pixels.
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     if min(mask.shape) < 2:
         return np.zeros_like(specular)

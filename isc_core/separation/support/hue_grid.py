@@ -1,16 +1,16 @@
-"""What pixels of like hue do in each part of a photo: histograms on a coarse grid over row, column
-and hue.
+"""Histograms on a coarse grid over row, column and hue.
 
-Problem: a statistic of all pixels that are near and of like hue, for every pixel. Equation: pixels
-vote into the eight cells around them, linearly; the votes are blurred over neighbouring cells, a
-quantile is taken in each cell, and pixels read it back, linearly.
+Problem: a statistic of all pixels that are near and of similar hue, for every pixel.
+
+Equation: pixels vote into the eight cells around them, linearly; the votes are blurred over
+neighbouring cells, a quantile is taken in each cell, and pixels interpolate it linearly.
 
 Citation: J. Chen, S. Paris and F. Durand, "Real-time edge-aware image processing with the bilateral
 grid", ACM Trans. Graph. 26(3), 103 (2007), doi:10.1145/1276377.1276506; here cells hold histograms
-instead of means, and the third axis is the hue, which is round.
+instead of means, and the third axis is the hue, which is periodic.
 
-Limits: a cell's histogram knows nothing finer than the cell; where few pixels vote, those of like
-hue everywhere count in their place.
+Limits: a cell's histogram resolves nothing finer than the cell; where few pixels vote, those of
+similar hue everywhere count in their place.
 """
 
 from dataclasses import dataclass
@@ -25,10 +25,19 @@ _OF_ALL = 20.0
 
 
 def hue_of(image: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """The hue (H, W), in [0, 6), of an image (H, W, 3) with smallest and largest channel `low`,
-    `high`: red 0, green 2, blue 4.
+    """Return the hue (H, W) in [0, 6): red 0, green 2, blue 4; 0 for grey.
 
-    White light on top does not change it. 0 for grey.
+    White light on top does not change it.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    low, high : (H, W) ndarray
+        Smallest and largest channel.
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     red, green, blue = image[..., 0], image[..., 1], image[..., 2]
     over = np.maximum(high - low, np.finfo(image.dtype).tiny)
@@ -43,8 +52,16 @@ def hue_of(image: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class HueGrid:
-    """Cells of `cell` pixels a side over a photo of shape `size`, and `hues` of them around the
-    circle of hues.
+    """A grid over a photo.
+
+    Attributes
+    ----------
+    size : tuple of int
+        Shape of the photo.
+    cell : float
+        Side of a cell in pixels.
+    hues : int
+        Cells around the circle of hues.
     """
 
     size: tuple[int, int]
@@ -53,17 +70,29 @@ class HueGrid:
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Cells down, across and around."""
+        """Number of cells down, across and around."""
         down, across = (int(np.ceil(n / self.cell)) + 2 for n in self.size)
         return down, across, self.hues
 
     def histograms(
         self, places: "Places", bins: np.ndarray, count: int, weight: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Votes near and everywhere:
+        """Collect votes.
 
-        (down, across, hues, count) and (hues, count), of `bins` (n,) from 0 with `weight` (n,) >=
-        0.
+        Parameters
+        ----------
+        places : Places
+        bins : (n,) int ndarray
+            From 0.
+        count : int
+            Number of bins.
+        weight : (n,) ndarray
+            Not negative.
+
+        Returns
+        -------
+        near : (down, across, hues, count) ndarray
+        everywhere : (hues, count) ndarray
         """
         cells = np.concatenate([cell * count + bins for cell, _ in places.corners])
         votes = np.bincount(
@@ -80,7 +109,7 @@ class HueGrid:
         return near, everywhere + _OF_ALL * total / total.sum()
 
     def places(self, rows: np.ndarray, columns: np.ndarray, hue: np.ndarray) -> "Places":
-        """Where pixels (n,) of these rows, columns and hues in [0, 6) lie among the cells."""
+        """Return the positions among the cells of pixels (n,) with rows, columns and hues in [0, 6)."""
         at = np.stack([rows / self.cell, columns / self.cell, hue * (self.hues / 6)])
         first = np.floor(at).astype(np.int64)
         return Places(first, (at - first).astype(np.float32), self.shape)
@@ -88,8 +117,16 @@ class HueGrid:
 
 @dataclass(frozen=True)
 class Places:
-    """Of n pixels the `first` (3, n) cell along each axis, how far beyond it they lie, `beyond` (3,
-    n) in [0, 1), in a grid of `shape`.
+    """Positions of n pixels in a grid.
+
+    Attributes
+    ----------
+    first : (3, n) ndarray
+        The first cell along each axis.
+    beyond : (3, n) ndarray
+        Distance beyond it, in [0, 1).
+    shape : tuple of int
+        Of the grid.
     """
 
     first: np.ndarray
@@ -98,13 +135,13 @@ class Places:
 
     @cached_property
     def corners(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """The eight cells around each pixel, as flat indices (n,), and its shares in them (n,)."""
+        """Return the eight cells around each pixel as flat indices (n,), and their weights (n,)."""
         return [
             self._corner(row, column, hue) for row in (0, 1) for column in (0, 1) for hue in (0, 1)
         ]
 
     def read(self, table: np.ndarray) -> np.ndarray:
-        """A table (down, across, hues) at the pixels (n,), linear between cells."""
+        """Interpolate a table (down, across, hues) at the pixels (n,)."""
         flat = np.ascontiguousarray(table, np.float32).ravel()
         return np.sum([share * flat[cell] for cell, share in self.corners], axis=0)
 
@@ -119,8 +156,18 @@ class Places:
 
 
 def quantile(histograms: np.ndarray, share: float) -> np.ndarray:
-    """The `share` quantile, in [0, 1] of the histograms' range, of each of (..., bins) histograms,
-    linear inside a bin.
+    """Return a quantile of each histogram, linear inside a bin.
+
+    Parameters
+    ----------
+    histograms : (..., bins) ndarray
+    share : float
+        In [0, 1].
+
+    Returns
+    -------
+    (...) ndarray
+        In [0, 1] of the histograms' range.
     """
     summed = np.cumsum(histograms, axis=-1)
     wanted = share * summed[..., -1]

@@ -1,10 +1,9 @@
-"""From what a method found at each pixel to the layers of a `Separation`, and how far they are
-trusted.
+"""From a method's specular or diffuse light to the layers of a `Separation`.
 
-Inside the mask 0 <= diffuse <= image, whatever the method says; clipped pixels are explained by
-`clipped`. Confidence, for methods that have none of their own, is exp(-e / u): e is the error of
-the specular light to be expected, what was removed plus a share of what could still hide in the
-smallest channel; u is the mean of the smallest channel over the mask.
+Inside the mask 0 <= diffuse <= image, whatever the method returns; `clipped` explains clipped
+pixels. Confidence, for methods without their own, is exp(-e / u): e is the expected error of the
+specular light, what was removed plus a share of what could still hide in the smallest channel; u is
+the mean of the smallest channel over the mask.
 """
 
 from collections.abc import Callable
@@ -23,11 +22,20 @@ DOUBT = 0.3
 def white_layers(
     image: np.ndarray, mask: np.ndarray, specular: np.ndarray, clipped: np.ndarray | None = None
 ) -> Separation:
-    """The layers where `specular` (H, W), the same in all three channels, is taken off `image` (H,
-    W, 3), but never below zero.
+    """Build the layers from white specular light, subtracted but never below zero.
 
-    What is not finite counts as 0. `mask`, `clipped`: (H, W) bool. The residual is 0 but where
-    clipped.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    specular : (H, W) ndarray
+        Equal in all channels; values that are not finite count as 0.
+    clipped : (H, W) bool ndarray, optional
+
+    Returns
+    -------
+    Separation
+        The residual is 0 except where clipped.
     """
     low = smallest(image)
     white = np.where(mask & np.isfinite(specular), np.clip(specular, 0, low), 0).astype(np.float32)
@@ -46,14 +54,25 @@ def bright_layers(
     least_saturation: float,
     fade: float | None,
 ) -> Separation:
-    """The layers of a method that can judge coloured objects only, and finds highlights where the
-    smallest channel lies above its mean.
+    """Build the layers of a method that finds highlights above the mean of the smallest channel.
 
-    `find(image, linear, base)` gives the specular light (H, W) of the image, zero outside the mask,
-    from the `linear` (H, W) bool pixels, those of the mask that are not clipped; `base` is the mean
-    of the smallest channel. It is not asked if the pixels above that mean have less `saturation`
-    together than `least_saturation`, in [0, 1]. `fade`: see `channels.fade_in`; None for all of it
-    everywhere.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    clipped : (H, W) bool ndarray or None
+    find : callable
+        `find(image, linear, base)` returns the specular light (H, W), 0 outside the mask, from the
+        pixels `linear` of the mask that are not clipped; `base` is the mean of the smallest
+        channel.
+    least_saturation : float
+        Nothing is removed if the pixels above that mean have less saturation together, in [0, 1].
+    fade : float or None
+        See `imaging.channels.fade_in`; None for all of it everywhere.
+
+    Returns
+    -------
+    Separation
     """
     seen = np.where(mask[..., None], image, 0)
     low = smallest(seen)
@@ -70,11 +89,20 @@ def bright_layers(
 def diffuse_layers(
     image: np.ndarray, mask: np.ndarray, diffuse: np.ndarray, clipped: np.ndarray | None = None
 ) -> Separation:
-    """The layers where `diffuse` (H, W, 3), kept within [0, image], is all that stays: the specular
-    layer may then be tinted.
+    """Build the layers from a diffuse layer; the specular layer may then be tinted.
 
-    What is not finite counts as the image. `mask`, `clipped`: (H, W) bool. The residual is 0 but
-    where clipped.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    diffuse : (H, W, 3) ndarray
+        Clamped to [0, image]; values that are not finite count as the image.
+    clipped : (H, W) bool ndarray, optional
+
+    Returns
+    -------
+    Separation
+        The residual is 0 except where clipped.
     """
     known = np.where(np.isfinite(diffuse), diffuse, image)
     kept = np.where(mask[..., None], np.clip(known, 0, image), 0).astype(np.float32)

@@ -1,20 +1,20 @@
-"""Specular light is hardly more coloured than the lamps: what is taken off a photo, held to that.
+"""A limit on the colour of the removed light: specular light is hardly more coloured than its sources.
 
-Problem: a network that judges each channel takes a highlight on green paint for green light, where
-it is not sure: the paint's hue leaves with it.
+Problem: a network that estimates each channel mistakes a highlight on green reflectance for green
+light, where it is uncertain: the hue of the reflectance vanishes with it.
 
-Equation: white light s_c = l that is to change the diffuse layer D = I - s as little as possible in
-its logarithm (to first order, log D moves by (l - s_c) / D_c) has
+Equation: white light s_c = l that changes the diffuse layer D = I - s as little as possible in its
+logarithm (to first order, log D moves by (l - s_c) / D_c) has
 
     l = sum_c (s_c / D_c^2) / sum_c (1 / D_c^2),
 
 so that the darkest channel, which white light would empty first, decides. With t = `tint`, s_c is
-brought to [l t^-1/2, l t^1/2], and below t min_c s_c where D_c has no room for that.
+clamped to [l t^-1/2, l t^1/2], and below t min_c s_c where D_c has no room for that.
 
 Citation: the dichromatic model, S. A. Shafer 1985, doi:10.1002/col.5080100409.
 
-Limits: light of a stronger colour than t loses what exceeds it. Metals tint their highlights: not
-meant.
+Limits: light more coloured than t loses the excess. Metals, which tint their highlights, are not
+covered.
 """
 
 import numpy as np
@@ -23,10 +23,21 @@ _LEFT = 1e-3  # of a pixel's largest channel, and of each channel: what stays at
 
 
 def held_to_light(seen: np.ndarray, diffuse: np.ndarray, tint: float) -> np.ndarray:
-    """The diffuse layer (H, W, 3) whose difference from `seen` (H, W, 3) >= `diffuse` is light of
-    that colour; float32, >= 0.
+    """Return the diffuse layer whose difference from the photo has the colour of light.
 
-    `tint` >= 1: the largest ratio of two of the light's channels.
+    Parameters
+    ----------
+    seen : (H, W, 3) ndarray
+        The photo.
+    diffuse : (H, W, 3) ndarray
+        Not above `seen`.
+    tint : float
+        Largest ratio of two of the light's channels, at least 1.
+
+    Returns
+    -------
+    (H, W, 3) float32 ndarray
+        Not negative.
     """
     taken = np.maximum(seen - diffuse, 0)
     weight = 1 / np.square(

@@ -1,15 +1,16 @@
-"""Whether a photo's colours can tell highlights from paint at all.
+"""A guard: whether the object is saturated enough to distinguish highlights from reflectance.
 
-Problem: white or pale paint beside coloured paint looks like a highlight to whoever judges by
-colour alone; on such objects methods do far more harm than all their highlights are worth.
-Equation: the colourfulness sum(max I - min I) / sum(max I) over the object lies near 1 for strong
-paints and near 0 for grey ones; it does not depend on the exposure. Below a low value nothing is
-removed, above a high one all that was found, and in between a share that rises smoothly, so that no
+Problem: white or pale reflectance beside a coloured one looks like a highlight to a method that
+uses colour alone; on such objects methods do far more harm than all their highlights are worth.
+
+Equation: the saturation sum(max I - min I) / sum(max I) over the object is near 1 for strong
+colours and near 0 for grey; it does not depend on the exposure. Below a low value nothing is
+removed, above a high one everything found, and in between a share that rises smoothly, so that no
 small change of the photo flips the result.
 
-Limits: this is a guard and finds nothing: highlights on grey objects stay too. One number stands
-for the whole object, so that white paint that covers little of it passes; and its two values were
-chosen on a dozen objects.
+Limits: a guard finds nothing: highlights on grey objects stay too. One number stands for the whole
+object, so that white reflectance that covers little of it passes; and its two values were chosen on
+a dozen objects.
 """
 
 import numpy as np
@@ -23,9 +24,17 @@ _GREY, _COLOURED = 0.45, 0.55
 
 
 def saturation_gate(image: np.ndarray, usable: np.ndarray) -> float:
-    """The share, in [0, 1], of a highlight found by colour that may be removed from `image` (H, W,
-    3).
+    """Return the share of a highlight found by colour that may be removed.
 
-    `usable` (H, W) bool: the pixels to judge by. 0 where there are none.
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+    usable : (H, W) bool ndarray
+        Pixels to decide by.
+
+    Returns
+    -------
+    float
+        In [0, 1]; 0 for no pixels.
     """
     return float(ramp(saturation(image[usable]), (_GREY, _COLOURED)))
