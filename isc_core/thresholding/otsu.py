@@ -82,7 +82,7 @@ class OtsuObjective:
 
     @classmethod
     def of(cls, levels: np.ndarray) -> "OtsuObjective":
-        """Return the objective of an image's levels, integers 0..255 of any shape (see `quantise`)."""
+        """Return the objective of an image's levels, integers 0..255 (see `quantise`)."""
         if (
             not np.issubdtype(np.asarray(levels).dtype, np.integer)
             or np.size(levels) == 0

@@ -174,7 +174,7 @@ def roughness(
 def paint_mixing(
     specular: np.ndarray, chroma: np.ndarray, ratio: np.ndarray, mask: np.ndarray, scale: float
 ) -> np.ndarray:
-    """Return how much of the layer's rise is white reflectance: 1 for reflectance, about 0 for light.
+    """Return how much of the layer's rise is white reflectance: 1; for light about 0.
 
     It is the share of grad s that runs against grad C, times 1 + q.
 

@@ -109,7 +109,7 @@ class HueGrid:
         return near, everywhere + _OF_ALL * total / total.sum()
 
     def places(self, rows: np.ndarray, columns: np.ndarray, hue: np.ndarray) -> "Places":
-        """Return the positions among the cells of pixels (n,) with rows, columns and hues in [0, 6)."""
+        """Return the positions of pixels (n,) among the cells; hues in [0, 6)."""
         at = np.stack([rows / self.cell, columns / self.cell, hue * (self.hues / 6)])
         first = np.floor(at).astype(np.int64)
         return Places(first, (at - first).astype(np.float32), self.shape)

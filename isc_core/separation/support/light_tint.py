@@ -1,4 +1,6 @@
-"""A limit on the colour of the removed light: specular light is hardly more coloured than its sources.
+"""A limit on the colour of the removed light.
+
+Specular light is hardly more coloured than its sources.
 
 Problem: a network that estimates each channel mistakes a highlight on green reflectance for green
 light, where it is uncertain: the hue of the reflectance vanishes with it.
