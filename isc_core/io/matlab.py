@@ -1,8 +1,8 @@
 """Numeric variables of MATLAB files of version 5 to 7.
 
 Problem: research data comes as MAT files, from anybody. SciPy reads them, but unpacks whatever size
-a file claims. The sizes of all compressed elements are checked against `Limits` before SciPy sees
-the file.
+a file claims, and crashes on elements of unknown type. All elements are checked before SciPy sees
+the file, the sizes of compressed ones against `Limits`.
 
 Citation: The MathWorks, "MAT-File Format", R2023a (2023), chapter 1, "Level 5 MAT-File Format".
 
@@ -12,6 +12,7 @@ Limits: real matrices and fields of scalar structs; not version 4, nor 7.3 (HDF5
 import io
 import struct
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,10 @@ from .limits import USUAL, Limits
 from .native_io import suppress_native_output
 
 _HEADER = 128  # bytes
-_DEFLATED = 15
+_MATRIX, _DEFLATED = 14, 15
+_NUMERIC = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 16, 17, 18}  # types of numbers and characters
+_CONTAINERS = {1, 2, 3, 16, 17}  # array classes that hold matrices: cells, structs, objects
+_DEEPEST = 32
 _DAMAGED = (
     MatReadError,
     ValueError,
@@ -31,6 +35,7 @@ _DAMAGED = (
     KeyError,
     IndexError,
     AttributeError,
+    UnboundLocalError,
     NotImplementedError,
     struct.error,
     zlib.error,
@@ -72,7 +77,7 @@ def read_matrix(path: Path, *keys: str, limits: Limits = USUAL) -> np.ndarray:
     if data.startswith(b"MATLAB 7.3"):
         raise InputError(f"{path} is a MATLAB 7.3 file: save it with '-v7' and try again")
     try:
-        _check_sizes(path, data, limits)
+        _check_elements(path, data, limits)
         with suppress_native_output():
             variables = loadmat(
                 io.BytesIO(data), variable_names=keys[:1], mat_dtype=True, struct_as_record=True
@@ -101,17 +106,48 @@ def _field(value: object, keys: tuple[str, ...]) -> np.ndarray | None:
     return value
 
 
-def _check_sizes(path: Path, data: bytes, limits: Limits) -> None:
-    """Refuse a file whose compressed elements claim to unpack to more than `limits` allow."""
+def _check_elements(path: Path, data: bytes, limits: Limits) -> None:
+    """Refuse elements that SciPy must not see: of unknown type, cut short or too large."""
     order = {b"IM": "<", b"MI": ">"}.get(data[_HEADER - 2 : _HEADER])
     if order is None:
         raise ValueError("no byte order mark")
-    at = _HEADER
+    for kind, content in _elements(data[_HEADER:], order):
+        if kind == _DEFLATED:
+            stream = zlib.decompressobj()
+            start = stream.decompress(content, 8)
+            size = struct.unpack(f"{order}II", start)[1]
+            limits.check_unpacked(path, size, len(data))
+            inner = start + stream.decompress(stream.unconsumed_tail, size + 1)
+            for inner_kind, inner_content in _elements(inner, order):
+                _check_matrix(inner_kind, inner_content, order, 0)
+        else:
+            _check_matrix(kind, content, order, 0)
+
+
+def _check_matrix(kind: int, content: bytes, order: str, depth: int) -> None:
+    """Check the elements of a matrix, cell array or struct.
+
+    SciPy dereferences a null pointer where numbers have a type that is none of a number.
+    """
+    if (kind not in _NUMERIC and kind != _MATRIX) or depth > _DEEPEST:
+        raise ValueError(f"an element of type {kind} at depth {depth}")
+    if kind == _MATRIX and content:
+        array_class = struct.unpack_from(f"{order}I", content, 8)[0] & 0xFF
+        for inner_kind, inner_content in _elements(content, order):
+            if inner_kind == _MATRIX and array_class not in _CONTAINERS:
+                raise ValueError("a matrix in place of numbers")
+            _check_matrix(inner_kind, inner_content, order, depth + 1)
+
+
+def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
+    """Type and content of consecutive elements."""
+    at = 0
     while at + 8 <= len(data):
         kind, size = struct.unpack_from(f"{order}II", data, at)
-        if at + 8 + size > len(data):
+        start, after = at + 8, at + 8 + size + (-size % 8 if kind != _DEFLATED else 0)
+        if kind >> 16:  # a small element holds its content in the tag
+            kind, size, start, after = kind & 0xFFFF, kind >> 16, at + 4, at + 8
+        if start + size > min(len(data), after):
             raise ValueError("an element is cut short")
-        if kind == _DEFLATED:
-            start = zlib.decompressobj().decompress(data[at + 8 : at + 8 + size], 8)
-            limits.check_unpacked(path, struct.unpack(f"{order}II", start)[1], len(data))
-        at += 8 + size
+        yield kind, data[start : start + size]
+        at = after

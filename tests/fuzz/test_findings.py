@@ -187,6 +187,16 @@ def test_archives_that_unpack_to_much_are_refused(refused: Callable[..., None]) 
     )
 
 
+@pytest.mark.parametrize("kind", [0, 8, 10, 14, 15, 19, 255])
+def test_matrix_of_an_unknown_type_is_refused(refused: Callable[..., None], kind: int) -> None:
+    """SciPy crashes on it."""
+    data = bytearray(matlab({"depth": np.arange(9.0).reshape(3, 3)}, packed=False))
+    values = data.index(struct.pack("<II", 9, 72))
+    data[values : values + 4] = struct.pack("<I", kind)
+    for wrapped in (bytes(data), deflated(bytes(data))):
+        refused(lambda path: read_matrix(path, "depth"), "a.mat", wrapped, "not a readable MATLAB")
+
+
 def test_matrix_that_claims_more_than_it_holds(refused: Callable[..., None]) -> None:
     data = bytearray(matlab({"depth": np.zeros((3, 3))}, packed=False))
     shape = data.index(struct.pack("<ii", 3, 3))
