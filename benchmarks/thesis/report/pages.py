@@ -179,15 +179,13 @@ def index_page(
         "|---|---|---|---|",
     ]
     for claim in ABSTRACT:
-        judged = [
-            (name, verdict)
-            for name, record in records.items()
-            for verdict in record.verdicts
-            if verdict.claim == claim
-        ]
         rows = [
-            f"| {claim} | {_sentence(v.here)} | {v.holds} | [{_spoken(name)}]({name}.md) |"
-            for name, v in judged
+            f"| {claim} | {_sentence(verdict.here)} | {verdict.holds} "
+            f"| [{item.kind} {item.number}]({_link(item, published)}) |"
+            for item in items
+            if item.name in records
+            for verdict in records[item.name].verdicts
+            if verdict.claim == claim
         ]
         lines += rows or [f"| {claim} | | not measured | |"]
     for kind in ("table", "figure"):
@@ -208,9 +206,13 @@ def sheet_name(chapter: int) -> str:
     return f"chapter-{chapter}.png"
 
 
+def _link(item: ThesisItem, published: bool) -> str:
+    """Return the file that shows an item."""
+    return sheet_name(item.chapter) if published and item.kind == "figure" else f"{item.name}.md"
+
+
 def _index_row(item: ThesisItem, record: ItemRecord | None, published: bool) -> str:
-    page = sheet_name(item.chapter) if published and item.kind == "figure" else f"{item.name}.md"
-    title = item.number if record is None else f"[{item.number}]({page})"
+    title = item.number if record is None else f"[{item.number}]({_link(item, published)})"
     state = f"not regenerable: {item.reason}" if item.make is None else "not made yet"
     return f"| {title} | {item.title} | {state if record is None else _counts(record.verdicts)} |"
 
@@ -239,7 +241,3 @@ def _counts(verdicts: Sequence[ClaimVerdict]) -> str:
 def _sentence(text: str) -> str:
     """Add a capital letter and a full stop."""
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}"
-
-
-def _spoken(name: str) -> str:
-    return name.replace("-", " ")
