@@ -12,7 +12,7 @@ perpendicular to L whatever B is:
 One albedo gives one plane, which determines one of two unknowns; several albedos meet in L alone.
 So L = 1 + d, sum d = 0, minimises
 
-    sum w (n . (1 + d))^2 / |n|^2   and   |d|^2 / 2 usual^2,
+    sum w (n . (1 + d))^2 / |n|^2   and   |d|^2 / 2 prior_deviation^2,
 
 weighted by the precision of the first, which comes from the disagreement of the normals, summed
 over blocks of the photo because neighbours have similar errors. The second term thus covers both
@@ -58,17 +58,17 @@ class IlluminantOptions:
 
     Attributes
     ----------
-    usual : float
+    prior_deviation : float
         Prior standard deviation of a light's colour from white, of mean 1; > 0.
-    doubt : float
+    common_deviation : float
         Standard deviation of the error that all planes of normals of a photo share; >= 0.
-    enough : float
+    min_confidence : float
         Confidence from which on the colour is determined, in [0, 1].
     """
 
-    usual: float = 0.1
-    doubt: float = 0.02
-    enough: float = 0.5
+    prior_deviation: float = 0.1
+    common_deviation: float = 0.02
+    min_confidence: float = 0.5
 
 
 @dataclass(frozen=True)
@@ -148,8 +148,15 @@ def estimate_illuminant(
         raise InputError(
             "the light's colour needs an image (H, W, 3) and a mask of its size that is not empty"
         )
-    if options.usual <= 0 or options.doubt < 0 or not 0 <= options.enough <= 1:
-        raise InputError("usual must be above 0, doubt at least 0, enough within [0, 1]")
+    if (
+        options.prior_deviation <= 0
+        or options.common_deviation < 0
+        or not 0 <= options.min_confidence <= 1
+    ):
+        raise InputError(
+            "prior_deviation must be above 0, common_deviation at least 0, min_confidence within "
+            "[0, 1]"
+        )
     changes = _changes(image, mask if clipped is None else mask & ~clipped)
     if without_white(changes.colour, changes.change):
         return _white(IlluminantOutcome.STRONG_OBJECT_COLOUR)
@@ -161,10 +168,10 @@ def estimate_illuminant(
             return _white(IlluminantOutcome.NO_FLANKS)
         shift, precision = _planes(changes, flanks, shift, options)
     weakest = float(np.linalg.eigvalsh(precision)[0])
-    confidence = weakest / (weakest + 1 / options.usual**2)
+    confidence = weakest / (weakest + 1 / options.prior_deviation**2)
     if np.abs(PLANE @ shift).max() > _FARTHEST:
         return _white(IlluminantOutcome.STRONG_HIGHLIGHT_COLOUR)
-    determined = confidence >= options.enough
+    determined = confidence >= options.min_confidence
     outcome = IlluminantOutcome.DETERMINED if determined else IlluminantOutcome.UNRELIABLE
     return Illuminant(_colour(shift), confidence, outcome)
 
@@ -277,7 +284,7 @@ def _planes(
     units = normals / length[:, None]
     along, offset = units @ PLANE, units.sum(axis=1)
     blocks = np.unique(changes.block[flanks], return_inverse=True)[1]
-    prior = np.eye(2) / options.usual**2
+    prior = np.eye(2) / options.prior_deviation**2
     precision, wanted, agreeing = np.zeros((2, 2)), shift, 0.0
     for tolerance in np.geomspace(_LOOSE, _TOLERANCE, _ROUNDS):
         off = offset + along @ shift
@@ -286,9 +293,9 @@ def _planes(
         weight /= weight.sum()
         curvature = (along * weight[:, None]).T @ along
         pulls = np.stack([np.bincount(blocks, weight * off * along[:, k]) for k in (0, 1)], axis=1)
-        # The blocks' pulls scatter around zero at the best shift; `doubt` is what all of them have
-        # in common, along each plane's normal.
-        scatter = pulls.T @ pulls + options.doubt**2 * curvature + 1e-12 * np.eye(2)
+        # The blocks' pulls scatter around zero at the best shift; `common_deviation` is the error that
+        # all of them share, along each plane's normal.
+        scatter = pulls.T @ pulls + options.common_deviation**2 * curvature + 1e-12 * np.eye(2)
         precision = curvature @ np.linalg.solve(scatter, curvature)
         wanted = (
             shift

@@ -24,7 +24,7 @@ from ..scene.lobe_fit import (
     LobeFitOptions,
     LobeFitOutcome,
 )
-from .environment_response import Surroundings, respond_to, surroundings, table_of
+from .environment_response import SplitEnvironment, respond_to, split_environment, table_of
 from .lamps import ALPHAS
 from .observed import Observed
 from .pixels import Pixels
@@ -79,29 +79,29 @@ def fit_under(
         If the environment map is unusable.
     """
     specular, normal, mask = seen.specular, seen.normal, seen.mask
-    sky = _checked(radiance)
+    environment = _checked(radiance)
     convention = CONVENTION[options.model]
     if not radiance.any():
         return LobeFit.without_lobe(options.model, LobeFitOutcome.NO_SPECULAR, specular.shape)
     least = max(ALPHAS[0], 0.5 * np.pi / len(radiance))
     rungs = np.linspace(np.log(least), np.log(ALPHAS[1]), _RUNGS)
-    tried = [_try(sky, pixels, options, rung) for rung in rungs]
+    tried = [_try(environment, pixels, options, rung) for rung in rungs]
     best = int(np.argmin([t.loss for t in tried]))
     low, high = rungs[max(best - 1, 0)], rungs[min(best + 1, _RUNGS - 1)]
     found = minimize_scalar(
-        lambda rung: _try(sky, pixels, options, rung).loss,
+        lambda rung: _try(environment, pixels, options, rung).loss,
         bounds=(low, high),
         method="bounded",
         options={"xatol": 1e-3, "maxiter": 14},
     )
-    chosen = _try(sky, pixels, options, float(found.x))
+    chosen = _try(environment, pixels, options, float(found.x))
     alpha = float(np.exp(chosen.log_alpha))
-    strength, image = _coloured(sky, pixels, chosen, normal, mask, options)
+    strength, image = _coloured(environment, pixels, chosen, normal, mask, options)
     total = float(np.square(specular[mask]).sum())
     explained = float(
         np.clip(1 - np.square(specular[mask] - image[mask]).sum() / max(total, 1e-300), 0, 1)
     )
-    sd_alpha, sd_strength, allowed = _deviations(sky, pixels, chosen, options)
+    sd_alpha, sd_strength, allowed = _deviations(environment, pixels, chosen, options)
     far = [t for t in tried if abs(t.log_alpha - chosen.log_alpha) > np.log(_FLAT)]
     flat = any(t.loss - chosen.loss < allowed or _alike(t, chosen, pixels) for t in far)
     outcome = (
@@ -139,7 +139,7 @@ def _alike(one: _Try, other: _Try, pixels: Pixels) -> bool:
     return bool(apart < _ALIKE**2 * (pixels.weight @ np.square(pixels.value)))
 
 
-def _checked(radiance: np.ndarray) -> Surroundings:
+def _checked(radiance: np.ndarray) -> SplitEnvironment:
     if (
         radiance.ndim != 3
         or radiance.shape[0] < 4
@@ -150,11 +150,15 @@ def _checked(radiance: np.ndarray) -> Surroundings:
         )
     if not (np.isfinite(radiance).all() and (radiance >= 0).all()):
         raise InputError("the environment has to be finite and 0 or more")
-    return surroundings(radiance)
+    return split_environment(radiance)
 
 
-def _try(sky: Surroundings, pixels: Pixels, options: LobeFitOptions, log_alpha: float) -> _Try:
-    shape = respond_to(sky, options.model, pixels.normal, float(np.exp(log_alpha))).mean(axis=1)
+def _try(
+    environment: SplitEnvironment, pixels: Pixels, options: LobeFitOptions, log_alpha: float
+) -> _Try:
+    shape = respond_to(environment, options.model, pixels.normal, float(np.exp(log_alpha))).mean(
+        axis=1
+    )
     weight = pixels.weight
     strength = 0.0
     for _ in range(_STEPS):
@@ -169,15 +173,15 @@ def _try(sky: Surroundings, pixels: Pixels, options: LobeFitOptions, log_alpha: 
 
 
 def _deviations(
-    sky: Surroundings, pixels: Pixels, best: _Try, options: LobeFitOptions
+    environment: SplitEnvironment, pixels: Pixels, best: _Try, options: LobeFitOptions
 ) -> tuple[float, float, float]:
     """Deviations of log alpha and of log strength, and the rise of the loss within one of the
     first.
     """
     here, there = (
-        respond_to(sky, options.model, pixels.normal, float(np.exp(best.log_alpha + d))).mean(
-            axis=1
-        )
+        respond_to(
+            environment, options.model, pixels.normal, float(np.exp(best.log_alpha + d))
+        ).mean(axis=1)
         for d in (0, -_SLOPE)
     )
     jacobian = (
@@ -191,7 +195,7 @@ def _deviations(
 
 
 def _coloured(
-    sky: Surroundings,
+    environment: SplitEnvironment,
     pixels: Pixels,
     best: _Try,
     normal: np.ndarray,
@@ -200,11 +204,11 @@ def _coloured(
 ) -> tuple[np.ndarray, np.ndarray]:
     """The strength (3,) of each channel and the predicted image (H, W, 3)."""
     alpha = float(np.exp(best.log_alpha))
-    shape = respond_to(sky, options.model, pixels.normal, alpha)
+    shape = respond_to(environment, options.model, pixels.normal, alpha)
     scaled = (best.weight / pixels.sigma**2)[:, None] * shape
     strength = (scaled * pixels.colour).sum(axis=0) / np.maximum(
         (scaled * shape).sum(axis=0), 1e-300
     )
     image = np.zeros(normal.shape, np.float32)
-    image[mask] = table_of(sky, options.model, alpha, normal[mask]) * strength
+    image[mask] = table_of(environment, options.model, alpha, normal[mask]) * strength
     return strength, image

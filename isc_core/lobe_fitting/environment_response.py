@@ -27,7 +27,7 @@ _GRID = 81  # table of normals on a disc
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class SplitEnvironment:
     """A split environment map.
 
     Attributes
@@ -45,7 +45,7 @@ class Surroundings:
     rest: np.ndarray
 
 
-def surroundings(radiance: np.ndarray) -> Surroundings:
+def split_environment(radiance: np.ndarray) -> SplitEnvironment:
     """Split an environment map (rows, 2 rows, 3) into bright pixels and a smooth rest."""
     rows = len(radiance)
     mean = radiance.mean(axis=2).ravel()
@@ -54,15 +54,19 @@ def surroundings(radiance: np.ndarray) -> Surroundings:
     over = (radiance * (1 - gain)).reshape(-1, 3)
     kept = over.max(axis=1) > 1e-6 * float(over.max(initial=0))
     irradiance = over * solid_angles(rows).reshape(-1, 1)
-    return Surroundings(directions(rows).reshape(-1, 3)[kept], irradiance[kept], radiance * gain)
+    return SplitEnvironment(
+        directions(rows).reshape(-1, 3)[kept], irradiance[kept], radiance * gain
+    )
 
 
-def respond_to(sky: Surroundings, model: LobeModel, normal: np.ndarray, alpha: float) -> np.ndarray:
+def respond_to(
+    environment: SplitEnvironment, model: LobeModel, normal: np.ndarray, alpha: float
+) -> np.ndarray:
     """Compute the response of a lobe of strength 1.
 
     Parameters
     ----------
-    sky : Surroundings
+    environment : SplitEnvironment
         The environment map.
     model : {"ggx", "blinn_phong"}
         The lobe.
@@ -76,18 +80,20 @@ def respond_to(sky: Surroundings, model: LobeModel, normal: np.ndarray, alpha: f
     (N, 3) ndarray
         Radiance toward the viewer.
     """
-    total = _smooth(sky.rest, model, normal, alpha)
-    for direction, irradiance in zip(sky.bright, sky.irradiance, strict=True):
+    total = _smooth(environment.rest, model, normal, alpha)
+    for direction, irradiance in zip(environment.bright, environment.irradiance, strict=True):
         total += respond(model, normal, direction, alpha).value[:, None] * irradiance
     return total
 
 
-def table_of(sky: Surroundings, model: LobeModel, alpha: float, normal: np.ndarray) -> np.ndarray:
+def table_of(
+    environment: SplitEnvironment, model: LobeModel, alpha: float, normal: np.ndarray
+) -> np.ndarray:
     """Compute `respond_to` for many normals, by interpolation on the equal-area disc of normals.
 
     Parameters
     ----------
-    sky, model, alpha, normal
+    environment, model, alpha, normal
         As for `respond_to`.
 
     Returns
@@ -103,7 +109,7 @@ def table_of(sky: Surroundings, model: LobeModel, alpha: float, normal: np.ndarr
     )
     nodes[:, 2] = np.maximum(nodes[:, 2], 1e-3)
     nodes /= np.linalg.norm(nodes, axis=1, keepdims=True)
-    values = respond_to(sky, model, nodes, alpha).reshape(_GRID, _GRID, 3)
+    values = respond_to(environment, model, nodes, alpha).reshape(_GRID, _GRID, 3)
     flat = normal[:, :2] / np.sqrt(1 + np.clip(normal[:, 2], 0, 1))[:, None]
     at = ((flat + 1) / 2 * (_GRID - 1)).T
     return np.stack(

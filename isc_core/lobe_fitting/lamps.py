@@ -7,7 +7,7 @@ its middle) is
 
 y of `response`, over log a_k, log alpha, the base b, the directions l_k, which move in their
 tangent planes, and the nearness q_k >= 0 (0: infinitely far; 1 / q radii from the middle). The base
-is a mirrored smooth environment map, sum_j c_j B_j(n), see `sky_basis`; or, where a separator made
+is a mirrored smooth environment map, sum_j c_j B_j(n), see `mirrored_basis`; or, where a separator made
 the image, -c: it shows highlights only above an unknown level, so its image is max(0, s). The loss
 is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s - s_i) / sigma_i: quadratic for small
 errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting; gradients are
@@ -25,7 +25,7 @@ import numpy as np
 
 from ..scene.lobe_fit import LobeModel
 from .pixels import Pixels
-from .response import respond, sky_basis
+from .response import mirrored_basis, respond
 
 ALPHAS = (0.004, 0.98)
 _NEAREST = 0.6
@@ -36,7 +36,10 @@ _USUAL_LEVEL, _LEVEL_SPREAD, _LEVEL_WEIGHT = (
     0.7,
     20.0,
 )  # what is known beforehand of a separator's level, as a share of the peak
-_USUAL_SKY, _SKY_WEIGHT = 0.1, 0.1  # of the mirrored sky, as a share of the peak; a weak hint too
+_TYPICAL_MIRRORED, _MIRRORED_WEIGHT = (
+    0.1,
+    0.1,
+)  # of the mirrored map, as a share of the peak; a weak prior too
 _USUAL_NEARNESS, _NEARNESS_WEIGHT = (
     0.3,
     0.1,
@@ -103,7 +106,7 @@ class Problem:
 
     def basis(self, normal: np.ndarray) -> np.ndarray:
         """Return the basis (B, N) of the base on unit normals (N, 3)."""
-        return -np.ones((1, len(normal))) if self.thresholded else sky_basis(normal)
+        return -np.ones((1, len(normal))) if self.thresholded else mirrored_basis(normal)
 
 
 @dataclass(frozen=True)
@@ -287,10 +290,10 @@ def _hints(problem: Problem, lamps: Lamps) -> tuple[list[float], np.ndarray, np.
         losses.append(_LEVEL_WEIGHT * float(off) ** 2)
         gradient[count], curvature[count] = _LEVEL_WEIGHT * off * slope, _LEVEL_WEIGHT * slope**2
     else:
-        usual = _USUAL_SKY * problem.pixels.peak
-        losses.append(_SKY_WEIGHT * float(np.square(lamps.base / usual).sum()))
-        gradient[count : count + len(lamps.base)] = _SKY_WEIGHT * lamps.base / usual**2
-        curvature[count : count + len(lamps.base)] = _SKY_WEIGHT / usual**2
+        usual = _TYPICAL_MIRRORED * problem.pixels.peak
+        losses.append(_MIRRORED_WEIGHT * float(np.square(lamps.base / usual).sum()))
+        gradient[count : count + len(lamps.base)] = _MIRRORED_WEIGHT * lamps.base / usual**2
+        curvature[count : count + len(lamps.base)] = _MIRRORED_WEIGHT / usual**2
     if problem.nearness:
         losses.append(_NEARNESS_WEIGHT * float(np.square(lamps.nearness / _USUAL_NEARNESS).sum()))
         gradient[-count:] = _NEARNESS_WEIGHT * lamps.nearness / _USUAL_NEARNESS**2

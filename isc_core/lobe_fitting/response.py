@@ -83,7 +83,7 @@ def respond(model: LobeModel, normal: np.ndarray, light: np.ndarray, alpha: floa
     return Response(value, value * by_alpha, value[:, None] * by_light)
 
 
-def sky_response(normal: np.ndarray) -> np.ndarray:
+def mirrored_uniform(normal: np.ndarray) -> np.ndarray:
     """Compute the mirrored light of a uniform environment map of radiance 1: Schlick's F at the
     view, roughness neglected.
 
@@ -100,7 +100,7 @@ def sky_response(normal: np.ndarray) -> np.ndarray:
     return F0 + (1 - F0) * (1 - np.clip(normal[:, 2], 0, 1)) ** 5
 
 
-def sky_basis(normal: np.ndarray) -> np.ndarray:
+def mirrored_basis(normal: np.ndarray) -> np.ndarray:
     """Evaluate a basis of the mirrored light of a smooth environment map: uniform light, Fresnel's
     increase toward grazing angles, slow and fast, and light that increases upward in the mirrored
     view.

@@ -16,7 +16,7 @@ import numpy as np
 
 from .lamps import product
 from .pixels import Pixels
-from .response import sky_response
+from .response import mirrored_uniform
 
 _DEGREE = 4
 _STEPS = 5
@@ -46,7 +46,7 @@ def smooth_loss(pixels: Pixels) -> float:
         for b in range(_DEGREE + 1)
         if a + b + c <= _DEGREE
     ]
-    basis = np.stack(columns, axis=1) * (sky_response(normal) / pixels.sigma)[:, None]
+    basis = np.stack(columns, axis=1) * (mirrored_uniform(normal) / pixels.sigma)[:, None]
     target, weight = pixels.value / pixels.sigma, pixels.weight
     left = target
     for _ in range(_STEPS):

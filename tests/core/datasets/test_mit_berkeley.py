@@ -41,7 +41,7 @@ def root(shared: Path) -> Path:
 
 @pytest.fixture
 def copy(root: Path, tmp_path: Path) -> Path:
-    """A set of one object that a test may damage, under the folder names of the original release."""
+    """A set of one object that a test may damage, with the original release's folder names."""
     for source, target in (
         ("laboratory", "MIT-Berkeley-Laboratory"),
         ("natural", "MIT-Berkeley-Natural"),

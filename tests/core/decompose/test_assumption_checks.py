@@ -1,4 +1,4 @@
-"""What a photo shows that the models do not assume lowers the confidence, and the status says so."""
+"""Photos that violate the models' assumptions get a lower confidence and a warning."""
 
 from dataclasses import replace
 

@@ -91,7 +91,7 @@ def test_clipped_pixels_say_nothing():
 def test_less_is_believed_the_less_is_usual():
     image, mask = ball(PAINTS, LIGHT, 0.5)
     near, far = (
-        estimate_illuminant(image, mask, options=IlluminantOptions(usual=usual))
+        estimate_illuminant(image, mask, options=IlluminantOptions(prior_deviation=usual))
         for usual in (0.005, 0.2)
     )
     assert near.confidence < far.confidence
@@ -132,11 +132,11 @@ def test_what_does_not_fit_is_refused():
         with pytest.raises(InputError, match="the light's colour needs"):
             estimate_illuminant(*arrays)
     for options in (
-        IlluminantOptions(usual=0),
-        IlluminantOptions(doubt=-1),
-        IlluminantOptions(enough=2),
+        IlluminantOptions(prior_deviation=0),
+        IlluminantOptions(common_deviation=-1),
+        IlluminantOptions(min_confidence=2),
     ):
-        with pytest.raises(InputError, match="usual must be"):
+        with pytest.raises(InputError, match="prior_deviation must be"):
             estimate_illuminant(image, mask, options=options)
     for colour in (np.array([1.0, 0, 1]), np.ones(4), np.array([np.nan, 1, 1])):
         with pytest.raises(InputError, match="three numbers above 0"):

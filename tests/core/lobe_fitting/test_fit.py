@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter
 
 from isc_core.errors import Cancelled, InputError
 from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
-from isc_core.lobe_fitting.environment_response import respond_to, surroundings
+from isc_core.lobe_fitting.environment_response import respond_to, split_environment
 from isc_core.lobe_fitting.lamps import Lamps, Problem, _measured, _moved
 from isc_core.lobe_fitting.observed import observe
 from isc_core.lobe_fitting.pixels import choose_pixels
@@ -214,7 +214,7 @@ def test_the_response_to_an_environment_is_the_sum_over_its_pixels() -> None:
         directions(16).reshape(-1, 3), solid_angles(16).ravel(), sky.reshape(-1, 3)
     )
     for model, lobe in (("ggx", Ggx(0.4)), ("blinn_phong", BlinnPhong(1.0, 2 / 0.4**2 - 2))):
-        found = respond_to(surroundings(sky), model, normal, 0.4)  # type: ignore[arg-type]
+        found = respond_to(split_environment(sky), model, normal, 0.4)  # type: ignore[arg-type]
         np.testing.assert_allclose(found, radiance(lobe, normal, VIEW, lights), rtol=0.05)
 
 
@@ -240,7 +240,7 @@ def test_under_an_even_environment_alpha_is_undetermined() -> None:
     )  # toward grazing angles the gloss of rough surfaces does look different
     sky = np.ones((16, 32, 3))
     specular = np.zeros(normal.shape)
-    specular[mask] = respond_to(surroundings(sky), "ggx", normal[mask], 0.3)
+    specular[mask] = respond_to(split_environment(sky), "ggx", normal[mask], 0.3)
     specular *= np.random.default_rng(0).uniform(0.7, 1.3, mask.shape)[..., None]
     fit = fit_lobe(specular, normal, mask, light=GivenLight(environment=sky))
     assert fit.outcome == LobeFitOutcome.SMOOTH_LIGHT and fit.alpha is None

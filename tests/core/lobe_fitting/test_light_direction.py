@@ -1,6 +1,4 @@
-"""The optimal light direction: found again where one light made the picture, with_warnings where none
-did.
-"""
+"""The optimal light direction: recovered where one light made the image, undetermined elsewhere."""
 
 from dataclasses import replace
 
