@@ -5,3 +5,17 @@ light are known.
 selection of them into a `PriorSet`; `cross_validation` scores a selection on the others. Solvers
 import `sirfs.priors` only.
 """
+
+from .fit import FitOptions, LightFitOptions, fit_priors
+from .statistics import ObjectStatistics, TrainingObject, collect_statistics
+from .training_objects import read_training_objects
+
+__all__ = [
+    "FitOptions",
+    "LightFitOptions",
+    "ObjectStatistics",
+    "TrainingObject",
+    "collect_statistics",
+    "fit_priors",
+    "read_training_objects",
+]

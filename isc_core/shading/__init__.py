@@ -9,3 +9,24 @@ Frames: the camera frame is x right, y up, z toward the viewer; the reference's 
 down, right, toward the viewer. Shading is that of a Lambertian surface of albedo 1; radiance =
 albedo * shading.
 """
+
+from .lights import DirectionalLight
+from .radiance import DistantLights, sh_shading
+from .spherical_harmonics import (
+    light_from_reference,
+    light_to_reference,
+    normal_from_reference,
+    normal_to_reference,
+    real_sh,
+)
+
+__all__ = [
+    "DirectionalLight",
+    "DistantLights",
+    "light_from_reference",
+    "light_to_reference",
+    "normal_from_reference",
+    "normal_to_reference",
+    "real_sh",
+    "sh_shading",
+]

@@ -12,4 +12,6 @@ The way of an image: `recover` cuts out the object and brings it to one size (`p
 `surface`, `reflectance`, `illumination` and `silhouette`; `numpy_engine` evaluates them in plain
 NumPy, `numba_engine` by compiled `kernels`, and tests compare the two. `settings` holds the weights
 and the starts, `priors` the statistics, `normal_prior` the expectation of predicted normals.
+
+Nothing is re-exported here: the function `recover.recover` would hide its module.
 """

@@ -5,3 +5,9 @@
 `color_mixture`, `scale_mixture` and `lights` are the parts; `predicted_light` narrows the prior of
 the light to what a network predicted from the photo.
 """
+
+from .prior_file import load_prior_set, save_prior_set, shipped_prior_set
+from .prior_set import PriorSet
+from .priors import Priors
+
+__all__ = ["PriorSet", "Priors", "load_prior_set", "save_prior_set", "shipped_prior_set"]
