@@ -33,7 +33,7 @@ from ..scene.decomposition import Decomposition
 from ..shading.brdf.model import check_range
 from ..shading.environment_map import environment_from_shading
 from ..shading.lights import DirectionalLight
-from ..shading.lobe_rendering import USUAL_EXPONENT, Lobe, lobe_in, lobe_under
+from ..shading.lobe_rendering import DEFAULT_EXPONENT, Lobe, lobe_in_environment, lobe_under
 from .edited import MOST_GAIN, Edited, edited, light_color
 from .lobes import known_lobe, strength_of
 
@@ -109,9 +109,9 @@ def change_gloss(d: Decomposition, gloss: Gloss, light: DirectionalLight | None 
     seen = paint * light_color(d)
     tint = seen / np.maximum(seen.max(-1, keepdims=True), 1e-6)
     sky = environment_from_shading(d.illumination, _SKY_ROWS)
-    lobe = Lobe(gloss.exponent or gloss.present or USUAL_EXPONENT)
+    lobe = Lobe(gloss.exponent or gloss.present or DEFAULT_EXPONENT)
     mirrored = np.zeros_like(d.image)
-    mirrored[d.mask] = paint[d.mask] * lobe_in(lobe, d.normal[d.mask], sky)
+    mirrored[d.mask] = paint[d.mask] * lobe_in_environment(lobe, d.normal[d.mask], sky)
     metallic = specular * (1 - gloss.metal + gloss.metal * tint) + gloss.metal * mirrored
     return edited(d, (1 - gloss.metal) * d.diffuse, metallic, tuple(notes))
 
@@ -157,7 +157,7 @@ def _new_lobe(
         notes.append(
             "no single light and lobe explain the specular layer: the present exponent is a guess"
         )
-        present = USUAL_EXPONENT
+        present = DEFAULT_EXPONENT
     exponent = gloss.exponent or min(max(present * gloss.sharper, 1.0), 1e5)
     under = light or (fit.light if fit is not None else None)
     if gloss.method == "remap" or under is None:

@@ -155,8 +155,8 @@ def repainted(
 
 
 def _room(d: Decomposition, tint: np.ndarray) -> float:
-    """How bright a colour may become: as the object's brightest, or as what the photo shows white in the
-    object's brightest light.
+    """How bright a colour may become: as the object's brightest, or as what the photo shows white in
+    the object's brightest light.
     """
     float_photo = d.provenance.input.get("bit_depth", 8) == 32
     white = white_of(d.image, d.mask) if float_photo else 1.0

@@ -34,7 +34,7 @@ from ..scene.decomposition import Decomposition
 from ..shading.brdf.model import check_range
 from ..shading.environment_map import environment_from_shading, resampled, shading_under
 from ..shading.lights import DirectionalLight
-from ..shading.lobe_rendering import Lobe, lobe_in, lobe_under
+from ..shading.lobe_rendering import Lobe, lobe_in_environment, lobe_under
 from ..shading.radiance import sh_shading
 from .edited import Edited, edited, light_color
 from .lobes import known_lobe, strength_of
@@ -80,7 +80,8 @@ class NewLight:
             rows = len(self.environment)
             if np.shape(self.environment) != (rows, 2 * rows, 3) or rows < 2:
                 raise InputError(
-                    f"an environment is twice as wide as high, this one is {np.shape(self.environment)[1]} "
+                    f"an environment map is twice as wide as high, not "
+                    f"{np.shape(self.environment)[1]} "
                     f"x {rows}: use a full panorama"
                 )
             check_range("the environment's radiance", self.environment, 0, np.inf)
@@ -97,8 +98,9 @@ class NewLight:
         """Return the radiance (N, 3) of a lobe of strength 1 on unit normals (N, 3)."""
         if self.directional is not None:
             ambient = np.broadcast_to(self.directional.ambient, (_LOBE_ROWS, 2 * _LOBE_ROWS, 3))
-            return lobe_under(lobe, normals, self.directional) + lobe_in(lobe, normals, ambient)
-        return lobe_in(lobe, normals, self._sky(_LOBE_ROWS))
+            under = lobe_under(lobe, normals, self.directional)
+            return under + lobe_in_environment(lobe, normals, ambient)
+        return lobe_in_environment(lobe, normals, self._sky(_LOBE_ROWS))
 
     def _sky(self, rows: int) -> np.ndarray:
         if self.coefficients is not None:

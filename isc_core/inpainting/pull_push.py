@@ -58,7 +58,7 @@ def pull(values: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray
 
 
 def _sum_of_blocks(values: np.ndarray) -> np.ndarray:
-    """Over 2 x 2 blocks of `values` (H, W, ...); zeros complete those of an odd last row or column."""
+    """Sums over 2 x 2 blocks of `values` (H, W, ...), padded by zeros to even sides."""
     even = np.pad(values, [(0, n % 2) for n in values.shape[:2]] + [(0, 0)] * (values.ndim - 2))
     rows = even[::2] + even[1::2]
     return rows[:, ::2] + rows[:, 1::2]

@@ -1,37 +1,42 @@
-"""Everything of a result as plain arrays in one file, for programs that have NumPy and nothing
-else, such as Blender.
+"""All of a result as plain arrays in one file, for programs that have only NumPy, such as Blender.
 
 Problem: maps are OpenEXR, the mesh is glTF, and the light is nine coefficients of a logarithm: a
 program needs libraries to read them and mathematics to use them. `arrays.npz` (uncompressed, no
-pickles) holds what such a program has to know, float32 unless said otherwise:
+pickles) holds what such a program needs, float32 unless stated otherwise:
 
-    image diffuse specular residual reflectance shading   (H, W, 3) linear Rec.709; 0 outside the
-    mask normal (H, W, 3)   height, confidence (H, W)   mask (H, W) bool       as in maps.exr
-    vertices (V, 3)                  metres, +X right, +Y up, +Z toward the viewer faces (F, 3)
-    int32               counter-clockwise as the viewer sees them vertex_normals (V, 3)   uv (V, 2)
-    v counts from the BOTTOM of the texture vertex_pixel (V, 2) int32        row and column of each
-    vertex base_color (H, W, 3)             linear, k * reflectance, continued beyond the mask; not
-    cut at 1 normal_map (H, W, 3)             tangent space, green up, [0, 1] stands for [-1, 1]
-    reflectance_scale, metres_per_pixel ()    k, and the mesh's size    origin (3,)    column, row,
-    height in pixels of its origin illumination (9, 3)              of log shading, for
-    `reflectance` mesh_illumination (9, 3)         the same for `base_color`: the shading divided by
-    k sky (h, 2 h, 3)                  radiance that lights `base_color` so; layout of `environment`
-    sun_direction (3,)               unit vector toward the one light that best explains the
-    shading, camera frame sun_strength, sun_ambient (3,)   its irradiance across its beam, and the
-    shading it leaves to the rest, for `base_color` sun_explained, sun_cone ()       share of the
-    shading in [0, 1], and the direction's standard error in degrees lobe (H, W, 3)
-    the specular image that the fitted lobe predicts; 0 where none was fitted roughness ()
-    Blender's and glTF's, NaN if unknown specular_level ()                for `base_color`, 1 is
-    plastic (f0 = .04), NaN if unknown; at most what the photo has room for specular_variation (H,
-    W)        factor of that level, where it varies; else absent photo_size (2,) int32
-    width and height of the original photo    crop_scale ()    map pixels to one of its pixels
+    image, diffuse, specular, residual, reflectance, shading   (H, W, 3), linear Rec.709, 0 outside
+    normal (H, W, 3), height, confidence (H, W), mask (H, W) bool   as in maps.exr
+    vertices (V, 3)              metres, +X right, +Y up, +Z toward the viewer
+    faces (F, 3) int32           counter-clockwise as seen by the viewer
+    vertex_normals (V, 3)
+    uv (V, 2)                    v counts from the BOTTOM of the texture
+    vertex_pixel (V, 2) int32    row and column of each vertex
+    base_color (H, W, 3)         linear, k * reflectance, continued beyond the mask; not clipped
+    normal_map (H, W, 3)         tangent space, green up, [0, 1] stands for [-1, 1]
+    reflectance_scale ()         k
+    metres_per_pixel ()          size of the mesh
+    origin (3,)                  column, row, height in pixels of the mesh's origin
+    illumination (9, 3)          SH coefficients of log shading, for `reflectance`
+    mesh_illumination (9, 3)     the same for `base_color`: the shading divided by k
+    sky (h, 2 h, 3)              environment map, radiance, that lights `base_color` accordingly
+    sun_direction (3,)           unit vector toward the light that best explains the shading
+    sun_strength (3,)            its irradiance across its beam, for `base_color`
+    sun_ambient (3,)             the remaining ambient shading
+    sun_explained ()             share of the shading in [0, 1]
+    sun_cone ()                  standard error of the direction in degrees
+    lobe (H, W, 3)               specular image predicted by the fitted lobe; 0 without a fit
+    roughness ()                 of Blender and glTF; NaN if unknown
+    specular_level ()            for `base_color`, 1 is plastic (f0 = .04); NaN if unknown
+    specular_variation (H, W)    factor of that level, where it varies; else absent
+    photo_size (2,) int32        width and height of the original photo
+    crop_scale ()                map pixels per photo pixel
 
 Equation: base_color * exp(SH(n; mesh_illumination)) = diffuse, and the irradiance of `sky` on a
 white surface, over pi, is exp(SH(n; mesh_illumination)).
 
 Citation: NumPy's file format, NEP 1, https://numpy.org/neps/nep-0001-npy-format.html.
 
-Limits: the sky matches as well as `environment` says; the mesh is the one of the usual options.
+Limits: `sky` is as accurate as `shading.environment_map` states; the mesh has the default options.
 """
 
 from pathlib import Path
@@ -49,11 +54,21 @@ _INTEGERS = {"faces", "vertex_pixel", "photo_size"}
 
 
 def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) -> None:
-    """Writes the file. `built`: the mesh of `d`, built here if None. Equal results give equal
-    bytes.
+    """Write the file; equal results give equal bytes.
 
-    Raises `InputError` if the mask is too small for a mesh; `OSError` when the file cannot be
-    written.
+    Parameters
+    ----------
+    d : Decomposition
+    path : Path
+    built : MeshResult, optional
+        The mesh of `d`; built here by default.
+
+    Raises
+    ------
+    InputError
+        If the mask is too small for a mesh.
+    OSError
+        If the file cannot be written.
     """
     arrays = arrays_of(
         d, built or build_mesh(d.height, d.normal, d.mask, d.reflectance, None, bounded_specular(d))
@@ -63,7 +78,18 @@ def write_arrays(d: Decomposition, path: Path, built: MeshResult | None = None) 
 
 
 def arrays_of(d: Decomposition, built: MeshResult) -> dict[str, np.ndarray]:
-    """The file's arrays by name, see the module. `built`: the mesh of `d`."""
+    """Return the arrays of the file by name.
+
+    Parameters
+    ----------
+    d : Decomposition
+    built : MeshResult
+        The mesh of `d`.
+
+    Returns
+    -------
+    dict of str to ndarray
+    """
     values = _maps(d) | _mesh(built) | _light(d, built) | _gloss(d, built)
     size, scale = (
         d.provenance.input.get("size", d.mask.shape[::-1]),

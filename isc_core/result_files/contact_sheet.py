@@ -1,13 +1,13 @@
-"""The contact sheet: one picture that shows a person what came out, before anything else is opened.
+"""The contact sheet: one picture that shows a result, before anything else is opened.
 
-Tones: input, diffuse and specular share one exposure, so that they can be compared; reflectance has
-its own, and so has shading, which the light shares unless it would be too bright. An exposure puts
-the 99.5th percentile of the brightest channel inside the mask at 0.95. Everything is blended in
-linear light and coded as sRGB at the end. Maps are cropped to the object and scaled with their mask
-as weight, so that no black creeps in at the edge.
+Exposure: input, diffuse and specular share one exposure, so that they can be compared; reflectance
+has its own, and so has shading, which the light shares unless it would be too bright. An exposure
+puts the 99.5th percentile of the largest channel inside the mask at 0.95. Everything is blended in
+linear light and encoded as sRGB at the end. Maps are cropped to the object and scaled with their
+mask as weight, so that no black bleeds in at the edge.
 
-The height is drawn as a relief under a lamp at the upper left, with contour lines at round
-distances; the light as a white ball in it.
+The height is drawn as a relief lit from the upper left, with contour lines at round distances; the
+light as a white sphere.
 """
 
 from collections.abc import Sequence
@@ -39,9 +39,15 @@ _FULL_ERROR = 0.1  # of the photo's white: errors from here on have the full col
 
 @dataclass(frozen=True)
 class Panel:
-    """One picture of a sheet:
+    """One picture of a sheet.
 
-    `color` (N, N, 3) linear, `coverage` (N, N) in [0, 1], a label and a faint remark.
+    Attributes
+    ----------
+    color : (N, N, 3) ndarray
+        Linear.
+    coverage : (N, N) ndarray
+        In [0, 1].
+    label, remark : str
     """
 
     color: np.ndarray
@@ -51,11 +57,15 @@ class Panel:
 
 
 def contact_sheet(decomposition: Decomposition) -> Image.Image:
-    """The sheet of a decomposition: eight panels, 4 x 2, with a title taken from its provenance.
+    """Draw the sheet of a decomposition: eight panels, 4 x 2, and a title from its provenance.
 
-    The title reads `input["name"]`, `settings["model"]`, `settings["separator"]`,
-    `settings["illumination"]`, `status["loss"]`, `status["converged"]`, as far as they are there,
-    and the fitted gloss.
+    Parameters
+    ----------
+    decomposition : Decomposition
+
+    Returns
+    -------
+    PIL.Image.Image
     """
     d = decomposition
     frame = _Frame.around(d.mask)
@@ -96,9 +106,16 @@ def contact_sheet(decomposition: Decomposition) -> Image.Image:
 
 
 def thumbnail(sheet: Path, target: Path) -> None:
-    """Writes a small JPEG of a sheet's picture, for pages that show many.
+    """Write a small JPEG of a sheet, for pages that show many.
 
-    Raises `InputError` where it cannot be read or written.
+    Parameters
+    ----------
+    sheet, target : Path
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read or written.
     """
     try:
         with Image.open(sheet) as picture:
@@ -113,9 +130,19 @@ def thumbnail(sheet: Path, target: Path) -> None:
 def separation_sheet(
     separation: Separation, image: np.ndarray, mask: np.ndarray, title: str = ""
 ) -> Image.Image:
-    """The sheet of a separation, 3 x 1: input, diffuse, specular.
+    """Draw the sheet of a separation, 3 x 1: input, diffuse, specular.
 
-    `image`: (H, W, 3) linear. `mask`: (H, W) bool.
+    Parameters
+    ----------
+    separation : Separation
+    image : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) bool ndarray
+    title : str
+
+    Returns
+    -------
+    PIL.Image.Image
     """
     frame, gain = _Frame.around(mask), _exposure(image[mask])
     share = f"{100 * _share(separation.specular, image, mask):.1f} % of the light"
@@ -147,15 +174,27 @@ def comparison_sheet(
     answers: Sequence[Answer],
     truth: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Image.Image:
-    """Many separations of one photo, two in a row of six panels: each its diffuse layer, its
-    specular layer and its error.
+    """Draw many separations of one photo: diffuse layer, specular layer and error of each.
 
-    `image`, and the true (diffuse, specular) if they are known: (H, W, 3) linear; `mask`: (H, W)
-    bool. Errors of the diffuse layer are orange where too much light was left and blue where too
-    much was taken, in full colour from a tenth of the photo's white on. Without a truth the
-    confidence stands there, white where it is 1. The first three panels are the photo and the
-    truth, or the photo, its smallest channel and its chromaticity, which is all that methods by
-    colour see.
+    Errors of the diffuse layer are orange where too much light remains and blue where too much was
+    removed, saturated from a tenth of the photo's white. Without ground truth the confidence takes
+    their place, white where it is 1. The first three panels are the photo and the ground truth, or
+    the photo, its smallest channel and its chromaticity, which is all that methods by colour see.
+
+    Parameters
+    ----------
+    title : str
+    image : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) bool ndarray
+    answers : sequence
+        Separations to compare, with labels.
+    truth : tuple of (H, W, 3) ndarray, optional
+        The true diffuse and specular layer.
+
+    Returns
+    -------
+    PIL.Image.Image
     """
     frame, gain = _Frame.around(mask), _exposure(image[mask])
 
@@ -206,8 +245,16 @@ def comparison_sheet(
 
 @dataclass(frozen=True)
 class Shown:
-    """A map of the object on a sheet: `values` (H, W, 3) linear, `mask` (H, W) bool, a label, a
-    faint remark. `own`: in an exposure of its own.
+    """A map of the object on a sheet.
+
+    Attributes
+    ----------
+    values : (H, W, 3) ndarray
+        Linear.
+    mask : (H, W) bool ndarray
+    label, remark : str
+    own : bool
+        In an exposure of its own.
     """
 
     values: np.ndarray
@@ -220,10 +267,20 @@ class Shown:
 def edit_sheet(
     title: str, subtitle: str, maps: Sequence[Shown], others: Sequence[Panel] = (), columns: int = 4
 ) -> Image.Image:
-    """What an edit did:
+    """Draw the sheet of an edit.
 
-    `maps`, in the exposure of the first of them, then `others`, (320, 320) pixels each, as they
-    are.
+    Parameters
+    ----------
+    title, subtitle : str
+    maps : sequence of Shown
+        In the exposure of the first of them.
+    others : sequence of Panel
+        (320, 320) pixels each, unchanged.
+    columns : int
+
+    Returns
+    -------
+    PIL.Image.Image
     """
     first = _exposure(maps[0].values[maps[0].mask])
     panels = []

@@ -1,6 +1,4 @@
-"""Reading what is known of a scene beforehand: height maps and lights, from the files that people
-and programs have them in.
-"""
+"""Reading known inputs of a scene: height maps and lights, from the file formats in use."""
 
 from pathlib import Path
 from typing import Any
@@ -25,18 +23,35 @@ _CHANNELS = ("height.Z", "Z", "Y", "height.Y")
 def read_height(
     path: str | Path, shape: tuple[int, ...], scale: float | None = None, limits: Limits = USUAL
 ) -> np.ndarray:
-    """A height map (H, W) float64 in photo pixels toward the viewer, NaN where there is none.
+    """Read a height map.
 
-    `shape`: the photo's (H, W). `path`: an EXR with a channel Y or Z or height.Z, a NumPy array, an
-    integer PNG or TIFF (0 is a hole), or the folder of an earlier result of the same photo.
-    `scale`: photo pixels to one unit of the file; None for 1, or 1/64 for integers. Raises
-    `InputError` for a file that is missing, damaged, of another size, or all holes.
+    Parameters
+    ----------
+    path : str or Path
+        An EXR with a channel Y, Z or height.Z; a NumPy array; an integer PNG or TIFF (0 is a hole);
+        or the folder of an earlier result of the same photo.
+    shape : tuple of int
+        (H, W) of the photo.
+    scale : float, optional
+        Photo pixels per unit of the file; by default 1, or 1/64 for integers.
+    limits : Limits
+
+    Returns
+    -------
+    (H, W) float64 ndarray
+        Photo pixels toward the viewer; NaN in holes.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, damaged, of another size, or has only holes.
     """
     path = Path(path)
     height, unit = (_of_result(path, shape), 1.0) if path.is_dir() else _of_file(path, limits)
     if height.shape != shape:
         raise InputError(
-            f"{path}: the height map is {_size(height.shape)} pixels, the photo {_size(shape)}: give one of the photo's size"
+            f"{path}: the height map is {_size(height.shape)} pixels, the photo {_size(shape)}: "
+            "give one of the photo's size"
         )
     height = np.where(np.isfinite(height), height, np.nan) * (unit if scale is None else scale)
     if not np.isfinite(height).any():
@@ -45,10 +60,23 @@ def read_height(
 
 
 def read_light(path: str | Path) -> np.ndarray:
-    """Coefficients (9, 3) float64 of orthonormal real spherical harmonics of log shading.
+    """Read a light.
 
-    `path`: a decomposition.json, the folder that holds one, or a JSON file with 9 lists of 3
-    numbers, plain or as "coefficients". Raises `InputError`.
+    Parameters
+    ----------
+    path : str or Path
+        A decomposition.json, its folder, or a JSON file with 9 lists of 3 numbers, plain or as
+        "coefficients".
+
+    Returns
+    -------
+    (9, 3) float64 ndarray
+        SH coefficients of log shading, Rec.709.
+
+    Raises
+    ------
+    InputError
+        If the file holds no light.
     """
     path = Path(path)
     path = path / "decomposition.json" if path.is_dir() else path
@@ -58,7 +86,8 @@ def read_light(path: str | Path) -> np.ndarray:
     light = numbers(found, (9, 3))
     if light is None:
         raise InputError(
-            f"{path} holds no light: 9 lists of 3 numbers are needed, red, green and blue of each spherical harmonic"
+            f"{path} holds no light: 9 lists of 3 numbers are needed, red, green and blue of each "
+            "spherical harmonic"
         )
     return light
 
@@ -77,7 +106,8 @@ def _of_file(path: Path, limits: Limits) -> tuple[np.ndarray, float]:
     raster = read_raster(path, limits)
     if raster.values.shape[2] != 1 or raster.bit_depth < 16:
         raise InputError(
-            f"{path}: a height map has one channel of 16 bits or more: save it as a grey 16-bit PNG, a TIFF, an EXR or .npy"
+            f"{path}: a height map has one channel of 16 bits or more: save it as a grey 16-bit "
+            "PNG, a TIFF, an EXR or .npy"
         )
     values = raster.values[..., 0].astype(np.float64)
     return (values, 1.0) if raster.peak is None else (np.where(values > 0, values, np.nan), CODE)
@@ -91,7 +121,8 @@ def _of_exr(path: Path, limits: Limits) -> np.ndarray:
     )
     if name is None:
         raise InputError(
-            f"{path}: has no channel Y, Z or height.Z but {', '.join(list(channels)[:8])}: save the height as one of these"
+            f"{path}: has no channel Y, Z or height.Z but {', '.join(list(channels)[:8])}: save "
+            "the height as one of these"
         )
     height = channels[name].astype(np.float64)
     inside = channels.get("mask.A")
@@ -104,7 +135,8 @@ def _of_numpy(path: Path, limits: Limits) -> np.ndarray:
     values = read_array(path, limits)
     if values.ndim != 2 or values.dtype.kind not in "fiu":
         raise InputError(
-            f"{path} holds {values.dtype} of shape {values.shape}: a height map is one array (H, W) of numbers"
+            f"{path} holds {values.dtype} of shape {values.shape}: a height map is one array (H, "
+            "W) of numbers"
         )
     return values.astype(np.float64)
 
@@ -117,11 +149,13 @@ def _of_result(folder: Path, shape: tuple[int, ...]) -> np.ndarray:
     scale = result.provenance.input.get("scale")
     if not isinstance(scale, int | float) or not 0 < scale <= 1:
         raise InputError(
-            f"{folder / 'decomposition.json'} does not say at which scale its maps are: it is damaged"
+            f"{folder / 'decomposition.json'} does not say at which scale its maps are: it is "
+            "damaged"
         )
     if tuple(int(np.ceil(n * scale - 1e-6)) for n in shape) != result.mask.shape:
         raise InputError(
-            f"{folder} is the result of a photo of another size than {_size(shape)}: give one of this photo"
+            f"{folder} is the result of a photo of another size than {_size(shape)}: give one of "
+            "this photo"
         )
     # As the map will be brought to the working grid, so that going there and back changes nothing.
     return nearest_samples(np.where(result.mask, result.height, np.nan), shape, 1 / scale) / scale

@@ -1,4 +1,4 @@
-"""A lobe fit as it stands in `scene.decomposition.json`, read back: what `LobeFit.to_json` wrote."""
+"""Reading the lobe fit of a `decomposition.json`; the inverse of `LobeFit.to_json`."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -13,10 +13,22 @@ _LENGTH = 1e-3  # that a direction's may differ from 1
 
 
 def lobe_fit_from_json(record: Mapping[str, Any], predicted: np.ndarray) -> LobeFit:
-    """The fit that wrote `record`; `predicted` (H, W, 3): its specular image, which is not part of
-    it.
+    """Return the fit of a record.
 
-    Raises `KeyError`, `TypeError` or `ValueError` where the record is not one of a fit.
+    Parameters
+    ----------
+    record : mapping
+    predicted : (H, W, 3) ndarray
+        Its specular image, which is not part of the record.
+
+    Returns
+    -------
+    LobeFit
+
+    Raises
+    ------
+    KeyError, TypeError, ValueError
+        If the record is not one of a fit.
     """
     alpha, strength = record["alpha"], record["strength"]
     if record["model"] not in CONVENTION.values():

@@ -1,37 +1,36 @@
 """A textured mesh of the visible side of the object, as glTF 2.0 binary.
 
-Problem: a height map over a mask, with its normals and reflectance, is to stand as an object in any
-viewer, under the recovered light, and look like the photo.
+Problem: a height map over a mask, with its normals and reflectance, is to become an object in any
+viewer, under the recovered light, that looks like the photo.
 
 Geometry: one vertex per pixel centre (or every `stride`-th), one cell of two triangles where all
 pixels of the cell lie inside the mask. World axes are those of glTF: +X right, +Y up, +Z toward the
 viewer, metres; the origin is the middle of the bounding box. Vertex normals are the recovered ones,
-averaged over a vertex' cell; the tangent-space normal map (green up) holds what remains between
-them and the recovered normal of each pixel. At stride 1 nothing remains and the map is flat.
+averaged over a vertex's cell; the tangent-space normal map (green up) holds the difference between
+them and the recovered normal of each pixel. At stride 1 the map is flat.
 
-Rim: the true slope of a smooth object is infinite at its silhouette, so that the outermost heights
-of a reconstruction are the least certain and may spike. Coming from inside, a height in the last
-`rim` rings of pixels may differ from its neighbours further inside by no more than 1.5 times what
-these differ from theirs, plus half a pixel; a sphere keeps its shape under this rule. Then the
-outermost ring is averaged along itself over 5 x 5 pixels: the outline climbs the steps of the pixel
-grid, and on a steep rim each step of one pixel sideways would be a tooth of many pixels in depth.
+Rim: the true slope of a smooth object is infinite at its silhouette, so the outermost heights of a
+reconstruction are the least certain and may spike. From the inside out, a height in the last `rim`
+rings of pixels may differ from its neighbours further inside by no more than 1.5 times what these
+differ from theirs, plus half a pixel; a sphere keeps its shape under this rule. Then the outermost
+ring is averaged along itself over 5 x 5 pixels: the silhouette follows the steps of the pixel grid,
+and on a steep rim each step of one pixel sideways would be a tooth of many pixels in depth.
 
-Base colour: k * reflectance, with k such that the 99.5th percentile of the reflectance's brightest
-channel becomes 0.9; the light that belongs to it is the recovered one divided by k, that is log
-shading - log k. Beyond the mask the texture repeats the nearest colour inside, so that filtering
-draws no dark fringe.
+Base colour: k * reflectance, with k such that the 99.5th percentile of the reflectance's largest
+channel becomes 0.9; the matching light is the recovered one divided by k, that is log shading - log
+k. Beyond the mask the texture repeats the nearest colour inside, so that filtering draws no dark
+fringe.
 
-Gloss: roughness and specular level are those given (see `lobe_fitting.specular_upper_bound.bounded_specular`), the level times k, as
-the base colour is. A level up to 1, and its variation over the object in a texture's alpha, are
-KHR_materials_specular's factor; what lies above 1 is its colour. Where no level is known the factor
-is 0: what is not known is not shown as gloss, which a file without the extension would be, as shiny
-as plastic.
+Gloss: roughness and specular level are given (see `lobe_fitting.specular_upper_bound`), the level
+times k, as the base colour is. A level up to 1, and its variation over the object in a texture's
+alpha, are KHR_materials_specular's factor; the excess above 1 is its colour. Where no level is
+known the factor is 0: without the extension the file would look as glossy as plastic.
 
 Reference: Khronos Group (2021), glTF 2.0 specification,
 https://registry.khronos.org/glTF/specs/2.0/glTF-2.0.html, section 3.9.
 
 Limits: one sheet without a back; steps of one cell along the silhouette; reflectances above 1/k are
-cut (at most 0.5 % of the pixels).
+clipped (at most 0.5 % of the pixels).
 """
 
 import io
@@ -58,11 +57,20 @@ _LEAST_DEPTH = (
 class MeshOptions:
     """How the mesh is built.
 
-    `longest_side`: metres, of the mask's bounding box; `metres_per_pixel` takes its place where it
-    is given. `max_faces`: the grid takes every n-th pixel so as to stay below; the usual value
-    spares 512 x 512 pixels. `rim`: rings of border pixels whose height is limited (0: none).
-    `bleed`: pixels by which the texture runs on beyond the mask. `roughness`, `metallic`: glTF
-    factors in [0, 1], usual values; a fitted gloss has a roughness of its own.
+    Attributes
+    ----------
+    longest_side : float
+        Longest side of the mask's bounding box, in metres.
+    metres_per_pixel : float or None
+        Replaces `longest_side`.
+    max_faces : int
+        The grid takes every n-th pixel to stay below; the default keeps 512 x 512 pixels.
+    rim : int
+        Rings of border pixels whose height is limited; 0 for none.
+    bleed : int
+        Pixels by which the texture continues beyond the mask.
+    roughness, metallic : float
+        Default glTF factors in [0, 1]; a fitted gloss has its own roughness.
     """
 
     longest_side: float = 0.1
@@ -98,22 +106,17 @@ class MeshResult:
 
     @property
     def specular(self) -> float:
-        """The specular level for the base colour, >= 0; 0 where it is not known, so that nothing is
-        shown that the photo may not have.
-        """
+        """The specular level for the base colour, not negative; 0 where unknown."""
         return 0.0 if self.gloss.specular is None else self.reflectance_scale * self.gloss.specular
 
     def illumination(self, recovered: np.ndarray) -> np.ndarray:
-        """The light, (9, 3), that gives the photo's diffuse image with the base colour:
-
-        `recovered` divided by k.
-        """
+        """Return the light (9, 3), `recovered` / k, that gives the diffuse image with the texture."""
         light = np.array(recovered, np.float64)
         light[0] -= log(self.reflectance_scale) * sqrt(4 * pi)
         return light
 
     def glb(self) -> bytes:
-        """The content of a `.glb` file. Equal meshes give equal bytes."""
+        """Return the content of a `.glb` file; equal meshes give equal bytes."""
         scene = trimesh.Scene()
         scene.add_geometry(self.mesh, node_name="object", geom_name="object")
         return bytes(
@@ -141,7 +144,7 @@ class MeshResult:
         tree["extensionsUsed"] = [*tree.get("extensionsUsed", []), "KHR_materials_specular"]
 
     def describe(self) -> dict[str, Any]:
-        """What a reader needs beside the file, ready for JSON."""
+        """Return what a reader needs beside the file, ready for JSON."""
         return {
             "reflectance_scale": self.reflectance_scale,
             "metres_per_pixel": self.metres_per_pixel,
@@ -157,7 +160,8 @@ class MeshResult:
                 "value": self.specular,
                 "source": self.gloss.specular_source,
                 "texture": self.gloss.variation is not None,
-                "convention": "factor of the reflectance along the normal, 1 is .04; KHR_materials_specular",
+                "convention": "factor of the reflectance along the normal, 1 is .04; "
+                "KHR_materials_specular",
             },
             "metallic": {"value": self.options.metallic, "source": SpecularSource.NOT_FITTED},
         }
@@ -171,12 +175,29 @@ def build_mesh(
     options: MeshOptions | None = None,
     gloss: SpecularFit | None = None,
 ) -> MeshResult:
-    """Builds the mesh of the pixels inside the mask.
+    """Build the mesh of the pixels inside the mask.
 
-    `height`: (H, W), pixels toward the viewer. `normal`: (H, W, 3), unit, camera frame. `mask`: (H,
-    W) bool. `reflectance`: (H, W, 3), linear, >= 0. All finite inside the mask. `gloss`: of its
-    surface; where it says nothing, the usual roughness and no gloss. Raises `InputError` if the
-    mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
+    Parameters
+    ----------
+    height : (H, W) ndarray
+        Pixels, toward the viewer.
+    normal : (H, W, 3) ndarray
+        Unit vectors, camera frame.
+    mask : (H, W) bool ndarray
+    reflectance : (H, W, 3) ndarray
+        Linear, not negative.
+    options : MeshOptions, optional
+    gloss : optional
+        Gloss of the surface; where unknown, the default roughness and no gloss.
+
+    Returns
+    -------
+    MeshResult
+
+    Raises
+    ------
+    InputError
+        If the mask holds no block of 2 x 2 pixels, or a size in the options is not positive.
     """
     options, gloss = options or MeshOptions(), gloss or SpecularFit()
     _require_sound(height, normal, mask, reflectance, options)
@@ -218,10 +239,21 @@ def build_mesh(
 
 
 def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[np.ndarray, float]:
-    """k * reflectance, (H, W, 3) linear, continued `bleed` pixels beyond the mask; and k.
+    """Return the texture and its scale.
 
-    Further out it is the mean colour, which is what the smallest versions of a texture should fade
-    to.
+    Parameters
+    ----------
+    reflectance : (H, W, 3) ndarray
+    mask : (H, W) bool ndarray
+    bleed : int
+        Pixels by which it continues beyond the mask; further out it is the mean colour, which the
+        smallest mipmaps should fade to.
+
+    Returns
+    -------
+    color : (H, W, 3) ndarray
+        k * reflectance, linear.
+    k : float
     """
     inside = reflectance[mask].astype(np.float64)
     bright = float(np.percentile(inside.max(-1), 99.5))
@@ -232,8 +264,17 @@ def base_color(reflectance: np.ndarray, mask: np.ndarray, bleed: int) -> tuple[n
 
 
 def limit_rim(height: np.ndarray, mask: np.ndarray, rings: int) -> np.ndarray:
-    """The heights, (H, W) float64, with the last `rings` rings inside the mask held to what the
-    inside foretells (see the module).
+    """Limit the heights of the outermost rings by extrapolation from the inside (see the module).
+
+    Parameters
+    ----------
+    height : (H, W) ndarray
+    mask : (H, W) bool ndarray
+    rings : int
+
+    Returns
+    -------
+    (H, W) float64 ndarray
     """
     depth = ndimage.distance_transform_cdt(np.pad(mask, 1), "chessboard")[
         1:-1, 1:-1

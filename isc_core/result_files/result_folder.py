@@ -1,11 +1,11 @@
-"""The files of a result: what other programs read and what a person looks at first.
+"""The folder of a result: what other programs read and what a person opens first.
 
-A decomposition's folder holds `maps.exr` (one multilayer float32 file), `scene.decomposition.json`,
-`result_files.mesh.glb`, `preview.png`, and under `maps/` the main maps once more as single-layer files, for
-programs that cannot read multilayer ones; on demand `arrays.npz`, see `arrays_file`. Where a lobe
-was fitted, `maps.exr` has one layer more, `lobe`: the specular image that the fit predicts. A
-separation's folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder
-appears whole or not at all (see `atomic`).
+A decomposition's folder holds `maps.exr` (one multilayer float32 file), `decomposition.json`,
+`mesh.glb`, `preview.png`, and under `maps/` the main maps again as single-layer files, for programs
+that cannot read multilayer ones; on request `arrays.npz`, see `arrays_file`. With a fitted lobe,
+`maps.exr` has one more layer, `lobe`: the specular image that the fit predicts. A separation's
+folder holds `separation.exr`, `diffuse.png`, `specular.png`, `preview.png`. A folder appears
+completely or not at all (see `io.atomic`).
 """
 
 import json
@@ -73,11 +73,25 @@ def save(
     arrays: bool = False,
     monitor: Monitor | None = None,
 ) -> None:
-    """Writes the folder of a decomposition, whole or not at all; an earlier result there is
-    replaced. `arrays`: with `arrays.npz`.
+    """Write the folder of a decomposition, completely or not at all; an earlier result is replaced.
 
-    Raises `InputError` if the folder is not ours or cannot be written, or the mask is too small for
-    a mesh; `Cancelled`. Raises `ValueError` if a map holds NaN or infinite values.
+    Parameters
+    ----------
+    decomposition : Decomposition
+    folder : Path or str
+    mesh : MeshOptions, optional
+    arrays : bool
+        Write `arrays.npz` too.
+    monitor : Monitor, optional
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be replaced or written, or the mask is too small for a mesh.
+    Cancelled
+        If the user asked to stop.
+    ValueError
+        If a map holds NaN or infinite values.
     """
     monitor = monitor or Monitor()
     channels = _channels({name: getattr(decomposition, name) for name in LAYERS}, LAYERS)
@@ -112,9 +126,20 @@ def save(
 
 
 def load(folder: Path | str) -> Decomposition:
-    """Reads what `save` wrote.
+    """Read a folder of `save`.
 
-    Raises `InputError` if something is missing, damaged, or does not fit together.
+    Parameters
+    ----------
+    folder : Path or str
+
+    Returns
+    -------
+    Decomposition
+
+    Raises
+    ------
+    InputError
+        If something is missing, damaged, or inconsistent.
     """
     folder = Path(folder)
     if not (folder / "decomposition.json").is_file():
@@ -142,11 +167,22 @@ def save_separation(
     mask: np.ndarray | None = None,
     title: str = "",
 ) -> None:
-    """Writes the folder of a separation: `separation.exr` (linear: image, diffuse, specular,
-    residual, confidence) and sRGB pictures.
+    """Write the folder of a separation.
 
-    `image`: (H, W, 3) linear. `mask`: (H, W) bool; without one, the pixels that are not black.
-    Raises `InputError` if the folder is not ours or cannot be written.
+    Parameters
+    ----------
+    separation : Separation
+    image : (H, W, 3) ndarray
+        Linear.
+    folder : Path or str
+    mask : (H, W) bool ndarray, optional
+        By default the pixels that are not black.
+    title : str
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be replaced or written.
     """
     inside = image.max(-1) > 0 if mask is None else mask
     if not inside.any():
@@ -167,15 +203,31 @@ def save_separation(
 def require_writable_result(
     folder: Path | str, *, separation: bool = False, inputs: Iterable[Path | None] = ()
 ) -> None:
-    """Tells before the work whether its result could be written to `folder` without loss of its
-    `inputs`. Raises `InputError`.
+    """Check, before the work, that its result can be written without loss of its inputs.
+
+    Parameters
+    ----------
+    folder : Path or str
+    separation : bool
+    inputs : iterable of Path
+
+    Raises
+    ------
+    InputError
+        If it cannot.
     """
     require_writable(folder, SEPARATION_FILES if separation else _OURS, inputs)
 
 
 def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> None:
-    """Raises `InputError` where the disk surely has no room for the result of an object of `pixels`
-    pixels: known before the work.
+    """Raise `InputError` if the disk certainly has no room for a result.
+
+    Parameters
+    ----------
+    folder : Path or str
+    pixels : int
+        Of the object.
+    arrays : bool
     """
     place = next(parent for parent in (Path(folder).resolve() / "maps").parents if parent.exists())
     least = _LEAST_BYTES + (_LEAST_BYTES_A_PIXEL + _ARRAY_BYTES_A_PIXEL * arrays) * pixels
@@ -189,7 +241,10 @@ def require_room(folder: Path | str, pixels: int, *, arrays: bool = False) -> No
 
 def _description(d: Decomposition, built: MeshResult) -> dict[str, Any]:
     p = d.provenance
-    convention = "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, x right, y up, z toward the viewer"
+    convention = (
+        "log shading_c(n) = sum_k coefficients[k][c] Y_k(n); orthonormal real spherical harmonics, "
+        "x right, y up, z toward the viewer"
+    )
     return {
         "schema_version": SCHEMA_VERSION,
         "illumination": {"coefficients": d.illumination, "convention": convention},

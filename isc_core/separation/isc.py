@@ -540,7 +540,7 @@ def _by_place(
 
 
 def _paths(smooth: np.ndarray, low: np.ndarray, chroma: np.ndarray, photo: _Photo) -> Paths:
-    """Distances that grow across borders of paint, and are beyond reach across the mask's outline."""
+    """Distances that grow across reflectance edges, and are infinite across the silhouette."""
     dark = _DARK * photo.peak
     free = smooth - low[..., None]
     shares = free / (free.sum(axis=2) + np.float32(dark))[..., None]

@@ -32,8 +32,8 @@ def build_parser() -> argparse.ArgumentParser:
     """The parser of the whole command; what it parses has `run`, to be called, and `quiet`."""
     parser = Parser(
         prog="isc",
-        description="Intrinsic scene characteristics from one photo of a glossy object: diffuse and "
-        "specular light, shape, illumination, "
+        description="Intrinsic scene characteristics from one photo of a glossy object: diffuse "
+        "and specular light, shape, illumination, "
         "shading and reflectance, and a textured mesh.",
         epilog=_EXAMPLES,
     )

@@ -25,7 +25,7 @@ from ..interface.options import (
     positive,
 )
 
-_EXAMPLES = """  isc batch photos -o results          every photo of the folder; cup_mask.png masks cup.jpg
+_EXAMPLES = """  isc batch photos -o results       all photos; cup_mask.png masks cup.jpg
   isc batch 'catalogue/**/*.jpg' --masks masks -o results --timeout 300
   isc batch list.csv -o results --workers 4 --memory 4GB
   isc batch list.jsonl -o /net/results --scheduler tcp://node7:8786
