@@ -82,7 +82,7 @@ LIGHT_PRIORS = tuple(one.value for one in LightPrior)
 SHAPE_PRIORS = tuple(one.value for one in ShapePrior)
 
 # Values of earlier versions, accepted for one version.
-_RENAMED = {
+_RENAMED: dict[str, dict[str, str]] = {
     "light_prior": {"seen": LightPrior.PREDICTED, "usual": LightPrior.DATASET},
     "shape_prior": {"seen": ShapePrior.PREDICTED, "outline": ShapePrior.SILHOUETTE},
 }

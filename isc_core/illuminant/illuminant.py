@@ -293,8 +293,8 @@ def _planes(
         weight /= weight.sum()
         curvature = (along * weight[:, None]).T @ along
         pulls = np.stack([np.bincount(blocks, weight * off * along[:, k]) for k in (0, 1)], axis=1)
-        # The blocks' pulls scatter around zero at the best shift; `common_deviation` is the error that
-        # all of them share, along each plane's normal.
+        # The blocks' pulls scatter around zero at the best shift; `common_deviation` is the error
+        # that all of them share, along each plane's normal.
         scatter = pulls.T @ pulls + options.common_deviation**2 * curvature + 1e-12 * np.eye(2)
         precision = curvature @ np.linalg.solve(scatter, curvature)
         wanted = (
