@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from isc_core.cli.main import main
-from isc_core.io.exr import read_channels, write_channels
 from isc_core.imaging.srgb import linear_to_srgb
+from isc_core.io.exr import read_channels, write_channels
 from isc_core.result_files.result_folder import save
 from tests.core.ball_scene import LIGHT, ball
 
@@ -83,7 +83,7 @@ def test_every_action_writes_its_pictures(
     assert (
         ("shading: from" in output.out)
         == (words[0] == "light-direction")
-        == ("at first sight: " in output.out)
+        == ("predicted: " in output.out)
     )
 
 

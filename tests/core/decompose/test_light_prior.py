@@ -1,4 +1,4 @@
-"""What SIRFS expects of the light: what the photo shows at first sight, or the lights of all
+"""What SIRFS expects of the light: what the networks predict from the photo, or the lights of all
 photos.
 """
 

@@ -1,4 +1,4 @@
-"""What SIRFS expects of the shape: what the photo shows at first sight, or what its outline alone
+"""What SIRFS expects of the shape: what the networks predict from the photo, or what its outline alone
 suggests.
 """
 
