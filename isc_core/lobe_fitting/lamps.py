@@ -10,8 +10,8 @@ tangent planes, and the nearness q_k >= 0 (0: infinitely far; 1 / q radii from t
 is a mirrored smooth environment map, sum_j c_j B_j(n), see `mirrored_basis`; or, where a separator
 made the image, -c: it shows highlights only above an unknown level, so its image is max(0, s).
 The loss is Charbonnier's, sum_i w_i 2 (sqrt(1 + r_i^2) - 1), r_i = (s - s_i) / sigma_i: quadratic
-for small errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting; gradients
-are exact.
+for small errors, linear for large ones. Steps are Levenberg-Marquardt's with re-weighting;
+gradients are exact.
 
 Citation: D. W. Marquardt, SIAM J. Appl. Math. 11(2) (1963), doi:10.1137/0111030; P. Charbonnier, L.
 Blanc-Feraud, G. Aubert, M. Barlaud, IEEE TIP 6(2) (1997), doi:10.1109/83.551699.
