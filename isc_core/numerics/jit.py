@@ -33,9 +33,15 @@ REASSOCIATED = ACCUMULATED | {"arcp", "afn"}
 
 
 @overload
-def jit(loop: Loop, /) -> Loop: ...
+def jit(loop: Loop, /) -> Loop:
+    """Compile `loop` exactly."""
+
+
 @overload
-def jit(*, math: frozenset[str] = EXACT, inline: bool = False) -> Callable[[Loop], Loop]: ...
+def jit(*, math: frozenset[str] = EXACT, inline: bool = False) -> Callable[[Loop], Loop]:
+    """Return a decorator."""
+
+
 def jit(
     loop: Loop | None = None, /, *, math: frozenset[str] = EXACT, inline: bool = False
 ) -> Loop | Callable[[Loop], Loop]:

@@ -187,8 +187,6 @@ def forward_rows(first, last, padded, photo, light, whiten, surface, reflectance
     """
     log_image, spans = photo.log_image, photo.spans
     geometry = surface.geometry
-    whitened, palette = reflectance.smoothness, reflectance.palette
-    whiten_smooth, whiten_palette = whiten.smoothness, whiten.palette
     t = geometry.dtype.type
     one, two, half = t(1), t(2), t(0.5)
     channels, width = log_image.shape[1], log_image.shape[2]
@@ -224,37 +222,20 @@ def forward_rows(first, last, padded, photo, light, whiten, surface, reflectance
         count = stop - start
         if count <= 0:
             continue
-        up, mid, low = (
-            padded[i, start : stop + 2],
-            padded[i + 1, start : stop + 2],
-            padded[i + 2, start : stop + 2],
-        )
-        zi, zj, zii, zjj, zij = (
-            row[0, start:stop],
-            row[1, start:stop],
-            row[2, start:stop],
-            row[3, start:stop],
-            row[4, start:stop],
-        )
-        n1, n2, n3, k = (
-            row[5, start:stop],
-            row[6, start:stop],
-            row[7, start:stop],
-            row[8, start:stop],
-        )
+        end = stop + 2
+        up, mid, low = padded[i, start:end], padded[i + 1, start:end], padded[i + 2, start:end]
+        zi, zj, zii = row[0, start:stop], row[1, start:stop], row[2, start:stop]
+        zjj, zij, n1 = row[3, start:stop], row[4, start:stop], row[5, start:stop]
+        n2, n3, k = row[6, start:stop], row[7, start:stop], row[8, start:stop]
         for j in range(count):
-            left, centre = (
-                (up[j] - mid[j]) + (low[j] - mid[j]),
-                (up[j + 1] - mid[j + 1]) + (low[j + 1] - mid[j + 1]),
-            )
+            left = (up[j] - mid[j]) + (low[j] - mid[j])
+            centre = (up[j + 1] - mid[j + 1]) + (low[j + 1] - mid[j + 1])
             zii[j] = (
                 left + 2.0 * centre + ((up[j + 2] - mid[j + 2]) + (low[j + 2] - mid[j + 2]))
             ) * 0.25
         for j in range(count):
-            top, centre = (
-                (up[j] - up[j + 1]) + (up[j + 2] - up[j + 1]),
-                (mid[j] - mid[j + 1]) + (mid[j + 2] - mid[j + 1]),
-            )
+            top = (up[j] - up[j + 1]) + (up[j + 2] - up[j + 1])
+            centre = (mid[j] - mid[j + 1]) + (mid[j + 2] - mid[j + 1])
             zjj[j] = (
                 top + 2.0 * centre + ((low[j] - low[j + 1]) + (low[j + 2] - low[j + 1]))
             ) * 0.25
@@ -281,8 +262,8 @@ def forward_rows(first, last, padded, photo, light, whiten, surface, reflectance
                     + n2[j] * (l1 + l5 * n3[j] - l8 * n2[j])
                     + n3[j] * (l2 + l6 * n3[j])
                 )
-        _mix(a[:, :count], whiten_smooth, whitened[i, :, start:stop])
-        _mix(a[:, :count], whiten_palette, palette[i, :, start:stop])
+        _mix(a[:, :count], whiten.smoothness, reflectance.smoothness[i, :, start:stop])
+        _mix(a[:, :count], whiten.palette, reflectance.palette[i, :, start:stop])
 
 
 @jit(math=REASSOCIATED, inline=True)
