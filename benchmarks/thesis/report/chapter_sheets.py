@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from isc_core.io.atomic import new_file
@@ -85,7 +86,13 @@ def _reduced(path: Path) -> Image.Image:
 def _with_palette(sheet: Image.Image) -> Image.Image:
     """Reduce the sheet to 256 dithered colours, a third of the size in full colour."""
     palette = sheet.quantize(256, method=Image.Quantize.MAXCOVERAGE)
-    return sheet.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
+    dithered = sheet.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
+    # Pillow maps to an approximately nearest colour, so that white paper may become off-white.
+    paper = Image.fromarray((np.asarray(sheet) == _PAPER).all(axis=2))
+    colours = np.reshape(dithered.getpalette() or [], (-1, 3))
+    white = int(np.argmax(colours.sum(axis=1)))
+    dithered.paste(white, mask=paper)
+    return dithered
 
 
 def _composed(cells: Sequence[_Cell]) -> Image.Image:

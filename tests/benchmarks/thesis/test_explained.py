@@ -101,7 +101,7 @@ def context(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Context:
         applications,
         catalogue,
     ):
-        monkeypatch.setattr(module, "decomposed", decomposed)
+        monkeypatch.setattr(module, "decompose_subject", decomposed)
     monkeypatch.setattr(applications, "DIRECTIONS", applications.DIRECTIONS[:1])
     return Known(tmp_path, quick=True)
 

@@ -165,7 +165,9 @@ def test_runs_are_repeated_with_other_seeds_and_taken_up_again(
         {way.label: {subject.name: [first[0], replace(first[1], exact=False)]}}
     ).rows == ((way.label, 2, "50 %"),)
     assert way.options(1) == {"optimiser": "chaotic_clonal", "seed": 1}
-    monkeypatch.setattr(separation_scores, "split", lambda *_: pytest.fail("computed again"))
+    monkeypatch.setattr(
+        separation_scores, "separate_subject", lambda *_: pytest.fail("computed again")
+    )
     assert separation_scores.score_separations(context, subject, way, 3) == first
 
 
