@@ -13,7 +13,7 @@ from isc_core.result_files.arrays_file import ARRAYS
 from isc_core.result_files.result_folder import save
 from isc_core.scene.decomposition import Decomposition
 from isc_core.shading.environment_map import environment_from_shading
-from tests.core.test_arrays_file import glossy
+from tests.core.result_files.test_arrays_file import glossy
 
 
 def test_plastic_mirrors_a_25th_of_an_even_sky_in_front() -> None:

@@ -22,7 +22,7 @@ from isc_core.scene.decomposition import Decomposition
 from isc_core.scene.lobe_fit import LobeFit, LobeFitOutcome
 from isc_core.shading.environment_map import directions, solid_angles
 from isc_core.shading.lights import DirectionalLight, sphere_directions, toward, turn, turned_light
-from isc_core.shading.lobe_rendering import Lobe, lobe_in, lobe_under
+from isc_core.shading.lobe_rendering import Lobe, lobe_in_environment, lobe_under
 from isc_core.shading.spherical_harmonics import real_sh
 from tests.core.ball_scene import LIGHT, ball
 
@@ -416,7 +416,9 @@ def test_a_lobe_in_a_sky_with_one_bright_spot_is_the_lobe_under_that_light() -> 
     normals = sphere_directions(400)[:190]
     for lobe in (Lobe(30.0), Lobe(alpha=0.3)):
         expected = lobe_under(lobe, normals, sun)
-        assert lobe_in(lobe, normals, sky) == pytest.approx(expected, abs=0.03 * expected.max())
+        assert lobe_in_environment(lobe, normals, sky) == pytest.approx(
+            expected, abs=0.03 * expected.max()
+        )
 
 
 def test_remapping_makes_one_exponent_of_another(scene: Decomposition) -> None:

@@ -186,7 +186,7 @@ def test_ctrl_c_in_a_real_process_leaves_nothing(tmp_path: Path) -> None:
         "    (partial / 'mark.json').write_text('half')\n"
         "    os.kill(os.getpid(), signal.SIGINT)\n"
     )
-    root = Path(__file__).resolve().parents[2]
+    root = Path(__file__).resolve().parents[3]
     done = subprocess.run(
         [sys.executable, "-c", script, str(tmp_path / "out")],
         cwd=root,

@@ -292,7 +292,7 @@ def test_a_disk_that_takes_no_more_is_one_clear_line_and_leaves_nothing(
         "except InputError as error:\n"
         "    sys.exit(f'error: {error}')\n"
     )
-    root = Path(__file__).resolve().parents[2]
+    root = Path(__file__).resolve().parents[3]
     command = [sys.executable, "-c", script, str(tmp_path / "a" / "out")]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
     assert done.returncode == 1

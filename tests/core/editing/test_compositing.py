@@ -15,9 +15,9 @@ from isc_core.editing.edit_folder import Original, Record, Sheet, save_edit
 from isc_core.editing.edited import Edited
 from isc_core.editing.recolour import ColourEdit, recolour
 from isc_core.errors import InputError
+from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.io.exr import read_channels, write_channels
 from isc_core.photo import Photo, PhotoSource, read_linear, read_photo, read_raster
-from isc_core.imaging.srgb import linear_to_srgb
 from isc_core.scene.decomposition import Decomposition, Provenance
 from tests.core.ball_scene import ball
 

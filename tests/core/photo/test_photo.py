@@ -18,10 +18,10 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from isc_core.errors import InputError
+from isc_core.imaging.bounding_box import mask_box
+from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
 from isc_core.io.limits import Limits
 from isc_core.photo import Photo, PhotoSource, read_linear, read_photo, read_raster, tidy_mask
-from isc_core.imaging.srgb import linear_to_srgb, srgb_to_linear
-from isc_core.imaging.bounding_box import mask_box
 
 H, W = 40, 52
 

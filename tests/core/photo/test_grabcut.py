@@ -8,9 +8,9 @@ import pytest
 from PIL import Image
 
 from isc_core.errors import InputError
-from isc_core.photo.grabcut import cut_out, grabcut, write_mask
-from isc_core.photo import read_photo
 from isc_core.imaging.srgb import srgb_to_linear
+from isc_core.photo import read_photo
+from isc_core.photo.grabcut import cut_out, grabcut, write_mask
 
 
 def scene(h: int = 120, w: int = 160) -> tuple[np.ndarray, np.ndarray]:
