@@ -24,7 +24,7 @@ from blender_addon.settings import preferences, presets, properties  # noqa: E40
 from blender_addon.worker.process import WorkerUpdate  # noqa: E402
 from isc_core.decompose.pipeline import ILLUMINATIONS, MODELS  # noqa: E402
 from isc_core.errors import InputError  # noqa: E402
-from isc_core.separation import METHODS  # noqa: E402
+from isc_core.separation import BEST, METHODS  # noqa: E402
 from tests.addon.scene_fixture import bump, write_result  # noqa: E402
 
 
@@ -161,7 +161,8 @@ def test_two_runs_at_once_are_refused(addon: Any, tmp_path: Path) -> None:
 
 def test_the_panel_offers_all_models_separators_and_illuminations() -> None:
     assert {item[0] for item in properties.MODELS} == set(MODELS)
-    assert {item[0] for item in properties.SEPARATORS} == set(METHODS)
+    offered = {item[0] for item in properties.SEPARATORS}
+    assert BEST in offered and offered <= set(METHODS)
     assert {item[0] for item in properties.ILLUMINATIONS} == set(ILLUMINATIONS)
 
 

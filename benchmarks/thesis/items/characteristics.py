@@ -231,7 +231,7 @@ _BEFORE_TEXT = (
     "Below 1 is better than SIRFS on the photo. MZK06 and YCK06 in their improved "
     "variants, SC with both specular-free images; MDR-SIRFS with the separation "
     "`isc`. The last row is the result of a perfect separation and bounds the "
-    "possible gain. docs/results.md has more objects and levels of specular light, "
+    "possible gain. docs/research_log/models.md has more objects and levels of specular light, "
     "cross-validated."
 )
 _TIME_TEXT = "Seconds include separation and SIRFS. They depend on the load of the machine."

@@ -1,6 +1,7 @@
 """The one function for all methods, what it refuses, and options as people write them."""
 
 import json
+import re
 import subprocess
 import sys
 from dataclasses import dataclass, fields, replace
@@ -137,7 +138,12 @@ def test_every_method_has_the_same_face(method: str) -> None:
         options = method_options(method, name)
         if options is not None:
             text = type(options).__doc__ or ""
-            assert all(f"`{field.name}`" in text for field in fields(options)), method  # type: ignore[arg-type]
+            documented = {
+                name.strip()
+                for line in re.findall(r"^    (\w[\w, ]*) : ", text, re.MULTILINE)
+                for name in line.split(",")
+            }
+            assert {field.name for field in fields(options)} <= documented, method  # type: ignore[arg-type]
             changed = {field.name: getattr(options, field.name) for field in fields(options)}
             assert method_options(method, name, changed) == options
     if method_options(method) is not None:
@@ -149,8 +155,8 @@ def test_every_method_has_the_same_face(method: str) -> None:
 def test_a_start_does_not_wait_for_the_methods() -> None:
     code = (
         "import sys; from isc_core.cli.main import main; main(['separate', '--help']); "
-        f"print([m for m in {METHODS[1:]!r} if 'isc_core.separation.' + m in sys.modules], 'numba' "
-        "in sys.modules)"
+        f"print([m for m in {METHODS[1:]!r} if any(k.startswith('isc_core.separation') and k.endswith('.' + m) for k in "
+        "sys.modules)], 'numba' in sys.modules)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
