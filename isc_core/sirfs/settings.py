@@ -77,9 +77,9 @@ COLOR_LABORATORY = Weights(13.4543, 3.3636, 1.6818, 4.7568, 6.7272, 2.3784, 4, 4
 GREY_LABORATORY = Weights(6.7272, 1.4142, 1.6818, 4, 6.7272, 2.3784, 3.3636, 4.7568)
 
 
-# Chosen with the shipped priors, leave-one-object-out on ten objects; docs/research_log/sirfs.md has the
-# method and its uncertainty. The grey laboratory set follows the coloured one halfway; the grey
-# natural one differs from it mostly as the published colour sets do.
+# Chosen with the shipped priors, leave-one-object-out on ten objects; docs/research_log/sirfs.md
+# has the method and its uncertainty. The grey laboratory set follows the coloured one halfway; the
+# grey natural one differs from it mostly as the published colour sets do.
 ISC_NATURAL = replace(
     COLOR_NATURAL,
     smoothness=1.4 * COLOR_NATURAL.smoothness,

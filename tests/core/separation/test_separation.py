@@ -155,8 +155,9 @@ def test_every_method_has_the_same_face(method: str) -> None:
 def test_a_start_does_not_wait_for_the_methods() -> None:
     code = (
         "import sys; from isc_core.cli.main import main; main(['separate', '--help']); "
-        f"print([m for m in {METHODS[1:]!r} if any(k.startswith('isc_core.separation') and k.endswith('.' + m) for k in "
-        "sys.modules)], 'numba' in sys.modules)"
+        "loaded = [k for k in sys.modules if k.startswith('isc_core.separation')]; "
+        f"print([m for m in {METHODS[1:]!r} if any(k.endswith('.' + m) for k in loaded)], "
+        "'numba' in sys.modules)"
     )
     done = subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
