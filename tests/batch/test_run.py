@@ -15,7 +15,7 @@ from filelock import FileLock
 
 from isc_core.batch import run_batch as run_module
 from isc_core.batch.engine import Crew
-from isc_core.batch.item import DONE, FAILED, SKIPPED, ImageRecipe
+from isc_core.batch.item import DONE, FAILED, SKIPPED, ImageJob, ImageRecipe
 from isc_core.batch.journal import Journal
 from isc_core.batch.run_batch import run_batch
 from isc_core.batch.summary import PAGE
@@ -293,12 +293,11 @@ def test_a_stream_is_worked_off_in_a_window(
         "image\n" + "".join(f"{number}.png\n" for number in range(60))
     )
     taken, ended, ahead = itertools.count(), itertools.count(), []
-    jobs = run_module._jobs
 
-    def counted(*arguments: object) -> object:
-        for job in jobs(*arguments):
+    class CountedJob(ImageJob):
+        def __init__(self, *arguments: object) -> None:
+            super().__init__(*arguments)
             next(taken)
-            yield job
 
     class Counted(Journal):
         def add(self, entry: object) -> None:
@@ -306,7 +305,7 @@ def test_a_stream_is_worked_off_in_a_window(
             next(ended)
             ahead.append(int(repr(taken)[6:-1]) - int(repr(ended)[6:-1]))
 
-    monkeypatch.setattr(run_module, "_jobs", counted)
+    monkeypatch.setattr(run_module, "ImageJob", CountedJob)
     monkeypatch.setattr(run_module, "Journal", Counted)
     assert run_batch(
         batch(tmp_path / "list.csv", output=tmp_path / "out", crew=HERE), task=obedient

@@ -33,7 +33,7 @@ from ...progress import ProgressEvent
 from .terminal import discard_output
 
 _REPEAT_SECONDS = 0.05
-_PATIENCE_SECONDS = (1.0, 10.0)  # after asking, after interrupting
+PATIENCE_SECONDS = (1.0, 10.0)  # after asking, after interrupting
 _CANCELLED = 130
 
 
@@ -122,7 +122,7 @@ class JsonSpeaker:
 
     def _watch(self, descriptor: int) -> None:
         _await_cancel(descriptor)
-        for patience in _PATIENCE_SECONDS:
+        for patience in PATIENCE_SECONDS:
             with self._turn:
                 if self._ended.is_set():
                     return

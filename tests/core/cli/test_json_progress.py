@@ -23,7 +23,7 @@ def run(options, monitor):
 m.run = run
 """
 STUBBORN = """import time, isc_core.cli.commands.mask as m, isc_core.cli.interface.json_progress as j
-j._PATIENCE_SECONDS = (0.2, 0.2)
+j.PATIENCE_SECONDS = (0.2, 0.2)
 def run(options, monitor):
     monitor.report("sleeping", 0.5)
     while True:

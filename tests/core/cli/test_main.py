@@ -618,11 +618,11 @@ def test_trouble_with_the_machine_is_one_line(
     error: BaseException,
     words: str,
 ) -> None:
-    def fail(arguments: list[str], speaker: object) -> int:
+    def fail(options: object, monitor: object) -> list[str]:
         raise error
 
-    monkeypatch.setattr("isc_core.cli.main._run", fail)
-    assert main([]) == 2
+    monkeypatch.setattr("isc_core.cli.commands.mask.run", fail)
+    assert main(["mask", "photo.png", "--box", "1,1,9,9", "-o", "mask.png"]) == 2
     text = capsys.readouterr().err
     assert words in text and text.count("\n") == 1
 

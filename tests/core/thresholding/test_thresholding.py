@@ -13,13 +13,17 @@ from isc_core.thresholding import (
     OPTIMISERS,
     OtsuObjective,
     chaotic_clonal,
-    clonal_selection,
     exact,
     maximise,
     particle_swarm,
     quantise,
 )
-from isc_core.thresholding.clonal_selection import ClonalOptions, mutation_rate
+from isc_core.thresholding.clonal_selection import (
+    ClonalOptions,
+    PseudoRandomNumbers,
+    mutation_rate,
+    search,
+)
 from isc_core.thresholding.particle_swarm import FALLING, SwarmOptions
 
 # Exact optima for 3, 4 and 5 thresholds, of an independent program.
@@ -156,23 +160,58 @@ def test_swarm_with_falling_inertia_gathers_later() -> None:
     assert needed(FALLING) > 2 * needed(SwarmOptions())
 
 
+class FirstAntibody:
+    """Numbers that place every antibody of the first population at the same thresholds."""
+
+    def __init__(self, thresholds: list[int], seed: int) -> None:
+        self.first: list[int] | None = thresholds
+        self.others = PseudoRandomNumbers(seed)
+
+    def uniform(self, shape: tuple[int, ...]) -> np.ndarray:
+        if self.first is None:
+            return self.others.uniform(shape)
+        first, self.first = self.first, None
+        return np.tile((np.array(first) + 0.5) / 255, (shape[0], 1))
+
+
+class Recorder(OtsuObjective):
+    """An objective that keeps the candidates it evaluates."""
+
+    def __init__(self) -> None:
+        super().__init__(np.ones(256))
+        self.candidates: list[np.ndarray] = []
+
+    def __call__(self, thresholds: np.ndarray) -> np.ndarray:
+        self.candidates.append(thresholds.copy())
+        return super().__call__(thresholds)
+
+
+def first_clones(thresholds: list[int], decay: float, seed: int) -> np.ndarray:
+    """The clones (100, 40, K) of 100 equal antibodies, whose ranks rise from 0 to 1."""
+    objective = Recorder()
+    options = ClonalOptions(population=100, clone_share=0.4, decay=decay, replaced_share=0)
+    search(objective, len(thresholds), 4100, FirstAntibody(thresholds, seed), options)
+    antibodies, clones = objective.candidates
+    assert (antibodies == thresholds).all()
+    return clones.reshape(100, 40, -1)
+
+
 def test_clones_of_better_antibodies_move_less() -> None:
     assert mutation_rate(np.array([0.0, 0.5, 1.0]), 4) == pytest.approx([1, np.exp(-2), np.exp(-4)])
-    numbers = clonal_selection.PseudoRandomNumbers(0)
-    start = np.tile([60, 120, 180], (4000, 1))
-    for limit in (1.0, 5.0, 40.0):
-        moved = np.abs(clonal_selection._mutated(start, np.full(4000, limit), numbers) - start)
-        assert moved.max() == np.ceil(limit) and (moved.max(axis=1) >= 1).all()
-        # Where one threshold alone is moved, and where neighbours are, the step is one.
-        assert all(len(set(row[row > 0])) == 1 for row in moved)
+    clones = first_clones([60, 120, 180], 6.0, seed=0)
+    limits = np.maximum(1, 254 * mutation_rate(np.linspace(0, 1, 100), 6.0))
+    small = limits <= 40  # below half the distance of the thresholds nothing is sorted or clipped
+    moved = np.abs(clones - [60, 120, 180])[small]
+    assert (moved.max(axis=(1, 2)) <= np.ceil(limits[small])).all()
+    assert (moved.max(axis=(1, 2)) > 0.7 * limits[small]).all()
+    assert (moved.max(axis=2) >= 1).all()
+    # One common step for a run of thresholds.
+    assert all(len(set(row[row > 0])) == 1 for row in moved.reshape(-1, 3))
 
 
 def test_thresholds_stay_in_order_at_the_ends() -> None:
-    numbers = clonal_selection.PseudoRandomNumbers(1)
-    clones = clonal_selection._mutated(
-        np.tile([0, 1, 254], (3000, 1)), np.full(3000, 254.0), numbers
-    )
-    assert clones.min() == 0 and clones.max() == 254 and (np.diff(clones, axis=1) >= 0).all()
+    clones = first_clones([0, 1, 254], 1e-9, seed=1)
+    assert clones.min() == 0 and clones.max() == 254 and (np.diff(clones, axis=2) >= 0).all()
 
 
 @pytest.mark.parametrize("optimiser", OPTIMISERS)
