@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from isc_core.batch.item import Recipe
+from isc_core.batch.item import ImageRecipe
 from isc_core.batch.names import Names
 from isc_core.batch.sources import Inputs
 from isc_core.decompose.pipeline import Settings, decompose
@@ -249,7 +249,7 @@ def test_folder_of_many_images(tmp_path: Path) -> None:
         (tmp_path / f"image {number:06}.png").touch()
     for name in (".hidden.png", "letter.txt", "image 000003_mask.png"):
         (tmp_path / name).touch()
-    items = Inputs([str(tmp_path)], None, Recipe())
+    items = Inputs([str(tmp_path)], None, ImageRecipe())
     names = Names(items)
     given = [names.name(item) for item in items]
     assert len(given) == len(set(given)) == count and None not in given

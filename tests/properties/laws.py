@@ -30,15 +30,15 @@ def law(cases: st.SearchStrategy[Any], seconds: float = 0.02) -> Callable[..., C
     most = settings().max_examples
     count = max(4, min(most, round(0.03 / seconds * most)))
 
-    def decorate(check: Callable[[Any], None]) -> Callable[[], None]:
+    def decorate(check: Callable[..., None]) -> Callable[[], None]:
         @settings(max_examples=count)
         @given(cases)
         @functools.wraps(check)
-        def test(case: Any) -> None:
+        def test(**case: Any) -> None:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", RuntimeWarning)
                 try:
-                    check(case)
+                    check(**case)
                 except InputError as error:
                     event("refused")
                     if "\n" in str(error) or len(str(error)) < 10:

@@ -74,11 +74,10 @@ def test_numeric_warnings_fail() -> None:
         warns()
 
 
-@pytest.mark.parametrize("message", ["bad", "the first line\nand another"])
-def test_unclear_refusals_fail(message: str) -> None:
+def test_unclear_refusals_fail() -> None:
     @law(st.just(3))
     def refuses(size: int) -> None:
-        raise InputError(message)
+        raise InputError("bad")
 
     with pytest.raises(AssertionError, match="InputError"):
         refuses()
