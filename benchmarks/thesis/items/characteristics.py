@@ -147,7 +147,7 @@ def error_table(rows: Sequence[FrameworkErrors]) -> ItemTable:
 
 
 def _speed(rows: Sequence[FrameworkErrors], seed: int) -> ItemTable:
-    lines = []
+    lines: list[tuple[Cell, ...]] = []
     for label in dict.fromkeys(row.framework for row in rows):
         seconds, evaluations = _seconds(rows, label), _evaluations(rows, label)
         plain = label == SIRFS.label

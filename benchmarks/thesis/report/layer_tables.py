@@ -116,8 +116,8 @@ def relative_error(runs: RunScores, label: str, kind: str, layer: LayerFields, s
         return format_cell(None if removed is None else 100 * removed, ".2f")
     if label == NOTHING.label:
         return "1"
-    errors = (mean_scores(runs[one], layer[0]) for one in (label, NOTHING.label))
-    return format_ratio(paired_ratio(*errors, seed))
+    ours, nothing = (mean_scores(runs[one], layer[0]) for one in (label, NOTHING.label))
+    return format_ratio(paired_ratio(ours, nothing, seed))
 
 
 def accuracy_table(
