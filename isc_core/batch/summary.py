@@ -31,10 +31,11 @@ def write_summary(folder: RunFolder, journal: Journal) -> None:
     journal : Journal
     """
     with ExitStack() as stack:
-        how = {"encoding": "utf-8", "errors": "backslashreplace", "newline": ""}
         table = stack.enter_context(
-            stack.enter_context(new_file(folder.output / "summary.csv")).open("w", **how)
-        )  # type: ignore[call-overload]
+            stack.enter_context(new_file(folder.output / "summary.csv")).open(
+                "w", encoding="utf-8", errors="backslashreplace", newline=""
+            )
+        )
         lines = stack.enter_context(
             stack.enter_context(new_file(folder.output / "summary.jsonl")).open(
                 "w", encoding="ascii"

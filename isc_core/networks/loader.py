@@ -81,7 +81,7 @@ class Network:
     @classmethod
     def shipped(cls) -> Self:
         """Return the network that ships with the package, read once."""
-        return _shipped(cls)
+        return _shipped(cls)  # type: ignore[arg-type]  # mypy: types are hashable
 
 
 @cache

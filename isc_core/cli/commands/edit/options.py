@@ -9,7 +9,7 @@ from ....errors import InputError
 from ....imaging.srgb import srgb_to_linear
 from ....io.printable_names import readable
 from ....photo import TRANSFERS
-from ....shading.lobe_rendering import USUAL_EXPONENT, Lobe
+from ....shading.lobe_rendering import DEFAULT_EXPONENT, Lobe
 from ...interface.options import (
     add_limits,
     add_speech,
@@ -80,7 +80,7 @@ def lobe_of(options: argparse.Namespace) -> Lobe | None:
         raise InputError("--exponent and --alpha both say how rough the lobe is: give one of them")
     if options.exponent is None and options.alpha is None:
         return None
-    return Lobe(USUAL_EXPONENT if options.exponent is None else options.exponent, options.alpha)
+    return Lobe(DEFAULT_EXPONENT if options.exponent is None else options.exponent, options.alpha)
 
 
 def number(text: str) -> float:
