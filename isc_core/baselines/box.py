@@ -64,8 +64,16 @@ class Box:
         return np.pad(inside, [*self.around, *[(0, 0)] * (array.ndim - 2)])
 
     def place(self, cropped: np.ndarray) -> np.ndarray:
-        """Put the box with its margin back into the frame, (H, W); its border values continue
-        outward.
+        """Put the box with its margin back into the frame; its border values continue outward.
+
+        Parameters
+        ----------
+        cropped : (h, w, ...) ndarray
+            Of the box with its margin.
+
+        Returns
+        -------
+        (H, W, ...) ndarray
         """
         for axis, (start, stop) in enumerate((self.rows, self.columns)):
             first = start - self.around[axis][0]

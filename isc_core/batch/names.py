@@ -43,8 +43,16 @@ OWN_FILES = (
 def safe_name(text: str) -> str:
     """Return `text` as the name of a folder.
 
-    Letters, digits, ".", "-" and "_" stay, runs of all else become "_"; the name is never empty,
-    hidden or reserved.
+    Letters, digits, ".", "-" and "_" stay, runs of all else become "_".
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
+        Never empty, hidden or reserved.
     """
     name = text
     if not _SAFE.fullmatch(name):

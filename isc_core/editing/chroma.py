@@ -31,8 +31,16 @@ def to_oklab(linear: np.ndarray) -> np.ndarray:
 
 
 def from_oklab(lab: np.ndarray) -> np.ndarray:
-    """Convert Oklab (L, a, b) (..., 3) to linear Rec.709 (..., 3).
+    """Convert Oklab to linear Rec.709.
 
-    Outside the gamut some channels are negative.
+    Parameters
+    ----------
+    lab : (..., 3) ndarray
+        L, a, b.
+
+    Returns
+    -------
+    (..., 3) ndarray
+        Some channels are negative outside the gamut.
     """
     return (np.asarray(lab, float) @ np.linalg.inv(_LAB).T) ** 3 @ np.linalg.inv(_MIX).T

@@ -290,6 +290,14 @@ def lmse(truth: np.ndarray, estimate: np.ndarray, mask: np.ndarray) -> float:
 def geometric_mean(values: Iterable[float]) -> float:
     """Compute the geometric mean of numbers >= 0; 0 if one of them is 0.
 
+    Parameters
+    ----------
+    values : iterable of float
+
+    Returns
+    -------
+    float
+
     Raises
     ------
     ValueError

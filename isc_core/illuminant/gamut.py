@@ -63,8 +63,17 @@ def without_white(colour: np.ndarray, change: np.ndarray) -> bool:
 
 
 def distance_of_white(colour: np.ndarray) -> float:
-    """Return the distance of white from the hull of chromaticities of colours (N, 3) >= 0; negative
-    inside.
+    """Return the distance of white from the hull of chromaticities.
+
+    Parameters
+    ----------
+    colour : (N, 3) ndarray
+        Colours, linear, not negative.
+
+    Returns
+    -------
+    float
+        In the chromaticity plane; negative inside the hull.
     """
     intensity = colour.sum(axis=1, dtype=float)
     bright = intensity >= max(float(np.quantile(intensity, _DARK)), 1e-12)

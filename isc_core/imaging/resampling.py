@@ -18,6 +18,15 @@ def height_scale(old: tuple[int, ...], new: tuple[int, ...]) -> float:
     """Return the ratio of heights on a grid of shape `new` to those on a grid of shape `old`.
 
     Sizes are whole numbers, so it differs slightly from the requested factor.
+
+    Parameters
+    ----------
+    old, new : tuple of int
+        (H, W).
+
+    Returns
+    -------
+    float
     """
     return float(np.sqrt(new[0] * new[1] / (old[0] * old[1])))
 

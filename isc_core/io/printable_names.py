@@ -15,6 +15,14 @@ def readable(text: str) -> str:
     """Return `text` on one line, in printable characters that UTF-8 can encode.
 
     All others are escaped as in Python: `\\n`, `\\xe9`.
+
+    Parameters
+    ----------
+    text : str
+
+    Returns
+    -------
+    str
     """
     return "".join(map(_readable, text))
 

@@ -225,8 +225,17 @@ def arriving(
 
 
 def tangents(direction: np.ndarray) -> np.ndarray:
-    """Return two unit vectors (2, 3) perpendicular to a unit direction and to each other (Duff et
-    al. 2017, JCGT 6(1), no DOI).
+    """Return two unit vectors perpendicular to a unit direction and to each other.
+
+    Duff et al., JCGT 6(1), 2017 (no DOI).
+
+    Parameters
+    ----------
+    direction : (3,) ndarray
+
+    Returns
+    -------
+    (2, 3) ndarray
     """
     x, y, z = direction
     # Divided by 1 + |z|, which is never near 0.
@@ -309,8 +318,19 @@ def _normal_equations(problem: Problem, fitted: Fitted) -> tuple[np.ndarray, np.
 
 
 def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """Compute sum_n left_ni weight_n right_nj, (P, Q), without BLAS, whose threads take longer to
-    start than a few columns need.
+    """Compute sum_n left_ni weight_n right_nj.
+
+    Without BLAS, whose threads take longer to start than a few columns need.
+
+    Parameters
+    ----------
+    left : (N, P) ndarray
+    weight : (N,) ndarray
+    right : (N, Q) ndarray
+
+    Returns
+    -------
+    (P, Q) ndarray
     """
     return np.einsum("ni,nj->ij", left * weight[:, None], right)
 

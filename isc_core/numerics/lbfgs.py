@@ -172,9 +172,14 @@ class PairMemory:
         )
 
     def refresh(self, slot: int | None) -> None:
-        """Take the rows of `slot` as the newest pair; None if only the gradient has changed.
+        """Take the rows of a slot as the newest pair.
 
         A pair without positive curvature is skipped.
+
+        Parameters
+        ----------
+        slot : int or None
+            None if only the gradient has changed.
         """
         rows = [2 * self.size] if slot is None else [slot, self.size + slot, 2 * self.size]
         products = self._algebra.products(self.vectors, self.vectors[rows])

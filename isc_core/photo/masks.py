@@ -137,9 +137,17 @@ def _mask_of_file(mask_path: str | Path, photo: Raster, limits: Limits) -> np.nd
 
 
 def largest_channel(values: np.ndarray) -> np.ndarray:
-    """Return the largest channel (H, W) of (H, W, C) values.
+    """Return the largest channel of each pixel.
 
     NumPy's own maximum over a short last axis is ten times slower.
+
+    Parameters
+    ----------
+    values : (H, W, C) ndarray
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     return functools.reduce(np.maximum, np.moveaxis(values, 2, 0))
 

@@ -174,8 +174,15 @@ def turned_light(coefficients: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 
 
 def sphere_directions(count: int) -> np.ndarray:
-    """Return `count` unit vectors (count, 3), evenly over the sphere along a spiral, front to
-    back.
+    """Return unit vectors spread evenly over the sphere, along a spiral from front to back.
+
+    Parameters
+    ----------
+    count : int
+
+    Returns
+    -------
+    (count, 3) ndarray
     """
     z = 1 - (2 * np.arange(count) + 1) / count
     angle = np.pi * (3 - np.sqrt(5)) * np.arange(count)

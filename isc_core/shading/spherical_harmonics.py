@@ -80,15 +80,29 @@ def normal_from_reference(normal: np.ndarray) -> np.ndarray:
 
 
 def light_from_reference(light: np.ndarray) -> np.ndarray:
-    """Convert coefficients (9, ...) of the reference's basis to those of `real_sh`; same log
-    shading.
+    """Convert coefficients of the reference's basis to those of `real_sh`; same log shading.
+
+    Parameters
+    ----------
+    light : (9, ...) ndarray
+
+    Returns
+    -------
+    (9, ...) ndarray
     """
     return np.tensordot(_basis_change().T, np.asarray(light, float), axes=1)
 
 
 def light_to_reference(light: np.ndarray) -> np.ndarray:
-    """Convert coefficients (9, ...) of `real_sh` to those of the reference's basis; same log
-    shading.
+    """Convert coefficients of `real_sh` to those of the reference's basis; same log shading.
+
+    Parameters
+    ----------
+    light : (9, ...) ndarray
+
+    Returns
+    -------
+    (9, ...) ndarray
     """
     return np.tensordot(np.linalg.inv(_basis_change().T), np.asarray(light, float), axes=1)
 

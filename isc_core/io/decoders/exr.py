@@ -18,6 +18,23 @@ def read_exr(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode the RGB or Y channels, and A, which EXR colours are premultiplied by.
 
     The frame is the display window, black where it has no data.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Named in errors.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the image is larger than the limits, or the file is damaged.
     """
     for claimed in check_exr(data, path, limits):
         for window in (claimed.data, claimed.display):

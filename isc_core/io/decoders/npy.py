@@ -14,7 +14,24 @@ from .raster import Raster, check_size, raster_of_codes
 def read_npy(data: bytes, path: Path, limits: Limits) -> Raster:
     """Decode a NumPy array (H, W), (H, W, 1), (H, W, 3) or (H, W, 4).
 
-    Alpha comes last and is not multiplied in. The size is checked by the header alone.
+    Alpha comes last and is not premultiplied. The size is checked by the header alone.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Named in errors.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the image is larger than the limits, or shape or type are not those of an image.
     """
     shape, by_columns, kind, start = array_header(data)
     if len(shape) not in (2, 3) or shape[2:] not in ((), (1,), (3,), (4,)):

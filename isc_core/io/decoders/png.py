@@ -21,6 +21,23 @@ def read_png(data: bytes, path: Path, limits: Limits) -> Raster:
 
     16 bits go through OpenCV, because Pillow reduces RGB to 8. The checksum of each chunk is
     verified first, which decoders skip.
+
+    Parameters
+    ----------
+    data : bytes
+        The whole file.
+    path : Path
+        Named in errors.
+    limits : Limits
+
+    Returns
+    -------
+    Raster
+
+    Raises
+    ------
+    InputError
+        If the image is larger than the limits, or the file is damaged.
     """
     width, height, bits = struct.unpack(">IIB", data[16:25])
     check_size(path, limits, width, height)

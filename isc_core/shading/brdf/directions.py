@@ -74,8 +74,17 @@ def cosines(normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> Cosines:
 
 
 def half_vector(view: np.ndarray, light: np.ndarray) -> np.ndarray:
-    """Return the unit vectors (..., 3) midway between `view` and `light`; zero where they are
-    opposite.
+    """Return the unit vectors midway between two directions.
+
+    Parameters
+    ----------
+    view, light : (..., 3) ndarray
+        Of unit length.
+
+    Returns
+    -------
+    (..., 3) ndarray
+        Zero where the directions are opposite.
     """
     total = np.asarray(view, float) + np.asarray(light, float)
     length = np.sqrt((total * total).sum(axis=-1, keepdims=True))

@@ -103,16 +103,38 @@ class Ggx:
 
 
 def density(alpha: Parameter, cos_half: np.ndarray) -> np.ndarray:
-    """Return D in 1/sr: the density of facets that face directions at `cos_half` from the
-    normal.
+    """Return D, the density of facets by the direction that they face.
+
+    Parameters
+    ----------
+    alpha : float or ndarray
+        In (0, 1].
+    cos_half : ndarray
+        Cosine of the facets' angle to the normal.
+
+    Returns
+    -------
+    ndarray
+        In 1/sr.
     """
     square = np.square(cos_half)
     return np.square(alpha) / (np.pi * (np.square(alpha) * square + 1 - square) ** 2)
 
 
 def visible(alpha: Parameter, cosine: np.ndarray) -> np.ndarray:
-    """Return G1 in [0, 1]: the share of facets visible from a direction at `cosine` from the
-    normal.
+    """Return G1, the share of facets visible from a direction.
+
+    Parameters
+    ----------
+    alpha : float or ndarray
+        In (0, 1].
+    cosine : ndarray
+        Cosine of the direction's angle to the normal.
+
+    Returns
+    -------
+    ndarray
+        In [0, 1].
     """
     return 2 * cosine / (cosine + _root(alpha, cosine))
 

@@ -18,8 +18,17 @@ class Model(Protocol):
     """
 
     def value(self, normal: np.ndarray, view: np.ndarray, light: np.ndarray) -> np.ndarray:
-        """Return f_r (...), or (..., 3) for a coloured model, in 1/sr, >= 0; 0 below the
-        horizon.
+        """Return f_r.
+
+        Parameters
+        ----------
+        normal, view, light : (..., 3) ndarray
+            Of unit length.
+
+        Returns
+        -------
+        (...) or (..., 3) ndarray
+            In 1/sr, not negative, 0 below the horizon; three channels for a coloured model.
         """
         ...
 

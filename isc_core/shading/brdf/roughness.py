@@ -60,6 +60,14 @@ _TINY = 1e-100
 def alpha_from_blender(roughness: Parameter) -> np.ndarray:
     """Return the alpha of GGX from the roughness of Blender's Principled surface, both in [0, 1].
 
+    Parameters
+    ----------
+    roughness : float or ndarray
+
+    Returns
+    -------
+    ndarray
+
     Raises
     ------
     InputError
@@ -71,6 +79,14 @@ def alpha_from_blender(roughness: Parameter) -> np.ndarray:
 
 def blender_from_alpha(alpha: Parameter) -> np.ndarray:
     """Return the roughness of Blender's Principled surface from the alpha of GGX, both in [0, 1].
+
+    Parameters
+    ----------
+    alpha : float or ndarray
+
+    Returns
+    -------
+    ndarray
 
     Raises
     ------
@@ -84,6 +100,14 @@ def blender_from_alpha(alpha: Parameter) -> np.ndarray:
 def exponent_from_alpha(alpha: Parameter) -> np.ndarray:
     """Return p = 2 / alpha^2 - 2, >= 0, for alpha in (0, 1]: the usual rule.
 
+    Parameters
+    ----------
+    alpha : float or ndarray
+
+    Returns
+    -------
+    ndarray
+
     Raises
     ------
     InputError
@@ -95,6 +119,14 @@ def exponent_from_alpha(alpha: Parameter) -> np.ndarray:
 
 def alpha_from_exponent(exponent: Parameter) -> np.ndarray:
     """Return alpha = sqrt(2 / (p + 2)), in (0, 1], for p >= 0: the usual rule.
+
+    Parameters
+    ----------
+    exponent : float or ndarray
+
+    Returns
+    -------
+    ndarray
 
     Raises
     ------

@@ -110,9 +110,19 @@ class ColorScaleMixture:
         return (vectors / np.sqrt(values)) @ vectors.T
 
     def log_density(self, m: np.ndarray) -> np.ndarray:
-        """Return log p as a function of m >= 0, of the shape of `m`.
+        """Return log p as a function of m.
 
         The density never underflows at a reachable m: the largest v is 32.
+
+        Parameters
+        ----------
+        m : ndarray
+            Not negative.
+
+        Returns
+        -------
+        ndarray
+            Of the shape of `m`.
         """
         return np.log(_densities(np.asarray(m, float), self.variances) @ self.weights)
 

@@ -45,9 +45,18 @@ class Magnitudes:
 
     @staticmethod
     def of(x: np.ndarray) -> "Magnitudes":
-        """Return the histogram of finite samples `x` of any shape.
+        """Return the histogram of the magnitudes of samples.
 
         Magnitudes below 1e-9 or above 1e3 share the first or last bin.
+
+        Parameters
+        ----------
+        x : ndarray
+            Finite, of any shape.
+
+        Returns
+        -------
+        Magnitudes
         """
         size = np.abs(np.asarray(x, float)).ravel()
         bins = (_DECADES[1] - _DECADES[0]) * _PER_DECADE
