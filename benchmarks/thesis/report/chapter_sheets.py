@@ -1,16 +1,14 @@
 """One picture sheet per chapter: all figures of the chapter, reduced, in the order of the thesis.
 
-Problem: 71 figures as single files are too large to track. A sheet shows each at a readable size,
-in a palette of 256 colours.
+Problem: 71 figures as single files are too large to track. A sheet shows each at a readable size.
 
-Limits: figures are read from their PNG files; smooth gradients are dithered.
+Limits: figures are read from their PNG files, and compressed as JPEG.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from isc_core.io.atomic import new_file
@@ -19,7 +17,8 @@ from .item import ThesisItem
 from .pages import sheet_name
 from .records import ItemRecord
 
-_COLUMNS, _CELL, _GAP, _CAPTION, _LETTERS = 4, 420, 16, 22, 14  # pixels
+_COLUMNS, _CELL, _GAP, _CAPTION, _LETTERS = 4, 300, 12, 20, 13  # pixels
+_QUALITY = 78  # of the JPEG
 _PAPER, _INK = (255, 255, 255), (0, 0, 0)
 
 
@@ -37,7 +36,7 @@ def write_chapter_sheets(
     items: Sequence[ThesisItem],
     records: Mapping[str, ItemRecord],
 ) -> list[int]:
-    """Write `chapter-N.png` for each chapter that has figures.
+    """Write `chapter-N.jpg` for each chapter that has figures.
 
     Parameters
     ----------
@@ -64,9 +63,8 @@ def write_chapter_sheets(
                         _Cell(f"Figure {item.number}", _reduced(source / file))
                     )
     for chapter, cells in chapters.items():
-        picture = _with_palette(_composed(cells))
         with new_file(target / sheet_name(chapter)) as partial:
-            picture.save(partial, format="PNG", optimize=True)
+            _composed(cells).save(partial, format="JPEG", quality=_QUALITY, optimize=True)
     return sorted(chapters)
 
 
@@ -81,18 +79,6 @@ def _reduced(path: Path) -> Image.Image:
         .convert("RGB")
         .resize((_CELL, height), Image.Resampling.LANCZOS)
     )
-
-
-def _with_palette(sheet: Image.Image) -> Image.Image:
-    """Reduce the sheet to 256 dithered colours, a third of the size in full colour."""
-    palette = sheet.quantize(256, method=Image.Quantize.MAXCOVERAGE)
-    dithered = sheet.quantize(palette=palette, dither=Image.Dither.FLOYDSTEINBERG)
-    # Pillow maps to an approximately nearest colour, so that white paper may become off-white.
-    paper = Image.fromarray((np.asarray(sheet) == _PAPER).all(axis=2))
-    colours = np.reshape(dithered.getpalette() or [], (-1, 3))
-    white = int(np.argmax(colours.sum(axis=1)))
-    dithered.paste(white, mask=paper)
-    return dithered
 
 
 def _composed(cells: Sequence[_Cell]) -> Image.Image:

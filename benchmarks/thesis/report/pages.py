@@ -203,7 +203,7 @@ def index_page(
 
 def sheet_name(chapter: int) -> str:
     """Return the file name of a chapter's picture sheet."""
-    return f"chapter-{chapter}.png"
+    return f"chapter-{chapter}.jpg"
 
 
 def _link(item: ThesisItem, published: bool) -> str:

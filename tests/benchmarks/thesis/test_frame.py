@@ -342,13 +342,13 @@ def test_published_are_the_index_the_tables_pages_and_a_sheet_per_chapter(tmp_pa
     assert {path.name for path in target.iterdir()} == {
         "README.md",
         "table-9.1.md",
-        "chapter-8.png",
+        "chapter-8.jpg",
     }
     for page in target.glob("*.md"):
         text = page.read_text(encoding="utf-8")
         links = re.findall(r"\]\(([^)#]+)", text)
         assert all((target / link).exists() for link in links), f"{page.name}: {links}"
-    sheet = cv2.imread(str(target / "chapter-8.png"))
-    assert sheet.shape[1] > 400 and np.ptp(sheet) == 255
+    sheet = cv2.imread(str(target / "chapter-8.jpg"))
+    assert sheet.shape[1] > 300 and np.ptp(sheet) > 240  # JPEG rounds white and black
     with pytest.raises(InputError, match="has no items"):
         publish(tmp_path / "empty", target, items_made)
