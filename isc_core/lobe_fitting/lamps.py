@@ -152,14 +152,15 @@ def minimise(problem: Problem, start: Lamps, steps: int = 40) -> Fitted:
     Fitted
         The minimum.
     """
-    best = _measured(problem, start)
+    best = evaluate(problem, start)
     damping = 1e-2
     for _ in range(steps):
         curvature, gradient = _normal_equations(problem, best)
         diagonal = np.diag(curvature)
         ridge = np.diag(damping * diagonal + 1e-9 * max(float(diagonal.max()), 1e-300) + 1e-300)
-        tried = _measured(
-            problem, _moved(best.lamps, -np.linalg.solve(curvature + ridge, gradient), problem)
+        tried = evaluate(
+            problem,
+            step_parameters(best.lamps, -np.linalg.solve(curvature + ridge, gradient), problem),
         )
         if tried.loss < best.loss:
             small = best.loss - tried.loss < 1e-7 * best.loss
@@ -245,7 +246,18 @@ def tangents(direction: np.ndarray) -> np.ndarray:
     return np.array([[1 + sign * x * x * a, sign * b, -sign * x], [b, sign + y * y * a, -y]])
 
 
-def _measured(problem: Problem, lamps: Lamps) -> Fitted:
+def evaluate(problem: Problem, lamps: Lamps) -> Fitted:
+    """Compute residuals, their Jacobian and the loss at given parameters.
+
+    Parameters
+    ----------
+    problem : Problem
+    lamps : Lamps
+
+    Returns
+    -------
+    Fitted
+    """
     pixels, columns, turns, nearer = problem.pixels, [], [], []
     by_alpha = np.zeros(len(pixels.value))
     for direction, near, log_amplitude in zip(
@@ -335,7 +347,20 @@ def product(left: np.ndarray, weight: np.ndarray, right: np.ndarray) -> np.ndarr
     return np.einsum("ni,nj->ij", left * weight[:, None], right)
 
 
-def _moved(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
+def step_parameters(lamps: Lamps, step: np.ndarray, problem: Problem) -> Lamps:
+    """Move the parameters by a step, kept within their bounds.
+
+    Parameters
+    ----------
+    lamps : Lamps
+    step : (P,) ndarray
+        In the order of the columns of the Jacobian.
+    problem : Problem
+
+    Returns
+    -------
+    Lamps
+    """
     count = lamps.count
     log_alpha, at = lamps.log_alpha, count + len(lamps.base)
     if problem.alpha:

@@ -118,10 +118,16 @@ VARIANTS: dict[str, Akashi2016Options] = {
 
 
 @dataclass(frozen=True)
-class _Fit:
-    """`colours` (3, 1 + k), white first;
+class Fit:
+    """Colours and codes of a factorisation.
 
-    `codes` (1 + k, n) of the pixels fitted; the `objective` reached.
+    Attributes
+    ----------
+    colours : (3, 1 + k) ndarray
+        Unit vectors, white first.
+    codes : (1 + k, n) ndarray
+        Of the fitted pixels.
+    objective : float
     """
 
     colours: np.ndarray
@@ -177,7 +183,7 @@ def separate(
     unit = (float(image.max()) if options.own_scale else 1.0) / 255
     pixels = np.ascontiguousarray(image[mask].T) / unit
     telling = linear[mask]
-    best = _best_fit(pixels, np.flatnonzero(telling), options, monitor)
+    best = best_fit(pixels, np.flatnonzero(telling), options, monitor)
     codes = _all_codes(pixels, telling, best, options, monitor)
     if options.rest_is_diffuse:
         white = np.zeros(mask.shape)
@@ -202,11 +208,23 @@ def _check_options(options: Akashi2016Options) -> None:
         raise InputError("tolerance must be above 0, sparsity at least 0")
 
 
-def _best_fit(
+def best_fit(
     pixels: np.ndarray, telling: np.ndarray, options: Akashi2016Options, monitor: Monitor
-) -> _Fit:
-    """The fit of least objective to `pixels` (3, n)[:, telling] or a sample of them, among all
-    starts.
+) -> Fit:
+    """Return the fit of least objective among all starts.
+
+    Parameters
+    ----------
+    pixels : (3, n) ndarray
+        In units where white is 255.
+    telling : (m,) ndarray of int
+        The pixels that fit the colours; a sample of them if there are more than `options.sample`.
+    options : Akashi2016Options
+    monitor : Monitor
+
+    Returns
+    -------
+    Fit
     """
     fits = []
     for number in range(options.starts):
@@ -218,16 +236,30 @@ def _best_fit(
                 np.random.default_rng(options.seed).choice(telling, options.sample, replace=False)
             )
         fitted = np.ascontiguousarray(pixels[:, chosen])
-        begin = _random_start if options.start == "random" else _hue_start
-        fits.append(_fit(fitted, *begin(fitted, options.surface_colours, random), options, stage))
+        begin = random_start if options.start == "random" else _hue_start
+        fits.append(
+            fit_colours(fitted, *begin(fitted, options.surface_colours, random), options, stage)
+        )
     return min(fits, key=lambda fit: fit.objective)
 
 
-def _random_start(
+def random_start(
     pixels: np.ndarray, count: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
-    """White and `count` random unit colours (3, 1 + count), and random codes (1 + count, n) for
-    `pixels` (3, n).
+    """Draw random colours and codes.
+
+    Parameters
+    ----------
+    pixels : (3, n) ndarray
+    count : int
+        Number of surface colours.
+    random : numpy.random.Generator
+
+    Returns
+    -------
+    colours : (3, 1 + count) ndarray
+        Unit vectors, white first.
+    codes : (1 + count, n) ndarray
     """
     colours = np.concatenate([np.ones((3, 1)), random.uniform(1, 255, (3, count))], axis=1)
     return _unit(colours), random.uniform(1, 255, (1 + count, pixels.shape[1]))
@@ -237,7 +269,7 @@ def _hue_start(
     pixels: np.ndarray, count: int, random: np.random.Generator
 ) -> tuple[np.ndarray, np.ndarray]:
     """White and, for each peak of the hue histogram, the mean of its purest pixels; codes by
-    likeness. Shapes as in `_random_start`.
+    likeness. Shapes as in `random_start`.
     """
     low, high = pixels.min(axis=0), pixels.max(axis=0)
     chroma = high - low
@@ -264,14 +296,30 @@ def _unit(colours: np.ndarray) -> np.ndarray:
     return colours / np.maximum(np.linalg.norm(colours, axis=0), _TINY)
 
 
-def _fit(
+def fit_colours(
     pixels: np.ndarray,
     colours: np.ndarray,
     codes: np.ndarray,
     options: Akashi2016Options,
     monitor: Monitor,
-) -> _Fit:
-    """Iterates on `colours` (3, 1 + k) and `codes` (1 + k, n) until the objective rests."""
+) -> Fit:
+    """Iterate on colours and codes until the objective converges.
+
+    Parameters
+    ----------
+    pixels : (3, n) ndarray
+        In units where white is 255.
+    colours : (3, 1 + k) ndarray
+        Start; unit vectors, white first.
+    codes : (1 + k, n) ndarray
+        Start; overwritten.
+    options : Akashi2016Options
+    monitor : Monitor
+
+    Returns
+    -------
+    Fit
+    """
     energy = float(np.square(pixels).sum())
     last = np.inf
     for iteration in range(options.iterations):
@@ -288,7 +336,7 @@ def _fit(
         last = objective
         if iteration % 20 == 0:
             monitor.report("surface colours", iteration / options.iterations)
-    return _Fit(colours, codes, float(objective))
+    return Fit(colours, codes, float(objective))
 
 
 def _improve_codes(
@@ -331,7 +379,7 @@ def _improve_colours(colours: np.ndarray, remaining: np.ndarray, gram: np.ndarra
 
 
 def _all_codes(
-    pixels: np.ndarray, telling: np.ndarray, fit: _Fit, options: Akashi2016Options, monitor: Monitor
+    pixels: np.ndarray, telling: np.ndarray, fit: Fit, options: Akashi2016Options, monitor: Monitor
 ) -> np.ndarray:
     """Codes (1 + k, n) of all pixels (3, n): the fit's own where it has them all, else by descent
     with its colours.
@@ -344,7 +392,7 @@ def _all_codes(
     for first in range(0, pixels.shape[1], _BLOCK):
         monitor.report("mixes of the pixels", 0.8 + 0.2 * first / pixels.shape[1])
         block = slice(first, first + _BLOCK)
-        codes[:, block] = _descend(
+        codes[:, block] = descend(
             fit.colours.T @ pixels[:, block],
             fit.colours.T @ fit.colours,
             options.sparsity,
@@ -354,9 +402,25 @@ def _all_codes(
 
 
 @jit
-def _descend(like, own, sparsity, codes):
-    """Minimises 1/2 h' own h - (like - sparsity)' h over h >= 0 for each column of `like` (m, n),
-    starting from `codes` (m, n).
+def descend(like, own, sparsity, codes):
+    """Minimise 1/2 h' own h - (like - sparsity)' h over h >= 0 for each pixel.
+
+    Coordinate descent until no code changes by 0.02.
+
+    Parameters
+    ----------
+    like : (m, n) ndarray
+        W'I, the inner products of colours and pixels.
+    own : (m, m) ndarray
+        W'W.
+    sparsity : float
+    codes : (m, n) ndarray
+        Start; overwritten.
+
+    Returns
+    -------
+    (m, n) ndarray
+        `codes`.
     """
     size, count = like.shape
     for pixel in range(count):

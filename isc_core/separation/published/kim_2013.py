@@ -109,9 +109,9 @@ VARIANTS: dict[str, Kim2013Options] = {
     "paper": Kim2013Options(patch=15, base=0, bright_saturation=0, fade=None),
 }
 
-# Even the brightest highlight has a little say in its paint's colour, for the paint of which
-# nothing else is seen.
-_LEAST_SAY = 1e-4
+# Even the brightest highlight has a small weight in the diffuse colour, for a reflectance that is
+# seen nowhere else.
+_LEAST_WEIGHT = 1e-4
 # Between 1 (plain Gauss-Seidel) and 2; the first term makes the system well conditioned, so that
 # little is best.
 _OVER_RELAXATION = 1.2
@@ -119,10 +119,25 @@ _SMALLEST = 1e-12
 
 
 @dataclass(frozen=True)
-class _Scene:
-    """What stays while s is sought: `image` (H, W, 3), largest value 1; `mask` (H, W) bool of
-    linear pixels; `low` (H, W) its smallest channel, the upper bound; `dark` (H, W) is s_0; `base`
-    is u; `cells` (4, n) the mask's pixels in the grid of size `grid`.
+class Scene:
+    """What is constant during the search for s.
+
+    Attributes
+    ----------
+    image : (H, W, 3) ndarray
+        Largest value 1.
+    mask : (H, W) bool ndarray
+        Linear pixels.
+    low : (H, W) ndarray
+        The smallest channel, the upper bound of s.
+    dark : (H, W) ndarray
+        s_0.
+    base : float
+        u.
+    cells : (4, n) ndarray
+        The mask's pixels in the bilateral grid.
+    grid : tuple of int
+        Size of the bilateral grid.
     """
 
     image: np.ndarray
@@ -176,7 +191,7 @@ def separate(
     def find(seen: np.ndarray, linear: np.ndarray, base: float) -> np.ndarray:
         scale = float(seen[mask].max())
         return scale * _specular_of(
-            _scene(seen / scale, linear, base / scale, options), options, monitor
+            build_scene(seen / scale, linear, base / scale, options), options, monitor
         )
 
     return bright_layers(
@@ -199,13 +214,29 @@ def _check_options(options: Kim2013Options) -> None:
         raise InputError("bright_saturation must be within [0, 1], fade above 0 or none")
 
 
-def _scene(image: np.ndarray, mask: np.ndarray, base: float, options: Kim2013Options) -> _Scene:
+def build_scene(image: np.ndarray, mask: np.ndarray, base: float, options: Kim2013Options) -> Scene:
+    """Compute the dark channel, the bounds and the bilateral grid.
+
+    Parameters
+    ----------
+    image : (H, W, 3) ndarray
+        Largest value 1.
+    mask : (H, W) bool ndarray
+        Linear pixels.
+    base : float
+        u.
+    options : Kim2013Options
+
+    Returns
+    -------
+    Scene
+    """
     low = smallest(image)
     dark = dark_channel(low, mask, options.patch)
     first = np.where(mask, np.maximum(dark - options.base * base, 0), 0)
     cells = _cells(image, mask, options)
     grid = tuple(int(size) for size in np.ceil(cells.max(axis=1)) + 3)
-    return _Scene(image, mask, low, first, base, cells, grid)
+    return Scene(image, mask, low, first, base, cells, grid)
 
 
 def _cells(image: np.ndarray, mask: np.ndarray, options: Kim2013Options) -> np.ndarray:
@@ -231,58 +262,80 @@ def _cells(image: np.ndarray, mask: np.ndarray, options: Kim2013Options) -> np.n
     )
 
 
-def _specular_of(scene: _Scene, options: Kim2013Options, monitor: Monitor) -> np.ndarray:
+def _specular_of(scene: Scene, options: Kim2013Options, monitor: Monitor) -> np.ndarray:
     """s (H, W) of the scene's pixels, zero elsewhere."""
     specular = scene.dark
     for done in range(options.rounds):
         monitor.report("finding diffuse colours", done / options.rounds)
-        pull, target = _colour_term(scene, _paints(scene, specular, options.trust))
+        pull, target = colour_term(scene, _albedos(scene, specular, options.trust))
         total = pull + options.prior
         target = (pull * target + options.prior * scene.dark) / total
         specular = np.clip(target, 0, scene.low) if done == 0 else specular
         monitor.report("smoothing the specular layer", (done + 0.6) / options.rounds)
-        specular = _smoothed(specular, target, np.where(scene.mask, total, 0), scene, options)
+        specular = smooth_layer(specular, target, np.where(scene.mask, total, 0), scene, options)
     return specular
 
 
-def _paints(scene: _Scene, specular: np.ndarray, trust: float) -> np.ndarray:
+def _albedos(scene: Scene, specular: np.ndarray, trust: float) -> np.ndarray:
     """Unit vectors (n, 3) of the diffuse colour of the mask's pixels: means of what is diffuse now,
     over like hues around.
     """
     s = specular[scene.mask]
-    say = np.maximum(np.exp(-s / max(trust * scene.base, _SMALLEST)), _LEAST_SAY)
+    weight = np.maximum(np.exp(-s / max(trust * scene.base, _SMALLEST)), _LEAST_WEIGHT)
     nearest = np.ravel_multi_index(tuple(np.rint(scene.cells).astype(np.intp)), scene.grid)
     colours = np.empty((len(s), 3))
     for channel in range(3):
         diffuse = np.maximum(scene.image[..., channel][scene.mask] - s, 0)
-        sums = np.bincount(nearest, diffuse * say, int(np.prod(scene.grid))).reshape(scene.grid)
+        sums = np.bincount(nearest, diffuse * weight, int(np.prod(scene.grid))).reshape(scene.grid)
         means = ndimage.gaussian_filter(sums, 1, mode="constant", truncate=3)
         colours[:, channel] = ndimage.map_coordinates(means, scene.cells, order=1, mode="nearest")
     return colours / np.maximum(np.linalg.norm(colours, axis=1, keepdims=True), _SMALLEST)
 
 
-def _colour_term(scene: _Scene, paints: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """k and s_a of the first term, (H, W), for the unit vectors `paints` (n, 3) of the mask's
-    pixels; s_a is kept within the bounds.
+def colour_term(scene: Scene, albedos: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Compute k and s_a of the first term.
+
+    Parameters
+    ----------
+    scene : Scene
+    albedos : (n, 3) ndarray
+        Unit vectors of the diffuse colours of the mask's pixels.
+
+    Returns
+    -------
+    k : (H, W) ndarray
+    s_a : (H, W) ndarray
+        Within the bounds of s.
     """
     colours = scene.image[scene.mask]
-    whiteness = paints.sum(axis=1)
+    whiteness = albedos.sum(axis=1)
     pull, target = np.zeros_like(scene.low), np.zeros_like(scene.low)
     pull[scene.mask] = np.maximum(3 - whiteness**2, 0)
-    beside = colours.sum(axis=1) - whiteness * np.einsum("ij,ij->i", paints, colours)
+    beside = colours.sum(axis=1) - whiteness * np.einsum("ij,ij->i", albedos, colours)
     target[scene.mask] = beside / np.maximum(pull[scene.mask], _SMALLEST)
     return pull, np.clip(target, 0, scene.low)
 
 
-def _smoothed(
+def smooth_layer(
     specular: np.ndarray,
     target: np.ndarray,
     pull: np.ndarray,
-    scene: _Scene,
+    scene: Scene,
     options: Kim2013Options,
 ) -> np.ndarray:
-    """The minimum over s (H, W) of sum pull (s - target)^2 + weights * steps^2 within the bounds,
-    from the start `specular`.
+    """Minimise sum pull (s - target)^2 + weights * steps^2 over s within its bounds.
+
+    Parameters
+    ----------
+    specular : (H, W) ndarray
+        Start, which also gives the weights.
+    target, pull : (H, W) ndarray
+    scene : Scene
+    options : Kim2013Options
+
+    Returns
+    -------
+    (H, W) ndarray
     """
     across = _weights(np.diff(specular, axis=1), scene.mask[:, 1:] & scene.mask[:, :-1], options)
     down = _weights(np.diff(specular, axis=0), scene.mask[1:] & scene.mask[:-1], options)

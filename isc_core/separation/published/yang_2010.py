@@ -91,10 +91,15 @@ _MARGIN = 2
 
 
 @dataclass(frozen=True)
-class _Grid:
-    """A grid of one cell a sigma over row, column and guide;
+class BilateralGrid:
+    """A grid of one cell per sigma over row, column and guide.
 
-    `cells` (3,) its size, `at` (n, 3) where the pixels lie in it.
+    Attributes
+    ----------
+    cells : tuple of int
+        Its size.
+    at : (n, 3) ndarray
+        Where the pixels lie in it.
     """
 
     cells: tuple[int, int, int]
@@ -188,11 +193,11 @@ def _specular_of(
     total, high, low = colours.sum(axis=1), largest(colours), smallest(colours)
     chroma = total - 3 * low
     guide = np.where(chroma > 1e-9 * total, (high - low) / np.where(chroma > 0, chroma, 1), 1 / 3)
-    grid = _grid(domain, used, guide, options)
+    grid = make_grid(domain, used, guide, options)
     diffuse = high / total
     for done in range(options.rounds):
         monitor.report("smoothing the largest chromaticity", done / options.rounds)
-        smooth = _filtered(diffuse, grid)
+        smooth = filter_in_grid(diffuse, grid)
         above = float((smooth - diffuse).max())
         if above <= options.tolerance:
             break
@@ -201,11 +206,22 @@ def _specular_of(
     return np.where(known, (high - diffuse * total) / np.where(known, 1 - 3 * diffuse, 1), 0)
 
 
-def _grid(
+def make_grid(
     domain: np.ndarray, used: np.ndarray, guide: np.ndarray, options: Yang2010Options
-) -> _Grid:
-    """Of the box around `domain` (H, W), so that nothing depends on the space around it, for the
-    `used` pixels' `guide` (n,).
+) -> BilateralGrid:
+    """Build the grid of the box around a domain: nothing depends on the space around it.
+
+    Parameters
+    ----------
+    domain, used : (H, W) bool ndarray
+        The domain, and the pixels of it to filter.
+    guide : (n,) ndarray
+        Of the used pixels, in [0, 1].
+    options : Yang2010Options
+
+    Returns
+    -------
+    BilateralGrid
     """
     top, bottom = np.flatnonzero(domain.any(axis=1))[[0, -1]]
     left, right = np.flatnonzero(domain.any(axis=0))[[0, -1]]
@@ -219,11 +235,21 @@ def _grid(
     )
     spans = (bottom - top) / sigma, (right - left) / sigma, 1 / options.range_sigma
     sizes = [int(span) + 2 * _MARGIN + 2 for span in spans]
-    return _Grid((sizes[0], sizes[1], sizes[2]), at)
+    return BilateralGrid((sizes[0], sizes[1], sizes[2]), at)
 
 
-def _filtered(values: np.ndarray, grid: _Grid) -> np.ndarray:
-    """`values` (n,) averaged over the pixels near in the grid."""
+def filter_in_grid(values: np.ndarray, grid: BilateralGrid) -> np.ndarray:
+    """Average values over the pixels that are near in the grid.
+
+    Parameters
+    ----------
+    values : (n,) ndarray
+    grid : BilateralGrid
+
+    Returns
+    -------
+    (n,) ndarray
+    """
     sums, counts = np.zeros(grid.cells), np.zeros(grid.cells)
     _scatter(values, grid.at, sums, counts)
     kernel = np.exp([-0.5, 0.0, -0.5])

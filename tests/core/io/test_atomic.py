@@ -9,7 +9,6 @@ from pathlib import Path
 import pytest
 
 from isc_core.errors import Cancelled, InputError
-from isc_core.io import atomic
 from isc_core.io.atomic import new_file, new_folder, require_writable
 
 OURS = ("mark.json", "data.bin", "maps/one.bin")
@@ -162,7 +161,10 @@ def test_a_failure_of_the_last_step_brings_the_earlier_result_back(
             raise OSError(errno.EIO, "broken")
         real(source, target)
 
-    monkeypatch.setattr(atomic, "_exchanged", lambda one, other: False)
+    def no_exchange(*arguments: object, **options: object) -> object:
+        raise OSError("no C library")
+
+    monkeypatch.setattr("ctypes.CDLL", no_exchange)
     monkeypatch.setattr(os, "replace", third_fails)
     with pytest.raises(InputError, match="broken"):
         make(tmp_path / "out", "new")

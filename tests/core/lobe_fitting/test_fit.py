@@ -12,7 +12,7 @@ from scipy.ndimage import gaussian_filter
 from isc_core.errors import Cancelled, InputError
 from isc_core.lobe_fitting import GivenLight, PixelData, RecoveredScene, fit_lobe
 from isc_core.lobe_fitting.environment_response import respond_to, split_environment
-from isc_core.lobe_fitting.lamps import Lamps, Problem, _measured, _moved
+from isc_core.lobe_fitting.lamps import Lamps, Problem, evaluate, step_parameters
 from isc_core.lobe_fitting.observed import observe
 from isc_core.lobe_fitting.pixels import choose_pixels
 from isc_core.lobe_fitting.recovered import blurred_normals
@@ -533,11 +533,11 @@ def test_the_jacobian_of_the_whole_model_is_that_of_differences(thresholded: boo
     base = np.array([0.3]) if thresholded else np.array([0.1, -0.05, 0.2, 0.03])
     towards = np.array([KEY, [0.6, 0.0, 0.8]])
     lamps = Lamps(towards, np.array([0.2, 0.3]), np.log([2.0, 1.0]), base, float(np.log(0.25)))
-    here, step = _measured(problem, lamps), 1e-6
+    here, step = evaluate(problem, lamps), 1e-6
     for column_number in range(here.jacobian.shape[1]):
         change = np.zeros(here.jacobian.shape[1])
         change[column_number] = step
-        there = _measured(problem, _moved(lamps, change, problem))
+        there = evaluate(problem, step_parameters(lamps, change, problem))
         active = (here.weight > 0) & (there.weight > 0)
         slope = (there.residual - here.residual)[active] / step
         np.testing.assert_allclose(

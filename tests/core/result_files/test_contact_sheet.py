@@ -1,16 +1,16 @@
 """The contact sheet: every panel shows the map that its label names, in tones that can be compared."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, ImageDraw
 
 from isc_core.imaging.srgb import srgb_to_linear
 from isc_core.lobe_fitting import fit_lobe
 from isc_core.result_files.contact_sheet import (
     Answer,
-    _title,
     comparison_sheet,
     contact_sheet,
     separation_sheet,
@@ -232,23 +232,36 @@ def test_a_comparison_without_truth_shows_the_confidence(scene: Decomposition) -
     )
 
 
+def drawn_subtitle(d: Decomposition) -> str:
+    """The second line of text that the contact sheet draws."""
+    drawn: list[str] = []
+    text = ImageDraw.ImageDraw.text
+
+    def recorded(self: ImageDraw.ImageDraw, place: Any, line: str, **options: Any) -> None:
+        drawn.append(line)
+        text(self, place, line, **options)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(ImageDraw.ImageDraw, "text", recorded)
+        contact_sheet(d)
+    return drawn[1]
+
+
 def test_the_title_says_what_was_fitted() -> None:
     d = ball()
     fit = fit_lobe(d.specular, d.normal, d.mask)
     assert fit.blender_roughness is not None
-    assert _title(replace(d, brdf=fit))[1].endswith(f"roughness {fit.blender_roughness:.2f}")
-    doubtful = replace(
+    assert drawn_subtitle(replace(d, brdf=fit)).endswith(f"roughness {fit.blender_roughness:.2f}")
+    uncertain = replace(
         d.provenance,
         diagnostics=Diagnostics(warnings=(AssumptionWarning(WarningKind.MIRROR_OR_GLASS, 0.8),)),
     )
-    assert (
-        "unreliable" in _title(replace(d, provenance=doubtful))[1]
-        and "unreliable" not in _title(d)[1]
-    )
-    assert _title(replace(d, brdf=replace(fit, outcome=LobeFitOutcome.NARROW)))[1].endswith(
+    assert "unreliable" in drawn_subtitle(replace(d, provenance=uncertain))
+    assert "unreliable" not in drawn_subtitle(d)
+    assert drawn_subtitle(replace(d, brdf=replace(fit, outcome=LobeFitOutcome.NARROW))).endswith(
         f"roughness at most {fit.blender_roughness:.2f}"
     )
-    assert _title(replace(d, brdf=replace(fit, alpha=None)))[1].endswith("gloss undetermined")
-    assert _title(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask)))[1].endswith(
+    assert drawn_subtitle(replace(d, brdf=replace(fit, alpha=None))).endswith("gloss undetermined")
+    assert drawn_subtitle(replace(d, brdf=fit_lobe(0 * d.specular, d.normal, d.mask))).endswith(
         "no highlights"
     )

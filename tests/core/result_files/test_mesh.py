@@ -20,7 +20,6 @@ from isc_core.lobe_fitting.specular_level import SpecularFit, SpecularSource
 from isc_core.result_files.mesh import (
     MeshOptions,
     MeshResult,
-    _interpolated,
     base_color,
     build_mesh,
     limit_rim,
@@ -274,16 +273,6 @@ def test_the_normal_map_holds_what_a_thinned_mesh_lacks() -> None:
             found[name].append(np.degrees(np.arccos(np.clip(vector @ normal[row, column], -1, 1))))
     assert np.median(found["with map"]) < 2
     assert np.median(found["alone"]) > 5
-
-
-def test_normals_are_interpolated_on_the_triangles_that_are_drawn() -> None:
-    """A cell is split from top left to bottom right: the top right corner has no say below that
-    line.
-    """
-    corners = np.array([[[0.0], [1.0]], [[0.0], [0.0]]])
-    values = _interpolated(corners, (5, 5), 4)[..., 0]
-    rows, columns = np.mgrid[:5, :5]
-    assert np.allclose(values, np.maximum(columns - rows, 0) / 4)
 
 
 def tangent_of(corners: np.ndarray, uv: np.ndarray) -> np.ndarray:

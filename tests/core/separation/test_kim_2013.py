@@ -9,9 +9,9 @@ from isc_core.separation.published.kim_2013 import Kim2013Options
 from tests.core.separation.scenes import gaussian_plate
 
 
-def scene_of(image: np.ndarray, options: Kim2013Options) -> kim_2013._Scene:
+def scene_of(image: np.ndarray, options: Kim2013Options) -> kim_2013.Scene:
     mask = np.ones(image.shape[:2], bool)
-    return kim_2013._scene(image, mask, float(image.min(axis=2).mean()), options)
+    return kim_2013.build_scene(image, mask, float(image.min(axis=2).mean()), options)
 
 
 def test_the_dark_channel_comes_first() -> None:
@@ -22,24 +22,26 @@ def test_the_dark_channel_comes_first() -> None:
     for y, x in ((0, 0), (7, 9), (13, 4)):
         patch = low[max(y - 2, 0) : y + 3, max(x - 2, 0) : x + 3]
         assert scene.dark[y, x] == max(patch.min() - 0.1 * low.mean(), 0)
-    assert kim_2013._specular_of(scene, options, Monitor()) is scene.dark
+    plain = Kim2013Options(patch=5, base=0.1, rounds=0, bright_saturation=0, fade=None)
+    split = kim_2013.separate(image, np.ones((14, 17), bool), plain)
+    assert split.specular[..., 0] == pytest.approx(scene.dark, abs=1e-6)
 
 
 def test_the_colour_term_is_least_at_its_target() -> None:
     random = np.random.default_rng(1)
     image = random.random((4, 5, 3)) + 0.3
-    paints = random.random((20, 3))
-    paints /= np.linalg.norm(paints, axis=1, keepdims=True)
-    pull, target = kim_2013._colour_term(scene_of(image, Kim2013Options()), paints)
-    for colour, paint, k, s_a, low in zip(
-        image.reshape(-1, 3), paints, pull.flat, target.flat, image.min(axis=2).flat, strict=True
+    albedos = random.random((20, 3))
+    albedos /= np.linalg.norm(albedos, axis=1, keepdims=True)
+    pull, target = kim_2013.colour_term(scene_of(image, Kim2013Options()), albedos)
+    for colour, albedo, k, s_a, low in zip(
+        image.reshape(-1, 3), albedos, pull.flat, target.flat, image.min(axis=2).flat, strict=True
     ):
-        (_, best), *_ = np.linalg.lstsq(np.stack([paint, np.ones(3)], axis=1), colour, rcond=None)
+        (_, best), *_ = np.linalg.lstsq(np.stack([albedo, np.ones(3)], axis=1), colour, rcond=None)
         assert s_a == pytest.approx(np.clip(best, 0, low), abs=1e-9)
 
-        def misfit(s: float, colour: np.ndarray = colour, paint: np.ndarray = paint) -> float:
+        def misfit(s: float, colour: np.ndarray = colour, albedo: np.ndarray = albedo) -> float:
             rest = colour - s
-            return float(rest @ rest - (rest @ paint) ** 2)
+            return float(rest @ rest - (rest @ albedo) ** 2)
 
         assert misfit(best + 0.1) - misfit(best) == pytest.approx(0.01 * k)
 
@@ -50,7 +52,7 @@ def test_sweeps_reach_the_least_energy_within_the_bounds() -> None:
     options = Kim2013Options(sweeps=400)
     scene = scene_of(image, options)
     start, target, pull = random.random((6, 7)), random.random((6, 7)), random.random((6, 7)) + 0.05
-    s = kim_2013._smoothed(start, target, pull, scene, options)
+    s = kim_2013.smooth_layer(start, target, pull, scene, options)
     weights = [
         options.smoothness / np.hypot(np.diff(start, axis=axis) / options.gradient, 1)
         for axis in (0, 1)
@@ -72,7 +74,9 @@ def test_grey_surface_takes_the_specular_light_of_its_surroundings() -> None:
     scene = scene_of(image, options)
     known = np.ones((30, 30))
     known[12:18, 12:18] = 0  # nothing pulls there
-    s = kim_2013._smoothed(np.full((30, 30), 0.2), np.where(known, 0.2, 0.4), known, scene, options)
+    s = kim_2013.smooth_layer(
+        np.full((30, 30), 0.2), np.where(known, 0.2, 0.4), known, scene, options
+    )
     assert np.allclose(s, 0.2, atol=1e-6)
 
 

@@ -15,12 +15,12 @@ def test_the_filter_is_a_mean_over_places_and_guide() -> None:
     used = random.random((30, 45)) > 0.3
     options = Yang2010Options()
     guide = np.where(np.arange(used.sum()) % 2, 0.4, 0.9)
-    grid = yang_2010._grid(used, used, guide, options)
-    assert np.allclose(yang_2010._filtered(np.full(len(guide), 0.37), grid), 0.37)
+    grid = yang_2010.make_grid(used, used, guide, options)
+    assert np.allclose(yang_2010.filter_in_grid(np.full(len(guide), 0.37), grid), 0.37)
     assert np.allclose(
-        yang_2010._filtered(guide, grid), guide
+        yang_2010.filter_in_grid(guide, grid), guide
     )  # the two guides are too far apart to mix
-    smooth = yang_2010._filtered(random.random(len(guide)), grid)
+    smooth = yang_2010.filter_in_grid(random.random(len(guide)), grid)
     assert smooth.std() < 0.05 and abs(smooth.mean() - 0.5) < 0.05
 
 

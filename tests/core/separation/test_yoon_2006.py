@@ -1,7 +1,6 @@
 """Yoon, Choi & Kweon 2006: the exact end of its sweeps, its regions and quantiles."""
 
 import numpy as np
-from scipy import ndimage
 
 from isc_core.separation.published import yoon_2006
 from isc_core.separation.published.yoon_2006 import Yoon2006Options
@@ -24,22 +23,6 @@ def test_sweeps_end_at_the_smallest_ratio_of_each_region() -> None:
     solved = yoon_2006.separate(image, mask, Yoon2006Options(regions=True, **same))
     assert solved.specular.max() > 0.4
     assert np.array_equal(swept.specular, solved.specular)
-
-
-def test_regions_are_those_of_a_flood_fill() -> None:
-    image, mask = noisy_disc()
-    options = Yoon2006Options(colour_step=10.0, window=1, dark=0.0)
-    pixels = yoon_2006._two_band(np.where(mask[..., None], image, 0), mask, mask, options)
-    parent = np.arange(mask.size)
-    for axis in (1, 0):
-        yoon_2006._unite(*yoon_2006._pairs(pixels, options.colour_step, axis), parent)
-    yoon_2006._flatten(parent)
-    labels, count = ndimage.label(pixels.known)
-    assert count > 50
-    both = np.unique(
-        np.stack([parent.reshape(mask.shape)[pixels.known], labels[pixels.known]]), axis=1
-    )
-    assert both.shape[1] == count and len(np.unique(both[0])) == count
 
 
 def test_quantiles_of_groups() -> None:
