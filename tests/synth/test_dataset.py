@@ -16,7 +16,7 @@ from isc_core.datasets.highlight_set import load_rendered
 from isc_core.errors import Cancelled, InputError
 from isc_core.io.exr import read_channels
 from isc_core.photo import read_photo
-from isc_core.progress import Monitor
+from isc_core.progress import Monitor, ProgressEvent
 from isc_core.result_files.result_folder import LAYERS
 from isc_core.shading.spherical_harmonics import real_sh
 from synth.capture.recipe import PictureSettings, Recipe, photograph
@@ -280,16 +280,12 @@ def test_cancelling_leaves_whole_scenes_only(made: Path, tmp_path: Path, steps: 
 
 
 def test_progress_names_the_scene_and_never_goes_back(tmp_path: Path) -> None:
-    seen: list[tuple[str, float]] = []
-    make_dataset(
-        replace(RUN, count=2),
-        tmp_path / "set",
-        Monitor(lambda event: seen.append((event.stage, event.fraction))),
-    )
-    texts, fractions = zip(*seen, strict=True)
-    assert any(text == "scene 1 of 2" for text in texts)
-    assert any(text.startswith("scene 2 of 2, ") and text.endswith(" left") for text in texts)
-    assert list(fractions) == sorted(fractions) and fractions[-1] <= 1
+    seen: list[ProgressEvent] = []
+    make_dataset(replace(RUN, count=2), tmp_path / "set", Monitor(seen.append))
+    fractions = [event.fraction for event in seen]
+    assert any(event.stage == "scene 1 of 2" for event in seen)
+    assert any(event.stage == "scene 2 of 2" and event.detail.endswith(" left") for event in seen)
+    assert fractions == sorted(fractions) and fractions[-1] <= 1
 
 
 def test_a_longer_run_keeps_the_scenes_of_a_shorter_one(root: Path) -> None:
