@@ -66,15 +66,18 @@ def accepted(path: Path, read: Callable[[Path], object]) -> None:
 
 def test_the_scene_classifier(tmp_path: Path) -> None:
     rows = [labelled("rig", "", 3), labelled("mirror", "mirror", 1), labelled("synth", "either", 1)]
-    path, network = tmp_path / "out.npz", scene_classifier.Network(LayerNetwork.shipped())
-    fit(network, scene_classifier.Batches(rows, 4), scene_classifier.SCHEDULE, options(path))
+    path, network = (
+        tmp_path / "out.npz",
+        scene_classifier.SceneClassifierModule(LayerNetwork.shipped()),
+    )
+    fit(network, scene_classifier.SceneBatches(rows, 4), scene_classifier.SCHEDULE, options(path))
     accepted(path, SceneClassifier.read)
 
 
 def test_the_layer_network(tmp_path: Path) -> None:
     rows, path = [layered("", 0), layered("cup", 1)], tmp_path / "out.npz"
-    draw = layer_network.Batches(rows, 2)
-    fit(layer_network.Network(), draw, layer_network.SCHEDULE, options(path))
+    draw = layer_network.LayerBatches(rows, 2)
+    fit(layer_network.LayerNetworkModule(), draw, layer_network.SCHEDULE, options(path))
     accepted(path, LayerNetwork.read)
 
 
@@ -101,11 +104,11 @@ def test_the_programs_for_relit_objects(
 
 
 def test_a_run_resumes_where_it_stopped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    draw, schedule = layer_network.Batches([layered("", 0)], 2), layer_network.SCHEDULE
+    draw, schedule = layer_network.LayerBatches([layered("", 0)], 2), layer_network.SCHEDULE
     first, second = tmp_path / "first.npz", tmp_path / "second.npz"
-    fit(layer_network.Network(), draw, schedule, options(first))
+    fit(layer_network.LayerNetworkModule(), draw, schedule, options(first))
     fit(
-        layer_network.Network(),
+        layer_network.LayerNetworkModule(),
         draw,
         schedule,
         options(second, steps=3, resume=first.with_suffix(".pt")),
@@ -115,7 +118,7 @@ def test_a_run_resumes_where_it_stopped(tmp_path: Path, capsys: pytest.CaptureFi
     assert "step 3/3" in capsys.readouterr().out
     again = tmp_path / "again.npz"
     fit(
-        layer_network.Network(),
+        layer_network.LayerNetworkModule(),
         draw,
         schedule,
         options(again, steps=2, resume=first.with_suffix(".pt")),
@@ -124,9 +127,12 @@ def test_a_run_resumes_where_it_stopped(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_another_networks_checkpoint_is_refused(tmp_path: Path) -> None:
-    draw, path = layer_network.Batches([layered("", 0)], 2), tmp_path / "first.npz"
-    fit(layer_network.Network(), draw, layer_network.SCHEDULE, options(path))
-    other, resumed = normal_network.Network(), options(path, resume=path.with_suffix(".pt"))
+    draw, path = layer_network.LayerBatches([layered("", 0)], 2), tmp_path / "first.npz"
+    fit(layer_network.LayerNetworkModule(), draw, layer_network.SCHEDULE, options(path))
+    other, resumed = (
+        normal_network.NormalNetworkModule(),
+        options(path, resume=path.with_suffix(".pt")),
+    )
     with pytest.raises(ValueError, match="another network"):
         fit(other, draw, normal_network.SCHEDULE, resumed)
     torch.save({"weights": torch.zeros(1)}, tmp_path / "other.pt")

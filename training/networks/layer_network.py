@@ -54,7 +54,7 @@ _PHOTOGRAPHED_SHARE = 0.4
 _HUBER = 0.4
 
 
-class Network(nn.Module):  # type: ignore[misc]
+class LayerNetworkModule(nn.Module):  # type: ignore[misc]
     """The trainable layer network."""
 
     def __init__(self) -> None:
@@ -153,7 +153,7 @@ def _gradient(error: torch.Tensor, mask: torch.Tensor) -> torch.Tensor:
 
 
 @dataclass(frozen=True)
-class Batches:
+class LayerBatches:
     """Draws batches.
 
     Attributes
@@ -203,8 +203,8 @@ def main() -> None:
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     training, held_out = split(objects, lambda one: one.family, options)
-    validation = Batches(held_out, options.batch) if held_out else None
-    fit(Network(), Batches(training, options.batch), SCHEDULE, options, validation)
+    validation = LayerBatches(held_out, options.batch) if held_out else None
+    fit(LayerNetworkModule(), LayerBatches(training, options.batch), SCHEDULE, options, validation)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from torch import nn
 from torch.nn import functional
 
 from isc_core.networks.layer_network import LayerNetwork
-from isc_core.networks.light_network import CELL, LONG_SIDE, SURE, UNSURE
+from isc_core.networks.light_network import CELL, LONG_SIDE, MAX_LOG_DEVIATION, MIN_LOG_DEVIATION
 from isc_core.scene.light_estimate import PLACES
 from isc_core.shading.spherical_harmonics import real_sh
 from isc_core.sirfs.priors.predicted_light import FRONT_NORMALS, LIGHT_TERMS
@@ -51,7 +51,7 @@ _DARKEST = 0.05  # of the mean shading: darker pixels are in shadow
 _RIDGE = 0.05  # weight of uniform light in the fit of the light's parameters
 
 
-class Network(nn.Module):  # type: ignore[misc]
+class LightNetworkModule(nn.Module):  # type: ignore[misc]
     """The trainable light network."""
 
     def __init__(self) -> None:
@@ -122,7 +122,7 @@ class Network(nn.Module):  # type: ignore[misc]
         return list(self.convolutions.parameters())
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """Return the loss of a batch of `Batches`, and its terms."""
+        """Return the loss of a batch of `LightBatches`, and its terms."""
         inputs, count, places, normals, light = batch
         count_odds, place_odds, predicted, shape = self(inputs)
         counts = functional.cross_entropy(count_odds, count)
@@ -131,7 +131,7 @@ class Network(nn.Module):  # type: ignore[misc]
         cover = functional.avg_pool2d(inputs[:, 3:], CELL)
         shapes = (((shape - normals) ** 2).sum(1, keepdim=True) * cover).sum() / cover.sum()
         parameters = light.shape[1]
-        log_deviation = predicted[:, parameters:].clamp(SURE, UNSURE)
+        log_deviation = predicted[:, parameters:].clamp(MIN_LOG_DEVIATION, MAX_LOG_DEVIATION)
         error = (light - predicted[:, :parameters]) * torch.exp(-log_deviation)
         lights = (0.5 * error**2 + log_deviation).mean()
         terms = {"count": counts, "direction": directions, "normals": shapes, "light": lights}
@@ -160,7 +160,7 @@ def _cell_positions(rows: int, columns: int, weight: torch.Tensor) -> torch.Tens
 
 
 @dataclass(frozen=True)
-class Batches:
+class LightBatches:
     """Draws batches.
 
     Attributes
@@ -257,8 +257,8 @@ def main() -> None:
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     training, held_out = split(objects, lambda one: one.shape, options)
-    validation = Batches(held_out, options.batch) if held_out else None
-    fit(Network(), Batches(training, options.batch), SCHEDULE, options, validation)
+    validation = LightBatches(held_out, options.batch) if held_out else None
+    fit(LightNetworkModule(), LightBatches(training, options.batch), SCHEDULE, options, validation)
 
 
 if __name__ == "__main__":

@@ -29,7 +29,7 @@ from torch import nn
 from torch.nn import functional
 
 from isc_core.networks.light_network import LightNetwork
-from isc_core.networks.normal_network import CELL, LONG_SIDE, SURE, UNSURE
+from isc_core.networks.normal_network import CELL, LONG_SIDE, MAX_LOG_DEVIATION, MIN_LOG_DEVIATION
 
 from ..data.random_draws import log_uniform
 from ..data.relighting import LightCount, RelightableObject, draw_photo, relightable_objects
@@ -54,7 +54,7 @@ _LEAST_FRONTAL = 5  # lights in front of a mapped object
 _LIKELIHOOD_WEIGHT = 0.1
 
 
-class Network(nn.Module):  # type: ignore[misc]
+class NormalNetworkModule(nn.Module):  # type: ignore[misc]
     """The trainable normal network."""
 
     def __init__(self) -> None:
@@ -89,12 +89,12 @@ class Network(nn.Module):  # type: ignore[misc]
         return list(self.down.parameters())
 
     def loss(self, batch: Batch) -> tuple[torch.Tensor, dict[str, torch.Tensor]]:
-        """Return the loss of a batch of `Batches`, and its terms."""
+        """Return the loss of a batch of `NormalBatches`, and its terms."""
         inputs, normals, cover = batch
         found = self(inputs)
         error = (found[:, :3] - normals) ** 2
         share = cover / cover.sum((1, 2, 3), keepdim=True).clamp(min=1) / len(cover)
-        log_deviation = found[:, 3:].clamp(SURE, UNSURE)
+        log_deviation = found[:, 3:].clamp(MIN_LOG_DEVIATION, MAX_LOG_DEVIATION)
         squared = (error.sum(1, keepdim=True) * share).sum()
         in_plane = 0.5 * error[:, :2].sum(1, keepdim=True).detach()
         likelihood = (in_plane * torch.exp(-2 * log_deviation) + 2 * log_deviation) * share
@@ -109,7 +109,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
 
 @dataclass(frozen=True)
-class Batches:
+class NormalBatches:
     """Draws batches.
 
     Attributes
@@ -208,9 +208,9 @@ def main() -> None:
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     training, held_out = split(objects, lambda one: one.shape, options)
-    draw = Batches(training, measured, options.batch)
-    validation = Batches(held_out, [], options.batch) if held_out else None
-    fit(Network(), draw, SCHEDULE, options, validation)
+    draw = NormalBatches(training, measured, options.batch)
+    validation = NormalBatches(held_out, [], options.batch) if held_out else None
+    fit(NormalNetworkModule(), draw, SCHEDULE, options, validation)
 
 
 if __name__ == "__main__":

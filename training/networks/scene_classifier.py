@@ -49,7 +49,7 @@ _SHARES = {
 _SMOOTHING = 0.02
 
 
-class Network(nn.Module):  # type: ignore[misc]
+class SceneClassifierModule(nn.Module):  # type: ignore[misc]
     """The trainable scene classifier.
 
     Parameters
@@ -108,7 +108,7 @@ class Network(nn.Module):  # type: ignore[misc]
 
 
 @dataclass(frozen=True)
-class Batches:
+class SceneBatches:
     """Draws batches.
 
     Attributes
@@ -165,10 +165,12 @@ def main() -> None:
     options = run_options(arguments)
     torch.manual_seed(options.seed)
     path = arguments.encoder
-    network = Network(LayerNetwork.shipped() if path is None else LayerNetwork.read(path))
+    network = SceneClassifierModule(
+        LayerNetwork.shipped() if path is None else LayerNetwork.read(path)
+    )
     training, held_out = split(objects, lambda one: one.family, options)
-    validation = Batches(held_out, options.batch) if held_out else None
-    fit(network, Batches(training, options.batch), SCHEDULE, options, validation)
+    validation = SceneBatches(held_out, options.batch) if held_out else None
+    fit(network, SceneBatches(training, options.batch), SCHEDULE, options, validation)
 
 
 if __name__ == "__main__":
